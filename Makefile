@@ -1,0 +1,40 @@
+# One target per habit. Each makes .venv first if it is missing or out of date.
+#
+#   PYTHON=python3.12   the interpreter to make .venv with; otherwise the first that is found to run
+#   TORCH_INDEX=URL     where Linux takes PyTorch from; empty for pip's own index, which has the CUDA build
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test lint clean
+
+PY := .venv/bin/python
+PYTHONS := $(or $(PYTHON),$(PY) python3 python3.13 python3.12 python3.11)
+IS_SUPPORTED := import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))
+
+help:
+	@echo 'make demo    watch the trained leg walk'
+	@echo 'make test    lint, types and tests'
+	@echo 'make lint    lint and types alone'
+	@echo 'make setup   make .venv and nothing more'
+	@echo 'make clean   remove .venv and the caches; runs/ stays'
+
+setup:
+	@for python in $(PYTHONS); do \
+	  if $$python -c '$(IS_SUPPORTED)' 2>/dev/null; then exec $$python scripts/setup_venv.py; fi; \
+	done; \
+	echo 'set-up stopped: no Python 3.11 to 3.13 here ($(PYTHONS)); name one: make PYTHON=/path/to/python' >&2; \
+	exit 1
+
+demo: setup
+	@$(PY) -m agents.demo
+
+test: lint
+	@echo 'pytest' && $(PY) -m pytest -q -n auto
+
+lint: setup
+	@echo 'ruff check' && $(PY) -m ruff check -q
+	@echo 'ruff format' && $(PY) -m ruff format -q --check
+	@echo 'mypy' && $(PY) -m mypy
+
+clean:
+	@rm -rf .venv dist build .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	@find . -name __pycache__ -type d -prune -exec rm -rf {} +
