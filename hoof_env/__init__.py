@@ -1,0 +1,1 @@
+from hoof_env._version import __version__

@@ -1,0 +1,67 @@
+"""What the leg hangs from: a trunk that is fixed, slides on a rail or is suspended by the rest of the animal."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hoof_env.errors import check_choice, check_number
+
+TRUNKS = ("fixed", "rail", "suspended")
+"""Kinds of trunk; the kernel takes the position in this tuple."""
+
+FIXED, RAIL, SUSPENDED = range(3)
+
+TRUNK = np.dtype(
+    [("kind", "i8")]
+    + [(name, "f8") for name in ("mass", "total_mass", "share", "stiffness", "damping", "height", "drag", "gravity")]
+)
+
+
+@dataclass(frozen=True)
+class Trunk:
+    """The trunk over one leg; O, the crank centre, is its point.
+
+    "fixed": O stays where it is. "rail": O slides along x at fixed height. "suspended": O moves along x and y; the leg
+    must bear `share` of the weight of trunk and leg, the rest of the animal carries the other part and adds a vertical
+    spring and damper towards `height`. The trunk does not pitch.
+
+    Attributes:
+        kind: one of `TRUNKS`.
+        mass: trunk mass that goes with this leg [kg], without the leg's own.
+        share: part of the weight that the leg must bear, 0 to 1; "suspended" only.
+        stiffness, damping: vertical spring [N/m] and damper [N s/m]; "suspended" only.
+        drag: resistance to forward motion [N s/m].
+        height: height of O above the ground [m] where the spring is at rest, or of the rail.
+
+    Raises:
+        ParameterError: an unknown kind or a value out of range.
+    """
+
+    kind: str = "suspended"
+    mass: float = 80.0
+    share: float = 0.8
+    stiffness: float = 4000.0
+    damping: float = 1130.0
+    drag: float = 20.0
+    height: float = 1.7
+
+    def __post_init__(self) -> None:
+        check_choice("trunk", self.kind, TRUNKS)
+        check_number("trunk_mass", self.mass, low=0, exclusive_low=True)
+        check_number("trunk_share", self.share, low=0, high=1)
+        check_number("trunk_stiffness", self.stiffness, low=0)
+        check_number("trunk_damping", self.damping, low=0)
+        check_number("trunk_drag", self.drag, low=0)
+        check_number("trunk_height", self.height, low=0, exclusive_low=True)
+
+    def to_record(self, leg_mass: float, gravity: float) -> Any:
+        """The settings as one record of dtype `TRUNK` for the kernels."""
+        record = np.zeros(1, dtype=TRUNK)[0]
+        record["kind"] = TRUNKS.index(self.kind)
+        for name in ("mass", "share", "stiffness", "damping", "height", "drag"):
+            record[name] = getattr(self, name)
+        record["total_mass"], record["gravity"] = self.mass + leg_mass, gravity
+        return record

@@ -1,0 +1,58 @@
+"""Errors raised at the border of the package: each names what was given and what was expected."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+
+class HoofEnvError(Exception):
+    """Base class of every error that this package raises on purpose."""
+
+
+class ParameterError(HoofEnvError, ValueError):
+    """A parameter has a wrong type, is not finite or lies outside its range."""
+
+
+class GeometryError(ParameterError):
+    """The linkage cannot be assembled or cannot turn through a full revolution."""
+
+
+class DataFileError(HoofEnvError, ValueError):
+    """A data, preset or model file is missing, unreadable or lacks what is expected of it."""
+
+
+class OutputError(HoofEnvError, OSError):
+    """An output or compile-cache folder cannot be written."""
+
+
+def check_number(
+    name: str,
+    value: Any,
+    *,
+    low: float = -np.inf,
+    high: float = np.inf,
+    exclusive_low: bool = False,
+) -> float:
+    """Return `value` as a float, or raise `ParameterError` unless it is finite and within [low, high]."""
+    bracket = "(" if exclusive_low else "["
+    bounds = f"a finite number in {bracket}{low:g}, {high:g}]"
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise ParameterError(f"{name}: expected {bounds}, got {value!r}") from None
+    if isinstance(value, (bool, str)) or not np.isfinite(number):
+        raise ParameterError(f"{name}: expected {bounds}, got {value!r}")
+    if number > high or number < low or (exclusive_low and number == low):
+        raise ParameterError(f"{name}: expected {bounds}, got {value!r}")
+    return number
+
+
+def check_choice(name: str, value: Any, choices: Iterable[str]) -> str:
+    """Return `value`, or raise `ParameterError` unless it is one of `choices`."""
+    known = sorted(choices)
+    if not isinstance(value, str) or value not in known:
+        raise ParameterError(f"{name}: expected one of {', '.join(known)}, got {value!r}")
+    return value

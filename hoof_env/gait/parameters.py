@@ -1,0 +1,93 @@
+"""Gait parameters: what a policy may ask of the leg, with units, limits and the paper's presets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoof_env.errors import DataFileError, ParameterError, check_choice, check_number
+from hoof_env.leg.geometry import read_preset
+
+LIMITS = MappingProxyType(
+    {
+        "crank_speed": (0.0, 4 * np.pi),
+        "swing_offset": (0.0, 1.4),
+        "swing_sin": (-0.8, 0.8),
+        "swing_cos": (-0.8, 0.8),
+    }
+)
+"""Lowest and highest value of each gait parameter [rad/s, rad, rad, rad]; both gaits of the paper lie inside, and
+the middle of the first is the paper's crank speed, 2 pi."""
+
+
+@dataclass(frozen=True)
+class GaitParameters:
+    """One steady gait: the crank turns at `crank_speed` and the leg's frame swings about the crank centre by
+
+        phi = swing_offset + swing_sin * sin(theta) + swing_cos * cos(theta),   theta the crank angle.
+
+    The paper says that running 'controls the leg orientation by swinging motion with respect to the body' and does
+    not print the law; one harmonic is this project's assumption.
+
+    Attributes:
+        crank_speed: theta's rate [rad/s], 0 to 4 pi.
+        swing_offset: phi0 [rad], 0 to 1.4.
+        swing_sin: A [rad], -0.8 to 0.8.
+        swing_cos: B [rad], -0.8 to 0.8.
+
+    Raises:
+        ParameterError: a value is not finite or outside `LIMITS`.
+    """
+
+    crank_speed: float
+    swing_offset: float
+    swing_sin: float
+    swing_cos: float
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            low, high = LIMITS[item.name]
+            object.__setattr__(self, item.name, check_number(item.name, getattr(self, item.name), low=low, high=high))
+
+    def to_array(self) -> NDArray[np.float64]:
+        """The four values in the order of the fields, shape (4,)."""
+        return np.array([getattr(self, item.name) for item in fields(self)])
+
+    @classmethod
+    def from_array(cls, values: Any) -> GaitParameters:
+        """Inverse of `to_array`."""
+        array = np.asarray(values, dtype=np.float64)
+        if array.shape != (4,):
+            raise ParameterError(f"gait parameters: expected 4 values {PARAMETERS}, got shape {array.shape}")
+        return cls(*array.tolist())
+
+
+PARAMETERS = tuple(item.name for item in fields(GaitParameters))
+"""Names of the gait parameters, in the order used by actions and filters."""
+
+
+def gait_names(preset: str | Path = "first_fit") -> list[str]:
+    """Names of the gaits in a preset."""
+    return sorted(read_preset(preset).get("gaits", {}))
+
+
+def load_gait(name: str, preset: str | Path = "first_fit") -> GaitParameters:
+    """A gait of a preset file.
+
+    Raises:
+        ParameterError: unknown preset or gait name, or a value outside its limits.
+        DataFileError: the file lacks the part.
+    """
+    gaits = read_preset(preset).get("gaits")
+    if not isinstance(gaits, dict) or not gaits:
+        raise DataFileError(f"preset {preset}: expected an object 'gaits' with at least one gait, got {gaits!r}")
+    check_choice("gait", name, gaits)
+    try:
+        return GaitParameters(**gaits[name])
+    except TypeError as error:
+        raise DataFileError(f"preset {preset}, gait {name!r}: expected {', '.join(PARAMETERS)}: {error}") from None

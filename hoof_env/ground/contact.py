@@ -1,0 +1,152 @@
+"""Which hoof point touches, since when, how fast it came in, and what the ground does to it (Eqs. 10-15)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoof_env._jit import kernel
+from hoof_env.errors import ParameterError, check_choice, check_number
+from hoof_env.ground.friction import FRICTION_LAWS, friction_force
+from hoof_env.ground.normal_force import NORMAL_LAWS, damping, normal_force
+
+CONTACT = np.dtype(
+    [
+        ("penetration", "f8"),  # [m], negative above the ground (Eq. 10)
+        ("rate", "f8"),  # [m/s], positive while going in (Eq. 12)
+        ("approach", "f8"),  # [m/s], rate at touch-down, kept until the point leaves; 0 outside
+        ("normal", "f8"),  # [N], upward on the hoof (Eq. 14)
+        ("friction", "f8"),  # [N], along x on the hoof (Eq. 15)
+        ("x", "f8"),  # [m], where the point is
+        ("vx", "f8"),  # [m/s], how fast it slides (Eq. 13)
+        ("inside", "b1"),
+    ]
+)
+"""State of one hoof point; contacts are arrays of two, toe first."""
+
+TOE, HEEL = 0, 1
+
+GROUND = np.dtype(
+    [
+        ("stiffness", "f8"),
+        ("exponent", "f8"),
+        ("chi", "f8"),
+        ("dashpot", "f8"),
+        ("approach_floor", "f8"),
+        ("friction", "f8"),
+        ("friction_slow", "f8"),
+        ("friction_fast", "f8"),
+        ("friction_law", "i8"),
+        ("interpolated", "b1"),
+    ]
+)
+
+
+@dataclass(frozen=True)
+class Ground:
+    """Flat ground at y = 0 with one normal law and one friction law.
+
+    Attributes:
+        stiffness: K [N/m^n]; the paper's 2e4 ('no smaller than').
+        exponent: n [-]; 1.5 is Hertz's and Lankarani-Nikravesh's, the paper does not print it.
+        normal_law: one of `NORMAL_LAWS`.
+        restitution: nominal coefficient of restitution cr, 0 ('inelastic') to 1 ('elastic').
+        approach_floor: smallest approach speed [m/s] that Eq. 14 divides by.
+        approach: "interpolated" takes the approach speed at the interpolated crossing, "sampled" at the first sample
+            inside, as a loop with a fixed step does.
+        friction_law: one of `FRICTION_LAWS`.
+        friction: mu_k [-]; the paper's 0.4.
+        friction_slow, friction_fast: threshold speeds of the friction law [m/s], assumed (not in the paper).
+        reference_mass: used by "kelvin-voigt" only [kg].
+
+    Raises:
+        ParameterError: an unknown law or a value out of range.
+    """
+
+    stiffness: float = 2e4
+    exponent: float = 1.5
+    normal_law: str = "lankarani-nikravesh"
+    restitution: float = 1.0
+    approach_floor: float = 1e-4
+    approach: str = "interpolated"
+    friction_law: str = "ambrosio"
+    friction: float = 0.4
+    friction_slow: float = 1e-3
+    friction_fast: float = 1e-2
+    reference_mass: float = 80.0
+
+    def __post_init__(self) -> None:
+        check_number("stiffness", self.stiffness, low=0, exclusive_low=True)
+        check_number("exponent", self.exponent, low=1, high=3)
+        check_choice("normal_law", self.normal_law, NORMAL_LAWS)
+        check_number("approach_floor", self.approach_floor, low=0, exclusive_low=True)
+        check_choice("approach", self.approach, ("interpolated", "sampled"))
+        check_choice("friction_law", self.friction_law, FRICTION_LAWS)
+        check_number("friction", self.friction, low=0, high=10)
+        check_number("friction_slow", self.friction_slow, low=0)
+        check_number("friction_fast", self.friction_fast, low=0, exclusive_low=True)
+        check_number("reference_mass", self.reference_mass, low=0, exclusive_low=True)
+        if self.friction_fast <= self.friction_slow:
+            raise ParameterError(
+                f"friction_fast: expected more than friction_slow = {self.friction_slow:g} m/s, got {self.friction_fast:g}"
+            )
+        damping(self.normal_law, self.restitution, self.stiffness, self.reference_mass)
+
+    def to_record(self) -> Any:
+        """The settings as one record of dtype `GROUND` for the kernels."""
+        chi, dashpot = damping(self.normal_law, self.restitution, self.stiffness, self.reference_mass)
+        record = np.zeros(1, dtype=GROUND)[0]
+        for name in ("stiffness", "exponent", "approach_floor", "friction", "friction_slow", "friction_fast"):
+            record[name] = getattr(self, name)
+        record["chi"], record["dashpot"] = chi, dashpot
+        record["friction_law"] = FRICTION_LAWS.index(self.friction_law)
+        record["interpolated"] = self.approach == "interpolated"
+        return record
+
+
+def new_contacts() -> NDArray[np.void]:
+    """Toe and heel above the ground, shape (2,) of dtype `CONTACT`."""
+    return np.zeros(2, dtype=CONTACT)
+
+
+@kernel
+def latch(contact, penetration, rate, ground):  # type: ignore[no-untyped-def]
+    """Update penetration and rate of a point; on entering the ground, latch its approach speed (floored)."""
+    if penetration > 0.0 and not contact.inside:
+        speed = rate
+        if ground.interpolated and contact.penetration < 0.0:
+            part = contact.penetration / (contact.penetration - penetration)  # of the step, up to the crossing
+            speed = contact.rate + part * (rate - contact.rate)
+        contact.approach = max(speed, ground.approach_floor)
+    contact.inside = penetration > 0.0
+    if not contact.inside:
+        contact.approach = 0.0
+    contact.penetration = penetration
+    contact.rate = rate
+
+
+@kernel
+def touch(contact, position, velocity, ground):  # type: ignore[no-untyped-def]
+    """Force of the ground on one hoof point, as the complex number friction + i normal [N].
+
+    Args:
+        contact: record of dtype `CONTACT`, updated.
+        position, velocity: of the point, complex [m, m/s]; the ground is y = 0.
+        ground: record of dtype `GROUND`.
+    """
+    latch(contact, -position.imag, -velocity.imag, ground)
+    contact.x = position.real
+    contact.vx = velocity.real
+    contact.normal = 0.0
+    contact.friction = 0.0
+    if contact.inside:
+        contact.normal = normal_force(
+            contact.penetration, contact.rate, contact.approach, ground.stiffness, ground.exponent, ground.chi, ground.dashpot
+        )  # fmt: skip
+        contact.friction = friction_force(
+            contact.vx, contact.normal, ground.friction_law, ground.friction, ground.friction_slow, ground.friction_fast
+        )
+    return complex(contact.friction, contact.normal)

@@ -1,0 +1,146 @@
+"""Normal contact laws: how hard the ground pushes back.
+
+Every law is one expression, F = K d^n (1 + chi v / v0) + c v with penetration d, penetration rate v and approach
+speed v0 latched at touch-down; the laws differ in the damping factor chi as a function of the coefficient of
+restitution cr (and Kelvin-Voigt in using a dashpot c instead). Eq. 14 of the paper is Lankarani and Nikravesh's.
+
+For a free impact of a mass, any K and n, a factor chi returns the restitution e that solves
+chi (1 + e) = ln[(1 + chi) / (1 - chi e)]; only "exact" returns cr itself. Lankarani and Nikravesh's law at cr = 0 bounces
+with e = 0.66. Sources: Lankarani & Nikravesh 1990 (J Mech Des 112:369), Hunt & Crossley 1975 (J Appl Mech 42:440),
+Flores et al. 2011 (Multibody Syst Dyn 25:357), Gonthier et al. 2004 (Multibody Syst Dyn 11:209), Hu & Guo 2015,
+Skrinjar et al. 2018 (Int J Mech Sci 145:171, a review); Schwager & Poeschel 2007 (Granular Matter 9:465) for the
+spring-dashpot that may not pull.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from hoof_env._jit import kernel
+from hoof_env.errors import ParameterError, check_choice, check_number
+
+
+def lankarani_nikravesh(cr: float) -> float:
+    """Damping factor chi = 3 (1 - cr^2) / 4 [-], Eq. 14."""
+    return 3 * (1 - cr**2) / 4
+
+
+def hunt_crossley(cr: float) -> float:
+    """Damping factor chi = 3 (1 - cr) / 2 [-]."""
+    return 3 * (1 - cr) / 2
+
+
+def flores(cr: float) -> float:
+    """Damping factor chi = 8 (1 - cr) / (5 cr) [-]."""
+    return 8 * (1 - cr) / (5 * cr)
+
+
+def gonthier(cr: float) -> float:
+    """Damping factor chi = (1 - cr^2) / cr [-]."""
+    return (1 - cr**2) / cr
+
+
+def hu_guo(cr: float) -> float:
+    """Damping factor chi = 3 (1 - cr) / (2 cr) [-]."""
+    return 3 * (1 - cr) / (2 * cr)
+
+
+def exact(cr: float) -> float:
+    """Damping factor [-] for which a free impact returns exactly cr."""
+    if cr == 1.0:
+        return 0.0
+    return _bisect(lambda chi: restitution_of_factor(chi) - cr, 1e-12, 1e6)
+
+
+FACTORS: dict[str, Callable[[float], float]] = {
+    "lankarani-nikravesh": lankarani_nikravesh,
+    "hunt-crossley": hunt_crossley,
+    "flores": flores,
+    "gonthier": gonthier,
+    "hu-guo": hu_guo,
+    "exact": exact,
+}
+NORMAL_LAWS = (*FACTORS, "kelvin-voigt")
+"""Names of the normal laws."""
+
+SMALLEST_RESTITUTION = 0.01
+"""Below this the damping of every law but the first two grows without bound [-]."""
+
+
+def damping(law: str, restitution: float, stiffness: float, reference_mass: float) -> tuple[float, float]:
+    """Damping factor chi [-] and dashpot coefficient c [N s/m] of a law.
+
+    Args:
+        law: one of `NORMAL_LAWS`.
+        restitution: nominal coefficient of restitution, 0 to 1.
+        stiffness: K [N/m^n]; used by "kelvin-voigt" only.
+        reference_mass: mass [kg] for which "kelvin-voigt" with exponent 1 returns `restitution`; a linear dashpot has
+            one restitution for each mass.
+
+    Raises:
+        ParameterError: unknown law, or a restitution that the law cannot represent.
+    """
+    check_choice("normal_law", law, NORMAL_LAWS)
+    cr = check_number("restitution", restitution, low=0, high=1)
+    if law not in ("lankarani-nikravesh", "hunt-crossley") and cr < SMALLEST_RESTITUTION:
+        raise ParameterError(
+            f"restitution: expected a number in [{SMALLEST_RESTITUTION}, 1] for {law!r}, whose damping grows without "
+            f"bound towards 0, got {restitution!r}"
+        )
+    if law == "kelvin-voigt":
+        return 0.0, 2 * kelvin_voigt_damping_ratio(cr) * math.sqrt(stiffness * reference_mass)
+    return FACTORS[law](cr), 0.0
+
+
+def restitution_of_factor(chi: float) -> float:
+    """Restitution e [-] that a free impact returns under damping factor chi: chi (1 + e) = ln[(1 + chi) / (1 - chi e)]."""
+    if chi <= 1e-9:
+        return 1.0
+    return _bisect(lambda e: math.log1p(chi) - math.log1p(-chi * e) - chi * (1 + e), 0.0, min(1.0, (1 - 1e-15) / chi))
+
+
+def restitution_of_damping_ratio(zeta: float) -> float:
+    """Restitution [-] of a linear spring-dashpot that may not pull, for damping ratio zeta."""
+    if zeta < 1.0:
+        w = math.sqrt(1 - zeta**2)
+        return math.exp(-zeta / w * (math.pi - math.atan2(2 * zeta * w, 1 - 2 * zeta**2)))
+    if zeta == 1.0:
+        return math.exp(-2.0)
+    w = math.sqrt(zeta**2 - 1)
+    return math.exp(-zeta / w * math.log((zeta + w) / (zeta - w)))
+
+
+def kelvin_voigt_damping_ratio(cr: float) -> float:
+    """Damping ratio [-] for which `restitution_of_damping_ratio` is cr."""
+    return 0.0 if cr == 1.0 else _bisect(lambda zeta: restitution_of_damping_ratio(zeta) - cr, 0.0, 100.0)
+
+
+def _bisect(f: Callable[[float], float], low: float, high: float) -> float:
+    """Root of a function that changes sign once on [low, high], to the last bit."""
+    sign = f(low) > 0
+    while True:
+        middle = (low + high) / 2
+        if middle in (low, high):
+            return middle
+        if (f(middle) > 0) == sign:
+            low = middle
+        else:
+            high = middle
+
+
+@kernel
+def normal_force(penetration, rate, approach, stiffness, exponent, chi, dashpot):  # type: ignore[no-untyped-def]
+    """Normal force [N] on a point inside the ground; never negative, zero outside.
+
+    Eq. 14: F = K d^n (1 + chi v / v0), plus c v for Kelvin-Voigt. The ground does not pull.
+
+    Args:
+        penetration, rate, approach: d [m], its rate v [m/s] and v at touch-down v0 [m/s] (> 0).
+        stiffness, exponent: K [N/m^n], n [-].
+        chi, dashpot: see `damping`.
+    """
+    if penetration <= 0.0:
+        return 0.0
+    force = stiffness * penetration**exponent * (1.0 + chi * rate / approach) + dashpot * rate
+    return max(force, 0.0)

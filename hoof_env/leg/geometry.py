@@ -1,0 +1,294 @@
+"""What a leg is: its lengths, pivot, assembly, masses and how it stands in the world.
+
+A `Geometry` is a frozen value; building one checks it. A leg that cannot turn through a full crank revolution is
+refused with the dyad, the crank angle and the missing length. Presets are JSON files with a provenance line in
+`hoof_env/data`; the default, `first_fit`, is *identified* from the paper's results (the paper prints no lengths).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from importlib import resources
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoof_env.errors import DataFileError, GeometryError, ParameterError, check_choice, check_number
+from hoof_env.leg.linkage import BODIES, BODY_LENGTHS, CONSTRUCTION, DYADS, LENGTHS, POINTS, Dyad
+
+INERTIA_RULES = ("uniform_rod", "paper")
+
+LINEAR_DENSITY = 1.0
+"""Default mass per length of a link [kg/m]. The paper prints no masses. One kilogram a metre gives the identified
+leg 7.3 kg, 9 % of the default trunk; on a fixed trunk masses change torques and reactions only, never motion or
+ground force."""
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """A leg of the paper's mechanism, in the frame of the leg: O at the origin, crank turning clockwise.
+
+    Attributes:
+        lengths: the 15 lengths named in `linkage.LENGTHS` [m].
+        pivot: position of the fixed pivot C relative to the crank centre O [m].
+        assembly: for each dyad's point, +1 if it lies left of the line between its two centres, else -1.
+        toe, heel: which of the hoof corners "I" and "J" is which.
+        travel: +1 if the leg travels towards +x of its own frame, -1 if towards -x. The world's x always points
+            forward; the mirror is applied where the leg is placed in the world and nowhere else.
+        hip_height: height of O above the ground in the paper's set-up [m], one level for both gaits.
+        linear_density: mass per length of every link [kg/m], unless `masses` is given.
+        masses: 14 link masses [kg], or None for `linear_density` times length.
+        inertia: "uniform_rod" (J = m L^2 / 3 with half-length L) or "paper" (the printed J = 2 l / 3 with
+            half-length l, in kg m^2 though its units do not match; it needs no mass).
+        name, provenance: where the numbers come from.
+
+    Raises:
+        ParameterError: a value is missing, unknown, not finite or out of range.
+        GeometryError: the linkage cannot be assembled at some crank angle.
+    """
+
+    lengths: Mapping[str, float]
+    pivot: tuple[float, float]
+    assembly: Mapping[str, int]
+    toe: str
+    heel: str
+    travel: int
+    hip_height: float
+    linear_density: float = LINEAR_DENSITY
+    masses: tuple[float, ...] | None = None
+    inertia: str = "uniform_rod"
+    name: str = "custom"
+    provenance: str = field(default="", compare=False)
+
+    def __post_init__(self) -> None:
+        _check_keys("lengths", self.lengths, LENGTHS)
+        lengths = {k: check_number(f"lengths[{k!r}]", self.lengths[k], low=0, exclusive_low=True) for k in LENGTHS}
+        points = [dyad.point for dyad in DYADS]
+        _check_keys("assembly", self.assembly, points)
+        for point in points:
+            if self.assembly[point] not in (1, -1):
+                raise ParameterError(f"assembly[{point!r}]: expected +1 or -1, got {self.assembly[point]!r}")
+        if {self.toe, self.heel} != {"I", "J"}:
+            raise ParameterError(f"toe and heel: expected I and J, one each, got {self.toe!r} and {self.heel!r}")
+        if self.travel not in (1, -1):
+            raise ParameterError(f"travel: expected +1 or -1, got {self.travel!r}")
+        if len(self.pivot) != 2:
+            raise ParameterError(f"pivot: expected two numbers (C_x, C_y) in metres, got {self.pivot!r}")
+        pivot = tuple(check_number(f"pivot[{i}]", c) for i, c in enumerate(self.pivot))
+        check_number("hip_height", self.hip_height, low=0, exclusive_low=True)
+        check_number("linear_density", self.linear_density, low=0, exclusive_low=True)
+        check_choice("inertia", self.inertia, INERTIA_RULES)
+        if self.masses is not None:
+            if len(self.masses) != len(BODIES):
+                raise ParameterError(f"masses: expected {len(BODIES)} link masses, got {len(self.masses)}")
+            masses = tuple(
+                check_number(f"masses[{i}]", m, low=0, exclusive_low=True) for i, m in enumerate(self.masses)
+            )
+            object.__setattr__(self, "masses", masses)
+        object.__setattr__(self, "lengths", MappingProxyType(lengths))
+        object.__setattr__(self, "pivot", pivot)
+        object.__setattr__(self, "assembly", MappingProxyType({p: int(self.assembly[p]) for p in points}))
+        check_full_revolution(self)
+
+    def __hash__(self) -> int:
+        return hash((tuple(self.lengths.items()), self.pivot, tuple(self.assembly.items()), self.name))
+
+    def __reduce__(self) -> tuple[Any, ...]:  # mapping proxies do not pickle
+        return (_from_dict, (self.to_dict(),))
+
+    @property
+    def body_lengths(self) -> NDArray[np.float64]:
+        """Length of each of the 14 bodies [m], shape (14,)."""
+        return np.array([self.lengths[name] for name in BODY_LENGTHS])
+
+    @property
+    def body_masses(self) -> NDArray[np.float64]:
+        """Mass of each of the 14 bodies [kg], shape (14,)."""
+        return self.linear_density * self.body_lengths if self.masses is None else np.array(self.masses)
+
+    @property
+    def body_inertias(self) -> NDArray[np.float64]:
+        """Moment of inertia of each body about its centre [kg m^2], shape (14,)."""
+        half = self.body_lengths / 2
+        return 2 * half / 3 if self.inertia == "paper" else self.body_masses * half**2 / 3
+
+    @property
+    def mass(self) -> float:
+        """Mass of the whole leg [kg]."""
+        return float(self.body_masses.sum())
+
+    @cached_property
+    def transmission_margin(self) -> float:
+        """Smallest |sine| of the angle between a dyad's two links over a revolution (0: a dead point) [-]."""
+        return min(float(np.min(s)) for s in _dyad_sines(self, np.linspace(0, 2 * np.pi, 3600)).values())
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything that `from_dict` needs, JSON-serialisable."""
+        return {
+            "lengths": dict(self.lengths),
+            "pivot": list(self.pivot),
+            "assembly": dict(self.assembly),
+            "toe": self.toe,
+            "heel": self.heel,
+            "travel": self.travel,
+            "hip_height": self.hip_height,
+            "linear_density": self.linear_density,
+            "masses": None if self.masses is None else list(self.masses),
+            "inertia": self.inertia,
+            "name": self.name,
+            "provenance": self.provenance,
+        }
+
+    def replace(self, **changes: Any) -> Geometry:
+        """A copy with some attributes changed; `lengths` and `assembly` may be partial mappings."""
+        for name in ("lengths", "assembly"):
+            if name in changes:
+                changes[name] = {**getattr(self, name), **changes[name]}
+        return replace(self, **changes)
+
+
+def _check_keys(what: str, given: Any, expected: Any) -> None:
+    if not isinstance(given, Mapping):
+        raise ParameterError(f"{what}: expected a mapping with {', '.join(expected)}, got {given!r}")
+    missing, unknown = set(expected) - set(given), set(given) - set(expected)
+    if missing or unknown:
+        parts = [f"missing {', '.join(sorted(missing))}"] if missing else []
+        parts += [f"unknown {', '.join(sorted(map(str, unknown)))}"] if unknown else []
+        raise ParameterError(f"{what}: expected exactly {', '.join(expected)}; {'; '.join(parts)}")
+
+
+def _from_dict(data: Mapping[str, Any]) -> Geometry:
+    values = dict(data)
+    values["pivot"] = tuple(values["pivot"])
+    if values.get("masses") is not None:
+        values["masses"] = tuple(values["masses"])
+    return Geometry(**values)
+
+
+def _solve(geometry: Geometry, theta: NDArray[np.float64]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Points and, per dyad, (d, r1, r2) at crank angles `theta`; NaN past the first dyad that does not close."""
+    lengths = geometry.lengths
+    z: dict[str, Any] = {"O": 0j * theta, "C": complex(*geometry.pivot) + 0j * theta}
+    z["P"] = lengths["OP"] * np.exp(-1j * theta)
+    spans = {}
+    with np.errstate(invalid="ignore", divide="ignore"):
+        for step in CONSTRUCTION:
+            a, b = z[step.first], z[step.second]
+            if isinstance(step, Dyad):
+                r1, r2 = lengths[step.from_first], lengths[step.from_second]
+                d2 = np.abs(b - a) ** 2
+                u = (r1**2 - r2**2 + d2) / (2 * d2)
+                w = geometry.assembly[step.point] * np.sqrt(r1**2 / d2 - u**2)
+                z[step.point] = a + (b - a) * (u + 1j * w)
+                spans[step.point] = (np.sqrt(d2), r1, r2)
+            else:
+                z[step.point] = z[step.origin] + (b - a) * (lengths[step.distance] / lengths[step.span])
+    return z, spans
+
+
+def _dyad_sines(geometry: Geometry, theta: NDArray[np.float64]) -> dict[str, Any]:
+    z, _ = _solve(geometry, theta)
+    sines = {}
+    for dyad in DYADS:
+        one, two = z[dyad.point] - z[dyad.first], z[dyad.point] - z[dyad.second]
+        sines[dyad.point] = np.abs((np.conj(one) * two).imag) / (np.abs(one) * np.abs(two))
+    return sines
+
+
+def check_full_revolution(geometry: Geometry, samples: int = 3600) -> None:
+    """Raise `GeometryError` unless every dyad closes at every crank angle.
+
+    The distance between a dyad's centres must stay strictly between the difference and the sum of its two
+    lengths. A grid of `samples` angles is refined three times around the tightest one.
+    """
+    step = 2 * np.pi / samples
+    for index, dyad in enumerate(DYADS):
+        theta = np.arange(samples) * step
+        for _ in range(4):
+            _, spans = _solve(geometry, theta)
+            d, r1, r2 = spans[dyad.point]
+            margins = np.stack([r1 + r2 - d, d - abs(r1 - r2)])
+            which, where = np.unravel_index(np.argmin(margins), margins.shape)
+            miss, angle = -margins[which, where], float(theta[where])
+            if miss >= 0:
+                break
+            theta = angle + np.linspace(-1, 1, 201) * (theta[1] - theta[0])
+        if miss >= 0:
+            reach = "too far apart by" if which == 0 else "too close by"
+            raise GeometryError(
+                f"dyad {index + 1} ({dyad.first}-{dyad.point}-{dyad.second}, lengths {r1:.6g} and {r2:.6g} m) does not "
+                f"close at crank angle {np.degrees(angle) % 360:.2f} deg: its centres, {float(d[where]):.6g} m apart, "
+                f"are {reach} {miss:.3g} m; expected a leg that turns through a full revolution"
+            )
+
+
+def preset_names() -> list[str]:
+    """Names accepted by `load_geometry`."""
+    files = resources.files("hoof_env").joinpath("data").iterdir()
+    return sorted(f.name.removesuffix(".json") for f in files if f.name.endswith(".json"))
+
+
+def read_preset(source: str | Path) -> dict[str, Any]:
+    """The JSON content of a preset by name, or of a file by path (ends in .json).
+
+    Raises:
+        ParameterError: unknown preset name.
+        DataFileError: the file is missing or is not a JSON object.
+    """
+    if isinstance(source, Path) or str(source).endswith(".json"):
+        path: Any = Path(source)
+    else:
+        check_choice("preset", source, preset_names())
+        path = resources.files("hoof_env").joinpath("data", f"{source}.json")
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise DataFileError(f"cannot read {path}: {error.strerror or error}") from None
+    except ValueError as error:
+        raise DataFileError(f"{path}: expected a JSON preset file, but it does not parse: {error}") from None
+    if not isinstance(data, dict):
+        raise DataFileError(f"{path}: expected a JSON object with 'geometry' and 'gaits', got {type(data).__name__}")
+    return data
+
+
+def load_geometry(source: str | Path = "first_fit") -> Geometry:
+    """The geometry of a preset (by name) or of a preset file (by path).
+
+    Raises:
+        ParameterError: unknown preset name, or a value out of range.
+        DataFileError: the file is unreadable or lacks a part.
+        GeometryError: the leg in the file cannot turn.
+    """
+    data = read_preset(source)
+    try:
+        values = {"name": str(source), "provenance": data["provenance"], **data["geometry"]}
+        return _from_dict(values)
+    except (KeyError, TypeError) as error:
+        raise DataFileError(f"preset {source}: its 'geometry' is incomplete or has unknown entries: {error}") from None
+
+
+def tables(geometry: Geometry) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """The construction of this leg as arrays for the kernels.
+
+    Returns:
+        steps: shape (8, 5), rows (is_dyad, point, first, second, origin) as indices into `linkage.POINTS`.
+        values: shape (8, 3), rows (r1, r2, side) for a dyad, (distance / span, 0, 0) for an extension.
+    """
+    number = {name: i for i, name in enumerate(POINTS)}
+    lengths = geometry.lengths
+    steps, values = [], []
+    for step in CONSTRUCTION:
+        first, second = number[step.first], number[step.second]
+        if isinstance(step, Dyad):
+            steps.append((1, number[step.point], first, second, first))
+            values.append((lengths[step.from_first], lengths[step.from_second], float(geometry.assembly[step.point])))
+        else:
+            steps.append((0, number[step.point], first, second, number[step.origin]))
+            values.append((lengths[step.distance] / lengths[step.span], 0.0, 0.0))
+    return np.array(steps, dtype=np.int64), np.array(values)
