@@ -1,1 +1,55 @@
+"""hoof-env: a Gymnasium environment for learned gait control of a horse's leg.
+
+Importing the package registers its environments and nothing more: numba, pygame and the rest load when needed.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium as _gym
+
 from hoof_env._version import __version__
+
+_PUBLIC = {
+    "Geometry": "hoof_env.leg.geometry",
+    "load_geometry": "hoof_env.leg.geometry",
+    "GaitParameters": "hoof_env.gait.parameters",
+    "load_gait": "hoof_env.gait.parameters",
+    "Ground": "hoof_env.ground.contact",
+    "Trunk": "hoof_env.dynamics.trunk",
+    "LegEngine": "hoof_env.dynamics.engine",
+    "ConstrainedLeg": "hoof_env.dynamics.constrained",
+    "HorseLegEnv": "hoof_env.envs.horse_leg",
+    "HorseLegFixedEnv": "hoof_env.envs.horse_leg_fixed",
+    "make_policy": "hoof_env.envs.policies",
+    "HoofEnvError": "hoof_env.errors",
+    "ParameterError": "hoof_env.errors",
+    "GeometryError": "hoof_env.errors",
+    "DataFileError": "hoof_env.errors",
+    "OutputError": "hoof_env.errors",
+}
+
+__all__ = ["__version__", *_PUBLIC]
+
+_ENTRY_POINTS = {
+    "hoof_env/HorseLeg-v0": "hoof_env.envs.horse_leg:HorseLegEnv",
+    "hoof_env/HorseLegFixed-v0": "hoof_env.envs.horse_leg_fixed:HorseLegFixedEnv",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name in _PUBLIC:
+        from importlib import import_module
+
+        return getattr(import_module(_PUBLIC[name]), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)
+
+
+for _id, _entry in _ENTRY_POINTS.items():
+    if _id not in _gym.registry:
+        _gym.register(id=_id, entry_point=_entry)

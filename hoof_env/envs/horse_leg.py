@@ -1,0 +1,287 @@
+"""`hoof_env/HorseLeg-v0`: a horse's leg that must carry and move its trunk. The class docstring is the manual page."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from hoof_env.dynamics.engine import GRAVITY, LegEngine
+from hoof_env.dynamics.result import Result
+from hoof_env.dynamics.trace import new_trace
+from hoof_env.dynamics.trunk import TRUNKS, Trunk
+from hoof_env.envs import reward
+from hoof_env.envs.observation import HALF_RANGE, MIDDLE, layout, observe
+from hoof_env.envs.stance import new_account, summarize, take_account
+from hoof_env.errors import ParameterError, check_choice, check_number
+from hoof_env.gait.motion_law import FilterSettings
+from hoof_env.gait.parameters import GaitParameters, gait_names, load_gait
+from hoof_env.ground.contact import Ground
+from hoof_env.leg.geometry import load_geometry
+from hoof_env.leg.kinematics import FrameMotion, pose
+
+RENDER_MODES = ("human", "rgb_array")
+LOWEST, HIGHEST = 0.6, 2.0
+"""Heights of the trunk at which an episode fails, as parts of its nominal height."""
+
+
+class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
+    """DOCSTRING"""
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": list(RENDER_MODES), "render_fps": 50}  # type: ignore[misc]
+
+    def __init__(
+        self,
+        *,
+        preset: str = "first_fit",
+        trunk: str = "suspended",
+        hip_height: float | None = None,
+        trunk_mass: float = 80.0,
+        trunk_share: float = 0.8,
+        trunk_stiffness: float = 4000.0,
+        trunk_damping: float = 1130.0,
+        trunk_drag: float = 20.0,
+        stiffness: float = 2e4,
+        exponent: float = 1.5,
+        normal_law: str = "lankarani-nikravesh",
+        restitution: float = 0.5,
+        approach_floor: float = 0.1,
+        friction_law: str = "ambrosio",
+        friction: float = 0.4,
+        friction_slow: float = 1e-3,
+        friction_fast: float = 5e-2,
+        sim_dt: float = 1e-3,
+        dt: float = 0.02,
+        episode_seconds: float = 10.0,
+        reward_weights: Mapping[str, float] | None = None,
+        render_mode: str | None = None,
+    ) -> None:
+        if render_mode is not None:
+            check_choice("render_mode", render_mode, RENDER_MODES)
+        check_choice("trunk", trunk, TRUNKS)
+        self.preset, self.geometry = preset, load_geometry(preset)
+        self.gaits = {name: load_gait(name, preset) for name in gait_names(preset)}
+        self.weights = reward.RewardWeights.of(reward_weights)
+        self.episode_seconds = check_number("episode_seconds", episode_seconds, low=0, exclusive_low=True)
+        self.substeps = _substeps(dt, sim_dt)
+        self.sim_dt, self.dt = sim_dt, sim_dt * self.substeps
+        self._steps_per_episode = max(1, round(episode_seconds / self.dt))
+        height = self.geometry.hip_height if hip_height is None else hip_height
+        self.filters = FilterSettings()
+        self.engine = self._build_engine(
+            Trunk(trunk, trunk_mass, trunk_share, trunk_stiffness, trunk_damping, trunk_drag, height),
+            Ground(
+                stiffness, exponent, normal_law, restitution, approach_floor, "interpolated",
+                friction_law, friction, friction_slow, friction_fast, trunk_mass,
+            ),
+        )  # fmt: skip
+        self.weight = (trunk_mass + self.geometry.mass) * GRAVITY
+        self._rate_bounds = self.filters.to_array()[:, 1]
+
+        self.observation_names = layout(trunk)
+        self.observation_space = spaces.Box(-1.0, 1.0, (len(self.observation_names),), np.float32)
+        self.action_space = spaces.Box(-1.0, 1.0, (4,), np.float32)
+        self.render_mode = render_mode
+        self.metadata = {**type(self).metadata, "render_fps": round(1 / self.dt)}  # type: ignore[misc]
+        self._renderer: Any = None
+        self._action: NDArray[np.float32] = np.zeros(4, np.float32)
+        self._account = new_account()
+        self._step_count = 0
+        self.trace = new_trace(1)
+
+    def _build_engine(self, trunk: Trunk, ground: Ground) -> Any:
+        return LegEngine(self.geometry, trunk, ground, self.sim_dt, self.filters)
+
+    # -- actions ---------------------------------------------------------------------------------------------------
+
+    def command_of(self, action: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Gait parameters that an action commands, shape (4,); the action is clipped to [-1, 1]."""
+        return MIDDLE + HALF_RANGE * np.clip(action.astype(np.float64), -1.0, 1.0)
+
+    def action_for(self, gait: GaitParameters) -> NDArray[np.float32]:
+        """The action that commands the given gait, to float32 precision."""
+        return np.clip((gait.to_array() - MIDDLE) / HALF_RANGE, -1, 1).astype(np.float32)
+
+    # -- gymnasium -------------------------------------------------------------------------------------------------
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Start an episode; see 'Starting state' in the class docstring for the options."""
+        super().reset(seed=seed)
+        gait, theta, speed, height = self._start(_check_options(options))
+        self.trace = self.engine.reset(gait, theta=theta, height=height, speed=speed)
+        self._action = self.action_for(gait)
+        self._account = new_account()
+        self._step_count = 0
+        if self.render_mode is not None:
+            self._get_renderer().reset()
+            self._renderer.add(self.trace)
+            if self.render_mode == "human":
+                self.render()
+        info = {"crank_angle": theta, "speed": speed, "height": height, **_as_info(gait)}
+        return self._observe(), info
+
+    def step(
+        self, action: NDArray[np.float32]
+    ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+        """Command the gait parameters for `dt`; see the class docstring."""
+        previous, self._action = self._action, self._check_action(action)
+        result = self._advance()
+        failed = result is not Result.OK or self._fallen()
+        terms = self._reward_terms(previous, failed)
+        self._step_count += 1
+        truncated = not failed and self._step_count >= self._steps_per_episode
+        info: dict[str, Any] = dict(terms)
+        if failed or truncated:
+            info["episode_summary"] = summarize(self._account, self.weight, failed)
+        if failed:
+            info["failure"] = result.message if result is not Result.OK else "the trunk left its range of heights"
+        if self.render_mode is not None:
+            self._get_renderer().add(self.trace)
+            if self.render_mode == "human":
+                self.render()
+        return self._observe(), sum(terms.values()), failed, truncated, info
+
+    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+        """Draw the present state: an (H, W, 3) uint8 array for "rgb_array", a window for "human"."""
+        if self.render_mode is None:
+            gym.logger.warn("render() was called without a render_mode: pass render_mode='rgb_array' or 'human'")
+            return None
+        frame: NDArray[np.uint8] | None = self._get_renderer().frame()
+        return frame
+
+    def close(self) -> None:
+        """Close the window, if any."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+    # -- parts of a step -------------------------------------------------------------------------------------------
+
+    def _check_action(self, action: Any) -> NDArray[np.float32]:
+        array = np.array(action, dtype=np.float32)
+        if array.shape != (4,) or not np.isfinite(array).all():
+            raise ParameterError(f"action: expected 4 finite numbers in [-1, 1], got {action!r}")
+        return np.clip(array, -1.0, 1.0)
+
+    def _advance(self) -> Result:
+        start_x = float(self.trace[-1]["trunk_x"])
+        trace = new_trace(self.substeps)
+        result: Result = self.engine.advance(self.command_of(self._action), trace)
+        if result is Result.OK:
+            self.trace = trace
+            take_account(self._account, trace, self.sim_dt, start_x, self.engine.trunk.kind == "fixed")
+        return result
+
+    def _fallen(self) -> bool:
+        height = self.engine.trunk.height
+        return not LOWEST * height < self.trace[-1]["trunk_y"] < HIGHEST * height
+
+    def _reward_terms(self, previous: NDArray[np.float32], failed: bool) -> dict[str, float]:
+        weights, account = self.weights, self._account
+        return {
+            "reward_progress": reward.progress(weights, account),
+            "reward_peak": reward.peak(weights, account),
+            "reward_energy": reward.energy(weights, account),
+            "reward_action": reward.action_change(weights, self._action, previous),
+            "reward_failure": reward.failure(weights, failed, self.episode_seconds),
+        }
+
+    def _observe(self) -> NDArray[np.float32]:
+        trunk = self.engine.trunk
+        return observe(
+            self.trace[-1], self.engine.state.filters, self._rate_bounds, trunk.kind, trunk.height, self.weight,
+            float(self._account["peak"]), self._action,
+        )  # fmt: skip
+
+    def _start(self, options: dict[str, Any]) -> tuple[GaitParameters, float, float, float]:
+        """Gait, crank angle, speed and height to start from: drawn at random unless an option fixes them."""
+        mix, turn, draw = self.np_random.random(3)
+        names = sorted(self.gaits)
+        one, two = self.gaits[names[0]].to_array(), self.gaits[names[-1]].to_array()
+        gait = _gait_option(options.get("gait"), self.gaits) or GaitParameters.from_array(one + mix * (two - one))
+        theta = options.get("crank_angle", 2 * np.pi * turn)
+        trunk = self.engine.trunk
+        speed = options.get("speed", START_SPEED * draw if trunk.kind != "fixed" else 0.0)
+        if trunk.kind == "suspended":
+            # no contact begins with a hoof inside the ground: hang the trunk higher where it would
+            height = options.get("height", max(trunk.height, -self._lowest_point(gait, theta)))
+        else:
+            height = trunk.height
+            for _ in range(100):
+                if "crank_angle" in options or height + self._lowest_point(gait, theta) >= 0:
+                    break
+                theta = 2 * np.pi * self.np_random.random()
+        return gait, float(theta), float(speed), float(height)
+
+    def _lowest_point(self, gait: GaitParameters, theta: float) -> float:
+        """Height of the lower hoof point relative to O [m]."""
+        phi = gait.swing_offset + gait.swing_sin * math.sin(theta) + gait.swing_cos * math.cos(theta)
+        points = pose(self.geometry, theta, frame=FrameMotion(phi=phi))
+        return min(float(points.point("I")[1]), float(points.point("J")[1]))
+
+    def _get_renderer(self) -> Any:
+        if self._renderer is None:
+            from hoof_env.envs.rendering import Renderer
+
+            self._renderer = Renderer(
+                self.geometry, str(self.render_mode), self.metadata["render_fps"], weight_n=self.weight
+            )
+        return self._renderer
+
+
+START_SPEED = 2.0
+"""Highest forward speed at reset [m/s]: a learner meets both a standing start and a rolling one."""
+
+OPTIONS = {
+    "crank_angle": (-np.inf, np.inf),
+    "speed": (-20.0, 20.0),
+    "height": (0.5, 5.0),
+}
+"""Numeric reset options and their ranges [rad, m/s, m]; "gait" is the other one."""
+
+
+def _check_options(options: dict[str, Any] | None) -> dict[str, Any]:
+    known = ("gait", *OPTIONS)
+    if options is None:
+        return {}
+    if not isinstance(options, Mapping) or not set(options) <= set(known):
+        raise ParameterError(f"options: expected a mapping with some of {', '.join(known)}, got {options!r}")
+    checked = dict(options)
+    for name, (low, high) in OPTIONS.items():
+        if name in checked:
+            checked[name] = check_number(f"options[{name!r}]", checked[name], low=low, high=high)
+    return checked
+
+
+def _gait_option(value: Any, gaits: Mapping[str, GaitParameters]) -> GaitParameters | None:
+    if value is None or isinstance(value, GaitParameters):
+        return value
+    if isinstance(value, str):
+        return gaits[check_choice("options['gait']", value, gaits)]
+    try:
+        return GaitParameters(**value)
+    except TypeError:
+        raise ParameterError(
+            f"options['gait']: expected a gait name ({', '.join(sorted(gaits))}) or a mapping of the four gait "
+            f"parameters, got {value!r}"
+        ) from None
+
+
+def _substeps(dt: float, sim_dt: float) -> int:
+    check_number("sim_dt", sim_dt, low=0, exclusive_low=True)
+    check_number("dt", dt, low=0, exclusive_low=True)
+    ratio = dt / sim_dt
+    if round(ratio) < 1 or abs(ratio - round(ratio)) > 1e-6:
+        raise ParameterError(f"dt: expected a whole multiple of sim_dt = {sim_dt:g} s, got {dt:g} s (ratio {ratio:g})")
+    return round(ratio)
+
+
+def _as_info(gait: GaitParameters) -> dict[str, float]:
+    return {name: float(getattr(gait, name)) for name in ("crank_speed", "swing_offset", "swing_sin", "swing_cos")}

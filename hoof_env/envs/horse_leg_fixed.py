@@ -1,0 +1,76 @@
+"""`hoof_env/HorseLegFixed-v0`: the paper's set-up, one gait on a fixed trunk for one second."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoof_env.dynamics.constrained import ConstrainedLeg
+from hoof_env.dynamics.trunk import Trunk
+from hoof_env.envs.horse_leg import HorseLegEnv
+from hoof_env.envs.observation import HALF_RANGE
+from hoof_env.errors import check_choice
+from hoof_env.gait.parameters import LIMITS, GaitParameters
+from hoof_env.ground.contact import Ground
+
+SOLVERS = ("exact", "paper")
+
+
+class HorseLegFixedEnv(HorseLegEnv):
+    """DOCSTRING"""
+
+    def __init__(
+        self,
+        *,
+        gait: str = "walk",
+        solver: str = "exact",
+        preset: str = "first_fit",
+        hip_height: float | None = None,
+        stiffness: float = 2e4,
+        exponent: float = 1.5,
+        normal_law: str = "lankarani-nikravesh",
+        restitution: float = 1.0,
+        approach_floor: float = 1e-4,
+        friction_law: str = "ambrosio",
+        friction: float = 0.4,
+        friction_slow: float = 1e-3,
+        friction_fast: float = 1e-2,
+        sim_dt: float | None = None,
+        dt: float = 0.02,
+        episode_seconds: float = 1.0,
+        reward_weights: dict[str, float] | None = None,
+        render_mode: str | None = None,
+    ) -> None:
+        self.solver = check_choice("solver", solver, SOLVERS)
+        if sim_dt is None:
+            sim_dt = 1e-3 if solver == "paper" else 1e-4
+        super().__init__(
+            preset=preset, trunk="fixed", hip_height=hip_height, stiffness=stiffness, exponent=exponent,
+            normal_law=normal_law, restitution=restitution, approach_floor=approach_floor, friction_law=friction_law,
+            friction=friction, friction_slow=friction_slow, friction_fast=friction_fast, sim_dt=sim_dt, dt=dt,
+            episode_seconds=episode_seconds, reward_weights=reward_weights, render_mode=render_mode,
+        )  # fmt: skip
+        self.gait = self.gaits[check_choice("gait", gait, self.gaits)]
+
+    def _build_engine(self, trunk: Trunk, ground: Ground) -> Any:
+        if self.solver == "exact":
+            return super()._build_engine(trunk, ground)
+        sampled = Ground(**{**vars(ground), "approach": "sampled"})
+        return ConstrainedLeg(self.geometry, sampled, self.sim_dt, self.filters, height=trunk.height)
+
+    def command_of(self, action: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Gait parameters that an action commands: the gait plus an offset; the zero action is exactly the gait."""
+        low, high = np.array(list(LIMITS.values())).T
+        offset = HALF_RANGE * np.clip(action.astype(np.float64), -1.0, 1.0)
+        return np.clip(self.gait.to_array() + offset, low, high)
+
+    def action_for(self, gait: GaitParameters) -> NDArray[np.float32]:
+        """The offset that commands the given gait, to float32 precision."""
+        return np.clip((gait.to_array() - self.gait.to_array()) / HALF_RANGE, -1, 1).astype(np.float32)
+
+    def _start(self, options: dict[str, Any]) -> tuple[GaitParameters, float, float, float]:
+        """The gait at crank angle 0, as in the paper, unless an option says otherwise."""
+        options = {"gait": self.gait, "crank_angle": 0.0, **options}
+        return super()._start(options)
