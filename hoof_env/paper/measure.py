@@ -1,0 +1,156 @@
+"""From the trace of one cycle to what the paper reports about it.
+
+A hoof point is in contact between the instants at which its penetration crosses zero, interpolated linearly between
+samples. First contact is the earliest of these instants over toe and heel, last contact the latest; hoof angles there
+are interpolated too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoof_env.errors import ParameterError
+
+Interval = tuple[float, float]
+
+POINTS = ("toe", "heel")
+
+
+@dataclass(frozen=True)
+class Stance:
+    """The stance of one cycle and its forces.
+
+    Attributes:
+        period: length of the cycle [s].
+        toe, heel: intervals in which each point is in the ground [s].
+        double: the longest interval in which both are [s], or None.
+        angle_start_deg, angle_end_deg: hoof angle at first and last contact, heel up positive [deg].
+        angle_flat_deg: at the middle of `double` [deg], or None.
+        angle_range_deg: largest minus smallest hoof angle in contact [deg].
+        peak, peak_time: maximum over the cycle of the normal force summed over both points [N], and when [s].
+        peak_resultant: the same maximum of the resultant sqrt(Fn^2 + Ft^2) [N].
+        mean: time average of the normal force over the whole cycle [N]. mean_stance: over stance alone [N].
+    """
+
+    period: float
+    toe: tuple[Interval, ...]
+    heel: tuple[Interval, ...]
+    double: Interval | None
+    angle_start_deg: float
+    angle_end_deg: float
+    angle_flat_deg: float | None
+    angle_range_deg: float
+    peak: float
+    peak_time: float
+    peak_resultant: float
+    mean: float
+    mean_stance: float
+
+    @property
+    def start(self) -> float:
+        """First contact [s]."""
+        return min(enter for enter, _ in self.toe + self.heel)
+
+    @property
+    def end(self) -> float:
+        """Last contact [s]."""
+        return max(leave for _, leave in self.toe + self.heel)
+
+    @property
+    def middle(self) -> float:
+        """Middle of stance [s]."""
+        return (self.start + self.end) / 2
+
+    @property
+    def duty(self) -> float:
+        """Duty factor, the part of the cycle between first and last contact [-]."""
+        return (self.end - self.start) / self.period
+
+    @property
+    def angle_variation_deg(self) -> float:
+        """Net change of the hoof angle from first to last contact [deg]."""
+        return self.angle_end_deg - self.angle_start_deg
+
+    @property
+    def first_points(self) -> set[str]:
+        """The hoof points (toe, heel or both) that touch first."""
+        return {name for name in POINTS if any(enter == self.start for enter, _ in getattr(self, name))}
+
+    @property
+    def last_points(self) -> set[str]:
+        """The hoof points that leave last."""
+        return {name for name in POINTS if any(leave == self.end for _, leave in getattr(self, name))}
+
+
+def contact_intervals(t: NDArray[np.float64], penetration: NDArray[np.float64]) -> tuple[Interval, ...]:
+    """Intervals [s] in which a penetration [m], sampled at `t`, is positive, its zeros interpolated linearly.
+
+    Raises:
+        ParameterError: a contact that the cycle cuts in two (it starts or ends in the ground).
+    """
+    inside = penetration > 0
+    if inside[0] or inside[-1]:
+        raise ParameterError("trace: expected a cycle that starts and ends with the hoof in the air, got one in stance")
+    before = np.flatnonzero(np.diff(inside))
+    part = penetration[before] / (penetration[before] - penetration[before + 1])
+    zeros = (t[before] + part * (t[before + 1] - t[before])).tolist()
+    return tuple(zip(zeros[::2], zeros[1::2], strict=True))
+
+
+def overlap(one: tuple[Interval, ...], two: tuple[Interval, ...]) -> Interval | None:
+    """The longest interval common to an interval of `one` and an interval of `two`, or None."""
+    common = [(max(a[0], b[0]), min(a[1], b[1])) for a in one for b in two]
+    longest = max(common, key=lambda interval: interval[1] - interval[0], default=(0.0, 0.0))
+    return longest if longest[1] > longest[0] else None
+
+
+def integral(trace: NDArray[np.void], values: NDArray[np.float64], start: float, end: float) -> float:
+    """Integral over [start, end] s of `values` sampled with the trace, linear between samples (trapezoidal rule)."""
+    t = trace["t"]
+    inner = (t > start) & (t < end)
+    times = np.concatenate(([start], t[inner], [end]))
+    return float(np.sum(np.diff(times) * _midpoints(np.interp(times, t, values))))
+
+
+def _midpoints(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    return (values[1:] + values[:-1]) / 2
+
+
+def measure_stance(trace: NDArray[np.void]) -> Stance:
+    """Measure one cycle.
+
+    Args:
+        trace: dtype `hoof_env.dynamics.trace.TRACE`, from the start of the cycle to its end, both included.
+
+    Raises:
+        ParameterError: no contact, or a contact that the cycle cuts in two.
+    """
+    t = trace["t"]
+    toe, heel = (contact_intervals(t, trace[f"{name}_penetration"]) for name in POINTS)
+    if not toe + heel:
+        raise ParameterError("trace: expected a cycle with ground contact, got none")
+    start = min(enter for enter, _ in toe + heel)
+    end = max(leave for _, leave in toe + heel)
+    double = overlap(toe, heel)
+    angle = np.degrees(trace["hoof_angle"])
+    touching = np.concatenate((np.interp([start, end], t, angle), angle[(t > start) & (t < end)]))
+    impulse = integral(trace, trace["normal"], float(t[0]), float(t[-1]))
+    period, top = float(t[-1] - t[0]), int(np.argmax(trace["normal"]))
+    return Stance(
+        period=period,
+        toe=toe,
+        heel=heel,
+        double=double,
+        angle_start_deg=float(touching[0]),
+        angle_end_deg=float(touching[1]),
+        angle_flat_deg=float(np.interp(sum(double) / 2, t, angle)) if double else None,
+        angle_range_deg=float(np.ptp(touching)),
+        peak=float(trace["normal"][top]),
+        peak_time=float(t[top]),
+        peak_resultant=float(trace["grf"].max()),
+        mean=impulse / period,
+        mean_stance=impulse / (end - start),
+    )

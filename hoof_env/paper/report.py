@@ -1,0 +1,136 @@
+"""The reproduction as a readable page: published beside simulated, claims about shape, versions and command."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Iterable, Mapping
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
+
+from hoof_env.paper.rows import severity
+
+if TYPE_CHECKING:
+    from hoof_env.paper.reproduce import Reproduction
+
+WORST = 3
+"""How many rows of each solver are named as its worst."""
+
+_DIGITS = {"s": 4, "deg": 2, "N": 1, "%": 2, "-": 3, "point": 2, "": 3}
+_PACKAGES = ("hoof-env", "gymnasium", "numpy", "numba")
+
+
+def markdown(reproduction: Reproduction, *, command: str, figures: bool) -> str:
+    """The whole page; `command` is named as what wrote it, `figures` says whether pictures lie beside it."""
+    solvers = list(dict.fromkeys(row["solver"] for row in reproduction.rows))
+    versions = ", ".join(f"{name} {version(name)}" for name in _PACKAGES)
+    geometry = reproduction.geometry
+    parts = [
+        "# The paper's four conditions, reproduced",
+        f"{reproduction.published.source}.",
+        f"**The leg's geometry and its gaits are identified, not published** (preset `{geometry.name}`). "
+        f"{geometry.provenance}",
+        "Each condition is one cycle of 1 s on a fixed trunk under the zero action. Solver `paper` is the paper's Eq. 8 "
+        "with its Baumgarte terms and explicit Euler at 1 ms; solver `exact` is the same motion in closed form, "
+        "at a step at which its results have converged.",
+        f"Written by `{command}` with Python {platform.python_version()}, {versions}.",
+        "## Published beside simulated",
+        *(_summary(reproduction, solver) for solver in solvers),
+        "Errors are in the measure of the bar; ✗ marks a row outside its bar, and bold its solver's worst.",
+        _rows_table(reproduction, solvers),
+        "## Other readings of the same rows",
+        _beside_table(reproduction, solvers),
+        "## Claims about shape",
+        *(_shape(reproduction, claim.id, figures) for claim in reproduction.published.claims),
+        "## How each row is measured",
+        _definitions(reproduction, solvers[0]),
+    ]
+    if figures:
+        parts += ["## Figures", *(f"![{name}]({name}.png)" for name in _figure_names())]
+    return "\n\n".join(parts) + "\n"
+
+
+def _figure_names() -> tuple[str, ...]:
+    return ("figure1", "figure3", "figure4", "figure5", "figure6")
+
+
+def _of(entries: Iterable[Mapping[str, Any]], **wanted: str) -> list[Any]:
+    return [entry for entry in entries if all(entry[key] == value for key, value in wanted.items())]
+
+
+def _number(value: float | None, unit: str, sign: str = "") -> str:
+    return "none" if value is None else f"{value:{sign}.{_DIGITS[unit]}f}"
+
+
+def _error(row: Mapping[str, Any], reproduction: Reproduction) -> str:
+    measure = reproduction.published.row(row["id"]).bar.measure
+    name = {"point": " points"}.get(measure, f" {measure}" if measure else "")
+    return "none" if row["error"] is None else _number(row["error"], measure, "+") + name
+
+
+def _worst(reproduction: Reproduction, solver: str) -> list[dict[str, Any]]:
+    rows = [row for row in _of(reproduction.rows, solver=solver) if row["within_bar"] is False]
+    return sorted(rows, key=lambda row: -severity(row, reproduction.published))[:WORST]
+
+
+def _summary(reproduction: Reproduction, solver: str) -> str:
+    barred = [row for row in _of(reproduction.rows, solver=solver) if row["within_bar"] is not None]
+    within = sum(row["within_bar"] for row in barred)
+    worst = ", ".join(
+        f"{row['id']} {_error(row, reproduction)} (bar {row['bar']})" for row in _worst(reproduction, solver)
+    )
+    return f"Solver `{solver}`: {within} of {len(barred)} rows within their bar. Worst: {worst or 'none outside'}."
+
+
+def _table(head: list[str], rows: Iterable[list[str]]) -> str:
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def _rows_table(reproduction: Reproduction, solvers: list[str]) -> str:
+    worst = {(row["id"], solver) for solver in solvers for row in _worst(reproduction, solver)}
+    lines = []
+    for published in reproduction.published.rows:
+        line = [
+            f"`{published.id}`",
+            published.quantity,
+            published.unit,
+            _number(published.value, published.unit),
+            published.bar_text,
+        ]
+        for solver in solvers:
+            (row,) = _of(reproduction.rows, id=published.id, solver=solver)
+            error = _error(row, reproduction) + (" ✗" if row["within_bar"] is False else "")
+            line += [_number(row["simulated"], row["unit"]), f"**{error}**" if (row["id"], solver) in worst else error]
+        lines.append(line)
+    head = ["row", "quantity", "unit", "published", "bar"]
+    return _table(head + [text for solver in solvers for text in (f"solver {solver}", "error")], lines)
+
+
+def _beside_table(reproduction: Reproduction, solvers: list[str]) -> str:
+    lines = []
+    for published in reproduction.published.rows:
+        by_solver = [_of(reproduction.rows, id=published.id, solver=solver)[0]["beside"] for solver in solvers]
+        for name in by_solver[0]:
+            values = [_number(beside.get(name), published.unit) for beside in by_solver]
+            lines.append([f"`{published.id}`", name.replace("_", " "), _number(published.printed, published.unit), *values])
+    return _table(["row", "reading", "in print", *(f"solver {solver}" for solver in solvers)], lines)
+
+
+def _shape(reproduction: Reproduction, claim_id: str, figures: bool) -> str:
+    entries = _of(reproduction.shapes, id=claim_id)
+    first = entries[0]
+    lines = [f"**`{claim_id}`**: {first['claim']}"]
+    if first["reading"]:
+        lines.append(f"- Reading: {first['reading']}.")
+    lines += [f"- Solver `{e['solver']}`: **{'holds' if e['holds'] else 'does not hold'}**. {e['evidence']}." for e in entries]
+    if figures:
+        lines.append(f"- Picture: [{first['figure']}]({first['figure']})")
+    return "\n".join(lines)
+
+
+def _definitions(reproduction: Reproduction, solver: str) -> str:
+    lines = []
+    for row in _of(reproduction.rows, solver=solver):
+        reading = f" Reading: {row['reading']}." if row["reading"] else ""
+        lines.append(f"- `{row['id']}`: {row['definition']}.{reading}")
+    return "\n".join(lines)

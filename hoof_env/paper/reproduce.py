@@ -1,0 +1,181 @@
+"""The paper's four conditions, walking and running on elastic and inelastic ground, through the public environment.
+
+Both solvers run them: "paper" is Eq. 8 with explicit Euler at 1 ms, "exact" the closed form at a step at which the
+results no longer change. The trunk is fixed and the action is zero, which is exactly the gait.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+import hoof_env  # noqa: F401  (registers the environments)
+from hoof_env._output import staged
+from hoof_env.errors import HoofEnvError
+from hoof_env.leg.geometry import Geometry, load_geometry
+from hoof_env.paper import report
+from hoof_env.paper.measure import measure_stance
+from hoof_env.paper.published import CONDITIONS, Published, load_published
+from hoof_env.paper.rows import compare
+from hoof_env.paper.shapes import DEPTHS, judge, sole_velocity
+
+GAITS = ("walk", "run")
+SOLVERS = ("paper", "exact")
+DEFAULT_PRESET = "first_fit"
+
+FIGURES = {
+    "walk.order": "figure4",
+    "walk.peaks": "figure5",
+    "run.order": "figure4",
+    "run.peaks": "figure5",
+    "run.step": "figure3",
+    "walk.direction": "figure6",
+    "run.direction": "figure6",
+    "walk.walks": "figure3",
+}
+"""The picture that shows each claim about shape."""
+
+Trace = NDArray[np.void]
+
+
+@dataclass(frozen=True)
+class Reproduction:
+    """What the four conditions gave.
+
+    Attributes:
+        rows: one dictionary for each published row and solver, see `hoof_env.paper.rows.compare`.
+        shapes: one dictionary for each claim about shape and solver: kind ("shape"), id, claim, reading, solver, holds,
+            evidence, figure.
+        traces: one cycle of dtype `hoof_env.dynamics.trace.TRACE`, its first row at t = 0, by (gait, condition, solver).
+        geometry: the leg, identified and not published.
+        published: what was compared with.
+    """
+
+    rows: list[dict[str, Any]]
+    shapes: list[dict[str, Any]]
+    traces: dict[tuple[str, str, str], Trace]
+    geometry: Geometry
+    published: Published
+
+
+def run_cycle(gait: str, solver: str, **settings: Any) -> Trace:
+    """One cycle of a gait on a fixed trunk under the zero action.
+
+    Args:
+        gait, solver: as `hoof_env/HorseLegFixed-v0` takes them.
+        settings: further arguments of that environment.
+
+    Returns:
+        One row a substep and one before them for t = 0.
+
+    Raises:
+        ParameterError: what the environment refuses. HoofEnvError: the simulation stopped before its end.
+    """
+    env = gymnasium.make("hoof_env/HorseLegFixed-v0", gait=gait, solver=solver, **settings)
+    try:
+        env.reset(seed=0)
+        action = np.zeros(env.action_space.shape or (), np.float32)
+        parts, terminated, truncated = [env.get_wrapper_attr("trace")], False, False
+        while not truncated:
+            _, _, terminated, truncated, _ = env.step(action)
+            if terminated:
+                raise HoofEnvError(f"{gait} with solver {solver!r}: the simulation failed before the end of its cycle")
+            parts.append(env.get_wrapper_attr("trace"))
+    finally:
+        env.close()
+    return np.concatenate(parts)
+
+
+def reproduce(progress: Callable[[str], None] | None = None, *, preset: str = DEFAULT_PRESET) -> Reproduction:
+    """Run the four conditions with both solvers and compare them with the paper.
+
+    Args:
+        progress: called with one line after each run.
+        preset: geometry and gaits, a name or a file (`hoof_env.leg.geometry.load_geometry`).
+
+    Raises:
+        HoofEnvError: a preset that is unknown or does not walk and run.
+    """
+    tell = progress or (lambda line: None)
+    geometry, published = load_geometry(preset), load_published()
+    traces: dict[tuple[str, str, str], Trace] = {}
+    rows: list[dict[str, Any]] = []
+    shapes: list[dict[str, Any]] = []
+    for solver in SOLVERS:
+        stances, medians = {}, {}
+        for gait in GAITS:
+            for condition, restitution in CONDITIONS.items():
+                trace = run_cycle(gait, solver, restitution=restitution, preset=preset)
+                traces[gait, condition, solver] = trace
+                stance = stances[gait, condition] = measure_stance(trace)
+                tell(f"{solver} solver, {gait}, {condition}: peak {stance.peak:.1f} N, mean {stance.mean:.1f} N")
+            medians[gait] = _sole_velocities(traces[gait, "elastic", solver], gait, solver, geometry, preset)
+            tell(f"{solver} solver, {gait}, deeper: sole moves at {_listed(medians[gait].values())} m/s")
+        cycles = {(gait, condition): traces[gait, condition, solver] for gait in GAITS for condition in CONDITIONS}
+        rows += compare(published, stances, solver)
+        verdicts = judge(cycles, medians)
+        shapes += [
+            {
+                "kind": "shape",
+                "id": claim.id,
+                "claim": claim.claim,
+                "reading": claim.reading,
+                "solver": solver,
+                "holds": verdicts[claim.id].holds,
+                "evidence": verdicts[claim.id].evidence,
+                "figure": f"{FIGURES[claim.id]}.png",
+            }
+            for claim in published.claims
+        ]
+    return Reproduction(rows, shapes, traces, geometry, published)
+
+
+def _listed(values: Any) -> str:
+    return ", ".join(f"{value:+.2f}" for value in values)
+
+
+def _sole_velocities(trace: Trace, gait: str, solver: str, geometry: Geometry, preset: str) -> dict[float, float]:
+    """`sole_velocity` [m/s] by depth [m]; `trace` is the elastic cycle at depth 0."""
+    medians = {0.0: sole_velocity(trace)}
+    for depth in DEPTHS[1:]:
+        deeper = run_cycle(gait, solver, preset=preset, restitution=1.0, hip_height=geometry.hip_height - depth)
+        medians[depth] = sole_velocity(deeper)
+    return medians
+
+
+def write_reproduction(
+    reproduction: Reproduction, out_dir: Path | str, *, figures: bool = True, command: str = "hoof-env reproduce --out DIR"
+) -> list[Path]:
+    """Write `reproduction.json`, `reproduction.md` and the figures; returns their paths.
+
+    Nothing replaces an older result unless everything could be written.
+
+    Args:
+        reproduction: what to write.
+        out_dir: folder, made if need be.
+        figures: draw figures 1 and 3 to 6 too.
+        command: what the report names as the command that wrote it.
+
+    Raises:
+        OutputError: the folder cannot be written. HoofEnvError: figures without matplotlib.
+    """
+    out_dir = Path(out_dir)
+    with staged(out_dir) as stage:
+        entries = [*reproduction.rows, *reproduction.shapes]
+        text = json.dumps(entries, indent=1, ensure_ascii=False, allow_nan=False)
+        (stage / "reproduction.json").write_text(text + "\n", encoding="utf-8")
+        if figures:
+            from hoof_env.paper.figures import draw_all
+
+            draw_all(reproduction, stage)
+        markdown = report.markdown(reproduction, command=command, figures=figures)
+        (stage / "reproduction.md").write_text(markdown, encoding="utf-8")
+        names = sorted(file.name for file in stage.iterdir())
+    return [out_dir / name for name in names]

@@ -1,0 +1,123 @@
+"""The published rows beside what a simulation gives: one dictionary a row, ready for JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from hoof_env.paper.measure import Stance
+from hoof_env.paper.published import Published, PublishedRow
+
+Stances = Mapping[tuple[str, str], Stance]
+"""Measured cycles by (gait, condition)."""
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """How a row is measured.
+
+    Attributes:
+        value: from the stance in the row's condition (elastic where it has none) and the other one.
+        definition: the same in words.
+        beside: values under another reading, by name.
+    """
+
+    value: Callable[[Stance, Stance], float | None]
+    definition: str
+    beside: Callable[[Stance, Stance], dict[str, float | None]] = lambda stance, other: {}
+
+
+def _reduction(elastic: float, inelastic: float) -> float:
+    return 100 * (inelastic - elastic) / inelastic
+
+
+QUANTITIES = {
+    "contact_start": Quantity(lambda s, _: s.start, "first instant at which a hoof point enters the ground, interpolated"),
+    "contact_end": Quantity(lambda s, _: s.end, "instant at which the last hoof point leaves the ground, interpolated"),
+    "duty": Quantity(lambda s, _: s.duty, "(last contact - first contact) / period"),
+    "angle_contact": Quantity(lambda s, _: s.angle_start_deg, "hoof angle at first contact, heel up positive"),
+    "angle_liftoff": Quantity(lambda s, _: s.angle_end_deg, "hoof angle at last contact, heel up positive"),
+    "angle_flat": Quantity(
+        lambda s, _: s.angle_flat_deg, "hoof angle at the middle of the interval in which toe and heel are in the ground"
+    ),
+    "angle_variation": Quantity(
+        lambda s, _: s.angle_variation_deg,
+        "hoof angle at last contact minus hoof angle at first contact",
+        lambda s, _: {"range_deg": s.angle_range_deg},
+    ),
+    "peak": Quantity(
+        lambda s, _: s.peak,
+        "maximum over the cycle of the normal force summed over toe and heel",
+        lambda s, _: {"resultant_N": s.peak_resultant},
+    ),
+    "mean": Quantity(
+        lambda s, _: s.mean,
+        "normal force summed over toe and heel, mean over the whole cycle",
+        lambda s, _: {"mean_over_stance_N": s.mean_stance},
+    ),
+    "reduction": Quantity(
+        lambda elastic, inelastic: _reduction(elastic.peak, inelastic.peak),
+        "(inelastic - elastic) / inelastic of the maximum normal forces",
+        lambda elastic, inelastic: {"resultant_%": _reduction(elastic.peak_resultant, inelastic.peak_resultant)},
+    ),
+}
+"""By the part of a row's id between the gait and the condition."""
+
+
+def compare(published: Published, stances: Stances, solver: str) -> list[dict[str, Any]]:
+    """One row for each published number, measured with one solver.
+
+    Returns:
+        Dictionaries with kind ("row"), id, gait, quantity, unit, condition, reading, definition, published (as read),
+        bar, solver, simulated, error (signed, in the bar's own measure), within_bar (None where the bar is 'reported')
+        and beside (other readings by name).
+    """
+    return [_compare(row, stances, solver) for row in published.rows]
+
+
+def _compare(row: PublishedRow, stances: Stances, solver: str) -> dict[str, Any]:
+    simulated, definition, beside = _measure(row, stances)
+    error = None if simulated is None else row.bar.error(simulated, row.value)
+    if row.printed != row.value and simulated is not None:
+        beside |= {"published_in_print": row.printed, "error_against_print": row.bar.error(simulated, row.printed)}
+    return {
+        "kind": "row",
+        "id": row.id,
+        "gait": row.gait,
+        "quantity": row.quantity,
+        "unit": row.unit,
+        "condition": row.condition,
+        "reading": row.reading,
+        "definition": definition,
+        "published": row.value,
+        "bar": row.bar_text,
+        "solver": solver,
+        "simulated": simulated,
+        "error": error,
+        "within_bar": row.bar.holds(error),
+        "beside": beside,
+    }
+
+
+def _measure(row: PublishedRow, stances: Stances) -> tuple[float | None, str, dict[str, Any]]:
+    if row.id == "ratio.angle_variation":
+        run, walk = stances["run", "elastic"], stances["walk", "elastic"]
+        return (
+            run.angle_variation_deg / walk.angle_variation_deg,
+            "ratio of the net changes of the hoof angle",
+            {"ratio_of_ranges": run.angle_range_deg / walk.angle_range_deg},
+        )
+    quantity = QUANTITIES[row.id.split(".")[1].removesuffix(f"_{row.condition}")]
+    condition = row.condition or "elastic"
+    other = "inelastic" if condition == "elastic" else "elastic"
+    pair = stances[row.gait, condition], stances[row.gait, other]
+    return quantity.value(*pair), quantity.definition, quantity.beside(*pair)
+
+
+def severity(row: Mapping[str, Any], published: Published) -> float:
+    """How many bars a row is off [-]: 0 where the bar is 'reported', infinite where there is no value."""
+    limit = published.row(row["id"]).bar.limit
+    if limit is None:
+        return 0.0
+    return float("inf") if row["error"] is None else abs(row["error"]) / limit

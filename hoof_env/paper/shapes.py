@@ -1,0 +1,232 @@
+"""The paper's claims about shape, each decided by numbers: pure functions of measured cycles.
+
+Every function returns a `Verdict`; its thresholds are the constants below.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoof_env.paper.measure import POINTS, Stance, integral, measure_stance
+
+PROMINENCE = 0.1
+"""A force peak counts if it stands out by this part of the highest force [-]."""
+
+PEAK_GAP = 0.01
+"""Two peaks are apart in time if at least this far [s]: a hundredth of the cycle, ten time steps of the paper."""
+
+FLAT_DEG = 3.0
+"""A hoof is flat within this angle [deg]: the bar of the published angle at mid-stance."""
+
+DEPTHS = (0.0, 0.05, 0.1)
+"""How much deeper than the identified level the leg is put for the claim `walk.walks` [m]."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether a claim holds, and the numbers that decide."""
+
+    holds: bool
+    evidence: str
+
+
+Trace = NDArray[np.void]
+
+
+def find_peaks(force: NDArray[np.float64]) -> list[int]:
+    """Indices of the local maxima of a force that rises from 0 and returns to it, if prominent enough.
+
+    A maximum's prominence is its height above the higher of the two lowest points that separate it from higher
+    ground (or from the ends) on either side; it must reach `PROMINENCE` of the highest force. A plateau counts once,
+    at its first sample.
+    """
+    steps = np.diff(force)
+    moving = np.flatnonzero(steps)
+    turns = (steps[moving[:-1]] > 0) & (steps[moving[1:]] < 0)
+    found = []
+    for k in (moving[:-1][turns] + 1).tolist():
+        higher = np.flatnonzero(force > force[k])
+        left, right = higher[higher < k], higher[higher > k]
+        base_left = force[left[-1] if left.size else 0 : k].min()
+        base_right = force[k : right[0] + 1 if right.size else None].min()
+        if force[k] - max(base_left, base_right) >= PROMINENCE * force.max():
+            found.append(k)
+    return found
+
+
+def _describe(points: set[str]) -> str:
+    return " and ".join(sorted(points))
+
+
+def _phase(interval: tuple[float, float] | None) -> str:
+    return f"both bear {interval[0]:.3f}-{interval[1]:.3f} s" if interval else "never both in the ground"
+
+
+def walk_order(walk: Stance, trace: Trace) -> Verdict:
+    """Heel-strike, flat, toe-off: the heel touches first, then both bear with the sole flat within `FLAT_DEG` at some
+    instant, and the toe leaves last."""
+    smallest = float("inf")
+    if walk.double:
+        t = trace["t"]
+        both = np.degrees(trace["hoof_angle"][(t >= walk.double[0]) & (t <= walk.double[1])])
+        smallest = float(np.abs(both).min()) if both.size else smallest
+    return Verdict(
+        walk.first_points == {"heel"} and smallest <= FLAT_DEG and walk.last_points == {"toe"},
+        f"first in: {_describe(walk.first_points)} at {walk.start:.3f} s, {walk.angle_start_deg:.1f} deg; "
+        f"{_phase(walk.double)}, smallest |angle| there {smallest:.1f} deg; "
+        f"last out: {_describe(walk.last_points)} at {walk.end:.3f} s, {walk.angle_end_deg:.1f} deg",
+    )
+
+
+def walk_peaks(walk: Stance, trace: Trace) -> Verdict:
+    """Two peaks of the normal force, one in each half of stance, and both points loaded at the dip between them."""
+    force, t = trace["normal"], trace["t"]
+    peaks = find_peaks(force)
+    evidence = ", ".join(f"{force[k]:.0f} N at {t[k]:.3f} s" for k in peaks)
+    evidence = f"{len(peaks)} peak(s): {evidence}; middle of stance {walk.middle:.3f} s"
+    if len(peaks) != 2:
+        return Verdict(False, evidence)
+    dip = peaks[0] + int(np.argmin(force[peaks[0] : peaks[1]]))
+    toe, heel = float(trace["toe_normal"][dip]), float(trace["heel_normal"][dip])
+    return Verdict(
+        bool(t[peaks[0]] < walk.middle < t[peaks[1]]) and toe > 0 and heel > 0,
+        f"{evidence}; dip {force[dip]:.0f} N at {t[dip]:.3f} s with toe {toe:.0f} N and heel {heel:.0f} N",
+    )
+
+
+def run_order(run: Stance, walk: Stance, run_trace: Trace, walk_trace: Trace) -> Verdict:
+    """Toe-strike, roll-over, toe-off with a large gap: the toe touches first, the heel follows and leaves before the
+    toe, and at toe-off it is higher above the ground than at toe-off in walking."""
+    gaps = [float(-np.interp(s.end, tr["t"], tr["heel_penetration"])) for s, tr in ((run, run_trace), (walk, walk_trace))]
+    rolls = run.first_points == {"toe"} and bool(run.heel) and run.last_points == {"toe"}
+    heel = f"heel in the ground {run.heel[0][0]:.3f}-{run.heel[-1][1]:.3f} s" if run.heel else "heel never in the ground"
+    return Verdict(
+        rolls and gaps[0] > gaps[1],
+        f"first in: {_describe(run.first_points)} at {run.start:.3f} s, {run.angle_start_deg:.1f} deg; {heel}; "
+        f"last out: {_describe(run.last_points)} at {run.end:.3f} s, {run.angle_end_deg:.1f} deg; "
+        f"heel {100 * gaps[0]:.1f} cm above the ground then, walking {100 * gaps[1]:.1f} cm",
+    )
+
+
+def run_peaks(elastic: Trace, inelastic: Trace) -> Verdict:
+    """One peak of the normal force in each condition, at least `PEAK_GAP` apart in time."""
+    peaks = [find_peaks(trace["normal"]) for trace in (elastic, inelastic)]
+    times = [float(trace["t"][np.argmax(trace["normal"])]) for trace in (elastic, inelastic)]
+    gap = times[0] - times[1]
+    return Verdict(
+        all(len(found) == 1 for found in peaks) and abs(gap) >= PEAK_GAP,
+        f"elastic {len(peaks[0])} peak(s), highest at {times[0]:.4f} s; inelastic {len(peaks[1])}, highest at "
+        f"{times[1]:.4f} s; the elastic one is {1000 * gap:+.1f} ms later",
+    )
+
+
+def step_length(trace: Trace, stance: Stance) -> tuple[float, float]:
+    """How far the middle of the sole travels back from first to last contact, and the length of its closed path [m].
+
+    On a fixed trunk the first is how far a body would pass over the foot in one stance.
+    """
+    sole = (trace["toe_x"] + trace["heel_x"]) / 2 - trace["trunk_x"]
+    start, end = np.interp([stance.start, stance.end], trace["t"], sole)
+    return float(start - end), float(np.ptp(sole))
+
+
+def run_step(run: Stance, walk: Stance, run_trace: Trace, walk_trace: Trace) -> Verdict:
+    """The sole travels farther back in the running stance than in the walking one (`step_length`)."""
+    (run_step, run_path), (walk_step, walk_path) = step_length(run_trace, run), step_length(walk_trace, walk)
+    return Verdict(
+        run_step > walk_step,
+        f"sole travels back {run_step:.3f} m in the running stance, {walk_step:.3f} m in the walking one; "
+        f"horizontal extent of its path over the cycle {run_path:.3f} m and {walk_path:.3f} m",
+    )
+
+
+def half_impulses(trace: Trace, stance: Stance) -> list[tuple[float, float]]:
+    """Horizontal (forward positive) and vertical impulse on the leg in each half of stance [N s]."""
+    halves = ((stance.start, stance.middle), (stance.middle, stance.end))
+    return [(integral(trace, trace["friction"], *half), integral(trace, trace["normal"], *half)) for half in halves]
+
+
+def walk_direction(walk: Stance, trace: Trace) -> Verdict:
+    """Braking through the walking stance, literally: the ground pushes the leg backward in both halves of stance."""
+    (first, _), (second, _) = half_impulses(trace, walk)
+    if first < 0 and second < 0:
+        supports = "supports 'the hoof slides forward'"
+    elif first > 0 and second > 0:
+        supports = "supports 'the force of the hoof on the ground' (that one points backward throughout)"
+    else:
+        supports = (
+            "supports neither 'the hoof slides forward' nor 'the force of the hoof on the ground' through the whole "
+            "stance; only 'against the hoof's own motion', which sliding friction always is"
+        )
+    return Verdict(
+        first < 0 and second < 0,
+        f"horizontal impulse on the leg {first:+.2f} N s in the first half of stance, {second:+.2f} N s in the second, "
+        f"{first + second:+.2f} N s in all (forward positive); {supports}",
+    )
+
+
+def run_direction(run: Stance, trace: Trace) -> Verdict:
+    """Turning towards propulsion: the mean force of the second half of stance points forward, and more than the first's."""
+    halves = half_impulses(trace, run)
+    first, second = (float(np.degrees(np.arctan2(*half))) for half in halves)
+    return Verdict(
+        second > 0 and second > first,
+        f"horizontal impulse on the leg {halves[0][0]:+.1f} N s in the first half of stance, {halves[1][0]:+.1f} N s in "
+        f"the second; mean force {first:+.1f} and {second:+.1f} deg forward of vertical",
+    )
+
+
+def sole_velocity(trace: Trace) -> float:
+    """Load-weighted median of the horizontal velocity of toe and heel [m/s]: half of the load acts below it.
+
+    Under Coulomb friction and full sliding the ground propels where it is negative. NaN without load.
+    """
+    velocity = np.concatenate([trace[f"{name}_vx"] for name in POINTS])
+    load = np.concatenate([trace[f"{name}_normal"] for name in POINTS])
+    order = np.argsort(velocity)
+    below = np.cumsum(load[order])
+    return float(velocity[order][np.searchsorted(below, below[-1] / 2)]) if below[-1] > 0 else float("nan")
+
+
+def walk_walks(medians: Mapping[str, Mapping[float, float]]) -> Verdict:
+    """A gait must move its animal: the load-weighted median velocity of the sole is backward in both gaits, at the ground
+    level and deeper.
+
+    Args:
+        medians: by gait, `sole_velocity` [m/s] by depth [m].
+    """
+    parts = [
+        f"{gait} " + ", ".join(f"{v:+.2f} m/s" + (f" ({100 * depth:.0f} cm deeper)" if depth else "") for depth, v in by.items())
+        for gait, by in medians.items()
+    ]
+    return Verdict(
+        all(v < 0 for by in medians.values() for v in by.values()),
+        "load-weighted median velocity of the sole (backward negative): " + "; ".join(parts),
+    )
+
+
+def judge(
+    traces: Mapping[tuple[str, str], Trace], medians: Mapping[str, Mapping[float, float]]
+) -> dict[str, Verdict]:
+    """Every claim by id.
+
+    Args:
+        traces: one cycle for each (gait, condition).
+        medians: see `walk_walks`.
+    """
+    walk_trace, run_trace = traces["walk", "elastic"], traces["run", "elastic"]
+    walk, run = measure_stance(walk_trace), measure_stance(run_trace)
+    return {
+        "walk.order": walk_order(walk, walk_trace),
+        "walk.peaks": walk_peaks(walk, walk_trace),
+        "run.order": run_order(run, walk, run_trace, walk_trace),
+        "run.peaks": run_peaks(run_trace, traces["run", "inelastic"]),
+        "run.step": run_step(run, walk, run_trace, walk_trace),
+        "walk.direction": walk_direction(walk, walk_trace),
+        "run.direction": run_direction(run, run_trace),
+        "walk.walks": walk_walks(medians),
+    }
