@@ -1,33 +1,64 @@
 """The one place where kernels are compiled: numba, serial, cached, without fast-math.
 
-Kernels are plain scalar functions over NumPy records and arrays. Fast-math stays off, so that a result does not
-depend on how the compiler arranged a loop.
+Kernels are plain scalar functions over NumPy records and arrays. Fast-math stays off, so that a result does
+not depend on how the compiler arranged a loop.
 """
 
 from __future__ import annotations
 
+import hashlib
 import os
+import tempfile
 from collections.abc import Callable
-from typing import Any, TypeVar
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar, cast
 
 from hoof_env.errors import OutputError
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+MECHANICS = ("leg", "ground", "gait", "dynamics")
+"""The rooms whose sources end up in kernels."""
 
 
 def kernel(function: F) -> F:
     """Compile `function` with numba at its first call and keep the result in numba's cache folder.
 
     Raises:
-        OutputError: no cache folder can be written.
+        OutputError: the folder named by NUMBA_CACHE_DIR, or without it every folder that numba tries, is not
+            writable.
     """
     import numba
 
+    given = os.environ.get("NUMBA_CACHE_DIR")
     try:
-        return numba.njit(cache=True, error_model="numpy")(function)  # type: ignore[no-any-return]
+        if given:
+            _check_writable(given)  # numba would pass it over in silence
+        compiled: Any = numba.njit(cache=True, error_model="numpy")(function)
     except (RuntimeError, OSError) as error:
-        given = os.environ.get("NUMBA_CACHE_DIR") or os.path.dirname(function.__code__.co_filename)
+        folder = given or os.path.dirname(function.__code__.co_filename)
         raise OutputError(
-            f"cannot keep compiled kernels in {given!r} ({error}); expected a writable folder: "
+            f"cannot keep compiled kernels in {folder!r} ({error}); expected a writable folder: "
             "set the environment variable NUMBA_CACHE_DIR to one"
         ) from None
+    # numba looks for changes in the file of a kernel alone, but a kernel contains those that it calls
+    stored = compiled._cache._cache_file
+    stored._source_stamp = (stored._source_stamp, _sources())
+    return cast(F, compiled)
+
+
+@cache
+def _check_writable(folder: str) -> None:
+    os.makedirs(folder, exist_ok=True)
+    tempfile.TemporaryFile(dir=folder).close()
+
+
+@cache
+def _sources() -> str:
+    """Digest of everything that kernels are made from."""
+    here = Path(__file__).parent
+    digest = hashlib.sha256()
+    for path in sorted(path for room in MECHANICS for path in (here / room).glob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
