@@ -41,7 +41,7 @@ def check_number(
     bounds = f"a finite number in {bracket}{low:g}, {high:g}]"
     try:
         number = float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ParameterError(f"{name}: expected {bounds}, got {value!r}") from None
     if isinstance(value, (bool, str)) or not np.isfinite(number):
         raise ParameterError(f"{name}: expected {bounds}, got {value!r}")

@@ -1,17 +1,18 @@
 """The leg in minimal coordinates: what moves is computed in closed form, the trunk alone is integrated.
 
-Crank and swing are prescribed by the motion law, so every link follows without iteration and the loops are closed to
-round-off. The trunk's state is the momentum and the centre of mass of trunk and leg together; the trunk itself
-follows from them and the pose of the leg. So the trunk feels every link swing, and momentum in flight is conserved to
-round-off. Momentum and centre of mass advance by semi-implicit Euler.
+Crank and swing are prescribed by the motion law, so every link follows without iteration and the loops are
+closed to round-off. The trunk's state is the momentum and the centre of mass of trunk and leg together; the
+trunk itself follows from them and the pose of the leg. So the trunk feels every link swing, and momentum in
+flight is conserved to round-off. Momentum and centre of mass advance by semi-implicit Euler.
 
-The two drives (crank and swing) do what the motion needs; their torques come from virtual power, with inertia,
-weight and ground force of every body. Power is torque times rate of each drive; braking power is negative and is reported
-as it is (what a cost makes of it is the environment's business).
+The two drives (crank and swing) do what the motion needs; their torques come from virtual power, with
+inertia, weight and ground force of every body. Power is torque times rate of each drive; braking power is
+negative and is reported as it is (what a cost makes of it is the environment's business).
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -22,7 +23,7 @@ from hoof_env._jit import kernel
 from hoof_env.dynamics.result import Result
 from hoof_env.dynamics.trace import new_trace, record
 from hoof_env.dynamics.trunk import FIXED, SUSPENDED, Trunk
-from hoof_env.errors import check_number
+from hoof_env.errors import ParameterError, check_number
 from hoof_env.gait.motion_law import (
     MOTION,
     FilterSettings,
@@ -31,7 +32,7 @@ from hoof_env.gait.motion_law import (
     evaluate_motion,
     steady_filters,
 )
-from hoof_env.gait.parameters import GaitParameters
+from hoof_env.gait.parameters import PARAMETERS, GaitParameters
 from hoof_env.ground.contact import HEEL, TOE, Ground, new_contacts, touch
 from hoof_env.leg.geometry import Geometry, tables
 from hoof_env.leg.kinematics import dot, place, solve_points
@@ -40,9 +41,9 @@ from hoof_env.leg.linkage import BODIES, POINTS
 GRAVITY = 9.81
 """[m/s^2], as in the paper's Table 1."""
 
-BODY = np.dtype([("t", "f8"), ("px", "f8"), ("py", "f8"), ("cx", "f8"), ("cy", "f8")])
-"""Time [s]; momentum [kg m/s] and centre of mass [m] of trunk and leg together, in the directions that are free
-(on a fixed trunk cx is the place of O)."""
+BODY = np.dtype([(name, "f8") for name in ("t", "px", "py", "cx", "cy", "fx", "fy")])
+"""Time [s]; momentum [kg m/s], centre of mass [m] and outer force [N] of trunk and leg together, in the
+directions that are free (on a fixed trunk cx is the place of O)."""
 
 _NUMBER = {name: i for i, name in enumerate(POINTS)}
 _TAIL = np.array([_NUMBER[body.tail] for body in BODIES])
@@ -81,8 +82,12 @@ class Tables:
     inertias: NDArray[np.float64]
     toe: int
     heel: int
-    z: NDArray[np.complex128] = field(repr=False, default_factory=lambda: np.zeros((3, len(POINTS)), np.complex128))
-    moving: NDArray[np.complex128] = field(repr=False, default_factory=lambda: np.zeros((5, len(POINTS)), np.complex128))
+    z: NDArray[np.complex128] = field(
+        repr=False, default_factory=lambda: np.zeros((3, len(POINTS)), np.complex128)
+    )
+    moving: NDArray[np.complex128] = field(
+        repr=False, default_factory=lambda: np.zeros((5, len(POINTS)), np.complex128)
+    )
 
     @classmethod
     def of(cls, geometry: Geometry) -> Tables:
@@ -108,11 +113,12 @@ class Tables:
 
 @kernel
 def move_points(motion, crank, pivot, travel, steps, values, z, moving):  # type: ignore[no-untyped-def]
-    """Fill `moving`, shape (5, 11): position, velocity, acceleration relative to O and partial velocities of each point."""
+    """Fill `moving`, shape (5, 11): each point's position, velocity, acceleration and partial velocities."""
     solve_points(motion.theta, crank, pivot, steps, values, z[0], z[1], z[2])
     for k in range(z.shape[1]):
         moving[0, k], moving[1, k], moving[2, k], moving[3, k], moving[4, k] = place(
-            z[0, k], z[1, k], z[2, k], motion.theta_rate, motion.theta_acc, motion.phi, motion.phi_rate, motion.phi_acc, travel
+            z[0, k], z[1, k], z[2, k], motion.theta_rate, motion.theta_acc,
+            motion.phi, motion.phi_rate, motion.phi_acc, travel,
         )  # fmt: skip
 
 
@@ -155,7 +161,11 @@ def trunk_force(trunk, y, vx, vy):  # type: ignore[no-untyped-def]
     """External force on trunk and leg other than the ground's: weight, support, drag; complex [N]."""
     fy = 0.0
     if trunk.kind == SUSPENDED:
-        fy = -trunk.share * trunk.total_mass * trunk.gravity - trunk.stiffness * (y - trunk.height) - trunk.damping * vy
+        fy = (
+            -trunk.share * trunk.total_mass * trunk.gravity
+            - trunk.stiffness * (y - trunk.height)
+            - trunk.damping * vy
+        )
     return complex(-trunk.drag * vx, fy)
 
 
@@ -172,9 +182,9 @@ def trunk_motion(body, trunk, s, p):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def evaluate(body, motion, filters, contacts, command, settings, trunk, ground, row,
-             crank, pivot, travel, steps, values, masses, inertias, toe, heel, z, moving):  # type: ignore[no-untyped-def]  # fmt: skip
-    """From the state at one instant: motion of every point, contact, torques; fills `row`, returns the outer force."""
+def evaluate(body, motion, filters, contacts, command, settings, trunk, ground, row,  # type: ignore[no-untyped-def]
+             crank, pivot, travel, steps, values, masses, inertias, toe, heel, z, moving):  # fmt: skip
+    """From the state at one instant: motion of every point, contact, outer force, torques; fills `row`."""
     command_filters(filters, command, settings)
     evaluate_motion(motion, filters)
     move_points(motion, crank, pivot, travel, steps, values, z, moving)
@@ -191,28 +201,27 @@ def evaluate(body, motion, filters, contacts, command, settings, trunk, ground, 
         acceleration = complex(acceleration.real, 0.0)
     lift = acceleration + complex(0.0, trunk.gravity)
     crank_torque, hip_torque = drive_torques(moving, masses, inertias, lift, toe, heel, toe_force, heel_force)
+    body.fx, body.fy = force.real, force.imag
     record(row, body.t, motion, origin, velocity, contacts, toe_at, heel_at, crank_torque, hip_torque)
-    return force
 
 
 @kernel
-def advance(body, motion, filters, contacts, command, settings, trunk, ground, h, force, trace,
-            crank, pivot, travel, steps, values, masses, inertias, toe, heel, z, moving):  # type: ignore[no-untyped-def]  # fmt: skip
-    """Advance by `len(trace)` substeps of `h` [s], one row each; returns the force at the end (complex) [N]."""
+def advance(body, motion, filters, contacts, command, settings, trunk, ground, h, trace,  # type: ignore[no-untyped-def]
+            crank, pivot, travel, steps, values, masses, inertias, toe, heel, z, moving):  # fmt: skip
+    """Advance by `len(trace)` substeps of `h` [s], one row each."""
     start = body.t
     for k in range(trace.shape[0]):
         command_filters(filters, command, settings)
         advance_motion(motion, filters, h)
         if trunk.kind != FIXED:
-            body.px += h * force.real
+            body.px += h * body.fx
             body.cx += h * body.px / trunk.total_mass
         if trunk.kind == SUSPENDED:
-            body.py += h * force.imag
+            body.py += h * body.fy
             body.cy += h * body.py / trunk.total_mass
         body.t = start + (k + 1) * h
-        force = evaluate(body, motion, filters, contacts, command, settings, trunk, ground, trace[k],
-                         crank, pivot, travel, steps, values, masses, inertias, toe, heel, z, moving)  # fmt: skip
-    return force
+        evaluate(body, motion, filters, contacts, command, settings, trunk, ground, trace[k],
+                 crank, pivot, travel, steps, values, masses, inertias, toe, heel, z, moving)  # fmt: skip
 
 
 class LegEngine:
@@ -223,6 +232,9 @@ class LegEngine:
         trunk, ground: what it hangs from and stands on.
         sim_dt: time step h [s].
         filters: bounds of the command filters.
+
+    Raises:
+        ParameterError: `sim_dt` is out of range or too long for the filters.
     """
 
     def __init__(
@@ -234,23 +246,38 @@ class LegEngine:
         filters: FilterSettings | None = None,
     ) -> None:
         self.geometry, self.trunk, self.ground = geometry, trunk, ground
-        self.sim_dt = check_number("sim_dt", sim_dt, low=1e-7, high=0.1)
+        filters = filters or FilterSettings()
+        self.sim_dt = check_number("sim_dt", sim_dt, low=1e-7, high=filters.longest_step)
         self.tables = Tables.of(geometry)
-        self._settings = (filters or FilterSettings()).to_array()
+        self._settings = filters.to_array()
         self._trunk, self._ground = trunk.to_record(geometry.mass, GRAVITY), ground.to_record()
-        self._force = 0j
         self.state = State(
             np.zeros(1, BODY)[0], np.zeros(1, MOTION)[0], steady_filters(np.zeros(4)), new_contacts()
         )
 
     def reset(
-        self, gait: GaitParameters, theta: float = 0.0, height: float | None = None, speed: float = 0.0, x: float = 0.0
+        self,
+        gait: GaitParameters,
+        theta: float = 0.0,
+        height: float | None = None,
+        speed: float = 0.0,
+        x: float = 0.0,
     ) -> NDArray[np.void]:
-        """Start at rest in the filters of `gait`, crank at `theta` [rad], O at (x, height) [m] moving at `speed` [m/s].
+        """Start with the filters at rest at `gait`, crank at `theta` [rad] and O at (x, height) [m], moving
+        forward at `speed` [m/s]. A `height` of None is the trunk's own.
 
         A hoof point that starts inside the ground has entered it at its present rate. Returns one trace row.
+
+        Raises:
+            ParameterError: a value is not finite, or asks of the trunk what its kind forbids.
         """
-        state = self.state
+        kind, state = self.trunk.kind, self.state
+        theta, speed, x = check_number("theta", theta), check_number("speed", speed), check_number("x", x)
+        y = check_number("height", self.trunk.height if height is None else height)
+        if kind != "suspended" and y != self.trunk.height:
+            raise ParameterError(f"height: a {kind} trunk is at {self.trunk.height:g} m, got {y:g} m")
+        if kind == "fixed" and speed != 0.0:
+            raise ParameterError(f"speed: expected 0 of a fixed trunk, got {speed:g} m/s")
         state.filters[:] = steady_filters(gait.to_array())
         state.contacts[:] = new_contacts()
         state.motion["theta"] = theta
@@ -259,32 +286,37 @@ class LegEngine:
         move_points(state.motion, t.crank, t.pivot, t.travel, t.steps, t.values, t.z, t.moving)
         s, p, _ = first_moments(t.moving, t.masses)
         body, total = state.body, float(self._trunk["total_mass"])
-        y = self.trunk.height if height is None else height
         body["t"] = 0.0
-        if self.trunk.kind == "fixed":
+        if kind == "fixed":
             body["cx"], body["cy"], body["px"], body["py"] = x, 0.0, 0.0, 0.0
         else:
             body["cx"], body["cy"] = x + s.real / total, y + s.imag / total
             body["px"], body["py"] = total * speed + p.real, p.imag
         trace = new_trace(1)
-        self._force = evaluate(
-            body, state.motion, state.filters, state.contacts, gait.to_array(), self._settings, self._trunk, self._ground,
-            trace[0], *t.args(),
+        evaluate(
+            body, state.motion, state.filters, state.contacts, gait.to_array(), self._settings,
+            self._trunk, self._ground, trace[0], *t.args(),
         )  # fmt: skip
         return trace
 
     def advance(self, command: NDArray[np.float64], trace: NDArray[np.void]) -> Result:
         """Advance `len(trace)` substeps under a command (four gait parameters), filling one trace row each.
 
-        If anything is not finite at the end, the state stays as it was and the result says so.
+        If anything is not finite at the end, the state stays as it was, the result says so and `trace` is
+        without meaning.
+
+        Raises:
+            ParameterError: the command is not four numbers.
         """
-        before, force = self.state.copy(), self._force
-        state = self.state
-        self._force = advance(
-            state.body, state.motion, state.filters, state.contacts, command, self._settings, self._trunk, self._ground,
-            self.sim_dt, self._force, trace, *self.tables.args(),
+        command = np.asarray(command, dtype=np.float64)
+        if command.shape != (4,):
+            raise ParameterError(f"command: expected 4 values {PARAMETERS}, got shape {command.shape}")
+        state, before = self.state, self.state.copy()
+        advance(
+            state.body, state.motion, state.filters, state.contacts, command, self._settings,
+            self._trunk, self._ground, self.sim_dt, trace, *self.tables.args(),
         )  # fmt: skip
-        if np.isfinite(self._force) and np.isfinite(state.motion["theta"]) and np.isfinite(state.body["cx"]):
+        if math.isfinite(sum(state.body.item()) + sum(state.motion.item())):
             return Result.OK
-        self.state, self._force = before, force
+        self.state = before
         return Result.NOT_FINITE

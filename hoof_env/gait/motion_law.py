@@ -1,9 +1,9 @@
 """From commands to motion: filtered gait parameters, crank angle and swing angle with all their derivatives.
 
-A command (crank speed, swing offset, sine and cosine coefficient) does not act at once. Each passes a filter whose
-rate and acceleration are bounded, so that crank angle and swing angle are twice differentiable whatever a policy
-asks. The filters are part of the state, and their derivatives enter the swing's rate and acceleration: a hoof
-speed that comes from changing a parameter is a real speed.
+A command (crank speed, swing offset, sine and cosine coefficient) does not act at once. Each passes a filter
+whose rate and acceleration are bounded, so that crank angle and swing angle are twice differentiable whatever
+a policy asks. The filters are part of the state, and their derivatives enter the swing's rate and
+acceleration: a hoof speed that comes from changing a parameter is a real speed.
 """
 
 from __future__ import annotations
@@ -19,11 +19,16 @@ from hoof_env.errors import ParameterError, check_number
 FILTER = np.dtype([("value", "f8"), ("rate", "f8"), ("acc", "f8")])
 """State of one filter: a parameter, its rate and its acceleration (per s, per s^2)."""
 
+INNER = 5.0
+"""How many times faster a filter's rate follows than its value; above 4 the approach does not oscillate."""
+
 SPEED, OFFSET, SIN, COS = range(4)
 """Order of the four filters, as in `gait.parameters.PARAMETERS`."""
 
-MOTION = np.dtype([(name, "f8") for name in ("theta", "theta_rate", "theta_acc", "phi", "phi_rate", "phi_acc")])
-"""Crank angle (clockwise positive, not wrapped) and swing angle with two derivatives each [rad, rad/s, rad/s^2]."""
+MOTION = np.dtype(
+    [(name, "f8") for name in ("theta", "theta_rate", "theta_acc", "phi", "phi_rate", "phi_acc")]
+)
+"""Crank angle (clockwise positive, not wrapped) and swing angle, with two derivatives each [rad, s]."""
 
 
 @dataclass(frozen=True)
@@ -31,11 +36,12 @@ class FilterSettings:
     """Bounds of the command filters.
 
     Attributes:
-        gain: how fast a parameter approaches its command [1/s]; the inner loop is five times as fast.
+        gain: how fast a parameter approaches its command [1/s]; the rate follows `INNER` times as fast.
         crank_rate, crank_acc: bounds on the crank speed's rate [rad/s^2] and its acceleration [rad/s^3].
         swing_rate, swing_acc: the same for the three swing parameters [rad/s, rad/s^2].
 
-    The acceleration bound must allow the approach: gain * rate <= acc, else a parameter could overshoot its command.
+    The acceleration bound must allow the approach: gain * rate <= acc, else a parameter could overshoot its
+    command.
     """
 
     gain: float = 20.0
@@ -55,6 +61,11 @@ class FilterSettings:
                     f"got {self.gain:g} * {rate:g} > {acc:g}"
                 )
 
+    @property
+    def longest_step(self) -> float:
+        """Longest time step [s] at which the filters still keep their bounds and do not overshoot."""
+        return 1.0 / (INNER * self.gain)
+
     def to_array(self) -> NDArray[np.float64]:
         """Rows (gain, rate bound, acceleration bound) for the four filters, shape (4, 3)."""
         crank = (self.gain, self.crank_rate, self.crank_acc)
@@ -70,11 +81,11 @@ def clip(x: float, bound: float) -> float:
 
 @kernel
 def command_filters(filters, command, settings):  # type: ignore[no-untyped-def]
-    """Set each filter's acceleration from its command: a bounded rate towards it, a bounded acceleration to that rate."""
+    """Set each filter's acceleration: bounded, towards a bounded rate, towards the command."""
     for k in range(4):
         gain, rate_bound, acc_bound = settings[k, 0], settings[k, 1], settings[k, 2]
         wanted_rate = clip(gain * (command[k] - filters[k].value), rate_bound)
-        filters[k].acc = clip(5.0 * gain * (wanted_rate - filters[k].rate), acc_bound)
+        filters[k].acc = clip(INNER * gain * (wanted_rate - filters[k].rate), acc_bound)
 
 
 @kernel
