@@ -18,8 +18,11 @@ TRACE = np.dtype(
             "theta", "theta_rate", "theta_acc",  # crank angle, clockwise in the leg's frame [rad ...]
             "phi", "phi_rate", "phi_acc",  # swing angle of the leg's frame [rad ...]
             "trunk_x", "trunk_y", "trunk_vx", "trunk_vy",  # crank centre O in the world [m, m/s]
+            # where it is, how fast it slides, penetration (negative in the air) and its rate [m, m/s];
+            # approach speed [m/s] and forces [N], 0 outside the ground
             "toe_x", "toe_vx", "toe_penetration", "toe_rate", "toe_approach", "toe_normal", "toe_friction",
-            "heel_x", "heel_vx", "heel_penetration", "heel_rate", "heel_approach", "heel_normal", "heel_friction",
+            "heel_x", "heel_vx", "heel_penetration", "heel_rate",
+            "heel_approach", "heel_normal", "heel_friction",
             "hoof_angle",  # heel up positive [rad]
             "normal", "friction", "grf",  # sums over both points and their resultant [N]
             "cop_x",  # centre of pressure [m], NaN without load
@@ -28,7 +31,7 @@ TRACE = np.dtype(
         )
     ]
 )  # fmt: skip
-"""One row a substep, taken at its end. A contact quantity is 0 outside the ground."""
+"""One row a substep, taken at its end."""
 
 
 @kernel
@@ -65,5 +68,3 @@ def new_trace(rows: int) -> NDArray[np.void]:
 def to_table(trace: NDArray[np.void]) -> dict[str, Any]:
     """A trace as columns, name to array, for people who do not want a structured array."""
     return {name: trace[name].copy() for name in TRACE.names or ()}
-
-

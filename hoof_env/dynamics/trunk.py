@@ -1,4 +1,4 @@
-"""What the leg hangs from: a trunk that is fixed, slides on a rail or is suspended by the rest of the animal."""
+"""What the leg hangs from: a trunk that is fixed, on a rail or suspended by the rest of the animal."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ FIXED, RAIL, SUSPENDED = range(3)
 
 TRUNK = np.dtype(
     [("kind", "i8")]
-    + [(name, "f8") for name in ("mass", "total_mass", "share", "stiffness", "damping", "height", "drag", "gravity")]
+    + [
+        (name, "f8")
+        for name in ("mass", "total_mass", "share", "stiffness", "damping", "height", "drag", "gravity")
+    ]
 )
 
 
@@ -24,9 +27,9 @@ TRUNK = np.dtype(
 class Trunk:
     """The trunk over one leg; O, the crank centre, is its point.
 
-    "fixed": O stays where it is. "rail": O slides along x at fixed height. "suspended": O moves along x and y; the leg
-    must bear `share` of the weight of trunk and leg, the rest of the animal carries the other part and adds a vertical
-    spring and damper towards `height`. The trunk does not pitch.
+    "fixed": O stays where it is. "rail": O slides along x at fixed height. "suspended": O moves along x and
+    y; the leg must bear `share` of the weight of trunk and leg, the rest of the animal carries the other part
+    and adds a vertical spring and damper towards `height`. The trunk does not pitch.
 
     Attributes:
         kind: one of `TRUNKS`.

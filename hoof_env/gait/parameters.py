@@ -17,12 +17,12 @@ LIMITS = MappingProxyType(
     {
         "crank_speed": (0.0, 4 * np.pi),
         "swing_offset": (0.0, 1.4),
-        "swing_sin": (-0.8, 0.8),
-        "swing_cos": (-0.8, 0.8),
+        "swing_sin": (-0.8, 0.4),
+        "swing_cos": (-0.8, 0.2),
     }
 )
-"""Lowest and highest value of each gait parameter [rad/s, rad, rad, rad]; both gaits of the paper lie inside, and
-the middle of the first is the paper's crank speed, 2 pi."""
+"""Lowest and highest value of each gait parameter [rad/s, rad, rad, rad]; both gaits of the paper lie inside,
+and the middle of the first is the paper's crank speed, 2 pi."""
 
 
 @dataclass(frozen=True)
@@ -31,14 +31,14 @@ class GaitParameters:
 
         phi = swing_offset + swing_sin * sin(theta) + swing_cos * cos(theta),   theta the crank angle.
 
-    The paper says that running 'controls the leg orientation by swinging motion with respect to the body' and does
-    not print the law; one harmonic is this project's assumption.
+    The paper says that running 'controls the leg orientation by swinging motion with respect to the body' and
+    does not print the law; one harmonic is this project's assumption.
 
     Attributes:
         crank_speed: theta's rate [rad/s], 0 to 4 pi.
         swing_offset: phi0 [rad], 0 to 1.4.
-        swing_sin: A [rad], -0.8 to 0.8.
-        swing_cos: B [rad], -0.8 to 0.8.
+        swing_sin: A [rad], -0.8 to 0.4.
+        swing_cos: B [rad], -0.8 to 0.2.
 
     Raises:
         ParameterError: a value is not finite or outside `LIMITS`.
@@ -52,7 +52,9 @@ class GaitParameters:
     def __post_init__(self) -> None:
         for item in fields(self):
             low, high = LIMITS[item.name]
-            object.__setattr__(self, item.name, check_number(item.name, getattr(self, item.name), low=low, high=high))
+            object.__setattr__(
+                self, item.name, check_number(item.name, getattr(self, item.name), low=low, high=high)
+            )
 
     def to_array(self) -> NDArray[np.float64]:
         """The four values in the order of the fields, shape (4,)."""
@@ -85,9 +87,13 @@ def load_gait(name: str, preset: str | Path = "first_fit") -> GaitParameters:
     """
     gaits = read_preset(preset).get("gaits")
     if not isinstance(gaits, dict) or not gaits:
-        raise DataFileError(f"preset {preset}: expected an object 'gaits' with at least one gait, got {gaits!r}")
+        raise DataFileError(
+            f"preset {preset}: expected an object 'gaits' with at least one gait, got {gaits!r}"
+        )
     check_choice("gait", name, gaits)
     try:
         return GaitParameters(**gaits[name])
     except TypeError as error:
-        raise DataFileError(f"preset {preset}, gait {name!r}: expected {', '.join(PARAMETERS)}: {error}") from None
+        raise DataFileError(
+            f"preset {preset}, gait {name!r}: expected {', '.join(PARAMETERS)}: {error}"
+        ) from None

@@ -55,8 +55,8 @@ class Ground:
         normal_law: one of `NORMAL_LAWS`.
         restitution: nominal coefficient of restitution cr, 0 ('inelastic') to 1 ('elastic').
         approach_floor: smallest approach speed [m/s] that Eq. 14 divides by.
-        approach: "interpolated" takes the approach speed at the interpolated crossing, "sampled" at the first sample
-            inside, as a loop with a fixed step does.
+        approach: "interpolated" takes the approach speed at the interpolated crossing, "sampled" at the first
+            sample inside, as a loop with a fixed step does.
         friction_law: one of `FRICTION_LAWS`.
         friction: mu_k [-]; the paper's 0.4.
         friction_slow, friction_fast: threshold speeds of the friction law [m/s], assumed (not in the paper).
@@ -91,7 +91,8 @@ class Ground:
         check_number("reference_mass", self.reference_mass, low=0, exclusive_low=True)
         if self.friction_fast <= self.friction_slow:
             raise ParameterError(
-                f"friction_fast: expected more than friction_slow = {self.friction_slow:g} m/s, got {self.friction_fast:g}"
+                f"friction_fast: expected more than friction_slow = {self.friction_slow:g} m/s, "
+                f"got {self.friction_fast:g}"
             )
         damping(self.normal_law, self.restitution, self.stiffness, self.reference_mass)
 
@@ -118,7 +119,7 @@ def latch(contact, penetration, rate, ground):  # type: ignore[no-untyped-def]
     if penetration > 0.0 and not contact.inside:
         speed = rate
         if ground.interpolated and contact.penetration < 0.0:
-            part = contact.penetration / (contact.penetration - penetration)  # of the step, up to the crossing
+            part = contact.penetration / (contact.penetration - penetration)  # of the step, to the crossing
             speed = contact.rate + part * (rate - contact.rate)
         contact.approach = max(speed, ground.approach_floor)
     contact.inside = penetration > 0.0
@@ -144,9 +145,11 @@ def touch(contact, position, velocity, ground):  # type: ignore[no-untyped-def]
     contact.friction = 0.0
     if contact.inside:
         contact.normal = normal_force(
-            contact.penetration, contact.rate, contact.approach, ground.stiffness, ground.exponent, ground.chi, ground.dashpot
+            contact.penetration, contact.rate, contact.approach,
+            ground.stiffness, ground.exponent, ground.chi, ground.dashpot,
         )  # fmt: skip
         contact.friction = friction_force(
-            contact.vx, contact.normal, ground.friction_law, ground.friction, ground.friction_slow, ground.friction_fast
-        )
+            contact.vx, contact.normal,
+            ground.friction_law, ground.friction, ground.friction_slow, ground.friction_fast,
+        )  # fmt: skip
     return complex(contact.friction, contact.normal)

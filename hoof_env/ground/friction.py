@@ -1,9 +1,9 @@
 """Friction laws: F_t = -mu(v) F_n v / |v| with a coefficient that depends on the sliding speed.
 
-Eq. 15 of the paper is Coulomb friction with Ambrosio's dynamic correction c_d; its c_f is read as the direction
-v / |v|, for friction opposes sliding. All laws here are functions of the sliding speed alone: they cannot hold a
-hoof at rest, it creeps. Sources: Ambrosio 2003 (in Virtual Nonlinear Multibody Systems, 57-81); Threlfall 1978 (Mech Mach
-Theory 13:475); hyperbolic tangent, common in robotics.
+Eq. 15 of the paper is Coulomb friction with Ambrosio's dynamic correction c_d; its c_f is read as the
+direction v / |v|, for friction opposes sliding. All laws here are functions of the sliding speed alone: they
+cannot hold a hoof at rest, it creeps. Sources: Ambrosio 2003 (in Virtual Nonlinear Multibody Systems, 57-81);
+Threlfall 1978 (Mech Mach Theory 13:475); hyperbolic tangent, common in robotics.
 """
 
 from __future__ import annotations
@@ -22,8 +22,9 @@ def friction_coefficient(speed, law, kinetic, slow, fast):  # type: ignore[no-un
 
     Args:
         speed: sliding speed |v| [m/s].
-        law: index into `FRICTION_LAWS`. 0, Ambrosio: mu_k c_d with c_d = 0 below `slow`, 1 above `fast`, linear between.
-            1, Threlfall: mu_k (1 - exp(-3 |v| / v0)) up to v0 = `fast`, constant above. 2: mu_k tanh(|v| / `fast`).
+        law: index into `FRICTION_LAWS`. 0, Ambrosio: mu_k c_d with c_d = 0 below `slow`, 1 above `fast`,
+            linear between. 1, Threlfall: mu_k (1 - exp(-3 |v| / v0)) up to v0 = `fast`, constant above.
+            2: mu_k tanh(|v| / `fast`).
         kinetic: mu_k [-].
         slow, fast: threshold speeds v0 and v1 [m/s]; the paper does not print them.
     """

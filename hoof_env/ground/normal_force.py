@@ -1,15 +1,18 @@
 """Normal contact laws: how hard the ground pushes back.
 
-Every law is one expression, F = K d^n (1 + chi v / v0) + c v with penetration d, penetration rate v and approach
-speed v0 latched at touch-down; the laws differ in the damping factor chi as a function of the coefficient of
-restitution cr (and Kelvin-Voigt in using a dashpot c instead). Eq. 14 of the paper is Lankarani and Nikravesh's.
+Every law is one expression, F = K d^n (1 + chi v / v0) + c v with penetration d, penetration rate v and
+approach speed v0 latched at touch-down; the laws differ in the damping factor chi as a function of the
+coefficient of restitution cr (and Kelvin-Voigt in using a dashpot c instead). Eq. 14 of the paper is
+Lankarani and Nikravesh's.
 
 For a free impact of a mass, any K and n, a factor chi returns the restitution e that solves
-chi (1 + e) = ln[(1 + chi) / (1 - chi e)]; only "exact" returns cr itself. Lankarani and Nikravesh's law at cr = 0 bounces
-with e = 0.66. Sources: Lankarani & Nikravesh 1990 (J Mech Des 112:369), Hunt & Crossley 1975 (J Appl Mech 42:440),
-Flores et al. 2011 (Multibody Syst Dyn 25:357), Gonthier et al. 2004 (Multibody Syst Dyn 11:209), Hu & Guo 2015,
-Skrinjar et al. 2018 (Int J Mech Sci 145:171, a review); Schwager & Poeschel 2007 (Granular Matter 9:465) for the
-spring-dashpot that may not pull.
+chi (1 + e) = ln[(1 + chi) / (1 - chi e)]; only "exact" returns cr itself. Lankarani and Nikravesh's law at
+cr = 0 bounces with e = 0.66.
+
+Sources: Lankarani & Nikravesh 1990 (J Mech Des 112:369), Hunt & Crossley 1975 (J Appl Mech 42:440), Flores
+et al. 2011 (Multibody Syst Dyn 25:357), Gonthier et al. 2004 (Multibody Syst Dyn 11:209), Hu & Guo 2015;
+Skrinjar et al. 2018 (Int J Mech Sci 145:171), a review; Schwager & Poeschel 2007 (Granular Matter 9:465) for
+the spring-dashpot that may not pull.
 """
 
 from __future__ import annotations
@@ -75,8 +78,8 @@ def damping(law: str, restitution: float, stiffness: float, reference_mass: floa
         law: one of `NORMAL_LAWS`.
         restitution: nominal coefficient of restitution, 0 to 1.
         stiffness: K [N/m^n]; used by "kelvin-voigt" only.
-        reference_mass: mass [kg] for which "kelvin-voigt" with exponent 1 returns `restitution`; a linear dashpot has
-            one restitution for each mass.
+        reference_mass: mass [kg] for which "kelvin-voigt" with exponent 1 returns `restitution`; a linear
+            dashpot has one restitution for each mass.
 
     Raises:
         ParameterError: unknown law, or a restitution that the law cannot represent.
@@ -85,8 +88,8 @@ def damping(law: str, restitution: float, stiffness: float, reference_mass: floa
     cr = check_number("restitution", restitution, low=0, high=1)
     if law not in ("lankarani-nikravesh", "hunt-crossley") and cr < SMALLEST_RESTITUTION:
         raise ParameterError(
-            f"restitution: expected a number in [{SMALLEST_RESTITUTION}, 1] for {law!r}, whose damping grows without "
-            f"bound towards 0, got {restitution!r}"
+            f"restitution: expected a number in [{SMALLEST_RESTITUTION}, 1] for {law!r}, whose damping grows "
+            f"without bound towards 0, got {restitution!r}"
         )
     if law == "kelvin-voigt":
         return 0.0, 2 * kelvin_voigt_damping_ratio(cr) * math.sqrt(stiffness * reference_mass)
@@ -94,10 +97,12 @@ def damping(law: str, restitution: float, stiffness: float, reference_mass: floa
 
 
 def restitution_of_factor(chi: float) -> float:
-    """Restitution e [-] that a free impact returns under damping factor chi: chi (1 + e) = ln[(1 + chi) / (1 - chi e)]."""
+    """Restitution e [-] of a free impact under damping factor chi; see the module docstring."""
     if chi <= 1e-9:
         return 1.0
-    return _bisect(lambda e: math.log1p(chi) - math.log1p(-chi * e) - chi * (1 + e), 0.0, min(1.0, (1 - 1e-15) / chi))
+    return _bisect(
+        lambda e: math.log1p(chi) - math.log1p(-chi * e) - chi * (1 + e), 0.0, min(1.0, (1 - 1e-15) / chi)
+    )
 
 
 def restitution_of_damping_ratio(zeta: float) -> float:

@@ -1,8 +1,9 @@
 """What a leg is: its lengths, pivot, assembly, masses and how it stands in the world.
 
-A `Geometry` is a frozen value; building one checks it. A leg that cannot turn through a full crank revolution is
-refused with the dyad, the crank angle and the missing length. Presets are JSON files with a provenance line in
-`hoof_env/data`; the default, `first_fit`, is *identified* from the paper's results (the paper prints no lengths).
+A `Geometry` is a frozen value; building one checks it. A leg that cannot turn through a full crank revolution
+is refused with the dyad, the crank angle and the missing length. Presets are JSON files with a provenance
+line in `hoof_env/data`; the default, `first_fit`, is *identified* from the paper's results (the paper prints
+no lengths).
 """
 
 from __future__ import annotations
@@ -25,9 +26,9 @@ from hoof_env.leg.linkage import BODIES, BODY_LENGTHS, CONSTRUCTION, DYADS, LENG
 INERTIA_RULES = ("uniform_rod", "paper")
 
 LINEAR_DENSITY = 1.0
-"""Default mass per length of a link [kg/m]. The paper prints no masses. One kilogram a metre gives the identified
-leg 7.3 kg, 9 % of the default trunk; on a fixed trunk masses change torques and reactions only, never motion or
-ground force."""
+"""Default mass per length of a link [kg/m]. The paper prints no masses. One kilogram a metre gives the
+identified leg 7.3 kg, 9 % of the default trunk; on a fixed trunk masses change torques and reactions only,
+never motion or ground force."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +40,8 @@ class Geometry:
         pivot: position of the fixed pivot C relative to the crank centre O [m].
         assembly: for each dyad's point, +1 if it lies left of the line between its two centres, else -1.
         toe, heel: which of the hoof corners "I" and "J" is which.
-        travel: +1 if the leg travels towards +x of its own frame, -1 if towards -x. The world's x always points
-            forward; the mirror is applied where the leg is placed in the world and nowhere else.
+        travel: +1 if the leg travels towards +x of its own frame, -1 if towards -x. The world's x always
+            points forward; the mirror is applied where the leg is placed in the world and nowhere else.
         hip_height: height of O above the ground in the paper's set-up [m], one level for both gaits.
         linear_density: mass per length of every link [kg/m], unless `masses` is given.
         masses: 14 link masses [kg], or None for `linear_density` times length.
@@ -68,14 +69,18 @@ class Geometry:
 
     def __post_init__(self) -> None:
         _check_keys("lengths", self.lengths, LENGTHS)
-        lengths = {k: check_number(f"lengths[{k!r}]", self.lengths[k], low=0, exclusive_low=True) for k in LENGTHS}
+        lengths = {
+            k: check_number(f"lengths[{k!r}]", self.lengths[k], low=0, exclusive_low=True) for k in LENGTHS
+        }
         points = [dyad.point for dyad in DYADS]
         _check_keys("assembly", self.assembly, points)
         for point in points:
             if self.assembly[point] not in (1, -1):
                 raise ParameterError(f"assembly[{point!r}]: expected +1 or -1, got {self.assembly[point]!r}")
         if {self.toe, self.heel} != {"I", "J"}:
-            raise ParameterError(f"toe and heel: expected I and J, one each, got {self.toe!r} and {self.heel!r}")
+            raise ParameterError(
+                f"toe and heel: expected I and J, one each, got {self.toe!r} and {self.heel!r}"
+            )
         if self.travel not in (1, -1):
             raise ParameterError(f"travel: expected +1 or -1, got {self.travel!r}")
         if len(self.pivot) != 2:
@@ -171,8 +176,8 @@ def _from_dict(data: Mapping[str, Any]) -> Geometry:
     return Geometry(**values)
 
 
-def _solve(geometry: Geometry, theta: NDArray[np.float64]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Points and, per dyad, (d, r1, r2) at crank angles `theta`; NaN past the first dyad that does not close."""
+def _solve(geometry: Geometry, theta: NDArray[np.floating[Any]]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Points and, per dyad, (d, r1, r2) at crank angles `theta`; NaN past a dyad that does not close."""
     lengths = geometry.lengths
     z: dict[str, Any] = {"O": 0j * theta, "C": complex(*geometry.pivot) + 0j * theta}
     z["P"] = lengths["OP"] * np.exp(-1j * theta)
@@ -216,15 +221,16 @@ def check_full_revolution(geometry: Geometry, samples: int = 3600) -> None:
             margins = np.stack([r1 + r2 - d, d - abs(r1 - r2)])
             which, where = np.unravel_index(np.argmin(margins), margins.shape)
             miss, angle = -margins[which, where], float(theta[where])
-            if miss >= 0:
+            if not miss < 0:  # or not a number: an earlier dyad misses between two samples
                 break
             theta = angle + np.linspace(-1, 1, 201) * (theta[1] - theta[0])
-        if miss >= 0:
+        if not miss < 0:
             reach = "too far apart by" if which == 0 else "too close by"
             raise GeometryError(
-                f"dyad {index + 1} ({dyad.first}-{dyad.point}-{dyad.second}, lengths {r1:.6g} and {r2:.6g} m) does not "
-                f"close at crank angle {np.degrees(angle) % 360:.2f} deg: its centres, {float(d[where]):.6g} m apart, "
-                f"are {reach} {miss:.3g} m; expected a leg that turns through a full revolution"
+                f"dyad {index + 1} ({dyad.first}-{dyad.point}-{dyad.second}, lengths {r1:.6g} and {r2:.6g} m)"
+                f" does not close at crank angle {np.degrees(angle) % 360:.2f} deg: its centres, "
+                f"{float(d[where]):.6g} m apart, are {reach} {miss:.3g} m; "
+                "expected a leg that turns through a full revolution"
             )
 
 
@@ -253,7 +259,9 @@ def read_preset(source: str | Path) -> dict[str, Any]:
     except ValueError as error:
         raise DataFileError(f"{path}: expected a JSON preset file, but it does not parse: {error}") from None
     if not isinstance(data, dict):
-        raise DataFileError(f"{path}: expected a JSON object with 'geometry' and 'gaits', got {type(data).__name__}")
+        raise DataFileError(
+            f"{path}: expected a JSON object with 'geometry' and 'gaits', got {type(data).__name__}"
+        )
     return data
 
 
@@ -270,7 +278,9 @@ def load_geometry(source: str | Path = "first_fit") -> Geometry:
         values = {"name": str(source), "provenance": data["provenance"], **data["geometry"]}
         return _from_dict(values)
     except (KeyError, TypeError) as error:
-        raise DataFileError(f"preset {source}: its 'geometry' is incomplete or has unknown entries: {error}") from None
+        raise DataFileError(
+            f"preset {source}: its 'geometry' is incomplete or has unknown entries: {error}"
+        ) from None
 
 
 def tables(geometry: Geometry) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
@@ -287,7 +297,9 @@ def tables(geometry: Geometry) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         first, second = number[step.first], number[step.second]
         if isinstance(step, Dyad):
             steps.append((1, number[step.point], first, second, first))
-            values.append((lengths[step.from_first], lengths[step.from_second], float(geometry.assembly[step.point])))
+            values.append(
+                (lengths[step.from_first], lengths[step.from_second], float(geometry.assembly[step.point]))
+            )
         else:
             steps.append((0, number[step.point], first, second, number[step.origin]))
             values.append((lengths[step.distance] / lengths[step.span], 0.0, 0.0))

@@ -1,8 +1,8 @@
 """Closed-form motion of the linkage: position, velocity and acceleration of every point and body.
 
-Planar vectors are complex numbers. `solve_points` finds every point in the frame of the leg, with its first and
-second derivative by the crank angle theta, dyad by dyad and without iteration. `place` turns these into motion in the
-world, for any motion of the crank and of the leg's frame. `pose` wraps both for people.
+Planar vectors are complex numbers. `solve_points` finds every point in the frame of the leg, with its first
+and second derivative by the crank angle theta, dyad by dyad and without iteration. `place` turns these into
+motion in the world, for any motion of the crank and of the leg's frame. `pose` wraps both for people.
 """
 
 from __future__ import annotations
@@ -128,7 +128,8 @@ class Pose:
     Attributes:
         points, point_velocities, point_accelerations: shape (11, 2), rows in the order of `linkage.POINTS`
             [m, m/s, m/s^2].
-        centres, centre_velocities, centre_accelerations: shape (14, 2), rows in the order of `linkage.BODIES`.
+        centres, centre_velocities, centre_accelerations: shape (14, 2), rows in the order of
+            `linkage.BODIES` [m, m/s, m/s^2].
         angles, angular_velocities, angular_accelerations: shape (14,) [rad, rad/s, rad/s^2].
     """
 
@@ -158,8 +159,8 @@ def pose(
 
     Args:
         geometry: the leg.
-        theta, theta_rate, theta_acc: crank angle relative to the leg's frame, positive clockwise in that frame
-            [rad, rad/s, rad/s^2].
+        theta, theta_rate, theta_acc: crank angle relative to the leg's frame, positive clockwise in that
+            frame [rad, rad/s, rad/s^2].
         frame: motion of the leg's frame; at rest at the origin if None.
     """
     frame = frame or FrameMotion()
@@ -167,8 +168,8 @@ def pose(
     steps, values = tables(geometry)
     solve_points(float(theta), geometry.lengths["OP"], complex(*geometry.pivot), steps, values, z, dz, ddz)
     motion = [
-        place(z[k], dz[k], ddz[k], float(theta_rate), float(theta_acc), float(frame.phi), float(frame.phi_rate),
-              float(frame.phi_acc), float(geometry.travel))
+        place(z[k], dz[k], ddz[k], float(theta_rate), float(theta_acc),
+              float(frame.phi), float(frame.phi_rate), float(frame.phi_acc), float(geometry.travel))
         for k in range(len(POINTS))
     ]  # fmt: skip
     r = np.array([m[0] for m in motion]) + complex(*frame.position)

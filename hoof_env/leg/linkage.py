@@ -1,4 +1,4 @@
-"""The mechanism of the paper's Eq. 2 as one table of data: 14 bodies, 20 revolute joints, a lock and a driver.
+"""The mechanism of the paper's Eq. 2 as one table: 14 bodies, 20 revolute joints, a lock and a driver.
 
 Both solvers are built from it. The constrained solver (`hoof_env.dynamics.constrained`) reads `BODIES` and
 `JOINTS` and writes one constraint row after the other; the closed form (`hoof_env.leg.kinematics`) reads
