@@ -10,6 +10,7 @@ class Result(IntEnum):
 
     OK = 0
     NOT_FINITE = 1
+    SINGULAR = 2
 
     @property
     def message(self) -> str:
@@ -20,4 +21,5 @@ class Result(IntEnum):
 _MESSAGES = {
     Result.OK: "ok",
     Result.NOT_FINITE: "the state stopped being finite; it was put back to the last good one",
+    Result.SINGULAR: "the equations of motion are singular; the state was put back to the last good one",
 }

@@ -1,0 +1,266 @@
+"""The leg as the paper solves it (Eqs. 2-9): 42 coordinates, 42 multipliers, Baumgarte stabilisation.
+
+    [ M      Phi_q^T ] [ qdd    ]   [ h                                    ]
+    [ Phi_q  0       ] [ lambda ] = [ gamma - 2 alpha Phi_dot - beta^2 Phi ]      (Eq. 8)
+
+Crank angle and swing follow the motion law exactly; q and qd are integrated numerically and drift. That is
+what this solver is for: it shows what the paper's method does. `dynamics.engine` computes the same motion in
+closed form.
+
+Phi_q is square, so the second row of Eq. 8 alone fixes qdd: contact, masses and weight change the multipliers
+(joint reactions, drive torques) and never the motion. q lives in the frame of the paper's drawing; hoof
+points go to the world, and ground forces come back, through one mirror.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoof_env.dynamics.constraints import (
+    DRIVER_ROW,
+    JOINT_ROWS,
+    LOCK_ROW,
+    SIZE,
+    Closure,
+    Constraints,
+    body_coordinate,
+    closed_form,
+)
+from hoof_env.dynamics.engine import BODY, GRAVITY, State
+from hoof_env.dynamics.integrators import INTEGRATORS, Vector
+from hoof_env.dynamics.result import Result
+from hoof_env.dynamics.trace import new_trace, record
+from hoof_env.dynamics.trunk import Trunk
+from hoof_env.errors import ParameterError, check_choice, check_number
+from hoof_env.gait.motion_law import (
+    MOTION,
+    FilterSettings,
+    advance_motion,
+    command_filters,
+    evaluate_motion,
+    steady_filters,
+)
+from hoof_env.gait.parameters import PARAMETERS, GaitParameters
+from hoof_env.ground.contact import HEEL, TOE, Ground, new_contacts, touch
+from hoof_env.leg.geometry import Geometry
+from hoof_env.leg.kinematics import cross, mirror
+from hoof_env.leg.linkage import BODIES
+
+SOLE = next(i for i, body in enumerate(BODIES) if {body.tail, body.head} == {"I", "J"})
+"""The link whose ends are toe and heel."""
+
+_X, _Y, _TURN = 3 * SOLE, 3 * SOLE + 1, 3 * SOLE + 2
+
+
+@dataclass
+class ConstrainedState(State):
+    """`engine.State` with q and qd, shape (42,) each, in the frame of the paper's drawing."""
+
+    q: Vector
+    qd: Vector
+
+    def copy(self) -> ConstrainedState:
+        """An independent copy."""
+        return ConstrainedState(**{name: array.copy() for name, array in vars(self).items()})
+
+
+class Reactions(NamedTuple):
+    """What the constraints do to the bodies, in the world (x forward, y up, counter-clockwise).
+
+    Attributes:
+        joints: shape (20, 2), force on body `i` of each `Joint(point, i, j)` [N], in the order of
+            `linkage.JOINTS`; body `j` (or the frame) feels the opposite.
+        lock: moment on body 10 by body 7 [N m].
+        driver: moment on the crank by the leg's frame [N m].
+    """
+
+    joints: NDArray[np.float64]
+    lock: float
+    driver: float
+
+
+class ConstrainedLeg:
+    """One leg on a fixed trunk over the ground, by Eq. 8; see the module docstring.
+
+    Interface and meaning of every reported quantity are those of `engine.LegEngine`.
+
+    Args:
+        geometry: the leg.
+        ground: what it stands on.
+        sim_dt: time step h [s].
+        filters: bounds of the command filters.
+        alpha, beta: Baumgarte's parameters [1/s]; the paper's 15 and sqrt(2 * 15). A closure error decays by
+            the roots of s^2 + 2 alpha s + beta^2.
+        integrator: one of `integrators.INTEGRATORS`.
+        height: of O above the ground [m]; the geometry's own if None.
+
+    Raises:
+        ParameterError: a value out of range or an unknown integrator.
+    """
+
+    def __init__(
+        self,
+        geometry: Geometry,
+        ground: Ground,
+        sim_dt: float = 1e-3,
+        filters: FilterSettings | None = None,
+        alpha: float = 15.0,
+        beta: float = math.sqrt(30.0),
+        integrator: str = "euler",
+        height: float | None = None,
+    ) -> None:
+        self.geometry, self.ground = geometry, ground
+        filters = filters or FilterSettings()
+        self.sim_dt = check_number("sim_dt", sim_dt, low=1e-7, high=filters.longest_step)
+        self.alpha = check_number("alpha", alpha, low=0)
+        self.beta = check_number("beta", beta, low=0)
+        self.integrator = check_choice("integrator", integrator, INTEGRATORS)
+        self.trunk = Trunk(kind="fixed", height=geometry.hip_height if height is None else height)
+        self.constraints = Constraints(geometry)
+        self._settings = filters.to_array()
+        self._ground = ground.to_record()
+        self._travel = float(geometry.travel)
+        self._corners = np.array([body_coordinate(geometry, p, SOLE) for p in (geometry.toe, geometry.heel)])
+        masses, inertias = geometry.body_masses, geometry.body_inertias
+        self._system = np.zeros((2 * SIZE, 2 * SIZE))
+        self._system[:SIZE, :SIZE] = np.diag(np.column_stack([masses, masses, inertias]).ravel())  # Eqs. 4, 5
+        self._weight = np.zeros(SIZE)
+        self._weight[1::3] = -masses * GRAVITY  # Eq. 7
+        self.state = ConstrainedState(
+            np.zeros(1, BODY)[0], np.zeros(1, MOTION)[0], steady_filters(np.zeros(4)), new_contacts(),
+            np.zeros(SIZE), np.zeros(SIZE),
+        )  # fmt: skip
+
+    def reset(
+        self,
+        gait: GaitParameters,
+        theta: float = 0.0,
+        height: float | None = None,
+        speed: float = 0.0,
+        x: float = 0.0,
+    ) -> NDArray[np.void]:
+        """Start with the filters at rest at `gait`, crank at `theta` [rad], O at x [m] and the loops closed.
+
+        A hoof point that starts inside the ground has entered it at its present rate. Returns one trace row.
+
+        Raises:
+            ParameterError: theta or x is not finite, or `height` or `speed` is not that of the fixed trunk.
+        """
+        theta, x = check_number("theta", theta), check_number("x", x)
+        if height not in (None, self.trunk.height) or speed != 0.0:
+            raise ParameterError(
+                f"height and speed: a fixed trunk rests at {self.trunk.height:g} m, got {height!r} and {speed!r}"
+            )
+        state, command = self.state, gait.to_array()
+        state.body["t"], state.body["cx"], state.motion["theta"] = 0.0, x, theta
+        state.filters[:] = steady_filters(command)
+        state.contacts[:] = new_contacts()
+        evaluate_motion(state.motion, state.filters)
+        state.q, state.qd = closed_form(self.geometry, state.motion)
+        trace = new_trace(1)
+        self._evaluate(command, trace[0])
+        return trace
+
+    def advance(self, command: NDArray[np.float64], trace: NDArray[np.void]) -> Result:
+        """Advance `len(trace)` substeps under a command (four gait parameters), filling one trace row each.
+
+        If q, qd or the multipliers stop being finite, or Eq. 8 is singular, the state stays as it was, the
+        result says so and `trace` is without meaning.
+
+        Raises:
+            ParameterError: the command is not four numbers.
+        """
+        command = np.asarray(command, dtype=np.float64)
+        if command.shape != (4,):
+            raise ParameterError(f"command: expected 4 values {PARAMETERS}, got shape {command.shape}")
+        before, result = self.state.copy(), Result.OK
+        try:
+            with np.errstate(all="ignore"):  # a diverging integration is a result, not a warning
+                for k, row in enumerate(trace):
+                    if not self._substep(command, before.body["t"] + (k + 1) * self.sim_dt, row):
+                        result = Result.NOT_FINITE
+                        break
+        except np.linalg.LinAlgError:
+            result = Result.SINGULAR
+        if result is not Result.OK:
+            self.state = before
+        return result
+
+    def closure(self) -> Closure:
+        """The constraint equations at the present state; `closure().error` is the drift."""
+        return self.constraints(self.state.q, self.state.qd, self.state.motion)
+
+    def solve(self, ground: bool = True) -> tuple[Vector, Vector]:
+        """qdd and lambda of Eq. 8 at the present state, shape (42,) each, with or without ground forces.
+
+        Raises:
+            numpy.linalg.LinAlgError: Eq. 8 is singular.
+        """
+        return self._solve(self.closure(), self._ground_load() if ground else 0.0)
+
+    def reactions(self) -> Reactions:
+        """Joint forces and moments at the present state, ground included."""
+        load = -self.solve()[1]  # the constraints load the bodies with -Phi_q^T lambda; Phi_q is +1 at body i
+        joints = load[:JOINT_ROWS].reshape(-1, 2) * (self._travel, 1.0)
+        return Reactions(joints, float(self._travel * load[LOCK_ROW]), float(self._travel * load[DRIVER_ROW]))
+
+    def _substep(self, command: NDArray[np.float64], t: float, row: np.void) -> bool:
+        """One step of h to time t; fills `row` and returns whether all is finite."""
+        state = self.state
+        command_filters(state.filters, command, self._settings)
+
+        def acceleration(elapsed: float, q: Vector, qd: Vector) -> Vector:
+            # Ground forces stay out: they do not change qdd, and a contact must not latch at a stage.
+            motion, filters = state.motion.copy(), state.filters.copy()
+            advance_motion(motion, filters, elapsed)
+            evaluate_motion(motion, filters)
+            return self._solve(self.constraints(q, qd, motion))[0]
+
+        state.q, state.qd = INTEGRATORS[self.integrator](acceleration, state.q, state.qd, self.sim_dt)
+        advance_motion(state.motion, state.filters, self.sim_dt)
+        state.body["t"] = t
+        return bool(np.isfinite([state.q, state.qd]).all()) and self._evaluate(command, row)
+
+    def _evaluate(self, command: NDArray[np.float64], row: np.void) -> bool:
+        """Contact and multipliers at the present instant; fills `row`, returns whether these are finite."""
+        state, travel = self.state, self._travel
+        command_filters(state.filters, command, self._settings)
+        evaluate_motion(state.motion, state.filters)
+        trunk = complex(state.body["cx"], self.trunk.height)
+        arms = self._corner_arms()
+        at = complex(state.q[_X], state.q[_Y]) + arms
+        velocity = complex(state.qd[_X], state.qd[_Y]) + 1j * state.qd[_TURN] * arms
+        toe, heel = (trunk + mirror(z, travel) for z in at)
+        touch(state.contacts[TOE], toe, mirror(velocity[TOE], travel), self._ground)
+        touch(state.contacts[HEEL], heel, mirror(velocity[HEEL], travel), self._ground)
+        closure = self.closure()
+        _, multipliers = self._solve(closure, self._ground_load())
+        # The drives bring in lambda . Phi_t, so the torques are lambda . dPhi/dtheta and lambda . dPhi/dphi.
+        crank, hip = multipliers[DRIVER_ROW], multipliers @ closure.by_phi
+        record(row, state.body["t"], state.motion, trunk, 0j, state.contacts, toe, heel, crank, hip)
+        return bool(np.isfinite(multipliers).all())
+
+    def _corner_arms(self) -> NDArray[np.complex128]:
+        """Toe and heel relative to the centre of the sole link, in the frame of q [m]."""
+        return self._corners * np.exp(1j * self.state.q[_TURN])
+
+    def _ground_load(self) -> Vector:
+        """What the present contact forces add to h: force and moment on the sole link."""
+        load = np.zeros(SIZE)
+        for contact, arm in zip(self.state.contacts, self._corner_arms(), strict=True):
+            force = mirror(complex(contact["friction"], contact["normal"]), self._travel)
+            load[[_X, _Y, _TURN]] += force.real, force.imag, cross(arm, force)
+        return load
+
+    def _solve(self, closure: Closure, load: Vector | float = 0.0) -> tuple[Vector, Vector]:
+        """qdd and lambda of Eq. 8, shape (42,) each."""
+        self._system[SIZE:, :SIZE] = closure.jacobian
+        self._system[:SIZE, SIZE:] = closure.jacobian.T
+        stabilised = closure.gamma - 2 * self.alpha * closure.error_rate - self.beta**2 * closure.error
+        solution = np.linalg.solve(self._system, np.concatenate([self._weight + load, stabilised]))
+        return solution[:SIZE], solution[SIZE:]
