@@ -1,1 +1,1 @@
-"""Training, evaluation and the demonstration. Run from a checkout (`python -m agents.train`); not in the wheel."""
+"""Training, evaluation and the demonstration, run from a checkout (`python -m agents.train`)."""

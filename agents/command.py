@@ -11,7 +11,7 @@ from hoof_env.errors import HoofEnvError, ParameterError
 
 
 def run(command: Callable[[], int | None]) -> NoReturn:
-    """Exit with what `command` returns; an error of ours becomes one line and 1, an interruption one line and 130."""
+    """Exit with what `command` returns: one line and 1 for an error of ours, one line and 130 for Ctrl-C."""
     try:
         code = command() or 0
     except HoofEnvError as error:
@@ -24,7 +24,7 @@ def run(command: Callable[[], int | None]) -> NoReturn:
 
 
 def parse_pairs(option: str, items: Sequence[str]) -> dict[str, Any]:
-    """Read `key=value` items, or JSON objects, into one mapping. A value is read as JSON where it is, else kept as text.
+    """Read `key=value` items, or JSON objects, into one mapping; a value that is not JSON is kept as text.
 
     >>> parse_pairs("--env-kwargs", ["trunk=rail", "restitution=0.5", '{"render_mode": null}'])
     {'trunk': 'rail', 'restitution': 0.5, 'render_mode': None}

@@ -14,69 +14,42 @@ A model file is a pickle and can run any code when it is loaded: load only files
 from __future__ import annotations
 
 import json
-import os
 import platform
 import subprocess
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
+from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
 
-from hoof_env.errors import OutputError, ParameterError
+import hoof_env  # noqa: F401  (registers the environments)
+from hoof_env._output import staged
+from hoof_env.errors import DataFileError, ParameterError
 
 PACKAGES = ("hoof-env", "numpy", "gymnasium", "numba", "stable-baselines3", "torch")
 
 
-def make_folder(path: Path) -> Path:
-    """Make `path` and check that it takes a file, or raise `OutputError`."""
-    probe = path / f".probe-{os.getpid()}"
+def make_env(env_id: str, **kwargs: Any) -> gym.Env[Any, Any]:
+    """`gymnasium.make`, refusals in our words.
+
+    Raises:
+        ParameterError: unknown id, or an argument that the environment does not take.
+    """
     try:
-        path.mkdir(parents=True, exist_ok=True)
-        probe.touch()
-        probe.unlink()
-    except OSError as error:
-        raise OutputError(
-            f"cannot write into {path}: {error.strerror}; expected a folder that can be written"
-        ) from None
-    return path
+        return gym.make(env_id, **kwargs)
+    except (gym.error.Error, ModuleNotFoundError, TypeError) as error:
+        raise ParameterError(f"environment {env_id!r} with {kwargs or 'no arguments'}: {error}") from None
 
 
-@contextmanager
-def replacing(path: Path) -> Iterator[Path]:
-    """Give a temporary name beside `path`, and put it in the place of `path` only when the block has succeeded."""
-    partial = path.with_name(f".{path.stem}-{os.getpid()}{path.suffix}")
-    try:
-        yield partial
-        os.replace(partial, path)
-    except OSError as error:
-        raise OutputError(f"cannot write {path}: {error.strerror or error}") from None
-    finally:
-        with suppress(OSError):
-            partial.unlink()
-
-
-def save_model(model: Any, path: Path) -> Path:
-    """Write an SB3 model, and the statistics of its `VecNormalize` if it has one, without ever leaving half a file."""
-    with replacing(path) as partial, partial.open("wb") as file:
-        model.save(file)
-    statistics = model.get_vec_normalize_env()
-    if statistics is not None:
-        with replacing(path.with_name("vecnormalize.pkl")) as partial:
-            statistics.save(str(partial))
-    return path
-
-
-def write_json(path: Path, data: Any) -> None:
-    """Write `data` as JSON, replacing `path` at once."""
-    with replacing(path) as partial:
-        partial.write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
+def describe_spaces(env: Any) -> dict[str, str]:
+    """Both spaces of an environment or a model as text, to be kept beside a model and compared."""
+    return {"observation_space": str(env.observation_space), "action_space": str(env.action_space)}
 
 
 def versions() -> dict[str, str]:
-    """Python, platform, the packages that a result depends on, and the git commit of this checkout where there is one."""
+    """Python, platform, the packages that a result depends on, and the git commit where there is one."""
     found = {"python": platform.python_version(), "platform": f"{platform.system()} {platform.machine()}"}
     for package in PACKAGES:
         with suppress(PackageNotFoundError):
@@ -89,20 +62,105 @@ def versions() -> dict[str, str]:
     return found
 
 
-def make_env(env_id: str, **kwargs: Any) -> gym.Env[Any, Any]:
-    """`gymnasium.make`, with the ids of `hoof_env` registered.
+def write_text(path: Path, text: str) -> None:
+    """Write a text file that replaces an older one only when it is complete; `OutputError` if it cannot."""
+    with staged(path.parent) as stage:
+        (stage / path.name).write_text(text, encoding="utf-8")
 
-    Raises:
-        ParameterError: unknown id, or an argument that the environment does not take.
+
+def save_model(model: Any, path: Path) -> None:
+    """Write an SB3 model, and the statistics of its `VecNormalize` if it has one, never half a file."""
+    with staged(path.parent) as stage:
+        model.save(stage / path.name)
+        if model.get_vec_normalize_env() is not None:
+            model.get_vec_normalize_env().save(str(stage / "vecnormalize.pkl"))
+
+
+@dataclass(frozen=True)
+class SavedModel:
+    """A model file and what its run folder says about it; nothing has been unpickled yet.
+
+    Attributes:
+        path: of the .zip.
+        record: content of run.json, empty where there is none.
     """
-    import hoof_env  # noqa: F401  (registers the environments)
 
-    try:
-        return gym.make(env_id, **kwargs)
-    except (gym.error.Error, ModuleNotFoundError, TypeError) as error:
-        raise ParameterError(f"environment {env_id!r} with {kwargs or 'no arguments'}: {error}") from None
+    path: Path
+    record: dict[str, Any]
+
+    @classmethod
+    def find(cls, path: Path) -> SavedModel:
+        """The model at `path`, which is a .zip or a run folder.
+
+        Raises:
+            DataFileError: there is none, or its run.json cannot be read.
+        """
+        file = path / "model.zip" if path.is_dir() else path
+        if not file.is_file():
+            raise DataFileError(
+                f"model {path}: expected a .zip of agents.train or its run folder, found no {file}"
+            )
+        for beside in (
+            file.parent / "run.json",
+            file.parent.parent / "run.json",
+        ):  # a checkpoint is one deeper
+            if beside.is_file():
+                try:
+                    record = json.loads(beside.read_text(encoding="utf-8"))
+                    return cls(file, {**record, "env_id": record["env_id"], "algo": record["algo"]})
+                except (OSError, ValueError, TypeError, KeyError) as error:
+                    raise DataFileError(
+                        f"{beside}: expected the JSON object of agents.train with env_id and algo: {error!r}"
+                    ) from None
+        return cls(file, {})
+
+    def load(self, env: gym.Env[Any, Any], env_id: str) -> Trained:
+        """Unpickle the model for `env`. This can run any code that the file holds.
+
+        Raises:
+            DataFileError: not a model, or one for another environment or other spaces.
+        """
+        self._check(self.record, {"env_id": env_id, **describe_spaces(env)})
+
+        import stable_baselines3
+        from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
+
+        algorithm = getattr(stable_baselines3, self.record.get("algo", "ppo").upper())
+        statistics, normalize = self.path.with_name("vecnormalize.pkl"), None
+        try:
+            model = algorithm.load(self.path, device="cpu")
+            if statistics.is_file():
+                normalize = VecNormalize.load(str(statistics), DummyVecEnv([lambda: env])).normalize_obs
+        except Exception as error:  # a damaged pickle may raise anything
+            reason = f"{type(error).__name__}: {error}".splitlines()[0]
+            raise DataFileError(
+                f"model {self.path}: expected a model saved by Stable-Baselines3, cannot read it ({reason})"
+            ) from None
+        self._check(describe_spaces(model), describe_spaces(env))
+        return Trained(model, normalize)
+
+    def _check(self, found: dict[str, Any], wanted: dict[str, str]) -> None:
+        for key, value in wanted.items():
+            if found.get(key, value) != value:
+                raise DataFileError(f"model {self.path}: trained for {key} {found[key]}, expected {value}")
 
 
-def describe_spaces(env: gym.Env[Any, Any]) -> dict[str, str]:
-    """Both spaces as text, kept beside a model and compared before it is used."""
-    return {"observation_space": str(env.observation_space), "action_space": str(env.action_space)}
+@dataclass(frozen=True)
+class Trained:
+    """A trained policy that sees observations as it saw them in training.
+
+    Attributes:
+        model: of Stable-Baselines3.
+        normalize: of the `VecNormalize` it was trained with, or None.
+    """
+
+    model: Any
+    normalize: Any
+
+    def predict(
+        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
+    ) -> tuple[Any, Any]:
+        """Action for an observation of the environment."""
+        if self.normalize is not None:
+            observation = self.normalize(observation)
+        return self.model.predict(observation, state, episode_start, deterministic)

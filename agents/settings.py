@@ -33,14 +33,14 @@ def load_settings(path: Path, env_id: str) -> dict[str, Any]:
     entry = entries.get(env_id, entries.get("default"))
     if not isinstance(entry, Mapping) or not {"n_envs", "n_timesteps", "policy"} <= entry.keys():
         raise DataFileError(
-            f"hyperparameter file {path}: expected an entry {env_id!r} or 'default' with n_envs, n_timesteps and policy, "
-            f"got {entry!r}"
+            f"hyperparameter file {path}: expected an entry {env_id!r} or 'default' with "
+            f"n_envs, n_timesteps and policy, got {entry!r}"
         )
     return dict(entry)
 
 
 def model_arguments(settings: Mapping[str, Any]) -> dict[str, Any]:
-    """The part of `settings` that the algorithm's constructor takes, with schedules and network arguments built.
+    """The part of `settings` that the algorithm's constructor takes, schedules and network arguments built.
 
     Raises:
         DataFileError: a schedule or `policy_kwargs` is not in the zoo's form.

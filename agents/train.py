@@ -4,12 +4,14 @@
     python -m agents.train --steps 300000 --max-minutes 2   a quick one
     tensorboard --logdir runs                               watch it
 
-Ctrl-C stops after the current step and keeps the model; pressed twice it stops at once and keeps only checkpoints.
-What a run folder holds is written in agents/runs.py. Runs with the same seed, arguments, machine and versions are equal.
+Ctrl-C stops after the current step and keeps the model; pressed twice it stops at once and keeps only
+checkpoints. What a run folder holds is written in agents/runs.py. The same seed, arguments, machine and
+versions give the same run.
 """
 
 from __future__ import annotations
 
+import json
 import shlex
 import signal
 import sys
@@ -28,6 +30,7 @@ import yaml
 from agents import runs
 from agents.command import parse_pairs, run
 from agents.settings import FOLDER, load_settings, model_arguments
+from hoof_env._output import check_folder
 from hoof_env.errors import OutputError, ParameterError, check_number
 
 
@@ -78,7 +81,7 @@ class Trained:
 
 
 def train(args: Args) -> Trained:
-    """Train as `args` say and fill the run folder; returns early, model kept, on SIGINT, SIGTERM or the time limit.
+    """Train as `args` say and fill the run folder. SIGINT, SIGTERM and the time limit end it early.
 
     Raises:
         ParameterError, DataFileError: the arguments, the environment or the hyperparameters do not fit.
@@ -112,7 +115,7 @@ def train(args: Args) -> Trained:
     from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv, VecMonitor, VecNormalize
 
     # The run folder
-    runs.make_folder(folder)
+    check_folder(folder)
     record = {
         "env_id": args.env_id,
         "env_kwargs": env_kwargs,
@@ -125,9 +128,8 @@ def train(args: Args) -> Trained:
         "command": shlex.join(["python", "-m", "agents.train", *sys.argv[1:]]),
         "versions": runs.versions(),
     }
-    runs.write_json(folder / "run.json", record)
-    with runs.replacing(folder / "config.yml") as partial:
-        partial.write_text(yaml.safe_dump({args.env_id: settings}, sort_keys=False), encoding="utf-8")
+    runs.write_text(folder / "run.json", json.dumps(record, indent=2) + "\n")
+    runs.write_text(folder / "config.yml", yaml.safe_dump({args.env_id: settings}, sort_keys=False))
 
     # Environments, side by side in this process: they are faster than what a pipe to another would cost
     torch.set_num_threads(args.torch_threads)
@@ -180,16 +182,17 @@ def make_watch(folder: Path, steps: int, checkpoint_every: int, max_minutes: flo
                 self.summaries.append(self.locals["infos"][index].get("episode_summary", {}))
             if self.num_timesteps >= self.next_checkpoint:
                 self.next_checkpoint += checkpoint_every
-                checkpoints = runs.make_folder(folder / "checkpoints")
-                runs.save_model(self.model, checkpoints / f"model-{self.num_timesteps}.zip")
+                runs.save_model(self.model, folder / "checkpoints" / f"model-{self.num_timesteps}.zip")
             return self.stopped_by is None and time.monotonic() < self.deadline
 
         def _on_rollout_end(self) -> None:
             if self.model.ep_info_buffer:
                 returns = [episode["r"] for episode in self.model.ep_info_buffer]
                 self.bar.set_postfix_str(f"return {np.mean(returns):.1f}", refresh=False)
-            for key in self.summaries[0] if self.summaries else ():
-                self.logger.record_mean(f"gait/{key}", float(np.mean([one[key] for one in self.summaries])))
+            for summary in self.summaries:
+                for key, value in summary.items():
+                    if np.isfinite(value):  # the cost of transport is infinite without progress
+                        self.logger.record_mean(f"gait/{key}", value)
             self.summaries.clear()
 
         def _on_training_end(self) -> None:

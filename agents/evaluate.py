@@ -1,0 +1,254 @@
+"""Score scripted and trained policies on the same fresh episodes.
+
+    python -m agents.evaluate --policy walk run idle random
+    python -m agents.evaluate --policy run runs/ppo-HorseLeg-v0-s0 --json scores.json --video gait.mp4
+
+A policy is a name (a gait of the preset, idle, random, bang-bang, drag, airborne) or a trained model: its .zip
+or its run folder. Brackets hold the bootstrap's 95 % interval of the mean over episodes.
+
+A model file is a pickle and can run any code when it is loaded: give only files that you trust.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import shlex
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+
+from agents import runs
+from agents.command import parse_pairs, run
+from hoof_env.envs.policies import make_policy, policy_names
+from hoof_env.errors import ParameterError, check_number
+
+DEFAULT_ENV = "hoof_env/HorseLeg-v0"
+
+
+@dataclass(frozen=True)
+class Metric:
+    """One column of the table: `title`, factor and digits of what a person reads."""
+
+    title: str
+    factor: float = 1.0
+    digits: int = 2
+
+
+METRICS = {
+    "return": Metric("return", digits=1),
+    "distance_m": Metric("progress\nm", digits=1),
+    "speed_m_s": Metric("speed\nm/s"),
+    "peak_grf_n": Metric("peak GRF\nkN", 1e-3),
+    "mean_grf_n": Metric("mean GRF\nkN", 1e-3),
+    "stance_peak_sum_n": Metric("stance peaks\nkN", 1e-3, 1),
+    "duty_factor": Metric("duty\nfactor"),
+    "cost_of_transport": Metric("cost of\ntransport"),
+    "failed": Metric("failed"),
+}
+"""The columns: "return", and figures of the episode summary (`hoof_env.envs.stance.summarize`)."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A mean over episodes and the bounds of its 95 % interval, None for one episode or an infinite mean."""
+
+    mean: float
+    low: float | None
+    high: float | None
+
+
+@dataclass(frozen=True)
+class Score:
+    """What a policy did: one dictionary per episode, its return and the figures of its summary."""
+
+    policy: str
+    episodes: list[dict[str, float]]
+
+    @property
+    def estimates(self) -> dict[str, Estimate]:
+        """By key of `METRICS`, those that the episodes have."""
+        return {
+            key: estimate([one[key] for one in self.episodes]) for key in METRICS if key in self.episodes[0]
+        }
+
+
+def estimate(values: Sequence[float]) -> Estimate:
+    """The mean of `values` and the bias-corrected bootstrap's 95 % interval of it."""
+    from scipy.stats import bootstrap
+
+    sample = np.asarray(values, dtype=float)
+    mean = float(sample.mean())
+    if len(sample) < 2 or not math.isfinite(mean):
+        return Estimate(mean, None, None)
+    if np.ptp(sample) <= 1e-12 * abs(mean):  # the bootstrap is undefined without variance
+        return Estimate(mean, mean, mean)
+    bounds = bootstrap((sample,), np.mean, rng=np.random.default_rng(0)).confidence_interval
+    return Estimate(mean, float(bounds.low), float(bounds.high))
+
+
+def play(
+    env: gym.Env[Any, Any], policy: Any, seeds: Sequence[int], tick: Any = lambda: None
+) -> list[dict[str, float]]:
+    """One episode per seed; its return and its summary. `tick` is called after each."""
+    episodes = []
+    for seed in seeds:
+        observation, info = env.reset(seed=seed)
+        total, start, done = 0.0, np.ones(1, bool), False
+        while not done:
+            action, _ = policy.predict(observation, episode_start=start, deterministic=True)
+            observation, reward, terminated, truncated, info = env.step(action)
+            total, start, done = total + float(reward), np.zeros(1, bool), terminated or truncated
+        episodes.append({"return": total, **info.get("episode_summary", {})})
+        tick()
+    return episodes
+
+
+def is_model(name: str) -> bool:
+    """Whether a policy's name is the path of a model rather than that of a scripted policy."""
+    return name.endswith(".zip") or "/" in name or Path(name).exists()
+
+
+def find_policy(name: str, env: gym.Env[Any, Any], env_id: str) -> Any:
+    """A scripted policy by its name, or a trained one by its path.
+
+    Raises:
+        ParameterError: unknown name. DataFileError: no such model, or one that does not fit.
+    """
+    if is_model(name):
+        return runs.SavedModel.find(Path(name)).load(env, env_id)
+    names = policy_names(env) if hasattr(env.unwrapped, "gaits") else []
+    if name not in names:
+        known = ", ".join(names) or f"none is scripted for {env_id}"
+        raise ParameterError(
+            f"policy: expected a name ({known}) or the path of a trained model, got {name!r}"
+        )
+    return make_policy(name, env)
+
+
+@dataclass(frozen=True)
+class Args:
+    policy: tuple[str, ...] = ("walk", "run", "idle", "random")
+    """names of scripted policies and paths of trained models (trusted ones only: a model is code)"""
+    episodes: int = 20
+    """of each policy"""
+    seed: int = 1000
+    """of the first episode; the others follow it"""
+    env_id: str | None = None
+    """environment; otherwise that of the first trained model, or hoof_env/HorseLeg-v0"""
+    env_kwargs: tuple[str, ...] = ()
+    """its arguments: key=value ..., or one JSON object; otherwise those of the first trained model"""
+    json: Path | None = None
+    """write all figures of all episodes to this file"""
+    video: Path | None = None
+    """film the first episode of each policy to this MP4; with several policies the name is added to it"""
+
+
+def evaluate(args: Args) -> tuple[list[Score], dict[str, Any]]:
+    """Score the policies of `args`; returns the scores and what they were measured in (env_id, env_kwargs).
+
+    Raises:
+        ParameterError, DataFileError: the arguments, a policy or a model do not fit.
+        OutputError: the video cannot be written.
+    """
+    from tqdm import tqdm
+
+    check_number("episodes", args.episodes, low=1)
+    check_number("seed", args.seed, low=0)
+    records = [runs.SavedModel.find(Path(name)).record for name in args.policy if is_model(name)]
+    record = next(filter(None, records), {})
+    env_id = args.env_id or record.get("env_id", DEFAULT_ENV)
+    kwargs = parse_pairs("--env-kwargs", args.env_kwargs) or record.get("env_kwargs", {})
+    scores = []
+    with runs.make_env(env_id, **kwargs) as env:
+        policies = {
+            name: find_policy(name, env, env_id) for name in args.policy
+        }  # all, before the first is played
+        with tqdm(total=args.episodes * len(policies), unit=" episodes", leave=False, disable=None) as bar:
+            for name, policy in policies.items():
+                bar.set_description(name)
+                seeds = range(args.seed, args.seed + args.episodes)
+                scores.append(Score(name, play(env, policy, seeds, bar.update)))
+    if args.video:
+        from agents.video import film
+
+        with runs.make_env(env_id, render_mode="rgb_array", **kwargs) as env:
+            for name in policies:
+                suffix = f"-{Path(name).stem}" if len(policies) > 1 else ""
+                path = args.video.with_name(f"{args.video.stem}{suffix}{args.video.suffix or '.mp4'}")
+                film(env, find_policy(name, env, env_id), path, seed=args.seed)
+                print(f"filmed {name}: {path}")
+    return scores, {"env_id": env_id, "env_kwargs": kwargs}
+
+
+def cell(metric: Metric, value: Estimate) -> tuple[str, str]:
+    """Mean and interval as a person reads them."""
+    if not math.isfinite(value.mean):
+        return "∞", ""
+    mean, *bounds = (
+        "" if x is None else f"{x * metric.factor:.{metric.digits}f}"
+        for x in (value.mean, value.low, value.high)
+    )
+    return mean, f"[{bounds[0]}, {bounds[1]}]" if bounds[0] else ""
+
+
+def table(scores: Sequence[Score]) -> Any:
+    """The scores as a `rich` table."""
+    from rich import box
+    from rich.table import Table
+
+    columns = list(scores[0].estimates)
+    grid = Table(box=box.SIMPLE_HEAD, show_lines=False, pad_edge=False)
+    grid.add_column("policy", no_wrap=True)
+    for key in columns:
+        grid.add_column(METRICS[key].title, justify="right")
+    for score in scores:
+        cells = [cell(METRICS[key], score.estimates[key]) for key in columns]
+        grid.add_row(score.policy, *("\n".join(pair) for pair in cells))
+    return grid
+
+
+def to_json(scores: Sequence[Score], **about: Any) -> dict[str, Any]:
+    """The scores as plain data: JSON knows no infinity, so an infinite figure is null."""
+
+    def finite(value: float | None) -> float | None:
+        return value if value is not None and math.isfinite(value) else None
+
+    return {
+        **about,
+        "policies": {
+            score.policy: {
+                "mean": {key: finite(value.mean) for key, value in score.estimates.items()},
+                "interval95": {key: [finite(v.low), finite(v.high)] for key, v in score.estimates.items()},
+                "episodes": [{key: finite(value) for key, value in one.items()} for one in score.episodes],
+            }
+            for score in scores
+        },
+    }
+
+
+def main(argv: list[str] | None = None) -> None:
+    import tyro
+    from rich.console import Console
+
+    args = tyro.cli(Args, args=argv, description=__doc__)
+    scores, setting = evaluate(args)
+    console = Console(width=None if sys.stdout.isatty() else 160)
+    console.print(table(scores))
+    if args.json:
+        about = {
+            "command": shlex.join(["python", "-m", "agents.evaluate", *sys.argv[1:]]),
+            "versions": runs.versions(),
+        }
+        data = to_json(scores, **setting, seed=args.seed, **about)
+        runs.write_text(args.json, json.dumps(data, indent=1, allow_nan=False) + "\n")
+        print(f"written: {args.json}")
+
+
+if __name__ == "__main__":
+    run(main)
