@@ -37,7 +37,7 @@ REASONS = {  # a sign in what pip or venv says: what it means. The first sign th
     "ConnectTimeoutError": UNREACHABLE,
     "ProxyError": UNREACHABLE,
     "ReadTimeoutError": "the package index stopped answering; run the same command again",
-    "ResolutionImpossible": "pyproject.toml and constraints.txt contradict each other",
+    "ResolutionImpossible": "the package index lacks a version that constraints.txt names",
 }
 
 
@@ -155,9 +155,10 @@ def install(anew: bool) -> None:
 
 
 def pip(title: str, *arguments: str) -> None:
-    python = str(venv("bin/python"))
-    pinned = ("--constraint", "constraints.txt", "--disable-pip-version-check", "--no-input")
-    step(title, python, "-I", "-m", "pip", "install", *pinned, *arguments)
+    options = ["--constraint", "constraints.txt", "--disable-pip-version-check", "--no-input"]
+    if not os.environ.get("PYTHONDONTWRITEBYTECODE"):
+        options.append("--no-compile")  # a third of the time; the first import compiles what is used
+    step(title, str(venv("bin/python")), "-I", "-m", "pip", "install", *options, *arguments)
 
 
 def step(title: str, *command: str) -> None:
@@ -165,19 +166,12 @@ def step(title: str, *command: str) -> None:
     started = time.monotonic()
     print(f"  {title} ", end="", flush=True)
     environment = {"PIP_RETRIES": "3", **os.environ, "PIP_USER": "0", "LC_ALL": "C.UTF-8"}
-    process = subprocess.Popen(
-        command,
-        cwd=str(ROOT),
-        env=environment,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        universal_newlines=True,
-    )
+    streams = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
+    process = subprocess.Popen(command, cwd=str(ROOT), env=environment, universal_newlines=True, **streams)
     said = []
     try:
         for line in process.stdout:
-            said.append(line.strip())
+            said.append(line)
             if line.startswith("Collecting"):
                 print(".", end="", flush=True)
     except BaseException:
@@ -190,14 +184,14 @@ def step(title: str, *command: str) -> None:
 
 
 def why(said) -> str:
-    """The one line that explains a failed command: a known reason, with the command's own last error."""
+    """The one line that explains a failed command; all that the command said goes to a file beside it."""
     errors = [line for line in said if line.lower().startswith("error:")]
-    detail = (errors or said or ["no output"])[-1]
-    for text in ("\n".join(errors), "\n".join(said)):
-        for sign, reason in REASONS.items():
-            if sign in text:
-                return f"{reason} ({detail})"
-    return detail
+    reasons = [reason for sign, reason in REASONS.items() if any(sign in line for line in said)]
+    reason = (reasons or errors or said or ["it said nothing"])[0].strip()
+    with suppress(OSError):
+        venv("set-up.log").write_text("".join(said))
+        reason += " (more in .venv/set-up.log)"
+    return reason
 
 
 if __name__ == "__main__":

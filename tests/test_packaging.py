@@ -1,0 +1,81 @@
+"""What is shipped: the wheel, the version, and an import that costs next to nothing."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+
+import hoof_env
+
+ROOT = Path(__file__).resolve().parent.parent
+HEAVY = {"numba", "torch", "pygame", "matplotlib", "tyro", "stable_baselines3", "scipy", "importlib.metadata"}
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> zipfile.ZipFile:
+    folder = tmp_path_factory.mktemp("dist")
+    build = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)]
+    subprocess.run(build, cwd=ROOT, check=True, capture_output=True)
+    return zipfile.ZipFile(next(folder.glob("*.whl")))
+
+
+def test_wheel_holds_the_package_and_nothing_else(wheel: zipfile.ZipFile) -> None:
+    shipped = {name for name in wheel.namelist() if ".dist-info/" not in name}
+    sources = {path for path in (ROOT / "hoof_env").rglob("*") if path.suffix in {".py", ".json", ".typed"}}
+    sources.add(ROOT / "hoof_env" / "py.typed")
+    assert shipped == {path.relative_to(ROOT).as_posix() for path in sources}
+    assert any(name.endswith(".json") for name in shipped)
+
+
+def test_wheel_carries_licence_version_and_command(wheel: zipfile.ZipFile) -> None:
+    info = f"hoof_env-{hoof_env.__version__}.dist-info"
+    metadata = wheel.read(f"{info}/METADATA").decode()
+    assert f"\nVersion: {hoof_env.__version__}\n" in metadata
+    assert f"{info}/licenses/LICENSE" in wheel.namelist()
+    assert "hoof-env = hoof_env.cli:main" in wheel.read(f"{info}/entry_points.txt").decode()
+
+
+def test_installed_metadata_agrees_with_the_package() -> None:
+    from importlib.metadata import version
+
+    assert version("hoof-env") == hoof_env.__version__
+
+
+def test_import_is_quick_and_loads_nothing_heavy() -> None:
+    program = (
+        "import sys, time; start = time.perf_counter(); import hoof_env; took = time.perf_counter() - start;"
+        "import json; print(json.dumps([took, sorted(sys.modules)]))"
+    )
+    runs = [
+        json.loads(subprocess.run([sys.executable, "-c", program], check=True, capture_output=True).stdout)
+        for _ in range(5)
+    ]
+    assert not HEAVY.intersection(runs[0][1])
+    assert min(took for took, _ in runs) < 0.5, "seconds, the best of five"
+
+
+def test_every_dependency_has_a_tested_version() -> None:
+    """And the tested version lies within the bounds that pyproject.toml gives."""
+    from packaging.requirements import Requirement
+    from packaging.utils import canonicalize_name
+
+    lines = (ROOT / "constraints.txt").read_text().splitlines()
+    pins = dict(line.split("==") for line in lines if not line.startswith("#"))
+    tested = {canonicalize_name(name): version for name, version in pins.items()}
+    assert all(re.fullmatch(r"[0-9.]+", version) for version in tested.values()), (
+        "no +cpu, no bounds, no markers"
+    )
+
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    asked = project["build-system"]["requires"] + project["project"]["dependencies"]
+    for extra in project["project"]["optional-dependencies"].values():
+        asked += extra
+    for requirement in map(Requirement, asked):
+        assert requirement.specifier.contains(tested[canonicalize_name(requirement.name)]), requirement
