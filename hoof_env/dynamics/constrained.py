@@ -154,7 +154,7 @@ class ConstrainedLeg:
         theta, x = check_number("theta", theta), check_number("x", x)
         if height not in (None, self.trunk.height) or speed != 0.0:
             raise ParameterError(
-                f"height and speed: a fixed trunk rests at {self.trunk.height:g} m, got {height!r} and {speed!r}"
+                f"height, speed: a fixed trunk rests at {self.trunk.height:g} m, got {height!r} and {speed!r}"
             )
         state, command = self.state, gait.to_array()
         state.body["t"], state.body["cx"], state.motion["theta"] = 0.0, x, theta

@@ -43,7 +43,7 @@ BODIES = (
     Body("G", "F", "shank, lower part"),
     Body("G", "J", "hoof triangle"),
     Body("J", "A", "hoof tie rod"),
-    Body("G", "I", "hoof triangle"),
+    Body("I", "G", "hoof triangle"),
     Body("I", "J", "hoof triangle, sole"),
 )
 """Bodies 1 to 14 of Eq. 2; index 0 here is the paper's body 1."""
