@@ -83,15 +83,15 @@ class Geometry:
             )
         if self.travel not in (1, -1):
             raise ParameterError(f"travel: expected +1 or -1, got {self.travel!r}")
-        if len(self.pivot) != 2:
+        if np.shape(self.pivot) != (2,):
             raise ParameterError(f"pivot: expected two numbers (C_x, C_y) in metres, got {self.pivot!r}")
         pivot = tuple(check_number(f"pivot[{i}]", c) for i, c in enumerate(self.pivot))
         check_number("hip_height", self.hip_height, low=0, exclusive_low=True)
         check_number("linear_density", self.linear_density, low=0, exclusive_low=True)
         check_choice("inertia", self.inertia, INERTIA_RULES)
         if self.masses is not None:
-            if len(self.masses) != len(BODIES):
-                raise ParameterError(f"masses: expected {len(BODIES)} link masses, got {len(self.masses)}")
+            if np.shape(self.masses) != (len(BODIES),):
+                raise ParameterError(f"masses: expected {len(BODIES)} link masses, got {self.masses!r}")
             masses = tuple(
                 check_number(f"masses[{i}]", m, low=0, exclusive_low=True) for i, m in enumerate(self.masses)
             )

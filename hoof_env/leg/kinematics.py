@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env._jit import kernel
+from hoof_env.errors import check_number
 from hoof_env.leg.geometry import Geometry, tables
 from hoof_env.leg.linkage import BODIES, POINTS
 
@@ -111,6 +112,9 @@ class FrameMotion:
     """Motion of the leg's frame: its turn phi about O (before the mirror) and the motion of O in the world.
 
     Units: rad, rad/s, rad/s^2; m, m/s, m/s^2 for (x, y) pairs.
+
+    Raises:
+        ParameterError: a value is not finite.
     """
 
     phi: float = 0.0
@@ -119,6 +123,11 @@ class FrameMotion:
     position: tuple[float, float] = (0.0, 0.0)
     velocity: tuple[float, float] = (0.0, 0.0)
     acceleration: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            for part in value if isinstance(value, tuple) else (value,):
+                check_number(f"frame.{name}", part)
 
 
 @dataclass(frozen=True)
@@ -162,13 +171,18 @@ def pose(
         theta, theta_rate, theta_acc: crank angle relative to the leg's frame, positive clockwise in that
             frame [rad, rad/s, rad/s^2].
         frame: motion of the leg's frame; at rest at the origin if None.
+
+    Raises:
+        ParameterError: an angle, rate or acceleration is not finite.
     """
+    theta = check_number("theta", theta)
+    theta_rate, theta_acc = check_number("theta_rate", theta_rate), check_number("theta_acc", theta_acc)
     frame = frame or FrameMotion()
     z, dz, ddz = (np.empty(len(POINTS), dtype=np.complex128) for _ in range(3))
     steps, values = tables(geometry)
-    solve_points(float(theta), geometry.lengths["OP"], complex(*geometry.pivot), steps, values, z, dz, ddz)
+    solve_points(theta, geometry.lengths["OP"], complex(*geometry.pivot), steps, values, z, dz, ddz)
     motion = [
-        place(z[k], dz[k], ddz[k], float(theta_rate), float(theta_acc),
+        place(z[k], dz[k], ddz[k], theta_rate, theta_acc,
               float(frame.phi), float(frame.phi_rate), float(frame.phi_acc), float(geometry.travel))
         for k in range(len(POINTS))
     ]  # fmt: skip
