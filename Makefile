@@ -31,8 +31,8 @@ test: lint
 	@echo 'pytest' && $(PY) -m pytest -q -n auto
 
 lint: setup
-	@echo 'ruff check' && $(PY) -m ruff check -q
-	@echo 'ruff format' && $(PY) -m ruff format -q --check
+	@echo 'ruff check' && $(PY) -m ruff check -q --output-format concise
+	@echo 'ruff format' && $(PY) -m ruff format --check --quiet --output-format concise
 	@echo 'mypy' && $(PY) -m mypy
 
 clean:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -49,16 +50,17 @@ def test_installed_metadata_agrees_with_the_package() -> None:
 
 
 def test_import_is_quick_and_loads_nothing_heavy() -> None:
+    """Processor time, which a busy machine hardly changes; the first run of five may still compile bytes."""
     program = (
-        "import sys, time; start = time.perf_counter(); import hoof_env; took = time.perf_counter() - start;"
+        "import sys, time; start = time.process_time(); import hoof_env; took = time.process_time() - start;"
         "import json; print(json.dumps([took, sorted(sys.modules)]))"
     )
-    runs = [
-        json.loads(subprocess.run([sys.executable, "-c", program], check=True, capture_output=True).stdout)
-        for _ in range(5)
-    ]
-    assert not HEAVY.intersection(runs[0][1])
-    assert min(took for took, _ in runs) < 0.5, "seconds, the best of five"
+    compiling = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    command = [sys.executable, "-c", program]
+    runs = [subprocess.run(command, env=compiling, check=True, capture_output=True) for _ in range(5)]
+    seconds, modules = zip(*(json.loads(run.stdout) for run in runs), strict=True)
+    assert not HEAVY.intersection(modules[0])
+    assert min(seconds) < 0.5
 
 
 def test_every_dependency_has_a_tested_version() -> None:
