@@ -43,12 +43,6 @@ def test_wheel_carries_licence_version_and_command(wheel: zipfile.ZipFile) -> No
     assert "hoof-env = hoof_env.cli:main" in wheel.read(f"{info}/entry_points.txt").decode()
 
 
-def test_installed_metadata_agrees_with_the_package() -> None:
-    from importlib.metadata import version
-
-    assert version("hoof-env") == hoof_env.__version__
-
-
 def test_import_is_quick_and_loads_nothing_heavy() -> None:
     """Processor time, which a busy machine hardly changes; the first run of five may still compile bytes."""
     program = (
