@@ -16,10 +16,12 @@ from hoof_env.leg.linkage import BODIES, BODY_LENGTHS, JOINTS
 GEOMETRY = load_geometry()
 CONSTRAINTS = Constraints(GEOMETRY)
 
-# The joints of Eq. 2 as shared out by the paper: T and H are the tail and the head of a link, A8 is the point at
-# a distance CA from the head of link 8 towards its tail.
-PRINTED = """T1=O T2=H1 H3=H2 T3=C H4=H2 H5=T4 T5=C H6=T4 H7=T6 T8=T7 H8=C H9=T7 T9=H1 H10=T7
-             T11=T10 T12=H11 H12=A8 H13=T10 T14=T13 H14=T12""".split()
+# The joints of Eq. 2 as the paper shares them out: T and H are the tail and the head of a link, A8 is the
+# point at distance CA from the head of link 8 towards its tail. (The print is garbled at F and A.)
+PRINTED = (
+    "T1=O", "T2=H1", "H3=H2", "T3=C", "H4=H2", "H5=T4", "T5=C", "H6=T4", "H7=T6", "T8=T7", "H8=C", "H9=T7",
+    "T9=H1", "H10=T7", "T11=T10", "T12=H11", "H12=A8", "H13=T10", "T14=T13", "H14=T12",
+)  # fmt: skip
 
 angle = st.floats(-50, 50)
 swing = st.floats(-1.5, 1.5)
@@ -32,9 +34,9 @@ def a_motion(theta, theta_rate=0.0, theta_acc=0.0, phi=0.0, phi_rate=0.0, phi_ac
 
 @pytest.fixture(scope="module")
 def symbolic():
-    """(q, qd, motion) -> Phi, d/dt Phi, Phi_q, dPhi/dphi, gamma, by symbolic differentiation of the printed rows.
+    """(q, qd, motion) -> Phi, its rate, Phi_q, dPhi/dphi, gamma: the rows differentiated symbolically.
 
-    Each coordinate moves as q + qd tau, crank and swing with their accelerations too: then Phi'' = -gamma at tau = 0.
+    Coordinates move as q + qd tau, crank and swing with their accelerations too: Phi'' = -gamma at tau = 0.
     """
     q, qd, motion = sympy.symbols("q:42"), sympy.symbols("v:42"), sympy.symbols("m:6")
     tau = sympy.Symbol("tau")

@@ -1,4 +1,4 @@
-"""Each scheme against analytic solutions: its order, its use of time, and what semi-implicit Euler conserves."""
+"""Each scheme by its order, its use of time, and what semi-implicit Euler keeps bounded."""
 
 from __future__ import annotations
 

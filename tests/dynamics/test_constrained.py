@@ -1,0 +1,312 @@
+"""Eq. 8 against the closed form, Newton and Euler's laws, its own drift equation and its own claims."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hoof_env.dynamics.constrained import ConstrainedLeg
+from hoof_env.dynamics.constraints import closed_form
+from hoof_env.dynamics.engine import GRAVITY, LegEngine
+from hoof_env.dynamics.result import Result
+from hoof_env.dynamics.trace import TRACE, new_trace
+from hoof_env.dynamics.trunk import Trunk
+from hoof_env.errors import ParameterError
+from hoof_env.gait.parameters import LIMITS, GaitParameters, load_gait
+from hoof_env.ground.contact import Ground
+from hoof_env.leg.geometry import load_geometry
+from hoof_env.leg.kinematics import FrameMotion, pose
+from hoof_env.leg.linkage import BODIES, CRANK, FRAME, JOINTS, LOCK
+
+GEOMETRY = load_geometry()
+MIRRORED = {travel: GEOMETRY.replace(travel=travel) for travel in (1, -1)}
+WALK, RUN = load_gait("walk"), load_gait("run")
+PAPER_BETA = math.sqrt(30)
+
+ORDERS = {"euler": 1, "semi_implicit_euler": 1, "midpoint": 2, "rk4": 4}
+AIR = 10.0
+"""A height at which nothing touches [m]."""
+
+UP = np.array([0, GRAVITY])
+
+gaits = st.builds(GaitParameters, *(st.floats(low, high) for low, high in LIMITS.values()))
+
+
+def exact_engine(geometry, height, sim_dt=1e-3, ground=None):
+    return LegEngine(geometry, Trunk(kind="fixed", height=height), ground or Ground(), sim_dt)
+
+
+def travelled(leg, gait, theta, seconds):
+    """The last trace row of a constant gait from crank angle `theta`."""
+    leg.reset(gait, theta)
+    trace = new_trace(round(seconds / leg.sim_dt))
+    assert leg.advance(gait.to_array(), trace) is Result.OK
+    return trace[-1]
+
+
+def drift(leg):
+    """Largest distance of q from the closed form, angles by their directions."""
+    error = leg.state.q - closed_form(leg.geometry, leg.state.motion)[0]
+    error[2::3] = np.angle(np.exp(1j * error[2::3]))
+    return np.abs(error).max()
+
+
+def assert_same_rows(row, expected, rtol=1e-9):
+    """Every field of two rows agrees, torques and powers relative to the ground force that they balance."""
+    for name in TRACE.names:
+        scale = max(1.0, abs(expected["grf"])) if "torque" in name or "power" in name else 1.0
+        assert row[name] == pytest.approx(expected[name], rel=rtol, abs=rtol * scale, nan_ok=True), name
+
+
+# -- motion ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("alpha", "beta"), [(0.0, 0.0), (15.0, PAPER_BETA), (15.0, 15 * math.sqrt(2))])
+@pytest.mark.parametrize(("scheme", "order"), ORDERS.items())
+def test_drift_shrinks_with_the_order_of_the_scheme(scheme, order, alpha, beta):
+    drifts = []
+    for sim_dt in (1e-2, 5e-3, 2.5e-3):
+        leg = ConstrainedLeg(
+            GEOMETRY, Ground(), sim_dt, alpha=alpha, beta=beta, integrator=scheme, height=AIR
+        )
+        travelled(leg, RUN, 0.4, 0.2)
+        drifts.append(drift(leg))
+    assert np.diff(-np.log2(drifts)) == pytest.approx(order, abs=0.3)
+
+
+@pytest.mark.parametrize("beta", [PAPER_BETA, 15 * math.sqrt(2), 0.0])
+def test_an_open_loop_closes_by_the_roots_of_baumgarte(beta):
+    """Every row of Phi obeys Phi'' + 2 alpha Phi' + beta^2 Phi = 0, whatever the leg does."""
+    alpha, seconds = 15.0, 0.1
+    leg = ConstrainedLeg(GEOMETRY, Ground(), alpha=alpha, beta=beta, integrator="rk4")
+    leg.reset(RUN, 1.0)
+    generator = np.random.default_rng(1)
+    leg.state.q += generator.uniform(-1e-3, 1e-3, 42)
+    leg.state.qd += generator.uniform(-1e-2, 1e-2, 42)
+    start = leg.closure()
+    assert leg.advance(RUN.to_array(), new_trace(round(seconds / leg.sim_dt))) is Result.OK
+    split = np.sqrt(complex(alpha**2 - beta**2))
+    fast, slow = -alpha - split, -alpha + split
+    decay = (start.error_rate - slow * start.error) / (fast - slow) * np.exp(fast * seconds)
+    decay = decay + (start.error_rate - fast * start.error) / (slow - fast) * np.exp(slow * seconds)
+    np.testing.assert_allclose(leg.closure().error, decay.real, atol=1e-8)
+
+
+def test_a_constant_command_is_the_paper_s_crank():
+    leg = ConstrainedLeg(GEOMETRY, Ground())
+    leg.reset(WALK)
+    trace = new_trace(100)
+    leg.advance(WALK.to_array(), trace)
+    np.testing.assert_allclose(trace["t"], np.arange(1, 101) * 1e-3, rtol=1e-14)
+    np.testing.assert_allclose(trace["theta"], 2 * np.pi * trace["t"], rtol=1e-13)
+
+
+def test_contact_changes_the_multipliers_and_never_the_motion():
+    low, high = ConstrainedLeg(GEOMETRY, Ground()), ConstrainedLeg(GEOMETRY, Ground(), height=AIR)
+    rows = []
+    for leg in (low, high):
+        leg.reset(RUN, 1.2)
+        rows.append(new_trace(200))
+        assert leg.advance(RUN.to_array(), rows[-1]) is Result.OK
+    assert rows[0]["normal"].max() > 1000
+    assert rows[1]["normal"].max() == 0
+    assert low.state.q.tobytes() == high.state.q.tobytes()
+    assert low.state.qd.tobytes() == high.state.qd.tobytes()
+    assert np.abs(rows[0]["crank_torque"] - rows[1]["crank_torque"]).max() > 100
+
+    qdd, multipliers = low.solve()  # Eq. 8 says the same with the ground's forces in h
+    free_qdd, free_multipliers = low.solve(ground=False)
+    np.testing.assert_allclose(qdd, free_qdd, atol=1e-9 * np.abs(qdd).max())
+    assert np.abs(multipliers - free_multipliers).max() > 100
+
+
+# -- torques -----------------------------------------------------------------------------------
+
+
+@settings(max_examples=60, deadline=None)
+@given(gaits, st.floats(-30, 30), st.floats(1.2, 2.5), st.sampled_from([1, -1]), st.sampled_from([0.0, 1.0]))
+def test_at_one_instant_everything_equals_the_closed_form(gait, theta, height, travel, restitution):
+    ground = Ground(restitution=restitution)
+    leg = ConstrainedLeg(MIRRORED[travel], ground, height=height)
+    expected = exact_engine(MIRRORED[travel], height, ground=ground).reset(gait, theta, x=0.7)[0]
+    assert_same_rows(leg.reset(gait, theta, x=0.7)[0], expected)
+
+
+@settings(max_examples=15, deadline=None)
+@given(gaits, gaits, st.floats(0, 6.3), st.sampled_from([1, -1]))
+def test_a_changing_gait_equals_the_closed_form(gait, command, theta, travel):
+    """The swing's accelerations and the filters' own: every derivative of the motion law is in Eq. 8."""
+    leg = ConstrainedLeg(MIRRORED[travel], Ground(), 2.5e-4, integrator="rk4")
+    engine = exact_engine(MIRRORED[travel], GEOMETRY.hip_height, 2.5e-4)
+    rows = []
+    for solver in (leg, engine):
+        solver.reset(gait, theta)
+        rows.append(new_trace(40))
+        assert solver.advance(command.to_array(), rows[-1]) is Result.OK
+    assert_same_rows(rows[0][-1], rows[1][-1], rtol=1e-6)
+    assert np.abs(leg.closure().error).max() < 1e-8
+
+
+@pytest.mark.parametrize("height", [AIR, GEOMETRY.hip_height])
+@pytest.mark.parametrize(("scheme", "order"), ORDERS.items())
+def test_torques_converge_to_the_closed_form(scheme, order, height):
+    exact = travelled(exact_engine(GEOMETRY, height), RUN, 1.6, 0.15)
+    assert (exact["normal"] > 1000) == (height < AIR)
+    longest = {1: 2e-3, 2: 5e-3, 4: 1e-2}[order]  # where the scheme shows its order and round-off does not
+    for name in ("crank_torque", "hip_torque"):
+        errors = []
+        for sim_dt in (longest, longest / 2, longest / 4):
+            leg = ConstrainedLeg(GEOMETRY, Ground(), sim_dt, integrator=scheme, height=height)
+            errors.append(abs(travelled(leg, RUN, 1.6, 0.15)[name] - exact[name]))
+        assert np.diff(-np.log2(errors)) == pytest.approx(order, abs=0.3)
+
+
+# -- joint reactions ---------------------------------------------------------------------------
+
+
+def cross(a, b):
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
+@pytest.fixture(params=itertools.product((1, -1), (WALK, RUN), (0.3, 2.2)))
+def loaded(request):
+    """A leg at one instant of its cycle, on the ground at the second angle, and its motion in the world."""
+    travel, gait, theta = request.param
+    geometry = GEOMETRY.replace(travel=travel, inertia="paper" if travel == 1 else "uniform_rod")
+    leg = ConstrainedLeg(geometry, Ground(restitution=0.3), height=GEOMETRY.hip_height - 0.05)
+    row = leg.reset(gait, theta)[0]
+    assert (row["normal"] > 0) == (theta > 1)
+    frame = FrameMotion(row["phi"], row["phi_rate"], row["phi_acc"], position=(0.0, leg.trunk.height))
+    return leg, row, pose(geometry, theta, row["theta_rate"], 0.0, frame)
+
+
+def test_every_body_obeys_newton_and_euler(loaded):
+    leg, _, motion = loaded
+    geometry, reactions = leg.geometry, leg.reactions()
+    force = np.zeros((14, 2))
+    moment = np.zeros(14)
+
+    def push(body, point, pushed):
+        force[body] += pushed
+        moment[body] += cross(motion.point(point) - motion.centres[body], pushed)
+
+    for joint, reaction in zip(JOINTS, reactions.joints, strict=True):
+        push(joint.i, joint.point, reaction)
+        if joint.j != FRAME:
+            push(joint.j, joint.point, -reaction)
+    sole = next(i for i, body in enumerate(BODIES) if {body.tail, body.head} == {"I", "J"})
+    for point, contact in zip((geometry.toe, geometry.heel), leg.state.contacts, strict=True):
+        push(sole, point, np.array([contact["friction"], contact["normal"]]))
+    moment[list(LOCK)] += reactions.lock, -reactions.lock
+    moment[CRANK] += reactions.driver
+
+    masses = geometry.body_masses[:, None]
+    scale = np.abs(reactions.joints).max()
+    expected = masses * (motion.centre_accelerations + UP)
+    np.testing.assert_allclose(force, expected, atol=1e-11 * scale)
+    expected = geometry.body_inertias * motion.angular_accelerations
+    np.testing.assert_allclose(moment, expected, atol=1e-11 * scale)
+
+
+def test_the_frame_carries_the_leg(loaded):
+    """Sums over the leg: the frame's forces are momentum rate less weight and ground force; their moment
+    about O is the hip torque; the drives' power is the rate of all energy less the power of the ground."""
+    leg, row, motion = loaded
+    geometry, reactions = leg.geometry, leg.reactions()
+    masses = geometry.body_masses[:, None]
+    load = masses * (motion.centre_accelerations + UP)
+    held = [(joint, force) for joint, force in zip(JOINTS, reactions.joints, strict=True) if joint.j == FRAME]
+    frame = sum(force for _, force in held)
+    scale = np.abs(reactions.joints).max()
+    np.testing.assert_allclose(frame, load.sum(axis=0) - (row["friction"], row["normal"]), atol=1e-11 * scale)
+
+    about_o = sum(cross(motion.point(joint.point) - motion.point("O"), force) for joint, force in held)
+    # the frame turns in its own sense, before the mirror; the crank turns clockwise in it
+    hip_torque = geometry.travel * (about_o + reactions.driver)
+    assert hip_torque == pytest.approx(row["hip_torque"], abs=1e-11 * scale)
+    assert -geometry.travel * reactions.driver == pytest.approx(row["crank_torque"], abs=1e-11 * scale)
+
+    power = (load * motion.centre_velocities).sum()
+    power += (geometry.body_inertias * motion.angular_accelerations * motion.angular_velocities).sum()
+    names = list("OCPBDFEGAJI")
+    for point, end in ((geometry.toe, "toe"), (geometry.heel, "heel")):
+        power -= motion.point_velocities[names.index(point)] @ (row[f"{end}_friction"], row[f"{end}_normal"])
+    assert row["crank_power"] + row["hip_power"] == pytest.approx(power, abs=1e-10 * scale)
+
+
+# -- state and failure -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("scheme", ORDERS)
+def test_a_restored_state_continues_bit_for_bit(scheme):
+    leg = ConstrainedLeg(GEOMETRY, Ground(restitution=0.0), integrator=scheme)
+    leg.reset(WALK, 1.5)
+    leg.advance(RUN.to_array(), new_trace(40))
+    saved, first, again = leg.state.copy(), new_trace(60), new_trace(60)
+    leg.advance(WALK.to_array(), first)
+    assert first["normal"].max() > 0
+    leg.advance(RUN.to_array(), new_trace(5))
+    leg.state = saved.copy()
+    leg.advance(WALK.to_array(), again)
+    assert first.tobytes() == again.tobytes()
+
+
+def test_a_reset_forgets_what_was_before():
+    used, fresh = (ConstrainedLeg(GEOMETRY, Ground(restitution=0.0)) for _ in range(2))
+    travelled(used, RUN, 1.0, 0.1)
+    assert used.reset(WALK, 1.9).tobytes() == fresh.reset(WALK, 1.9).tobytes()
+    rows = [travelled(leg, WALK, 1.9, 0.05) for leg in (used, fresh)]
+    assert rows[0].tobytes() == rows[1].tobytes()
+
+
+@pytest.mark.parametrize(
+    ("spoil", "result"),
+    [
+        (
+            lambda state: state.q.fill(0.0),
+            Result.SINGULAR,
+        ),  # all links along x: the loops close in one way only
+        (lambda state: state.qd.fill(1e200), Result.NOT_FINITE),
+    ],
+)
+def test_a_failure_is_a_result_and_puts_the_state_back(spoil, result):
+    leg = ConstrainedLeg(GEOMETRY, Ground())
+    leg.reset(WALK)
+    spoil(leg.state)
+    before = leg.state.copy()
+    assert leg.advance(WALK.to_array(), new_trace(10)) is result
+    assert "put back" in result.message
+    for name, value in vars(before).items():
+        assert getattr(leg.state, name).tobytes() == value.tobytes(), name
+
+
+@pytest.mark.parametrize(
+    ("setting", "value"),
+    [
+        ("alpha", -1.0), ("beta", -1.0), ("beta", math.nan), ("integrator", "leapfrog"), ("integrator", None),
+        ("sim_dt", 0.0), ("sim_dt", 1.0), ("height", 0.0), ("height", math.inf),
+    ],
+)  # fmt: skip
+def test_a_bad_setting_is_refused_by_name(setting, value):
+    with pytest.raises(ParameterError, match=setting):
+        ConstrainedLeg(GEOMETRY, Ground(), **{setting: value})
+
+
+@pytest.mark.parametrize(
+    ("argument", "value"), [("theta", math.nan), ("x", math.inf), ("height", 3.0), ("speed", 1.0)]
+)
+def test_a_bad_start_is_refused_by_name(argument, value):
+    with pytest.raises(ParameterError, match=argument):
+        ConstrainedLeg(GEOMETRY, Ground()).reset(WALK, **{argument: value})
+
+
+def test_a_command_of_the_wrong_shape_is_refused():
+    leg = ConstrainedLeg(GEOMETRY, Ground())
+    leg.reset(WALK)
+    with pytest.raises(ParameterError, match="command: expected 4 values"):
+        leg.advance(np.zeros(3), new_trace(1))
