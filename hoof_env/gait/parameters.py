@@ -74,8 +74,13 @@ PARAMETERS = tuple(item.name for item in fields(GaitParameters))
 
 
 def gait_names(preset: str | Path = "first_fit") -> list[str]:
-    """Names of the gaits in a preset."""
-    return sorted(read_preset(preset).get("gaits", {}))
+    """Names of the gaits in a preset.
+
+    Raises:
+        ParameterError: unknown preset name.
+        DataFileError: the file lacks the part.
+    """
+    return sorted(_read_gaits(preset))
 
 
 def load_gait(name: str, preset: str | Path = "first_fit") -> GaitParameters:
@@ -85,11 +90,7 @@ def load_gait(name: str, preset: str | Path = "first_fit") -> GaitParameters:
         ParameterError: unknown preset or gait name, or a value outside its limits.
         DataFileError: the file lacks the part.
     """
-    gaits = read_preset(preset).get("gaits")
-    if not isinstance(gaits, dict) or not gaits:
-        raise DataFileError(
-            f"preset {preset}: expected an object 'gaits' with at least one gait, got {gaits!r}"
-        )
+    gaits = _read_gaits(preset)
     check_choice("gait", name, gaits)
     try:
         return GaitParameters(**gaits[name])
@@ -97,3 +98,12 @@ def load_gait(name: str, preset: str | Path = "first_fit") -> GaitParameters:
         raise DataFileError(
             f"preset {preset}, gait {name!r}: expected {', '.join(PARAMETERS)}: {error}"
         ) from None
+
+
+def _read_gaits(preset: str | Path) -> dict[str, Any]:
+    gaits = read_preset(preset).get("gaits")
+    if not isinstance(gaits, dict) or not gaits:
+        raise DataFileError(
+            f"preset {preset}: expected an object 'gaits' with at least one gait, got {gaits!r}"
+        )
+    return gaits

@@ -1,8 +1,8 @@
 """The upper linkage is Theo Jansen's, so his 'holy numbers' must give his foot.
 
 Crank m = OP, couplers j = PB and k = PF, triangle b = CB, e = BD, d = CD, rocker c = CF and links f = DE and
-g = EF are ours one for one. Below, the legs differ: Jansen's foot is the apex of a rigid triangle on E-F, ours
-the hoof below the ankle G. So the upper points come from our closed form and the foot is set on them here.
+g = EF are ours one for one. Below, the legs differ: Jansen's foot is the apex of a rigid triangle on E-F and
+ours the hoof below the ankle G. So the upper points come from our closed form; the foot is set on them here.
 
 Golden values: foot path of the holy numbers, computed independently by circle intersection at 720 steps:
 stroke 67.9, lift 22.5, foot height -91.8 to -69.4 below the crank centre, and 43, 52 and 59 % of the cycle

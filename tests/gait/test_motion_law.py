@@ -1,0 +1,135 @@
+"""Commands become motion that a machine could make, and every derivative of it is a derivative."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hoof_env.errors import ParameterError
+from hoof_env.gait.motion_law import (
+    MOTION,
+    FilterSettings,
+    advance_motion,
+    command_filters,
+    evaluate_motion,
+    steady_filters,
+)
+from hoof_env.gait.parameters import LIMITS
+
+LOW, HIGH = np.array(list(LIMITS.values())).T
+SETTINGS = FilterSettings()
+TABLE = SETTINGS.to_array()
+
+commands = st.tuples(
+    *(st.floats(low, high) | st.sampled_from([low, high]) for low, high in LIMITS.values())
+).map(np.array)
+sequences = st.lists(st.tuples(commands, st.integers(1, 60)), min_size=1, max_size=8)
+
+OFFSETS = np.arange(-4, 5)  # central differences of eighth order
+FIRST = np.array([3, -32, 168, -672, 0, 672, -168, 32, -3]) / 840
+SECOND = np.array([-9, 128, -1008, 8064, -14350, 8064, -1008, 128, -9]) / 5040
+
+
+def start(gait, theta=0.0):
+    motion = np.zeros(1, dtype=MOTION)[0]
+    motion["theta"] = theta
+    return motion, steady_filters(gait)
+
+
+def play(sequence, h, gait, theta=0.0):
+    """Every state (motion, filters) that a sequence of (command, substeps) leads through."""
+    motion, filters = start(gait, theta)
+    for command, substeps in sequence:
+        for _ in range(substeps):
+            command_filters(filters, command, TABLE)
+            advance_motion(motion, filters, h)
+            evaluate_motion(motion, filters)
+            yield motion, filters
+
+
+@given(sequence=sequences, gait=commands, h=st.sampled_from([1e-4, 1e-3, 4e-3, SETTINGS.longest_step]))
+@settings(deadline=None, max_examples=80)
+def test_rates_and_accelerations_are_bounded_and_values_stay_in_range(sequence, gait, h):
+    for _, filters in play(sequence, h, gait):
+        assert (np.abs(filters["rate"]) <= TABLE[:, 1] * (1 + 1e-12)).all()
+        assert (np.abs(filters["acc"]) <= TABLE[:, 2]).all()
+        assert (filters["value"] >= LOW - 1e-9).all()
+        assert (filters["value"] <= HIGH + 1e-9).all()
+
+
+@given(gait=commands, command=commands, h=st.sampled_from([1e-3, SETTINGS.longest_step]))
+@settings(deadline=None, max_examples=30)
+def test_a_command_is_reached_without_overshoot(gait, command, h):
+    way = np.sign(command - gait)
+    before = gait
+    for _, filters in play([(command, round(4.0 / h))], h, gait):
+        now = filters["value"].copy()
+        assert (way * (now - before) >= -1e-12).all()  # never back
+        assert (way * (command - now) >= -1e-9).all()  # never beyond
+        before = now
+    assert before == pytest.approx(command, abs=1e-9)
+    assert filters["rate"] == pytest.approx(np.zeros(4), abs=1e-8)
+
+
+@given(sequence=sequences, gait=commands, theta=st.floats(-10, 10))
+@settings(deadline=None, max_examples=60)
+def test_derivatives_are_those_of_the_motion_while_commands_change(sequence, gait, theta):
+    motion, filters = list(play(sequence, 1e-3, gait, theta))[-1]
+    path = []
+    for (
+        k
+    ) in OFFSETS:  # the accelerations of the filters are constant over a substep: go on and back with them
+        there, moved = motion.copy(), filters.copy()
+        advance_motion(there, moved, 1e-3 * k)
+        evaluate_motion(there, moved)
+        path.append((there["theta"], there["phi"]))
+    evaluate_motion(motion, filters)
+    rates, accelerations = FIRST @ path / 1e-3, SECOND @ path / 1e-6
+    assert (motion["theta_rate"], motion["phi_rate"]) == pytest.approx(rates, rel=1e-8, abs=1e-8)
+    assert (motion["theta_acc"], motion["phi_acc"]) == pytest.approx(accelerations, rel=1e-6, abs=1e-5)
+
+
+@given(sequence=sequences, gait=commands)
+@settings(deadline=None, max_examples=20)
+def test_the_recorded_rates_add_up_to_the_recorded_motion(sequence, gait):
+    """Trapezoidal sums over the whole history, command changes included; what is left is of order h^2."""
+    h = 1e-4
+    rows = [
+        tuple(motion[["theta", "theta_rate", "phi", "phi_rate"]]) for motion, _ in play(sequence, h, gait)
+    ]
+    theta, theta_rate, phi, phi_rate = np.array(rows).T
+    for value, rate in ((theta, theta_rate), (phi, phi_rate)):
+        assert value[-1] - value[0] == pytest.approx(h * (rate[1:] + rate[:-1]).sum() / 2, abs=2e-7)
+
+
+def test_a_kept_command_keeps_every_bit():
+    gait = np.array([2 * np.pi, 0.3434509445955683, 0.10151325708757945, -0.15539461237071284])
+    for _, filters in play([(gait, 3000)], 1e-3, gait):
+        assert (filters["value"] == gait).all()
+        assert (filters["rate"] == 0).all()
+
+
+def test_the_crank_angle_is_not_wrapped():
+    gait = np.array([4 * np.pi, 0.5, 0.0, 0.0])
+    motion, _ = list(play([(gait, 10000)], 1e-3, gait))[-1]
+    assert motion["theta"] == pytest.approx(40 * np.pi, rel=1e-12)
+
+
+def test_without_amplitude_the_frame_stands_still():
+    gait = np.array([4 * np.pi, 0.7, 0.0, 0.0])
+    for motion, _ in play([(gait, 500)], 1e-3, gait):
+        assert (motion["phi"], motion["phi_rate"], motion["phi_acc"]) == (0.7, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("given_", "message"),
+    [
+        ({"gain": 0.0}, "filters.gain: expected"),
+        ({"swing_rate": -1.0}, "filters.swing_rate: expected"),
+        ({"crank_acc": 399.0}, r"gain \* crank_rate <= crank_acc .* got 20 \* 20 > 399"),
+        ({"swing_rate": 5.0}, r"gain \* swing_rate <= swing_acc .* got 20 \* 5 > 80"),
+    ],
+)
+def test_bad_settings_are_named(given_, message):
+    with pytest.raises(ParameterError, match=message):
+        FilterSettings(**given_)

@@ -1,0 +1,81 @@
+"""Gait parameters: limits, order, and the two gaits of the default preset."""
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hoof_env.errors import DataFileError, ParameterError
+from hoof_env.gait.parameters import LIMITS, PARAMETERS, GaitParameters, gait_names, load_gait
+
+inside = st.tuples(*(st.floats(low, high) for low, high in LIMITS.values()))
+
+
+@given(values=inside)
+def test_an_array_and_back(values):
+    gait = GaitParameters.from_array(values)
+    assert tuple(gait.to_array()) == values
+    assert tuple(getattr(gait, name) for name in PARAMETERS) == values
+
+
+@pytest.mark.parametrize("name", PARAMETERS)
+def test_each_limit_is_kept(name):
+    low, high = LIMITS[name]
+    gait = dict(zip(PARAMETERS, (1.0, 0.5, 0.0, 0.0), strict=True))
+    for value in (low, high):
+        GaitParameters(**{**gait, name: value})
+    for value in (low - 1e-6, high + 1e-6, np.nan, np.inf, "fast", None, True):
+        with pytest.raises(ParameterError, match=f"{name}: expected a finite number in"):
+            GaitParameters(**{**gait, name: value})
+
+
+def test_an_array_of_another_shape():
+    with pytest.raises(ParameterError, match=r"expected 4 values .*crank_speed.*, got shape \(3,\)"):
+        GaitParameters.from_array([1.0, 0.5, 0.0])
+
+
+@pytest.mark.parametrize(
+    # Golden: amplitude and phase of the swing as the identifying search reported them; the preset holds
+    # phi = offset + A sin(theta) + B cos(theta)
+    ("name", "offset", "amplitude", "phase"),
+    [
+        ("walk", 0.3434509445955683, 0.1856136496014587, -0.9921320005284548),
+        ("run", 1.111873519500804, 0.7071698802333156, -2.46127843461837),
+    ],
+)
+def test_the_gaits_of_the_default_preset(name, offset, amplitude, phase):
+    gait = load_gait(name)
+    assert gait.crank_speed == 2 * np.pi
+    for theta in np.linspace(0, 6, 7):
+        swing = gait.swing_offset + gait.swing_sin * np.sin(theta) + gait.swing_cos * np.cos(theta)
+        assert swing == pytest.approx(offset + amplitude * np.sin(theta + phase), abs=1e-12)
+
+
+def test_an_unknown_gait():
+    assert gait_names() == ["run", "walk"]
+    with pytest.raises(ParameterError, match="gait: expected one of run, walk, got 'trot'"):
+        load_gait("trot")
+
+
+@pytest.mark.parametrize(
+    ("gaits", "error", "message"),
+    [
+        (None, DataFileError, "expected an object 'gaits' with at least one gait, got None"),
+        ({}, DataFileError, "expected an object 'gaits' with at least one gait"),
+        ([1], DataFileError, "expected an object 'gaits' with at least one gait"),
+        ({"walk": 3}, DataFileError, "gait 'walk': expected crank_speed"),
+        ({"walk": {"crank_speed": 6.0}}, DataFileError, "gait 'walk': expected crank_speed"),
+        ({"walk": {"crank_speed": 99, "swing_offset": 0, "swing_sin": 0, "swing_cos": 0}},
+         ParameterError, "crank_speed: expected"),
+    ],
+)  # fmt: skip
+def test_a_bad_preset_is_named(tmp_path, gaits, error, message):
+    path = tmp_path / "bad.json"
+    path.write_text(json.dumps({"gaits": gaits}))
+    with pytest.raises(error, match=message):
+        load_gait("walk", path)
+    if not gaits or not isinstance(gaits, dict):
+        with pytest.raises(DataFileError, match="expected an object 'gaits'"):
+            gait_names(path)

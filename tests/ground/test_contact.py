@@ -1,0 +1,113 @@
+"""The latch: how fast a point came in is taken at touch-down and kept until that point leaves."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hoof_env.errors import ParameterError
+from hoof_env.ground.contact import HEEL, TOE, Ground, latch, new_contacts, touch
+from hoof_env.ground.friction import friction_force
+from hoof_env.ground.normal_force import normal_force
+
+INTERPOLATED = Ground(restitution=0.5, approach_floor=0.01).to_record()
+SAMPLED = Ground(restitution=0.5, approach_floor=0.01, approach="sampled").to_record()
+
+
+def follow(path, ground):
+    """Approach speed after each (penetration, rate) of a path."""
+    contact = new_contacts()[TOE]
+    seen = []
+    for penetration, rate in path:
+        latch(contact, penetration, rate, ground)
+        seen.append((bool(contact["inside"]), float(contact["approach"])))
+    return seen
+
+
+def test_it_holds_until_the_point_leaves_and_latches_anew():
+    path = [(-0.1, 1.0), (0.1, 1.0), (0.2, 0.4), (0.1, -2.0), (-0.1, -2.0), (-0.05, 3.0), (0.05, 3.0)]
+    assert follow(path, INTERPOLATED) == [
+        (False, 0.0), (True, 1.0), (True, 1.0), (True, 1.0), (False, 0.0), (False, 0.0), (True, 3.0),
+    ]  # fmt: skip
+
+
+def test_the_sampled_speed_is_that_of_the_first_sample_inside():
+    path = [(-0.3, 1.0), (0.1, 2.0)]
+    assert follow(path, SAMPLED)[-1] == (True, 2.0)
+    assert follow(path, INTERPOLATED)[-1] == (True, pytest.approx(1.75))  # three quarters of the way
+
+
+@given(
+    start=st.floats(-1.0, -1e-6),
+    rate=st.floats(0.02, 10.0),
+    acc=st.floats(-5.0, 20.0),
+    h=st.floats(1e-4, 1e-2),
+)
+@settings(deadline=None, max_examples=100)
+def test_interpolation_meets_the_crossing(start, rate, acc, h):
+    """Exact where the point moves uniformly, of second order in the step where it accelerates."""
+    for a in (0.0, acc):
+        times = np.arange(0, 1000) * h
+        depth, speed = start + rate * times + a * times**2 / 2, rate + a * times
+        inside = np.flatnonzero(depth > 0)
+        if not inside.size or speed[inside[0]] < 0.02:
+            continue
+        end = inside[0] + 1
+        seen = follow(zip(depth[:end].tolist(), speed[:end].tolist(), strict=True), INTERPOLATED)
+        true = np.sqrt(rate**2 - 2 * a * start)
+        step = speed[end - 1] - speed[end - 2]  # over the step of the crossing
+        assert seen[-1][1] == pytest.approx(true, rel=1e-9, abs=step**2 / true)
+
+
+def test_a_grazing_point_has_the_floor():
+    for ground in (INTERPOLATED, SAMPLED):
+        assert follow([(-0.1, -1.0), (1e-3, 1e-5)], ground)[-1] == (True, 0.01)
+        assert follow([(0.1, -0.5)], ground)[-1] == (True, 0.01)  # begins inside, on its way out
+
+
+def test_a_point_that_begins_inside_has_entered_at_its_present_rate():
+    assert follow([(0.1, 0.7), (0.2, 0.1)], INTERPOLATED) == [(True, 0.7), (True, 0.7)]
+
+
+def test_points_latch_each_for_itself():
+    contacts = new_contacts()
+    touch(contacts[TOE], complex(0.3, -0.01), complex(0.5, -0.8), INTERPOLATED)
+    touch(contacts[HEEL], complex(0.1, 0.02), complex(0.5, -0.3), INTERPOLATED)
+    assert contacts["inside"].tolist() == [True, False]
+    assert contacts["approach"].tolist() == [0.8, 0.0]
+
+
+@given(x=st.floats(-5, 5), y=st.floats(-0.3, 0.3), vx=st.floats(-8, 8), vy=st.floats(-8, 8))
+@settings(deadline=None, max_examples=60)
+def test_touch_is_the_two_laws_at_the_place_of_the_point(x, y, vx, vy):
+    ground = Ground(restitution=0.3, normal_law="hunt-crossley")
+    record, contact = ground.to_record(), new_contacts()[TOE]
+    force = touch(contact, complex(x, y), complex(vx, vy), record)
+    normal = friction = 0.0
+    if y < 0:
+        normal = normal_force(-y, -vy, max(-vy, 1e-4), 2e4, 1.5, 1.05, 0.0)
+        friction = friction_force(vx, normal, 0, 0.4, 1e-3, 1e-2)
+    assert force == complex(friction, normal)
+    assert [contact[name] for name in ("x", "vx", "penetration", "rate")] == [x, vx, -y, -vy]
+    assert [contact["normal"], contact["friction"]] == [normal, friction]
+
+
+@pytest.mark.parametrize(
+    ("settings_", "message"),
+    [
+        ({"stiffness": 0.0}, "stiffness: expected"),
+        ({"exponent": 0.5}, r"exponent: expected a finite number in \[1, 3\], got 0.5"),
+        ({"normal_law": "hertz"}, "normal_law: expected one of"),
+        ({"restitution": -0.1}, "restitution: expected"),
+        ({"restitution": 0.0, "normal_law": "flores"}, "damping grows without bound"),
+        ({"approach_floor": 0.0}, "approach_floor: expected"),
+        ({"approach": "guessed"}, "approach: expected one of interpolated, sampled, got 'guessed'"),
+        ({"friction_law": "coulomb"}, "friction_law: expected one of ambrosio, tanh, threlfall"),
+        ({"friction": float("nan")}, "friction: expected"),
+        ({"friction_slow": 0.02}, "friction_fast: expected more than friction_slow"),
+        ({"reference_mass": 0.0}, "reference_mass: expected"),
+    ],
+)
+def test_bad_settings_are_named(settings_, message):
+    with pytest.raises(ParameterError, match=message):
+        Ground(**settings_)
