@@ -14,7 +14,8 @@ from hoof_env.errors import OutputError
 
 @contextmanager
 def staged(folder: Path) -> Iterator[Path]:
-    """A temporary folder inside `folder` (made if need be); its files replace those of `folder` if the block succeeds.
+    """A temporary folder inside `folder`, which is made if need be; if the block succeeds, its files replace
+    those of `folder`.
 
     Raises:
         OutputError: `folder` cannot be made or written.
@@ -23,7 +24,9 @@ def staged(folder: Path) -> Iterator[Path]:
         folder.mkdir(parents=True, exist_ok=True)
         stage = Path(tempfile.mkdtemp(prefix=".unfinished-", dir=folder))
     except OSError as error:
-        raise OutputError(f"cannot write to {str(folder)!r} ({error.strerror}); expected a writable folder") from None
+        raise OutputError(
+            f"cannot write to {str(folder)!r} ({error.strerror}); expected a writable folder"
+        ) from None
     try:
         yield stage
         for file in sorted(stage.iterdir()):

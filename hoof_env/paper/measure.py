@@ -1,8 +1,8 @@
 """From the trace of one cycle to what the paper reports about it.
 
-A hoof point is in contact between the instants at which its penetration crosses zero, interpolated linearly between
-samples. First contact is the earliest of these instants over toe and heel, last contact the latest; hoof angles there
-are interpolated too.
+A hoof point is in contact between the instants at which its penetration crosses zero, interpolated linearly
+between samples. First contact is the earliest of these instants over toe and heel, last contact the latest;
+hoof angles there are interpolated too.
 """
 
 from __future__ import annotations
@@ -93,7 +93,9 @@ def contact_intervals(t: NDArray[np.float64], penetration: NDArray[np.float64]) 
     """
     inside = penetration > 0
     if inside[0] or inside[-1]:
-        raise ParameterError("trace: expected a cycle that starts and ends with the hoof in the air, got one in stance")
+        raise ParameterError(
+            "trace: expected a cycle that starts and ends with the hoof in the air, got one in stance"
+        )
     before = np.flatnonzero(np.diff(inside))
     part = penetration[before] / (penetration[before] - penetration[before + 1])
     zeros = (t[before] + part * (t[before + 1] - t[before])).tolist()
@@ -108,7 +110,7 @@ def overlap(one: tuple[Interval, ...], two: tuple[Interval, ...]) -> Interval | 
 
 
 def integral(trace: NDArray[np.void], values: NDArray[np.float64], start: float, end: float) -> float:
-    """Integral over [start, end] s of `values` sampled with the trace, linear between samples (trapezoidal rule)."""
+    """Integral over [start, end] [s] of `values` sampled with the trace, linear between samples."""
     t = trace["t"]
     inner = (t > start) & (t < end)
     times = np.concatenate(([start], t[inner], [end]))

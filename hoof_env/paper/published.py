@@ -1,4 +1,4 @@
-"""What the paper prints: every number with its unit and the bar for its reproduction, and the claims about shape."""
+"""What the paper prints: numbers with units and bars for their reproduction, and claims about shape."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ class Bar:
 
     Attributes:
         limit: largest error accepted, or None where the error is only reported.
-        measure: "s", "deg", "%" (relative to the published value), "point" (difference of two percentages) or ""
-            (plain difference).
+        measure: "s", "deg", "%" (relative to the published value), "point" (difference of two percentages) or
+            "" (plain difference).
     """
 
     limit: float | None
@@ -37,7 +37,7 @@ class Bar:
         return 100 * difference / published if self.measure == "%" else difference
 
     def holds(self, error: float | None) -> bool | None:
-        """Whether an error is within the bar: None where it is only reported, False where there is no value."""
+        """Whether an error is within the bar: None if it is only reported, False if there is no value."""
         if self.limit is None:
             return None
         return error is not None and abs(error) <= self.limit
@@ -61,7 +61,9 @@ def parse_bar(text: str, unit: str) -> Bar:
     match = _BAR.fullmatch(text) if isinstance(text, str) else None
     if match is None or (match[2] or "") not in allowed:
         form = f"0.5 {allowed[0]}".strip()
-        raise ParameterError(f"bar: expected 'reported' or a number like {form!r} for unit {unit!r}, got {text!r}")
+        raise ParameterError(
+            f"bar: expected 'reported' or a number like {form!r} for unit {unit!r}, got {text!r}"
+        )
     return Bar(float(match[1]), match[2] or "")
 
 
@@ -134,9 +136,11 @@ def load_published(path: Path | None = None) -> Published:
         raise DataFileError(f"{file}: {error}") from None
     except (ValueError, KeyError, TypeError) as error:
         raise DataFileError(f"{file}: expected source, parameters, rows and shapes: {error!r}") from None
-    ids = [item.id for item in (*published.rows, *published.claims)]
+    ids = [row.id for row in published.rows] + [claim.id for claim in published.claims]
     if len(ids) != len(set(ids)):
-        raise DataFileError(f"{file}: expected every id once, got {', '.join(sorted({i for i in ids if ids.count(i) > 1}))}")
+        raise DataFileError(
+            f"{file}: expected every id once, got {', '.join(sorted({i for i in ids if ids.count(i) > 1}))}"
+        )
     return published
 
 
@@ -154,5 +158,5 @@ def _row(entry: dict[str, Any]) -> PublishedRow:
         bar=parse_bar(entry["bar"], entry["unit"]),
         bar_text=entry["bar"],
         condition=condition,
-        reading=entry.get("reading", entry.get("definition", "")),
+        reading=entry.get("reading", ""),
     )

@@ -1,4 +1,4 @@
-"""The reproduction as a readable page: published beside simulated, claims about shape, versions and command."""
+"""The reproduction as a page to read: published beside simulated, claims about shape, versions, command."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ def markdown(reproduction: Reproduction, *, command: str, figures: bool) -> str:
         f"{reproduction.published.source}.",
         f"**The leg's geometry and its gaits are identified, not published** (preset `{geometry.name}`). "
         f"{geometry.provenance}",
-        "Each condition is one cycle of 1 s on a fixed trunk under the zero action. Solver `paper` is the paper's Eq. 8 "
-        "with its Baumgarte terms and explicit Euler at 1 ms; solver `exact` is the same motion in closed form, "
-        "at a step at which its results have converged.",
+        "Each condition is one cycle of 1 s on a fixed trunk under the zero action. Solver `paper` is "
+        "the paper's Eq. 8 with its Baumgarte terms and explicit Euler at 1 ms; solver `exact` is the same "
+        "motion in closed form, at a step at which its results have converged.",
         f"Written by `{command}` with Python {platform.python_version()}, {versions}.",
         "## Published beside simulated",
         *(_summary(reproduction, solver) for solver in solvers),
@@ -78,7 +78,8 @@ def _summary(reproduction: Reproduction, solver: str) -> str:
     worst = ", ".join(
         f"{row['id']} {_error(row, reproduction)} (bar {row['bar']})" for row in _worst(reproduction, solver)
     )
-    return f"Solver `{solver}`: {within} of {len(barred)} rows within their bar. Worst: {worst or 'none outside'}."
+    counts = f"{within} of {len(barred)} rows within their bar"
+    return f"Solver `{solver}`: {counts}. Worst: {worst or 'none outside'}."
 
 
 def _table(head: list[str], rows: Iterable[list[str]]) -> str:
@@ -100,7 +101,10 @@ def _rows_table(reproduction: Reproduction, solvers: list[str]) -> str:
         for solver in solvers:
             (row,) = _of(reproduction.rows, id=published.id, solver=solver)
             error = _error(row, reproduction) + (" ✗" if row["within_bar"] is False else "")
-            line += [_number(row["simulated"], row["unit"]), f"**{error}**" if (row["id"], solver) in worst else error]
+            line += [
+                _number(row["simulated"], row["unit"]),
+                f"**{error}**" if (row["id"], solver) in worst else error,
+            ]
         lines.append(line)
     head = ["row", "quantity", "unit", "published", "bar"]
     return _table(head + [text for solver in solvers for text in (f"solver {solver}", "error")], lines)
@@ -109,10 +113,19 @@ def _rows_table(reproduction: Reproduction, solvers: list[str]) -> str:
 def _beside_table(reproduction: Reproduction, solvers: list[str]) -> str:
     lines = []
     for published in reproduction.published.rows:
-        by_solver = [_of(reproduction.rows, id=published.id, solver=solver)[0]["beside"] for solver in solvers]
-        for name in by_solver[0]:
+        by_solver = [
+            _of(reproduction.rows, id=published.id, solver=solver)[0]["beside"] for solver in solvers
+        ]
+        for name in sorted(by_solver[0].keys() - {"printed"}):
             values = [_number(beside.get(name), published.unit) for beside in by_solver]
-            lines.append([f"`{published.id}`", name.replace("_", " "), _number(published.printed, published.unit), *values])
+            lines.append(
+                [
+                    f"`{published.id}`",
+                    name.replace("_", " "),
+                    _number(published.printed, published.unit),
+                    *values,
+                ]
+            )
     return _table(["row", "reading", "in print", *(f"solver {solver}" for solver in solvers)], lines)
 
 
@@ -122,7 +135,10 @@ def _shape(reproduction: Reproduction, claim_id: str, figures: bool) -> str:
     lines = [f"**`{claim_id}`**: {first['claim']}"]
     if first["reading"]:
         lines.append(f"- Reading: {first['reading']}.")
-    lines += [f"- Solver `{e['solver']}`: **{'holds' if e['holds'] else 'does not hold'}**. {e['evidence']}." for e in entries]
+    lines += [
+        f"- Solver `{e['solver']}`: **{'holds' if e['holds'] else 'does not hold'}**. {e['evidence']}."
+        for e in entries
+    ]
     if figures:
         lines.append(f"- Picture: [{first['figure']}]({first['figure']})")
     return "\n".join(lines)

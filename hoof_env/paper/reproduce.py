@@ -1,7 +1,7 @@
-"""The paper's four conditions, walking and running on elastic and inelastic ground, through the public environment.
+"""The paper's four conditions, walking and running, elastic and inelastic, through the public environment.
 
-Both solvers run them: "paper" is Eq. 8 with explicit Euler at 1 ms, "exact" the closed form at a step at which the
-results no longer change. The trunk is fixed and the action is zero, which is exactly the gait.
+Both solvers run them: "paper" is Eq. 8 with explicit Euler at 1 ms, "exact" the closed form at a step at
+which the results no longer change. The trunk is fixed and the action is zero, which is exactly the gait.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from numpy.typing import NDArray
 import hoof_env  # noqa: F401  (registers the environments)
 from hoof_env._output import staged
 from hoof_env.errors import HoofEnvError
-from hoof_env.leg.geometry import Geometry, load_geometry
+from hoof_env.leg.geometry import Geometry
 from hoof_env.paper import report
 from hoof_env.paper.measure import measure_stance
 from hoof_env.paper.published import CONDITIONS, Published, load_published
 from hoof_env.paper.rows import compare
 from hoof_env.paper.shapes import DEPTHS, judge, sole_velocity
 
+ENVIRONMENT = "hoof_env/HorseLegFixed-v0"
 GAITS = ("walk", "run")
 SOLVERS = ("paper", "exact")
-DEFAULT_PRESET = "first_fit"
 
 FIGURES = {
     "walk.order": "figure4",
@@ -51,9 +51,10 @@ class Reproduction:
 
     Attributes:
         rows: one dictionary for each published row and solver, see `hoof_env.paper.rows.compare`.
-        shapes: one dictionary for each claim about shape and solver: kind ("shape"), id, claim, reading, solver, holds,
-            evidence, figure.
-        traces: one cycle of dtype `hoof_env.dynamics.trace.TRACE`, its first row at t = 0, by (gait, condition, solver).
+        shapes: one dictionary for each claim about shape and solver: kind ("shape"), id, claim, reading,
+            solver, holds, evidence, figure.
+        traces: one cycle of dtype `hoof_env.dynamics.trace.TRACE`, its first row at t = 0, by (gait,
+            condition, solver).
         geometry: the leg, identified and not published.
         published: what was compared with.
     """
@@ -78,7 +79,7 @@ def run_cycle(gait: str, solver: str, **settings: Any) -> Trace:
     Raises:
         ParameterError: what the environment refuses. HoofEnvError: the simulation stopped before its end.
     """
-    env = gymnasium.make("hoof_env/HorseLegFixed-v0", gait=gait, solver=solver, **settings)
+    env = gymnasium.make(ENVIRONMENT, gait=gait, solver=solver, **settings)
     try:
         env.reset(seed=0)
         action = np.zeros(env.action_space.shape or (), np.float32)
@@ -86,25 +87,31 @@ def run_cycle(gait: str, solver: str, **settings: Any) -> Trace:
         while not truncated:
             _, _, terminated, truncated, _ = env.step(action)
             if terminated:
-                raise HoofEnvError(f"{gait} with solver {solver!r}: the simulation failed before the end of its cycle")
+                raise HoofEnvError(
+                    f"{gait} with solver {solver!r}: the simulation failed before the end of its cycle"
+                )
             parts.append(env.get_wrapper_attr("trace"))
     finally:
         env.close()
     return np.concatenate(parts)
 
 
-def reproduce(progress: Callable[[str], None] | None = None, *, preset: str = DEFAULT_PRESET) -> Reproduction:
+def reproduce(progress: Callable[[str], None] | None = None, *, preset: str | None = None) -> Reproduction:
     """Run the four conditions with both solvers and compare them with the paper.
 
     Args:
         progress: called with one line after each run.
-        preset: geometry and gaits, a name or a file (`hoof_env.leg.geometry.load_geometry`).
+        preset: geometry and gaits, a name or a file; the environment's default if None.
 
     Raises:
         HoofEnvError: a preset that is unknown or does not walk and run.
     """
     tell = progress or (lambda line: None)
-    geometry, published = load_geometry(preset), load_published()
+    settings: dict[str, Any] = {} if preset is None else {"preset": preset}
+    geometry, published = (
+        gymnasium.make(ENVIRONMENT, **settings).get_wrapper_attr("geometry"),
+        load_published(),
+    )
     traces: dict[tuple[str, str, str], Trace] = {}
     rows: list[dict[str, Any]] = []
     shapes: list[dict[str, Any]] = []
@@ -112,13 +119,17 @@ def reproduce(progress: Callable[[str], None] | None = None, *, preset: str = DE
         stances, medians = {}, {}
         for gait in GAITS:
             for condition, restitution in CONDITIONS.items():
-                trace = run_cycle(gait, solver, restitution=restitution, preset=preset)
+                trace = run_cycle(gait, solver, restitution=restitution, **settings)
                 traces[gait, condition, solver] = trace
                 stance = stances[gait, condition] = measure_stance(trace)
-                tell(f"{solver} solver, {gait}, {condition}: peak {stance.peak:.1f} N, mean {stance.mean:.1f} N")
-            medians[gait] = _sole_velocities(traces[gait, "elastic", solver], gait, solver, geometry, preset)
-            tell(f"{solver} solver, {gait}, deeper: sole moves at {_listed(medians[gait].values())} m/s")
-        cycles = {(gait, condition): traces[gait, condition, solver] for gait in GAITS for condition in CONDITIONS}
+                tell(f"{solver}, {gait}, {condition}: peak {stance.peak:.1f} N, mean {stance.mean:.1f} N")
+            medians[gait] = _sole_velocities(
+                traces[gait, "elastic", solver], gait, solver, geometry.hip_height, settings
+            )
+            tell(f"{solver}, {gait}, 0, 5, 10 cm deep: sole moves at {_listed(medians[gait].values())} m/s")
+        cycles = {
+            (gait, condition): traces[gait, condition, solver] for gait in GAITS for condition in CONDITIONS
+        }
         rows += compare(published, stances, solver)
         verdicts = judge(cycles, medians)
         shapes += [
@@ -141,17 +152,23 @@ def _listed(values: Any) -> str:
     return ", ".join(f"{value:+.2f}" for value in values)
 
 
-def _sole_velocities(trace: Trace, gait: str, solver: str, geometry: Geometry, preset: str) -> dict[float, float]:
-    """`sole_velocity` [m/s] by depth [m]; `trace` is the elastic cycle at depth 0."""
+def _sole_velocities(
+    trace: Trace, gait: str, solver: str, height: float, settings: dict[str, Any]
+) -> dict[float, float]:
+    """`sole_velocity` [m/s] by depth [m]; `trace` is the elastic cycle at depth 0, hip at `height` [m]."""
     medians = {0.0: sole_velocity(trace)}
     for depth in DEPTHS[1:]:
-        deeper = run_cycle(gait, solver, preset=preset, restitution=1.0, hip_height=geometry.hip_height - depth)
+        deeper = run_cycle(gait, solver, restitution=1.0, hip_height=height - depth, **settings)
         medians[depth] = sole_velocity(deeper)
     return medians
 
 
 def write_reproduction(
-    reproduction: Reproduction, out_dir: Path | str, *, figures: bool = True, command: str = "hoof-env reproduce --out DIR"
+    reproduction: Reproduction,
+    out_dir: Path | str,
+    *,
+    figures: bool = True,
+    command: str = "hoof-env reproduce --out DIR",
 ) -> list[Path]:
     """Write `reproduction.json`, `reproduction.md` and the figures; returns their paths.
 

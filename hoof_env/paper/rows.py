@@ -33,13 +33,20 @@ def _reduction(elastic: float, inelastic: float) -> float:
 
 
 QUANTITIES = {
-    "contact_start": Quantity(lambda s, _: s.start, "first instant at which a hoof point enters the ground, interpolated"),
-    "contact_end": Quantity(lambda s, _: s.end, "instant at which the last hoof point leaves the ground, interpolated"),
+    "contact_start": Quantity(
+        lambda s, _: s.start, "first instant at which a hoof point enters the ground, interpolated"
+    ),
+    "contact_end": Quantity(
+        lambda s, _: s.end, "instant at which the last hoof point leaves the ground, interpolated"
+    ),
     "duty": Quantity(lambda s, _: s.duty, "(last contact - first contact) / period"),
-    "angle_contact": Quantity(lambda s, _: s.angle_start_deg, "hoof angle at first contact, heel up positive"),
+    "angle_contact": Quantity(
+        lambda s, _: s.angle_start_deg, "hoof angle at first contact, heel up positive"
+    ),
     "angle_liftoff": Quantity(lambda s, _: s.angle_end_deg, "hoof angle at last contact, heel up positive"),
     "angle_flat": Quantity(
-        lambda s, _: s.angle_flat_deg, "hoof angle at the middle of the interval in which toe and heel are in the ground"
+        lambda s, _: s.angle_flat_deg,
+        "hoof angle at the middle of the time that toe and heel both bear; the paper does not say when",
     ),
     "angle_variation": Quantity(
         lambda s, _: s.angle_variation_deg,
@@ -59,7 +66,9 @@ QUANTITIES = {
     "reduction": Quantity(
         lambda elastic, inelastic: _reduction(elastic.peak, inelastic.peak),
         "(inelastic - elastic) / inelastic of the maximum normal forces",
-        lambda elastic, inelastic: {"resultant_%": _reduction(elastic.peak_resultant, inelastic.peak_resultant)},
+        lambda elastic, inelastic: {
+            "resultant_%": _reduction(elastic.peak_resultant, inelastic.peak_resultant)
+        },
     ),
 }
 """By the part of a row's id between the gait and the condition."""
@@ -69,9 +78,9 @@ def compare(published: Published, stances: Stances, solver: str) -> list[dict[st
     """One row for each published number, measured with one solver.
 
     Returns:
-        Dictionaries with kind ("row"), id, gait, quantity, unit, condition, reading, definition, published (as read),
-        bar, solver, simulated, error (signed, in the bar's own measure), within_bar (None where the bar is 'reported')
-        and beside (other readings by name).
+        Dictionaries with kind ("row"), id, gait, quantity, unit, condition, reading, definition,
+        published (as read), bar, solver, simulated, error (signed, in the bar's measure), within_bar (None where
+        the bar is 'reported') and beside (other readings by name).
     """
     return [_compare(row, stances, solver) for row in published.rows]
 
@@ -80,7 +89,7 @@ def _compare(row: PublishedRow, stances: Stances, solver: str) -> dict[str, Any]
     simulated, definition, beside = _measure(row, stances)
     error = None if simulated is None else row.bar.error(simulated, row.value)
     if row.printed != row.value and simulated is not None:
-        beside |= {"published_in_print": row.printed, "error_against_print": row.bar.error(simulated, row.printed)}
+        beside |= {"printed": row.printed, "error_against_printed": row.bar.error(simulated, row.printed)}
     return {
         "kind": "row",
         "id": row.id,

@@ -17,7 +17,7 @@ PROMINENCE = 0.1
 """A force peak counts if it stands out by this part of the highest force [-]."""
 
 PEAK_GAP = 0.01
-"""Two peaks are apart in time if at least this far [s]: a hundredth of the cycle, ten time steps of the paper."""
+"""Two peaks are apart in time if at least this far [s], ten time steps of the paper."""
 
 FLAT_DEG = 3.0
 """A hoof is flat within this angle [deg]: the bar of the published angle at mid-stance."""
@@ -40,9 +40,9 @@ Trace = NDArray[np.void]
 def find_peaks(force: NDArray[np.float64]) -> list[int]:
     """Indices of the local maxima of a force that rises from 0 and returns to it, if prominent enough.
 
-    A maximum's prominence is its height above the higher of the two lowest points that separate it from higher
-    ground (or from the ends) on either side; it must reach `PROMINENCE` of the highest force. A plateau counts once,
-    at its first sample.
+    A maximum's prominence is its height above the higher of the two lowest points that separate it from
+    higher ground (or from the ends) on either side; it must reach `PROMINENCE` of the highest force. A
+    plateau counts once, at its first sample.
     """
     steps = np.diff(force)
     moving = np.flatnonzero(steps)
@@ -67,8 +67,8 @@ def _phase(interval: tuple[float, float] | None) -> str:
 
 
 def walk_order(walk: Stance, trace: Trace) -> Verdict:
-    """Heel-strike, flat, toe-off: the heel touches first, then both bear with the sole flat within `FLAT_DEG` at some
-    instant, and the toe leaves last."""
+    """Heel-strike, flat, toe-off: the heel touches first, then both bear with the sole flat within
+    `FLAT_DEG` at some instant, and the toe leaves last."""
     smallest = float("inf")
     if walk.double:
         t = trace["t"]
@@ -83,7 +83,7 @@ def walk_order(walk: Stance, trace: Trace) -> Verdict:
 
 
 def walk_peaks(walk: Stance, trace: Trace) -> Verdict:
-    """Two peaks of the normal force, one in each half of stance, and both points loaded at the dip between them."""
+    """Two peaks of the normal force, one in each half of stance; toe and heel both bear at the dip."""
     force, t = trace["normal"], trace["t"]
     peaks = find_peaks(force)
     evidence = ", ".join(f"{force[k]:.0f} N at {t[k]:.3f} s" for k in peaks)
@@ -99,14 +99,22 @@ def walk_peaks(walk: Stance, trace: Trace) -> Verdict:
 
 
 def run_order(run: Stance, walk: Stance, run_trace: Trace, walk_trace: Trace) -> Verdict:
-    """Toe-strike, roll-over, toe-off with a large gap: the toe touches first, the heel follows and leaves before the
-    toe, and at toe-off it is higher above the ground than at toe-off in walking."""
-    gaps = [float(-np.interp(s.end, tr["t"], tr["heel_penetration"])) for s, tr in ((run, run_trace), (walk, walk_trace))]
+    """Toe-strike, roll-over, toe-off with a large gap: the toe touches first, the heel follows and leaves
+    before the toe, and at toe-off it is higher above the ground than at toe-off in walking."""
+    gaps = [
+        float(-np.interp(s.end, tr["t"], tr["heel_penetration"]))
+        for s, tr in ((run, run_trace), (walk, walk_trace))
+    ]
     rolls = run.first_points == {"toe"} and bool(run.heel) and run.last_points == {"toe"}
-    heel = f"heel in the ground {run.heel[0][0]:.3f}-{run.heel[-1][1]:.3f} s" if run.heel else "heel never in the ground"
+    heel = (
+        f"heel in the ground {run.heel[0][0]:.3f}-{run.heel[-1][1]:.3f} s"
+        if run.heel
+        else "heel never in the ground"
+    )
     return Verdict(
         rolls and gaps[0] > gaps[1],
-        f"first in: {_describe(run.first_points)} at {run.start:.3f} s, {run.angle_start_deg:.1f} deg; {heel}; "
+        f"first in: {_describe(run.first_points)} at {run.start:.3f} s, {run.angle_start_deg:.1f} deg; "
+        f"{heel}; "
         f"last out: {_describe(run.last_points)} at {run.end:.3f} s, {run.angle_end_deg:.1f} deg; "
         f"heel {100 * gaps[0]:.1f} cm above the ground then, walking {100 * gaps[1]:.1f} cm",
     )
@@ -119,15 +127,16 @@ def run_peaks(elastic: Trace, inelastic: Trace) -> Verdict:
     gap = times[0] - times[1]
     return Verdict(
         all(len(found) == 1 for found in peaks) and abs(gap) >= PEAK_GAP,
-        f"elastic {len(peaks[0])} peak(s), highest at {times[0]:.4f} s; inelastic {len(peaks[1])}, highest at "
-        f"{times[1]:.4f} s; the elastic one is {1000 * gap:+.1f} ms later",
+        f"elastic {len(peaks[0])} peak(s), highest at {times[0]:.4f} s; inelastic {len(peaks[1])}, highest "
+        f"at {times[1]:.4f} s; the elastic one is {1000 * gap:+.1f} ms later",
     )
 
 
 def step_length(trace: Trace, stance: Stance) -> tuple[float, float]:
-    """How far the middle of the sole travels back from first to last contact, and the length of its closed path [m].
+    """How far the middle of the sole travels back from first to last contact, and how far over the cycle [m].
 
-    On a fixed trunk the first is how far a body would pass over the foot in one stance.
+    The second is the horizontal extent of its closed path. On a fixed trunk the
+    first is how far a body would pass over the foot in one stance.
     """
     sole = (trace["toe_x"] + trace["heel_x"]) / 2 - trace["trunk_x"]
     start, end = np.interp([stance.start, stance.end], trace["t"], sole)
@@ -147,11 +156,14 @@ def run_step(run: Stance, walk: Stance, run_trace: Trace, walk_trace: Trace) -> 
 def half_impulses(trace: Trace, stance: Stance) -> list[tuple[float, float]]:
     """Horizontal (forward positive) and vertical impulse on the leg in each half of stance [N s]."""
     halves = ((stance.start, stance.middle), (stance.middle, stance.end))
-    return [(integral(trace, trace["friction"], *half), integral(trace, trace["normal"], *half)) for half in halves]
+    return [
+        (integral(trace, trace["friction"], *half), integral(trace, trace["normal"], *half))
+        for half in halves
+    ]
 
 
 def walk_direction(walk: Stance, trace: Trace) -> Verdict:
-    """Braking through the walking stance, literally: the ground pushes the leg backward in both halves of stance."""
+    """Braking through the walking stance, literally: the ground pushes back in both halves of stance."""
     (first, _), (second, _) = half_impulses(trace, walk)
     if first < 0 and second < 0:
         supports = "supports 'the hoof slides forward'"
@@ -159,24 +171,25 @@ def walk_direction(walk: Stance, trace: Trace) -> Verdict:
         supports = "supports 'the force of the hoof on the ground' (that one points backward throughout)"
     else:
         supports = (
-            "supports neither 'the hoof slides forward' nor 'the force of the hoof on the ground' through the whole "
-            "stance; only 'against the hoof's own motion', which sliding friction always is"
+            "supports neither 'the hoof slides forward' nor 'the force of the hoof on the ground' throughout "
+            "the stance; only 'against the hoof's own motion', which sliding friction always is"
         )
     return Verdict(
         first < 0 and second < 0,
-        f"horizontal impulse on the leg {first:+.2f} N s in the first half of stance, {second:+.2f} N s in the second, "
-        f"{first + second:+.2f} N s in all (forward positive); {supports}",
+        f"horizontal impulse on the leg {first:+.2f} N s in the first half of stance, {second:+.2f} N s in "
+        f"the second, {first + second:+.2f} N s in all (forward positive); {supports}",
     )
 
 
 def run_direction(run: Stance, trace: Trace) -> Verdict:
-    """Turning towards propulsion: the mean force of the second half of stance points forward, and more than the first's."""
+    """Turning towards propulsion: in the second half of stance the mean force is forward, and more so."""
     halves = half_impulses(trace, run)
     first, second = (float(np.degrees(np.arctan2(*half))) for half in halves)
     return Verdict(
         second > 0 and second > first,
-        f"horizontal impulse on the leg {halves[0][0]:+.1f} N s in the first half of stance, {halves[1][0]:+.1f} N s in "
-        f"the second; mean force {first:+.1f} and {second:+.1f} deg forward of vertical",
+        f"horizontal impulse on the leg {halves[0][0]:+.1f} N s in the first half of stance, "
+        f"{halves[1][0]:+.1f} N s in the second; mean force {first:+.1f} and {second:+.1f} deg from vertical "
+        "(forward positive)",
     )
 
 
@@ -193,14 +206,17 @@ def sole_velocity(trace: Trace) -> float:
 
 
 def walk_walks(medians: Mapping[str, Mapping[float, float]]) -> Verdict:
-    """A gait must move its animal: the load-weighted median velocity of the sole is backward in both gaits, at the ground
-    level and deeper.
+    """A gait must move its animal: the load-weighted median velocity of the sole is backward in both gaits,
+    at the ground level and deeper.
 
     Args:
         medians: by gait, `sole_velocity` [m/s] by depth [m].
     """
     parts = [
-        f"{gait} " + ", ".join(f"{v:+.2f} m/s" + (f" ({100 * depth:.0f} cm deeper)" if depth else "") for depth, v in by.items())
+        f"{gait} "
+        + ", ".join(
+            f"{v:+.2f} m/s" + (f" ({100 * depth:.0f} cm deeper)" if depth else "") for depth, v in by.items()
+        )
         for gait, by in medians.items()
     ]
     return Verdict(
