@@ -1,6 +1,7 @@
 """hoof-env: a Gymnasium environment for learned gait control of a horse's leg.
 
-Importing the package registers its environments and nothing more: numba, pygame and the rest load when needed.
+Importing the package registers its environments and nothing more: numba, pygame and the rest load when
+needed.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""`hoof_env/HorseLeg-v0`: a horse's leg that must carry and move its trunk. The class docstring is the manual page."""
+"""`hoof_env/HorseLeg-v0`: a leg that must carry and move its trunk. The class docstring is the manual page."""
 
 from __future__ import annotations
 
@@ -31,7 +31,124 @@ LOWEST, HIGHEST = 0.6, 2.0
 
 
 class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
-    """DOCSTRING"""
+    """A horse's leg that must carry and move its trunk.
+
+    ## Description
+
+    The leg is the closed-loop linkage of Batbaatar & Wagatsuma (2021): 14 links turned by one crank, with a
+    hoof triangle that meets a viscoelastic ground at toe and heel (Eqs. 10-15). A second drive swings the
+    leg's frame about the crank centre by phi = offset + sine coefficient * sin(theta) + cosine coefficient
+    * cos(theta). The policy commands crank speed and swing parameters; filters with bounded rate and
+    acceleration turn commands into motion. The trunk moves by what friction gives it and feels every link
+    swing. Lengths are *identified* from the paper's results, not published.
+
+    `trunk="suspended"` (default): the trunk moves along x and y. The leg must bear `trunk_share` of the
+    weight of trunk and leg; a constant force carries the rest, a vertical spring and damper stands for the
+    animal's other legs. `"rail"`: it slides at fixed height. `"fixed"`: it stays; progress is then the
+    load-weighted backward travel of the hoof points while they bear load.
+
+    ## Action space
+
+    `Box(-1, 1, (4,), float32)`, clipped to these limits; every 0.02 s by default.
+
+    | Num | Command | At -1 | At +1 | Unit |
+    |---|---|---|---|---|
+    | 0 | crank speed | 0 | 12.566 (4 pi) | rad/s |
+    | 1 | swing offset | 0 | 1.4 | rad |
+    | 2 | swing sine coefficient | -0.8 | 0.4 | rad |
+    | 3 | swing cosine coefficient | -0.8 | 0.2 | rad |
+
+    ## Observation space
+
+    `Box(-1, 1, (24,), float32)` on a suspended trunk; a rail lacks rows 11-12 and a fixed trunk 10-12.
+
+    | Num | Observation | Scaling | Unit before scaling |
+    |---|---|---|---|
+    | 0 | sin(crank angle) | none | - |
+    | 1 | cos(crank angle) | none | - |
+    | 2 | crank speed | as action 0 | rad/s |
+    | 3 | swing offset | as action 1 | rad |
+    | 4 | swing sine coefficient | as action 2 | rad |
+    | 5 | swing cosine coefficient | as action 3 | rad |
+    | 6 | rate of crank speed | / 20 | rad/s^2 |
+    | 7 | rate of swing offset | / 4 | rad/s |
+    | 8 | rate of swing sine coefficient | / 4 | rad/s |
+    | 9 | rate of swing cosine coefficient | / 4 | rad/s |
+    | 10 | forward speed | tanh(x / 5) | m/s |
+    | 11 | vertical speed | tanh(x / 2) | m/s |
+    | 12 | height | tanh((x - hip height) / 0.3) | m |
+    | 13 | toe contact | 0 or 1 | - |
+    | 14 | heel contact | 0 or 1 | - |
+    | 15 | toe load | tanh(x / 3 weights) | N |
+    | 16 | heel load | tanh(x / 3 weights) | N |
+    | 17 | toe approach speed | tanh(x / 2) | m/s |
+    | 18 | heel approach speed | tanh(x / 2) | m/s |
+    | 19 | running peak force | tanh(x / 3 weights) | N |
+    | 20 | previous action: crank speed | none | - |
+    | 21 | previous action: swing offset | none | - |
+    | 22 | previous action: swing sine coefficient | none | - |
+    | 23 | previous action: swing cosine coefficient | none | - |
+
+    A weight is that of trunk and leg. Loads are those of the last substep.
+
+    ## Rewards
+
+    The sum of five terms, each in `info` under its name; `reward_weights` is a mapping with any of the
+    weights.
+
+    | Term | Weight | Meaning |
+    |---|---|---|
+    | `reward_progress` | `progress` = 1 per m | forward travel of the trunk |
+    | `reward_peak` | `peak` = 0.3 per kN | minus the increase of the stance's running peak GRF, the maximum over all substeps; the terms of one stance add up to its peak |
+    | `reward_energy` | `energy` = 0.1 per kJ | minus the positive work of crank and swing drive; braking power is not recovered |
+    | `reward_action` | `action` = 0.01 | minus the mean squared change of the action |
+    | `reward_failure` | `failure` = 20 per s | once, minus this times `episode_seconds`, when the episode fails |
+
+    A stance opens when the first hoof point enters the ground and closes when the last one leaves, or after
+    one crank revolution, whichever comes first.
+
+    ## Starting state
+
+    Crank angle uniform; gait parameters on the line between the preset's walk and run, at rest in the
+    filters; speed uniform in 0 to 1 m/s; the trunk at its nominal height, or as much higher as the hoof
+    needs to be above the ground (on a rail or fixed trunk the crank angle is drawn until it is).
+    `reset(options=...)` sets any of `gait` (name, mapping or `GaitParameters`), `crank_angle` [rad],
+    `speed` [m/s], `height` [m]; `info` tells what was used.
+
+    ## Episode end
+
+    Terminated when the trunk leaves 0.6 to 2 times its nominal height, or the simulation stops being finite
+    (`info["failure"]` says which). Truncated after `episode_seconds`. The last `info` has
+    `episode_summary`, see `envs.stance.summarize`.
+
+    ## Arguments
+
+    | Name | Default | Unit | Meaning |
+    |---|---|---|---|
+    | `preset` | "first_fit" | | leg and gaits: a preset's name or a JSON file |
+    | `trunk` | "suspended" | | "suspended", "rail" or "fixed" |
+    | `hip_height` | None | m | nominal height of the crank centre; None for the geometry's own, 1.718 |
+    | `trunk_mass` | 80 | kg | trunk mass that goes with this leg |
+    | `trunk_share` | 0.8 | - | part of the weight that the leg must bear |
+    | `trunk_stiffness`, `trunk_damping` | 4000, 1130 | N/m, N s/m | vertical suspension |
+    | `trunk_drag` | 20 | N s/m | resistance to forward motion |
+    | `stiffness`, `exponent` | 2e4, 1.5 | N/m^n, - | K and n of the contact law |
+    | `normal_law` | "lankarani-nikravesh" | | also "hunt-crossley", "flores", "gonthier", "hu-guo", "exact", "kelvin-voigt" |
+    | `restitution` | 0.5 | - | nominal coefficient of restitution |
+    | `approach_floor` | 0.1 | m/s | smallest approach speed in the damping term |
+    | `friction_law` | "ambrosio" | | also "threlfall", "tanh" |
+    | `friction`, `friction_slow`, `friction_fast` | 0.4, 1e-3, 5e-2 | -, m/s, m/s | mu_k and threshold speeds |
+    | `sim_dt`, `dt` | 1e-3, 0.02 | s | substep and control step; `dt` is a whole multiple |
+    | `episode_seconds` | 10 | s | time limit |
+    | `reward_weights` | None | | changes to the weights above |
+    | `render_mode` | None | | "rgb_array" or "human" |
+
+    Raises `ParameterError` (a `ValueError`) for a bad argument, option or action.
+
+    ## Version history
+
+    * v0: first version.
+    """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": list(RENDER_MODES), "render_fps": 50}  # type: ignore[misc]
 
@@ -97,8 +214,6 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     def _build_engine(self, trunk: Trunk, ground: Ground) -> Any:
         return LegEngine(self.geometry, trunk, ground, self.sim_dt, self.filters)
 
-    # -- actions ---------------------------------------------------------------------------------------------------
-
     def command_of(self, action: NDArray[np.float32]) -> NDArray[np.float64]:
         """Gait parameters that an action commands, shape (4,); the action is clipped to [-1, 1]."""
         return MIDDLE + HALF_RANGE * np.clip(action.astype(np.float64), -1.0, 1.0)
@@ -106,8 +221,6 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     def action_for(self, gait: GaitParameters) -> NDArray[np.float32]:
         """The action that commands the given gait, to float32 precision."""
         return np.clip((gait.to_array() - MIDDLE) / HALF_RANGE, -1, 1).astype(np.float32)
-
-    # -- gymnasium -------------------------------------------------------------------------------------------------
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -141,17 +254,21 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         if failed or truncated:
             info["episode_summary"] = summarize(self._account, self.weight, failed)
         if failed:
-            info["failure"] = result.message if result is not Result.OK else "the trunk left its range of heights"
+            info["failure"] = (
+                result.message if result is not Result.OK else "the trunk left its range of heights"
+            )
         if self.render_mode is not None:
             self._get_renderer().add(self.trace)
             if self.render_mode == "human":
                 self.render()
         return self._observe(), sum(terms.values()), failed, truncated, info
 
-    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+    def render(self) -> NDArray[np.uint8] | None:
         """Draw the present state: an (H, W, 3) uint8 array for "rgb_array", a window for "human"."""
         if self.render_mode is None:
-            gym.logger.warn("render() was called without a render_mode: pass render_mode='rgb_array' or 'human'")
+            gym.logger.warn(
+                "render() was called without a render_mode: pass render_mode='rgb_array' or 'human'"
+            )
             return None
         frame: NDArray[np.uint8] | None = self._get_renderer().frame()
         return frame
@@ -162,10 +279,11 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             self._renderer.close()
             self._renderer = None
 
-    # -- parts of a step -------------------------------------------------------------------------------------------
-
     def _check_action(self, action: Any) -> NDArray[np.float32]:
-        array = np.array(action, dtype=np.float32)
+        try:
+            array = np.array(action, dtype=np.float32)
+        except (TypeError, ValueError):
+            array = np.empty(0, np.float32)
         if array.shape != (4,) or not np.isfinite(array).all():
             raise ParameterError(f"action: expected 4 finite numbers in [-1, 1], got {action!r}")
         return np.clip(array, -1.0, 1.0)
@@ -196,31 +314,39 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     def _observe(self) -> NDArray[np.float32]:
         trunk = self.engine.trunk
         return observe(
-            self.trace[-1], self.engine.state.filters, self._rate_bounds, trunk.kind, trunk.height, self.weight,
-            float(self._account["peak"]), self._action,
-        )  # fmt: skip
+            self.trace[-1],
+            self.engine.state.filters,
+            self._rate_bounds,
+            trunk.kind,
+            trunk.height,
+            self.weight,
+            float(self._account["peak"]),
+            self._action,
+        )
 
     def _start(self, options: dict[str, Any]) -> tuple[GaitParameters, float, float, float]:
         """Gait, crank angle, speed and height to start from: drawn at random unless an option fixes them."""
         mix, turn, draw = self.np_random.random(3)
         names = sorted(self.gaits)
         one, two = self.gaits[names[0]].to_array(), self.gaits[names[-1]].to_array()
-        gait = _gait_option(options.get("gait"), self.gaits) or GaitParameters.from_array(one + mix * (two - one))
+        gait = _gait_option(options.get("gait"), self.gaits) or GaitParameters.from_array(
+            one + mix * (two - one)
+        )
         theta = options.get("crank_angle", 2 * np.pi * turn)
         trunk = self.engine.trunk
         speed = options.get("speed", START_SPEED * draw if trunk.kind != "fixed" else 0.0)
         if trunk.kind == "suspended":
             # no contact begins with a hoof inside the ground: hang the trunk higher where it would
-            height = options.get("height", max(trunk.height, -self._lowest_point(gait, theta)))
+            height = options.get("height", max(trunk.height, -self.hoof_height(gait, theta)))
         else:
             height = trunk.height
             for _ in range(100):
-                if "crank_angle" in options or height + self._lowest_point(gait, theta) >= 0:
+                if "crank_angle" in options or height + self.hoof_height(gait, theta) >= 0:
                     break
                 theta = 2 * np.pi * self.np_random.random()
         return gait, float(theta), float(speed), float(height)
 
-    def _lowest_point(self, gait: GaitParameters, theta: float) -> float:
+    def hoof_height(self, gait: GaitParameters, theta: float) -> float:
         """Height of the lower hoof point relative to O [m]."""
         phi = gait.swing_offset + gait.swing_sin * math.sin(theta) + gait.swing_cos * math.cos(theta)
         points = pose(self.geometry, theta, frame=FrameMotion(phi=phi))
@@ -236,7 +362,7 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         return self._renderer
 
 
-START_SPEED = 2.0
+START_SPEED = 1.0
 """Highest forward speed at reset [m/s]: a learner meets both a standing start and a rolling one."""
 
 OPTIONS = {
@@ -269,8 +395,8 @@ def _gait_option(value: Any, gaits: Mapping[str, GaitParameters]) -> GaitParamet
         return GaitParameters(**value)
     except TypeError:
         raise ParameterError(
-            f"options['gait']: expected a gait name ({', '.join(sorted(gaits))}) or a mapping of the four gait "
-            f"parameters, got {value!r}"
+            f"options['gait']: expected a gait name ({', '.join(sorted(gaits))}) or a mapping of the four "
+            f"gait parameters, got {value!r}"
         ) from None
 
 
@@ -279,9 +405,13 @@ def _substeps(dt: float, sim_dt: float) -> int:
     check_number("dt", dt, low=0, exclusive_low=True)
     ratio = dt / sim_dt
     if round(ratio) < 1 or abs(ratio - round(ratio)) > 1e-6:
-        raise ParameterError(f"dt: expected a whole multiple of sim_dt = {sim_dt:g} s, got {dt:g} s (ratio {ratio:g})")
+        raise ParameterError(
+            f"dt: expected a whole multiple of sim_dt = {sim_dt:g} s, got {dt:g} s (ratio {ratio:g})"
+        )
     return round(ratio)
 
 
 def _as_info(gait: GaitParameters) -> dict[str, float]:
-    return {name: float(getattr(gait, name)) for name in ("crank_speed", "swing_offset", "swing_sin", "swing_cos")}
+    return {
+        name: float(getattr(gait, name)) for name in ("crank_speed", "swing_offset", "swing_sin", "swing_cos")
+    }

@@ -19,7 +19,65 @@ SOLVERS = ("exact", "paper")
 
 
 class HorseLegFixedEnv(HorseLegEnv):
-    """DOCSTRING"""
+    """The paper's set-up: one gait on a fixed trunk, one crank revolution.
+
+    ## Description
+
+    The trunk is fixed and a policy commands offsets from the paper's walk or run; the zero action is
+    exactly that gait, and reproduces the paper: `hoof-env reproduce` runs this environment.
+    `solver="paper"` integrates Eq. 8 (42 coordinates, 42 multipliers, Baumgarte) with explicit Euler at 1
+    ms and samples the approach speed at the first step inside the ground; `solver="exact"` follows the
+    closed form at 0.1 ms and interpolates it.
+
+    ## Action space
+
+    `Box(-1, 1, (4,), float32)`: offsets from the gait in half ranges of the commands of
+    `hoof_env/HorseLeg-v0`; the sum is clipped to the commands' limits.
+
+    | Num | Offset of | At -1 | At +1 | Unit |
+    |---|---|---|---|---|
+    | 0 | crank speed | -6.283 | +6.283 | rad/s |
+    | 1 | swing offset | -0.7 | +0.7 | rad |
+    | 2 | swing sine coefficient | -0.6 | +0.6 | rad |
+    | 3 | swing cosine coefficient | -0.5 | +0.5 | rad |
+
+    ## Observation space
+
+    `Box(-1, 1, (21,), float32)`: the entries of `hoof_env/HorseLeg-v0` without those of the trunk.
+
+    ## Rewards
+
+    As in `hoof_env/HorseLeg-v0`; progress is the load-weighted backward travel of the hoof points while
+    they bear load.
+
+    ## Starting state
+
+    The gait at crank angle 0, always the same; `reset(options=...)` as in `hoof_env/HorseLeg-v0`.
+
+    ## Episode end
+
+    Truncated after `episode_seconds`, one crank revolution of the paper's gaits. Terminated if the
+    simulation stops being finite.
+
+    ## Arguments
+
+    | Name | Default | Unit | Meaning |
+    |---|---|---|---|
+    | `gait` | "walk" | | "walk" or "run": a gait of the preset |
+    | `solver` | "exact" | | "exact" or "paper" |
+    | `restitution` | 1 | - | 1 is the paper's elastic condition, 0 its inelastic one |
+    | `approach_floor` | 1e-4 | m/s | smallest approach speed in Eq. 14: the walk grazes |
+    | `friction_fast` | 1e-2 | m/s | upper threshold of Ambrosio's correction; assumed |
+    | `sim_dt` | None | s | None for the solver's own, 1e-3 or 1e-4 |
+    | `episode_seconds` | 1 | s | time limit |
+
+    `preset`, `hip_height`, `stiffness`, `exponent`, `normal_law`, `friction_law`, `friction`,
+    `friction_slow`, `dt`, `reward_weights` and `render_mode` as in `hoof_env/HorseLeg-v0`.
+
+    ## Version history
+
+    * v0: first version.
+    """
 
     def __init__(
         self,

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from hoof_env.gait.parameters import LIMITS
 
 SPEED_SCALE, RISE_SCALE, HEIGHT_SCALE, APPROACH_SCALE, LOAD_SCALE = 5.0, 2.0, 0.3, 2.0, 3.0
-"""Squashing scales: forward speed [m/s], vertical speed [m/s], height [m], approach speed [m/s], force [weights]."""
+"""Scales of tanh: forward speed [m/s], vertical speed [m/s], height [m], approach
+speed [m/s], force [weights]."""
 
 _LOW, _HIGH = (np.array([limit[i] for limit in LIMITS.values()]) for i in (0, 1))
 MIDDLE, HALF_RANGE = (_LOW + _HIGH) / 2, (_HIGH - _LOW) / 2
@@ -66,12 +67,13 @@ def observe(
 ) -> NDArray[np.float32]:
     """The observation after a control step, float32, entries as in `layout`.
 
-    Unbounded quantities are squashed by tanh(value / scale); parameters and their rates are divided by their bounds.
+    Unbounded quantities are squashed by tanh(value / scale); parameters and their rates are divided by
+    their bounds.
 
     Args:
-        row: last row of the trace. filters: shape (4,). rate_bounds: of the filters, shape (4,).
-        trunk, height: kind of trunk and its nominal height [m].
-        weight: of trunk and leg [N]. peak: running peak of the open stance [N]. action: the last one, shape (4,).
+        row: last row of the trace. filters: shape (4,). rate_bounds: of the filters, shape (4,). trunk,
+        height: kind of trunk and its nominal height [m]. weight: of trunk and leg [N]. peak: running peak
+        of the open stance [N]. action: the last one, shape (4,).
     """
     values = ((filters["value"] - MIDDLE) / HALF_RANGE).tolist()
     rates = (filters["rate"] / rate_bounds).tolist()

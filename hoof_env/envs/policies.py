@@ -60,9 +60,10 @@ def policy_names(env: Any) -> list[str]:
 def make_policy(name: str, env: Any, seed: int = 0) -> Scripted:
     """A scripted policy for an environment.
 
-    A gait name commands that gait. "idle" stops the crank and holds the swing; "random" draws a new action every step;
-    "bang-bang" flips all four actions between their limits every quarter of a second; "drag" turns the hoof to the ground,
-    stops there and rubs it to and fro with the swing; "airborne" turns it to its highest place and stops there.
+    A gait name commands that gait. "idle" stops the crank and holds the swing; "random" draws a new action
+    every step; "bang-bang" flips all four actions between their limits every quarter of a second; "drag"
+    turns the hoof to the ground, stops there and rubs it to and fro with the swing; "airborne" turns it to
+    its highest place and stops there.
 
     Raises:
         ParameterError: unknown name.
@@ -82,15 +83,14 @@ def make_policy(name: str, env: Any, seed: int = 0) -> Scripted:
     if name == "idle":
         return Scripted(lambda observation, time: rest, leg.dt)
     angles = np.linspace(0, 2 * np.pi, 360, endpoint=False)
-    heights = [leg._lowest_point(stand, angle) for angle in angles]
+    heights = [leg.hoof_height(stand, angle) for angle in angles]
     target = float(angles[np.argmax(heights) if name == "airborne" else np.argmin(heights)])
 
     def hold(observation: Any, time: float) -> Action:
-        """Turn the crank (it turns one way only) to `target` and stop; "drag" then swings."""
+        """Turn the crank (it turns one way only) to `target` and stop; "drag" then swings to and fro."""
         ahead = (target - math.atan2(observation[0], observation[1])) % (2 * np.pi)
-        speed = 4.0 * ahead if 0.05 < ahead < 2 * np.pi - 0.3 else 0.0
-        swing = 0.3 * math.copysign(1.0, math.sin(2 * np.pi * time)) if name == "drag" else 0.0
-        wanted = GaitParameters(min(speed, 2 * np.pi), stand.swing_offset + swing, 0.0, 0.0)
-        return leg.action_for(wanted)
+        speed = 2.0 * ahead if 0.05 < ahead < np.pi * 1.5 else 0.0
+        swing = 0.15 * math.sin(np.pi * time) if name == "drag" else 0.0
+        return leg.action_for(GaitParameters(min(speed, 2 * np.pi), stand.swing_offset + swing, 0.0, 0.0))
 
     return Scripted(hold, leg.dt)

@@ -17,19 +17,18 @@ class RewardWeights:
     """Weights of the reward terms; `docs/environment.md` gives their reasons and what the defaults lead to.
 
     Attributes:
-        progress: per metre forward [1/m].
-        peak: per kilonewton of every stance's peak ground reaction force [1/kN].
-        energy: per kilojoule of positive work of the two drives [1/kJ]; braking power is not recovered.
-        action: per control step and unit of mean squared action change [-].
-        failure: per second of a whole episode, charged once when the episode ends by failure [1/s]: more than the worst
+        progress: per metre forward [1/m]. peak: per kilonewton of every stance's peak ground reaction force
+        [1/kN]. energy: per kilojoule of positive work of the two drives [1/kJ]; braking power is not
+        recovered. action: per control step and unit of mean squared action change [-]. failure: per second
+        of a whole episode, charged once when the episode ends by failure [1/s]: more than the worst
             policy found loses by going on.
     """
 
     progress: float = 1.0
     peak: float = 0.3
     energy: float = 0.1
-    action: float = 0.002
-    failure: float = 30.0
+    action: float = 0.01
+    failure: float = 20.0
 
     def __post_init__(self) -> None:
         for item in fields(self):
@@ -42,7 +41,9 @@ class RewardWeights:
             return cls()
         names = [item.name for item in fields(cls)]
         if not isinstance(changes, Mapping) or not set(changes) <= set(names):
-            raise ParameterError(f"reward_weights: expected a mapping with some of {', '.join(names)}, got {changes!r}")
+            raise ParameterError(
+                f"reward_weights: expected a mapping with some of {', '.join(names)}, got {changes!r}"
+            )
         return replace(cls(), **changes)
 
 
@@ -61,7 +62,9 @@ def energy(weights: RewardWeights, account: Any) -> float:
     return -weights.energy * float(account["work"]) / 1000
 
 
-def action_change(weights: RewardWeights, action: NDArray[np.float32], previous: NDArray[np.float32]) -> float:
+def action_change(
+    weights: RewardWeights, action: NDArray[np.float32], previous: NDArray[np.float32]
+) -> float:
     """Cost of changing the action."""
     change = action - previous
     return -weights.action * float(change @ change) / change.size

@@ -1,9 +1,9 @@
 """Stances and sums: what reward and episode summary read from the trace, in one pass over its rows.
 
-A stance opens when the first hoof point enters the ground. It closes when the last one leaves, or after one crank
-revolution, whichever comes first, so that a hoof that never lifts pays for a peak every revolution. While it is open its
-peak is the highest resultant ground reaction force of any substep; the increases of a stance's running peak add up to
-that peak.
+A stance opens when the first hoof point enters the ground. It closes when the last one leaves, or after one
+crank revolution, whichever comes first, so that a hoof that never lifts pays for a peak every revolution.
+While it is open its peak is the highest resultant ground reaction force of any substep; the increases of a
+stance's running peak add up to that peak.
 """
 
 from __future__ import annotations
@@ -44,10 +44,9 @@ def take_account(account, trace, h, start_x, fixed):  # type: ignore[no-untyped-
     """Add the rows of one control step to the account.
 
     Args:
-        account: record of dtype `ACCOUNT`.
-        trace: rows of dtype `TRACE`, `h` [s] apart.
-        start_x: where the trunk was before the first row [m].
-        fixed: on a trunk that cannot move, progress is the load-weighted backward travel of the hoof points while
+        account: record of dtype `ACCOUNT`. trace: rows of dtype `TRACE`, `h` [s] apart. start_x: where the
+        trunk was before the first row [m]. fixed: on a trunk that cannot move, progress is the
+        load-weighted backward travel of the hoof points while
             they bear load, and 0 in the air; else it is the trunk's.
     """
     account.peak_increase = 0.0
@@ -74,7 +73,9 @@ def take_account(account, trace, h, start_x, fixed):  # type: ignore[no-untyped-
         if row.normal > 0.0:
             account.loaded_time += h
             if fixed:
-                account.progress -= h * (row.toe_normal * row.toe_vx + row.heel_normal * row.heel_vx) / row.normal
+                account.progress -= (
+                    h * (row.toe_normal * row.toe_vx + row.heel_normal * row.heel_vx) / row.normal
+                )
     if not fixed:
         account.progress = trace[trace.shape[0] - 1].trunk_x - start_x
     account.time += h * trace.shape[0]
@@ -92,9 +93,10 @@ def summarize(account: Any, weight: float, failed: bool) -> dict[str, float]:
         failed: whether the episode ended by failure.
 
     Returns:
-        seconds, distance_m, speed_m_s, peak_grf_n (highest of the episode), mean_grf_n (normal force over the whole time),
-        stance_peak_sum_n, stances, duty_factor, drive_work_j (braking is not recovered), cost_of_transport (work per weight and
-        distance; infinite without forward progress), weight_share (mean normal force over weight), failed (0 or 1).
+        seconds, distance_m, speed_m_s, peak_grf_n (highest of the episode), mean_grf_n (normal force over
+        the whole time), stance_peak_sum_n, stances, duty_factor, drive_work_j (braking is not recovered),
+        cost_of_transport (work per weight and distance; infinite without forward progress), weight_share
+        (mean normal force over weight), failed (0 or 1).
     """
     seconds, distance, work = float(account["time"]), float(account["distance"]), float(account["total_work"])
     time = max(seconds, 1e-12)

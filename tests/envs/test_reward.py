@@ -1,0 +1,182 @@
+"""The reward pays what it says, and nothing simple beats the scripted run."""
+
+from __future__ import annotations
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hoof_env.dynamics.trace import new_trace
+from hoof_env.envs.policies import make_policy
+from hoof_env.envs.reward import RewardWeights
+from hoof_env.envs.stance import new_account, summarize, take_account
+
+TERMS = ("reward_progress", "reward_peak", "reward_energy", "reward_action", "reward_failure")
+
+
+def rollout(env, policy, seed):
+    """Return, list of infos and the traces of one episode."""
+    observation, _ = env.reset(seed=seed)
+    total, infos, traces, done = 0.0, [], [], False
+    while not done:
+        action, _ = policy.predict(observation, episode_start=not infos)
+        observation, reward, terminated, truncated, info = env.step(action)
+        assert reward == sum(info[term] for term in TERMS)
+        total, done = total + reward, terminated or truncated
+        infos.append(info)
+        traces.append(env.unwrapped.trace)
+    return total, infos, np.concatenate(traces)
+
+
+def stance_peaks(trace):
+    """Peaks of all stances, independently of the account: split where both points are out or after a turn."""
+    inside = (trace["toe_penetration"] > 0) | (trace["heel_penetration"] > 0)
+    peaks, opened = [], None
+    for now, theta, grf in zip(inside, trace["theta"], trace["grf"], strict=True):
+        if not now:
+            opened = None
+        elif opened is None or theta - opened >= 2 * np.pi:
+            opened = theta
+            peaks.append(grf)
+        else:
+            peaks[-1] = max(peaks[-1], grf)
+    return peaks
+
+
+@pytest.mark.parametrize("name", ["walk", "run", "drag", "random"])
+@pytest.mark.parametrize("trunk", ["suspended", "rail", "fixed"])
+def test_terms_add_up_and_each_stance_pays_its_peak(name, trunk):
+    env = gym.make("hoof_env/HorseLeg-v0", trunk=trunk, episode_seconds=4.0)
+    _, infos, trace = rollout(env, make_policy(name, env), seed=4)
+    paid = -sum(info["reward_peak"] for info in infos) * 1000 / RewardWeights().peak
+    assert paid == pytest.approx(sum(stance_peaks(trace)), rel=1e-9)
+    work = (
+        np.sum(np.maximum(trace["crank_power"], 0) + np.maximum(trace["hip_power"], 0)) * env.unwrapped.sim_dt
+    )
+    assert -sum(info["reward_energy"] for info in infos) == pytest.approx(
+        RewardWeights().energy * work / 1000, rel=1e-9
+    )
+    if trunk != "fixed":
+        travelled = trace["trunk_x"][-1]
+        assert sum(info["reward_progress"] for info in infos) == pytest.approx(travelled, rel=1e-9, abs=1e-12)
+
+
+@given(
+    st.lists(st.tuples(st.booleans(), st.floats(0, 1e4)), min_size=1, max_size=60),
+    st.integers(1, 7),
+    st.floats(0.01, 1.5),
+)
+@settings(max_examples=100, deadline=None)
+def test_account_over_any_contact_pattern_and_any_split(pattern, chunk, turn):
+    trace = new_trace(len(pattern))
+    trace["theta"] = turn * np.arange(len(pattern))
+    trace["toe_penetration"] = [1.0 if inside else -1.0 for inside, _ in pattern]
+    trace["grf"] = [force if inside else 0.0 for inside, force in pattern]
+    account, paid = new_account(), 0.0
+    for start in range(0, len(pattern), chunk):
+        take_account(account, trace[start : start + chunk], 1e-3, 0.0, False)
+        paid += account["peak_increase"]
+    peaks = stance_peaks(trace)
+    assert paid == pytest.approx(sum(peaks), rel=1e-9, abs=1e-9)
+    assert account["stances"] == len(peaks)
+    assert summarize(account, 800.0, False)["peak_grf_n"] == max([0.0, *trace["grf"]])
+
+
+def test_a_hoof_that_never_lifts_pays_every_revolution():
+    trace = new_trace(1000)
+    trace["theta"] = np.linspace(0.0, 6 * np.pi - 1e-6, 1000)
+    trace["toe_penetration"], trace["grf"] = 0.01, 700.0
+    account = new_account()
+    take_account(account, trace, 1e-3, 0.0, False)
+    assert account["stances"] == 3
+    assert account["peak_sum"] == 3 * 700.0
+
+
+def test_fixed_trunk_progress_is_load_weighted_backward_travel():
+    trace = new_trace(2)
+    trace["toe_normal"], trace["heel_normal"], trace["normal"] = [300.0, 0.0], [100.0, 0.0], [400.0, 0.0]
+    trace["toe_vx"], trace["heel_vx"] = (
+        [-2.0, -9.0],
+        [1.0, -9.0],
+    )  # in the air the second row counts for nothing
+    account = new_account()
+    take_account(account, trace, 0.5, 0.0, True)
+    assert account["progress"] == pytest.approx(0.5 * (300 * 2.0 - 100 * 1.0) / 400)
+
+
+MARGIN = 3.0
+"""Return by which the scripted run beats every simple policy over ten seconds, mean of five seeds [-]."""
+
+
+@pytest.fixture(scope="module")
+def run_return():
+    env = gym.make("hoof_env/HorseLeg-v0")
+    return np.mean([rollout(env, make_policy("run", env), seed)[0] for seed in range(5)])
+
+
+@pytest.mark.parametrize("name", ["idle", "airborne", "bang-bang", "drag", "random"])
+def test_simple_policies_score_below_the_scripted_run(name, run_return):
+    env = gym.make("hoof_env/HorseLeg-v0")
+    returns = [rollout(env, make_policy(name, env, seed), seed)[0] for seed in range(5)]
+    assert np.mean(returns) < run_return - MARGIN
+
+
+@pytest.mark.parametrize("half_period", [0.06, 0.1, 0.15, 0.2, 0.35, 0.5, 1.0])
+def test_no_bang_bang_of_any_pace_beats_the_scripted_run(half_period, run_return):
+    env = gym.make("hoof_env/HorseLeg-v0")
+
+    class BangBang:
+        time = 0.0
+
+        def predict(self, observation, episode_start=None):
+            self.time += 0.02
+            return np.full(4, 1.0 if int(self.time / half_period) % 2 else -1.0, np.float32), None
+
+    assert np.mean([rollout(env, BangBang(), seed)[0] for seed in range(3)]) < run_return
+
+
+def test_failing_never_pays_more_than_going_on_badly():
+    """The charge for failing exceeds the worst loss over a whole episode among 60 wild feedback policies."""
+    generator = np.random.default_rng(0)
+    env = gym.make("hoof_env/HorseLeg-v0")
+
+    class Wild:
+        def __init__(self):
+            self.gain, self.bias = generator.normal(size=(4, 2)), generator.normal(size=4)
+
+        def predict(self, observation, episode_start=None):
+            return np.sign(self.gain @ observation[:2] + self.bias).astype(np.float32), None
+
+    worst = min(rollout(env, Wild(), seed)[0] for seed in range(60))
+    assert worst < -30  # the search did find policies that go badly wrong
+    assert RewardWeights().failure * env.unwrapped.episode_seconds > -1.5 * worst
+
+
+def test_a_collapse_terminates_and_is_charged_once():
+    env = gym.make(
+        "hoof_env/HorseLeg-v0",
+        trunk_stiffness=0.0,
+        trunk_damping=0.0,
+        trunk_share=1.0,
+        reward_weights={"failure": 7.0},
+    )
+    _, infos, trace = rollout(env, make_policy("airborne", env), seed=0)
+    assert "height" in infos[-1]["failure"]
+    assert [info["reward_failure"] for info in infos[-2:]] == [0.0, -70.0]
+    assert infos[-1]["episode_summary"]["failed"] == 1.0
+    assert trace["trunk_y"][-1] < 0.6 * env.unwrapped.engine.trunk.height
+
+
+def test_summary_agrees_with_the_trace():
+    env = gym.make("hoof_env/HorseLeg-v0")
+    _, infos, trace = rollout(env, make_policy("run", env), seed=1)
+    summary = infos[-1]["episode_summary"]
+    assert summary["seconds"] == pytest.approx(10.0)
+    assert summary["mean_grf_n"] == pytest.approx(trace["normal"].mean())
+    assert summary["peak_grf_n"] == trace["grf"].max()
+    assert summary["duty_factor"] == pytest.approx((trace["normal"] > 0).mean())
+    assert summary["speed_m_s"] == pytest.approx(trace["trunk_x"][-1] / 10)
+    work = summary["cost_of_transport"] * env.unwrapped.weight * summary["distance_m"]
+    assert work == pytest.approx(summary["drive_work_j"])
