@@ -79,8 +79,8 @@ def compare(published: Published, stances: Stances, solver: str) -> list[dict[st
 
     Returns:
         Dictionaries with kind ("row"), id, gait, quantity, unit, condition, reading, definition,
-        published (as read), bar, solver, simulated, error (signed, in the bar's measure), within_bar (None where
-        the bar is 'reported') and beside (other readings by name).
+        published (as read), bar, solver, simulated, error (signed, in the bar's measure), within_bar (None
+        where the bar is 'reported') and beside (other readings by name).
     """
     return [_compare(row, stances, solver) for row in published.rows]
 

@@ -1,0 +1,176 @@
+"""Every claim of the paper on cycles made to fulfil it and on cycles made to break it."""
+
+import numpy as np
+import pytest
+import scipy.signal
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hoof_env.paper import shapes
+from hoof_env.paper.measure import measure_stance
+
+TURNING = {"hoof_angle": lambda t: np.radians(100 * (t - 0.4))}  # flat at 0.4 s
+LEVEL = {"hoof_angle": 0.2}  # 11 deg throughout
+
+
+@given(st.lists(st.integers(0, 50), min_size=1, max_size=60))
+def test_peaks_are_those_of_scipy(heights):
+    force = np.array([0, *heights, 0], dtype=float)
+    if force.max() == 0:
+        return
+    theirs, _ = scipy.signal.find_peaks(force, prominence=shapes.PROMINENCE * force.max(), plateau_size=1)
+    assert force[shapes.find_peaks(force)].tolist() == force[theirs].tolist()
+
+
+@pytest.mark.parametrize(
+    ("parts", "holds"),
+    [
+        ({"toe": (0.3, 0.6), "heel": (0.25, 0.5), **TURNING}, True),
+        ({"toe": (0.25, 0.6), "heel": (0.3, 0.5), **TURNING}, False),  # toe first
+        ({"toe": (0.3, 0.5), "heel": (0.25, 0.6), **TURNING}, False),  # heel last
+        ({"toe": (0.45, 0.6), "heel": (0.25, 0.42), **TURNING}, False),  # never both
+        ({"toe": (0.3, 0.6), "heel": (0.25, 0.5), **LEVEL}, False),  # never flat
+    ],
+)
+def test_walk_order(cycle, parts, holds):
+    trace = cycle(**parts)
+    assert shapes.walk_order(measure_stance(trace), trace).holds is holds
+
+
+TWO_HALVES = {"heel_normal": [(0.25, 0.45, 100)], "toe_normal": [(0.4, 0.6, 80)]}
+
+
+@pytest.mark.parametrize(
+    ("loads", "holds"),
+    [
+        (TWO_HALVES, True),
+        (
+            {"heel_normal": [(0.25, 0.45, 100)], "toe_normal": [(0.47, 0.6, 80)]},
+            False,
+        ),  # nobody bears in the dip
+        ({"heel_normal": [(0.25, 0.5, 100)], "toe_normal": [(0.4, 0.6, 10)]}, False),  # one peak
+        (
+            {"heel_normal": [(0.25, 0.33, 100), (0.32, 0.4, 100)], "toe_normal": [(0.3, 0.6, 5)]},
+            False,
+        ),  # one half
+        (
+            {"heel_normal": [(0.25, 0.4, 100), (0.39, 0.5, 100)], "toe_normal": [(0.49, 0.6, 80)]},
+            False,
+        ),  # three
+    ],
+)
+def test_walk_peaks(cycle, bump, loads, holds):
+    trace = cycle(**{name: bump(*bumps) for name, bumps in loads.items()})
+    assert shapes.walk_peaks(measure_stance(trace), trace).holds is holds
+
+
+def test_a_dip_with_one_point_unloaded_is_no_double_support(cycle, bump):
+    trace = cycle(toe_normal=bump((0.25, 0.45, 100), (0.4, 0.6, 80)))
+    assert len(shapes.find_peaks(trace["normal"])) == 2
+    assert not shapes.walk_peaks(measure_stance(trace), trace).holds
+
+
+@pytest.mark.parametrize(
+    ("toe", "heel", "walk_toe", "holds"),
+    [
+        ((0.2, 0.5), (0.25, 0.4), (0.3, 0.55), True),  # heel 0.1 m up at toe-off, walking 0.05 m
+        ((0.25, 0.5), (0.2, 0.4), (0.3, 0.55), False),  # heel first
+        ((0.2, 0.4), (0.25, 0.5), (0.3, 0.55), False),  # heel last
+        ((0.2, 0.5), None, (0.3, 0.55), False),  # no roll-over
+        ((0.2, 0.5), (0.25, 0.4), (0.3, 0.75), False),  # the gap is larger in walking
+    ],
+)
+def test_run_order(cycle, toe, heel, walk_toe, holds):
+    run, walk = cycle(toe, heel), cycle(walk_toe, (0.25, 0.5))
+    assert shapes.run_order(measure_stance(run), measure_stance(walk), run, walk).holds is holds
+
+
+@pytest.mark.parametrize(
+    ("elastic", "inelastic", "holds"),
+    [
+        ([(0.2, 0.6, 100)], [(0.2, 0.5, 150)], True),
+        ([(0.2, 0.5, 100)], [(0.2, 0.6, 150)], True),  # apart, whichever comes first
+        ([(0.2, 0.6, 100)], [(0.2, 0.602, 150)], False),  # 1 ms apart
+        ([(0.2, 0.4, 100), (0.38, 0.6, 100)], [(0.2, 0.5, 150)], False),
+        ([(0.2, 0.6, 100)], [(0.2, 0.4, 100), (0.38, 0.6, 100)], False),
+    ],
+)
+def test_run_peaks(cycle, bump, elastic, inelastic, holds):
+    traces = [cycle((0.2, 0.6), None, toe_normal=bump(*bumps)) for bumps in (elastic, inelastic)]
+    assert shapes.run_peaks(*traces).holds is holds
+
+
+@pytest.mark.parametrize(("run_speed", "holds"), [(-3.0, True), (-0.5, False), (3.0, False)])
+def test_run_step(cycle, run_speed, holds):
+    def sweep(speed):
+        return cycle((0.3, 0.6), None, toe_x=lambda t: speed * t + 0.2, heel_x=lambda t: speed * t)
+
+    run, walk = sweep(run_speed), sweep(-1.0)
+    assert shapes.run_step(measure_stance(run), measure_stance(walk), run, walk).holds is holds
+    assert shapes.step_length(run, measure_stance(run)) == pytest.approx((-0.3 * run_speed, abs(run_speed)))
+
+
+def friction(first, second):
+    """A force along x: `first` before the middle of stance at 0.45 s, `second` after it."""
+    return lambda t: np.where((t > 0.3) & (t < 0.6), np.where(t < 0.45, first, second), 0.0)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "holds", "word"),
+    [
+        (-10, -20, True, "supports 'the hoof slides forward'"),
+        (10, 20, False, "supports 'the force of the hoof on the ground'"),
+        (-10, 20, False, "supports neither"),
+        (10, -20, False, "supports neither"),
+    ],
+)
+def test_walk_direction(cycle, first, second, holds, word):
+    trace = cycle((0.3, 0.6), None, friction=friction(first, second))
+    verdict = shapes.walk_direction(measure_stance(trace), trace)
+    assert verdict.holds is holds
+    assert word in verdict.evidence
+    impulses = [horizontal for horizontal, _ in shapes.half_impulses(trace, measure_stance(trace))]
+    assert impulses == pytest.approx([0.15 * first, 0.15 * second], rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "holds"),
+    [(-10, 20, True), (10, 20, True), (20, 10, False), (-20, -10, False), (10, -20, False)],
+)
+def test_run_direction(cycle, bump, first, second, holds):
+    trace = cycle((0.3, 0.6), None, toe_normal=bump((0.3, 0.6, 100)), friction=friction(first, second))
+    assert shapes.run_direction(measure_stance(trace), trace).holds is holds
+
+
+def test_the_median_velocity_of_the_sole_is_weighted_by_load(cycle):
+    def trace(toe_load, heel_load):
+        return cycle(toe_vx=-2.0, heel_vx=1.0, toe_normal=toe_load, heel_normal=heel_load)
+
+    assert shapes.sole_velocity(trace(60.0, 40.0)) == -2.0
+    assert shapes.sole_velocity(trace(40.0, 60.0)) == 1.0
+    assert np.isnan(shapes.sole_velocity(trace(0.0, 0.0)))
+
+
+@given(st.lists(st.tuples(st.floats(-5, 5), st.floats(0.1, 100)), min_size=1, max_size=30))
+def test_under_coulomb_friction_the_median_gives_the_direction_of_the_impulse(cycle, samples):
+    velocity, load = np.array(samples).T
+    trace = cycle(samples=len(samples) - 1) if len(samples) > 1 else cycle(samples=1)[:1]
+    trace["toe_vx"], trace["toe_normal"], trace["heel_normal"] = velocity, load, 0.0
+    impulse = -np.sum(np.sign(velocity) * load)
+    median = shapes.sole_velocity(trace)
+    if abs(impulse) > 1e-9 and not np.any(velocity == 0):
+        assert np.sign(median) == -np.sign(impulse)
+
+
+@pytest.mark.parametrize(
+    ("walk", "run", "holds"),
+    [
+        ((-0.1, -0.2, -0.3), (-5, -5, -5), True),
+        ((-0.1, 0.2, -0.3), (-5, -5, -5), False),
+        ((-0.1, -0.2, -0.3), (-5, -5, 5), False),
+        ((float("nan"), -0.2, -0.3), (-5, -5, -5), False),
+    ],
+)
+def test_walk_walks(walk, run, holds):
+    medians = {name: dict(zip(shapes.DEPTHS, v, strict=True)) for name, v in (("walk", walk), ("run", run))}
+    assert shapes.walk_walks(medians).holds is holds

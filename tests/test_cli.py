@@ -1,0 +1,101 @@
+import json
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from hoof_env import cli
+
+HOOF_ENV = [sys.executable, "-m", "hoof_env.cli"]
+
+
+def hoof_env(*arguments):
+    return subprocess.run(
+        [*HOOF_ENV, *map(str, arguments)], capture_output=True, text=True, timeout=120, check=False
+    )
+
+
+def test_help_lists_the_sub_commands():
+    done = hoof_env("--help")
+    assert done.returncode == 0
+    assert all(name in done.stdout for name in cli.COMMANDS)
+
+
+def test_help_of_a_sub_command_explains_its_options(capsys):
+    with pytest.raises(SystemExit) as stop:
+        cli.main(["reproduce", "--help"])
+    assert stop.value.code == 0
+    assert "--no-figures" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "arguments", [["reproduec"], [], ["reproduce"], ["reproduce", "--out", "x", "--speed", "2"]]
+)
+def test_wrong_arguments_exit_with_2(arguments, capsys):
+    with pytest.raises(SystemExit) as stop:
+        cli.main(arguments)
+    assert stop.value.code == 2
+    assert "Traceback" not in capsys.readouterr().err
+
+
+def test_reproduce_writes_its_results(tmp_path):
+    done = hoof_env("reproduce", "--out", tmp_path / "new" / "folder", "--no-figures")
+    assert done.returncode == 0, done.stderr
+    assert "exact, run, inelastic: peak" in done.stdout
+    assert {file.name for file in (tmp_path / "new" / "folder").iterdir()} == {
+        "reproduction.json",
+        "reproduction.md",
+    }
+    assert (
+        len(json.loads((tmp_path / "new" / "folder" / "reproduction.json").read_text(encoding="utf-8"))) == 64
+    )
+    page = (tmp_path / "new" / "folder" / "reproduction.md").read_text(encoding="utf-8")
+    assert f"hoof-env reproduce --out {tmp_path / 'new' / 'folder'} --no-figures" in page
+
+
+def test_a_folder_that_cannot_be_written_is_one_line_before_anything_runs(tmp_path):
+    (tmp_path / "file").write_text("mine", encoding="utf-8")
+    done = hoof_env("reproduce", "--out", tmp_path / "file")
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert done.stderr.startswith("hoof-env: error: cannot write to")
+    assert done.stderr.count("\n") == 1
+    assert (tmp_path / "file").read_text(encoding="utf-8") == "mine"
+
+
+def test_an_error_on_the_way_is_one_line(tmp_path, capsys):
+    assert cli.main(["reproduce", "--out", str(tmp_path), "--preset", "nobody"]) == 2
+    assert capsys.readouterr().err.startswith("hoof-env: error: preset: expected one of")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_figures_without_matplotlib_are_one_line(tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    assert cli.main(["reproduce", "--out", str(tmp_path)]) == 2
+    assert 'pip install "hoof-env[plot]"' in capsys.readouterr().err
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT to another process")
+def test_an_interrupt_is_one_line_and_leaves_nothing_behind(tmp_path):
+    with subprocess.Popen(
+        [*HOOF_ENV, "reproduce", "--out", str(tmp_path)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        process.stdout.readline()  # the first condition is done, fifteen runs remain
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert errors == "interrupted\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_interrupt_while_kernels_compile_is_one_line(tmp_path, monkeypatch, capsys):
+    def compiling(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("hoof_env.paper.reproduce.reproduce", compiling)
+    assert cli.main(["reproduce", "--out", str(tmp_path), "--no-figures"]) == 130
+    assert capsys.readouterr().err == "interrupted\n"
