@@ -106,18 +106,13 @@ class Constraints:
 
 
 def closed_form(geometry: Geometry, motion: Any) -> tuple[Vector, Vector]:
-    """The q and qd, shape (42,) each, that solve Eq. 2 for a `MOTION` record, angles without 2 pi jumps."""
+    """The q and qd, shape (42,) each, that solve Eq. 2 for a `MOTION` record, lock and driver included."""
     drawn = geometry.replace(travel=1)  # the paper's own frame, not the world's
     frame = FrameMotion(motion["phi"], motion["phi_rate"])
     p = pose(drawn, motion["theta"], motion["theta_rate"], frame=frame)
     angles = p.angles.copy()
-    angles[DRIVER] = _nearest_turn(angles[DRIVER], motion["phi"] - motion["theta"])
-    angles[LOCK[0]] = _nearest_turn(angles[LOCK[0]], angles[LOCK[1]])
+    angles[DRIVER] = motion["phi"] - motion["theta"]  # pose returns angles but for whole turns
+    angles[LOCK[0]] = angles[LOCK[1]]
     q = np.column_stack([p.centres, angles])
     qd = np.column_stack([p.centre_velocities, p.angular_velocities])
     return q.ravel(), qd.ravel()
-
-
-def _nearest_turn(angle: float, target: float) -> float:
-    """`angle` plus the number of whole turns that brings it nearest to `target`."""
-    return angle + 2 * np.pi * round((target - angle) / (2 * np.pi))
