@@ -30,7 +30,7 @@ def test_every_touch_of_a_bouncing_point_counts():
 
 
 def test_overlap_is_the_longest_common_interval():
-    assert overlap(((0.1, 0.3), (0.5, 0.9)), ((0.2, 0.6),)) == (0.2, 0.3)
+    assert overlap(((0.1, 0.3), (0.5, 0.9)), ((0.2, 0.53),)) == (0.2, 0.3)
     assert overlap(((0.1, 0.2),), ((0.2, 0.6),)) is None
     assert overlap((), ((0.2, 0.6),)) is None
 

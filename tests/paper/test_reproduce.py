@@ -69,6 +69,18 @@ def test_rows_are_what_a_reader_would_measure_on_the_trace(reproduction):
         assert value[f"{gait}.contact_start", solver] == pytest.approx(trace["t"][inside][0], abs=1.01 * step)
 
 
+def test_derived_rows_follow_from_the_others(reproduction):
+    for solver in SOLVERS:
+        value = {row["id"]: row["simulated"] for row in reproduction.rows if row["solver"] == solver}
+        for gait in GAITS:
+            left = value[f"{gait}.peak_elastic"] / value[f"{gait}.peak_inelastic"]
+            assert value[f"{gait}.reduction"] == pytest.approx(100 * (1 - left))
+            change = value[f"{gait}.angle_liftoff"] - value[f"{gait}.angle_contact"]
+            assert value[f"{gait}.angle_variation"] == pytest.approx(change)
+        ratio = value["run.angle_variation"] / value["walk.angle_variation"]
+        assert value["ratio.angle_variation"] == pytest.approx(ratio)
+
+
 def test_the_angle_at_lift_off_is_compared_heel_up_and_its_literal_print_is_kept(reproduction):
     for row in reproduction.rows:
         if row["id"] == "walk.angle_liftoff":
