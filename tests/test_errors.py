@@ -1,0 +1,70 @@
+"""Errors name what came and what was expected, and an exception is of the kind a caller would catch."""
+
+from decimal import Decimal
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hoof_env.errors import (
+    DataFileError,
+    GeometryError,
+    HoofEnvError,
+    OutputError,
+    ParameterError,
+    check_choice,
+    check_number,
+)
+
+numbers = st.floats(allow_nan=True, allow_infinity=True) | st.integers()
+
+
+@given(value=numbers, bounds=st.tuples(st.integers(-9, 9), st.integers(-9, 9)), exclusive=st.booleans())
+def test_a_number_is_returned_or_named(value, bounds, exclusive):
+    low, high = sorted(bounds)
+    fits = -1e300 < value < 1e300 and low <= value <= high and not (exclusive and value == low)
+    if fits:
+        result = check_number("x", value, low=low, high=high, exclusive_low=exclusive)
+        assert type(result) is float
+        assert result == value
+    else:
+        with pytest.raises(ParameterError) as error:
+            check_number("x", value, low=low, high=high, exclusive_low=exclusive)
+        bracket = "(" if exclusive else "["
+        assert str(error.value) == f"x: expected a finite number in {bracket}{low}, {high}], got {value!r}"
+
+
+@pytest.mark.parametrize(
+    "value", [True, False, "1", "one", None, [1], (), {}, 1j, np.zeros(2), 10**400, np.nan]
+)
+def test_what_is_no_number_is_refused(value):
+    with pytest.raises(ParameterError, match=r"x: expected a finite number in \[-inf, inf\], got "):
+        check_number("x", value)
+
+
+@pytest.mark.parametrize("value", [np.float32(0.5), np.int64(3), 2, Decimal("0.25")])
+def test_other_kinds_of_number_are_taken(value):
+    assert check_number("x", value) == float(value)
+
+
+def test_a_choice_is_returned_or_named():
+    assert check_choice("way", "left", {"right": 1, "left": 2}) == "left"
+    for value in ("up", None, 3, ["left"]):
+        with pytest.raises(ParameterError) as error:
+            check_choice("way", value, ("right", "left"))
+        assert str(error.value) == f"way: expected one of left, right, got {value!r}"
+
+
+@pytest.mark.parametrize(
+    ("error", "also"),
+    [
+        (ParameterError, ValueError),
+        (GeometryError, ParameterError),
+        (DataFileError, ValueError),
+        (OutputError, OSError),
+    ],
+)
+def test_every_error_is_ours_and_of_a_common_kind(error, also):
+    assert issubclass(error, HoofEnvError)
+    assert issubclass(error, also)
