@@ -7,6 +7,7 @@ from hoof_env.dynamics.engine import GRAVITY, LegEngine
 from hoof_env.dynamics.result import Result
 from hoof_env.dynamics.trace import new_trace
 from hoof_env.dynamics.trunk import Trunk
+from hoof_env.gait.motion_law import FilterSettings
 from hoof_env.gait.parameters import LIMITS, load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
@@ -16,6 +17,7 @@ LEG = load_geometry()
 WALK, RUN = load_gait("walk"), load_gait("run")
 LOW, HIGH = np.array(list(LIMITS.values())).T
 FLOATING = Trunk(share=0.0, stiffness=0.0, damping=0.0, drag=0.0, height=50.0)
+FILTERS = FilterSettings(swing_rate=4.0, swing_acc=80.0)
 SOFT = Ground(restitution=0.5, approach_floor=0.1, friction_fast=0.05)
 
 
@@ -79,7 +81,7 @@ def books(engine, trace):
 @pytest.mark.parametrize("travel", [-1, 1])
 def test_momentum_in_flight_is_kept_to_round_off(travel):
     """The leg swings under random commands, nothing outside acts: no drift over thousands of steps."""
-    engine = LegEngine(LEG.replace(travel=travel), FLOATING, SOFT, 1e-3)
+    engine = LegEngine(LEG.replace(travel=travel), FLOATING, SOFT, 1e-3, FILTERS)
     engine.reset(RUN, theta=1.0, speed=3.0)
     trace = play(engine, random_schedule(5, 100, 50))
     assert np.ptp(trace["trunk_vx"]) > 0.05  # the trunk feels the leg swing
@@ -93,7 +95,7 @@ def test_momentum_in_flight_is_kept_to_round_off(travel):
 def test_impulse_is_the_change_of_momentum(kind):
     """At every substep: sums of all outer forces, ground included, are exact to round-off."""
     h = 1e-3
-    engine = LegEngine(LEG, Trunk(kind, height=LEG.hip_height), SOFT, h)
+    engine = LegEngine(LEG, Trunk(kind, height=LEG.hip_height), SOFT, h, FILTERS)
     trace = np.concatenate([engine.reset(RUN, theta=0.5, speed=2.0), play(engine, smooth_schedule(h))])
     assert trace["normal"].max() > 500  # it stood
     momentum, centre, _, _, force = books(engine, trace)
@@ -106,7 +108,7 @@ def test_impulse_is_the_change_of_momentum(kind):
 
 def energy_gap(trunk, ground, h):
     """Energy gained less work done, at every substep [J]."""
-    engine = LegEngine(LEG, trunk, ground, h)
+    engine = LegEngine(LEG, trunk, ground, h, FILTERS)
     speed = 0.0 if trunk.kind == "fixed" else 1.5
     trace = np.concatenate([engine.reset(WALK, theta=0.2, speed=speed), play(engine, smooth_schedule(h))])
     assert trace["normal"].max() > 100  # it stood
@@ -132,13 +134,13 @@ def test_energy_gained_is_work_done(kind, ground):
     middle, fine = middle[1::2], fine[3::4]  # at the same instants
     sizes = [np.abs(gap).max() for gap in (coarse, middle, fine)]
     assert (np.log2([sizes[0] / sizes[1], sizes[1] / sizes[2]]) > 0.8).all()
-    assert np.abs(2 * fine - middle).max() < 0.02 * sizes[2]  # what stays as h goes to 0
+    assert np.abs(2 * fine - middle).max() < 0.03 * sizes[2]  # what stays as h goes to 0
 
 
 def test_a_standing_leg_bears_its_share_of_the_weight():
     """Crank stopped, all settled: the leg bears its share of the weight and what the spring pulls down."""
     trunk = Trunk(height=1.65)
-    engine = LegEngine(LEG, trunk, SOFT, 1e-3)
+    engine = LegEngine(LEG, trunk, SOFT, 1e-3, FILTERS)
     still = np.array([0.0, *WALK.to_array()[1:]])
     engine.reset(type(WALK).from_array(still), theta=2.6, height=1.75)
     last = play(engine, [(still, 8000)])[-1]
@@ -164,7 +166,7 @@ def test_a_standing_leg_bears_its_share_of_the_weight():
 
 @pytest.mark.parametrize("kind", ["fixed", "rail"])
 def test_fixed_and_rail_keep_what_they_hold(kind):
-    engine = LegEngine(LEG, Trunk(kind, height=1.6), SOFT, 1e-3)
+    engine = LegEngine(LEG, Trunk(kind, height=1.6), SOFT, 1e-3, FILTERS)
     engine.reset(RUN, x=2.5)
     trace = play(engine, random_schedule(3, 10, 50))
     assert (trace["trunk_y"] == 1.6).all()
@@ -177,7 +179,7 @@ def test_fixed_and_rail_keep_what_they_hold(kind):
 
 def test_the_elastic_peak_of_a_free_trunk_converges_with_the_step():
     def peak(h):
-        engine = LegEngine(LEG, Trunk(height=LEG.hip_height), Ground(), h)
+        engine = LegEngine(LEG, Trunk(height=LEG.hip_height), Ground(), h, FILTERS)
         engine.reset(RUN, speed=2.0)
         return play(engine, [(RUN.to_array(), round(0.6 / h))])["normal"].max()
 

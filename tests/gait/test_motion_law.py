@@ -126,8 +126,8 @@ def test_without_amplitude_the_frame_stands_still():
     [
         ({"gain": 0.0}, "filters.gain: expected"),
         ({"swing_rate": -1.0}, "filters.swing_rate: expected"),
-        ({"crank_acc": 399.0}, r"gain \* crank_rate <= crank_acc .* got 20 \* 20 > 399"),
-        ({"swing_rate": 5.0}, r"gain \* swing_rate <= swing_acc .* got 20 \* 5 > 80"),
+        ({"crank_rate": 20.0, "crank_acc": 399.0}, r"gain \* crank_rate <= crank_acc .* got 20 \* 20 > 399"),
+        ({"swing_rate": 5.0, "swing_acc": 80.0}, r"gain \* swing_rate <= swing_acc .* got 20 \* 5 > 80"),
     ],
 )
 def test_bad_settings_are_named(given_, message):
