@@ -85,20 +85,16 @@ def _draw_whole(ax: Any, at: dict[str, Point], hoof: dict[str, str]) -> None:
         )  # fmt: skip
     for name, point in at.items():
         fixed = name in ("O", "C")
-        ax.plot(
-            *point,
-            "^" if fixed else "o",
-            ms=7 if fixed else 4,
-            mfc="black" if fixed else "white",
-            mec="black",
-            zorder=6,
-        )
+        look = {"marker": "^", "ms": 7, "mfc": "black"} if fixed else {"marker": "o", "ms": 4, "mfc": "white"}
+        ax.plot(*point, mec="black", zorder=6, **look)
         side = _label_side(at, name)
+        place = {"xytext": 9 * side, "ha": "center", "va": "center"}
+        if name in hoof:  # long labels, clear of the line of the ground
+            right, above = side[0] > 0, point[1] > 0
+            place = {"xytext": (8 if right else -8, 3 if above else -3)}
+            place |= {"ha": "left" if right else "right", "va": "bottom" if above else "top"}
         text = f"{name} = {hoof[name]}" if name in hoof else name
-        ax.annotate(
-            text, point, xytext=9 * side, textcoords="offset points", weight="bold", zorder=7, va="center",
-            ha="center" if name not in hoof else ("left" if side[0] > 0 else "right"),
-        )  # fmt: skip
+        ax.annotate(text, point, textcoords="offset points", weight="bold", zorder=7, **place)
     ax.annotate("y = 0, the ground", (0.02, 0.02), xycoords="axes fraction", color=GREY, fontsize=8)
     x, top = [point[0] for point in at.values()], max(point[1] for point in at.values())
     ax.set(
@@ -111,7 +107,10 @@ def _draw_whole(ax: Any, at: dict[str, Point], hoof: dict[str, str]) -> None:
 
 def _draw_close(ax: Any, at: dict[str, Point], toe: Point, heel: Point, row: np.void) -> None:
     ax.set(title="(b) its hoof on the ground", xlabel="x forward of O [m]", aspect="equal")
-    ax.set(xlim=(toe[0] - 0.42, toe[0] + 0.23), ylim=(-0.2, 0.46))
+    corners = np.array([toe, heel, at["G"]])
+    ax.set(
+        xlim=(corners[:, 0].min() - 0.1, corners[:, 0].max() + 0.23), ylim=(-0.2, corners[:, 1].max() + 0.1)
+    )
     draw_ground(ax, -1)
     _draw_links(ax, at, 2.5)
     for name, point, offset in (("K", toe, (-16, -6)), ("H", heel, (-10, 4)), ("G", at["G"], (-9, 6))):

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
+from hoof_env import __version__
 from hoof_env.paper.rows import severity
 
 if TYPE_CHECKING:
@@ -16,7 +17,7 @@ WORST = 3
 """How many rows of each solver are named as its worst."""
 
 _DIGITS = {"s": 4, "deg": 2, "N": 1, "%": 2, "-": 3, "point": 2, "": 3}
-_PACKAGES = ("hoof-env", "gymnasium", "numpy", "numba")
+_PACKAGES = ("gymnasium", "numpy", "numba")
 
 
 def markdown(reproduction: Reproduction, *, command: str, figures: bool) -> str:
@@ -32,7 +33,7 @@ def markdown(reproduction: Reproduction, *, command: str, figures: bool) -> str:
         "Each condition is one cycle of 1 s on a fixed trunk under the zero action. Solver `paper` is "
         "the paper's Eq. 8 with its Baumgarte terms and explicit Euler at 1 ms; solver `exact` is the same "
         "motion in closed form, at a step at which its results have converged.",
-        f"Written by `{command}` with Python {platform.python_version()}, {versions}.",
+        f"Written by `{command}` with hoof-env {__version__}, Python {platform.python_version()}, {versions}.",
         "## Published beside simulated",
         *(_summary(reproduction, solver) for solver in solvers),
         "Errors are in the measure of the bar; ✗ marks a row outside its bar, and bold its solver's worst.",

@@ -18,8 +18,8 @@ def reproduction():
 def cycle():
     """A function that makes one cycle of 1 s from its parts.
 
-    `toe` and `heel` are (enter, leave) [s] or None: penetration is a tent of unit slope, exactly linear around
-    its zeros. Every other keyword is a column, a number or a function of time; normal, friction and grf follow.
+    `toe` and `heel` are (enter, leave) [s] or None: penetration is a tent of unit slope, linear around its
+    zeros. Every other keyword is a column, a number or a function of time; the sums follow.
     """
 
     def make(toe=(0.3, 0.6), heel=(0.25, 0.5), samples=1000, **columns):
