@@ -23,7 +23,9 @@ _PACKAGES = ("gymnasium", "numpy", "numba")
 def markdown(reproduction: Reproduction, *, command: str, figures: bool) -> str:
     """The whole page; `command` is named as what wrote it, `figures` says whether pictures lie beside it."""
     solvers = list(dict.fromkeys(row["solver"] for row in reproduction.rows))
-    versions = ", ".join(f"{name} {version(name)}" for name in _PACKAGES)
+    versions = ", ".join(
+        [f"Python {platform.python_version()}", *(f"{name} {version(name)}" for name in _PACKAGES)]
+    )
     geometry = reproduction.geometry
     parts = [
         "# The paper's four conditions, reproduced",
@@ -33,7 +35,7 @@ def markdown(reproduction: Reproduction, *, command: str, figures: bool) -> str:
         "Each condition is one cycle of 1 s on a fixed trunk under the zero action. Solver `paper` is "
         "the paper's Eq. 8 with its Baumgarte terms and explicit Euler at 1 ms; solver `exact` is the same "
         "motion in closed form, at a step at which its results have converged.",
-        f"Written by `{command}` with hoof-env {__version__}, Python {platform.python_version()}, {versions}.",
+        f"Written by `{command}` with hoof-env {__version__}, {versions}.",
         "## Published beside simulated",
         *(_summary(reproduction, solver) for solver in solvers),
         "Errors are in the measure of the bar; ✗ marks a row outside its bar, and bold its solver's worst.",
