@@ -356,8 +356,9 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self._renderer is None:
             from hoof_env.envs.rendering import Renderer
 
+            weight = self.weight if self.engine.trunk.kind == "suspended" else None
             self._renderer = Renderer(
-                self.geometry, str(self.render_mode), self.metadata["render_fps"], weight_n=self.weight
+                self.geometry, str(self.render_mode), self.metadata["render_fps"], weight_n=weight
             )
         return self._renderer
 

@@ -1,0 +1,115 @@
+"""The body: the trunk with what holds it, and the leg with flesh, links and joints."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pygame
+
+from hoof_env.envs.render_paint import CRANK, FINE, GREY, INK, PAPER, Brush, bar
+from hoof_env.leg.geometry import Geometry
+from hoof_env.leg.linkage import BODIES
+from hoof_env.leg.linkage import CRANK as CRANK_BODY
+
+COAT, COAT_EDGE, PASTERN, HOOF = (226, 210, 194), (186, 163, 141), (196, 170, 146), (104, 74, 54)
+LINK, PLATE = (64, 78, 92), (186, 195, 205)
+
+TRUNK_M = (1.05, 0.42, 0.16)
+"""The trunk about O: half its length, its height above and below [m]."""
+
+WHEEL_M = 0.05
+"""Radius of the wheels between trunk and rail [m]."""
+
+FLESH_M = (("O", "C", 0.13, 0.15), ("C", "F", 0.15, 0.095), ("F", "G", 0.085, 0.055))
+"""Flesh around the rigid links where a horse's leg has its bones: from, to, radius at both ends [m]."""
+
+HORN_SHARE = 0.45
+"""Part of the hoof triangle, from the sole up, that is horn; above it is the pastern."""
+
+
+class Body:
+    """Draws trunk and leg.
+
+    Args:
+        brush: the paint box.
+        geometry: the leg.
+        scale: pixels per metre.
+        suspended: the trunk hangs from a spring; else a rail holds it.
+    """
+
+    def __init__(self, brush: Brush, geometry: Geometry, scale: float, suspended: bool) -> None:
+        self._brush, self._scale, self._suspended = brush, scale, suspended
+        self._crank = geometry.lengths["OP"]
+        self._trunk = self._paint_trunk()
+
+    def _paint_trunk(self) -> Any:
+        half, above, below = (self._scale * length for length in TRUNK_M)
+        wheel = 0.0 if self._suspended else self._scale * WHEEL_M
+        image = pygame.Surface((round(2 * half), round(2 * wheel + above + below)), pygame.SRCALPHA, 32)
+
+        def paint(fine: Any, place: Any) -> None:
+            for x in (half / 2, 3 * half / 2):
+                pygame.draw.circle(fine, GREY, place(complex(x, wheel)), wheel * FINE)
+            hollow = round(2 * wheel * FINE)  # between trunk and rail
+            barrel = pygame.Rect(0, hollow, fine.get_width(), fine.get_height() - hollow)
+            for colour, inset in ((COAT_EDGE, 0), (COAT, round(1.5 * FINE))):
+                radius = round(0.25 * self._scale * FINE) - inset
+                pygame.draw.rect(fine, colour, barrel.inflate(-2 * inset, -2 * inset), border_radius=radius)
+
+        self._brush.smooth(image, [0j, complex(*image.get_size())], 0, paint)
+        return image
+
+    def draw_trunk(self, canvas: Any, hip: complex) -> None:
+        """Draw the trunk around O at pixel `hip`, and the spring or rail that holds it."""
+        half, above, _ = (self._scale * length for length in TRUNK_M)
+        top = hip - 1j * above
+        if self._suspended:
+            coil = np.linspace(complex(hip.real, 0), top, 17)
+            coil[2:-2] += 0.06 * self._scale * np.resize([1, -1], 13)
+
+            def paint(fine: Any, place: Any) -> None:
+                width = round(2 * self._brush.unit * FINE)
+                pygame.draw.lines(fine, GREY, False, [place(z) for z in coil.tolist()], width)
+
+            self._brush.smooth(canvas, coil, 3, paint)
+        else:
+            top -= 2j * self._scale * WHEEL_M
+            thick = max(2, round(4 * self._brush.unit))
+            canvas.fill(GREY, (0, round(top.imag) - thick, canvas.get_width(), thick))
+        corner = top - half
+        at = round(corner.real), round(corner.imag)
+        canvas.blit(self._trunk, at, special_flags=pygame.BLEND_PREMULTIPLIED)
+
+    def draw_leg(self, canvas: Any, pixels: dict[str, complex]) -> None:
+        """Draw the leg; `pixels` holds every named point."""
+        metre = self._scale * FINE  # on the fine surface
+        edge = 1.5 * FINE
+
+        def paint(fine: Any, place: Any) -> None:
+            at = {name: place(z) for name, z in pixels.items()}
+            horn = [place(pixels[n] + HORN_SHARE * (pixels["G"] - pixels[n])) for n in "JI"]
+            for colour, grow in ((COAT_EDGE, edge), (COAT, 0.0)):
+                for a, b, radius_a, radius_b in FLESH_M:
+                    bar(fine, colour, at[a], at[b], radius_a * metre + grow, radius_b * metre + grow)
+            pygame.draw.polygon(fine, PASTERN, [at["G"], at["I"], at["J"]])
+            pygame.draw.polygon(fine, HOOF, [at["I"], at["J"], *horn])
+            pygame.draw.circle(fine, CRANK, at["O"], self._crank * metre, round(1.3 * FINE))
+            bar(fine, PLATE, at["O"], at["C"], 0.02 * metre, 0.02 * metre)
+            pygame.draw.polygon(fine, PLATE, [at["C"], at["B"], at["D"]])
+            for i, link in enumerate(BODIES):
+                colour, radius = (CRANK, 0.024 * metre) if i == CRANK_BODY else (LINK, 0.015 * metre)
+                bar(fine, colour, at[link.tail], at[link.head], radius, radius)
+            for name, where in at.items():
+                radius = (0.038 if name in "OC" else 0.025) * metre
+                pygame.draw.circle(fine, INK, where, radius)
+                pygame.draw.circle(fine, PAPER, where, radius - edge)
+            for pivot in "OC":
+                pygame.draw.circle(fine, INK, at[pivot], 0.013 * metre)
+
+        turn = self._crank * self._scale * (1 + 1j)
+        box = [*pixels.values(), pixels["O"] - turn, pixels["O"] + turn]
+        self._brush.smooth(canvas, box, 0.16 * self._scale + 2, paint)
+        for pivot, side, shift in (("O", "midbottom", -0.05j), ("C", "midleft", 0.06)):
+            letter = pixels[pivot] + shift * self._scale
+            self._brush.write(canvas, pivot, (letter.real, letter.imag), 18, INK, side)

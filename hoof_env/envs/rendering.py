@@ -1,0 +1,152 @@
+"""Pictures of the leg at work: an off-screen RGB array, or a window for people.
+
+Drawing is done in software on an off-screen surface; only render mode "human" opens a display. Every
+number in the picture is read from rows of dtype `dynamics.trace.TRACE`; it computes no mechanics of its own.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from gymnasium.error import DependencyNotInstalled, ResetNeeded
+from numpy.typing import NDArray
+
+from hoof_env.errors import ParameterError, check_choice, check_number
+from hoof_env.leg.geometry import Geometry
+
+MODES = ("rgb_array", "human")
+"""Render modes."""
+
+SMALLEST_SIZE = (480, 270)
+"""Below this the lettering is not readable [pixels]."""
+
+
+class Renderer:
+    """Draws the leg, the ground, the force on the hoof and a panel with numbers and the force trace.
+
+    Args:
+        geometry: the leg.
+        mode: one of `MODES`.
+        fps: frames per second that a window is held to [Hz].
+        size: width and height of the picture [pixels].
+        weight_n: weight of trunk and leg [N] if the trunk is suspended: it is drawn on a spring, and the
+            weight as a line beside the force. None if it is fixed or on a rail: it is drawn under a rail.
+
+    Raises:
+        ParameterError: an unknown mode, or a value out of range.
+        DependencyNotInstalled: pygame is missing.
+    """
+
+    def __init__(
+        self,
+        geometry: Geometry,
+        mode: str,
+        fps: float,
+        size: tuple[int, int] = (960, 540),
+        weight_n: float | None = None,
+    ) -> None:
+        self.mode = check_choice("render_mode", mode, MODES)
+        self.fps = check_number("fps", fps, low=0, exclusive_low=True)
+        self.size = _check_size(size)
+        if weight_n is not None:
+            check_number("weight_n", weight_n, low=0)
+        try:
+            import pygame
+        except ImportError:
+            hint = 'pygame is not installed, run `pip install "hoof-env[render]"`'
+            raise DependencyNotInstalled(hint) from None
+        from hoof_env.envs.render_paint import Brush
+        from hoof_env.envs.render_panel import Panel
+        from hoof_env.envs.render_scene import Scene
+
+        self._pygame = pygame
+        self._canvas = pygame.Surface(self.size, 0, 32)
+        # laid out in memory as a frame is, so that the copy is quick
+        self._packed = pygame.Surface(self.size, 0, 24, (0xFF, 0xFF00, 0xFF0000, 0))
+        brush = Brush(self.size)
+        edge, column = round(16 * brush.unit), round(304 * brush.unit)
+        self._scene = Scene(brush, geometry, self.size, column + 2 * edge, suspended=weight_n is not None)
+        box = (self.size[0] - edge - column, edge, column, round(424 * brush.unit))
+        self._panel = Panel(brush, box, weight_n)
+        self._window_open = False
+        self._clock = pygame.time.Clock()
+        self._closed = False
+        self._row: Any = None
+
+    def reset(self) -> None:
+        """A new episode: forget the force history and the path of the toe."""
+        self._row = None
+        self._scene.reset()
+        self._panel.reset()
+
+    def add(self, trace: NDArray[np.void]) -> None:
+        """Take the rows (dtype `TRACE`) of one control step; rows that are not finite are left out."""
+        drawn = ("theta", "phi", "trunk_x", "trunk_y", "grf")
+        trace = trace[np.isfinite(sum(trace[name] for name in drawn))]
+        if len(trace):
+            self._row = trace[-1].copy()
+            self._scene.add(trace)
+            self._panel.add(trace)
+
+    def frame(self) -> NDArray[np.uint8] | None:
+        """Draw the latest row.
+
+        Returns:
+            "rgb_array": a fresh array of shape (height, width, 3). "human": None; the window shows the
+            picture and the call waits so that frames come at `fps`. A window that was closed stays closed.
+
+        Raises:
+            ResetNeeded: there is no row yet.
+        """
+        if self._row is None:
+            raise ResetNeeded("nothing to draw yet: reset the environment first")
+        if self.mode == "human":
+            self._show()
+            return None
+        self._draw()
+        self._packed.blit(self._canvas, (0, 0))
+        return self._pygame.surfarray.pixels3d(self._packed).transpose(1, 0, 2).copy()
+
+    def close(self) -> None:
+        """Close the window, if there is one, for good. Calling it again does nothing."""
+        self._closed = True
+        if self._window_open:
+            self._window_open = False
+            self._pygame.display.quit()
+
+    def _draw(self) -> None:
+        self._scene.draw(self._canvas, self._row, self._panel.full_scale)
+        self._panel.draw(self._canvas, self._row)
+
+    def _show(self) -> None:
+        if self._closed:
+            return
+        display = self._pygame.display
+        if not display.get_init():  # at the first frame, or after somebody else's pygame.quit()
+            display.init()
+        if display.get_surface() is None:
+            display.set_mode(self.size)
+            display.set_caption("hoof-env")
+            self._window_open = True
+        if any(event.type == self._pygame.QUIT for event in self._pygame.event.get()):
+            self.close()
+            return
+        self._draw()
+        display.get_surface().blit(self._canvas, (0, 0))
+        display.flip()
+        self._clock.tick(self.fps)
+
+
+def _check_size(size: Any) -> tuple[int, int]:
+    low_w, low_h = SMALLEST_SIZE
+    try:
+        width, height = size
+        good = width == int(width) >= low_w and height == int(height) >= low_h
+    except (TypeError, ValueError):
+        good = False
+    if not good:
+        raise ParameterError(
+            f"size: expected (width, height) of at least {low_w} x {low_h} pixels, got {size!r}"
+        )
+    return int(width), int(height)
