@@ -51,7 +51,7 @@ class Panel:
         unit = brush.unit
         self._brush, self._box, self._weight = brush, pygame.Rect(box), weight_n
         self._inside = self._box.inflate(-36 * unit, -32 * unit)
-        self._plot = pygame.Rect(0, 0, self._inside.width - 40 * unit, 160 * unit)
+        self._plot = pygame.Rect(0, 0, self._inside.width - 40 * unit, 156 * unit)
         self._plot.bottomright = self._inside.right - round(6 * unit), self._inside.bottom - round(38 * unit)
         self._card = lru_cache(maxsize=8)(self._paint_card)
         self.reset()
@@ -102,7 +102,7 @@ class Panel:
 
     def _line(self, k: int, x: float) -> tuple[float, float]:
         """Middle of line `k` of the numbers, `x` from the left."""
-        return self._inside.left + x * self._brush.unit, self._inside.top + (10 + 27 * k) * self._brush.unit
+        return self._inside.left + x * self._brush.unit, self._inside.top + (10 + 26 * k) * self._brush.unit
 
     def _paint_card(self, full_scale: float) -> Any:
         unit = self._brush.unit
