@@ -89,6 +89,25 @@ def test_derivatives_are_those_of_the_motion_while_commands_change(sequence, gai
     assert (motion["theta_acc"], motion["phi_acc"]) == pytest.approx(accelerations, rel=1e-6, abs=1e-5)
 
 
+@given(sequence=sequences, gait=commands, h=st.floats(1e-4, 0.05))
+@settings(deadline=None, max_examples=40)
+def test_a_step_is_exact(sequence, gait, h):
+    """Under constant filter accelerations a value is quadratic in time: Simpson's rule sums it exactly."""
+    motion, filters = list(play(sequence, 1e-3, gait))[-1]
+    values, angle = [], float(motion["theta"])
+    for part in (0.0, 0.5, 1.0):
+        moved = filters.copy()
+        advance_motion(motion.copy(), moved, h * part)
+        start_value, rate, acc = (filters[name] for name in ("value", "rate", "acc"))
+        assert moved["value"] == pytest.approx(start_value + h * part * rate + (h * part) ** 2 / 2 * acc)
+        assert moved["rate"] == pytest.approx(rate + h * part * acc)
+        values.append(moved["value"][0])
+    advance_motion(motion, filters, h)
+    assert motion["theta"] - angle == pytest.approx(
+        h * (values[0] + 4 * values[1] + values[2]) / 6, abs=1e-12
+    )
+
+
 @given(sequence=sequences, gait=commands)
 @settings(deadline=None, max_examples=20)
 def test_the_recorded_rates_add_up_to_the_recorded_motion(sequence, gait):
