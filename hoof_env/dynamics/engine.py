@@ -251,8 +251,8 @@ class LegEngine:
         self.tables = Tables.of(geometry)
         self._settings = filters.to_array()
         self._trunk, self._ground = trunk.to_record(geometry.mass, GRAVITY), ground.to_record()
-        self.state = State(
-            np.zeros(1, BODY)[0], np.zeros(1, MOTION)[0], steady_filters(np.zeros(4)), new_contacts()
+        self.state = State(  # nowhere, until reset
+            np.full(1, np.nan, BODY)[0], np.zeros(1, MOTION)[0], steady_filters(np.zeros(4)), new_contacts()
         )
 
     def reset(

@@ -231,6 +231,14 @@ def test_an_absurd_state_is_reported_and_kept(field, value):
     assert bits(engine.state) == before
 
 
+@pytest.mark.parametrize("kind", ["fixed", "rail", "suspended"])
+def test_an_engine_that_was_never_reset_goes_nowhere(kind):
+    engine = LegEngine(LEG, Trunk(kind), Ground(), 1e-3)
+    assert engine.advance(COMMANDS[0], new_trace(1)) is Result.NOT_FINITE
+    engine.reset(RUN)
+    assert engine.advance(COMMANDS[0], new_trace(1)) is Result.OK
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [
