@@ -4,7 +4,7 @@ from decimal import Decimal
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hoof_env.errors import (
@@ -21,6 +21,7 @@ numbers = st.floats(allow_nan=True, allow_infinity=True) | st.integers()
 
 
 @given(value=numbers, bounds=st.tuples(st.integers(-9, 9), st.integers(-9, 9)), exclusive=st.booleans())
+@settings(deadline=None)
 def test_a_number_is_returned_or_named(value, bounds, exclusive):
     low, high = sorted(bounds)
     fits = -1e300 < value < 1e300 and low <= value <= high and not (exclusive and value == low)

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hoof_env.errors import DataFileError, ParameterError
@@ -14,6 +14,7 @@ inside = st.tuples(*(st.floats(low, high) for low, high in LIMITS.values()))
 
 
 @given(values=inside)
+@settings(deadline=None)
 def test_an_array_and_back(values):
     gait = GaitParameters.from_array(values)
     assert tuple(gait.to_array()) == values

@@ -70,13 +70,14 @@ def rebound(law, cr, stiffness, mass, exponent, speed, reference_mass=REFERENCE_
     return -path.y[1, -1]
 
 
-@pytest.mark.parametrize("law", FACTORS)
-@pytest.mark.parametrize("cr", [0.0, 0.1, 0.3, 0.5, 0.7, 0.8, 0.9, 1.0])
+@pytest.mark.parametrize(
+    ("law", "cr"),
+    [(law, cr) for law in FACTORS for cr in (0.0, 0.1, 0.3, 0.5, 0.7, 0.8, 0.9, 1.0)
+     if cr > 0 or RESTITUTION.get(law, {}).get(0)],
+)  # fmt: skip
 @given(impact=impacts)
 @settings(deadline=None, max_examples=3)
 def test_a_free_impact_returns_what_the_factor_says(law, cr, impact):
-    if cr == 0.0 and law not in ("lankarani-nikravesh", "hunt-crossley"):
-        return
     chi, _ = damping(law, cr, impact["stiffness"], REFERENCE_MASS)
     assert rebound(law, cr, **impact) == pytest.approx(restitution_of_factor(chi), abs=1e-5)
 
