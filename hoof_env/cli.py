@@ -41,7 +41,14 @@ def reproduce(out: Path, figures: bool = True, preset: str | None = None) -> Non
     _say(f"{len(paths)} files written; read {out / 'reproduction.md'} first")
 
 
-COMMANDS: dict[str, Callable[..., None]] = {"reproduce": reproduce}
+def trunks() -> None:
+    """Measure how the scripted walk and run move a rail and differently suspended trunks; prints a table."""
+    from hoof_env.envs.trunk_study import study
+
+    _say(study())
+
+
+COMMANDS: dict[str, Callable[..., None]] = {"reproduce": reproduce, "trunks": trunks}
 
 
 def _say(line: str) -> None:

@@ -71,9 +71,9 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     | 4 | swing sine coefficient | as action 2 | rad |
     | 5 | swing cosine coefficient | as action 3 | rad |
     | 6 | rate of crank speed | / 20 | rad/s^2 |
-    | 7 | rate of swing offset | / 4 | rad/s |
-    | 8 | rate of swing sine coefficient | / 4 | rad/s |
-    | 9 | rate of swing cosine coefficient | / 4 | rad/s |
+    | 7 | rate of swing offset | / 6 | rad/s |
+    | 8 | rate of swing sine coefficient | / 6 | rad/s |
+    | 9 | rate of swing cosine coefficient | / 6 | rad/s |
     | 10 | forward speed | tanh(x / 5) | m/s |
     | 11 | vertical speed | tanh(x / 2) | m/s |
     | 12 | height | tanh((x - hip height) / 0.3) | m |
@@ -101,7 +101,7 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     | `reward_progress` | `progress` = 1 per m | forward travel of the trunk |
     | `reward_peak` | `peak` = 0.3 per kN | minus the increase of the stance's running peak GRF, the maximum over all substeps; the terms of one stance add up to its peak |
     | `reward_energy` | `energy` = 0.1 per kJ | minus the positive work of crank and swing drive; braking power is not recovered |
-    | `reward_action` | `action` = 0.01 | minus the mean squared change of the action |
+    | `reward_action` | `action` = 0.02 | minus the mean squared change of the action |
     | `reward_failure` | `failure` = 20 per s | once, minus this times `episode_seconds`, when the episode fails |
 
     A stance opens when the first hoof point enters the ground and closes when the last one leaves, or after

@@ -78,19 +78,34 @@ def make_policy(name: str, env: Any, seed: int = 0) -> Scripted:
         return Scripted(lambda observation, time: generator.uniform(-1, 1, 4), leg.dt)
     if name == "bang-bang":
         return Scripted(lambda observation, time: np.full(4, 1.0 if int(time / 0.25) % 2 else -1.0), leg.dt)
-    stand = GaitParameters(0.0, sum(g.swing_offset for g in leg.gaits.values()) / len(leg.gaits), 0.0, 0.0)
-    rest = leg.action_for(stand)
+    middle = sum(gait.swing_offset for gait in leg.gaits.values()) / len(leg.gaits)
+    rest = leg.action_for(GaitParameters(0.0, middle, 0.0, 0.0))
     if name == "idle":
         return Scripted(lambda observation, time: rest, leg.dt)
-    angles = np.linspace(0, 2 * np.pi, 360, endpoint=False)
-    heights = [leg.hoof_height(stand, angle) for angle in angles]
-    target = float(angles[np.argmax(heights) if name == "airborne" else np.argmin(heights)])
+    offset, target = _extreme_posture(
+        leg, [middle] if name == "drag" else np.linspace(0.0, 1.4, 15), name == "drag"
+    )
 
     def hold(observation: Any, time: float) -> Action:
         """Turn the crank (it turns one way only) to `target` and stop; "drag" then swings to and fro."""
         ahead = (target - math.atan2(observation[0], observation[1])) % (2 * np.pi)
         speed = 2.0 * ahead if 0.05 < ahead < np.pi * 1.5 else 0.0
         swing = 0.15 * math.sin(np.pi * time) if name == "drag" else 0.0
-        return leg.action_for(GaitParameters(min(speed, 2 * np.pi), stand.swing_offset + swing, 0.0, 0.0))
+        return leg.action_for(GaitParameters(min(speed, 2 * np.pi), offset + swing, 0.0, 0.0))
 
     return Scripted(hold, leg.dt)
+
+
+def _extreme_posture(leg: HorseLegEnv, offsets: Any, lowest: bool) -> tuple[float, float]:
+    """Swing offset and crank angle [rad] at which the lower hoof point is highest, or lowest."""
+    sign = -1.0 if lowest else 1.0
+    postures = [
+        (
+            sign * leg.hoof_height(GaitParameters(0.0, float(offset), 0.0, 0.0), float(theta)),
+            float(offset),
+            float(theta),
+        )
+        for offset in offsets
+        for theta in np.linspace(0, 2 * np.pi, 72, endpoint=False)
+    ]
+    return max(postures)[1:]

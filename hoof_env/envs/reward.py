@@ -27,7 +27,7 @@ class RewardWeights:
     progress: float = 1.0
     peak: float = 0.3
     energy: float = 0.1
-    action: float = 0.01
+    action: float = 0.02
     failure: float = 20.0
 
     def __post_init__(self) -> None:

@@ -47,8 +47,8 @@ class FilterSettings:
     gain: float = 20.0
     crank_rate: float = 20.0
     crank_acc: float = 400.0
-    swing_rate: float = 4.0
-    swing_acc: float = 80.0
+    swing_rate: float = 6.0
+    swing_acc: float = 120.0
 
     def __post_init__(self) -> None:
         for name in ("gain", "crank_rate", "crank_acc", "swing_rate", "swing_acc"):
