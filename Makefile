@@ -11,7 +11,7 @@ PYTHONS := $(or $(PYTHON),$(PY) python3 python3.13 python3.12 python3.11)
 IS_SUPPORTED := import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))
 
 help:
-	@echo 'make demo    watch the trained leg walk'
+	@echo 'make demo    reproduce the paper, train an agent, write runs/demo/report.html'
 	@echo 'make test    lint, types and tests'
 	@echo 'make lint    lint and types alone'
 	@echo 'make setup   make .venv and nothing more'
