@@ -93,11 +93,11 @@ def summarize(account: Any, weight: float, failed: bool) -> dict[str, float]:
         failed: whether the episode ended by failure.
 
     Returns:
-        seconds, distance_m, speed_m_s, peak_grf_n (highest of the episode), mean_grf_n (normal force over the
-        whole time), stance_peak_sum_n, stances, duty_factor, drive_work_j (braking is not recovered),
-        cost_of_transport (work per weight and distance; infinite without forward progress), weight_share (mean
-        normal force over weight: what the leg bore), support_share (the rest: what the rail or the suspension
-        bore), failed (0 or 1).
+        seconds, distance_m, speed_m_s, peak_grf_n (highest of the episode), mean_grf_n (normal force over
+        the whole time), stance_peak_sum_n, stances, duty_factor, drive_work_j (braking is not recovered),
+        cost_of_transport (work per weight and distance; infinite without forward progress), weight_share
+        (mean normal force over weight: what the leg bore), support_share (the rest: what the rail or the
+        suspension bore), failed (0 or 1).
     """
     seconds, distance, work = float(account["time"]), float(account["distance"]), float(account["total_work"])
     time = max(seconds, 1e-12)

@@ -60,14 +60,14 @@ def _of(entries: Iterable[Mapping[str, Any]], **wanted: str) -> list[Any]:
     return [entry for entry in entries if all(entry[key] == value for key, value in wanted.items())]
 
 
-def _number(value: float | None, unit: str, sign: str = "") -> str:
+def format_number(value: float | None, unit: str, sign: str = "") -> str:
     return "none" if value is None else f"{value:{sign}.{_DIGITS[unit]}f}"
 
 
-def _error(row: Mapping[str, Any], reproduction: Reproduction) -> str:
+def format_error(row: Mapping[str, Any], reproduction: Reproduction) -> str:
     measure = reproduction.published.row(row["id"]).bar.measure
     name = {"point": " points"}.get(measure, f" {measure}" if measure else "")
-    return "none" if row["error"] is None else _number(row["error"], measure, "+") + name
+    return "none" if row["error"] is None else format_number(row["error"], measure, "+") + name
 
 
 def _worst(reproduction: Reproduction, solver: str) -> list[dict[str, Any]]:
@@ -79,7 +79,8 @@ def _summary(reproduction: Reproduction, solver: str) -> str:
     barred = [row for row in _of(reproduction.rows, solver=solver) if row["within_bar"] is not None]
     within = sum(row["within_bar"] for row in barred)
     worst = ", ".join(
-        f"{row['id']} {_error(row, reproduction)} (bar {row['bar']})" for row in _worst(reproduction, solver)
+        f"{row['id']} {format_error(row, reproduction)} (bar {row['bar']})"
+        for row in _worst(reproduction, solver)
     )
     counts = f"{within} of {len(barred)} rows within their bar"
     return f"Solver `{solver}`: {counts}. Worst: {worst or 'none outside'}."
@@ -98,14 +99,14 @@ def _rows_table(reproduction: Reproduction, solvers: list[str]) -> str:
             f"`{published.id}`",
             published.quantity,
             published.unit,
-            _number(published.value, published.unit),
+            format_number(published.value, published.unit),
             published.bar_text,
         ]
         for solver in solvers:
             (row,) = _of(reproduction.rows, id=published.id, solver=solver)
-            error = _error(row, reproduction) + (" ✗" if row["within_bar"] is False else "")
+            error = format_error(row, reproduction) + (" ✗" if row["within_bar"] is False else "")
             line += [
-                _number(row["simulated"], row["unit"]),
+                format_number(row["simulated"], row["unit"]),
                 f"**{error}**" if (row["id"], solver) in worst else error,
             ]
         lines.append(line)
@@ -120,12 +121,12 @@ def _beside_table(reproduction: Reproduction, solvers: list[str]) -> str:
             _of(reproduction.rows, id=published.id, solver=solver)[0]["beside"] for solver in solvers
         ]
         for name in sorted(by_solver[0].keys() - {"printed"}):
-            values = [_number(beside.get(name), published.unit) for beside in by_solver]
+            values = [format_number(beside.get(name), published.unit) for beside in by_solver]
             lines.append(
                 [
                     f"`{published.id}`",
                     name.replace("_", " "),
-                    _number(published.printed, published.unit),
+                    format_number(published.printed, published.unit),
                     *values,
                 ]
             )

@@ -13,10 +13,11 @@ from hoof_env.dynamics.trace import new_trace
 from hoof_env.dynamics.trunk import Trunk
 from hoof_env.envs.horse_leg import HorseLegEnv
 from hoof_env.envs.horse_leg_fixed import HorseLegFixedEnv
+from hoof_env.envs.observation import MIDDLE
 from hoof_env.envs.policies import make_policy, policy_names
 from hoof_env.envs.reward import RewardWeights
 from hoof_env.errors import ParameterError
-from hoof_env.gait.parameters import LIMITS, load_gait
+from hoof_env.gait.parameters import LIMITS, GaitParameters, load_gait
 from hoof_env.ground.contact import Ground
 
 LEG, FIXED = "hoof_env/HorseLeg-v0", "hoof_env/HorseLegFixed-v0"
@@ -115,6 +116,29 @@ def test_episodes_with_different_substeps_agree():
         env.reset(seed=0, options={"gait": "run", "crank_angle": 0.0, "speed": 0.0, "height": 2.0})
         speeds.append(traces(env, env.unwrapped.action_for(load_gait("run")))["trunk_x"][-1] / 4)
     assert speeds[0] == pytest.approx(speeds[1], rel=0.02)
+
+
+def speed_and_peaks(gait, **kwargs):
+    env = gym.make(LEG, **kwargs)
+    env.reset(seed=0, options={"gait": gait, "crank_angle": 0.0, "speed": 0.0})
+    trace = traces(env, env.unwrapped.action_for(gait))
+    return trace["trunk_x"][-1] / 10, trace["grf"].max()
+
+
+def test_the_middle_of_the_ranges_moves_forward_and_no_swing_backward():
+    """As docs/environment.md says of the ranges."""
+    middle = GaitParameters.from_array(MIDDLE)
+    assert speed_and_peaks(middle)[0] > 0.5
+    assert speed_and_peaks(GaitParameters(2 * np.pi, 0.7, 0.0, 0.0))[0] < -2.0
+
+
+@pytest.mark.parametrize(
+    "change", [{"approach_floor": 1e-4}, {"friction_fast": 1e-2}, {"sim_dt": 1e-4}], ids=str
+)
+def test_assumed_contact_settings_hardly_matter_to_the_run(change):
+    """As docs/environment.md says of floor, friction threshold and substep."""
+    run = load_gait("run")
+    assert speed_and_peaks(run, **change) == pytest.approx(speed_and_peaks(run), rel=0.01)
 
 
 def table(docstring, heading):
