@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import json
 import math
-import shlex
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -43,15 +42,16 @@ class Metric:
 METRICS = {
     "return": Metric("return", digits=1),
     "distance_m": Metric("progress\nm", digits=1),
-    "speed_m_s": Metric("speed\nm/s"),
     "peak_grf_n": Metric("peak GRF\nkN", 1e-3),
+    "stance_peak_n": Metric("stance peak\nkN", 1e-3),
     "mean_grf_n": Metric("mean GRF\nkN", 1e-3),
-    "stance_peak_sum_n": Metric("stance peaks\nkN", 1e-3, 1),
+    "weight_share": Metric("weight\nshare"),
     "duty_factor": Metric("duty\nfactor"),
     "cost_of_transport": Metric("cost of\ntransport"),
     "failed": Metric("failed"),
 }
-"""The columns: "return", and figures of the episode summary (`hoof_env.envs.stance.summarize`)."""
+"""The columns: "return", figures of the episode summary (`hoof_env.envs.stance.summarize`), and
+"stance_peak_n", the mean over the stances of an episode of their highest force, 0 without a stance."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,10 @@ def play(
             action, _ = policy.predict(observation, episode_start=start, deterministic=True)
             observation, reward, terminated, truncated, info = env.step(action)
             total, start, done = total + float(reward), np.zeros(1, bool), terminated or truncated
-        episodes.append({"return": total, **info.get("episode_summary", {})})
+        summary = info.get("episode_summary", {})
+        if "stances" in summary:
+            summary["stance_peak_n"] = summary["stance_peak_sum_n"] / max(summary["stances"], 1.0)
+        episodes.append({"return": total, **summary})
         tick()
     return episodes
 
@@ -166,6 +169,7 @@ def evaluate(args: Args) -> tuple[list[Score], dict[str, Any]]:
     kwargs = parse_pairs("--env-kwargs", args.env_kwargs) or record.get("env_kwargs", {})
     scores = []
     with runs.make_env(env_id, **kwargs) as env:
+        runs.warm_up(env)
         policies = {
             name: find_policy(name, env, env_id) for name in args.policy
         }  # all, before the first is played
@@ -213,6 +217,13 @@ def table(scores: Sequence[Score]) -> Any:
     return grid
 
 
+def print_table(scores: Sequence[Score]) -> None:
+    """Print the scores; as wide as they need where the output is not a terminal."""
+    from rich.console import Console
+
+    Console(width=None if sys.stdout.isatty() else 160).print(table(scores))
+
+
 def to_json(scores: Sequence[Score], **about: Any) -> dict[str, Any]:
     """The scores as plain data: JSON knows no infinity, so an infinite figure is null."""
 
@@ -234,15 +245,13 @@ def to_json(scores: Sequence[Score], **about: Any) -> dict[str, Any]:
 
 def main(argv: list[str] | None = None) -> None:
     import tyro
-    from rich.console import Console
 
     args = tyro.cli(Args, args=argv, description=__doc__)
     scores, setting = evaluate(args)
-    console = Console(width=None if sys.stdout.isatty() else 160)
-    console.print(table(scores))
+    print_table(scores)
     if args.json:
         about = {
-            "command": shlex.join(["python", "-m", "agents.evaluate", *sys.argv[1:]]),
+            "command": runs.command(),
             "versions": runs.versions(),
         }
         data = to_json(scores, **setting, seed=args.seed, **about)

@@ -15,9 +15,12 @@ from __future__ import annotations
 
 import json
 import platform
+import shlex
 import subprocess
+import sys
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -27,6 +30,9 @@ import gymnasium as gym
 import hoof_env  # noqa: F401  (registers the environments)
 from hoof_env._output import staged
 from hoof_env.errors import DataFileError, ParameterError
+
+FILES = ("model.zip", "config.yml", "run.json", "monitor.csv")
+"""What a run without normalisation and checkpoints leaves, TensorBoard's files aside."""
 
 PACKAGES = ("hoof-env", "numpy", "gymnasium", "numba", "stable-baselines3", "torch")
 
@@ -41,6 +47,36 @@ def make_env(env_id: str, **kwargs: Any) -> gym.Env[Any, Any]:
         return gym.make(env_id, **kwargs)
     except (gym.error.Error, ModuleNotFoundError, TypeError) as error:
         raise ParameterError(f"environment {env_id!r} with {kwargs or 'no arguments'}: {error}") from None
+
+
+@cache
+def announce_compiling() -> None:
+    """From now on, say so once if numba compiles kernels rather than reading them from its cache."""
+    from numba.core import event
+
+    class Announce(event.Listener):
+        told = False
+
+        def on_start(self, event: Any) -> None:
+            if not self.told:
+                self.told = True
+                print("compiling the kernels, about 10 s, once", file=sys.stderr, flush=True)
+
+        def on_end(self, event: Any) -> None: ...
+
+    event.install_listener("numba:compile", Announce())
+
+
+def warm_up(env: gym.Env[Any, Any]) -> None:
+    """Reset and step once, so that kernels are compiled, and said to be, before anything is timed."""
+    announce_compiling()
+    env.reset(seed=0)
+    env.step(env.action_space.sample())
+
+
+def command() -> str:
+    """The command that started this process."""
+    return shlex.join(["python", *sys.orig_argv[1:]])
 
 
 def describe_spaces(env: Any) -> dict[str, str]:
@@ -114,7 +150,7 @@ class SavedModel:
                     ) from None
         return cls(file, {})
 
-    def load(self, env: gym.Env[Any, Any], env_id: str) -> Trained:
+    def load(self, env: gym.Env[Any, Any], env_id: str) -> TrainedPolicy:
         """Unpickle the model for `env`. This can run any code that the file holds.
 
         Raises:
@@ -137,7 +173,7 @@ class SavedModel:
                 f"model {self.path}: expected a model saved by Stable-Baselines3, cannot read it ({reason})"
             ) from None
         self._check(describe_spaces(model), describe_spaces(env))
-        return Trained(model, normalize)
+        return TrainedPolicy(model, normalize)
 
     def _check(self, found: dict[str, Any], wanted: dict[str, str]) -> None:
         for key, value in wanted.items():
@@ -146,7 +182,7 @@ class SavedModel:
 
 
 @dataclass(frozen=True)
-class Trained:
+class TrainedPolicy:
     """A trained policy that sees observations as it saw them in training.
 
     Attributes:

@@ -12,7 +12,6 @@ versions give the same run.
 from __future__ import annotations
 
 import json
-import shlex
 import signal
 import sys
 import time
@@ -73,10 +72,15 @@ class Trained:
     seconds: float
     stopped_by: int | None  # signal number
 
+    @property
+    def rate(self) -> float:
+        """Steps per second."""
+        return self.steps / max(self.seconds, 1e-9)
+
     def __str__(self) -> str:
-        rate = self.steps / max(self.seconds, 1e-9)
         return (
-            f"{self.steps:,} steps in {self.seconds:.0f} s ({rate:,.0f} steps/s); model kept in {self.folder}"
+            f"{self.steps:,} steps in {self.seconds:.0f} s ({self.rate:,.0f} steps/s); "
+            f"model kept in {self.folder}"
         )
 
 
@@ -107,6 +111,8 @@ def train(args: Args) -> Trained:
         )
     with runs.make_env(args.env_id, **env_kwargs) as env:
         spaces = runs.describe_spaces(env)
+        runs.warm_up(env)
+    check_folder(folder)
 
     # Importing torch takes seconds: only now
     import stable_baselines3
@@ -115,7 +121,6 @@ def train(args: Args) -> Trained:
     from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv, VecMonitor, VecNormalize
 
     # The run folder
-    check_folder(folder)
     record = {
         "env_id": args.env_id,
         "env_kwargs": env_kwargs,
@@ -125,7 +130,7 @@ def train(args: Args) -> Trained:
         "args": {
             key: str(value) if isinstance(value, Path) else value for key, value in asdict(args).items()
         },
-        "command": shlex.join(["python", "-m", "agents.train", *sys.argv[1:]]),
+        "command": runs.command(),
         "versions": runs.versions(),
     }
     runs.write_text(folder / "run.json", json.dumps(record, indent=2) + "\n")

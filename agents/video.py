@@ -22,6 +22,7 @@ def film(
     seconds: float = math.inf,
     width: int | None = None,
     crf: int = 24,
+    speed: float = 1.0,
 ) -> Path:
     """Write one episode, or its first `seconds`, to `path` in H.264; an older file is replaced at the end.
 
@@ -30,6 +31,7 @@ def film(
         policy: anything with Stable-Baselines3's `predict`.
         width: of the picture [pixels]; None keeps that of the environment.
         crf: x264's quality, lower is better and larger.
+        speed: of the film over that of life.
 
     Raises:
         OutputError: the folder cannot be written.
@@ -44,7 +46,7 @@ def film(
         writer = imageio_ffmpeg.write_frames(
             str(stage / path.name),
             frame.shape[1::-1],
-            fps=fps,
+            fps=fps * speed,
             codec="libx264",
             pix_fmt_out="yuv420p",
             macro_block_size=2,

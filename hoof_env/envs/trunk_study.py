@@ -36,7 +36,7 @@ def measure(gait: str, trunk: dict[str, Any]) -> dict[str, float]:
     Returns:
         mean_force_n (normal force), peak_force_n (resultant), weight_share (mean force over weight),
         speed_m_s, sinkage_m (nominal less mean height), bounce_m (highest less lowest), duty_factor; NaN if
-        the trunk falls before the end.
+        the episode fails (the trunk leaves its range of heights).
     """
     env = gym.make("hoof_env/HorseLeg-v0", episode_seconds=SETTLE + WINDOW, **trunk)
     leg: Any = env.unwrapped
@@ -69,7 +69,7 @@ def study(progress: Callable[[str], None] | None = None) -> str:
     for gait in ("walk", "run"):
         for trunk in TRUNKS:
             m = measure(gait, trunk)
-            cells = ["falls"] * 7
+            cells = ["fails"] * 7
             if np.isfinite(m["mean_force_n"]):
                 cells = [
                     *(f"{m[name]:.0f}" for name in ("mean_force_n", "peak_force_n")),

@@ -21,8 +21,8 @@ LIMITS = MappingProxyType(
         "swing_cos": (-0.8, 0.2),
     }
 )
-"""Lowest and highest value of each gait parameter [rad/s, rad, rad, rad]. Both gaits of the paper lie inside, and the
-middle of all four moves the identified leg forward at the paper's crank speed, 2 pi."""
+"""Lowest and highest value of each gait parameter [rad/s, rad, rad, rad]. Both gaits of the paper lie inside,
+and the middle of all four moves the identified leg forward at the paper's crank speed, 2 pi."""
 
 
 @dataclass(frozen=True)
