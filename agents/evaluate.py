@@ -3,8 +3,8 @@
     python -m agents.evaluate --policy walk run idle random
     python -m agents.evaluate --policy run runs/ppo-HorseLeg-v0-s0 --json scores.json --video gait.mp4
 
-A policy is a name (a gait of the preset, idle, random, bang-bang, drag, airborne) or a trained model: its .zip
-or its run folder. Brackets hold the bootstrap's 95 % interval of the mean over episodes.
+A policy is a name (a gait of the preset, idle, random, bang-bang, drag, airborne) or the path of a trained
+model: its .zip or its run folder. Brackets hold the bootstrap's 95 % interval of the mean over episodes.
 
 A model file is a pickle and can run any code when it is loaded: give only files that you trust.
 """
@@ -170,9 +170,8 @@ def evaluate(args: Args) -> tuple[list[Score], dict[str, Any]]:
     scores = []
     with runs.make_env(env_id, **kwargs) as env:
         runs.warm_up(env)
-        policies = {
-            name: find_policy(name, env, env_id) for name in args.policy
-        }  # all, before the first is played
+        # All are found before the first is played
+        policies = {name: find_policy(name, env, env_id) for name in args.policy}
         with tqdm(total=args.episodes * len(policies), unit=" episodes", leave=False, disable=None) as bar:
             for name, policy in policies.items():
                 bar.set_description(name)
@@ -250,11 +249,7 @@ def main(argv: list[str] | None = None) -> None:
     scores, setting = evaluate(args)
     print_table(scores)
     if args.json:
-        about = {
-            "command": runs.command(),
-            "versions": runs.versions(),
-        }
-        data = to_json(scores, **setting, seed=args.seed, **about)
+        data = to_json(scores, **setting, seed=args.seed, command=runs.command(), versions=runs.versions())
         runs.write_text(args.json, json.dumps(data, indent=1, allow_nan=False) + "\n")
         print(f"written: {args.json}")
 

@@ -136,10 +136,8 @@ class SavedModel:
             raise DataFileError(
                 f"model {path}: expected a .zip of agents.train or its run folder, found no {file}"
             )
-        for beside in (
-            file.parent / "run.json",
-            file.parent.parent / "run.json",
-        ):  # a checkpoint is one deeper
+        for folder in (file.parent, file.parent.parent):  # a checkpoint is one deeper
+            beside = folder / "run.json"
             if beside.is_file():
                 try:
                     record = json.loads(beside.read_text(encoding="utf-8"))
