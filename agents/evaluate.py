@@ -3,8 +3,8 @@
     python -m agents.evaluate --policy walk run idle random
     python -m agents.evaluate --policy run runs/ppo-HorseLeg-v0-s0 --json scores.json --video gait.mp4
 
-A policy is a name (a gait of the preset, idle, random, bang-bang, drag, airborne) or the path of a trained
-model: its .zip or its run folder. Brackets hold the bootstrap's 95 % interval of the mean over episodes.
+A policy is a name (a gait of the preset, idle, random, bang-bang, drag, airborne) or a trained model: its
+.zip or its run folder. Brackets hold the bootstrap's 95 % interval of the mean over episodes.
 
 A model file is a pickle and can run any code when it is loaded: give only files that you trust.
 """
