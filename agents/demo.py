@@ -157,20 +157,19 @@ def train_agent(args: Args, budget: Budget, stage: Path) -> train.Trained:
 def film_all(scores: list[evaluate.Score], budget: Budget, stage: Path) -> list[page.Clip]:
     """Film the gaits and the agent on their own trunk, and the gaits, slowly, on a fixed one."""
     clips = []
+    first_episodes = {score.policy: score.episodes[0] for score in scores}
     with runs.make_env(ENV_ID, render_mode="rgb_array") as env:
-        for score in scores:
-            if score.policy not in (*GAITS, TRAINED):
-                continue
-            name = str(stage / "model.zip") if score.policy == TRAINED else score.policy
-            policy = evaluate.find_policy(name, env, ENV_ID)
-            path = stage / f"{score.policy.replace(' ', '-')}.mp4"
+        for name in (TRAINED, *GAITS):
+            model_or_name = str(stage / "model.zip") if name == TRAINED else name
+            policy = evaluate.find_policy(model_or_name, env, ENV_ID)
+            path = stage / f"{name.replace(' ', '-')}.mp4"
             video.film(env, policy, path, seed=FIRST_SEED, seconds=budget.film_seconds, crf=28)
-            first = score.episodes[0]
+            first = first_episodes[name]
             caption = (
                 f"{first['distance_m']:+.1f} m in {first['seconds']:.0f} s, return {first['return']:.1f}"
             )
-            clips.append(page.Clip(f"{score.policy.capitalize()}, moving trunk", caption, path))
-            say(f"filmed {score.policy}")
+            clips.append(page.Clip(f"{name.capitalize()}, moving trunk", caption, path))
+            say(f"filmed {name}")
     for gait in GAITS:
         settings: dict[str, Any] = {"gait": gait, "dt": 0.02 / SLOW, "render_mode": "rgb_array"}
         with runs.make_env(FIXED_ID, **settings) as env:

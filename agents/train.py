@@ -128,7 +128,9 @@ def train(args: Args) -> Trained:
         **spaces,
         "seed": args.seed,
         "args": {
-            key: str(value) if isinstance(value, Path) else value for key, value in asdict(args).items()
+            key: str(value) if isinstance(value, Path) else value
+            for key, value in asdict(args).items()
+            if key != "out"  # the run is where this file is
         },
         "command": runs.command(),
         "versions": runs.versions(),

@@ -1,0 +1,184 @@
+"""Training on tiny numbers: what it writes, that it repeats, stops in good order and refuses what does not fit."""
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from stable_baselines3 import PPO
+
+from agents.command import parse_pairs
+from agents.runs import SavedModel, make_env
+from agents.train import Args, train
+from hoof_env.errors import DataFileError, OutputError, ParameterError
+from tests.agents.conftest import SHORT, TINY, train_tiny
+
+ROOT = Path(__file__).parents[2]
+
+
+def curve(folder: Path) -> list[tuple[str, str]]:
+    """Return and length of every training episode."""
+    with (folder / "monitor.csv").open() as file:
+        next(file)
+        return [(row["r"], row["l"]) for row in csv.DictReader(file)]
+
+
+def test_run_folder(trained):
+    names = {path.name for path in trained.folder.iterdir()}
+    assert names == {"model.zip", "run.json", "config.yml", "monitor.csv", "checkpoints", "tensorboard"}
+    assert trained.steps == 256
+    assert trained.stopped_by is None
+    assert {path.name for path in (trained.folder / "checkpoints").iterdir()} == {
+        "model-128.zip",
+        "model-256.zip",
+    }
+    record = json.loads((trained.folder / "run.json").read_text())
+    assert record["env_id"] == "hoof_env/HorseLeg-v0"
+    assert record["env_kwargs"] == {"episode_seconds": 0.4}
+    assert record["seed"] == 0
+    assert {"python", "platform", "numpy", "gymnasium", "stable-baselines3", "torch"} <= set(
+        record["versions"]
+    )
+    used = yaml.safe_load((trained.folder / "config.yml").read_text())["hoof_env/HorseLeg-v0"]
+    assert (used["n_steps"], used["n_envs"], used["n_timesteps"]) == (32, 4, 256)
+
+
+def test_every_training_step_is_in_the_curve(trained):
+    episodes = curve(trained.folder)
+    assert {length for _, length in episodes} == {"20"}
+    assert len(episodes) == 4 * (256 // 4 // 20)
+
+
+def test_model_reloads(trained):
+    with make_env("hoof_env/HorseLeg-v0", **parse_pairs("", SHORT)) as env:
+        observation, _ = env.reset(seed=3)
+        policy = SavedModel.find(trained.folder).load(env, "hoof_env/HorseLeg-v0")
+        action, _ = policy.predict(observation)
+        expected, _ = PPO.load(trained.folder / "model.zip").predict(observation, deterministic=True)
+        checkpoint = SavedModel.find(trained.folder / "checkpoints" / "model-256.zip")
+    np.testing.assert_array_equal(action, expected)
+    assert checkpoint.record["env_id"] == "hoof_env/HorseLeg-v0"
+
+
+def test_same_seed_same_run(trained, tmp_path):
+    again, other = train_tiny(tmp_path / "again"), train_tiny(tmp_path / "other", seed=1)
+    assert curve(again.folder) == curve(trained.folder)
+    assert curve(other.folder) != curve(trained.folder)
+
+
+def test_normalisation_statistics_stay_with_the_model(tmp_path):
+    params = (*TINY, '{"normalize": {"norm_reward": false}}')
+    folder = train_tiny(tmp_path / "run", params=params, checkpoint_every=0).folder
+    with make_env("hoof_env/HorseLeg-v0", **parse_pairs("", SHORT)) as env:
+        observation, _ = env.reset(seed=3)
+        policy = SavedModel.find(folder).load(env, "hoof_env/HorseLeg-v0")
+        normalized = policy.normalize(observation)
+        expected, _ = PPO.load(folder / "model.zip").predict(normalized, deterministic=True)
+        np.testing.assert_array_equal(policy.predict(observation)[0], expected)
+    assert not np.allclose(normalized, observation)
+
+
+def test_time_limit(tmp_path):
+    trained = train_tiny(tmp_path / "run", steps=10**9, max_minutes=0.01, checkpoint_every=0)
+    assert trained.steps < 10**5
+    assert (trained.folder / "model.zip").is_file()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_interrupted_training_keeps_its_model(tmp_path, number):
+    folder = tmp_path / "run"
+    command = [
+        sys.executable,
+        "-m",
+        "agents.train",
+        "--steps",
+        "1000000000",
+        "--n-envs",
+        "4",
+        "--out",
+        str(folder),
+    ]
+    process = subprocess.Popen(
+        [*command, "--env-kwargs", *SHORT, "--params", *TINY],
+        cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    monitor, deadline = folder / "monitor.csv", time.monotonic() + 60
+    while not (monitor.is_file() and len(monitor.read_text().splitlines()) > 2):
+        assert process.poll() is None, process.stderr.read()
+        assert time.monotonic() < deadline, "no episode ended within a minute"
+        time.sleep(0.05)
+    os.kill(process.pid, number)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 128 + number
+    assert "Traceback" not in err
+    (line,) = out.splitlines()
+    assert line.startswith("interrupted: ")
+    assert str(folder) in line
+    assert PPO.load(folder / "model.zip").num_timesteps > 0
+
+
+def test_finished_run_is_not_overwritten(trained):
+    before = (trained.folder / "model.zip").read_bytes()
+    with pytest.raises(OutputError, match="already holds a trained model"):
+        train_tiny(trained.folder)
+    assert (trained.folder / "model.zip").read_bytes() == before
+
+
+def test_unwritable_folder(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(OutputError, match="file"):
+        train_tiny(tmp_path / "file" / "run")
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"env_id": "hoof_env/Cow-v0"}, "Cow"),
+        ({"env_kwargs": ("wheels=4",)}, "wheels"),
+        ({"env_kwargs": ("trunk=flying",)}, "flying"),
+        ({"env_kwargs": ("trunk",)}, "'trunk'"),
+        ({"env_kwargs": ("{trunk: 1}",)}, "JSON"),
+        ({"params": ("horsepower=1",)}, "horsepower"),
+        ({"params": ("learning_rate=fast",)}, "fast"),
+        ({"steps": 0}, "steps"),
+        ({"n_envs": 0}, "n_envs"),
+        ({"seed": -1}, "seed"),
+        ({"max_minutes": 0.0}, "max_minutes"),
+    ],
+    ids=str,
+)
+def test_bad_input(tmp_path, changes, said):
+    with pytest.raises((ParameterError, DataFileError), match=said):
+        train_tiny(tmp_path / "run", **changes)
+    assert not (tmp_path / "run" / "model.zip").exists()
+
+
+def test_an_error_is_one_line():
+    command = [sys.executable, "-m", "agents.train", "--env-id", "hoof_env/Cow-v0"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 1
+    assert done.stderr.startswith("error: environment 'hoof_env/Cow-v0'")
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_pairs():
+    items = ["trunk=rail", "restitution=0.5", '{"reward_weights": {"peak": 1}, "x": null}', "empty="]
+    assert parse_pairs("--env-kwargs", items) == {
+        "trunk": "rail",
+        "restitution": 0.5,
+        "reward_weights": {"peak": 1},
+        "x": None,
+        "empty": "",
+    }
+
+
+def test_another_environment_trains_too(tmp_path):
+    folder = train(Args(env_id="Pendulum-v1", steps=64, n_envs=2, params=TINY, out=tmp_path / "run")).folder
+    assert SavedModel.find(folder).record["env_id"] == "Pendulum-v1"
