@@ -165,8 +165,10 @@ def film_all(scores: list[evaluate.Score], budget: Budget, stage: Path) -> list[
             path = stage / f"{name.replace(' ', '-')}.mp4"
             video.film(env, policy, path, seed=FIRST_SEED, seconds=budget.film_seconds, crf=28)
             first = first_episodes[name]
+            way = "forward" if first["distance_m"] >= 0 else "backward"
             caption = (
-                f"{first['distance_m']:+.1f} m in {first['seconds']:.0f} s, return {first['return']:.1f}"
+                f"{abs(first['distance_m']):.1f} m {way} in an episode of {first['seconds']:.0f} s, "
+                f"return {first['return']:.1f}"
             )
             clips.append(page.Clip(f"{name.capitalize()}, moving trunk", caption, path))
             say(f"filmed {name}")

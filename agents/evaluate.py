@@ -24,6 +24,7 @@ import numpy as np
 
 from agents import runs
 from agents.command import parse_pairs, run
+from hoof_env._output import check_folder
 from hoof_env.envs.policies import make_policy, policy_names
 from hoof_env.errors import ParameterError, check_number
 
@@ -114,7 +115,7 @@ def play(
 
 def is_model(name: str) -> bool:
     """Whether a policy's name is the path of a model rather than that of a scripted policy."""
-    return name.endswith(".zip") or "/" in name or Path(name).exists()
+    return name.endswith(".zip") or Path(name).name != name or Path(name, "model.zip").is_file()
 
 
 def find_policy(name: str, env: gym.Env[Any, Any], env_id: str) -> Any:
@@ -157,12 +158,14 @@ def evaluate(args: Args) -> tuple[list[Score], dict[str, Any]]:
 
     Raises:
         ParameterError, DataFileError: the arguments, a policy or a model do not fit.
-        OutputError: the video cannot be written.
+        OutputError: the JSON or the video cannot be written.
     """
     from tqdm import tqdm
 
     check_number("episodes", args.episodes, low=1)
     check_number("seed", args.seed, low=0)
+    for path in filter(None, (args.json, args.video)):
+        check_folder(path.parent)
     records = [runs.SavedModel.find(Path(name)).record for name in args.policy if is_model(name)]
     record = next(filter(None, records), {})
     env_id = args.env_id or record.get("env_id", DEFAULT_ENV)
@@ -180,9 +183,10 @@ def evaluate(args: Args) -> tuple[list[Score], dict[str, Any]]:
     if args.video:
         from agents.video import film
 
-        with runs.make_env(env_id, render_mode="rgb_array", **kwargs) as env:
+        with runs.make_env(env_id, **{**kwargs, "render_mode": "rgb_array"}) as env:
             for name in policies:
-                suffix = f"-{Path(name).stem}" if len(policies) > 1 else ""
+                short = Path(name).parent.name if name.endswith("model.zip") else Path(name).stem
+                suffix = f"-{short}" if len(policies) > 1 else ""
                 path = args.video.with_name(f"{args.video.stem}{suffix}{args.video.suffix or '.mp4'}")
                 film(env, find_policy(name, env, env_id), path, seed=args.seed)
                 print(f"filmed {name}: {path}")
@@ -190,14 +194,14 @@ def evaluate(args: Args) -> tuple[list[Score], dict[str, Any]]:
 
 
 def cell(metric: Metric, value: Estimate) -> tuple[str, str]:
-    """Mean and interval as a person reads them."""
+    """Mean and interval as a person reads them; no interval where there is none or all episodes agree."""
     if not math.isfinite(value.mean):
         return "∞", ""
     mean, *bounds = (
         "" if x is None else f"{x * metric.factor:.{metric.digits}f}"
         for x in (value.mean, value.low, value.high)
     )
-    return mean, f"[{bounds[0]}, {bounds[1]}]" if bounds[0] else ""
+    return mean, f"[{bounds[0]}, {bounds[1]}]" if value.low != value.high else ""
 
 
 def table(scores: Sequence[Score]) -> Any:

@@ -125,7 +125,7 @@ def draw_curve(curve: Curve, scores: Sequence[evaluate.Score], labelled: Sequenc
     from hoof_env.paper.figure_style import BLUE, GREY, ORANGE, STYLE
 
     with matplotlib.rc_context({**STYLE, "font.size": 10}):
-        figure = Figure(figsize=(7, 3.8), layout="constrained")
+        figure = Figure(figsize=(9, 4.2), layout="constrained")
         axes = figure.subplots()
         steps, returns = curve.T
         axes.plot(steps, returns, ".", ms=3, color=BLUE, alpha=0.25, mew=0, label="one training episode")
@@ -146,7 +146,7 @@ def draw_curve(curve: Curve, scores: Sequence[evaluate.Score], labelled: Sequenc
         axes.xaxis.set_major_formatter(lambda value, _: f"{value:,.0f}")
         axes.set_xlim(left=0)
         axes.grid(axis="y", color=GREY, alpha=0.15)
-        axes.legend(loc="lower right")
+        figure.legend(loc="outside upper left", ncols=2)
         buffer = io.BytesIO()
         figure.savefig(buffer, format="svg", metadata={"Date": None})
     return buffer.getvalue()
