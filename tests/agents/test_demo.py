@@ -1,0 +1,185 @@
+"""The demonstration on tiny numbers: one page that needs nothing else, and an older one that survives."""
+
+import base64
+import json
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from agents import demo, page
+from agents.evaluate import METRICS, Args, evaluate
+from hoof_env.errors import OutputError
+from hoof_env.paper.published import load_published
+from hoof_env.paper.reproduce import SOLVERS
+
+ROOT = Path(__file__).parents[2]
+
+
+class Page(HTMLParser):
+    """What a page links to, its ids, its text, and the rows of its tables by the table's id."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.links: list[str] = []
+        self.tags: list[str] = []
+        self.ids: list[str] = []
+        self.text = ""
+        self.tables: dict[str, list[list[str]]] = {}
+        self.in_cell = False
+        self.feed(html)
+
+    def handle_starttag(self, tag, attrs):
+        attributes = dict(attrs)
+        self.tags.append(tag)
+        self.ids += [attributes["id"]] if "id" in attributes else []
+        self.links += [attributes[key] for key in ("src", "href", "poster", "data") if key in attributes]
+        if tag == "table":
+            self.rows = self.tables[attributes["id"]] = []
+        elif tag == "tr":
+            self.rows.append([])
+        elif tag in ("td", "th"):
+            self.rows[-1].append("")
+            self.in_cell = True
+
+    def handle_endtag(self, tag):
+        if tag in ("td", "th"):
+            self.in_cell = False
+
+    def handle_data(self, data):
+        self.text += data
+        if self.in_cell:
+            self.rows[-1][-1] += f" {data.strip()}"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    out = tmp_path_factory.mktemp("runs") / "demo"
+    assert demo.demo(demo.Args(out=out, quick=True)) == out / "report.html"
+    return out
+
+
+@pytest.fixture(scope="module")
+def html(folder) -> str:
+    return (folder / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def report(html) -> Page:
+    return Page(html)
+
+
+def test_nothing_is_fetched_from_outside(html, report):
+    assert "script" not in report.tags
+    assert "link" not in report.tags
+    assert report.links
+    for link in report.links:
+        kind, content = re.fullmatch(r"data:([a-z0-9/+]+);base64,(.+)", link).groups()
+        decoded = base64.b64decode(content, validate=True)
+        if kind == "image/svg+xml":  # a picture may not reach out either
+            outside = re.findall(rb"(?:href|src)\s*=\s*[\"'](?!#|data:)([^\"']*)", decoded)
+            assert not outside, outside
+    assert not re.search(r"url\(|@import", html)
+    assert "</html>" in html
+
+
+def test_the_page_says_that_it_is_quick(report):
+    assert "Quick run." in report.text
+
+
+def test_every_published_number_stands_beside_both_solvers(folder, report):
+    published = load_published()
+    entries = json.loads((folder / "reproduction.json").read_text())
+    shown = {row[0].split()[-1]: row for row in report.tables["reproduction"] if len(row) == 2 + len(SOLVERS)}
+    for row in published.rows:
+        simulated = [e for e in entries if e["id"] == row.id]
+        assert [e["solver"] for e in simulated] == list(SOLVERS)
+        _, printed, *cells = shown[row.id]
+        assert float(printed.split()[0]) == pytest.approx(row.value, abs=0.051)
+        assert row.bar_text in printed
+        for cell, entry in zip(cells, simulated, strict=True):
+            assert float(cell.split()[0]) == pytest.approx(entry["simulated"], abs=0.051)
+            assert ("✓" in cell, "✗" in cell) == (entry["within_bar"] is True, entry["within_bar"] is False)
+    for claim in published.claims:
+        assert claim.id in report.ids
+
+
+def test_scores_on_the_page_are_those_of_the_file(folder, report):
+    data = json.loads((folder / "scores.json").read_text())
+    rows = {row[0].strip(): row[1:] for row in report.tables["scores"][1:]}
+    assert set(rows) == set(data["policies"]) == {*demo.SCRIPTED, demo.TRAINED}
+    for name, policy in data["policies"].items():
+        for (key, metric), cell in zip(METRICS.items(), rows[name], strict=True):
+            mean = policy["mean"][key]
+            expected = "∞" if mean is None else f"{mean * metric.factor:.{metric.digits}f}"
+            assert cell.split()[0] == expected
+
+
+def test_pictures_and_films(report):
+    assert {*page.FIGURES, "curve"} <= set(report.ids)
+    assert report.tags.count("video") == 5
+    assert sum(link.startswith("data:video/mp4;base64,") for link in report.links) == 5
+
+
+def test_versions_and_command(report):
+    for word in ("python 3.", "numpy ", "gymnasium ", "numba ", "stable-baselines3 ", "torch ", "hoof-env "):
+        assert word in report.text
+
+
+def test_the_agent_of_the_report_can_be_played(folder):
+    (score,), setting = evaluate(Args(policy=(str(folder),), episodes=2, seed=demo.FIRST_SEED))
+    data = json.loads((folder / "scores.json").read_text())
+    assert setting["env_id"] == data["env_id"]
+    shown = [episode["return"] for episode in data["policies"][demo.TRAINED]["episodes"]]
+    np.testing.assert_allclose([episode["return"] for episode in score.episodes], shown, rtol=1e-6)
+
+
+def test_only_finished_files_stay(folder):
+    names = {path.name for path in folder.iterdir()}
+    assert {"report.html", "reproduction.json", "scores.json", "model.zip", "run.json", "walk.mp4"} <= names
+    assert not [name for name in names if name.startswith(".")]
+
+
+@pytest.mark.parametrize("failure", [KeyboardInterrupt(), RuntimeError("broken")])
+def test_a_failed_run_leaves_the_older_report(folder, monkeypatch, failure):
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+
+    def fail(*_, **__):
+        raise failure
+
+    monkeypatch.setattr(demo, "reproduce", lambda say: None)
+    monkeypatch.setattr(demo, "write_reproduction", lambda r, stage, **_: (stage / "walk.mp4").touch())
+    monkeypatch.setattr(demo, "print_reproduction", fail)
+    with pytest.raises(type(failure)):
+        demo.demo(demo.Args(out=folder, quick=True))
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_unwritable_folder(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(OutputError, match="file"):
+        demo.demo(demo.Args(out=tmp_path / "file" / "demo", quick=True))
+
+
+def test_learning_curve_counts_steps(tmp_path):
+    path = tmp_path / "monitor.csv"
+    path.write_text('#{"t_start": 0}\nr,l,t\n-1.5,20,0.1\n2.0,30,0.2\n')
+    np.testing.assert_array_equal(page.read_curve(path), [[20, -1.5], [50, 2.0]])
+
+
+def test_interrupted_from_the_keyboard_says_one_line(tmp_path):
+    """The signal comes while the first step is at work."""
+    code = (
+        "import os, signal, sys; from agents import command, demo;"
+        "demo.reproduce = lambda say: os.kill(os.getpid(), signal.SIGINT);"
+        "sys.argv = ['demo', '--out', sys.argv[1], '--quick']; command.run(demo.main)"
+    )
+    out = subprocess.run(
+        [sys.executable, "-c", code, str(tmp_path)], cwd=ROOT, capture_output=True, text=True, timeout=60
+    )
+    assert out.returncode == 130
+    assert out.stderr.split() == ["interrupted"]
