@@ -211,7 +211,7 @@ def main(argv: list[str] | None = None) -> None:
     import tyro
 
     started = time.monotonic()
-    report = demo(tyro.cli(Args, args=argv, description=__doc__))
+    report = demo(tyro.cli(Args, args=argv, prog="python -m agents.demo", description=__doc__))
     print(f"{time.monotonic() - started:.0f} s in all. Open {report}")
 
 

@@ -249,7 +249,7 @@ def to_json(scores: Sequence[Score], **about: Any) -> dict[str, Any]:
 def main(argv: list[str] | None = None) -> None:
     import tyro
 
-    args = tyro.cli(Args, args=argv, description=__doc__)
+    args = tyro.cli(Args, args=argv, prog="python -m agents.evaluate", description=__doc__)
     scores, setting = evaluate(args)
     print_table(scores)
     if args.json:

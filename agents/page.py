@@ -128,7 +128,7 @@ def draw_curve(curve: Curve, scores: Sequence[evaluate.Score], labelled: Sequenc
         figure = Figure(figsize=(9, 4.2), layout="constrained")
         axes = figure.subplots()
         steps, returns = curve.T
-        axes.plot(steps, returns, ".", ms=3, color=BLUE, alpha=0.25, mew=0, label="one training episode")
+        axes.plot(steps, returns, ".", ms=3, color=BLUE, alpha=0.35, mew=0, label="one training episode")
         width = min(SMOOTHED, len(curve))
         if width:
             mean = np.convolve(returns, np.ones(width) / width, mode="valid")
@@ -146,7 +146,7 @@ def draw_curve(curve: Curve, scores: Sequence[evaluate.Score], labelled: Sequenc
         axes.xaxis.set_major_formatter(lambda value, _: f"{value:,.0f}")
         axes.set_xlim(left=0)
         axes.grid(axis="y", color=GREY, alpha=0.15)
-        figure.legend(loc="outside upper left", ncols=2)
+        figure.legend(loc="outside upper left", ncols=2, markerscale=3)
         buffer = io.BytesIO()
         figure.savefig(buffer, format="svg", metadata={"Date": None})
     return buffer.getvalue()

@@ -64,7 +64,7 @@ def announce_compiling() -> None:
 
         def on_end(self, event: Any) -> None: ...
 
-    event.install_listener("numba:compile", Announce())
+    event.register("numba:compile", Announce())
 
 
 def warm_up(env: gym.Env[Any, Any]) -> None:

@@ -232,7 +232,7 @@ def stop_on_signals(watch: Any) -> Iterator[None]:
 def main(argv: list[str] | None = None) -> int:
     import tyro
 
-    trained = train(tyro.cli(Args, args=argv, description=__doc__))
+    trained = train(tyro.cli(Args, args=argv, prog="python -m agents.train", description=__doc__))
     print(f"{'interrupted: ' if trained.stopped_by else ''}{trained}")
     return 128 + trained.stopped_by if trained.stopped_by else 0
 
