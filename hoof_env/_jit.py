@@ -14,7 +14,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from hoof_env.errors import OutputError
+from hoof_env.errors import HoofEnvError, OutputError
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -28,6 +28,7 @@ def kernel(function: F) -> F:
     Raises:
         OutputError: the folder named by NUMBA_CACHE_DIR, or without it every folder that numba tries, is not
             writable.
+        HoofEnvError: numba is told not to compile.
     """
     import numba
 
@@ -42,6 +43,8 @@ def kernel(function: F) -> F:
             f"cannot keep compiled kernels in {folder!r} ({error}); expected a writable folder: "
             "set the environment variable NUMBA_CACHE_DIR to one"
         ) from None
+    if not hasattr(compiled, "_cache"):  # records have no attributes outside compiled code
+        raise HoofEnvError("NUMBA_DISABLE_JIT is set, but kernels run compiled only: unset it")
     # numba looks for changes in the file of a kernel alone, but a kernel contains those that it calls
     stored = compiled._cache._cache_file
     stored._source_stamp = (stored._source_stamp, _sources())

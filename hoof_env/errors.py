@@ -43,7 +43,7 @@ def check_number(
         number = float(value)
     except (TypeError, ValueError, OverflowError):
         raise ParameterError(f"{name}: expected {bounds}, got {value!r}") from None
-    if isinstance(value, (bool, str)) or not np.isfinite(number):
+    if isinstance(value, (bool, np.bool_, str, bytes)) or not np.isfinite(number):
         raise ParameterError(f"{name}: expected {bounds}, got {value!r}")
     if number > high or number < low or (exclusive_low and number == low):
         raise ParameterError(f"{name}: expected {bounds}, got {value!r}")

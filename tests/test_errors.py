@@ -37,7 +37,7 @@ def test_a_number_is_returned_or_named(value, bounds, exclusive):
 
 
 @pytest.mark.parametrize(
-    "value", [True, False, "1", "one", None, [1], (), {}, 1j, np.zeros(2), 10**400, np.nan]
+    "value", [True, False, np.True_, b"1", "1", "one", None, [1], (), {}, 1j, np.zeros(2), 10**400, np.nan]
 )
 def test_what_is_no_number_is_refused(value):
     with pytest.raises(ParameterError, match=r"x: expected a finite number in \[-inf, inf\], got "):

@@ -47,6 +47,11 @@ def test_a_cache_folder_that_cannot_be_is_named_with_the_remedy(tmp_path):
     assert "expected a writable folder: set the environment variable NUMBA_CACHE_DIR to one" in result.stdout
 
 
+def test_without_compilation_the_reason_is_named():
+    result = python("import hoof_env.leg.kinematics", PACKAGE.parent, NUMBA_DISABLE_JIT="1")
+    assert "HoofEnvError: NUMBA_DISABLE_JIT is set" in result.stderr
+
+
 @pytest.mark.skipif(
     os.name != "posix" or os.geteuid() == 0, reason="needs a folder that this user cannot write"
 )

@@ -234,7 +234,7 @@ class LegEngine:
         filters: bounds of the command filters.
 
     Raises:
-        ParameterError: `sim_dt` is out of range or too long for the filters.
+        ParameterError: `sim_dt` is out of range or too long for the filters or the suspension.
     """
 
     def __init__(
@@ -250,6 +250,7 @@ class LegEngine:
         self.sim_dt = check_number("sim_dt", sim_dt, low=1e-7, high=filters.longest_step)
         self.tables = Tables.of(geometry)
         self._settings = filters.to_array()
+        trunk.check_step(self.sim_dt, geometry.mass)
         self._trunk, self._ground = trunk.to_record(geometry.mass, GRAVITY), ground.to_record()
         self.state = State(  # nowhere, until reset
             np.full(1, np.nan, BODY)[0], np.zeros(1, MOTION)[0], steady_filters(np.zeros(4)), new_contacts()

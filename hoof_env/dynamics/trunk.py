@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hoof_env.errors import check_choice, check_number
+from hoof_env.errors import ParameterError, check_choice, check_number
 
 TRUNKS = ("fixed", "rail", "suspended")
 """Kinds of trunk; the kernel takes the position in this tuple."""
@@ -68,3 +68,19 @@ class Trunk:
             record[name] = getattr(self, name)
         record["total_mass"], record["gravity"] = self.mass + leg_mass, gravity
         return record
+
+    def check_step(self, h: float, leg_mass: float) -> None:
+        """Raise `ParameterError` where a step of `h` [s] makes semi-implicit Euler blow up the free trunk.
+
+        With the mass m of trunk and leg, spring k and damper c are stable while h^2 k / m + 2 h c / m < 4.
+        """
+        m = self.mass + leg_mass
+        if self.kind == "suspended" and h * h * self.stiffness / m + 2 * h * self.damping / m >= 4:
+            raise ParameterError(
+                f"trunk_stiffness, trunk_damping: expected h^2 k / m + 2 h c / m < 4 with h = {h:g} s and "
+                f"m = {m:g} kg, got k = {self.stiffness:g} N/m and c = {self.damping:g} N s/m"
+            )
+        if self.kind != "fixed" and h * self.drag / m >= 2:
+            raise ParameterError(
+                f"trunk_drag: expected less than 2 m / h = {2 * m / h:g} N s/m, got {self.drag:g} N s/m"
+            )

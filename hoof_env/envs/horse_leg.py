@@ -184,10 +184,12 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.preset, self.geometry = preset, load_geometry(preset)
         self.gaits = {name: load_gait(name, preset) for name in gait_names(preset)}
         self.weights = reward.RewardWeights.of(reward_weights)
-        self.episode_seconds = check_number("episode_seconds", episode_seconds, low=0, exclusive_low=True)
         self.substeps = _substeps(dt, sim_dt)
         self.sim_dt, self.dt = sim_dt, sim_dt * self.substeps
-        self._steps_per_episode = max(1, round(episode_seconds / self.dt))
+        self.episode_seconds = check_number(
+            "episode_seconds", episode_seconds, low=self.dt * (1 - 1e-9), high=LONGEST_EPISODE
+        )
+        self._steps_per_episode = round(episode_seconds / self.dt)
         height = self.geometry.hip_height if hip_height is None else hip_height
         self.filters = FilterSettings()
         self.engine = self._build_engine(
@@ -279,6 +281,10 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             self._renderer.close()
             self._renderer = None
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Copies and pickles leave the window behind; it belongs to this process and this environment."""
+        return {**self.__dict__, "_renderer": None}
+
     def _check_action(self, action: Any) -> NDArray[np.float32]:
         try:
             array = np.array(action, dtype=np.float32)
@@ -295,6 +301,9 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         if result is Result.OK:
             self.trace = trace
             take_account(self._account, trace, self.sim_dt, start_x, self.engine.trunk.kind == "fixed")
+        else:  # the state is the last good one: what led to it is not paid twice
+            for name in ("peak_increase", "work", "progress"):
+                self._account[name] = 0.0
         return result
 
     def _fallen(self) -> bool:
@@ -339,7 +348,7 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             # no contact begins with a hoof inside the ground: hang the trunk higher where it would
             height = options.get("height", max(trunk.height, -self.hoof_height(gait, theta)))
         else:
-            height = trunk.height
+            height = options.get("height", trunk.height)
             for _ in range(100):
                 if "crank_angle" in options or height + self.hoof_height(gait, theta) >= 0:
                     break
@@ -362,6 +371,9 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             )
         return self._renderer
 
+
+LONGEST_EPISODE, MOST_SUBSTEPS = 1e6, 100_000
+"""Seconds of an episode and substeps of a control step at most."""
 
 START_SPEED = 1.0
 """Highest forward speed at reset [m/s]: a learner meets both a standing start and a rolling one."""
@@ -405,9 +417,10 @@ def _substeps(dt: float, sim_dt: float) -> int:
     check_number("sim_dt", sim_dt, low=0, exclusive_low=True)
     check_number("dt", dt, low=0, exclusive_low=True)
     ratio = dt / sim_dt
-    if round(ratio) < 1 or abs(ratio - round(ratio)) > 1e-6:
+    if not 0.5 < ratio <= MOST_SUBSTEPS or abs(ratio - round(ratio)) > 1e-6:
         raise ParameterError(
-            f"dt: expected a whole multiple of sim_dt = {sim_dt:g} s, got {dt:g} s (ratio {ratio:g})"
+            f"dt: expected a whole multiple of sim_dt = {sim_dt:g} s, got {dt:g} s "
+            f"(ratio {ratio:g}; at most {MOST_SUBSTEPS})"
         )
     return round(ratio)
 

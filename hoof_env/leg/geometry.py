@@ -9,7 +9,7 @@ no lengths).
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib import resources
@@ -83,14 +83,14 @@ class Geometry:
             )
         if self.travel not in (1, -1):
             raise ParameterError(f"travel: expected +1 or -1, got {self.travel!r}")
-        if np.shape(self.pivot) != (2,):
+        if _count(self.pivot) != 2:
             raise ParameterError(f"pivot: expected two numbers (C_x, C_y) in metres, got {self.pivot!r}")
         pivot = tuple(check_number(f"pivot[{i}]", c) for i, c in enumerate(self.pivot))
         check_number("hip_height", self.hip_height, low=0, exclusive_low=True)
         check_number("linear_density", self.linear_density, low=0, exclusive_low=True)
         check_choice("inertia", self.inertia, INERTIA_RULES)
         if self.masses is not None:
-            if np.shape(self.masses) != (len(BODIES),):
+            if _count(self.masses) != len(BODIES):
                 raise ParameterError(f"masses: expected {len(BODIES)} link masses, got {self.masses!r}")
             masses = tuple(
                 check_number(f"masses[{i}]", m, low=0, exclusive_low=True) for i, m in enumerate(self.masses)
@@ -166,6 +166,10 @@ def _check_keys(what: str, given: Any, expected: Any) -> None:
         parts = [f"missing {', '.join(sorted(missing))}"] if missing else []
         parts += [f"unknown {', '.join(sorted(map(str, unknown)))}"] if unknown else []
         raise ParameterError(f"{what}: expected exactly {', '.join(expected)}; {'; '.join(parts)}")
+
+
+def _count(values: Any) -> int:
+    return len(values) if isinstance(values, (Sequence, np.ndarray)) else 0
 
 
 def _from_dict(data: Mapping[str, Any]) -> Geometry:
@@ -256,7 +260,7 @@ def read_preset(source: str | Path) -> dict[str, Any]:
         data = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise DataFileError(f"cannot read {path}: {error.strerror or error}") from None
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise DataFileError(f"{path}: expected a JSON preset file, but it does not parse: {error}") from None
     if not isinstance(data, dict):
         raise DataFileError(

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from hoof_env.dynamics.engine import GRAVITY, LegEngine
+from hoof_env.dynamics.result import Result
 from hoof_env.dynamics.trace import new_trace
 from hoof_env.dynamics.trunk import TRUNK, Trunk
 from hoof_env.errors import ParameterError
@@ -86,3 +87,32 @@ def test_the_record_holds_the_settings():
 def test_bad_settings_are_named(settings, message):
     with pytest.raises(ParameterError, match=message):
         Trunk(**settings)
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "damping", "drag"),
+    [(4.0, 0.0, 0.0), (0.1, 1.95, 0.0), (2.0, 1.0, 0.0), (0.0, 0.0, 2.0)],
+    ids=["spring", "mostly damper", "both", "drag"],
+)
+def test_a_suspension_too_quick_for_the_step_is_refused_at_its_limit(stiffness, damping, drag, monkeypatch):
+    """In units of m / h^2 and m / h: just inside the motion stays bounded, just outside it would not."""
+    h, m = 1e-3, 80.0 + LEG.mass
+
+    def scaled(part):
+        spring, rates = stiffness * m / h**2, {"damping": damping * m / h, "drag": drag * m / h}
+        settings = {"stiffness": spring, **rates}
+        return Trunk(**{**NOTHING, **{name: part * value for name, value in settings.items()}})
+
+    def furthest(trunk):
+        engine = LegEngine(LEG, trunk, Ground(), h)
+        engine.reset(STILL, height=30.1, speed=0.1)
+        trace = new_trace(2000)
+        if engine.advance(STILL.to_array(), trace) is not Result.OK:
+            return np.inf
+        return max(np.abs(trace["trunk_vx"]).max(), np.abs(trace["trunk_y"] - 30.0).max())
+
+    assert furthest(scaled(0.99)) < 10.0
+    with pytest.raises(ParameterError, match=r"trunk_(stiffness, trunk_damping|drag): expected"):
+        furthest(scaled(1.01))
+    monkeypatch.setattr(Trunk, "check_step", lambda *_: None)
+    assert furthest(scaled(1.01)) > 1e3

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import pickle
 import warnings
 
 import gymnasium as gym
@@ -115,3 +116,16 @@ def test_deep_copy_goes_on_identically():
         one, two = env.step(np.full(4, -0.3, np.float32)), twin.step(np.full(4, -0.3, np.float32))
         np.testing.assert_array_equal(one[0], two[0])
         assert one[1] == two[1]
+
+
+def test_copies_of_a_drawing_environment_draw_for_themselves():
+    pytest.importorskip("pygame")
+    env = gym.make("hoof_env/HorseLeg-v0", render_mode="rgb_array").unwrapped
+    env.reset(seed=2)
+    env.render()
+    for twin in (copy.deepcopy(env), pickle.loads(pickle.dumps(env))):
+        one, two = env.engine.state.copy(), twin.engine.state
+        assert one.body == two.body
+        twin.step(np.zeros(4, np.float32))
+        assert twin.render().shape == env.render().shape
+        assert env.engine.state.body == one.body

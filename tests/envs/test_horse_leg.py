@@ -212,6 +212,7 @@ BAD = [
     ({"render_mode": "ansi"}, "render_mode: expected one of human, rgb_array, got 'ansi'"),
     ({"dt": 0.0205}, "dt: expected a whole multiple of sim_dt = 0.001 s, got 0.0205 s"),
     ({"dt": 0.0005}, "dt: expected a whole multiple"),
+    ({"dt": 1e300, "sim_dt": 1e-300}, "dt: expected.* got 1e.300 s .ratio inf; at most 100000"),
     ({"sim_dt": 0.0}, "sim_dt: expected"),
     ({"dt": float("nan")}, "dt: expected.*got nan"),
     ({"trunk_mass": -80.0}, "trunk_mass: expected.*got -80.0"),
@@ -229,6 +230,8 @@ BAD = [
     ({"friction": -0.1}, "friction: expected.*got -0.1"),
     ({"friction_fast": 1e-4}, "friction_fast: expected more than friction_slow"),
     ({"episode_seconds": -1.0}, "episode_seconds: expected.*got -1.0"),
+    ({"episode_seconds": 1e308}, "episode_seconds: expected.*got 1e.308"),
+    ({"episode_seconds": 10.0, "dt": 20.0}, r"episode_seconds: expected.*\[20, .*got 10.0"),
     ({"reward_weights": {"speed": 1.0}}, "reward_weights: expected a mapping with some of progress.*got"),
     ({"reward_weights": {"peak": float("nan")}}, "reward_weights.'peak'.: expected.*got nan"),
     ({"reward_weights": 3}, "reward_weights: expected a mapping"),
@@ -289,3 +292,26 @@ def test_bad_reset_options(options, message):
     env = gym.make(LEG)
     with pytest.raises(ParameterError, match=message):
         env.reset(options=options)
+
+
+@pytest.mark.parametrize("trunk", ["rail", "fixed"])
+def test_a_trunk_that_cannot_rise_refuses_a_height(trunk):
+    env = gym.make(LEG, trunk=trunk)
+    with pytest.raises(ParameterError, match=f"height: a {trunk} trunk is at 1.718.* m, got 3 m"):
+        env.reset(options={"height": 3.0})
+
+
+def test_a_step_that_could_not_be_simulated_pays_for_nothing_but_the_failure():
+    env = gym.make(LEG).unwrapped
+    env.reset(seed=0, options={"gait": "run"})
+    for _ in range(20):
+        _, reward, *_ = env.step(env.action_for(env.gaits["run"]))
+    assert reward != 0.0
+    distance, work = env._account["distance"], env._account["total_work"]
+    env.engine.state.body["px"] = np.nan
+    _, reward, terminated, _, info = env.step(env.action_for(env.gaits["run"]))
+    assert terminated
+    assert "finite" in info["failure"]
+    assert reward == info["reward_failure"] == -200.0
+    assert info["episode_summary"]["distance_m"] == distance
+    assert info["episode_summary"]["drive_work_j"] == work

@@ -221,6 +221,7 @@ def lengths_without(name):
         ({"pivot": (0.0, np.inf)}, r"pivot\[1\]: expected .* got inf"),
         ({"pivot": (0.0,)}, "pivot: expected two numbers"),
         ({"pivot": 1.0}, "pivot: expected two numbers"),
+        ({"pivot": [[1.0], 1.0]}, r"pivot\[0\]: expected .* got \[1.0\]"),
         ({"assembly": {**LEG.assembly, "B": 0}}, r"assembly\['B'\]: expected \+1 or -1, got 0"),
         ({"assembly": {"B": 1}}, "assembly: expected exactly .* missing D, E, F, I, J"),
         ({"toe": "J"}, "toe and heel: expected I and J, one each, got 'J' and 'J'"),
@@ -231,6 +232,7 @@ def lengths_without(name):
         ({"masses": (1.0,) * 13}, "masses: expected 14 link masses, got"),
         ({"masses": (1.0,) * 13 + (0.0,)}, r"masses\[13\]: expected"),
         ({"masses": 3.0}, "masses: expected 14 link masses"),
+        ({"masses": [[1.0], 2.0]}, "masses: expected 14 link masses"),
         ({"inertia": "sphere"}, "inertia: expected one of paper, uniform_rod, got 'sphere'"),
     ],
 )

@@ -44,6 +44,7 @@ def test_a_missing_file_and_an_unknown_name(tmp_path):
     ("text", "message"),
     [
         ("{", "does not parse"),
+        ("[" * 100_000, "does not parse"),
         ("[]", "expected a JSON object with 'geometry' and 'gaits', got list"),
         ("{}", "its 'geometry' is incomplete or has unknown entries: 'provenance'"),
         ('{"provenance": "", "geometry": 3}', "its 'geometry' is incomplete"),
