@@ -45,7 +45,7 @@ def trunks() -> None:
     """Measure how the scripted walk and run move a rail and differently suspended trunks; prints a table."""
     from hoof_env.envs.trunk_study import study
 
-    _say(study())
+    study(_say)
 
 
 COMMANDS: dict[str, Callable[..., None]] = {"reproduce": reproduce, "trunks": trunks}

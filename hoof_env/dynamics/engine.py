@@ -317,7 +317,8 @@ class LegEngine:
             state.body, state.motion, state.filters, state.contacts, command, self._settings,
             self._trunk, self._ground, self.sim_dt, trace, *self.tables.args(),
         )  # fmt: skip
-        if math.isfinite(sum(state.body.item()) + sum(state.motion.item())):
+        seen = float(trace["grf"].sum() + trace["crank_power"].sum() + trace["hip_power"].sum())
+        if math.isfinite(sum(state.body.item()) + sum(state.motion.item()) + seen):
             return Result.OK
         self.state = before
         return Result.NOT_FINITE

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any, ClassVar
 
 import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
+from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.engine import GRAVITY, LegEngine
@@ -17,17 +18,15 @@ from hoof_env.dynamics.trace import new_trace
 from hoof_env.dynamics.trunk import TRUNKS, Trunk
 from hoof_env.envs import reward
 from hoof_env.envs.observation import HALF_RANGE, MIDDLE, layout, observe
-from hoof_env.envs.stance import new_account, summarize, take_account
+from hoof_env.envs.stance import LIFT_OFF, new_account, summarize, take_account
+from hoof_env.envs.start import HIGHEST, LOWEST, Start, check_options, draw_start
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait.motion_law import FilterSettings
 from hoof_env.gait.parameters import GaitParameters, gait_names, load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
-from hoof_env.leg.kinematics import FrameMotion, pose
 
 RENDER_MODES = ("human", "rgb_array")
-LOWEST, HIGHEST = 0.6, 2.0
-"""Heights of the trunk at which an episode fails, as parts of its nominal height."""
 
 
 class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
@@ -102,10 +101,10 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     | `reward_peak` | `peak` = 0.3 per kN | minus the increase of the stance's running peak GRF, the maximum over all substeps; the terms of one stance add up to its peak |
     | `reward_energy` | `energy` = 0.1 per kJ | minus the positive work of crank and swing drive; braking power is not recovered |
     | `reward_action` | `action` = 0.02 | minus the mean squared change of the action |
-    | `reward_failure` | `failure` = 20 per s | once, minus this times `episode_seconds`, when the episode fails |
+    | `reward_failure` | `failure` = 30 per s | once, minus this times `episode_seconds`, when the episode fails |
 
-    A stance opens when the first hoof point enters the ground and closes when the last one leaves, or after
-    one crank revolution, whichever comes first.
+    A stance opens when the normal force on the hoof rises above 5 % of the weight, as on a force plate. It
+    closes when the force falls below (lift-off), or after one crank revolution, whichever comes first.
 
     ## Starting state
 
@@ -190,7 +189,9 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             "episode_seconds", episode_seconds, low=self.dt * (1 - 1e-9), high=LONGEST_EPISODE
         )
         self._steps_per_episode = round(episode_seconds / self.dt)
-        height = self.geometry.hip_height if hip_height is None else hip_height
+        nominal = self.geometry.hip_height
+        height = nominal if hip_height is None else hip_height
+        check_number("hip_height", height, low=LOWEST * nominal, high=HIGHEST * nominal)
         self.filters = FilterSettings()
         self.engine = self._build_engine(
             Trunk(trunk, trunk_mass, trunk_share, trunk_stiffness, trunk_damping, trunk_drag, height),
@@ -209,8 +210,9 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.metadata = {**type(self).metadata, "render_fps": round(1 / self.dt)}  # type: ignore[misc]
         self._renderer: Any = None
         self._action: NDArray[np.float32] = np.zeros(4, np.float32)
-        self._account = new_account()
+        self._account = new_account(LIFT_OFF * self.weight)
         self._step_count = 0
+        self._started = False
         self.trace = new_trace(1)
 
     def _build_engine(self, trunk: Trunk, ground: Ground) -> Any:
@@ -229,23 +231,26 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Start an episode; see 'Starting state' in the class docstring for the options."""
         super().reset(seed=seed)
-        gait, theta, speed, height = self._start(_check_options(options))
-        self.trace = self.engine.reset(gait, theta=theta, height=height, speed=speed)
-        self._action = self.action_for(gait)
-        self._account = new_account()
-        self._step_count = 0
+        start = self._start(check_options(options, self.gaits))
+        self.trace = self.engine.reset(
+            start.gait, theta=start.crank_angle, height=start.height, speed=start.speed
+        )
+        self._action = self.action_for(start.gait)
+        self._account = new_account(LIFT_OFF * self.weight)
+        self._step_count, self._started = 0, True
         if self.render_mode is not None:
             self._get_renderer().reset()
             self._renderer.add(self.trace)
             if self.render_mode == "human":
                 self.render()
-        info = {"crank_angle": theta, "speed": speed, "height": height, **_as_info(gait)}
-        return self._observe(), info
+        return self._observe(), {**start._asdict(), "gait": asdict(start.gait)}
 
     def step(
         self, action: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """Command the gait parameters for `dt`; see the class docstring."""
+        if not self._started:
+            raise ResetNeeded("step() was called before reset(): expected reset() first")
         previous, self._action = self._action, self._check_action(action)
         result = self._advance()
         failed = result is not Result.OK or self._fallen()
@@ -287,8 +292,9 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def _check_action(self, action: Any) -> NDArray[np.float32]:
         try:
-            array = np.array(action, dtype=np.float32)
-        except (TypeError, ValueError):
+            given = np.asarray(action)
+            array = given.astype(np.float32) if given.dtype.kind in "fiu" else np.empty(0, np.float32)
+        except ValueError:
             array = np.empty(0, np.float32)
         if array.shape != (4,) or not np.isfinite(array).all():
             raise ParameterError(f"action: expected 4 finite numbers in [-1, 1], got {action!r}")
@@ -333,33 +339,8 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             self._action,
         )
 
-    def _start(self, options: dict[str, Any]) -> tuple[GaitParameters, float, float, float]:
-        """Gait, crank angle, speed and height to start from: drawn at random unless an option fixes them."""
-        mix, turn, draw = self.np_random.random(3)
-        names = sorted(self.gaits)
-        one, two = self.gaits[names[0]].to_array(), self.gaits[names[-1]].to_array()
-        gait = _gait_option(options.get("gait"), self.gaits) or GaitParameters.from_array(
-            one + mix * (two - one)
-        )
-        theta = options.get("crank_angle", 2 * np.pi * turn)
-        trunk = self.engine.trunk
-        speed = options.get("speed", START_SPEED * draw if trunk.kind != "fixed" else 0.0)
-        if trunk.kind == "suspended":
-            # no contact begins with a hoof inside the ground: hang the trunk higher where it would
-            height = options.get("height", max(trunk.height, -self.hoof_height(gait, theta)))
-        else:
-            height = options.get("height", trunk.height)
-            for _ in range(100):
-                if "crank_angle" in options or height + self.hoof_height(gait, theta) >= 0:
-                    break
-                theta = 2 * np.pi * self.np_random.random()
-        return gait, float(theta), float(speed), float(height)
-
-    def hoof_height(self, gait: GaitParameters, theta: float) -> float:
-        """Height of the lower hoof point relative to O [m]."""
-        phi = gait.swing_offset + gait.swing_sin * math.sin(theta) + gait.swing_cos * math.cos(theta)
-        points = pose(self.geometry, theta, frame=FrameMotion(phi=phi))
-        return min(float(points.point("I")[1]), float(points.point("J")[1]))
+    def _start(self, options: dict[str, Any]) -> Start:
+        return draw_start(options, self.np_random, self.geometry, self.engine.trunk, self.gaits)
 
     def _get_renderer(self) -> Any:
         if self._renderer is None:
@@ -367,50 +348,17 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
             weight = self.weight if self.engine.trunk.kind == "suspended" else None
             self._renderer = Renderer(
-                self.geometry, str(self.render_mode), self.metadata["render_fps"], weight_n=weight
+                self.geometry,
+                str(self.render_mode),
+                self.metadata["render_fps"],
+                weight_n=weight,
+                lift_off_n=LIFT_OFF * self.weight,
             )
         return self._renderer
 
 
 LONGEST_EPISODE, MOST_SUBSTEPS = 1e6, 100_000
 """Seconds of an episode and substeps of a control step at most."""
-
-START_SPEED = 1.0
-"""Highest forward speed at reset [m/s]: a learner meets both a standing start and a rolling one."""
-
-OPTIONS = {
-    "crank_angle": (-np.inf, np.inf),
-    "speed": (-20.0, 20.0),
-    "height": (0.5, 5.0),
-}
-"""Numeric reset options and their ranges [rad, m/s, m]; "gait" is the other one."""
-
-
-def _check_options(options: dict[str, Any] | None) -> dict[str, Any]:
-    known = ("gait", *OPTIONS)
-    if options is None:
-        return {}
-    if not isinstance(options, Mapping) or not set(options) <= set(known):
-        raise ParameterError(f"options: expected a mapping with some of {', '.join(known)}, got {options!r}")
-    checked = dict(options)
-    for name, (low, high) in OPTIONS.items():
-        if name in checked:
-            checked[name] = check_number(f"options[{name!r}]", checked[name], low=low, high=high)
-    return checked
-
-
-def _gait_option(value: Any, gaits: Mapping[str, GaitParameters]) -> GaitParameters | None:
-    if value is None or isinstance(value, GaitParameters):
-        return value
-    if isinstance(value, str):
-        return gaits[check_choice("options['gait']", value, gaits)]
-    try:
-        return GaitParameters(**value)
-    except TypeError:
-        raise ParameterError(
-            f"options['gait']: expected a gait name ({', '.join(sorted(gaits))}) or a mapping of the four "
-            f"gait parameters, got {value!r}"
-        ) from None
 
 
 def _substeps(dt: float, sim_dt: float) -> int:
@@ -423,9 +371,3 @@ def _substeps(dt: float, sim_dt: float) -> int:
             f"(ratio {ratio:g}; at most {MOST_SUBSTEPS})"
         )
     return round(ratio)
-
-
-def _as_info(gait: GaitParameters) -> dict[str, float]:
-    return {
-        name: float(getattr(gait, name)) for name in ("crank_speed", "swing_offset", "swing_sin", "swing_cos")
-    }

@@ -11,6 +11,7 @@ from hoof_env.dynamics.constrained import ConstrainedLeg
 from hoof_env.dynamics.trunk import Trunk
 from hoof_env.envs.horse_leg import HorseLegEnv
 from hoof_env.envs.observation import HALF_RANGE
+from hoof_env.envs.start import Start
 from hoof_env.errors import check_choice
 from hoof_env.gait.parameters import LIMITS, GaitParameters
 from hoof_env.ground.contact import Ground
@@ -128,7 +129,7 @@ class HorseLegFixedEnv(HorseLegEnv):
         """The offset that commands the given gait, to float32 precision."""
         return np.clip((gait.to_array() - self.gait.to_array()) / HALF_RANGE, -1, 1).astype(np.float32)
 
-    def _start(self, options: dict[str, Any]) -> tuple[GaitParameters, float, float, float]:
+    def _start(self, options: dict[str, Any]) -> Start:
         """The gait at crank angle 0, as in the paper, unless an option says otherwise."""
         options = {"gait": self.gait, "crank_angle": 0.0, **options}
         return super()._start(options)

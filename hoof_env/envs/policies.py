@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.envs.horse_leg import HorseLegEnv
+from hoof_env.envs.start import hoof_height
 from hoof_env.errors import check_choice
 from hoof_env.gait.parameters import GaitParameters
 
@@ -101,7 +102,7 @@ def _extreme_posture(leg: HorseLegEnv, offsets: Any, lowest: bool) -> tuple[floa
     sign = -1.0 if lowest else 1.0
     postures = [
         (
-            sign * leg.hoof_height(GaitParameters(0.0, float(offset), 0.0, 0.0), float(theta)),
+            sign * hoof_height(leg.geometry, GaitParameters(0.0, float(offset), 0.0, 0.0), float(theta)),
             float(offset),
             float(theta),
         )

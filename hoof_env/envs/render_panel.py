@@ -41,15 +41,19 @@ class Panel:
         brush: the paint box.
         box: left, top, width and height [pixels].
         weight_n: weight of trunk and leg [N], a line in the curve; or None.
+        lift_off_n: normal force that tells stance from swing [N].
 
     Attributes:
         peaks: time [s] and force [N] of the peak of each stance in view.
         full_scale: force at the top of the curve's axis [N]; during an episode it only grows.
     """
 
-    def __init__(self, brush: Brush, box: tuple[int, int, int, int], weight_n: float | None) -> None:
+    def __init__(
+        self, brush: Brush, box: tuple[int, int, int, int], weight_n: float | None, lift_off_n: float
+    ) -> None:
         unit = brush.unit
         self._brush, self._box, self._weight = brush, pygame.Rect(box), weight_n
+        self._lift_off = lift_off_n
         self._inside = self._box.inflate(-36 * unit, -32 * unit)
         self._plot = pygame.Rect(0, 0, self._inside.width - 40 * unit, 156 * unit)
         self._plot.bottomright = self._inside.right - round(6 * unit), self._inside.bottom - round(38 * unit)
@@ -58,7 +62,7 @@ class Panel:
 
     def reset(self) -> None:
         """Forget the forces."""
-        self._account = new_account()
+        self._account = new_account(self._lift_off)
         self._curve: deque[tuple[float, float]] = deque()  # time [s], force [N]
         self.peaks: deque[tuple[float, float]] = deque()
         self.full_scale = _nice(max(4 * (self._weight or 0.0), SMALLEST_SCALE))

@@ -45,6 +45,7 @@ class Renderer:
         fps: float,
         size: tuple[int, int] = (960, 540),
         weight_n: float | None = None,
+        lift_off_n: float = 0.0,
     ) -> None:
         self.mode = check_choice("render_mode", mode, MODES)
         self.fps = check_number("fps", fps, low=0, exclusive_low=True)
@@ -68,7 +69,7 @@ class Renderer:
         edge, column = round(16 * brush.unit), round(304 * brush.unit)
         self._scene = Scene(brush, geometry, self.size, column + 2 * edge, suspended=weight_n is not None)
         box = (self.size[0] - edge - column, edge, column, round(424 * brush.unit))
-        self._panel = Panel(brush, box, weight_n)
+        self._panel = Panel(brush, box, weight_n, lift_off_n)
         self._window_open = False
         self._clock = pygame.time.Clock()
         self._closed = False

@@ -28,11 +28,11 @@ class RewardWeights:
     peak: float = 0.3
     energy: float = 0.1
     action: float = 0.02
-    failure: float = 20.0
+    failure: float = 30.0
 
     def __post_init__(self) -> None:
         for item in fields(self):
-            check_number(f"reward_weights[{item.name!r}]", getattr(self, item.name), low=0)
+            check_number(f"reward_weights[{item.name!r}]", getattr(self, item.name), low=0, high=1e6)
 
     @classmethod
     def of(cls, changes: Mapping[str, float] | None) -> RewardWeights:

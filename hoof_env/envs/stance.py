@@ -1,9 +1,9 @@
 """Stances and sums: what reward and episode summary read from the trace, in one pass over its rows.
 
-A stance opens when the first hoof point enters the ground. It closes when the last one leaves, or after one
-crank revolution, whichever comes first, so that a hoof that never lifts pays for a peak every revolution.
-While it is open its peak is the highest resultant ground reaction force of any substep; the increases of a
-stance's running peak add up to that peak.
+A stance opens when the normal force on the hoof rises above a threshold, as on a force plate. It closes when
+the force falls below it (lift-off), or after one crank revolution, whichever comes first, so that a hoof that
+never lifts pays for a peak every revolution. While it is open its peak is the highest resultant ground
+reaction force of any substep; the increases of a stance's running peak add up to that peak.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from hoof_env._jit import kernel
 
 ACCOUNT = np.dtype(
     [
+        ("threshold", "f8"),  # normal force that tells stance from swing [N]
         ("open", "b1"),
         ("opened_at", "f8"),  # crank angle [rad]
         ("peak", "f8"),  # of the open stance [N]
@@ -34,9 +35,16 @@ ACCOUNT = np.dtype(
 )
 
 
-def new_account() -> Any:
-    """An empty account, as a record of dtype `ACCOUNT`."""
-    return np.zeros(1, ACCOUNT)[0]
+LIFT_OFF = 0.05
+"""Threshold of a stance, in weights of trunk and leg. A hoof that merely grazes the ground between two pushes
+has lifted off: were any contact stance, a policy could hold one peak for ever and push under it."""
+
+
+def new_account(threshold: float) -> Any:
+    """An empty account, as a record of dtype `ACCOUNT`, with the threshold of a stance [N]."""
+    account = np.zeros(1, ACCOUNT)[0]
+    account["threshold"] = threshold
+    return account
 
 
 @kernel
@@ -44,27 +52,28 @@ def take_account(account, trace, h, start_x, fixed):  # type: ignore[no-untyped-
     """Add the rows of one control step to the account.
 
     Args:
-        account: record of dtype `ACCOUNT`. trace: rows of dtype `TRACE`, `h` [s] apart. start_x: where the
-        trunk was before the first row [m]. fixed: on a trunk that cannot move, progress is the
-        load-weighted backward travel of the hoof points while
-            they bear load, and 0 in the air; else it is the trunk's.
+        account: record of dtype `ACCOUNT`.
+        trace: rows of dtype `TRACE`, `h` [s] apart.
+        start_x: where the trunk was before the first row [m].
+        fixed: on a trunk that cannot move, progress is the load-weighted backward travel of the hoof points
+            while they bear load, and 0 in the air; else it is the trunk's.
     """
     account.peak_increase = 0.0
     account.work = 0.0
     account.progress = 0.0
     for k in range(trace.shape[0]):
         row = trace[k]
-        inside = row.toe_penetration > 0.0 or row.heel_penetration > 0.0
-        if account.open and (not inside or row.theta - account.opened_at >= 2.0 * np.pi):
+        loaded = row.normal > account.threshold
+        if account.open and (not loaded or row.theta - account.opened_at >= 2.0 * np.pi):
             account.open = False
-        if inside and not account.open:
+        if loaded and not account.open:
             account.open = True
             account.opened_at = row.theta
             account.peak = 0.0
             account.stances += 1
         if not account.open:
             account.peak = 0.0
-        if row.grf > account.peak:
+        elif row.grf > account.peak:
             account.peak_increase += row.grf - account.peak
             account.peak = row.grf
         account.highest = max(account.highest, row.grf)

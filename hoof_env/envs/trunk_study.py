@@ -66,6 +66,8 @@ def study(progress: Callable[[str], None] | None = None) -> str:
         "| gait | trunk | mean N | peak N | weight share | speed m/s | sinkage m | bounce m | duty |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
+    if progress:
+        progress("\n".join(lines))
     for gait in ("walk", "run"):
         for trunk in TRUNKS:
             m = measure(gait, trunk)

@@ -79,7 +79,7 @@ class Ground:
     reference_mass: float = 80.0
 
     def __post_init__(self) -> None:
-        check_number("stiffness", self.stiffness, low=0, exclusive_low=True)
+        check_number("stiffness", self.stiffness, low=0, high=1e12, exclusive_low=True)
         check_number("exponent", self.exponent, low=1, high=3)
         check_choice("normal_law", self.normal_law, NORMAL_LAWS)
         check_number("approach_floor", self.approach_floor, low=0, exclusive_low=True)

@@ -69,9 +69,7 @@ class Geometry:
 
     def __post_init__(self) -> None:
         _check_keys("lengths", self.lengths, LENGTHS)
-        lengths = {
-            k: check_number(f"lengths[{k!r}]", self.lengths[k], low=0, exclusive_low=True) for k in LENGTHS
-        }
+        lengths = {k: check_number(f"lengths[{k!r}]", self.lengths[k], low=1e-3, high=1e3) for k in LENGTHS}
         points = [dyad.point for dyad in DYADS]
         _check_keys("assembly", self.assembly, points)
         for point in points:

@@ -86,7 +86,7 @@ def test_reset_options_set_the_start():
     gait = {"crank_speed": 5.0, "swing_offset": 0.5, "swing_sin": -0.1, "swing_cos": 0.1}
     _, info = env.reset(seed=0, options={"gait": gait, "crank_angle": 1.0, "speed": 0.5, "height": 2.0})
     row = env.unwrapped.trace[-1]
-    assert (row["theta"], row["trunk_y"], info["swing_offset"]) == (1.0, pytest.approx(2.0), 0.5)
+    assert (row["theta"], row["trunk_y"], info["gait"]["swing_offset"]) == (1.0, pytest.approx(2.0), 0.5)
     assert row["trunk_vx"] == pytest.approx(0.5)
     assert row["theta_rate"] == 5.0
 
@@ -312,6 +312,6 @@ def test_a_step_that_could_not_be_simulated_pays_for_nothing_but_the_failure():
     _, reward, terminated, _, info = env.step(env.action_for(env.gaits["run"]))
     assert terminated
     assert "finite" in info["failure"]
-    assert reward == info["reward_failure"] == -200.0
+    assert reward == info["reward_failure"] == -300.0
     assert info["episode_summary"]["distance_m"] == distance
     assert info["episode_summary"]["drive_work_j"] == work

@@ -30,12 +30,11 @@ def rollout(env, policy, seed):
     return total, infos, np.concatenate(traces)
 
 
-def stance_peaks(trace):
-    """Peaks of all stances, independently of the account: split where both points are out or after a turn."""
-    inside = (trace["toe_penetration"] > 0) | (trace["heel_penetration"] > 0)
+def stance_peaks(trace, threshold):
+    """Peaks of all stances, independently of the account: split where the load ends or after a turn."""
     peaks, opened = [], None
-    for now, theta, grf in zip(inside, trace["theta"], trace["grf"], strict=True):
-        if not now:
+    for normal, theta, grf in zip(trace["normal"], trace["theta"], trace["grf"], strict=True):
+        if normal <= threshold:
             opened = None
         elif opened is None or theta - opened >= 2 * np.pi:
             opened = theta
@@ -51,7 +50,7 @@ def test_terms_add_up_and_each_stance_pays_its_peak(name, trunk):
     env = gym.make("hoof_env/HorseLeg-v0", trunk=trunk, episode_seconds=4.0)
     _, infos, trace = rollout(env, make_policy(name, env), seed=4)
     paid = -sum(info["reward_peak"] for info in infos) * 1000 / RewardWeights().peak
-    assert paid == pytest.approx(sum(stance_peaks(trace)), rel=1e-9)
+    assert paid == pytest.approx(sum(stance_peaks(trace, 0.05 * env.unwrapped.weight)), rel=1e-9)
     work = (
         np.sum(np.maximum(trace["crank_power"], 0) + np.maximum(trace["hip_power"], 0)) * env.unwrapped.sim_dt
     )
@@ -64,34 +63,45 @@ def test_terms_add_up_and_each_stance_pays_its_peak(name, trunk):
 
 
 @given(
-    st.lists(st.tuples(st.booleans(), st.floats(0, 1e4)), min_size=1, max_size=60),
+    st.lists(st.floats(0, 1e4), min_size=1, max_size=60),
     st.integers(1, 7),
     st.floats(0.01, 1.5),
+    st.sampled_from([0.0, 40.0, 2000.0]),
 )
 @settings(max_examples=100, deadline=None)
-def test_account_over_any_contact_pattern_and_any_split(pattern, chunk, turn):
-    trace = new_trace(len(pattern))
-    trace["theta"] = turn * np.arange(len(pattern))
-    trace["toe_penetration"] = [1.0 if inside else -1.0 for inside, _ in pattern]
-    trace["grf"] = [force if inside else 0.0 for inside, force in pattern]
-    account, paid = new_account(), 0.0
-    for start in range(0, len(pattern), chunk):
+def test_account_over_any_load_and_any_split(loads, chunk, turn, threshold):
+    trace = new_trace(len(loads))
+    trace["theta"] = turn * np.arange(len(loads))
+    trace["normal"] = loads
+    trace["grf"] = 1.1 * np.array(loads)
+    account, paid = new_account(threshold), 0.0
+    for start in range(0, len(loads), chunk):
         take_account(account, trace[start : start + chunk], 1e-3, 0.0, False)
         paid += account["peak_increase"]
-    peaks = stance_peaks(trace)
+    peaks = stance_peaks(trace, threshold)
     assert paid == pytest.approx(sum(peaks), rel=1e-9, abs=1e-9)
     assert account["stances"] == len(peaks)
-    assert summarize(account, 800.0, False)["peak_grf_n"] == max([0.0, *trace["grf"]])
+    assert summarize(account, 800.0, False)["peak_grf_n"] == trace["grf"].max()
 
 
 def test_a_hoof_that_never_lifts_pays_every_revolution():
     trace = new_trace(1000)
     trace["theta"] = np.linspace(0.0, 6 * np.pi - 1e-6, 1000)
-    trace["toe_penetration"], trace["grf"] = 0.01, 700.0
-    account = new_account()
+    trace["normal"], trace["grf"] = 690.0, 700.0
+    account = new_account(40.0)
     take_account(account, trace, 1e-3, 0.0, False)
     assert account["stances"] == 3
     assert account["peak_sum"] == 3 * 700.0
+
+
+def test_grazing_the_ground_between_two_pushes_ends_a_stance():
+    """Or a policy could hold one peak for ever and push under it."""
+    trace = new_trace(4)
+    trace["toe_penetration"] = 0.01
+    trace["normal"] = trace["grf"] = [900.0, 30.0, 900.0, 900.0]
+    account = new_account(40.0)
+    take_account(account, trace, 1e-3, 0.0, False)
+    assert (account["stances"], account["peak_sum"]) == (2, 1800.0)
 
 
 def test_fixed_trunk_progress_is_load_weighted_backward_travel():
@@ -101,7 +111,7 @@ def test_fixed_trunk_progress_is_load_weighted_backward_travel():
         [-2.0, -9.0],
         [1.0, -9.0],
     )  # in the air the second row counts for nothing
-    account = new_account()
+    account = new_account(40.0)
     take_account(account, trace, 0.5, 0.0, True)
     assert account["progress"] == pytest.approx(0.5 * (300 * 2.0 - 100 * 1.0) / 400)
 
@@ -135,6 +145,27 @@ def test_no_bang_bang_of_any_pace_beats_the_scripted_run(half_period, run_return
             return np.full(4, 1.0 if int(self.time / half_period) % 2 else -1.0, np.float32), None
 
     assert np.mean([rollout(env, BangBang(), seed)[0] for seed in range(3)]) < run_return
+
+
+def test_paddling_under_one_held_peak_does_not_pay(run_return):
+    """A swing paddle at 4.9 Hz with the crank stopped and the hoof never quite out of the ground, found by a search
+    for forward progress in few stances; were any contact stance, it would pay for 2 peaks in 10 s and return 32."""
+    env = gym.make("hoof_env/HorseLeg-v0")
+    env.reset(seed=0, options={"crank_angle": 1.202, "speed": 0.5, "gait": "run"})
+    turn = 2 * np.pi * (0.3 + 4 * (np.tanh(0.189) + 1)) * 0.02 * np.arange(500)
+    offset = -0.389 - 0.462 * np.sin(turn - 0.8 * 1.541 * np.sin(turn))
+    wave = np.sin(turn + 3 * 1.669)
+    actions = np.clip(
+        np.stack([-1 + 0 * turn, offset, 1.727 + 0.509 * wave, 0.121 + 1.05 * wave], axis=1), -1, 1
+    )
+    total = 0.0
+    for action in actions.astype(np.float32):
+        _, reward, _, _, info = env.step(action)
+        total += reward
+    assert info["episode_summary"]["duty_factor"] > 0.95
+    assert info["episode_summary"]["distance_m"] > 30
+    assert info["episode_summary"]["stances"] > 30
+    assert total < run_return - MARGIN
 
 
 def test_failing_never_pays_more_than_going_on_badly():
