@@ -11,12 +11,12 @@ from hoof_env.errors import HoofEnvError, ParameterError
 
 
 def run(command: Callable[[], int | None]) -> NoReturn:
-    """Exit with what `command` returns: one line and 1 for an error of ours, one line and 130 for Ctrl-C."""
+    """Exit with what `command` returns: one line and 2 for an error of ours, one line and 130 for Ctrl-C."""
     try:
         code = command() or 0
     except HoofEnvError as error:
         print(f"error: {error}", file=sys.stderr)
-        code = 1
+        code = 2
     except KeyboardInterrupt:
         print("\ninterrupted", file=sys.stderr)
         code = 130

@@ -151,7 +151,7 @@ def test_bad_input(tmp_path, changes, said):
 def test_an_error_is_one_line():
     command = [sys.executable, "-m", "agents.train", "--env-id", "hoof_env/Cow-v0"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
-    assert done.returncode == 1
+    assert done.returncode == 2
     assert done.stderr.startswith("error: environment 'hoof_env/Cow-v0'")
     assert len(done.stderr.splitlines()) == 1
 

@@ -148,8 +148,9 @@ def test_no_bang_bang_of_any_pace_beats_the_scripted_run(half_period, run_return
 
 
 def test_paddling_under_one_held_peak_does_not_pay(run_return):
-    """A swing paddle at 4.9 Hz with the crank stopped and the hoof never quite out of the ground, found by a search
-    for forward progress in few stances; were any contact stance, it would pay for 2 peaks in 10 s and return 32."""
+    """A swing paddle at 5 Hz with the crank stopped and the hoof never quite out of the ground, found by a
+    search for forward progress in few stances. Were any contact stance, it would pay for 2 peaks in 10 s and
+    return 32."""
     env = gym.make("hoof_env/HorseLeg-v0")
     env.reset(seed=0, options={"crank_angle": 1.202, "speed": 0.5, "gait": "run"})
     turn = 2 * np.pi * (0.3 + 4 * (np.tanh(0.189) + 1)) * 0.02 * np.arange(500)
