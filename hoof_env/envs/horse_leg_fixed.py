@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.constrained import ConstrainedLeg
+from hoof_env.dynamics.integrators import INTEGRATORS
 from hoof_env.dynamics.trunk import Trunk
 from hoof_env.envs.horse_leg import HorseLegEnv
 from hoof_env.envs.observation import HALF_RANGE
 from hoof_env.envs.start import Start
-from hoof_env.errors import check_choice
+from hoof_env.errors import check_choice, check_number
 from hoof_env.gait.parameters import LIMITS, GaitParameters
 from hoof_env.ground.contact import Ground
 
 SOLVERS = ("exact", "paper")
+
+PRINTED_BETA = math.sqrt(2 * 15.0)
+"""Baumgarte's beta as the paper's Table 1 prints it, sqrt(2 alpha) [1/s]; sqrt(2) alpha = 21.2 is probably meant."""
 
 
 class HorseLegFixedEnv(HorseLegEnv):
@@ -69,6 +74,8 @@ class HorseLegFixedEnv(HorseLegEnv):
     | `restitution` | 1 | - | 1 is the paper's elastic condition, 0 its inelastic one |
     | `approach_floor` | 1e-4 | m/s | smallest approach speed in Eq. 14: the walk grazes |
     | `friction_fast` | 1e-2 | m/s | upper threshold of Ambrosio's correction; assumed |
+    | `integrator` | "euler" | | of `solver="paper"`: also "semi_implicit_euler", "midpoint", "rk4" |
+    | `baumgarte_alpha`, `baumgarte_beta` | 15, 5.477 | 1/s | of `solver="paper"`; beta as printed, sqrt(2 alpha) |
     | `sim_dt` | None | s | None for the solver's own, 1e-3 or 1e-4 |
     | `episode_seconds` | 1 | s | time limit |
 
@@ -96,6 +103,9 @@ class HorseLegFixedEnv(HorseLegEnv):
         friction: float = 0.4,
         friction_slow: float = 1e-3,
         friction_fast: float = 1e-2,
+        integrator: str = "euler",
+        baumgarte_alpha: float = 15.0,
+        baumgarte_beta: float = PRINTED_BETA,
         sim_dt: float | None = None,
         dt: float = 0.02,
         episode_seconds: float = 1.0,
@@ -103,6 +113,11 @@ class HorseLegFixedEnv(HorseLegEnv):
         render_mode: str | None = None,
     ) -> None:
         self.solver = check_choice("solver", solver, SOLVERS)
+        self._scheme: dict[str, Any] = {
+            "alpha": check_number("baumgarte_alpha", baumgarte_alpha, low=0),
+            "beta": check_number("baumgarte_beta", baumgarte_beta, low=0),
+            "integrator": check_choice("integrator", integrator, INTEGRATORS),
+        }
         if sim_dt is None:
             sim_dt = 1e-3 if solver == "paper" else 1e-4
         super().__init__(
@@ -117,7 +132,9 @@ class HorseLegFixedEnv(HorseLegEnv):
         if self.solver == "exact":
             return super()._build_engine(trunk, ground)
         sampled = Ground(**{**vars(ground), "approach": "sampled"})
-        return ConstrainedLeg(self.geometry, sampled, self.sim_dt, self.filters, height=trunk.height)
+        return ConstrainedLeg(
+            self.geometry, sampled, self.sim_dt, self.filters, height=trunk.height, **self._scheme
+        )
 
     def command_of(self, action: NDArray[np.float32]) -> NDArray[np.float64]:
         """Gait parameters that an action commands: the gait plus an offset; the zero action is exactly the gait."""

@@ -315,3 +315,31 @@ def test_a_step_that_could_not_be_simulated_pays_for_nothing_but_the_failure():
     assert reward == info["reward_failure"] == -300.0
     assert info["episode_summary"]["distance_m"] == distance
     assert info["episode_summary"]["drive_work_j"] == work
+
+
+def test_the_papers_solver_can_be_made_exact():
+    """rk4 instead of Euler removes the drift: the force curve is the closed form's."""
+    runs = [
+        {"solver": "paper", "integrator": "rk4"},
+        {"solver": "paper"},
+        {"solver": "exact", "sim_dt": 1e-3},
+    ]
+    forces = []
+    for kwargs in runs:
+        env = gym.make(FIXED, gait="run", episode_seconds=0.4, **kwargs)
+        env.reset(seed=0)
+        forces.append(traces(env, np.zeros(4, np.float32))["normal"])
+    assert np.abs(forces[0] - forces[2]).max() < 1e-6 * forces[2].max()
+    assert np.abs(forces[1] - forces[2]).max() > 1e-3 * forces[2].max()
+
+
+@pytest.mark.parametrize(
+    ("kwargs", "message"),
+    [
+        ({"integrator": "leapfrog"}, "integrator: expected one of euler.*got 'leapfrog'"),
+        ({"baumgarte_beta": -1.0}, "baumgarte_beta: expected.*got -1.0"),
+    ],
+)
+def test_bad_scheme(kwargs, message):
+    with pytest.raises(ParameterError, match=message):
+        gym.make(FIXED, **kwargs)
