@@ -16,6 +16,7 @@ import math
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,7 @@ from agents import runs
 from agents.command import parse_pairs, run
 from hoof_env._output import check_folder
 from hoof_env.envs.policies import make_policy, policy_names
-from hoof_env.errors import ParameterError, check_number
+from hoof_env.errors import OutputError, ParameterError, check_number
 
 DEFAULT_ENV = "hoof_env/HorseLeg-v0"
 
@@ -71,7 +72,7 @@ class Score:
     policy: str
     episodes: list[dict[str, float]]
 
-    @property
+    @cached_property
     def estimates(self) -> dict[str, Estimate]:
         """By key of `METRICS`, those that the episodes have."""
         return {
@@ -164,7 +165,11 @@ def evaluate(args: Args) -> tuple[list[Score], dict[str, Any]]:
 
     check_number("episodes", args.episodes, low=1)
     check_number("seed", args.seed, low=0)
+    if not args.policy:
+        raise ParameterError("policy: expected a name or the path of a trained model, got none")
     for path in filter(None, (args.json, args.video)):
+        if path.is_dir():
+            raise OutputError(f"cannot write to {str(path)!r}: expected a file, got a folder")
         check_folder(path.parent)
     records = [runs.SavedModel.find(Path(name)).record for name in args.policy if is_model(name)]
     record = next(filter(None, records), {})

@@ -5,7 +5,7 @@
     config.yml        the hyperparameters that were used, in rl-baselines3-zoo's form
     run.json          environment, spaces, command, arguments, versions
     monitor.csv       return, length and time of every training episode
-    checkpoints/      models on the way
+    checkpoints/N/    the model, and its statistics, after N steps
     tensorboard/      curves
 
 A model file is a pickle and can run any code when it is loaded: load only files that you trust.
@@ -136,7 +136,7 @@ class SavedModel:
             raise DataFileError(
                 f"model {path}: expected a .zip of agents.train or its run folder, found no {file}"
             )
-        for folder in (file.parent, file.parent.parent):  # a checkpoint is one deeper
+        for folder in file.parents[:3:2]:  # a checkpoint is two deeper
             beside = folder / "run.json"
             if beside.is_file():
                 try:

@@ -42,7 +42,8 @@ class Args:
     seed: int = 0
     """of the environments, the network and the sampling"""
     steps: int | None = None
-    """environment steps in all; otherwise n_timesteps of the hyperparameter file"""
+    """environment steps in all, rounded up to whole rollouts (n_steps times n_envs); otherwise n_timesteps
+    of the hyperparameter file"""
     n_envs: int | None = None
     """environments stepped side by side; otherwise n_envs of the hyperparameter file"""
     env_kwargs: tuple[str, ...] = ()
@@ -101,6 +102,8 @@ def train(args: Args) -> Trained:
     steps = int(check_number("steps", settings["n_timesteps"], low=1))
     if args.seed < 0:
         raise ParameterError(f"seed: expected 0 or more, got {args.seed}")
+    check_number("checkpoint_every", args.checkpoint_every, low=0)
+    check_number("torch_threads", args.torch_threads, low=1)
     if args.max_minutes is not None:
         check_number("max_minutes", args.max_minutes, low=0.0, exclusive_low=True)
     name = args.env_id.rpartition("/")[2]
@@ -152,8 +155,9 @@ def train(args: Args) -> Trained:
         algorithm = getattr(stable_baselines3, args.algo.upper())
         try:
             model = algorithm(env=envs, seed=args.seed, device=args.device, **model_arguments(settings))
-        except (TypeError, ValueError, AssertionError) as error:
-            raise ParameterError(f"hyperparameters of {args.algo} for {args.env_id}: {error}") from None
+        except (TypeError, ValueError, AssertionError, RuntimeError) as error:  # torch's, for the device
+            said = f"hyperparameters of {args.algo} for {args.env_id} on device {args.device!r}: {error}"
+            raise ParameterError(said) from None
         model.set_logger(configure(str(folder / "tensorboard"), ["tensorboard"]))
 
         # Train
@@ -189,7 +193,7 @@ def make_watch(folder: Path, steps: int, checkpoint_every: int, max_minutes: flo
                 self.summaries.append(self.locals["infos"][index].get("episode_summary", {}))
             if self.num_timesteps >= self.next_checkpoint:
                 self.next_checkpoint += checkpoint_every
-                runs.save_model(self.model, folder / "checkpoints" / f"model-{self.num_timesteps}.zip")
+                runs.save_model(self.model, folder / "checkpoints" / str(self.num_timesteps) / "model.zip")
             return self.stopped_by is None and time.monotonic() < self.deadline
 
         def _on_rollout_end(self) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from agents.evaluate import METRICS, Args, Score, estimate, evaluate, find_policy, main, play, table, to_json
 from agents.runs import SavedModel, make_env
-from hoof_env.errors import DataFileError, ParameterError
+from hoof_env.errors import DataFileError, OutputError, ParameterError
 from tests.agents.conftest import SHORT, train_tiny
 
 ENV_ID = "hoof_env/HorseLeg-v0"
@@ -157,6 +157,18 @@ def test_unusable_record(trained, tmp_path, env, content):
     (tmp_path / "run.json").write_text(content)
     with pytest.raises(DataFileError, match=r"run\.json: expected"):
         find_policy(str(tmp_path), env, ENV_ID)
+
+
+def test_output_that_is_a_folder_is_refused_before_the_first_episode(tmp_path, monkeypatch):
+    monkeypatch.setattr("agents.evaluate.play", lambda *_: pytest.fail("was played"))
+    for changes in ({"json": tmp_path}, {"video": tmp_path}):
+        with pytest.raises(OutputError, match="expected a file"):
+            evaluate(Args(policy=("run",), **changes))
+
+
+def test_no_policy():
+    with pytest.raises(ParameterError, match="got none"):
+        evaluate(Args(policy=()))
 
 
 @pytest.mark.parametrize("changes", [{"episodes": 0}, {"seed": -1}, {"env_id": "hoof_env/Cow-v0"}])

@@ -35,8 +35,8 @@ def test_run_folder(trained):
     assert trained.steps == 256
     assert trained.stopped_by is None
     assert {path.name for path in (trained.folder / "checkpoints").iterdir()} == {
-        "model-128.zip",
-        "model-256.zip",
+        "128",
+        "256",
     }
     record = json.loads((trained.folder / "run.json").read_text())
     assert record["env_id"] == "hoof_env/HorseLeg-v0"
@@ -61,7 +61,7 @@ def test_model_reloads(trained):
         policy = SavedModel.find(trained.folder).load(env, "hoof_env/HorseLeg-v0")
         action, _ = policy.predict(observation)
         expected, _ = PPO.load(trained.folder / "model.zip").predict(observation, deterministic=True)
-        checkpoint = SavedModel.find(trained.folder / "checkpoints" / "model-256.zip")
+        checkpoint = SavedModel.find(trained.folder / "checkpoints" / "256")
     np.testing.assert_array_equal(action, expected)
     assert checkpoint.record["env_id"] == "hoof_env/HorseLeg-v0"
 
@@ -74,14 +74,18 @@ def test_same_seed_same_run(trained, tmp_path):
 
 def test_normalisation_statistics_stay_with_the_model(tmp_path):
     params = (*TINY, '{"normalize": {"norm_reward": false}}')
-    folder = train_tiny(tmp_path / "run", params=params, checkpoint_every=0).folder
+    folder = train_tiny(tmp_path / "run", params=params).folder
     with make_env("hoof_env/HorseLeg-v0", **parse_pairs("", SHORT)) as env:
         observation, _ = env.reset(seed=3)
         policy = SavedModel.find(folder).load(env, "hoof_env/HorseLeg-v0")
         normalized = policy.normalize(observation)
         expected, _ = PPO.load(folder / "model.zip").predict(normalized, deterministic=True)
         np.testing.assert_array_equal(policy.predict(observation)[0], expected)
+        early = SavedModel.find(folder / "checkpoints" / "128").load(env, "hoof_env/HorseLeg-v0")
+        late = SavedModel.find(folder / "checkpoints" / "256").load(env, "hoof_env/HorseLeg-v0")
     assert not np.allclose(normalized, observation)
+    assert not np.allclose(early.normalize(observation), normalized)
+    np.testing.assert_array_equal(late.normalize(observation), normalized)
 
 
 def test_time_limit(tmp_path):
@@ -139,6 +143,9 @@ def test_unwritable_folder(tmp_path):
         ({"n_envs": 0}, "n_envs"),
         ({"seed": -1}, "seed"),
         ({"max_minutes": 0.0}, "max_minutes"),
+        ({"checkpoint_every": -1}, "checkpoint_every"),
+        ({"torch_threads": 0}, "torch_threads"),
+        ({"device": "abacus"}, "abacus"),
     ],
     ids=str,
 )
