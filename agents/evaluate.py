@@ -136,6 +136,23 @@ def find_policy(name: str, env: gym.Env[Any, Any], env_id: str) -> Any:
     return make_policy(name, env)
 
 
+def film_paths(video: Path, names: Sequence[str]) -> dict[str, Path]:
+    """Where the film of each policy goes: `video`, with the policy's name added if there are several.
+
+    Raises:
+        ParameterError: two films would have one name.
+    """
+    paths: dict[str, Path] = {}
+    for name in dict.fromkeys(names):
+        short = Path(name).parent.name if name.endswith("model.zip") else Path(name).stem
+        suffix = f"-{short}" if len(set(names)) > 1 else ""
+        path = video.with_name(f"{video.stem}{suffix}{video.suffix or '.mp4'}")
+        if path in paths.values():
+            raise ParameterError(f"--video: expected policies of different names, got two films {path}")
+        paths[name] = path
+    return paths
+
+
 @dataclass(frozen=True)
 class Args:
     policy: tuple[str, ...] = ("walk", "run", "idle", "random")
@@ -173,8 +190,10 @@ def evaluate(args: Args) -> tuple[list[Score], dict[str, Any]]:
         check_folder(path.parent)
     records = [runs.SavedModel.find(Path(name)).record for name in args.policy if is_model(name)]
     record = next(filter(None, records), {})
+    films = film_paths(args.video, args.policy) if args.video else {}
     env_id = args.env_id or record.get("env_id", DEFAULT_ENV)
-    kwargs = parse_pairs("--env-kwargs", args.env_kwargs) or record.get("env_kwargs", {})
+    recorded = record.get("env_kwargs", {}) if env_id == record.get("env_id") else {}
+    kwargs = parse_pairs("--env-kwargs", args.env_kwargs) or recorded
     scores = []
     with runs.make_env(env_id, **kwargs) as env:
         runs.warm_up(env)
@@ -189,10 +208,7 @@ def evaluate(args: Args) -> tuple[list[Score], dict[str, Any]]:
         from agents.video import film
 
         with runs.make_env(env_id, **{**kwargs, "render_mode": "rgb_array"}) as env:
-            for name in policies:
-                short = Path(name).parent.name if name.endswith("model.zip") else Path(name).stem
-                suffix = f"-{short}" if len(policies) > 1 else ""
-                path = args.video.with_name(f"{args.video.stem}{suffix}{args.video.suffix or '.mp4'}")
+            for name, path in films.items():
                 film(env, find_policy(name, env, env_id), path, seed=args.seed)
                 print(f"filmed {name}: {path}")
     return scores, {"env_id": env_id, "env_kwargs": kwargs}

@@ -71,9 +71,12 @@ def observe(
     their bounds.
 
     Args:
-        row: last row of the trace. filters: shape (4,). rate_bounds: of the filters, shape (4,). trunk,
-        height: kind of trunk and its nominal height [m]. weight: of trunk and leg [N]. peak: running peak
-        of the open stance [N]. action: the last one, shape (4,).
+        row: last row of the trace.
+        filters, rate_bounds: command filters and the bounds of their rates, shape (4,).
+        trunk, height: kind of trunk and its nominal height [m].
+        weight: of trunk and leg [N].
+        peak: running peak of the open stance [N].
+        action: the last one, shape (4,).
     """
     values = ((filters["value"] - MIDDLE) / HALF_RANGE).tolist()
     rates = (filters["rate"] / rate_bounds).tolist()

@@ -17,11 +17,12 @@ class RewardWeights:
     """Weights of the reward terms; `docs/environment.md` gives their reasons and what the defaults lead to.
 
     Attributes:
-        progress: per metre forward [1/m]. peak: per kilonewton of every stance's peak ground reaction force
-        [1/kN]. energy: per kilojoule of positive work of the two drives [1/kJ]; braking power is not
-        recovered. action: per control step and unit of mean squared action change [-]. failure: per second
-        of a whole episode, charged once when the episode ends by failure [1/s]: more than the worst
-            policy found loses by going on.
+        progress: per metre forward [1/m].
+        peak: per kilonewton of every stance's peak ground reaction force [1/kN].
+        energy: per kilojoule of positive work of the two drives [1/kJ]; braking power is not recovered.
+        action: per control step and unit of mean squared action change [-].
+        failure: per second of a whole episode, charged once when the episode ends by failure [1/s]: more than
+            the worst policy found loses by going on.
     """
 
     progress: float = 1.0

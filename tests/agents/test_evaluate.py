@@ -3,11 +3,24 @@
 import json
 import math
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from agents.evaluate import METRICS, Args, Score, estimate, evaluate, find_policy, main, play, table, to_json
+from agents.evaluate import (
+    METRICS,
+    Args,
+    Score,
+    estimate,
+    evaluate,
+    film_paths,
+    find_policy,
+    main,
+    play,
+    table,
+    to_json,
+)
 from agents.runs import SavedModel, make_env
 from hoof_env.errors import DataFileError, OutputError, ParameterError
 from tests.agents.conftest import SHORT, train_tiny
@@ -182,3 +195,11 @@ def test_an_environment_without_summaries(tmp_path):
     (score,), setting = evaluate(Args(policy=(str(folder),), episodes=1))
     assert setting["env_id"] == "Pendulum-v1"
     assert set(score.estimates) == {"return"}
+
+
+def test_films_of_two_policies_never_share_a_file():
+    paths = film_paths(Path("gait.mp4"), ["run", "a/ppo", "b/sac/model.zip"])
+    assert [str(path) for path in paths.values()] == ["gait-run.mp4", "gait-ppo.mp4", "gait-sac.mp4"]
+    assert film_paths(Path("gait"), ["run"]) == {"run": Path("gait.mp4")}
+    with pytest.raises(ParameterError, match=r"two films gait-ppo\.mp4"):
+        film_paths(Path("gait.mp4"), ["a/ppo", "b/ppo"])
