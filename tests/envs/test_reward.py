@@ -116,20 +116,21 @@ def test_fixed_trunk_progress_is_load_weighted_backward_travel():
     assert account["progress"] == pytest.approx(0.5 * (300 * 2.0 - 100 * 1.0) / 400)
 
 
-MARGIN = 2.5
-"""Return by which the scripted run beats every simple policy over ten seconds, mean of five seeds [-]."""
+MARGIN, SEEDS = 3.0, 20
+"""Return by which the scripted run beats every simple policy over ten seconds, in the mean of so many seeds.
+Single episodes vary more: from a lucky start an airborne policy can coast past a run."""
 
 
 @pytest.fixture(scope="module")
 def run_return():
     env = gym.make("hoof_env/HorseLeg-v0")
-    return np.mean([rollout(env, make_policy("run", env), seed)[0] for seed in range(5)])
+    return np.mean([rollout(env, make_policy("run", env), seed)[0] for seed in range(SEEDS)])
 
 
 @pytest.mark.parametrize("name", ["idle", "airborne", "bang-bang", "drag", "random"])
 def test_simple_policies_score_below_the_scripted_run(name, run_return):
     env = gym.make("hoof_env/HorseLeg-v0")
-    returns = [rollout(env, make_policy(name, env, seed), seed)[0] for seed in range(5)]
+    returns = [rollout(env, make_policy(name, env, seed), seed)[0] for seed in range(SEEDS)]
     assert np.mean(returns) < run_return - MARGIN
 
 
