@@ -18,7 +18,7 @@ from hoof_env.errors import HoofEnvError, OutputError
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-MECHANICS = ("leg", "ground", "gait", "dynamics")
+MECHANICS = ("leg", "ground", "gait", "dynamics", "identify")
 """The rooms whose sources end up in kernels."""
 
 
