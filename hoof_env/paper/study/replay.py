@@ -6,22 +6,23 @@ the simulator's own contact kernel; nothing of the law is written twice.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
-import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env._jit import kernel
-from hoof_env.dynamics.result import Result
 from hoof_env.dynamics.trace import new_trace, record
 from hoof_env.errors import HoofEnvError
+from hoof_env.gait.parameters import GaitParameters, load_gait
 from hoof_env.ground.contact import HEEL, TOE, Ground, new_contacts, touch
-from hoof_env.paper.measure import Stance, measure_stance
+from hoof_env.identify.drift import DriftCycle, drift_cycle
+from hoof_env.leg.geometry import Geometry, load_geometry
+from hoof_env.paper.measure import POINTS, Stance, measure_stance
 from hoof_env.paper.published import CONDITIONS, Published
-from hoof_env.paper.reproduce import ENVIRONMENT, GAITS, run_cycle
+from hoof_env.paper.reproduce import GAITS, run_cycle
 from hoof_env.paper.rows import compare
 
 Trace = NDArray[np.void]
@@ -32,54 +33,57 @@ BESIDE = "resultant_N", "resultant_%"
 """Readings of a row that are rows of their own here: `id` + ".resultant"."""
 
 
-@dataclass(frozen=True)
-class EulerCycle:
-    """One cycle of the paper's solver.
-
-    Attributes:
-        trace: as `run_cycle` gives it, on elastic ground.
-        closure: largest constraint error, in m (or rad in the angle lock and the driver), at every 50th part
-            of the cycle.
-    """
-
-    trace: Trace
-    closure: NDArray[np.float64]
-
-
 @lru_cache(maxsize=16)
 def exact_cycle(gait: str, preset: str | None, step: float = 1e-4) -> Trace:
     """One cycle of the closed form on elastic ground, sampled every `step` [s]; do not write to it."""
-    trace = run_cycle(gait, "exact", sim_dt=step, **_settings(preset))
+    settings: dict[str, Any] = {} if preset is None else {"preset": preset}
+    trace = run_cycle(gait, "exact", sim_dt=step, **settings)
     trace.flags.writeable = False
     return trace
 
 
-@lru_cache(maxsize=128)
-def euler_cycle(gait: str, preset: str | None, steps: int, beta: float) -> EulerCycle:
-    """One cycle of Eq. 8 in explicit Euler with `steps` steps to the second and Baumgarte's `beta` [1/s].
+@lru_cache(maxsize=64)
+def euler_cycle(gait: str, preset: str | None, steps: int, beta: float) -> Trace:
+    """One cycle of Eq. 8 in explicit Euler, `steps` steps to the second, Baumgarte's `beta` [1/s].
+
+    Only what the ground needs is filled in, and forces not before `replay`: the rest is NaN.
 
     Raises:
         HoofEnvError: the integration failed before the end.
     """
-    step = 1 / steps
-    env: Any = gymnasium.make(
-        ENVIRONMENT, gait=gait, solver="paper", sim_dt=step, dt=step, baumgarte_beta=beta, **_settings(preset)
-    ).unwrapped
-    engine, command = env.engine, env.gait.to_array()
-    parts, closure = [engine.reset(env.gait)], []
-    for chunk in np.array_split(np.arange(steps), 50):
-        parts.append(new_trace(len(chunk)))
-        if engine.advance(command, parts[-1]) is not Result.OK:
-            raise HoofEnvError(f"{gait} in {steps} Euler steps a second with beta {beta:g}: it diverged")
-        closure.append(float(np.abs(engine.closure().error).max()))
-    env.close()
-    trace = np.concatenate(parts)
+    motion = _drift(gait, preset, steps, beta, steps)
+    trace = new_trace(steps + 1)
+    for name in trace.dtype.names or ():
+        trace[name] = np.nan
+    trace["t"] = motion.t
+    trace["trunk_x"], trace["trunk_vx"], trace["trunk_vy"] = 0.0, 0.0, 0.0
+    trace["trunk_y"] = height = _leg(preset)[0].hip_height
+    for name in POINTS:
+        at, velocity = getattr(motion, name), getattr(motion, f"{name}_velocity")
+        trace[f"{name}_x"], trace[f"{name}_vx"] = at.real, velocity.real
+        trace[f"{name}_penetration"], trace[f"{name}_rate"] = -(at.imag + height), -velocity.imag
     trace.flags.writeable = False
-    return EulerCycle(trace, np.array(closure))
+    return trace
 
 
-def _settings(preset: str | None) -> dict[str, Any]:
-    return {} if preset is None else {"preset": preset}
+def closure_error(gait: str, preset: str | None, steps: int, beta: float) -> float:
+    """Largest constraint error of `euler_cycle`, at 20 instants of the cycle [m; rad in lock and driver]."""
+    parts = (steps * part // 20 for part in range(1, 21))
+    return max(_drift(gait, preset, steps, beta, part).closure_error for part in parts)
+
+
+def _drift(gait: str, preset: str | None, steps: int, beta: float, until: int) -> DriftCycle:
+    geometry, gaits = _leg(preset)
+    motion = drift_cycle(geometry, gaits[gait], sim_dt=1 / steps, steps=until, beta=beta)
+    if not motion.finite:
+        raise HoofEnvError(f"{gait} in {steps} Euler steps a second with beta {beta:g}: it diverged")
+    return motion
+
+
+@lru_cache(maxsize=8)
+def _leg(preset: str | None) -> tuple[Geometry, dict[str, GaitParameters]]:
+    source = () if preset is None else (preset,)
+    return load_geometry(*source), {gait: load_gait(gait, *source) for gait in GAITS}
 
 
 def replay(trace: Trace, ground: Ground, rise: float = 0.0) -> Trace:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
@@ -35,3 +36,14 @@ def listed(items: Iterable[str], last: str = "and") -> str:
     """'a', 'a and b', 'a, b and c'; 'none' without items."""
     *first, end = list(items) or ["none"]
     return f"{', '.join(first)} {last} {end}" if first else end
+
+
+def for_json(value: Any) -> Any:
+    """The same value in plain Python, with None for every number that is not finite."""
+    if isinstance(value, dict):
+        return {str(key): for_json(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [for_json(entry) for entry in value]
+    if hasattr(value, "tolist"):
+        return for_json(value.tolist())
+    return None if isinstance(value, float) and not math.isfinite(value) else value
