@@ -1,0 +1,240 @@
+"""What part 1 says, phrased from its numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from hoof_env.paper.published import Published, PublishedRow
+from hoof_env.paper.report import format_number
+from hoof_env.paper.study.section import listed, table
+
+GAIT_WORDS = {"walk": "walking", "run": "running"}
+
+
+def numerics_text(published: Published, data: Mapping[str, Any]) -> str:
+    """The part's text and tables."""
+    return "\n\n".join(
+        [*_drift(data), *_rows(published, data), *_causes(data), *_sweep(data), *_conditions(published, data)]
+    )
+
+
+def observed_order(errors: list[float]) -> float:
+    """Order of convergence from errors at steps that halve: how fast log2(error) falls; NaN if one is 0."""
+    if min(errors) <= 0:
+        return math.nan
+    return float(-np.polyfit(range(len(errors)), np.log2(errors), 1)[0])
+
+
+def number(value: float | None, spec: str) -> str:
+    """A number, or 'none'."""
+    return "none" if value is None or not math.isfinite(value) else format(value, spec)
+
+
+def _steps(data: Mapping[str, Any]) -> list[str]:
+    return [f"{1e3 / n:g} ms" for n in data["ladder"]]
+
+
+def _drift(data: Mapping[str, Any]) -> list[str]:
+    steps, lines, orders = _steps(data), [], []
+    first: dict[str, dict[str, float]] = {}
+    for name, ladder in data["drift"].items():
+        for gait, word in GAIT_WORDS.items():
+            errors = [entry[gait]["cycle_mm"] for entry in ladder]
+            orders.append(observed_order(errors))
+            first.setdefault(name, {})[word] = errors[0]
+            line = [f"{name}, {data['betas'][name]:.2f}", word, *(f"{error:.3g}" for error in errors)]
+            start = ladder[0][gait]
+            lines.append(
+                [*line, number(orders[-1], ".2f"), f"{start['stance_mm']:.3g}", f"{start['closure_mm']:.3g}"]
+            )
+    roots = listed(
+        f"{_slowest(data['alpha'], beta):.2f} 1/s for the {name} β = {beta:.2f} 1/s"
+        for name, beta in data["betas"].items()
+    )
+    errors_at_first = listed(
+        f"{error:.2f} mm ({word}, {name} β)" for name, by in first.items() for word, error in by.items()
+    )
+    gains = listed(
+        f"{first['printed'][word] / error:.1f} ({word})" for word, error in first["probable"].items()
+    )
+    head = ["β [1/s]", "gait", *(f"hoof error at {step} [mm]" for step in steps), "order"]
+    return [
+        "The paper integrates Eq. 8 by explicit Euler. A closure error decays by the roots of "
+        f"s² + 2αs + β² = 0; with α = {data['alpha']:g} 1/s the slowest has a real part of {roots}. "
+        f"At {steps[0]} toe or heel is up to {errors_at_first} away from where the closed form puts it: the "
+        f"printed β multiplies the error of the probable one by {gains}. Both converge to the exact motion; "
+        f"the order observed is {_span(orders)}, 1 being expected.",
+        table([*head, f"in stance at {steps[0]} [mm]", f"closure error at {steps[0]} [mm]"], lines),
+    ]
+
+
+def _span(values: list[float]) -> str:
+    low, high = f"{min(values):.2f}", f"{max(values):.2f}"
+    return low if low == high else f"{low} to {high}"
+
+
+def _slowest(alpha: float, beta: float) -> float:
+    """Real part of the root of s² + 2 alpha s + beta² that decays slowest [1/s]."""
+    return max(float(root.real) for root in np.roots([1, 2 * alpha, beta**2]))
+
+
+def _rows(published: Published, data: Mapping[str, Any]) -> list[str]:
+    steps, lines = _steps(data), []
+    outside: dict[str, list[str]] = {name: [] for name in data["betas"]}
+    for row in published.rows:
+        entry = data["rows"][row.id]
+        line = [f"`{row.id}`", row.unit, format_number(entry["exact"], row.unit)]
+        for name in data["betas"]:
+            errors = [_error(row, value, entry["exact"]) for value in entry[name]]
+            line += [_formatted(row, error) for error in errors]
+            if row.bar.holds(errors[0]) is False:
+                outside[name].append(row.id)
+        lines.append(line)
+    barred = sum(row.bar.limit is not None for row in published.rows)
+    head = [f"{name} β, {step}" for name in data["betas"] for step in steps]
+    counts = listed(
+        f"{len(rows)} with the {name} β" + (f" ({listed(f'`{row}`' for row in rows)})" if rows else "")
+        for name, rows in outside.items()
+    )
+    return [
+        "Errors of each row against the exact solver (not against the paper), in % of the row for forces, "
+        f"in its unit for the others. Of {barred} rows with a bar, Euler at {steps[0]} alone moves further "
+        f"than the bar {counts}.",
+        table(["row", "unit", "exact", *head], lines),
+    ]
+
+
+def _error(row: PublishedRow, value: float | None, exact: float | None) -> float | None:
+    return None if value is None or exact is None else row.bar.error(value, exact)
+
+
+def _formatted(row: PublishedRow, error: float | None) -> str:
+    return format_number(error, row.bar.measure, "+")
+
+
+def _causes(data: Mapping[str, Any]) -> list[str]:
+    lines, words = [], []
+    for gait, word in GAIT_WORDS.items():
+        peaks = data["causes"][gait]
+        for motion, by in peaks.items():
+            name = "exact" if motion == "exact" else f"Euler, {motion} β"
+            lines.append([word, name, f"{by['interpolated']:.1f}", f"{by['sampled']:.1f}"])
+        truth = peaks["exact"]["interpolated"]
+        drift = listed(
+            f"{100 * (peaks[name]['interpolated'] / truth - 1):+.1f} % ({name} β)" for name in data["betas"]
+        )
+        sampling = 100 * (peaks["exact"]["sampled"] / truth - 1)
+        words.append(f"{word}: drift alone {drift}, sampling alone {sampling:+.1f} %")
+    return [
+        "The inelastic peak has two sources of error: the drift of the motion, and the approach speed, "
+        "which a loop with a fixed step takes at its first sample inside the ground instead of at "
+        f"touch-down. Taken apart at {_steps(data)[0]}, {'; '.join(words)}.",
+        table(["gait", "motion", "peak, approach speed interpolated [N]", "sampled [N]"], lines),
+    ]
+
+
+def _sweep(data: Mapping[str, Any]) -> list[str]:
+    sweep = data["beta_sweep"]
+    beta = np.array(sweep["beta"])
+    best = listed(
+        f"{beta[int(np.argmin(errors))]:g} 1/s in {GAIT_WORDS[gait]} ({min(errors):.2f} mm)"
+        for gait, errors in sweep["hoof_mm"].items()
+    )
+    ranges = {key: (min(ratios), max(ratios)) for key, ratios in sweep["peak_ratio"].items()}
+    worst = max(ranges, key=lambda key: ranges[key][1] / ranges[key][0])
+    low, high = ranges.pop(worst)
+    others = [bound for pair in ranges.values() for bound in pair]
+    gait, condition = worst.split(".")
+    return [
+        f"With β from {beta.min():g} to {beta.max():g} 1/s at {_steps(data)[0]} the hoof error is smallest "
+        f"at {best}. The {GAIT_WORDS[gait]} {condition} peak runs from {low:.2f} to {high:.2f} of its exact "
+        f"value over that range, the other three from {min(others):.2f} to {max(others):.2f}.",
+        _level(data),
+    ]
+
+
+SPIKE = 1.5
+"""A peak over the ground level counts as a spike if its highest value is this many times its lowest."""
+
+
+def _level(data: Mapping[str, Any]) -> str:
+    rise = np.array(data["level_sweep"]["rise_mm"])
+    peaks = np.array(data["level_sweep"]["peaks"]["walk"]["exact"])
+    low, high = peaks.min(), peaks.max()
+    text = (
+        f"As the ground moves by ±{rise.max():g} mm, the exact walking inelastic peak runs from {low:.0f} to "
+        f"{high:.0f} N"
+    )
+    if high < SPIKE * low:
+        return f"{text}, without a spike."
+    wide = rise[peaks >= (low + high) / 2]
+    drift = listed(
+        f"{ladder[0]['walk']['stance_mm']:.2f} mm ({name} β)" for name, ladder in data["drift"].items()
+    )
+    return (
+        f"{text}: a spike, where a point of the hoof touches the ground so gently that Eq. 14 divides by "
+        f"next to nothing. It is highest with the ground {rise[int(peaks.argmax())]:+.2f} mm from this "
+        f"leg's level and {wide.max() - wide.min():.2f} mm wide at half height, against a drift of {drift} "
+        "in stance: the drift decides where on the spike the row lies."
+    )
+
+
+SOLVERS = (
+    ("paper", "step", "step, printed β"),
+    ("paper, probable beta", "step", "step, probable β"),
+    ("paper", "beta", "β, printed"),
+    ("paper, probable beta", "beta", "β, probable"),
+    ("paper", "ground", "hip, printed β"),
+    ("paper, probable beta", "ground", "hip, probable β"),
+    ("exact", "ground", "hip, exact"),
+)
+
+
+def _conditions(published: Published, data: Mapping[str, Any]) -> list[str]:
+    lines = []
+    worst: dict[str, float] = {}
+    crooked = []
+    for row in published.rows:
+        entry = data["conditions"][row.id]
+        line = [f"`{row.id}`"]
+        for solver, parameter, _ in SOLVERS:
+            answer = entry[solver][parameter]
+            line.append(number(answer["relative"], "+.3g"))
+            worst[row.id] = max(worst.get(row.id, 0.0), bars_spanned(row, answer) or 0.0)
+        answer = entry["exact"]["ground"]
+        digits, unit = ("+.4f" if row.unit in ("s", "-") else "+.2f"), row.unit.replace("-", "")
+        extremes = f"{format_number(answer['low'], row.unit)} to {format_number(answer['high'], row.unit)}"
+        lines.append([*line, f"{number(answer['slope'], digits)} {unit}".strip(), extremes])
+        span = bars_spanned(row, answer)
+        if span and span > 1 and abs(answer["high"] - answer["low"]) > 2 * 2 * abs(answer["slope"]):
+            crooked.append(f"`{row.id}`")
+    ranked = sorted(worst, key=lambda row: -worst[row])[:3]
+    noisy = published.row(next((row for row in ranked if published.row(row).unit == "N"), ranked[0]))
+    scatter = listed(
+        f"{number(data['conditions'][noisy.id][solver]['step']['scatter'], '.2g')} {noisy.unit} ({label})"
+        for solver, parameter, label in SOLVERS
+        if parameter == "step"
+    ).replace("step, ", "")
+    return [
+        "Condition of each row: relative change of the row per relative change of the time step, of β and "
+        "of the hip's height above the ground (which falls as the ground rises). Slopes are those of a "
+        "line through values within ±10 % of step and β and ±0.1 mm of ground; the last two columns give "
+        "the exact solver's change for 1 mm that the ground rises, and its extremes within ±1 mm. Angles "
+        "and times have an arbitrary zero, so their relative figures say little. Most bars, in the widest "
+        f"of these windows, are spanned by {listed(f'`{row}` ({worst[row]:.0f})' for row in ranked)}. "
+        f"`{noisy.id}` scatters by {scatter} rms about its line over the step: it has no derivative there. "
+        f"Within ±1 mm of ground more than twice what the exact slope says is spanned by {listed(crooked)}.",
+        table(["row", *(label for *_, label in SOLVERS), "exact, per mm", "exact, ±1 mm"], lines),
+    ]
+
+
+def bars_spanned(row: PublishedRow, answer: Mapping[str, Any]) -> float | None:
+    """How many bars a row spans in the window of an answer, None where it has no bar or no value."""
+    low, high = answer["low"], answer["high"]
+    if row.bar.limit is None or low is None or high is None:
+        return None
+    return abs(row.bar.error(high, row.value) - row.bar.error(low, row.value)) / row.bar.limit
