@@ -9,6 +9,7 @@ import numpy as np
 
 from hoof_env.paper.figure_style import BLUE, GAITS, GREY, ORANGE, SKY
 from hoof_env.paper.published import Published
+from hoof_env.paper.study.conditions import LEVEL_WINDOW, PART
 from hoof_env.paper.study.numerics_text import bars_spanned
 
 COLOURS = {"exact": GREY, "printed": ORANGE, "probable": BLUE}
@@ -132,12 +133,12 @@ def draw_conditions(published: Published, data: Mapping[str, Any]) -> Any:
     ax = figure.subplots()
     rows = [row for row in published.rows if row.bar.limit is not None]
     columns = [
-        ("paper", "step", "step ±10 %, printed β", ORANGE, "o"),
-        ("paper, probable beta", "step", "step ±10 %, probable β", BLUE, "o"),
-        ("paper", "beta", "β ±10 %, printed", ORANGE, "^"),
-        ("paper, probable beta", "beta", "β ±10 %, probable", BLUE, "^"),
-        ("paper", "ground", "ground ±1 mm, printed β", ORANGE, "s"),
-        ("exact", "ground", "ground ±1 mm, exact", SKY, "s"),
+        ("paper", "step", f"step ±{100 * PART:g} %, printed β", ORANGE, "o"),
+        ("paper, probable beta", "step", f"step ±{100 * PART:g} %, probable β", BLUE, "o"),
+        ("paper", "beta", f"β ±{100 * PART:g} %, printed", ORANGE, "^"),
+        ("paper, probable beta", "beta", f"β ±{100 * PART:g} %, probable", BLUE, "^"),
+        ("paper", "ground", f"ground ±{1e3 * LEVEL_WINDOW:g} mm, printed β", ORANGE, "s"),
+        ("exact", "ground", f"ground ±{1e3 * LEVEL_WINDOW:g} mm, exact", SKY, "s"),
     ]
     for solver, parameter, label, colour, marker in columns:
         spans = [bars_spanned(row, data["conditions"][row.id][solver][parameter]) for row in rows]

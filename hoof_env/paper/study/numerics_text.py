@@ -10,6 +10,7 @@ import numpy as np
 
 from hoof_env.paper.published import Published, PublishedRow
 from hoof_env.paper.report import format_number
+from hoof_env.paper.study.conditions import LEVEL_LINE, LEVEL_WINDOW, PART
 from hoof_env.paper.study.section import listed, table
 
 GAIT_WORDS = {"walk": "walking", "run": "running"}
@@ -195,7 +196,7 @@ SOLVERS = (
 
 
 def _conditions(published: Published, data: Mapping[str, Any]) -> list[str]:
-    lines = []
+    window, lines = f"±{1e3 * LEVEL_WINDOW:g} mm", []
     worst: dict[str, float] = {}
     crooked = []
     for row in published.rows:
@@ -210,7 +211,11 @@ def _conditions(published: Published, data: Mapping[str, Any]) -> list[str]:
         extremes = f"{format_number(answer['low'], row.unit)} to {format_number(answer['high'], row.unit)}"
         lines.append([*line, f"{number(answer['slope'], digits)} {unit}".strip(), extremes])
         span = bars_spanned(row, answer)
-        if span and span > 1 and abs(answer["high"] - answer["low"]) > 2 * 2 * abs(answer["slope"]):
+        if (
+            span
+            and span > 1
+            and abs(answer["high"] - answer["low"]) > 2 * 2e3 * LEVEL_WINDOW * abs(answer["slope"])
+        ):
             crooked.append(f"`{row.id}`")
     ranked = sorted(worst, key=lambda row: -worst[row])[:3]
     noisy = published.row(next((row for row in ranked if published.row(row).unit == "N"), ranked[0]))
@@ -222,13 +227,14 @@ def _conditions(published: Published, data: Mapping[str, Any]) -> list[str]:
     return [
         "Condition of each row: relative change of the row per relative change of the time step, of β and "
         "of the hip's height above the ground (which falls as the ground rises). Slopes are those of a "
-        "line through values within ±10 % of step and β and ±0.1 mm of ground; the last two columns give "
-        "the exact solver's change for 1 mm that the ground rises, and its extremes within ±1 mm. Angles "
-        "and times have an arbitrary zero, so their relative figures say little. Most bars, in the widest "
-        f"of these windows, are spanned by {listed(f'`{row}` ({worst[row]:.0f})' for row in ranked)}. "
-        f"`{noisy.id}` scatters by {scatter} rms about its line over the step: it has no derivative there. "
-        f"Within ±1 mm of ground more than twice what the exact slope says is spanned by {listed(crooked)}.",
-        table(["row", *(label for *_, label in SOLVERS), "exact, per mm", "exact, ±1 mm"], lines),
+        f"line through values within ±{100 * PART:g} % of step and β and ±{1e3 * LEVEL_LINE:g} mm of "
+        "ground; the last two columns give the exact solver's change for 1 mm that the ground rises, and "
+        f"its extremes within {window}. Angles and times have an arbitrary zero, so their relative figures "
+        "say little. Most bars, in the widest of these windows, are spanned by "
+        f"{listed(f'`{row}` ({worst[row]:.0f})' for row in ranked)}. `{noisy.id}` scatters by {scatter} rms "
+        f"about its line over the step: it has no derivative there. Within {window} of ground more than "
+        f"twice what the exact slope says is spanned by {listed(crooked)}.",
+        table(["row", *(label for *_, label in SOLVERS), "exact, per mm", f"exact, {window}"], lines),
     ]
 
 
