@@ -1,0 +1,317 @@
+"""What the paper prints about a gait, and the margins of the shape claims, from one cycle of toe and heel.
+
+Times of touch-down and lift-off and the highest force come from the cubic through penetration and rate at
+both ends of a sample, so that two hundred samples a revolution do what the step-by-step simulation needs ten
+thousand for. `hoof_env.paper` stays the judge: tests compare.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hoof_env._jit import kernel
+
+FEATURES = np.dtype(
+    [
+        (name, "f8")
+        for name in (
+            # rows of the paper, under the names of their ids [s, deg, N, %, -]
+            "contact_start", "contact_end", "duty",
+            "angle_contact", "angle_flat", "angle_liftoff", "angle_variation",
+            "peak_inelastic", "mean_inelastic", "peak_elastic", "mean_elastic", "reduction",
+            # the other reading of 'maximum force': peaks of the resultant [N]
+            "resultant_inelastic", "resultant_elastic",
+            "toe_after_heel_in", "toe_after_heel_out",  # how much later the toe enters and leaves [s]
+            "flattest",  # smallest |hoof angle| while both points bear [deg]
+            "second_elastic", "second_inelastic",  # prominence of a force's second peak, over its maximum [-]
+            "third_peak",  # likewise of the elastic force's third [-]
+            "peaks_apart",  # how far its two most prominent peaks keep from the middle of stance [s]
+            "dip_support",  # the smaller penetration at the dip between them [m]
+            "peak_gap",  # time of the elastic peak minus that of the inelastic one [s]
+            "step",  # backward travel of the middle of the sole through stance [m]
+            # part of the load on points that move back at `BACKWARD`, at the ground level, 5, 10 cm deeper
+            "swept_0", "swept_5", "swept_10",
+            "push_1", "push_2",  # horizontal over vertical impulse on the leg in the halves of stance [-]
+            "ankle",  # smallest height of the ankle above toe and heel in stance [m]
+            "heel_gap",  # height of the heel above the ground at last contact [m]
+            "start_depth",  # deepest penetration at the cycle's start, negative in the air [m]
+            "extra_entries",  # how often a point comes in after its first time [-]
+            "missing",  # sum over the points that never touch of their smallest height [m]
+        )
+    ]
+)  # fmt: skip
+"""What `measure_gait` fills in; NaN where there is no contact, except the last three."""
+
+BACKWARD = 0.3
+"""How fast the sole must move back under half of the load [m/s]."""
+
+CHI, MU, SLOW, FAST, FLOOR = 0.75, 0.4, 1e-3, 1e-2, 1e-4
+"""The paper preset of `hoof_env.ground`: Lankarani-Nikravesh's factor at cr = 0, friction and its two speeds
+[m/s], smallest approach speed [m/s]."""
+
+EL, INEL, PUSH_EL, PUSH_INEL, TOE_IN, HEEL_IN = range(6)
+"""Rows of the scratch array of `measure_gait`: forces [N], and approach speeds [m/s], 0 in the air."""
+
+
+@kernel
+def cubic(d0, d1, v0, v1, h, s):  # type: ignore[no-untyped-def]
+    """Value and rate at part s of a sample of length h of the cubic with the values and rates at its ends."""
+    s2 = s * s
+    s3 = s2 * s
+    d = (2 * s3 - 3 * s2 + 1) * d0 + (s3 - 2 * s2 + s) * h * v0 + (3 * s2 - 2 * s3) * d1 + (s3 - s2) * h * v1
+    v = (6 * s2 - 6 * s) * (d0 - d1) / h + (3 * s2 - 4 * s + 1) * v0 + (3 * s2 - 2 * s) * v1
+    return d, v
+
+
+@kernel
+def crossing(d0, d1, v0, v1, h):  # type: ignore[no-untyped-def]
+    """Where in a sample the cubic crosses zero, and its rate there; d0 and d1 differ in sign."""
+    low, high = 0.0, 1.0
+    s = d0 / (d0 - d1)
+    for _ in range(30):
+        d, v = cubic(d0, d1, v0, v1, h, s)
+        if (d > 0.0) == (d1 > 0.0):
+            high = s
+        else:
+            low = s
+        new = s - d / (v * h) if v != 0.0 else 0.5 * (low + high)
+        if not low < new < high:
+            new = 0.5 * (low + high)
+        if abs(new - s) < 1e-12:
+            break
+        s = new
+    return s, cubic(d0, d1, v0, v1, h, s)[1]
+
+
+@kernel
+def spring(d, exponent):  # type: ignore[no-untyped-def]
+    """d ** exponent for d > 0, fast for the usual one."""
+    return d * np.sqrt(d) if exponent == 1.5 else d**exponent
+
+
+@kernel
+def friction_part(v):  # type: ignore[no-untyped-def]
+    """Friction over mu N against a sliding velocity v [m/s], with Ambrosio's correction."""
+    size = min(max((abs(v) - SLOW) / (FAST - SLOW), 0.0), 1.0)
+    return -size if v > 0 else size
+
+
+@kernel
+def force_within(at, velocity, height, h, approach, stiffness, exponent, chi, k, s):  # type: ignore[no-untyped-def]
+    """Normal force [N] at part s of the sample that begins at k; `approach`: speeds of toe and heel."""
+    total = 0.0
+    for i in range(2):
+        speed = approach[i, k + 1] if approach[i, k + 1] > 0.0 else approach[i, k]
+        if speed > 0.0:
+            d0, d1 = -height - at[i, k].imag, -height - at[i, k + 1].imag
+            d, v = cubic(d0, d1, -velocity[i, k].imag, -velocity[i, k + 1].imag, h, s)
+            if d > 0.0:
+                total += stiffness * spring(d, exponent) * max(1.0 + chi * v / speed, 0.0)
+    return total
+
+
+@kernel
+def peak(at, velocity, height, h, approach, stiffness, exponent, chi, force, sampled):  # type: ignore[no-untyped-def]
+    """Highest force [N] and when [s]: of the samples, or found between them on eighths and a parabola."""
+    n, parts = force.shape[0], 8
+    top = np.argmax(force)
+    if sampled or top == 0 or top == n - 1:
+        return force[top], top * h
+    best, where = 0, -1.0
+    around = np.empty(2 * parts + 1)
+    for j in range(2 * parts + 1):
+        k = top - 1 if j < parts else top
+        s = (j - parts * (k - top + 1)) / parts
+        around[j] = force_within(at, velocity, height, h, approach, stiffness, exponent, chi, k, s)
+        if around[j] > where:
+            best, where = j, around[j]
+    t = (top - 1 + best / parts) * h
+    if best == 0 or best == 2 * parts:
+        return where, t
+    a, b, c = around[best - 1], around[best], around[best + 1]
+    bend = a - 2 * b + c
+    if bend >= 0.0:
+        return where, t
+    return b - (a - c) ** 2 / (8 * bend), t + 0.5 * (a - c) / bend * h / parts
+
+
+@kernel
+def prominences(force):  # type: ignore[no-untyped-def]
+    """Prominence of the second and third peak over the highest force, and samples of the first two in time.
+
+    Peaks and prominence as in `paper.shapes.find_peaks`; sample -1 if there is no second peak.
+    """
+    n = force.shape[0]
+    found = np.zeros(3)
+    at = np.full(3, -1)
+    rising = False
+    for k in range(1, n):
+        if force[k] > force[k - 1]:
+            rising = True
+        elif force[k] < force[k - 1] and rising:
+            rising = False
+            top = k - 1
+            while force[top - 1] == force[top]:
+                top -= 1
+            left, right = force[top], force[top]
+            for j in range(top - 1, -1, -1):
+                if force[j] > force[top]:
+                    break
+                left = min(left, force[j])
+            for j in range(top + 1, n):
+                if force[j] > force[top]:
+                    break
+                right = min(right, force[j])
+            height = force[top] - max(left, right)
+            for place in range(3):
+                if height > found[place]:
+                    for j in range(2, place, -1):
+                        found[j], at[j] = found[j - 1], at[j - 1]
+                    found[place], at[place] = height, top
+                    break
+    scale = max(found[0], 1e-9)
+    return found[1] / scale, found[2] / scale, min(at[0], at[1]), max(at[0], at[1])
+
+
+@kernel
+def between(row, x):  # type: ignore[no-untyped-def]
+    """Linear interpolation in a row of samples at the fractional index x."""
+    k = int(x)
+    return row[k] + (x - k) * (row[k + 1] - row[k])
+
+
+@kernel
+def hoof_angle(at, x):  # type: ignore[no-untyped-def]
+    """Hoof angle [deg], heel up positive, at the fractional sample x."""
+    arm = between(at[1], x) - between(at[0], x)
+    return np.degrees(np.arctan2(arm.imag, -arm.real))
+
+
+@kernel
+def press(at, velocity, height, h, sampled, stiffness, exponent, work, out):  # type: ignore[no-untyped-def]
+    """Fill the scratch `work` with forces; returns when toe and heel first enter and last leave [s]."""
+    n = at.shape[1]
+    work[:] = 0.0
+    enter, leave = np.full(2, np.inf), np.full(2, -np.inf)
+    out.start_depth, out.extra_entries, out.missing = -height - min(at[0, 0].imag, at[1, 0].imag), 0.0, 0.0
+    for i in range(2):
+        approach, entries, highest, before, rate_before = 0.0, 0, -np.inf, 0.0, 0.0
+        for k in range(n):
+            d, rate = -height - at[i, k].imag, -velocity[i, k].imag
+            highest = max(highest, d)
+            if d > 0.0:
+                if k == 0:
+                    approach = max(rate, FLOOR)
+                elif before <= 0.0:
+                    s, v = crossing(before, d, rate_before, rate, h)
+                    approach = max(rate if sampled else v, FLOOR)
+                    entries += 1
+                    enter[i] = min(enter[i], (k - 1 + s) * h)
+                elastic = stiffness * spring(d, exponent)
+                inelastic = elastic * max(1.0 + CHI * rate / approach, 0.0)
+                part = MU * friction_part(velocity[i, k].real)
+                work[EL, k] += elastic
+                work[INEL, k] += inelastic
+                work[PUSH_EL, k] += elastic * part
+                work[PUSH_INEL, k] += inelastic * part
+                work[TOE_IN + i, k] = approach
+            elif k > 0 and before > 0.0:
+                s, v = crossing(before, d, rate_before, rate, h)
+                leave[i] = max(leave[i], (k - 1 + s) * h)
+            before, rate_before = d, rate
+        out.extra_entries += max(entries - 1, 0)
+        out.missing += max(-highest, 0.0)
+    return enter, leave
+
+
+@kernel
+def swept_load(at, velocity, height, exponent):  # type: ignore[no-untyped-def]
+    """Part of the elastic load on points that move back at `BACKWARD`, softened over 6 cm/s [-]."""
+    load, swept = 1e-9, 0.0
+    for i in range(2):
+        for k in range(at.shape[1]):
+            d = -height - at[i, k].imag
+            if d > 0.0:
+                f = spring(d, exponent)
+                load += f
+                swept += f * min(max((-BACKWARD - velocity[i, k].real) / 0.06 + 0.5, 0.0), 1.0)
+    return swept / load
+
+
+@kernel
+def measure_halves(at, height, h, start, end, work, out):  # type: ignore[no-untyped-def]
+    """Fill what compares the halves of stance: impulses, peaks and the dip between them."""
+    n = at.shape[1]
+    force, push = work[EL], work[PUSH_EL]
+    middle = 0.5 * (start + end)
+    cut = min(int(middle / h) + 1, n - 1)  # the second half's first sample
+    push_1, push_2 = push[:cut].sum(), push[cut:].sum()
+    out.push_1 = push_1 / max(force[:cut].sum(), 1e-9)
+    out.push_2 = push_2 / max(force[cut:].sum(), 1e-9)
+    second, third, first_at, second_at = prominences(force)
+    out.second_elastic, out.third_peak, out.peaks_apart = second, third, 0.0
+    low = cut
+    if first_at >= 0:
+        out.peaks_apart = min(middle - first_at * h, second_at * h - middle)
+        low = first_at + np.argmin(force[first_at : second_at + 1])
+    out.dip_support = -height - max(at[0, low].imag, at[1, low].imag)
+    out.second_inelastic = prominences(work[INEL])[0]
+
+
+@kernel
+def measure_gait(at, velocity, ankle, height, speed, sampled, stiffness, exponent, work, out):  # type: ignore[no-untyped-def]
+    """Fill `out` from one revolution of toe and heel.
+
+    Args:
+        at, velocity, ankle: from `cycle.swing_hoof`, or a simulation: complex (2, n), (2, n), (n,) [m, m/s].
+        height: of the swing's centre above the ground [m].
+        speed: crank speed [rad/s].
+        sampled: as the paper's solver does it, the approach speed is that of the first sample inside, not of
+            the crossing, and the highest force that of a sample.
+        stiffness, exponent: of Eq. 14.
+        work: scratch, shape (6, n).
+        out: record of dtype `FEATURES`.
+    """
+    n = at.shape[1]
+    h = 2.0 * np.pi / speed / (n - 1)
+    enter, leave = press(at, velocity, height, h, sampled, stiffness, exponent, work, out)
+    start, end = enter.min(), leave.max()
+    if not 0.0 < start < end < np.inf:
+        return False
+    for i in range(2):  # a point that never touches does as the other, and `missing` tells
+        if enter[i] > leave[i]:
+            enter[i], leave[i] = enter[1 - i], leave[1 - i]
+    out.contact_start, out.contact_end, out.duty = start, end, (end - start) / (h * (n - 1))
+    out.toe_after_heel_in, out.toe_after_heel_out = enter[0] - enter[1], leave[0] - leave[1]
+    x0, x1 = start / h, min(end / h, n - 1.001)
+    out.angle_contact, out.angle_liftoff = hoof_angle(at, x0), hoof_angle(at, x1)
+    out.angle_variation = out.angle_liftoff - out.angle_contact
+    double, until = enter.max(), leave.min()
+    out.angle_flat = hoof_angle(at, min(max(0.5 * (double + until) / h, 0.0), n - 1.001))
+    out.flattest, before = 180.0, 0.0
+    for k in range(int(double / h) + 1, min(int(until / h) + 1, n)):
+        angle = hoof_angle(at, min(float(k), n - 1.001))
+        out.flattest = 0.0 if angle * before < 0.0 else min(out.flattest, abs(angle))
+        before = angle
+    limit = work[TOE_IN:]
+    out.peak_elastic, when = peak(at, velocity, height, h, limit, stiffness, exponent, 0.0, work[EL], sampled)
+    out.peak_inelastic, sooner = peak(
+        at, velocity, height, h, limit, stiffness, exponent, CHI, work[INEL], sampled
+    )
+    out.peak_gap = when - sooner
+    out.reduction = 100.0 * (out.peak_inelastic - out.peak_elastic) / max(out.peak_inelastic, 1e-9)
+    out.mean_elastic, out.mean_inelastic = work[EL].sum() / (n - 1), work[INEL].sum() / (n - 1)
+    out.resultant_elastic, out.resultant_inelastic, out.ankle = 0.0, 0.0, np.inf
+    for k in range(n):
+        out.resultant_elastic = max(out.resultant_elastic, np.hypot(work[EL, k], work[PUSH_EL, k]))
+        out.resultant_inelastic = max(out.resultant_inelastic, np.hypot(work[INEL, k], work[PUSH_INEL, k]))
+        if x0 <= k <= x1:
+            out.ankle = min(out.ankle, ankle[k] - max(at[0, k].imag, at[1, k].imag))
+    measure_halves(at, height, h, start, end, work, out)
+    sole = between(at[0], x0) + between(at[1], x0) - between(at[0], x1) - between(at[1], x1)
+    out.step = 0.5 * sole.real
+    out.swept_0 = swept_load(at, velocity, height, exponent)
+    out.swept_5 = swept_load(at, velocity, height - 0.05, exponent)
+    out.swept_10 = swept_load(at, velocity, height - 0.1, exponent)
+    out.heel_gap = between(at[1], x1).imag + height
+    return True

@@ -1,0 +1,242 @@
+"""How far a leg is from the paper: errors of its rows in bars, shortages of its plausibility, and one cost.
+
+`Objective` measures a vector x (see `candidate.names`) by kinematics alone, a revolution for each gait, and
+on demand once more through the paper's solver. The arithmetic is in kernels (`evaluate`), arrays are kept.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoof_env.errors import HoofEnvError, ParameterError, check_choice, check_number
+from hoof_env.identify.candidate import SPEED, Choice, check_vector, names
+from hoof_env.identify.evaluate import (
+    construction,
+    measure_exact,
+    measure_paper,
+    rate_demands,
+    rate_rows,
+)
+from hoof_env.identify.features import FEATURES
+from hoof_env.identify.plausibility import BOTH, LEG, LEG_DEMANDS, MEASURED, WALK_DEMANDS, demands
+from hoof_env.identify.targets import Targets, load_targets
+from hoof_env.leg.linkage import BODIES, POINTS
+
+Array = NDArray[np.float64]
+
+ILL_CONDITIONED = ("walk.peak_inelastic", "walk.mean_inelastic", "walk.reduction")
+"""Rows that the paper's solver need not meet: the walk grazes, and they hang on how it samples touch-down."""
+
+PAPER_SAMPLES = 1001
+"""Instants of the paper's solver in its one second."""
+
+
+class _Measured:
+    """Every measured number in one array, and the same as records for the kernels: leg, (walk, run), both."""
+
+    def __init__(self) -> None:
+        self.flat = np.full(len(MEASURED), np.nan)
+        leg, gait = len(LEG.names or ()), len(FEATURES.names or ())
+        parts = np.split(self.flat, [leg, leg + 2 * gait])
+        self.records = parts[0].view(LEG)[0], parts[1].view(FEATURES), parts[2].view(BOTH)[0]
+
+
+class Objective:
+    """What a search minimises for one choice. It pickles, and one object serves one thread.
+
+    Args:
+        choice: assembly and law of the legs.
+        targets: rows, bars and weights; the paper's own if None. A row without a bar does not count.
+        samples: instants a revolution of the exact solver.
+        paper_solver: the cost counts the paper's solver too, all rows but `ILL_CONDITIONED` and all demands
+            on its gaits. Only where the full system has the leg: link 9 at "F" and swing "crank".
+        walk: "walks", the sole goes back under load, or "brakes", the ground pushes back through stance.
+        stiffness, exponent: of Eq. 14 [N/m^n, -].
+        beta: Baumgarte's, of the paper's solver [1/s].
+
+    Attributes:
+        row_ids: the rows that `rows` gives, in order. demands: likewise of `plausibility`.
+
+    Raises:
+        ParameterError: a value out of range. HoofEnvError: the paper's solver for a variant that it lacks.
+    """
+
+    def __init__(
+        self,
+        choice: Choice,
+        targets: Targets | None = None,
+        *,
+        samples: int = 201,
+        paper_solver: bool = False,
+        walk: str = "walks",
+        stiffness: float = 2e4,
+        exponent: float = 1.5,
+        beta: float = math.sqrt(30),
+    ) -> None:
+        self._settings: dict[str, Any] = {
+            "choice": choice, "targets": targets, "samples": samples, "paper_solver": paper_solver,
+            "walk": walk, "stiffness": stiffness, "exponent": exponent, "beta": beta,
+        }  # fmt: skip
+        self.choice, self.paper_solver = choice, bool(paper_solver)
+        self.names = names(choice)
+        check_choice("walk", walk, WALK_DEMANDS)
+        if paper_solver:
+            self._check_simulable()
+        n = int(check_number("samples", samples, low=21, high=100_001))
+        self._law = (
+            check_number("stiffness", stiffness, low=0, exclusive_low=True),
+            check_number("exponent", exponent, low=1, high=3),
+        )
+        self._beta = check_number("beta", beta, low=0)
+        self._read_targets(load_targets() if targets is None else targets)
+        self._read_demands(walk)
+        self._build(n)
+
+    def _check_simulable(self) -> None:
+        if not self.choice.simulable:
+            raise HoofEnvError(
+                f"the paper's solver knows link 9 at 'F' and swing 'crank' only, got {self.choice.link9!r} "
+                f"and {self.choice.swing!r}"
+            )
+
+    def _read_targets(self, targets: Targets) -> None:
+        chosen = [
+            (row, weight)
+            for row, weight in zip(targets.rows, targets.weights, strict=True)
+            if row.bar.limit is not None
+        ]
+        if not chosen:
+            raise ParameterError("targets: expected at least one row with a bar")
+        self.row_ids = tuple(row.id for row, _ in chosen)
+        self._row = np.array([MEASURED.index(row.id.replace("ratio.", "both.")) for row, _ in chosen])
+        self._target = np.array([row.value for row, _ in chosen])
+        self._per_unit = np.array(
+            [row.bar.error(row.value + 1.0, row.value) / (row.bar.limit or 1.0) for row, _ in chosen]
+        )
+        self._weight = np.array([float(weight) for _, weight in chosen])
+        self._paper_weight = np.where(np.isin(self.row_ids, ILL_CONDITIONED), 0.0, self._weight)
+        self._errors = np.empty(len(chosen))
+
+    def _read_demands(self, walk: str) -> None:
+        all_demands = demands(walk)
+        self.demands = tuple(d.name for d in all_demands)
+        if self.paper_solver:
+            self.demands += tuple(f"paper.{d.name}" for d in all_demands[len(LEG_DEMANDS) :])
+        self._shortages = np.empty(len(self.demands))
+        columns = (
+            np.array([MEASURED.index(d.measured) for d in all_demands]),
+            np.array([float(d.sense) for d in all_demands]),
+            np.array([d.bound for d in all_demands]),
+            np.array([d.scale for d in all_demands]),
+        )
+        count, gaits = len(all_demands), slice(len(LEG_DEMANDS), None)
+        self._demand: tuple[Any, ...] = (*columns, self._shortages[:count])
+        self._paper_demand: tuple[Any, ...] = (*(c[gaits] for c in columns), self._shortages[count:])
+
+    def _build(self, n: int) -> None:
+        choice = self.choice
+        steps, sources = construction(choice)
+        points = len(POINTS) + (choice.link9 in ("6", "7"))
+        extras = {"6": 1, "7": 3}.get(choice.link9, 0)
+        corners = float(choice.travel), POINTS.index(choice.toe), POINTS.index(choice.heel)
+        values, gaits, ovals = np.zeros((len(steps), 7)), np.zeros((2, 4)), np.zeros((2, 2), np.complex128)
+        gaits[:, 0] = SPEED
+        self._exact, self._paper = _Measured(), _Measured()
+        self._exact_arguments: tuple[Any, ...] = (
+            np.array(choice.assembly, dtype=np.float64), steps, sources, extras,
+            choice.swing == "pivot", choice.swing == "oval", *corners, *self._law, values, gaits, ovals,
+            *np.zeros((2, points, n), np.complex128), *np.zeros((2, 2, n), np.complex128),
+            np.zeros(n), np.zeros((6, n)), *self._exact.records,
+        )  # fmt: skip
+        m = PAPER_SAMPLES
+        self._paper_arguments: tuple[Any, ...] = (
+            steps, values, gaits, *corners, *self._law, self._beta,
+            *np.zeros((2, len(BODIES), 3)), *np.zeros((2, 2, m), np.complex128),
+            np.zeros(m), np.zeros((6, m)), *self._paper.records[1:],
+        )  # fmt: skip
+
+    def __getstate__(self) -> dict[str, Any]:
+        return self._settings
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__init__(**state)  # type: ignore[misc]
+
+    def _measure(self, x: Array, paper: bool) -> None:
+        self._exact.flat[:] = np.nan
+        measure_exact(x, *self._exact_arguments)
+        if paper:
+            self._paper.flat[:] = np.nan
+            measure_paper(x, *self._paper_arguments)
+
+    def _rate_rows(self, measured: Array, weights: Array) -> float:
+        return rate_rows(measured, self._row, self._target, self._per_unit, weights, self._errors)
+
+    def _rate_demands(self) -> float:
+        cost = rate_demands(self._exact.flat, *self._demand)
+        if self.paper_solver:
+            cost += rate_demands(self._paper.flat, *self._paper_demand)
+        return cost
+
+    def cost(self, x: Array) -> float:
+        """Weighted cost of rows and demands; 0: every error within `DEAD_ZONE`, no shortage."""
+        self._measure(x, self.paper_solver)
+        cost = self._rate_rows(self._exact.flat, self._weight)
+        if self.paper_solver:
+            cost += self._rate_rows(self._paper.flat, self._paper_weight)
+        return cost + self._rate_demands()
+
+    def rows(self, x: Array) -> Array:
+        """Signed errors in bars, shape (rows,), with the exact solver; `MISSED_ROW` if there is no value."""
+        self._measure(check_vector(x, self.choice), False)
+        self._rate_rows(self._exact.flat, self._weight)
+        return self._errors.copy()
+
+    def paper_rows(self, x: Array) -> Array:
+        """The same with the paper's solver.
+
+        Raises:
+            HoofEnvError: a variant that the paper's solver lacks.
+        """
+        self._check_simulable()
+        self._measure(check_vector(x, self.choice), True)
+        self._rate_rows(self._paper.flat, self._paper_weight)
+        return self._errors.copy()
+
+    def plausibility(self, x: Array) -> Array:
+        """Shortages, shape (demands,), 0 where satisfied; those of the paper's solver last, if it counts."""
+        self._measure(check_vector(x, self.choice), self.paper_solver)
+        self._rate_demands()
+        return self._shortages.copy()
+
+    def measured(self, x: Array, *, paper_solver: bool = False) -> dict[str, float]:
+        """Every number of `plausibility.MEASURED` by name, NaN where there is none."""
+        if paper_solver:
+            self._check_simulable()
+        self._measure(check_vector(x, self.choice), paper_solver)
+        flat = (self._paper if paper_solver else self._exact).flat
+        return dict(zip(MEASURED, flat.tolist(), strict=True))
+
+    def report(self, x: Array) -> dict[str, Any]:
+        """Where a candidate stands, JSON-serialisable.
+
+        Returns:
+            cost; rows and, if it counts, paper_rows: errors in bars by id; plausibility: shortages above 0 by
+            name; within, of: rows within their bar among those that count; worst: id of the row furthest out,
+            "paper." before one of the paper's solver, and worst_error.
+        """
+        cost = self.cost(check_vector(x, self.choice))
+        rows = dict(zip(self.row_ids, self.rows(x).tolist(), strict=True))
+        result: dict[str, Any] = {"cost": cost, "rows": rows}
+        counted = dict(rows)
+        if self.paper_solver:
+            result["paper_rows"] = dict(zip(self.row_ids, self.paper_rows(x).tolist(), strict=True))
+            counted |= {f"paper.{k}": v for k, v in result["paper_rows"].items() if k not in ILL_CONDITIONED}
+        shortages = zip(self.demands, self.plausibility(x).tolist(), strict=True)
+        result["plausibility"] = {name: shortage for name, shortage in shortages if shortage > 0}
+        worst = max(counted, key=lambda name: abs(counted[name]))
+        within = sum(abs(error) <= 1 for error in counted.values())
+        return {**result, "within": within, "of": len(counted), "worst": worst, "worst_error": counted[worst]}
