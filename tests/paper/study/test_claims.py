@@ -1,0 +1,167 @@
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+
+from hoof_env.ground.normal_force import restitution_of_factor
+from hoof_env.paper.reproduce import SOLVERS
+from hoof_env.paper.study.case import Case
+from hoof_env.paper.study.claim import (
+    CONFIRMED,
+    CONTRADICTED,
+    PUBLISHED,
+    READING,
+    SOLVER,
+    STATUSES,
+    UNTESTABLE,
+    Examined,
+    Finding,
+)
+from hoof_env.paper.study.claims import examine_claims
+from hoof_env.paper.study.claims_force import free_impact_peak
+from hoof_env.paper.study.claims_motion import slip_speed
+from hoof_env.paper.study.claims_peaks import peak_times
+
+
+@pytest.fixture(scope="module")
+def case(reproduction):
+    return Case.of(reproduction)
+
+
+@pytest.fixture(scope="module")
+def section(reproduction):
+    return examine_claims(None, lambda line: None, reproduction)
+
+
+@pytest.fixture(scope="module")
+def found(section):
+    return {claim["id"]: claim for claim in section.data["claims"]}
+
+
+def examined(*verdicts):
+    """A claim with these (reading, source, holds)."""
+    return Examined("id", "quote", "section 3", "", tuple(Finding(*v, "evidence") for v in verdicts))
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "status"),
+    [
+        ([("a", "paper", True), ("a", "exact", True), ("b", PUBLISHED, True)], CONFIRMED),
+        ([("a", "paper", False), ("a", "exact", False)], CONTRADICTED),
+        ([("a", "paper", True), ("b", "paper", False)], READING),
+        ([("a", "paper", True), ("a", "exact", False)], SOLVER),
+        ([("a", "paper", None)], UNTESTABLE),
+        ([("a", "paper", None), ("b", "paper", True)], CONFIRMED),
+    ],
+)
+def test_a_status_needs_every_reading_and_source(verdicts, status):
+    assert examined(*verdicts).status == status
+
+
+def test_every_shape_of_the_paper_is_among_the_claims(reproduction, found):
+    """The verdicts are those of `judge`, taken over and not made again."""
+    evidence = {f["evidence"]: f["holds"] for claim in found.values() for f in claim["findings"]}
+    for shape in reproduction.shapes:
+        if shape["id"] not in ("walk.walks", "run.peaks"):  # not the paper's; taken apart into count and gap
+            assert evidence[shape["evidence"]] == shape["holds"], shape["id"]
+    peaks = [found[name]["findings"] for name in ("run.peaks", "run.delay")]
+    for shape in (s for s in reproduction.shapes if s["id"] == "run.peaks"):
+        parts = [next(f["holds"] for f in findings if f["source"] == shape["solver"]) for findings in peaks]
+        assert all(parts) == shape["holds"]
+
+
+def test_both_solvers_speak_wherever_the_leg_is_asked(found):
+    for claim in found.values():
+        for reading in {f["reading"] for f in claim["findings"]}:
+            sources = {f["source"] for f in claim["findings"] if f["reading"] == reading}
+            assert not sources & set(SOLVERS) or set(SOLVERS) <= sources, (claim["id"], reading)
+
+
+def test_what_was_asked_for_is_marked_and_what_was_only_reported_is_not(case, found):
+    assert case.asked("walk.order", "walk.direction", "walk.angle_variation", "walk.peak_elastic") == (
+        "walk.order",
+        "walk.peak_elastic",
+    )
+    assert found["walk.direction"]["asked"] == []
+    assert found["stiffness"]["asked"] == []
+    assert found["run.delay"]["asked"] == ["run.peaks"]
+
+
+def test_damping_lowers_the_peak_of_a_free_mass():
+    """Against energy (an elastic law stops the mass at d^2.5 = 1.25) and the law's known restitution."""
+    assert free_impact_peak(0.0) == 1.0
+    elastic = (2.5 / 2) ** (1.5 / 2.5)
+    depth, rate, top, h = 0.0, 1.0, 0.0, 1e-3
+    for _ in range(4000):  # midpoint rule, once more from the equation of motion
+
+        def force(depth, rate):
+            return max(depth, 0.0) ** 1.5 * (1 + 0.75 * rate)
+
+        middle = depth + h / 2 * rate, rate - h / 2 * force(depth, rate)
+        depth, rate = depth + h * middle[1], rate - h * force(*middle)
+        top = max(top, force(depth, rate))
+    assert rate == pytest.approx(-restitution_of_factor(0.75), abs=1e-3)
+    assert free_impact_peak(0.75) == pytest.approx(top / elastic, abs=1e-3)
+    assert free_impact_peak(0.75) < 1
+
+
+def test_under_prescribed_motion_the_damper_adds_force_and_brings_the_peak_forward(case, found):
+    """Where the hoof sinks Eq. 14 grows with 1 - cr^2, and the highest force moves towards touch-down."""
+    assert not any(
+        f["holds"]
+        for f in found["reduction"]["findings"]
+        if f["reading"].startswith("the damping of the contact")
+    )
+    times = list(peak_times(case, "run", "exact").values())
+    assert times == sorted(times, reverse=True)
+    trace = case.trace("run", "exact")
+    assert times[0] == trace["t"][np.argmax(trace["normal"])]
+
+
+def test_the_best_trunk_speed_cannot_be_beaten(case):
+    for gait in ("walk", "run"):
+        trace = case.trace(gait, "exact")
+        speed, slides = slip_speed(trace)
+        load = np.concatenate([trace["toe_normal"], trace["heel_normal"]])
+        velocity = np.concatenate([trace["toe_vx"], trace["heel_vx"]])
+        for other in speed + np.array([-0.5, -0.05, 0.05, 0.5]):
+            assert np.sum(load * abs(velocity + other)) / load.sum() > slides
+
+
+def test_verdicts_follow_the_traces(reproduction):
+    """A run whose friction is turned round brakes, and the verdicts say so."""
+    traces = {key: trace.copy() for key, trace in reproduction.traces.items()}
+    for key in traces:
+        traces[key]["friction"] *= -1
+    turned = dataclasses.replace(reproduction, traces=traces)
+    claims = {c["id"]: c for c in examine_claims(None, lambda line: None, turned).data["claims"]}
+    reading = "force of the ground on the leg, forward in both halves of stance"
+    holds = {f["holds"] for f in claims["run.direction"]["findings"] if f["reading"] == reading}
+    assert holds == {False}
+
+
+def test_weights_come_from_the_print(found, reproduction):
+    finding = next(f for f in found["body.weight"]["findings"] if f["source"] == PUBLISHED)
+    walk, run = (reproduction.published.row(f"{gait}.mean_elastic").value for gait in ("walk", "run"))
+    assert f"{walk / 9.81:.1f} kg" in finding["evidence"]
+    assert f"{run / 9.81:.0f} kg" in finding["evidence"]
+    assert finding["holds"] is False
+
+
+def test_the_page_has_every_claim_reading_and_the_counts(section, found):
+    lead = section.markdown.split("\n")[0].lower()
+    for status in STATUSES:
+        assert f"{status}: {sum(claim['status'] == status for claim in found.values())}" in lead
+    for claim in found.values():
+        assert f"| `{claim['id']}` |" in section.markdown
+        assert claim["quote"] in section.markdown
+        assert all(f["reading"][1:] in section.markdown for f in claim["findings"])
+    json.dumps(section.data, allow_nan=False)
+
+
+def test_figures_are_drawn_and_named_in_the_text(section):
+    pytest.importorskip("matplotlib")
+    for name, draw in section.figures.items():
+        assert f"({name}.png)" in section.markdown
+        assert all(ax.get_xlabel() or ax.get_title() for ax in draw().axes)
