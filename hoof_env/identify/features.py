@@ -49,6 +49,9 @@ CHI, MU, SLOW, FAST, FLOOR = 0.75, 0.4, 1e-3, 1e-2, 1e-4
 """The paper preset of `hoof_env.ground`: Lankarani-Nikravesh's factor at cr = 0, friction and its two speeds
 [m/s], smallest approach speed [m/s]."""
 
+NEAR_TOP = 0.9
+"""A maximum of the samples from this part of the highest may be the highest between samples [-]."""
+
 EL, INEL, PUSH_EL, PUSH_INEL, TOE_IN, HEEL_IN = range(6)
 """Rows of the scratch array of `measure_gait`: forces [N], and approach speeds [m/s], 0 in the air."""
 
@@ -111,28 +114,52 @@ def force_within(at, velocity, height, h, approach, stiffness, exponent, chi, k,
 
 
 @kernel
-def peak(at, velocity, height, h, approach, stiffness, exponent, chi, force, sampled):  # type: ignore[no-untyped-def]
-    """Highest force [N] and when [s]: of the samples, or found between them on eighths and a parabola."""
-    n, parts = force.shape[0], 8
-    top = np.argmax(force)
-    if sampled or top == 0 or top == n - 1:
-        return force[top], top * h
-    best, where = 0, -1.0
+def refine(at, velocity, height, h, approach, stiffness, exponent, chi, top):  # type: ignore[no-untyped-def]
+    """Highest force [N] within a sample of the one at `top`, and when [s]: on eighths and a parabola."""
+    parts, best = 8, 0
     around = np.empty(2 * parts + 1)
     for j in range(2 * parts + 1):
         k = top - 1 if j < parts else top
         s = (j - parts * (k - top + 1)) / parts
         around[j] = force_within(at, velocity, height, h, approach, stiffness, exponent, chi, k, s)
-        if around[j] > where:
-            best, where = j, around[j]
-    t = (top - 1 + best / parts) * h
-    if best == 0 or best == 2 * parts:
-        return where, t
-    a, b, c = around[best - 1], around[best], around[best + 1]
-    bend = a - 2 * b + c
-    if bend >= 0.0:
-        return where, t
-    return b - (a - c) ** 2 / (8 * bend), t + 0.5 * (a - c) / bend * h / parts
+        if around[j] > around[best]:
+            best = j
+    force, t = around[best], (top - 1 + best / parts) * h
+    if 0 < best < 2 * parts:
+        a, b, c = around[best - 1], around[best], around[best + 1]
+        bend = a - 2 * b + c
+        if bend < 0.0:
+            force, t = b - (a - c) ** 2 / (8 * bend), t + 0.5 * (a - c) / bend * h / parts
+    return force, t
+
+
+@kernel
+def peak(at, velocity, height, h, approach, stiffness, exponent, chi, force, sampled):  # type: ignore[no-untyped-def]
+    """Highest force [N] and when [s]: of the samples, or found between them around each maximum near it."""
+    top = np.argmax(force)
+    highest, when = force[top], top * h
+    if sampled:
+        return highest, when
+    enough = NEAR_TOP * highest
+    for k in range(1, force.shape[0] - 1):
+        if force[k] >= enough and force[k] >= force[k - 1] and force[k] >= force[k + 1]:
+            found, t = refine(at, velocity, height, h, approach, stiffness, exponent, chi, k)
+            if found > highest:
+                highest, when = found, t
+    return highest, when
+
+
+@kernel
+def average(at, velocity, height, h, approach, stiffness, exponent, chi, force, sampled):  # type: ignore[no-untyped-def]
+    """Mean force over the cycle [N]: of the samples, or by Simpson's rule with the middle of each."""
+    n, nodes = force.shape[0], 0.5 * (force[0] + force[-1]) + force[1:-1].sum()
+    if sampled:
+        return nodes / (n - 1)
+    middles = 0.0
+    for k in range(n - 1):
+        if force[k] > 0.0 or force[k + 1] > 0.0:
+            middles += force_within(at, velocity, height, h, approach, stiffness, exponent, chi, k, 0.5)
+    return (nodes + 2.0 * middles) / (3.0 * (n - 1))
 
 
 @kernel
@@ -174,17 +201,18 @@ def prominences(force):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def between(row, x):  # type: ignore[no-untyped-def]
-    """Linear interpolation in a row of samples at the fractional index x."""
-    k = int(x)
-    return row[k] + (x - k) * (row[k + 1] - row[k])
+def place(at, velocity, h, t):  # type: ignore[no-untyped-def]
+    """Toe and heel at the time t [s], complex [m], by the cubic."""
+    k = min(max(int(t / h), 0), at.shape[1] - 2)
+    toe, _ = cubic(at[0, k], at[0, k + 1], velocity[0, k], velocity[0, k + 1], h, t / h - k)
+    heel, _ = cubic(at[1, k], at[1, k + 1], velocity[1, k], velocity[1, k + 1], h, t / h - k)
+    return toe, heel
 
 
 @kernel
-def hoof_angle(at, x):  # type: ignore[no-untyped-def]
-    """Hoof angle [deg], heel up positive, at the fractional sample x."""
-    arm = between(at[1], x) - between(at[0], x)
-    return np.degrees(np.arctan2(arm.imag, -arm.real))
+def hoof_angle(toe, heel):  # type: ignore[no-untyped-def]
+    """Hoof angle [deg], heel up positive."""
+    return np.degrees(np.arctan2((heel - toe).imag, (toe - heel).real))
 
 
 @kernel
@@ -283,35 +311,35 @@ def measure_gait(at, velocity, ankle, height, speed, sampled, stiffness, exponen
             enter[i], leave[i] = enter[1 - i], leave[1 - i]
     out.contact_start, out.contact_end, out.duty = start, end, (end - start) / (h * (n - 1))
     out.toe_after_heel_in, out.toe_after_heel_out = enter[0] - enter[1], leave[0] - leave[1]
-    x0, x1 = start / h, min(end / h, n - 1.001)
-    out.angle_contact, out.angle_liftoff = hoof_angle(at, x0), hoof_angle(at, x1)
+    toe_in, heel_in = place(at, velocity, h, start)
+    toe_out, heel_out = place(at, velocity, h, end)
+    out.angle_contact, out.angle_liftoff = hoof_angle(toe_in, heel_in), hoof_angle(toe_out, heel_out)
+    out.step = 0.5 * (toe_in + heel_in - toe_out - heel_out).real
+    out.heel_gap = heel_out.imag + height
     out.angle_variation = out.angle_liftoff - out.angle_contact
     double, until = enter.max(), leave.min()
-    out.angle_flat = hoof_angle(at, min(max(0.5 * (double + until) / h, 0.0), n - 1.001))
+    toe_flat, heel_flat = place(at, velocity, h, 0.5 * (double + until))
+    out.angle_flat = hoof_angle(toe_flat, heel_flat)
     out.flattest, before = 180.0, 0.0
     for k in range(int(double / h) + 1, min(int(until / h) + 1, n)):
-        angle = hoof_angle(at, min(float(k), n - 1.001))
+        angle = hoof_angle(at[0, k], at[1, k])
         out.flattest = 0.0 if angle * before < 0.0 else min(out.flattest, abs(angle))
         before = angle
-    limit = work[TOE_IN:]
-    out.peak_elastic, when = peak(at, velocity, height, h, limit, stiffness, exponent, 0.0, work[EL], sampled)
-    out.peak_inelastic, sooner = peak(
-        at, velocity, height, h, limit, stiffness, exponent, CHI, work[INEL], sampled
-    )
-    out.peak_gap = when - sooner
+    fast, el, inel = work[TOE_IN:], work[EL], work[INEL]
+    out.peak_elastic, later = peak(at, velocity, height, h, fast, stiffness, exponent, 0.0, el, sampled)
+    out.peak_inelastic, sooner = peak(at, velocity, height, h, fast, stiffness, exponent, CHI, inel, sampled)
+    out.mean_elastic = average(at, velocity, height, h, fast, stiffness, exponent, 0.0, el, sampled)
+    out.mean_inelastic = average(at, velocity, height, h, fast, stiffness, exponent, CHI, inel, sampled)
+    out.peak_gap = later - sooner
     out.reduction = 100.0 * (out.peak_inelastic - out.peak_elastic) / max(out.peak_inelastic, 1e-9)
-    out.mean_elastic, out.mean_inelastic = work[EL].sum() / (n - 1), work[INEL].sum() / (n - 1)
     out.resultant_elastic, out.resultant_inelastic, out.ankle = 0.0, 0.0, np.inf
     for k in range(n):
         out.resultant_elastic = max(out.resultant_elastic, np.hypot(work[EL, k], work[PUSH_EL, k]))
         out.resultant_inelastic = max(out.resultant_inelastic, np.hypot(work[INEL, k], work[PUSH_INEL, k]))
-        if x0 <= k <= x1:
+        if start <= k * h <= end:
             out.ankle = min(out.ankle, ankle[k] - max(at[0, k].imag, at[1, k].imag))
     measure_halves(at, height, h, start, end, work, out)
-    sole = between(at[0], x0) + between(at[1], x0) - between(at[0], x1) - between(at[1], x1)
-    out.step = 0.5 * sole.real
     out.swept_0 = swept_load(at, velocity, height, exponent)
     out.swept_5 = swept_load(at, velocity, height - 0.05, exponent)
     out.swept_10 = swept_load(at, velocity, height - 0.1, exponent)
-    out.heel_gap = between(at[1], x1).imag + height
     return True
