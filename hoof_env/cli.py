@@ -9,6 +9,7 @@ import shlex
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Literal
 
 from hoof_env.errors import HoofEnvError
 
@@ -41,6 +42,41 @@ def reproduce(out: Path, figures: bool = True, preset: str | None = None) -> Non
     _say(f"{len(paths)} files written; read {out / 'reproduction.md'} first")
 
 
+def identify(
+    out: Path,
+    start: str = "first_fit",
+    seed: int = 0,
+    targets: Path | None = None,
+    walk: Literal["walks", "brakes"] = "walks",
+    workers: int = 2,
+    budget: int | None = None,
+    resume: bool = False,
+    keep_going: bool = False,
+) -> None:
+    """Search for the leg, the ground level and the gaits that the paper does not print (needs 'identify').
+
+    Ends at the first leg that meets every bar with both solvers, or when the budget is spent.
+
+    Args:
+        out: folder for identified.json (a preset), identify.json and identify.md; made if need be.
+        start: where to search: around a preset (a name or a JSON file), or "cold" for anywhere.
+        seed: the same seed and options find the same leg, with any number of workers.
+        targets: JSON file of the rows to meet, as published.json, each with an optional weight.
+        walk: a walk that moves its animal, or one that brakes through its stance (figure 6 read literally).
+        workers: processes.
+        budget: evaluations at most; one with the paper's solver counts for several.
+        resume: go on with a search in this folder that was interrupted or killed.
+        keep_going: spend the whole budget, to count how many starts meet the bar.
+    """
+    from hoof_env.identify.command import identify
+
+    paths = identify(
+        out, _say, start=start, seed=seed, targets=targets, walk=walk, workers=workers, budget=budget,
+        resume=resume, keep_going=keep_going,
+    )  # fmt: skip
+    _say(f"{len(paths)} files written; read {out / 'identify.md'} first")
+
+
 def trunks() -> None:
     """Measure how the scripted walk and run move a rail and differently suspended trunks; prints a table."""
     from hoof_env.envs.trunk_study import study
@@ -48,7 +84,11 @@ def trunks() -> None:
     study(_say)
 
 
-COMMANDS: dict[str, Callable[..., None]] = {"reproduce": reproduce, "trunks": trunks}
+COMMANDS: dict[str, Callable[..., None]] = {
+    "reproduce": reproduce,
+    "identify": identify,
+    "trunks": trunks,
+}
 
 
 def _say(line: str) -> None:

@@ -55,7 +55,8 @@ def load_targets(path: Path | str | None = None) -> Targets:
     if not isinstance(entries, list) or not entries:
         raise DataFileError(f"{file}: expected an object with a list 'rows' of at least one row")
     known = {row.id: row for row in load_published().rows}
-    rows, weights = [], []
+    rows: list[PublishedRow] = []
+    weights: list[float] = []
     for number, entry in enumerate(entries, 1):
         try:
             rows.append(_read(entry, known, {row.id for row in rows}))
@@ -114,9 +115,10 @@ def _contradictions(rows: dict[str, PublishedRow]) -> Iterator[str]:
             (a_low, a_high), (b_low, b_high) = map(_range, barred)
             low, high = (_COMBINED[name](a, b) for a, b in ((a_high, b_low), (a_low, b_high)))
             if not low - row.bar.limit <= row.value <= high + row.bar.limit:
+                given = " and ".join(source.id for source in barred)
                 yield (
-                    f"row {row.id}: got {row.value:g} +- {row.bar_text}, but {' and '.join(s.id for s in barred)}"
-                    f" with their bars leave {low:.4g} to {high:.4g}"
+                    f"row {row.id}: got {row.value:g} with bar {row.bar_text}, but {given} with their bars "
+                    f"leave {low:.4g} to {high:.4g}"
                 )
 
 

@@ -1,0 +1,76 @@
+"""The judge of a search: the full system, every row and every claim, with both solvers."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from hoof_env.identify.objective import ILL_CONDITIONED
+from hoof_env.identify.targets import Targets
+from hoof_env.paper.measure import measure_stance
+from hoof_env.paper.published import Published
+from hoof_env.paper.reproduce import SOLVERS, Reproduction, reproduce
+from hoof_env.paper.rows import compare
+
+GIVEN_UP: Mapping[str, tuple[str, ...]] = {"walks": ("walk.direction",), "brakes": ("walk.walks",)}
+"""The claim that each reading of the walk gives up: a hoof that slides forward brakes and does not walk."""
+
+
+@dataclass(frozen=True)
+class Confirmation:
+    """What the full system says of a preset.
+
+    Attributes:
+        reproduction: as `hoof_env.paper.reproduce` returns it, its rows compared with the targets.
+        outside: (id, solver) of the rows outside their bars that are required; `shown` of those that are not.
+        untrue: (id, solver) of the required claims that do not hold.
+    """
+
+    reproduction: Reproduction
+    outside: tuple[tuple[str, str], ...]
+    shown: tuple[tuple[str, str], ...]
+    untrue: tuple[tuple[str, str], ...]
+
+    @property
+    def holds(self) -> bool:
+        return not self.outside and not self.untrue
+
+    def within(self, solver: str) -> tuple[int, int]:
+        """Rows within their bars, and rows that have one, with a solver."""
+        judged = [r["within_bar"] for r in self.reproduction.rows if r["solver"] == solver]
+        return judged.count(True), len(judged) - judged.count(None)
+
+
+def confirm(preset: Mapping[str, Any], targets: Targets, walk: str) -> Confirmation:
+    """Run a preset through the full system.
+
+    Args:
+        preset: content of a preset file. targets: what its rows are compared with.
+        walk: "walks" or "brakes".
+
+    Raises:
+        HoofEnvError: the leg does not turn, or its simulation stops.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "identified.json"
+        path.write_text(json.dumps(preset), encoding="utf-8")
+        run = reproduce(preset=str(path))
+    aims: Published = replace(run.published, rows=targets.rows)
+    rows: list[dict[str, Any]] = []
+    for solver in SOLVERS:
+        stances = {key[:2]: measure_stance(trace) for key, trace in run.traces.items() if key[2] == solver}
+        rows += compare(aims, stances, solver)
+    out = [(row["id"], row["solver"]) for row in rows if row["within_bar"] is False]
+    required = [(name, solver) for name, solver in out if not (solver == "paper" and name in ILL_CONDITIONED)]
+    untrue = [
+        (claim["id"], claim["solver"])
+        for claim in run.shapes
+        if not claim["holds"] and claim["id"] not in GIVEN_UP[walk]
+    ]
+    result = replace(run, rows=rows, published=aims, geometry=run.geometry.replace(name="identified"))
+    shown = tuple(pair for pair in out if pair not in required)
+    return Confirmation(result, tuple(required), shown, tuple(untrue))
