@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hoof_env._output import staged
 from hoof_env.errors import HoofEnvError
-from hoof_env.paper.figure_force import draw_forces, draw_vectors
+from hoof_env.paper.figure_angles import draw_angles
+from hoof_env.paper.figure_forces import draw_forces
 from hoof_env.paper.figure_mechanism import draw_mechanism
-from hoof_env.paper.figure_motion import draw_angles, draw_paths
-from hoof_env.paper.figure_style import STYLE
+from hoof_env.paper.figure_paths import draw_paths
+from hoof_env.paper.figure_style import PRINT
+from hoof_env.paper.figure_vectors import draw_vectors
 
 if TYPE_CHECKING:
+    from hoof_env.paper.figure_ensemble import EnsembleCurves
     from hoof_env.paper.reproduce import Reproduction
 
 
@@ -27,30 +31,46 @@ def check_matplotlib() -> None:
         ) from None
 
 
-def draw_all(reproduction: Reproduction, out_dir: Path | str) -> list[Path]:
-    """Draw figures 1 and 3 to 6 as PNG and SVG; returns the paths of the files.
+def draw_all(
+    reproduction: Reproduction, folder: Path | str, ensemble: EnsembleCurves | None = None
+) -> list[Path]:
+    """Draw figures 1 and 3 to 6 as PNG and SVG, the same bytes for the same reproduction.
+
+    Args:
+        reproduction: what to draw.
+        folder: made if need be.
+        ensemble: figures 3 and 5 show the range of its members too.
+
+    Returns:
+        The paths of the files.
 
     Raises:
         HoofEnvError: matplotlib is missing. OutputError: the folder cannot be written.
     """
     check_matplotlib()
-    import matplotlib
+    from matplotlib import style
     from matplotlib.figure import Figure
 
-    out_dir = Path(out_dir)
+    folder = Path(folder)
     drawings: dict[str, Callable[[Any, Reproduction], None]] = {
         "figure1": draw_mechanism,
-        "figure3": draw_paths,
+        "figure3": partial(draw_paths, ensemble=ensemble),
         "figure4": draw_angles,
-        "figure5": draw_forces,
+        "figure5": partial(draw_forces, ensemble=ensemble),
         "figure6": draw_vectors,
     }
     paths = []
-    with staged(out_dir) as stage, matplotlib.rc_context(STYLE):
+    with staged(folder) as stage, style.context(["default", PRINT]):
         for name, draw in drawings.items():
-            figure = Figure(layout="constrained")
+            figure = Figure()
             draw(figure, reproduction)
-            for suffix, metadata in (("png", {}), ("svg", {"Date": None})):
-                figure.savefig(stage / f"{name}.{suffix}", metadata=metadata)
-                paths.append(out_dir / f"{name}.{suffix}")
+            paths += [folder / file.name for file in save(figure, stage / name)]
     return paths
+
+
+def save(figure: Any, path: Path) -> list[Path]:
+    """Save a figure as `path` with suffixes .png and .svg, without the date; returns the two paths."""
+    files = [path.with_suffix(suffix) for suffix in (".png", ".svg")]
+    for file, metadata in zip(files, ({}, {"Date": None}), strict=True):
+        figure.savefig(file, metadata=metadata)
+    return files

@@ -48,7 +48,8 @@ def markdown(reproduction: Reproduction, *, command: str, figures: bool) -> str:
         _definitions(reproduction, solvers[0]),
     ]
     if figures:
-        parts += ["## Figures", *(f"![{name}]({name}.png)" for name in _figure_names())]
+        shown = [f"![{name}]({name}.png)\n[{name}.svg]({name}.svg)" for name in _figure_names()]
+        parts += ["## Figures", *shown]
     return "\n\n".join(parts) + "\n"
 
 

@@ -1,42 +1,121 @@
+import dataclasses
 import sys
+from itertools import combinations
 
 import numpy as np
 import pytest
 
-from hoof_env.errors import HoofEnvError
+from hoof_env.errors import HoofEnvError, ParameterError
 from hoof_env.leg.linkage import BODIES, POINTS
 from hoof_env.paper import figures
-from hoof_env.paper.figure_force import draw_forces, draw_vectors
+from hoof_env.paper.figure_angles import draw_angles
+from hoof_env.paper.figure_ensemble import EnsembleCurves
+from hoof_env.paper.figure_forces import draw_forces
+from hoof_env.paper.figure_labels import spread
 from hoof_env.paper.figure_mechanism import draw_mechanism
-from hoof_env.paper.figure_motion import draw_angles, draw_paths
-from hoof_env.paper.figure_style import points_at
+from hoof_env.paper.figure_paths import draw_paths
+from hoof_env.paper.figure_phases import sub_phases
+from hoof_env.paper.figure_style import PRINT, SOLVER, points_at
+from hoof_env.paper.figure_vectors import draw_vectors
+from hoof_env.paper.measure import measure_stance
+from hoof_env.paper.reproduce import run_cycle
 
 Figure = pytest.importorskip("matplotlib.figure").Figure
 
+DRAWINGS = (draw_mechanism, draw_paths, draw_angles, draw_forces, draw_vectors)
+
 
 @pytest.fixture
-def drawn(reproduction):
-    def draw(function):
-        figure = Figure(layout="constrained")
-        function(figure, reproduction)
+def draw(reproduction):
+    """Draws a figure in the style of print, of the session's reproduction unless told another."""
+    from matplotlib import style
+
+    def draw(function, which=reproduction, **settings):
+        figure = Figure()
+        with style.context(["default", PRINT]):
+            function(figure, which, **settings)
+            figure.draw_without_rendering()
         return figure
 
     return draw
 
 
-def test_all_figures_are_written_as_png_and_svg(reproduction, tmp_path):
-    paths = figures.draw_all(reproduction, tmp_path)
-    assert sorted(paths) == sorted(tmp_path.iterdir())
-    assert {path.name for path in paths} == {
-        f"figure{n}.{s}" for n in (1, 3, 4, 5, 6) for s in ("png", "svg")
+@pytest.fixture(scope="module")
+def ensemble(reproduction):
+    """Three members: the leg itself, one stronger and ahead of it, one weaker, behind and higher."""
+    time = np.linspace(0, 1, 501)
+
+    def sampled(trace, values):
+        return np.interp(time, trace["t"], values)
+
+    normal, path = {}, {}
+    for (gait, condition, solver), trace in reproduction.traces.items():
+        if solver == SOLVER:
+            force = sampled(trace, trace["normal"])
+            normal[gait, condition] = np.array([force, 1.1 * force, 0.8 * force])
+            x = sampled(trace, (trace["toe_x"] + trace["heel_x"]) / 2)
+            y = sampled(trace, -(trace["toe_penetration"] + trace["heel_penetration"]) / 2 - trace["trunk_y"])
+            path[gait] = x + 1j * y + np.array([[0], [0.03], [-0.02 + 0.01j]])
+    return EnsembleCurves(time, normal, path)
+
+
+def marks(ax):
+    """Published values on some axes, as {(x, y)}."""
+    return {
+        (round(float(x), 4), round(float(y), 4))
+        for line in ax.lines
+        if line.get_marker() == "D"
+        for x, y in line.get_xydata()
     }
-    for path in paths:
-        start = path.read_bytes()[:200]
-        assert start.startswith(b"\x89PNG") or b"<?xml" in start
 
 
-def test_figure_1_names_every_point_and_numbers_every_link(drawn):
-    whole = drawn(draw_mechanism).axes[0]
+def half_bars(ax):
+    """Half lengths of the bars on some axes, by the middle of the bar."""
+    bars = {}
+    for container in ax.containers:
+        for segment in (s for lines in container.lines[2] for s in lines.get_segments()):
+            (x0, y0), (x1, y1) = segment
+            bars[round((x0 + x1) / 2, 4), round((y0 + y1) / 2, 4)] = max(x1 - x0, y1 - y0) / 2
+    return bars
+
+
+def spans(ax):
+    """Intervals that are shaded over the whole height of some axes, in order, those of one point alone or
+    of both, not the ground."""
+    from matplotlib.patches import Rectangle
+
+    upright = [p for p in ax.patches if isinstance(p, Rectangle) and p.get_height() == 1 and p.get_y() == 0]
+    return sorted((p.get_x(), p.get_x() + p.get_width()) for p in upright)
+
+
+def value(reproduction, row):
+    return reproduction.published.row(row).value
+
+
+def test_every_figure_is_written_twice_and_again_without_a_difference(reproduction, tmp_path):
+    import matplotlib
+    from PIL import Image
+
+    folders = tmp_path / "one", tmp_path / "two"
+    own = {"lines.linewidth": 7, "savefig.bbox": "tight", "axes.grid": True}  # a user's, without effect
+    for folder, settings in zip(folders, ({}, own), strict=True):
+        with matplotlib.rc_context(settings):
+            paths = figures.draw_all(reproduction, folder)
+        assert sorted(paths) == sorted(folder.iterdir())
+    names = {f"figure{n}.{s}" for n in (1, 3, 4, 5, 6) for s in ("png", "svg")}
+    assert {path.name for path in paths} == names
+    for name in names:
+        assert (folders[0] / name).read_bytes() == (folders[1] / name).read_bytes(), name
+        if name.endswith("png"):
+            with Image.open(folders[0] / name) as picture:
+                assert picture.width >= 175 / 25.4 * 200, name  # two columns at 200 dots an inch
+        else:
+            text = (folders[0] / name).read_text(encoding="utf-8")
+            assert f">Identified leg, not published (preset {reproduction.geometry.name}" in text, name
+
+
+def test_figure_1_names_every_point_and_numbers_every_link(draw):
+    whole = draw(draw_mechanism).axes[0]
     texts = [text.get_text() for text in whole.texts]
     assert {str(n) for n in range(1, len(BODIES) + 1)} <= set(texts)
     assert {text.split(" = ")[0] for text in texts} >= set(POINTS)
@@ -52,33 +131,182 @@ def test_a_drawn_leg_stands_where_the_simulation_had_its_hoof(reproduction):
         np.testing.assert_allclose(at[geometry.heel], (row["heel_x"], -row["heel_penetration"]), atol=1e-12)
 
 
-def test_figures_4_and_5_mark_the_published_numbers(drawn, reproduction):
-    published = reproduction.published
+def test_figure_3_marks_the_paths_at_the_published_contact_times(draw, reproduction):
+    axes = draw(draw_paths).axes
+    for gait, pair in (("walk", axes[:2]), ("run", axes[2:])):
+        trace = reproduction.traces[gait, "elastic", SOLVER]
+        stance = measure_stance(trace)
+        expected = set()
+        for row, points in (("contact_start", stance.first_points), ("contact_end", stance.last_points)):
+            at = trace[np.argmin(np.abs(trace["t"] - value(reproduction, f"{gait}.{row}")))]
+            expected |= {
+                (round(float(at[f"{name}_x"]), 4), round(float(-at[f"{name}_penetration"]), 4))
+                for name in points
+            }
+        for ax in pair:
+            np.testing.assert_allclose(sorted(marks(ax)), sorted(expected), atol=2e-4)
 
-    def marks(ax):
-        return {
-            (round(float(x), 4), float(y))
-            for line in ax.lines
-            if line.get_marker() == "D"
-            for x, y in line.get_xydata()
-        }
 
-    walk, run = drawn(draw_angles).axes[2:]
+def test_figure_4_marks_published_angles_with_their_bars(draw):
+    walk, run = (ax for ax in draw(draw_angles).axes if marks(ax))
     assert {(0.267, -6.83), (0.569, 20.9)} <= marks(walk)
+    assert -0.23 in {y for _, y in marks(walk)}
     assert marks(run) == {(0.208, 6.2), (0.478, 71.08)}
-    for ax, gait in zip(drawn(draw_forces).axes, ("walk", "run"), strict=True):
-        expected = {published.row(f"{gait}.peak_{c}").value for c in ("elastic", "inelastic")}
-        assert {y for _, y in marks(ax)} == expected
+    bars = {round(y, 2): half for (_, y), half in half_bars(walk).items()}
+    assert bars == pytest.approx({-6.83: 1, -0.23: 3, 20.9: 1})
 
 
-def test_every_axis_with_numbers_has_a_unit(drawn):
-    for function in (draw_mechanism, draw_paths, draw_angles, draw_forces, draw_vectors):
-        for ax in drawn(function).axes:
-            labels = ax.get_xlabel() + ax.get_ylabel()
-            bare = not ax.axison or not (
-                len(ax.get_xticklabels()) and any(t.get_text() for t in ax.get_xticklabels())
-            )
-            assert bare or "[" in labels, (function.__name__, labels)
+def test_figure_5_marks_published_forces_and_contact_times_with_their_bars(draw, reproduction):
+    axes = [ax for ax in draw(draw_forces).axes if marks(ax)]
+    for gait, (forces, means) in (("walk", axes[:2]), ("run", axes[2:])):
+        peaks = [value(reproduction, f"{gait}.peak_{c}") for c in ("elastic", "inelastic")]
+        times = [value(reproduction, f"{gait}.contact_{c}") for c in ("start", "end")]
+        assert {y for _, y in marks(forces)} == {*peaks, 0}
+        assert {x for x, y in marks(forces) if y == 0} == set(times)
+        expected = [value(reproduction, f"{gait}.mean_{c}") for c in ("elastic", "inelastic")]
+        assert [y for _, y in sorted(marks(means))] == expected
+        bars = half_bars(forces) | half_bars(means)
+        for (_, y), half in bars.items():
+            assert half == pytest.approx(0.02 * y if y else 0.005)
+        assert len(bars) == 6
+
+
+def test_shaded_sub_phases_are_the_measured_contacts(draw, reproduction):
+    for function in (draw_angles, draw_forces):
+        axes = draw(function).axes
+        for gait, first in (("walk", 0), ("run", len(axes) // 2)):
+            stance = measure_stance(reproduction.traces[gait, "elastic", SOLVER])
+            shaded = [spans(ax) for ax in axes[first : first + len(axes) // 2] if spans(ax)]
+            assert len(shaded) == 2  # the strip with the names, and behind the curve
+            for intervals in shaded:
+                edges = sorted(t for name in ("toe", "heel") for i in getattr(stance, name) for t in i)
+                np.testing.assert_allclose([start for start, _ in intervals], edges[:-1])
+                np.testing.assert_allclose([end for _, end in intervals], edges[1:])
+                assert (intervals[0][0], intervals[-1][1]) == pytest.approx((stance.start, stance.end))
+
+
+@pytest.mark.parametrize(
+    ("toe", "heel", "gait", "names"),
+    [
+        ((0.3, 0.6), (0.25, 0.5), "walk", ["heel-strike", "flat", "toe-off"]),
+        ((0.2, 0.5), (0.25, 0.45), "run", ["toe-strike", "roll-over", "toe-off"]),
+        ((0.3, 0.4), (0.2, 0.5), "walk", ["heel-strike", "flat", "heel-off"]),
+        ((0.4, 0.5), (0.2, 0.3), "walk", ["heel-strike", "in the air", "toe-off"]),
+        (None, (0.2, 0.5), "run", ["heel alone"]),
+    ],
+)
+def test_sub_phases_are_named_by_the_points_that_bear(cycle, toe, heel, gait, names):
+    phases = sub_phases(measure_stance(cycle(toe=toe, heel=heel)), gait)
+    assert [phase.name for phase in phases] == names
+    edges = sorted(t for interval in (toe, heel) if interval for t in interval)
+    np.testing.assert_allclose([p.start for p in phases] + [phases[-1].end], edges, atol=1e-9)
+
+
+def test_figure_6_draws_the_simulated_forces_where_they_act(draw, reproduction):
+    from matplotlib.quiver import Quiver
+
+    quivers = [c for ax in draw(draw_vectors).axes for c in ax.collections if isinstance(c, Quiver)]
+    for gait, arrows in zip(("walk", "run"), quivers, strict=True):
+        trace = reproduction.traces[gait, "elastic", SOLVER]
+        for (x, _), across, up in zip(arrows.get_offsets(), arrows.U, arrows.V, strict=True):
+            match = (trace["cop_x"] == x) & (trace["friction"] == across) & (trace["normal"] == up)
+            assert match.any()
+        assert arrows.V.max() > 0.98 * trace["normal"].max()
+
+
+def test_the_ensembles_band_covers_its_members(draw, ensemble):
+    axes = [ax for ax in draw(draw_forces, ensemble=ensemble).axes if marks(ax)][::2]
+    for gait, ax in zip(("walk", "run"), axes, strict=True):
+        bands = [c for c in ax.collections if len(c.get_paths()) and len(c.get_paths()[0].vertices) > 500]
+        for condition, band in zip(("elastic", "inelastic"), bands, strict=True):
+            x, y = band.get_paths()[0].vertices.T
+            for k in range(0, len(ensemble.time), 25):
+                here = y[np.isclose(x, ensemble.time[k])]
+                members = ensemble.normal[gait, condition][:, k]
+                assert (here.min(), here.max()) == pytest.approx((members.min(), members.max()))
+    labels = {text.get_text() for text in draw(draw_forces, ensemble=ensemble).legends[0].get_texts()}
+    assert any("ensemble of 3 identified legs" in label for label in labels)
+
+
+def test_the_ensembles_paths_are_drawn_above_their_own_ground(draw, reproduction, ensemble):
+    own = dataclasses.replace(ensemble, hip_height=np.array([1.5, 1.6, 1.7]))
+    for curves, heights in ((own, own.hip_height), (ensemble, [reproduction.geometry.hip_height] * 3)):
+        axes = draw(draw_paths, ensemble=curves).axes
+        for gait, ax in (("walk", axes[0]), ("run", axes[2])):
+            lines = [line for line in ax.lines if curves.label in str(line.get_label())]
+            for line, path, height in zip(lines, curves.path[gait], heights, strict=True):
+                np.testing.assert_allclose(line.get_xdata(), path.real)
+                np.testing.assert_allclose(line.get_ydata(), path.imag + height)
+
+
+def test_an_ensemble_that_does_not_fit_together_is_refused(ensemble):
+    short = {"walk": ensemble.path["walk"][:, :-1]}
+    with pytest.raises(ParameterError, match=r"path\['walk'\].*\(3, 501\).*\(3, 500\)"):
+        dataclasses.replace(ensemble, path=short)
+    with pytest.raises(ParameterError, match=r"hip_height.*\(3,\).*\(2,\)"):
+        dataclasses.replace(ensemble, hip_height=np.ones(2))
+    with pytest.raises(ParameterError, match="at least one member"):
+        EnsembleCurves(ensemble.time, {}, {})
+
+
+@pytest.fixture(scope="module", params=[0.0, 0.02, -0.08])
+def at_height(request, reproduction):
+    """The reproduction with the hip higher than the geometry's by so many metres."""
+    height = reproduction.geometry.hip_height + request.param
+    traces = {
+        (gait, condition, SOLVER): run_cycle(
+            gait, SOLVER, restitution=cr, hip_height=height, preset=reproduction.geometry.name
+        )
+        for gait in ("walk", "run")
+        for condition, cr in (("elastic", 1.0), ("inelastic", 0.0))
+    }
+    return dataclasses.replace(reproduction, traces=traces)
+
+
+@pytest.mark.parametrize("function", DRAWINGS)
+def test_no_two_texts_overlap_and_all_are_inside(draw, at_height, function):
+    figure = draw(function, at_height)
+    shown = [(text.get_text(), text.get_window_extent().padded(-1)) for text in texts_of(figure)]
+    for name, box in shown:
+        assert (figure.bbox.min <= box.min).all(), name
+        assert (box.max <= figure.bbox.max).all(), name
+    assert not [(a, b) for (a, one), (b, two) in combinations(shown, 2) if one.overlaps(two)]
+
+
+def texts_of(figure):
+    """All texts that are drawn."""
+    texts = [*figure.texts, *(text for legend in figure.legends for text in legend.get_texts())]
+    for ax in figure.axes:
+        texts += ax.texts
+        for axis, place in ((ax.xaxis, 0), (ax.yaxis, 1)):
+            low, high = axis.get_view_interval()
+            numbers = [t for t in axis.get_ticklabels() if low <= t.get_position()[place] <= high]
+            texts += [axis.label, *numbers] if ax.axison else []
+    return [text for text in texts if text.get_text().strip() and text.get_visible()]
+
+
+@pytest.mark.parametrize("function", DRAWINGS)
+def test_every_axis_with_numbers_has_a_unit(draw, function):
+    def numbered(axis):
+        labels = [t.get_text() for t in axis.get_ticklabels() if t.get_visible()]
+        return any(
+            label.replace("\N{MINUS SIGN}", "-").replace(".", "").lstrip("-").isdigit() for label in labels
+        )
+
+    axes = [ax for ax in draw(function).axes if ax.axison]
+    for ax in axes:
+        assert not numbered(ax.xaxis) or "[" in ax.get_xlabel()
+        beside = [other for other in axes if np.isclose(other.get_position().y0, ax.get_position().y0)]
+        assert not numbered(ax.yaxis) or any("[" in other.get_ylabel() for other in beside)
+
+
+def test_spread_labels_keep_apart_in_order_and_move_no_more_than_needed():
+    assert spread([10, 50, 90], [8, 8, 8], 0, 100) == [10, 50, 90]
+    for wanted in ([1, 2, 3], [97, 98, 99], [40, 40.5, 41]):
+        placed = np.array(spread(wanted, [10, 20, 10], 0, 100))
+        assert (np.diff(placed) >= [15 - 1e-9, 15 - 1e-9]).all()
+        assert placed[0] >= 5
+        assert placed[-1] <= 95
 
 
 def test_without_matplotlib_the_way_out_is_named(monkeypatch, reproduction, tmp_path):
