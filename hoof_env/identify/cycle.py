@@ -51,7 +51,7 @@ def close_triad(e, d, p, f, value, angles, k, z, dz):  # type: ignore[no-untyped
     de, ef, cf, pq, part = value[0], value[1], value[2], value[3], value[4]
     miss, det = 1.0, 0.0
     link, hold, one, two = 0j, 0j, 0j, 0j
-    for _ in range(30):
+    for _ in range(30 if k == 0 else 10):  # later samples begin near
         one = de * complex(np.cos(angles[0]), np.sin(angles[0]))
         two = cf * complex(np.cos(angles[1]), np.sin(angles[1]))
         z[e, k], z[f, k] = z[d, k] + one, z[_C, k] + two

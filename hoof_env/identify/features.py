@@ -22,7 +22,8 @@ FEATURES = np.dtype(
             # the other reading of 'maximum force': peaks of the resultant [N]
             "resultant_inelastic", "resultant_elastic",
             "toe_after_heel_in", "toe_after_heel_out",  # how much later the toe enters and leaves [s]
-            "flattest",  # smallest |hoof angle| while both points bear [deg]
+            "double",  # how long both bear; negative: how long neither does in between [s]
+            "flattest",  # smallest |hoof angle| while both bear [deg]
             "second_elastic", "second_inelastic",  # prominence of a force's second peak, over its maximum [-]
             "third_peak",  # likewise of the elastic force's third [-]
             "peaks_apart",  # how far its two most prominent peaks keep from the middle of stance [s]
@@ -318,9 +319,10 @@ def measure_gait(at, velocity, ankle, height, speed, sampled, stiffness, exponen
     out.heel_gap = heel_out.imag + height
     out.angle_variation = out.angle_liftoff - out.angle_contact
     double, until = enter.max(), leave.min()
+    out.double = until - double
     toe_flat, heel_flat = place(at, velocity, h, 0.5 * (double + until))
-    out.angle_flat = hoof_angle(toe_flat, heel_flat)
-    out.flattest, before = 180.0, 0.0
+    out.angle_flat = hoof_angle(toe_flat, heel_flat)  # a number even if they never both bear: `double` tells
+    out.flattest, before = abs(out.angle_flat), 0.0
     for k in range(int(double / h) + 1, min(int(until / h) + 1, n)):
         angle = hoof_angle(at[0, k], at[1, k])
         out.flattest = 0.0 if angle * before < 0.0 else min(out.flattest, abs(angle))

@@ -108,6 +108,7 @@ GAIT_DEMANDS = (
     *_of_each_gait("run"),
     _at_least("walk.heel_first", "walk.toe_after_heel_in", 0.008, 200, "claim walk.order: heel-strike"),
     _at_least("walk.toe_last", "walk.toe_after_heel_out", 0.008, 200, "claim walk.order: toe-off"),
+    _at_least("walk.double", "walk.double", 0.01, 200, "claim walk.order: heel and toe bear together"),
     _at_most("walk.flat", "walk.flattest", 2.8, 1, "claim walk.order: flat within 3 deg while both bear"),
     _at_least("walk.two_peaks", "walk.second_elastic", 0.12, 60, "claim walk.peaks: a second by 10 %"),
     _at_least("walk.halves", "walk.peaks_apart", 0.006, 200, "claim walk.peaks: each in its half of stance"),
