@@ -103,13 +103,13 @@ def open_state(out: Path, problem: Mapping[str, Any], digest: str, *, resume: bo
         differing = _differences(found, json.loads(json.dumps(problem)))
         if differing:
             raise DataFileError(f"{str(out)!r} holds another search: {'; '.join(differing)}; {_HINT}")
-    elif folder.exists() or (out / "identified.json").exists():
+    elif file.exists() or (out / "identified.json").exists():
         raise OutputError(
             f"{str(out)!r} already holds a search; add --resume to go on with it, or name another folder"
         )
     else:
         try:
-            folder.mkdir(parents=True)
+            folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise OutputError(
                 f"cannot write to {str(out)!r} ({error.strerror}); expected a writable folder"
