@@ -10,7 +10,7 @@ import numpy as np
 from hoof_env.paper.figure_style import BLUE, GAITS, GREY, ORANGE, SKY
 from hoof_env.paper.published import Published
 from hoof_env.paper.study.conditions import LEVEL_WINDOW, PART
-from hoof_env.paper.study.numerics_text import bars_spanned
+from hoof_env.paper.study.conditions_text import bars_spanned
 
 COLOURS = {"exact": GREY, "printed": ORANGE, "probable": BLUE}
 LINES = {"walk": "-", "run": "--"}

@@ -17,7 +17,25 @@ SHOWN = (0.0, 0.01, 0.1, 0.3, 0.5, 0.7, 0.9)
 
 def laws_text(data: Mapping[str, Any]) -> str:
     """The part's text and tables."""
-    return "\n\n".join([*_restitution(data), *_reduction(data), _why(data), *_exponents(data), _floor(data)])
+    return "\n\n".join(
+        [
+            "### What each law returns",
+            *_restitution(data),
+            "### Elastic against inelastic, law by law",
+            *_reduction(data),
+            "![Peak and reduction over the nominal restitution](laws_nominal.png)",
+            "![Restitution delivered, and the reduction over it](laws_delivered.png)",
+            "![Normal force over time under several laws](laws_curves.png)",
+            "### Why inelastic ground hits harder here",
+            _why(data),
+            "![Peak over elastic peak on a prescribed motion and in a free impact](laws_free.png)",
+            "### Exponent",
+            *_exponents(data),
+            "### Floor of the approach speed",
+            _floor(data),
+            "![Peak over the floor of the approach speed](laws_floor.png)",
+        ]
+    )
 
 
 def _laws(data: Mapping[str, Any]) -> dict[str, Any]:
@@ -73,18 +91,19 @@ def _reduction(data: Mapping[str, Any]) -> list[str]:
     )
     here = listed(f"{sweep[gait]['reduction'][k]:.1f} % ({word})" for gait, word in GAIT_WORDS.items())
     half = _at(exact, 0.5)
-    honest = listed(
-        f"{exact[gait]['reduction'][half]:.1f} % ({word}) at cr = {exact['nominal'][half]:g}"
-        for gait, word in GAIT_WORDS.items()
-        if half is not None
-    )
+    honest = ""
+    if half is not None:
+        by_gait = listed(
+            f"{exact[gait]['reduction'][half]:.1f} % ({word})" for gait, word in GAIT_WORDS.items()
+        )
+        honest = f"{by_gait} at cr = {exact['nominal'][half]:g}, and "
     least = exact["nominal"][0]
     most = listed(f"{exact[gait]['reduction'][0]:.1f} % ({word})" for gait, word in GAIT_WORDS.items())
     return [
         "On a prescribed motion δ, v and v₀ are given, so the force depends on the law through χ alone: "
         "over the delivered e the reductions of all laws fall on one curve for each gait. 'Elastic against "
         f"inelastic' is {here} on this leg under the paper's law. A law that returns what it says gives "
-        f"{honest} and {most} at cr = {least:g}, and would reach 100 % at 0, where χ has no bound: how much "
+        f"{honest}{most} at cr = {least:g}, and would reach 100 % at 0, where χ has no bound: how much "
         "lower the elastic peak is depends on which law is asked and how far it goes. This leg has the "
         f"published reductions of {reached}; the paper's law ends at e = {sweep['delivered'][k]:.3f}.",
         "Reduction of the peak by elastic ground, walking / running [%]:",
@@ -111,7 +130,7 @@ def _why(data: Mapping[str, Any]) -> str:
     curve = _laws(data)["exact"]
     lowest = int(np.argmin(curve["free_peak"]))
     return (
-        f"Why inelastic ground hits harder here: its peak is {ratios} times the elastic one because the "
+        f"The inelastic peak is {ratios} times the elastic one because the "
         "crank drives the hoof down the same path whatever the ground does. Damping then only adds: in "
         "compression (v > 0) the factor 1 + χ v/v₀ exceeds 1 at the same δ. In a free impact damping also "
         "takes speed away, and the hoof goes less deep; with the same law and χ the peak of a free mass is "

@@ -10,7 +10,7 @@ import numpy as np
 
 from hoof_env.paper.published import Published, PublishedRow
 from hoof_env.paper.report import format_number
-from hoof_env.paper.study.conditions import LEVEL_LINE, LEVEL_WINDOW, PART
+from hoof_env.paper.study.conditions_text import conditions_text, number
 from hoof_env.paper.study.section import listed, table
 
 GAIT_WORDS = {"walk": "walking", "run": "running"}
@@ -19,7 +19,22 @@ GAIT_WORDS = {"walk": "walking", "run": "running"}
 def numerics_text(published: Published, data: Mapping[str, Any]) -> str:
     """The part's text and tables."""
     return "\n\n".join(
-        [*_drift(data), *_rows(published, data), *_causes(data), *_sweep(data), *_conditions(published, data)]
+        [
+            "### How far Euler drifts",
+            *_drift(data),
+            "![Hoof error over time and over the step](numerics_drift.png)",
+            "### What that does to the rows",
+            *_rows(published, data),
+            *_causes(data),
+            "![Inelastic normal force, exact and by Euler](numerics_forces.png)",
+            "### Over beta, step and ground level",
+            *_sweep(data),
+            "![Hoof error and peaks over beta](numerics_beta.png)",
+            "![Inelastic peaks over the time step and the ground level](numerics_step.png)",
+            "### Condition of each row",
+            conditions_text(published, data["conditions"]),
+            "![Bars that each row spans as a parameter moves a little](numerics_conditions.png)",
+        ]
     )
 
 
@@ -28,11 +43,6 @@ def observed_order(errors: list[float]) -> float:
     if min(errors) <= 0:
         return math.nan
     return float(-np.polyfit(range(len(errors)), np.log2(errors), 1)[0])
-
-
-def number(value: float | None, spec: str) -> str:
-    """A number, or 'none'."""
-    return "none" if value is None or not math.isfinite(value) else format(value, spec)
 
 
 def _steps(data: Mapping[str, Any]) -> list[str]:
@@ -182,65 +192,3 @@ def _level(data: Mapping[str, Any]) -> str:
         f"leg's level and {wide.max() - wide.min():.2f} mm wide at half height, against a drift of {drift} "
         "in stance: the drift decides where on the spike the row lies."
     )
-
-
-SOLVERS = (
-    ("paper", "step", "step, printed β"),
-    ("paper, probable beta", "step", "step, probable β"),
-    ("paper", "beta", "β, printed"),
-    ("paper, probable beta", "beta", "β, probable"),
-    ("paper", "ground", "hip, printed β"),
-    ("paper, probable beta", "ground", "hip, probable β"),
-    ("exact", "ground", "hip, exact"),
-)
-
-
-def _conditions(published: Published, data: Mapping[str, Any]) -> list[str]:
-    window, lines = f"±{1e3 * LEVEL_WINDOW:g} mm", []
-    worst: dict[str, float] = {}
-    crooked = []
-    for row in published.rows:
-        entry = data["conditions"][row.id]
-        line = [f"`{row.id}`"]
-        for solver, parameter, _ in SOLVERS:
-            answer = entry[solver][parameter]
-            line.append(number(answer["relative"], "+.3g"))
-            worst[row.id] = max(worst.get(row.id, 0.0), bars_spanned(row, answer) or 0.0)
-        answer = entry["exact"]["ground"]
-        digits, unit = ("+.4f" if row.unit in ("s", "-") else "+.2f"), row.unit.replace("-", "")
-        extremes = f"{format_number(answer['low'], row.unit)} to {format_number(answer['high'], row.unit)}"
-        lines.append([*line, f"{number(answer['slope'], digits)} {unit}".strip(), extremes])
-        span = bars_spanned(row, answer)
-        if (
-            span
-            and span > 1
-            and abs(answer["high"] - answer["low"]) > 2 * 2e3 * LEVEL_WINDOW * abs(answer["slope"])
-        ):
-            crooked.append(f"`{row.id}`")
-    ranked = sorted(worst, key=lambda row: -worst[row])[:3]
-    noisy = published.row(next((row for row in ranked if published.row(row).unit == "N"), ranked[0]))
-    scatter = listed(
-        f"{number(data['conditions'][noisy.id][solver]['step']['scatter'], '.2g')} {noisy.unit} ({label})"
-        for solver, parameter, label in SOLVERS
-        if parameter == "step"
-    ).replace("step, ", "")
-    return [
-        "Condition of each row: relative change of the row per relative change of the time step, of β and "
-        "of the hip's height above the ground (which falls as the ground rises). Slopes are those of a "
-        f"line through values within ±{100 * PART:g} % of step and β and ±{1e3 * LEVEL_LINE:g} mm of "
-        "ground; the last two columns give the exact solver's change for 1 mm that the ground rises, and "
-        f"its extremes within {window}. Angles and times have an arbitrary zero, so their relative figures "
-        "say little. Most bars, in the widest of these windows, are spanned by "
-        f"{listed(f'`{row}` ({worst[row]:.0f})' for row in ranked)}. `{noisy.id}` scatters by {scatter} rms "
-        f"about its line over the step: it has no derivative there. Within {window} of ground more than "
-        f"twice what the exact slope says is spanned by {listed(crooked)}.",
-        table(["row", *(label for *_, label in SOLVERS), "exact, per mm", f"exact, {window}"], lines),
-    ]
-
-
-def bars_spanned(row: PublishedRow, answer: Mapping[str, Any]) -> float | None:
-    """How many bars a row spans in the window of an answer, None where it has no bar or no value."""
-    low, high = answer["low"], answer["high"]
-    if row.bar.limit is None or low is None or high is None:
-        return None
-    return abs(row.bar.error(high, row.value) - row.bar.error(low, row.value)) / row.bar.limit

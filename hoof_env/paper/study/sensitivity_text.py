@@ -26,12 +26,17 @@ def sensitivity_text(published: Published, data: Mapping[str, Any]) -> str:
     """The part's text and tables."""
     return "\n\n".join(
         [
+            "### Every row against every parameter",
             *_answers(published, data),
+            "![Change of each row in bars](sensitivity_map.png)",
+            "### What follows from the construction",
             *_laws(data),
+            "### Stiffness, friction, pace and level",
             *_stiffness(published, data),
             _friction(data),
             _speed(data),
             _level(data),
+            "![Peaks over ground level and stiffness; resultants over friction](sensitivity_sweeps.png)",
         ]
     )
 
@@ -159,6 +164,8 @@ def _friction(data: Mapping[str, Any]) -> str:
         if "peak" in row and row.endswith(".resultant")
         for name in ("friction_slow", "friction_fast")
     ]
+    most = max(thresholds)
+    effect = f"have elasticities up to {most:.1e}" if most > 1e-9 else "do not matter at the peaks"
     fast = data["friction"]
     lost = []
     for gait, ratios in fast["by_fast"].items():
@@ -171,9 +178,8 @@ def _friction(data: Mapping[str, Any]) -> str:
     return (
         "Resultants do depend on friction. If the hoof slips fully at the peak the resultant is √(1 + μ²) "
         f"times the normal force and its elasticity to μ is μ²/(1 + μ²) = {slip:.3f}; the measured one is "
-        f"{measured}. The thresholds, which the paper does "
-        f"not print, have elasticities up to {max(thresholds):.1e}; the elastic resultant peak falls by "
-        f"more than 1 % below full slip with an upper threshold from {listed(lost)}."
+        f"{measured}. The thresholds, which the paper does not print, {effect}; the elastic resultant peak "
+        f"falls by more than 1 % below full slip with an upper threshold from {listed(lost)}."
     )
 
 
@@ -200,6 +206,6 @@ def _level(data: Mapping[str, Any]) -> str:
         for key, ratios in data["level"]["peaks"].items()
     )
     return (
-        f"The ground level outweighs everything else: from {min(rise):g} to {max(rise):+g} mm the peaks "
-        f"run, as parts of the published ones, from {spans}."
+        f"With the ground from {min(rise):+g} to {max(rise):+g} mm the peaks run, as parts of the published "
+        f"ones, from {spans}."
     )
