@@ -1,0 +1,127 @@
+import json
+import math
+import re
+
+import numpy as np
+import pytest
+
+from hoof_env.ground.contact import Ground
+from hoof_env.paper.measure import measure_stance
+from hoof_env.paper.published import load_published
+from hoof_env.paper.reproduce import GAITS
+from hoof_env.paper.study import numerics
+from hoof_env.paper.study.conditions import betas, conditions
+from hoof_env.paper.study.conditions_text import bars_spanned
+from hoof_env.paper.study.numerics_text import observed_order
+from hoof_env.paper.study.replay import exact_cycle, replay
+
+
+@pytest.fixture(scope="module")
+def section():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(numerics, "BETA_SWEEP", np.linspace(0, 40, 9))
+        patch.setattr(numerics, "STEP_SWEEP", np.array([500, 1000, 2000]))
+        yield numerics.examine_numerics(None, lambda line: None)
+
+
+@pytest.fixture(scope="module")
+def answers():
+    return conditions()
+
+
+def test_euler_converges_with_first_order_under_either_beta(section):
+    for ladder in section.data["drift"].values():
+        for gait in GAITS:
+            for measure in ("cycle_mm", "stance_mm"):
+                order = observed_order([entry[gait][measure] for entry in ladder])
+                assert order == pytest.approx(1, abs=0.05)
+
+
+def test_order_of_known_errors():
+    assert observed_order([8.0, 2.0, 0.5]) == pytest.approx(2)
+    assert math.isnan(observed_order([1.0, 0.0]))
+
+
+def test_rows_approach_the_exact_ones_as_the_step_falls(section):
+    """All but the rows on the spike of a grazing touch-down do so step by step."""
+    for row in load_published().rows:
+        if row.gait == "walk" and (row.condition == "inelastic" or row.id.endswith("reduction")):
+            continue
+        entry = section.data["rows"][row.id]
+        for name in section.data["betas"]:
+            first, last = (abs(row.bar.error(entry[name][k], entry["exact"])) for k in (0, -1))
+            assert last < 0.3 * first + 0.02 * (row.bar.limit or 1), (row.id, name)
+
+
+def test_betas_are_the_two_readings():
+    printed, probable = betas(load_published()).values()
+    assert printed == pytest.approx(math.sqrt(2 * 15))
+    assert probable == pytest.approx(math.sqrt(2) * 15)
+
+
+def test_causes_are_those_of_the_motion_and_of_the_sampling(section):
+    for gait in GAITS:
+        exact = section.data["causes"][gait]["exact"]
+        peak = replay(exact_cycle(gait, None, 1e-3), Ground(restitution=0.0))["normal"].max()
+        assert exact["interpolated"] == peak
+        assert exact["sampled"] != peak
+
+
+def test_conditions_know_every_row_with_the_value_of_the_reproduction(answers, reproduction):
+    for row in reproduction.rows:
+        value = answers[row["id"]][row["solver"]]["value"]
+        assert value == pytest.approx(row["simulated"], rel=1e-6), row["id"]
+    assert answers.keys() == {row["id"] for row in reproduction.rows}
+
+
+def test_slopes_over_the_ground_level_are_those_of_the_law(answers):
+    """An elastic peak K d^n grows by K n d^(n - 1) as d does; touch-down is earlier by 1 / approach speed."""
+    ground = Ground()
+    for gait in GAITS:
+        trace = replay(exact_cycle(gait, None), ground)
+        top = trace[int(trace["normal"].argmax())]
+        slope = sum(
+            ground.stiffness * ground.exponent * max(top[f"{name}_penetration"], 0.0) ** (ground.exponent - 1)
+            for name in ("toe", "heel")
+        )
+        peak = answers[f"{gait}.peak_elastic"]["exact"]["ground"]
+        assert peak["slope"] == pytest.approx(1e-3 * slope, rel=1e-3)
+        first = "toe" if "toe" in measure_stance(trace).first_points else "heel"
+        speed = trace[f"{first}_approach"].max()
+        start = answers[f"{gait}.contact_start"]["exact"]["ground"]
+        assert start["slope"] == pytest.approx(-1e-3 / speed, rel=0.01)
+        height = float(trace["trunk_y"][0])
+        assert peak["relative"] == pytest.approx(-slope * height / top["normal"], rel=1e-3)
+
+
+def test_slopes_over_the_step_are_those_of_the_first_order_error(section, answers):
+    """Elastic peaks have no sampled approach speed: what 1 ms adds is about the slope times 1 ms."""
+    for gait in GAITS:
+        row = f"{gait}.peak_elastic"
+        entry = section.data["rows"][row]
+        answer = answers[row]["paper"]["step"]
+        assert answer["slope"] == pytest.approx(entry["printed"][0] - entry["exact"], rel=0.1)
+        assert answer["scatter"] < 1e-3 * entry["exact"]
+
+
+def test_windows_hold_the_values_and_count_in_bars(answers):
+    published = load_published()
+    for row in published.rows:
+        for solver, answer in answers[row.id].items():
+            if solver == "unit":
+                continue
+            for parameter in answer.keys() - {"value"}:
+                assert answer[parameter]["low"] <= answer["value"] <= answer[parameter]["high"]
+    peak = published.row("walk.peak_elastic")
+    two_percent = {"low": peak.value, "high": 1.02 * peak.value}
+    assert bars_spanned(peak, two_percent) == pytest.approx(1)
+    assert bars_spanned(published.row("walk.angle_variation"), two_percent) is None
+
+
+def test_the_section_is_json_and_draws_all_figures_that_it_shows(section):
+    pytest.importorskip("matplotlib")
+    json.dumps(section.data, allow_nan=False)
+    assert set(re.findall(r"\]\((\w+)\.png\)", section.markdown)) == section.figures.keys()
+    for draw in section.figures.values():
+        assert draw().axes
+    assert "nan" not in section.markdown
