@@ -14,6 +14,7 @@ from hoof_env.paper.published import CONDITIONS
 from hoof_env.paper.reproduce import GAITS
 from hoof_env.paper.study.case import NAMES, Case, Trace, by_solver
 from hoof_env.paper.study.claim import PUBLISHED, Examined, Finding
+from hoof_env.paper.study.laws import free_peak
 from hoof_env.paper.study.replay import replay
 from hoof_env.paper.study.section import listed
 from hoof_env.paper.study.slips_contact import over_cycle
@@ -38,24 +39,6 @@ def on_ground(case: Case, gait: str, solver: str, **settings: Any) -> Trace:
     """The elastic cycle of a solver on another ground."""
     approach = "sampled" if solver == "paper" else "interpolated"
     return replay(case.trace(gait, solver), Ground(approach=approach, **settings))
-
-
-def free_impact_peak(chi: float, step: float = 1e-4) -> float:
-    """Highest force of a free mass on Eq. 14, over that of its elastic impact, for exponent 1.5 [-].
-
-    The ratio depends on neither mass, stiffness nor speed; all are 1 here.
-    """
-
-    def highest(chi: float) -> float:
-        depth, rate, top = 0.0, 1.0, 0.0
-        while depth >= 0.0:
-            force = depth**1.5 * (1 + chi * rate)
-            top = max(top, force)
-            rate -= step * force
-            depth += step * rate
-        return top
-
-    return highest(chi) / highest(0.0)
 
 
 def _stiffness(case: Case) -> Examined:
@@ -100,7 +83,7 @@ def _reduction(case: Case) -> Examined:
             two < one for one, two in peaks.values()
         ), f"peak {words}; the damper absorbs {energy} a cycle"
 
-    free = free_impact_peak(lankarani_nikravesh(0.0))
+    free = free_peak(lankarani_nikravesh(0.0), Ground().exponent)
     findings = (
         *by_solver(
             "the elastic peak is lower than the inelastic one",

@@ -15,6 +15,9 @@ from hoof_env.paper.study.claims_peaks import peak_times
 
 SOLVER = "exact"
 
+SAMPLES = 400
+"""How many instants of a stance are drawn at least."""
+
 
 def _part(stance: Stance, t: Any) -> Any:
     """Time in percent of stance."""
@@ -22,7 +25,8 @@ def _part(stance: Stance, t: Any) -> Any:
 
 
 def _stance_rows(trace: NDArray[np.void], stance: Stance) -> NDArray[np.void]:
-    return trace[(trace["t"] >= stance.start) & (trace["t"] <= stance.end)]
+    rows = trace[(trace["t"] >= stance.start) & (trace["t"] <= stance.end)]
+    return rows[:: max(1, len(rows) // SAMPLES)]
 
 
 def draw_peaks(case: Case) -> Any:
