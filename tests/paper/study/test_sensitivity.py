@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from hoof_env.ground.contact import Ground
+from hoof_env.paper.measure import measure_stance
 from hoof_env.paper.published import load_published
 from hoof_env.paper.reproduce import GAITS
 from hoof_env.paper.study import sensitivity
@@ -72,6 +73,15 @@ def test_changes_are_counted_in_bars(section):
     assert one["change"] == pytest.approx(1, rel=1e-3)  # % of the force
     assert one["bars"] == pytest.approx(0.5, rel=1e-3)  # its bar is 2 %
     assert section.data["rows"]["walk.angle_variation"]["ground_level"]["bars"] is None
+
+
+@pytest.mark.parametrize("gait", GAITS)
+def test_a_rising_ground_is_met_earlier_by_its_rise_over_the_approach_speed(section, gait):
+    trace = replay(exact_cycle(gait, None), Ground())
+    stance = measure_stance(trace)
+    speed = max(trace[f"{name}_approach"].max() for name in stance.first_points)
+    change = section.data["rows"][f"{gait}.contact_start"]["ground_level"]["change"]
+    assert change == pytest.approx(-1e-3 / speed, rel=0.01)
 
 
 def test_stiffer_grounds_keep_the_walking_peak_at_their_level(section):
