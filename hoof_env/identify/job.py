@@ -14,6 +14,8 @@ from hoof_env.identify.records import Array, Job, Problem, Progress, Result
 
 CHECKPOINT_EVERY = 10.0
 """Seconds between two checkpoints of a job."""
+CLEAR = 0.95
+"""Largest error with which a job ends at the bar [bars], so that the judge, who samples finer, agrees."""
 TELL_EVERY = 0.5
 """Seconds between two reports of a job's progress."""
 
@@ -64,7 +66,8 @@ def run_job(
     while True:
         met = False
         if phase.ends_at_bar and es.best.f < judged:
-            judged, met = es.best.f, problem.standing(run.choice, es.best.x, phase.paper_solver).met
+            standing = problem.standing(run.choice, es.best.x, phase.paper_solver)
+            judged, met = es.best.f, standing.met and abs(standing.error) <= CLEAR
         now = time.monotonic()
         run.seconds = before + now - began
         if now - told > TELL_EVERY and es.countevals:

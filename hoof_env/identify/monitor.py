@@ -37,7 +37,9 @@ class Monitor:
         if sys.stderr.isatty() if bar is None else bar:
             from tqdm import tqdm
 
-            self._bar = tqdm(total=budget, unit=" evaluations", unit_scale=True, dynamic_ncols=True)
+            self._bar = tqdm(
+                desc="starting", total=budget, unit=" evaluations", unit_scale=True, dynamic_ncols=True
+            )
 
     def __enter__(self) -> Monitor:
         return self
