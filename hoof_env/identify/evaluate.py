@@ -17,7 +17,7 @@ from hoof_env.gait.parameters import LIMITS
 from hoof_env.identify.candidate import SIGNS, Choice, lengths_of
 from hoof_env.identify.cycle import DYAD, EXTENSION, TRIAD, leg_paths, swing_hoof
 from hoof_env.identify.drift import euler_cycle
-from hoof_env.identify.features import measure_gait
+from hoof_env.identify.features import cubic, measure_gait
 from hoof_env.identify.plausibility import LENGTH_RANGE, OVAL_LIMIT, PART_RANGE
 from hoof_env.leg.linkage import CONSTRUCTION, LENGTHS, POINTS, Dyad, Extension
 
@@ -125,9 +125,21 @@ def unpack(x, signs, steps, sources, extras, oval, values, gaits, ovals, leg):  
             leg.walk_excess = excess
         else:
             leg.run_excess = excess
-    leg.hip_height, leg.sole = x[_HIP], numbers[_IJ]
-    leg.sole_part = leg.sole / max(x[_HIP], 0.1)
+    leg.sole = numbers[_IJ]
     return numbers[0]
+
+
+@kernel
+def height_at(at, velocity, h, t):  # type: ignore[no-untyped-def]
+    """Height [m] of the swing's centre above a ground that the toe crosses at time t [s].
+
+    Args:
+        at, velocity: from `swing_hoof`. h: time between two samples [s].
+    """
+    part = min(max(t / h, 0.0), at.shape[1] - 1.001)
+    k = int(part)
+    y, _ = cubic(at[0, k].imag, at[0, k + 1].imag, velocity[0, k].imag, velocity[0, k + 1].imag, h, part - k)
+    return -y
 
 
 @kernel
@@ -142,9 +154,12 @@ def compare_gaits(walk, run, both):  # type: ignore[no-untyped-def]
 @kernel
 def measure_exact(  # type: ignore[no-untyped-def]
     x, signs, steps, sources, extras, about_pivot, oval, travel, toe, heel, stiffness, exponent,
-    values, gaits, ovals, z, dz, at, velocity, ankle, work, leg, features, both,
+    by_toe, values, gaits, ovals, z, dz, at, velocity, ankle, work, leg, features, both,
 ):  # fmt: skip
-    """Fill `leg`, `features` (walk, run) and `both` by kinematics alone; the other arrays are scratch."""
+    """Fill `leg`, `features` (walk, run) and `both` by kinematics alone; the other arrays are scratch.
+
+    With `by_toe` the entry of x for the hip's height is the time at which the walking toe touches down.
+    """
     crank = unpack(x, signs, steps, sources, extras, oval, values, gaits, ovals, leg)
     pivot, height = complex(x[_PIVOT_X], x[_PIVOT_Y]), x[_HIP]
     leg.miss, leg.transmission, leg.lowest = 0.0, 1.0, np.inf
@@ -153,17 +168,23 @@ def measure_exact(  # type: ignore[no-untyped-def]
             miss, sine = leg_paths(crank, pivot, ovals[g], steps, values, z, dz)
             leg.miss, leg.transmission = max(leg.miss, miss), min(leg.transmission, sine)
         lowest = swing_hoof(z, dz, gaits[g], about_pivot, travel, toe, heel, at, velocity, ankle)
+        if g == 0 and by_toe:
+            height = height_at(at, velocity, 2.0 * np.pi / gaits[0, 0] / (at.shape[1] - 1), x[_HIP])
         leg.lowest = min(leg.lowest, lowest + height)
         measure_gait(at, velocity, ankle, height, gaits[g, 0], False, stiffness, exponent, work, features[g])
+    leg.hip_height, leg.sole_part = height, leg.sole / max(height, 0.1)
     compare_gaits(features[0], features[1], both)
 
 
 @kernel
 def measure_paper(  # type: ignore[no-untyped-def]
-    x, steps, values, gaits, travel, toe, heel, stiffness, exponent, beta, q, qd, at, velocity, ankle, work,
-    features, both,
+    x, height, steps, values, gaits, travel, toe, heel, stiffness, exponent, beta, q, qd, at, velocity, ankle,
+    work, features, both,
 ):  # fmt: skip
-    """Fill `features` and `both` through the paper's solver; `values` and `gaits` are from `unpack`."""
+    """Fill `features` and `both` through the paper's solver.
+
+    `values`, `gaits` and the hip's `height` [m] are those of `measure_exact`.
+    """
     pivot, h = complex(x[_PIVOT_X], x[_PIVOT_Y]), 1e-3
     for g in range(2):
         if euler_cycle(
@@ -171,7 +192,7 @@ def measure_paper(  # type: ignore[no-untyped-def]
             q, qd, at, velocity, ankle,
         ):  # fmt: skip
             measure_gait(
-                at, velocity, ankle, x[_HIP], gaits[g, 0], True, stiffness, exponent, work, features[g]
+                at, velocity, ankle, height, gaits[g, 0], True, stiffness, exponent, work, features[g]
             )
     compare_gaits(features[0], features[1], both)
 

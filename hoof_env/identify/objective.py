@@ -31,6 +31,9 @@ Array = NDArray[np.float64]
 ILL_CONDITIONED = ("walk.peak_inelastic", "walk.mean_inelastic", "walk.reduction")
 """Rows that the paper's solver need not meet: the walk grazes, and they hang on how it samples touch-down."""
 
+LEVEL = 17
+"""Where x holds the hip's height."""
+
 PAPER_SAMPLES = 1001
 """Instants of the paper's solver in its one second."""
 
@@ -55,6 +58,10 @@ class Objective:
         paper_solver: the cost counts the paper's solver too, all rows but `ILL_CONDITIONED` and all demands
             on its gaits. Only where the full system has the leg: link 9 at "F" and swing "crank".
         walk: "walks", the sole goes back under load, or "brakes", the ground pushes back through stance.
+        by_toe: the entry of x for the hip's height is instead the time [s] at which the toe touches down in
+            walking, whose ground level follows: for searches. That contact grazes: a tenth of a millimetre
+            of height is a large step of the inelastic force, a tenth of a millisecond a small one. See
+            `to_toe_time` and `to_height`.
         stiffness, exponent: of Eq. 14 [N/m^n, -].
         beta: Baumgarte's, of the paper's solver [1/s].
 
@@ -73,15 +80,16 @@ class Objective:
         samples: int = 201,
         paper_solver: bool = False,
         walk: str = "walks",
+        by_toe: bool = False,
         stiffness: float = 2e4,
         exponent: float = 1.5,
         beta: float = math.sqrt(30),
     ) -> None:
         self._settings: dict[str, Any] = {
             "choice": choice, "targets": targets, "samples": samples, "paper_solver": paper_solver,
-            "walk": walk, "stiffness": stiffness, "exponent": exponent, "beta": beta,
+            "walk": walk, "by_toe": by_toe, "stiffness": stiffness, "exponent": exponent, "beta": beta,
         }  # fmt: skip
-        self.choice, self.paper_solver = choice, bool(paper_solver)
+        self.choice, self.paper_solver, self.by_toe = choice, bool(paper_solver), bool(by_toe)
         self.names = names(choice)
         check_choice("walk", walk, WALK_DEMANDS)
         if paper_solver:
@@ -148,7 +156,8 @@ class Objective:
         self._exact, self._paper = _Measured(), _Measured()
         self._exact_arguments: tuple[Any, ...] = (
             np.array(choice.assembly, dtype=np.float64), steps, sources, extras,
-            choice.swing == "pivot", choice.swing == "oval", *corners, *self._law, values, gaits, ovals,
+            choice.swing == "pivot", choice.swing == "oval", *corners, *self._law, self.by_toe,
+            values, gaits, ovals,
             *np.zeros((2, points, n), np.complex128), *np.zeros((2, 2, n), np.complex128),
             np.zeros(n), np.zeros((6, n)), *self._exact.records,
         )  # fmt: skip
@@ -170,7 +179,7 @@ class Objective:
         measure_exact(x, *self._exact_arguments)
         if paper:
             self._paper.flat[:] = np.nan
-            measure_paper(x, *self._paper_arguments)
+            measure_paper(x, self._exact.records[0]["hip_height"], *self._paper_arguments)
 
     def _rate_rows(self, measured: Array, weights: Array) -> float:
         return rate_rows(measured, self._row, self._target, self._per_unit, weights, self._errors)
@@ -220,6 +229,24 @@ class Objective:
         flat = (self._paper if paper_solver else self._exact).flat
         return dict(zip(MEASURED, flat.tolist(), strict=True))
 
+    def to_toe_time(self, x: Array) -> Array:
+        """x with the time of the walking toe's touch-down in place of the hip's height.
+
+        Raises:
+            HoofEnvError: the toe does not touch down in walking.
+        """
+        plain = Objective(**{**self._settings, "by_toe": False, "paper_solver": False})
+        found = plain.measured(x)
+        time = found["walk.contact_start"] + max(found["walk.toe_after_heel_in"], 0.0)
+        if not 0 <= time <= 1:
+            raise HoofEnvError("expected a walk whose toe touches down, got one whose toe stays in the air")
+        return _with_level(x, time)
+
+    def to_height(self, x: Array) -> Array:
+        """Inverse of `to_toe_time`."""
+        by_toe = Objective(**{**self._settings, "by_toe": True, "paper_solver": False})
+        return _with_level(x, by_toe.measured(x)["leg.hip_height"])
+
     def report(self, x: Array) -> dict[str, Any]:
         """Where a candidate stands, JSON-serialisable.
 
@@ -240,3 +267,9 @@ class Objective:
         worst = max(counted, key=lambda name: abs(counted[name]))
         within = sum(abs(error) <= 1 for error in counted.values())
         return {**result, "within": within, "of": len(counted), "worst": worst, "worst_error": counted[worst]}
+
+
+def _with_level(x: Array, value: float) -> Array:
+    y = np.array(x, dtype=np.float64)
+    y[LEVEL] = value
+    return y

@@ -204,7 +204,7 @@ def test_it_pickles_and_repeats_bit_for_bit():
     ("name", "change", "short"),
     [
         ("hip_height", 1.8, {"hip_high"}), ("hip_height", 1.1, {"hip_low"}),
-        ("log IJ", np.log(0.07), {"sole_short"}), ("log IJ", np.log(0.4), {"sole_long"}),
+        ("log IJ", np.log(0.04), {"sole_short"}), ("log IJ", np.log(0.4), {"sole_long"}),
         ("log BD", np.log(0.05), {"lengths"}), ("run.swing_sin", -0.9, {"run.limits"}),
         ("log OP", np.log(2.0), {"assembles", "transmission"}),
         ("hip_height", 5.0, {"walk.both_touch", "run.both_touch", "walk.heel_first"}),
@@ -218,6 +218,20 @@ def test_a_demand_not_met_is_named(name, change, short):
     before, after = objective().report(FIRST)["plausibility"], objective().report(x)["plausibility"]
     assert short <= after.keys()
     assert all(after[demand] > before.get(demand, 0.0) for demand in short)
+
+
+def test_the_level_may_be_given_by_the_toes_touch_down():
+    by_toe = objective(by_toe=True)
+    for x in (FIRST, vector("perturbed")):
+        y = by_toe.to_toe_time(x)
+        assert 0.2 < y[17] < 0.6
+        np.testing.assert_array_equal(np.delete(y, 17), np.delete(x, 17))
+        np.testing.assert_allclose(by_toe.to_height(y), x, rtol=1e-9)
+        np.testing.assert_allclose(by_toe.rows(y), objective().rows(x), atol=1e-5)
+    high = FIRST.copy()
+    high[17] = 5.0
+    with pytest.raises(HoofEnvError, match="toe touches down"):
+        by_toe.to_toe_time(high)
 
 
 def test_a_leg_in_the_air_has_no_rows():
