@@ -19,6 +19,7 @@ from hoof_env.ground.contact import Ground
 from hoof_env.paper.published import Published, load_published
 from hoof_env.paper.reproduce import GAITS
 from hoof_env.paper.study.replay import Cycles, euler_cycle, exact_cycle, row_values, stances_on
+from hoof_env.paper.study.section import for_json
 
 STEPS = 1000
 """The paper's steps to the second."""
@@ -57,6 +58,8 @@ def conditions(
         slope: change of the row in its unit per ms (step), per 1/s (beta), per mm that the ground rises.
         scatter: rms deviation from the line, in the row's unit.
         low, high: extremes in the window: 10 % of step and beta, 1 mm of ground, to either side.
+
+        They are None where the row has no value throughout (no double support).
     """
     published = load_published()
     exact = {gait: exact_cycle(gait, preset) for gait in GAITS}
@@ -65,10 +68,13 @@ def conditions(
     for name, beta in betas(published).items():
         progress(f"condition of each row, paper's solver with the {name} beta")
         answers["paper" if name == "printed" else f"paper, {name} beta"] = _euler(published, preset, beta)
-    return {
-        row.id: {"unit": row.unit, **{solver: answer[row.id] for solver, answer in answers.items()}}
-        for row in published.rows
-    }
+    result: dict[str, dict[str, Any]] = for_json(
+        {
+            row.id: {"unit": row.unit, **{solver: answer[row.id] for solver, answer in answers.items()}}
+            for row in published.rows
+        }
+    )
+    return result
 
 
 def euler_rows(published: Published, preset: str | None, steps: int, beta: float) -> Values:
@@ -116,13 +122,12 @@ def _add(
     """Fit a line to every row over parameter `name` at `x`; `size` makes its changes relative."""
     for row, answer in answers.items():
         y = np.array([values[row] for values in near])
-        known = np.isfinite(y)
-        slope, offset = np.polyfit(x[known], y[known], 1) if known.any() else (math.nan, math.nan)
+        slope, offset = np.polyfit(x, y, 1) if np.isfinite(y).all() else (math.nan, math.nan)
         window = [values[row] for values in far or near]
         answer[name] = {
             "relative": float(slope * size / answer["value"]),
             "slope": float(slope),
-            "scatter": float(np.sqrt(np.mean((y - offset - slope * x)[known] ** 2))),
+            "scatter": float(np.sqrt(np.mean((y - offset - slope * x) ** 2))),
             "low": float(np.min(window)),
             "high": float(np.max(window)),
         }

@@ -169,7 +169,7 @@ def _sweep(data: Mapping[str, Any]) -> list[str]:
 
 
 SPIKE = 1.5
-"""A peak over the ground level counts as a spike if its highest value is this many times its lowest."""
+"""A peak over the ground level is a spike if its top is this many times as high as both ends of the sweep."""
 
 
 def _level(data: Mapping[str, Any]) -> str:
@@ -177,18 +177,23 @@ def _level(data: Mapping[str, Any]) -> str:
     peaks = np.array(data["level_sweep"]["peaks"]["walk"]["exact"])
     low, high = peaks.min(), peaks.max()
     text = (
-        f"As the ground moves by ±{rise.max():g} mm, the exact walking inelastic peak runs from {low:.0f} to "
-        f"{high:.0f} N"
+        f"As the ground moves by ±{rise.max():g} mm, the exact walking inelastic peak runs from {low:.0f} "
+        f"to {high:.0f} N"
     )
-    if high < SPIKE * low:
+    if high < SPIKE * max(peaks[0], peaks[-1]):
         return f"{text}, without a spike."
     wide = rise[peaks >= (low + high) / 2]
-    drift = listed(
-        f"{ladder[0]['walk']['stance_mm']:.2f} mm ({name} β)" for name, ladder in data["drift"].items()
+    width = wide.max() - wide.min()
+    drifts = {name: ladder[0]["walk"]["stance_mm"] for name, ladder in data["drift"].items()}
+    drift = listed(f"{error:.2f} mm ({name} β)" for name, error in drifts.items())
+    verdict = (
+        "the drift decides where on the spike the row lies"
+        if max(drifts.values()) > width
+        else "more than the drift"
     )
     return (
         f"{text}: a spike, where a point of the hoof touches the ground so gently that Eq. 14 divides by "
         f"next to nothing. It is highest with the ground {rise[int(peaks.argmax())]:+.2f} mm from this "
-        f"leg's level and {wide.max() - wide.min():.2f} mm wide at half height, against a drift of {drift} "
-        "in stance: the drift decides where on the spike the row lies."
+        f"leg's level and {width:.2f} mm wide at half height, against a drift of {drift} in stance: "
+        f"{verdict}."
     )

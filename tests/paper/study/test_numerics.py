@@ -1,6 +1,7 @@
 import json
 import math
 import re
+from importlib import resources
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from hoof_env.paper.published import load_published
 from hoof_env.paper.reproduce import GAITS
 from hoof_env.paper.study import numerics
 from hoof_env.paper.study.conditions import betas, conditions
-from hoof_env.paper.study.conditions_text import bars_spanned
+from hoof_env.paper.study.conditions_text import bars_spanned, conditions_text
 from hoof_env.paper.study.numerics_text import observed_order
 from hoof_env.paper.study.replay import exact_cycle, replay
 
@@ -125,3 +126,14 @@ def test_the_section_is_json_and_draws_all_figures_that_it_shows(section):
     for draw in section.figures.values():
         assert draw().axes
     assert "nan" not in section.markdown
+
+
+def test_a_row_without_a_value_is_none_and_not_an_error(tmp_path):
+    data = json.loads(resources.files("hoof_env.data").joinpath("first_fit.json").read_text())
+    data["geometry"]["hip_height"] += 0.036  # so high that walking has no double support
+    (tmp_path / "high.json").write_text(json.dumps(data))
+    answers = conditions(str(tmp_path / "high.json"))
+    flat = answers["walk.angle_flat"]["exact"]
+    assert flat["value"] is None
+    assert set(flat["ground"].values()) == {None}
+    assert "| none |" in conditions_text(load_published(), answers)
