@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hoof_env.identify.plausibility import demands
 from hoof_env.paper.measure import Stance, measure_stance
 from hoof_env.paper.published import Published
 from hoof_env.paper.reproduce import SOLVERS, Reproduction
@@ -62,9 +63,14 @@ class Case:
         )
 
     def asked(self, *ids: str) -> tuple[str, ...]:
-        """Those of these rows and shapes that the identification asks for: all but the merely reported."""
+        """Those of these rows and shapes that the identification asks for: rows with a bar, claims in a demand."""
         barred = {row.id for row in self.published.rows if row.bar.limit is not None}
-        shapes = {claim.id for claim in self.published.claims if not claim.reading.startswith("reported")}
+        asks = demands("walks")
+        shapes = {
+            claim.id
+            for claim in self.published.claims
+            if any(f"claim {claim.id}" in demand.why or demand.name.startswith(claim.id) for demand in asks)
+        }
         return tuple(name for name in ids if name in barred | shapes)
 
 

@@ -75,10 +75,12 @@ def _markdown(claims: Sequence[Examined]) -> str:
     return "\n\n".join(
         [
             _summary(claims),
-            "The leg was identified from the paper's own numbers and shapes. Where a claim was asked for "
-            "in the identification, agreement shows that one leg can do it all, and is no independent "
-            "proof; only what was not asked for can confirm. A claim is confirmed or contradicted where "
-            "every reading and both solvers agree.",
+            "The leg was identified from the paper's own numbers and shapes. A reading marked [asked for: "
+            "x] bears on x, which the identification asks for: agreement then shows that one leg can do it "
+            "all and is no independent proof, and disagreement may be the identification's choice. Only "
+            "what was not asked for can confirm or contradict by itself. A claim is confirmed or "
+            "contradicted where every reading and both solvers agree. Where solvers agree the numbers are "
+            "those of `exact`; study.json has all.",
             table(["claim", "in the paper", "identification", "verdict"], [_line(claim) for claim in claims]),
             "![Normal force through the stance, with its peaks](claims_peaks.png)",
             "![Time of the highest force against restitution](claims_gap.png)",

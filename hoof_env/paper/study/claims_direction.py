@@ -44,6 +44,7 @@ def _braking(case: Case) -> Examined:
         *by_solver(
             f"{ON_THE_GROUND}, backward in both halves of stance",
             lambda solver: _signs(case, "walk", solver, -1),
+            case.asked("walk.direction"),
         ),
         *by_solver("against the hoof's own sliding", lambda solver: _friction_opposes(case, "walk", solver)),
     )
@@ -84,10 +85,12 @@ def _propulsion(case: Case) -> Examined:
             *by_solver(
                 f"{ON_THE_LEG}, forward in both halves of stance",
                 lambda solver: _signs(case, "run", solver, 1),
+                case.asked("run.direction", "walk.walks"),
             ),
             *by_solver(
                 f"{ON_THE_GROUND}, forward in both halves of stance",
                 lambda solver: _signs(case, "run", solver, -1),
+                case.asked("run.direction", "walk.walks"),
             ),
         ),
     )

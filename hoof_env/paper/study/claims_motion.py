@@ -275,7 +275,9 @@ def _rolling(case: Case) -> Examined:
         "sections 3, 4",
         "figure3",
         (
-            *by_solver("rolls without sliding under the paper's fixed trunk", rolls(False)),
+            *by_solver(
+                "rolls without sliding under the paper's fixed trunk", rolls(False), case.asked("walk.walks")
+            ),
             *by_solver("would roll without sliding under a trunk at the best steady speed", rolls(True)),
         ),
         f"Rolling means that loaded points stay below {SLIDING:g} m/s.",

@@ -132,7 +132,7 @@ def _delay(case: Case) -> Examined:
     findings = (
         *by_solver(f"the peaks are {1000 * PEAK_GAP:.0f} ms or more apart", apart, case.asked("run.peaks")),
         *by_solver("the shift grows with the damping", grows),
-        *by_solver("damping delays the peak", late),
+        *by_solver("damping delays the peak", late, case.asked("run.peaks")),
         *by_solver("specific to running: smaller in walking", only),
     )
     delayed = {finding.holds for finding in findings if finding.reading == "damping delays the peak"}
