@@ -63,7 +63,7 @@ class Case:
         )
 
     def asked(self, *ids: str) -> tuple[str, ...]:
-        """Those of these rows and shapes that the identification asks for: rows with a bar, claims in a demand."""
+        """Those of these rows and shapes that the identification asks for: with a bar, or in a demand."""
         barred = {row.id for row in self.published.rows if row.bar.limit is not None}
         asks = demands("walks")
         shapes = {
