@@ -32,7 +32,7 @@ PART, RISE = 1e-2, 1e-4
 STIFFER = (1.0, 1.5, 2.0, 3.0, 5.0, 10.0)
 """Stiffness over the paper's lower limit [-]."""
 
-LEVELS = np.linspace(-20e-3, 20e-3, 81)
+LEVELS = np.linspace(-20e-3, 20e-3, 201)
 """Rise of the ground in the sweep [m]."""
 
 FRICTIONS = np.linspace(0, 1, 41)
