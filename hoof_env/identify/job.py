@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from hoof_env.identify.records import Array, Job, Problem, Progress, Result
+from hoof_env.identify.records import Array, Job, Problem, Progress, Result, Standing
+from hoof_env.identify.schedule import Phase
 
 CHECKPOINT_EVERY = 10.0
 """Seconds between two checkpoints of a job."""
@@ -66,12 +67,12 @@ def run_job(
     while True:
         met = False
         if phase.ends_at_bar and es.best.f < judged:
-            standing = problem.standing(run.choice, es.best.x, phase.paper_solver)
+            standing = _standing(problem, run, phase)
             judged, met = es.best.f, standing.met and abs(standing.error) <= CLEAR
         now = time.monotonic()
         run.seconds = before + now - began
         if now - told > TELL_EVERY and es.countevals:
-            standing = problem.standing(run.choice, es.best.x, phase.paper_solver)
+            standing = _standing(problem, run, phase)
             tell(Progress(job.id, int(es.countevals), float(es.best.f), standing))
             told = now
         stop = _stop(job, es, met)
@@ -93,24 +94,33 @@ def _start(problem: Problem, job: Job) -> _Run:
     root = job.id
     if phase.start == "cold":
         choice, x = problem.cold(rng, phase)
+        y = problem.inward(choice, x, phase)
     elif phase.start == "given":
         choice, x = problem.given()
-        step = sigma * float(rng.choice(phase.spreads)) * problem.scales(choice)
-        x = x + step * rng.standard_normal(x.size)
+        step = sigma * float(rng.choice(phase.spreads)) * problem.scales(choice, phase)
+        y = problem.inward(choice, x, phase)
+        y = y + step * rng.standard_normal(y.size)
     else:
         best = 0 if rng.random() < phase.favour else int(rng.integers(len(job.parents)))
         parent = job.parents[best]
-        choice, x, root = parent.choice, np.array(parent.x), parent.root
+        choice, root = parent.choice, parent.root
+        y = problem.inward(choice, np.array(parent.x), phase)
     options = {
         "verbose": -9,
         "seed": np.nan,  # draws come from `randn` alone
         "randn": _Normal(rng),
         "popsize": population,
         "tolfun": 1e-5,
-        "CMA_stds": problem.scales(choice),
+        "CMA_stds": problem.scales(choice, phase),
         "signals_filename": "",
     }
-    return _Run(cma.CMAEvolutionStrategy(x, sigma, options), choice, root, sigma, population)
+    return _Run(cma.CMAEvolutionStrategy(y, sigma, options), choice, root, sigma, population)
+
+
+def _standing(problem: Problem, run: _Run, phase: Phase) -> Standing:
+    """Of the best candidate so far."""
+    x = problem.outward(run.choice, run.es.best.x, phase)
+    return problem.standing(run.choice, x, phase.paper_solver)
 
 
 def _stop(job: Job, es: Any, met: bool) -> str:
@@ -127,7 +137,7 @@ def _stop(job: Job, es: Any, met: bool) -> str:
 
 def _result(problem: Problem, job: Job, run: _Run, stop: str) -> Result:
     began = time.monotonic()
-    x = np.array(run.es.best.x)
+    x = problem.outward(run.choice, np.array(run.es.best.x), job.phase)
     exact, full = problem.rank(run.choice, x)
     both = None if full is None else problem.standing(run.choice, x, True)
     confirmed = both is not None and both.met and problem.confirm(run.choice, x)

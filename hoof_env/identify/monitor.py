@@ -9,6 +9,8 @@ from typing import Any
 
 from hoof_env.identify.records import Job, Progress, Result, Standing
 
+_FORMAT = "{desc} {percentage:3.0f}%|{bar:12}| {elapsed}<{remaining}"
+
 
 def describe(standing: Standing) -> str:
     """Rows within their bars, and what is furthest from its own."""
@@ -37,9 +39,7 @@ class Monitor:
         if sys.stderr.isatty() if bar is None else bar:
             from tqdm import tqdm
 
-            self._bar = tqdm(
-                desc="starting", total=budget, unit=" evaluations", unit_scale=True, dynamic_ncols=True
-            )
+            self._bar = tqdm(desc="starting", total=budget, dynamic_ncols=True, bar_format=_FORMAT)
 
     def __enter__(self) -> Monitor:
         return self
@@ -76,4 +76,7 @@ class Monitor:
         if cost < self._best:
             self._best = cost
             if self._bar is not None:
-                self._bar.set_description_str(f"best {cost:.2f}: {describe(standing)}")
+                rows = f"{standing.within}/{standing.of} rows"
+                self._bar.set_description_str(
+                    f"best cost {cost:.2f}, {rows}, worst {standing.worst} {standing.error:+.1f} bars"
+                )

@@ -15,6 +15,7 @@ from hoof_env.identify.candidate import (
     LINK9,
     SWINGS,
     Choice,
+    names,
     random_choice,
     random_start,
     standard_deviations,
@@ -31,13 +32,29 @@ Array = NDArray[np.float64]
 PRODUCT = 0.5
 """Part of the cold starts with link 9 and swing as the full system has them; the rest have any."""
 
+TOE_DOWN, TOE_STEP = 0.35, 0.1
+"""Where the search puts down a walking toe that stays in the air, and its step from there [s]."""
+
 SAMPLES = 401
 """Instants a revolution with which candidates of all phases are compared."""
 
 
 @lru_cache(maxsize=16)
-def _objective(choice: Choice, targets: Targets, walk: str, samples: int, paper_solver: bool) -> Objective:
-    return Objective(choice, targets, samples=samples, paper_solver=paper_solver, walk=walk)
+def _objective(
+    choice: Choice, targets: Targets, walk: str, samples: int, paper_solver: bool, by_toe: bool
+) -> Objective:
+    return Objective(choice, targets, samples=samples, paper_solver=paper_solver, walk=walk, by_toe=by_toe)
+
+
+def _level(choice: Choice) -> int:
+    """Where x holds the ground level."""
+    return names(choice).index("hip_height")
+
+
+def _with(x: Array, index: int, value: float) -> Array:
+    changed = np.array(x)
+    changed[index] = value
+    return changed
 
 
 @dataclass(frozen=True)
@@ -65,11 +82,35 @@ class LegProblem:
         tries = [random_start(choice, rng) for _ in range(phase.tries)]
         return choice.to_dict(), min(tries, key=cost)
 
-    def scales(self, choice: dict[str, Any]) -> Array:
-        return standard_deviations(Choice.from_dict(choice))
+    def scales(self, choice: dict[str, Any], phase: Phase) -> Array:
+        legs = Choice.from_dict(choice)
+        scales = standard_deviations(legs)
+        if phase.by_toe:
+            scales[_level(legs)] = TOE_STEP
+        return scales
+
+    def inward(self, choice: dict[str, Any], x: Array, phase: Phase) -> Array:
+        if not phase.by_toe:
+            return x
+        legs = Choice.from_dict(choice)
+        try:
+            return self.objective(legs, phase.samples, False).to_toe_time(x)
+        except HoofEnvError:  # the toe stays in the air
+            return _with(x, _level(legs), TOE_DOWN)
+
+    def outward(self, choice: dict[str, Any], y: Array, phase: Phase) -> Array:
+        if not phase.by_toe:
+            return y
+        legs = Choice.from_dict(choice)
+        by_toe = self.objective(legs, phase.samples, False, by_toe=True)
+        height = by_toe.measured(y)["leg.hip_height"]
+        return _with(y, _level(legs), height if np.isfinite(height) else 0.0)
 
     def cost(self, choice: dict[str, Any], phase: Phase) -> Callable[[Array], float]:
-        return self.objective(Choice.from_dict(choice), phase.samples, phase.paper_solver).cost
+        legs = Choice.from_dict(choice)
+        objective = self.objective(legs, phase.samples, phase.paper_solver, by_toe=phase.by_toe)
+        cost: Callable[[Array], float] = getattr(objective, phase.loss)
+        return cost
 
     def standing(self, choice: dict[str, Any], x: Array, paper_solver: bool) -> Standing:
         return standing(self.objective(Choice.from_dict(choice), SAMPLES, paper_solver), x)
@@ -86,9 +127,11 @@ class LegProblem:
         except HoofEnvError:  # a dead point between two samples, a gait beyond its limits
             return False
 
-    def objective(self, choice: Choice, samples: int, paper_solver: bool) -> Objective:
+    def objective(
+        self, choice: Choice, samples: int, paper_solver: bool, *, by_toe: bool = False
+    ) -> Objective:
         """The objective of a choice, kept for the next call."""
-        return _objective(choice, self.targets, self.walk, samples, paper_solver)
+        return _objective(choice, self.targets, self.walk, samples, paper_solver, by_toe)
 
 
 def standing(objective: Objective, x: Array) -> Standing:

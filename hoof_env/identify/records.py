@@ -45,11 +45,17 @@ class Problem(Protocol):
     def cold(self, rng: np.random.Generator, phase: Phase) -> tuple[dict[str, Any], Array]:
         """Choice and coordinates of a start anywhere."""
 
-    def scales(self, choice: dict[str, Any]) -> Array:
-        """The size of a step in each coordinate."""
+    def scales(self, choice: dict[str, Any], phase: Phase) -> Array:
+        """The size of a step in each of a phase's coordinates."""
+
+    def inward(self, choice: dict[str, Any], x: Array, phase: Phase) -> Array:
+        """The same candidate in the coordinates that a phase searches in."""
+
+    def outward(self, choice: dict[str, Any], y: Array, phase: Phase) -> Array:
+        """Inverse of `inward`."""
 
     def cost(self, choice: dict[str, Any], phase: Phase) -> Callable[[Array], float]:
-        """The function to minimise in a phase."""
+        """The function to minimise in a phase, of its coordinates."""
 
     def standing(self, choice: dict[str, Any], x: Array, paper_solver: bool) -> Standing:
         """How far a candidate is from its goal, with the exact solver alone or with both."""

@@ -27,9 +27,12 @@ class Phase:
         spreads: "given" only, one is drawn: the start's distance from the preset, in sigmas.
         tries: "cold" only, how many random legs the best of which is the start.
         elite, favour: "best" only: the best with this probability, else one of the best `elite` results.
-        below: "best" only: results that cost more are not refined; without any the phase is skipped.
+        below: "best" only: results of other phases that cost more with the exact solver are not refined;
+            without any left the phase is skipped.
         give_up: pairs (evaluations, cost): a job that costs more after so many evaluations ends.
         samples: instants a revolution.
+        by_toe: search the time of the walking toe's touch-down instead of the ground level, see `Objective`.
+        loss: what is minimised, a method of `Objective`.
         paper_solver: the objective contains the paper's solver too.
         ends_at_bar: a job ends as soon as all rows are clear within their bars and nothing falls short.
     """
@@ -48,6 +51,8 @@ class Phase:
     below: float = float("inf")
     give_up: tuple[tuple[int, float], ...] = ()
     samples: int = 201
+    by_toe: bool = False
+    loss: str = "cost"
     paper_solver: bool = False
     ends_at_bar: bool = False
 
@@ -60,36 +65,54 @@ class Phase:
 Schedule = tuple[Phase, ...]
 """Phases, run again and again until the bar is reached or the budget spent."""
 
-_GIVE_UP = ((15_000, 400.0), (40_000, 120.0), (80_000, 60.0), (200_000, 25.0))
 _REFINE = Phase(
     "refine",
     "best",
-    jobs=4,
-    rounds=2,
-    evaluations=500_000,
-    sigmas=(0.005, 0.01, 0.02, 0.04),
-    give_up=_GIVE_UP,
+    jobs=6,
+    rounds=3,
+    evaluations=60_000,
+    sigmas=(0.002, 0.005, 0.01, 0.02, 0.04),
+    populations=(14, 20, 30),
+    elite=8,
+    give_up=((20_000, 40.0),),
+    by_toe=True,
 )
 _BOTH = Phase(
     "both solvers",
     "best",
     jobs=4,
-    evaluations=60_000,
+    evaluations=30_000,
     sigmas=(0.002, 0.005, 0.01, 0.02),
-    populations=(16, 24, 40),
-    elite=4,
-    below=8.0,
+    populations=(14, 20),
+    below=6.0,
     paper_solver=True,
     ends_at_bar=True,
+    by_toe=True,
 )
 
 FROM_PRESET: Schedule = (
-    Phase("around", "given", jobs=4, evaluations=300_000, sigmas=(0.02, 0.04, 0.08, 0.15), give_up=_GIVE_UP),
+    Phase(
+        "around",
+        "given",
+        jobs=6,
+        evaluations=120_000,
+        sigmas=(0.02, 0.04, 0.08, 0.15),
+        populations=(14, 20, 30),
+        give_up=((20_000, 120.0), (60_000, 40.0)),
+        by_toe=True,
+    ),
     _REFINE,
     _BOTH,
 )
 COLD: Schedule = (
-    Phase("cold", "cold", jobs=8, evaluations=300_000, sigmas=(0.25,), give_up=_GIVE_UP),
+    Phase(
+        "cold",
+        "cold",
+        jobs=8,
+        evaluations=300_000,
+        sigmas=(0.25,),
+        give_up=((15_000, 400.0), (40_000, 120.0), (80_000, 60.0), (200_000, 25.0)),
+    ),
     _REFINE,
     _BOTH,
 )

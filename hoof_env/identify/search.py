@@ -115,7 +115,7 @@ def elite(phase: Phase, results: list[Result]) -> tuple[Parent, ...]:
     ranked = []
     for result in results:
         cost = result.full if phase.paper_solver else result.exact
-        if cost is not None and cost < phase.below:
+        if cost is not None and (result.exact < phase.below or result.phase == phase.name):
             ranked.append((cost, result.parent))
     ranked.sort(key=lambda pair: pair[0])
     best: dict[str, Parent] = {}

@@ -204,6 +204,5 @@ def test_a_terminal_gets_a_bar_with_the_best_so_far(outcome, capsys):
         monitor.finished(outcome.results[0])
     shown = capsys.readouterr()
     assert shown.out == ""
-    assert "best 9.00: 10 of 22 rows" in shown.err
-    assert "best 8.00: 10 of 22 rows" in shown.err
-    assert "500/1.00k" in shown.err
+    assert "best cost 9.00, 10/22 rows, worst walk.mean_inelastic -2.5 bars  10%|" in shown.err
+    assert "best cost 8.00, 10/22 rows, worst walk.mean_inelastic -2.5 bars  50%|" in shown.err

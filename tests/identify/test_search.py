@@ -24,8 +24,8 @@ from hoof_env.identify.workers import Workers
 
 PHASE = Phase("around", "given", jobs=3, evaluations=400, sigmas=(0.02, 0.05), populations=(8, 12))
 TINY = (
-    PHASE,
-    replace(PHASE, name="refine", start="best", jobs=2, sigmas=(0.01,)),
+    replace(PHASE, by_toe=True),
+    replace(PHASE, name="refine", start="best", jobs=2, sigmas=(0.002,), favour=1.0, by_toe=True),
     replace(PHASE, name="both", start="best", jobs=2, evaluations=60, paper_solver=True),
 )
 
@@ -39,14 +39,21 @@ class Bowl:
     def cold(self, rng, phase):
         return {"side": int(rng.choice([-1, 1]))}, rng.standard_normal(3)
 
-    def scales(self, choice):
+    def scales(self, choice, phase):
         return np.ones(3)
+
+    def inward(self, choice, x, phase):
+        return 2 * x if phase.by_toe else x
+
+    def outward(self, choice, y, phase):
+        return y / 2 if phase.by_toe else y
 
     calls = 0
 
     def cost(self, choice, phase):
-        def cost(x):
+        def cost(y):
             self.calls += 1
+            x = self.outward(choice, y, phase)
             return float((x[0] - 1) ** 2 + 100 * ((x[1:] - x[:-1] ** 2) ** 2).sum())
 
         return cost
@@ -85,6 +92,11 @@ class Killed(Exception):
 
 def ignore(_):
     pass
+
+
+@pytest.fixture(scope="module")
+def leg():
+    return LegProblem(load_targets(), "walks", load_start("first_fit"))
 
 
 def found(result):
@@ -155,6 +167,28 @@ def test_a_hopeless_job_gives_up_and_a_finished_one_ends():
     assert done.confirmed
 
 
+def test_a_result_is_in_plain_coordinates_whatever_a_phase_searches_in():
+    done = run_job(Bowl(), Job(0, 0, replace(PHASE, by_toe=True), 1, 20_000), None, ignore, ignore)
+    np.testing.assert_allclose(done.x, 1, atol=1e-2)
+    assert done.exact == done.cost
+
+
+def test_a_leg_keeps_its_ground_level_through_a_search_by_touch_down(leg):
+    choice, x = leg.given()
+    phase = replace(PHASE, by_toe=True, samples=401)
+    y = leg.inward(choice, x, phase)
+    (level,) = np.flatnonzero(y != x)
+    assert leg.scales(choice, phase)[level] != leg.scales(choice, PHASE)[level]
+    np.testing.assert_allclose(leg.outward(choice, y, phase), x, atol=1e-6)
+    assert leg.cost(choice, phase)(y) == pytest.approx(
+        leg.cost(choice, replace(PHASE, samples=401))(x), rel=1e-3
+    )
+    high = x.copy()
+    high[level] += 1.0  # a toe in the air is put down
+    lower = leg.outward(choice, leg.inward(choice, high, phase), phase)
+    assert lower[level] < high[level] - 0.5
+
+
 def test_a_result_survives_json():
     done = run_job(Bowl(), Job(0, 0, PHASE, 0, 100), None, ignore, ignore)
     assert Result.from_dict(done.to_dict()) == done
@@ -165,8 +199,8 @@ def test_a_result_survives_json():
 
 
 def test_phases_come_round_and_round():
-    names = [phase.name for _, phase in zip(range(9), (p for _, p in rounds(FROM_PRESET)), strict=False)]
-    assert names == 2 * ["around", "refine", "refine", "both solvers"] + ["around"]
+    names = [phase.name for _, phase in zip(range(10), (p for _, p in rounds(FROM_PRESET)), strict=False)]
+    assert names == 2 * ["around", "refine", "refine", "refine", "both solvers"]
     assert COLD[0].start == "cold"
 
 
@@ -181,9 +215,12 @@ def test_the_elite_is_the_best_result_of_each_of_the_best_starts():
     phase = replace(PHASE, start="best", elite=2)
     assert [parent.root for parent in elite(phase, results)] == ["000-01", "000-00"]
     assert len(elite(replace(phase, elite=9), results)) == 3
-    both = replace(phase, paper_solver=True, below=10.0)
-    assert [parent.root for parent in elite(both, results)] == ["000-01"]
+    both = replace(phase, name="both", paper_solver=True, below=10.0)
+    assert [parent.root for parent in elite(both, results)] == ["000-01", "000-00"]
+    assert [parent.root for parent in elite(replace(both, below=2.5), results)] == ["000-01"]
     assert plan(3, replace(both, below=1.0), results, 0, 10_000) == []
+    results.append(replace(results[0], phase="both", full=1.0))
+    assert [p.root for p in elite(replace(both, below=1.0), results)] == ["000-00"]
 
 
 def test_the_budget_is_shared_and_the_papers_solver_weighs_more():
@@ -191,11 +228,6 @@ def test_the_budget_is_shared_and_the_papers_solver_weighs_more():
     assert [job.evaluations for job in plan(0, PHASE, [], 0, 300)] == [100] * 3
     both = replace(PHASE, paper_solver=True)
     assert [job.evaluations for job in plan(0, both, [], 0, 3600)] == [3600 // 3 // both.weight] * 3
-
-
-@pytest.fixture(scope="module")
-def leg():
-    return LegProblem(load_targets(), "walks", load_start("first_fit"))
 
 
 def run(problem, out, workers=2, phases=TINY, budget=4000, resume=False, **options):
