@@ -27,6 +27,7 @@ DEAD_ZONE = 0.6
 MISSED_ROW, MISSED = 300.0, 20.0
 """Error [bars] of a row, and shortage of a demand, that cannot be measured."""
 
+_C = POINTS.index("C")
 _NUMBER = {name: i for i, name in enumerate((*POINTS, "Q"))}
 _LOG_RANGE = (math.log(LENGTH_RANGE[0]), math.log(LENGTH_RANGE[1]))
 _COUNT, _IJ, _DE = len(LENGTHS), LENGTHS.index("IJ"), LENGTHS.index("DE")
@@ -76,8 +77,17 @@ def construction(choice: Choice) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     return np.array(steps, dtype=np.int64), np.array(sources, dtype=np.int64)
 
 
+_MIDDLE = 0.5 * float(_LOW[0] + _HIGH[0])
+
+
 @kernel
-def unpack(x, signs, steps, sources, extras, oval, values, gaits, ovals, leg):  # type: ignore[no-untyped-def]
+def offset_excess(offset):  # type: ignore[no-untyped-def]
+    """How far a swing offset lies beyond its limits [rad]."""
+    return max(offset - _HIGH[0], _LOW[0] - offset, 0.0)
+
+
+@kernel
+def unpack(x, signs, steps, sources, extras, oval, by_toe, values, gaits, ovals, leg):  # type: ignore[no-untyped-def]
     """Turn x into the arguments of `leg_paths` and `swing_hoof`; returns OP [m].
 
     Args:
@@ -85,6 +95,7 @@ def unpack(x, signs, steps, sources, extras, oval, values, gaits, ovals, leg):  
         steps, sources: `candidate.construction`.
         extras: how many numbers x has for link 9: 0, 1 or 3.
         oval: whether the pivot moves on an ellipse.
+        by_toe: x does not hold the walk's offset, see `measure_exact`.
         values, gaits, ovals: outputs, shapes (m, 7), (2, 4), and complex (2, 2).
         leg: output, record of dtype `LEG`.
     """
@@ -113,7 +124,7 @@ def unpack(x, signs, steps, sources, extras, oval, values, gaits, ovals, leg):  
     for g in range(2):
         law = x[_REST + extras + g * size : _REST + extras + (g + 1) * size]
         gaits[g, 1], gaits[g, 2], gaits[g, 3] = law[0], 0.0, 0.0
-        excess = max(law[0] - _HIGH[0], _LOW[0] - law[0], 0.0)
+        excess = 0.0 if by_toe and g == 0 else offset_excess(law[0])
         if oval:
             ovals[g, 0], ovals[g, 1] = complex(law[1], law[2]), complex(law[3], law[4])
             excess += max(abs(ovals[g, 0]) + abs(ovals[g, 1]) - OVAL_LIMIT, 0.0)
@@ -127,6 +138,36 @@ def unpack(x, signs, steps, sources, extras, oval, values, gaits, ovals, leg):  
             leg.run_excess = excess
     leg.sole = numbers[_IJ]
     return numbers[0]
+
+
+@kernel
+def offset_at(z, dz, gait, about_pivot, toe, t, speed):  # type: ignore[no-untyped-def]
+    """Swing offset [rad] with which the toe sinks at so many m/s at time t [s].
+
+    Turning the frame turns the toe's velocity: the offset follows in closed form. Of the two that there are,
+    about half a turn apart, it is the one nearer to the middle of the limits. A toe that is too slow gets the
+    nearest it can.
+
+    Args:
+        z, dz: from `leg_paths`. gait: as in `swing_hoof`, its offset ignored.
+    """
+    n = z.shape[1]
+    theta = min(max(gait[0] * t, 0.0), 6.28)
+    k = int(theta / (2.0 * np.pi) * (n - 1))
+    h = 2.0 * np.pi / (n - 1)
+    part = theta / h - k
+    arm, moving = cubic(z[toe, k], z[toe, k + 1], dz[toe, k], dz[toe, k + 1], h, part)
+    if about_pivot:
+        centre, drift = cubic(z[_C, k], z[_C, k + 1], dz[_C, k], dz[_C, k + 1], h, part)
+        arm, moving = arm - centre, moving - drift
+    s, c = np.sin(theta), np.cos(theta)
+    moving = gait[0] * (moving + 1j * (gait[2] * c - gait[3] * s) * arm)
+    down = np.arcsin(min(max(-speed / max(abs(moving), 1e-9), -1.0), 1.0))
+    behind = np.angle(moving) + gait[2] * s + gait[3] * c + _MIDDLE
+    one, other = down - behind, np.pi - down - behind
+    one -= 2.0 * np.pi * np.round(one / (2.0 * np.pi))
+    other -= 2.0 * np.pi * np.round(other / (2.0 * np.pi))
+    return _MIDDLE + (one if abs(one) < abs(other) else other)
 
 
 @kernel
@@ -158,20 +199,27 @@ def measure_exact(  # type: ignore[no-untyped-def]
 ):  # fmt: skip
     """Fill `leg`, `features` (walk, run) and `both` by kinematics alone; the other arrays are scratch.
 
-    With `by_toe` the entry of x for the hip's height is the time at which the walking toe touches down.
+    With `by_toe` x holds for the hip's height the time at which the walking toe touches down, and for the
+    walk's swing offset the logarithm of its approach speed there.
     """
-    crank = unpack(x, signs, steps, sources, extras, oval, values, gaits, ovals, leg)
+    crank = unpack(x, signs, steps, sources, extras, oval, by_toe, values, gaits, ovals, leg)
     pivot, height = complex(x[_PIVOT_X], x[_PIVOT_Y]), x[_HIP]
     leg.miss, leg.transmission, leg.lowest = 0.0, 1.0, np.inf
     for g in range(2):
         if g == 0 or oval:
             miss, sine = leg_paths(crank, pivot, ovals[g], steps, values, z, dz)
             leg.miss, leg.transmission = max(leg.miss, miss), min(leg.transmission, sine)
+        if g == 0 and by_toe:
+            speed = np.exp(min(x[_REST + extras], 5.0))
+            gaits[0, 1] = offset_at(z, dz, gaits[0], about_pivot, toe, x[_HIP], speed)
+            leg.walk_excess += offset_excess(gaits[0, 1])
         lowest = swing_hoof(z, dz, gaits[g], about_pivot, travel, toe, heel, at, velocity, ankle)
         if g == 0 and by_toe:
             height = height_at(at, velocity, 2.0 * np.pi / gaits[0, 0] / (at.shape[1] - 1), x[_HIP])
         leg.lowest = min(leg.lowest, lowest + height)
-        measure_gait(at, velocity, ankle, height, gaits[g, 0], False, stiffness, exponent, work, features[g])
+        measure_gait(
+            at, velocity, ankle, height, gaits[g, 0], False, stiffness, exponent, work[g], features[g]
+        )
     leg.hip_height, leg.sole_part = height, leg.sole / max(height, 0.1)
     compare_gaits(features[0], features[1], both)
 

@@ -37,11 +37,12 @@ FEATURES = np.dtype(
             "heel_gap",  # height of the heel above the ground at last contact [m]
             "start_depth",  # deepest penetration at the cycle's start, negative in the air [m]
             "extra_entries",  # how often a point comes in after its first time [-]
+            "toe_speed",  # approach speed of the toe [m/s]; 0 if it stays in the air
             "missing",  # sum over the points that never touch of their smallest height [m]
         )
     ]
 )  # fmt: skip
-"""What `measure_gait` fills in; NaN where there is no contact, except the last three."""
+"""What `measure_gait` fills in; NaN where there is no contact, except the last four."""
 
 BACKWARD = 0.3
 """How fast the sole must move back under half of the load [m/s]."""
@@ -248,6 +249,8 @@ def press(at, velocity, height, h, sampled, stiffness, exponent, work, out):  # 
                 s, v = crossing(before, d, rate_before, rate, h)
                 leave[i] = max(leave[i], (k - 1 + s) * h)
             before, rate_before = d, rate
+        if i == 0:
+            out.toe_speed = approach
         out.extra_entries += max(entries - 1, 0)
         out.missing += max(-highest, 0.0)
     return enter, leave
@@ -268,22 +271,47 @@ def swept_load(at, velocity, height, exponent):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def measure_halves(at, height, h, start, end, work, out):  # type: ignore[no-untyped-def]
+def until_middle(values, m):  # type: ignore[no-untyped-def]
+    """Sum of samples by the trapezoidal rule from 0 to place m between them; the first is 0."""
+    k = min(int(m), values.shape[0] - 2)
+    s = m - k
+    return values[:k].sum() + (0.5 + s) * values[k] + 0.5 * s * s * (values[k + 1] - values[k])
+
+
+@kernel
+def measure_dip(at, velocity, height, h, first, second, stiffness, exponent, work):  # type: ignore[no-untyped-def]
+    """Times of the elastic force's two peaks [s], prominence of the lower over the higher one [-], and the
+    smaller penetration at the dip between them [m]; `first`, `second`: the samples of the peaks."""
+    force, approach = work[EL], work[TOE_IN:]
+    one, t_one = refine(at, velocity, height, h, approach, stiffness, exponent, 0.0, first)
+    two, t_two = refine(at, velocity, height, h, approach, stiffness, exponent, 0.0, second)
+    low = first + np.argmin(force[first : second + 1])
+    a, b, c = force[low - 1], force[low], force[low + 1]
+    bend = a - 2.0 * b + c
+    part = 0.5 * (a - c) / bend if bend > 0.0 else 0.0
+    toe, heel = place(at, velocity, h, (low + part) * h)
+    prominence = (min(one, two) - (b - 0.25 * (a - c) * part)) / max(one, two)
+    return t_one, t_two, prominence, -height - max(toe.imag, heel.imag)
+
+
+@kernel
+def measure_halves(at, velocity, height, h, start, end, stiffness, exponent, work, out):  # type: ignore[no-untyped-def]
     """Fill what compares the halves of stance: impulses, peaks and the dip between them."""
-    n = at.shape[1]
     force, push = work[EL], work[PUSH_EL]
     middle = 0.5 * (start + end)
-    cut = min(int(middle / h) + 1, n - 1)  # the second half's first sample
-    push_1, push_2 = push[:cut].sum(), push[cut:].sum()
-    out.push_1 = push_1 / max(force[:cut].sum(), 1e-9)
-    out.push_2 = push_2 / max(force[cut:].sum(), 1e-9)
-    second, third, first_at, second_at = prominences(force)
-    out.second_elastic, out.third_peak, out.peaks_apart = second, third, 0.0
-    low = cut
-    if first_at >= 0:
-        out.peaks_apart = min(middle - first_at * h, second_at * h - middle)
-        low = first_at + np.argmin(force[first_at : second_at + 1])
-    out.dip_support = -height - max(at[0, low].imag, at[1, low].imag)
+    load_1, push_1 = until_middle(force, middle / h), until_middle(push, middle / h)
+    out.push_1 = push_1 / max(load_1, 1e-9)
+    out.push_2 = (push.sum() - push_1) / max(force.sum() - load_1, 1e-9)
+    out.second_elastic, out.third_peak, first, second = prominences(force)
+    out.peaks_apart = 0.0
+    if first > 0:
+        one, two, out.second_elastic, out.dip_support = measure_dip(
+            at, velocity, height, h, first, second, stiffness, exponent, work
+        )
+        out.peaks_apart = min(middle - one, two - middle)
+    else:
+        toe, heel = place(at, velocity, h, middle)
+        out.dip_support = -height - max(toe.imag, heel.imag)
     out.second_inelastic = prominences(work[INEL])[0]
 
 
@@ -340,7 +368,7 @@ def measure_gait(at, velocity, ankle, height, speed, sampled, stiffness, exponen
         out.resultant_inelastic = max(out.resultant_inelastic, np.hypot(work[INEL, k], work[PUSH_INEL, k]))
         if start <= k * h <= end:
             out.ankle = min(out.ankle, ankle[k] - max(at[0, k].imag, at[1, k].imag))
-    measure_halves(at, height, h, start, end, work, out)
+    measure_halves(at, velocity, height, h, start, end, stiffness, exponent, work, out)
     out.swept_0 = swept_load(at, velocity, height, exponent)
     out.swept_5 = swept_load(at, velocity, height - 0.05, exponent)
     out.swept_10 = swept_load(at, velocity, height - 0.1, exponent)

@@ -58,10 +58,10 @@ class Objective:
         paper_solver: the cost counts the paper's solver too, all rows but `ILL_CONDITIONED` and all demands
             on its gaits. Only where the full system has the leg: link 9 at "F" and swing "crank".
         walk: "walks", the sole goes back under load, or "brakes", the ground pushes back through stance.
-        by_toe: the entry of x for the hip's height is instead the time [s] at which the toe touches down in
-            walking, whose ground level follows: for searches. That contact grazes: a tenth of a millimetre
-            of height is a large step of the inelastic force, a tenth of a millisecond a small one. See
-            `to_toe_time` and `to_height`.
+        by_toe: x holds instead of the hip's height the time [s] at which the toe touches down in walking, and
+            instead of the walk's offset the logarithm of the toe's approach speed there [log m/s]; level and
+            offset follow: for searches. That contact grazes: a tenth of a millimetre of height, or a
+            milliradian, is a large step of the inelastic force. See `to_touch_down`, `from_touch_down`.
         stiffness, exponent: of Eq. 14 [N/m^n, -].
         beta: Baumgarte's, of the paper's solver [1/s].
 
@@ -153,13 +153,14 @@ class Objective:
         corners = float(choice.travel), POINTS.index(choice.toe), POINTS.index(choice.heel)
         values, gaits, ovals = np.zeros((len(steps), 7)), np.zeros((2, 4)), np.zeros((2, 2), np.complex128)
         gaits[:, 0] = SPEED
-        self._exact, self._paper = _Measured(), _Measured()
+        work = np.zeros((2, 6, n))
+        self._exact, self._paper, self._gaits, self._work = _Measured(), _Measured(), gaits, work
         self._exact_arguments: tuple[Any, ...] = (
             np.array(choice.assembly, dtype=np.float64), steps, sources, extras,
             choice.swing == "pivot", choice.swing == "oval", *corners, *self._law, self.by_toe,
             values, gaits, ovals,
             *np.zeros((2, points, n), np.complex128), *np.zeros((2, 2, n), np.complex128),
-            np.zeros(n), np.zeros((6, n)), *self._exact.records,
+            np.zeros(n), work, *self._exact.records,
         )  # fmt: skip
         m = PAPER_SAMPLES
         self._paper_arguments: tuple[Any, ...] = (
@@ -229,23 +230,31 @@ class Objective:
         flat = (self._paper if paper_solver else self._exact).flat
         return dict(zip(MEASURED, flat.tolist(), strict=True))
 
-    def to_toe_time(self, x: Array) -> Array:
-        """x with the time of the walking toe's touch-down in place of the hip's height.
+    def to_touch_down(self, x: Array) -> Array:
+        """x as a search with `by_toe` has it.
 
         Raises:
             HoofEnvError: the toe does not touch down in walking.
         """
-        plain = Objective(**{**self._settings, "by_toe": False, "paper_solver": False})
-        found = plain.measured(x)
+        found = self._other(by_toe=False).measured(x)
         time = found["walk.contact_start"] + max(found["walk.toe_after_heel_in"], 0.0)
-        if not 0 <= time <= 1:
+        if not (0 <= time <= 1 and found["walk.toe_speed"] > 0):
             raise HoofEnvError("expected a walk whose toe touches down, got one whose toe stays in the air")
-        return _with_level(x, time)
+        return self._with(x, time, math.log(found["walk.toe_speed"]))
 
-    def to_height(self, x: Array) -> Array:
-        """Inverse of `to_toe_time`."""
-        by_toe = Objective(**{**self._settings, "by_toe": True, "paper_solver": False})
-        return _with_level(x, by_toe.measured(x)["leg.hip_height"])
+    def from_touch_down(self, y: Array) -> Array:
+        """Inverse of `to_touch_down`."""
+        by_toe = self._other(by_toe=True)
+        height = by_toe.measured(y)["leg.hip_height"]
+        return self._with(y, height, float(by_toe._gaits[0, 1]))
+
+    def _other(self, *, by_toe: bool) -> Objective:
+        return Objective(**{**self._settings, "by_toe": by_toe, "paper_solver": False})
+
+    def _with(self, x: Array, level: float, offset: float) -> Array:
+        changed = np.array(x, dtype=np.float64)
+        changed[LEVEL], changed[self.names.index("walk.swing_offset")] = level, offset
+        return changed
 
     def report(self, x: Array) -> dict[str, Any]:
         """Where a candidate stands, JSON-serialisable.
@@ -267,9 +276,3 @@ class Objective:
         worst = max(counted, key=lambda name: abs(counted[name]))
         within = sum(abs(error) <= 1 for error in counted.values())
         return {**result, "within": within, "of": len(counted), "worst": worst, "worst_error": counted[worst]}
-
-
-def _with_level(x: Array, value: float) -> Array:
-    y = np.array(x, dtype=np.float64)
-    y[LEVEL] = value
-    return y

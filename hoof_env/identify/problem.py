@@ -32,8 +32,11 @@ Array = NDArray[np.float64]
 PRODUCT = 0.5
 """Part of the cold starts with link 9 and swing as the full system has them; the rest have any."""
 
-TOE_DOWN, TOE_STEP = 0.35, 0.1
-"""Where the search puts down a walking toe that stays in the air, and its step from there [s]."""
+TOE_DOWN, TOE_SPEED = 0.35, -3.0
+"""When [s] and how fast [log m/s] the search puts down a walking toe that stays in the air."""
+
+TOE_SCALES = (0.1, 0.3)
+"""How far these two range."""
 
 SAMPLES = 401
 """Instants a revolution with which candidates of all phases are compared."""
@@ -46,14 +49,10 @@ def _objective(
     return Objective(choice, targets, samples=samples, paper_solver=paper_solver, walk=walk, by_toe=by_toe)
 
 
-def _level(choice: Choice) -> int:
-    """Where x holds the ground level."""
-    return names(choice).index("hip_height")
-
-
-def _with(x: Array, index: int, value: float) -> Array:
-    changed = np.array(x)
-    changed[index] = value
+def _with_toe(choice: Choice, x: Array, time: float, speed: float) -> Array:
+    """x with the two entries that `by_toe` replaces."""
+    changed, entries = np.array(x), names(choice)
+    changed[entries.index("hip_height")], changed[entries.index("walk.swing_offset")] = time, speed
     return changed
 
 
@@ -85,26 +84,22 @@ class LegProblem:
     def scales(self, choice: dict[str, Any], phase: Phase) -> Array:
         legs = Choice.from_dict(choice)
         scales = standard_deviations(legs)
-        if phase.by_toe:
-            scales[_level(legs)] = TOE_STEP
-        return scales
+        return _with_toe(legs, scales, *TOE_SCALES) if phase.by_toe else scales
 
     def inward(self, choice: dict[str, Any], x: Array, phase: Phase) -> Array:
         if not phase.by_toe:
             return x
         legs = Choice.from_dict(choice)
         try:
-            return self.objective(legs, phase.samples, False).to_toe_time(x)
+            return self.objective(legs, phase.samples, False).to_touch_down(x)
         except HoofEnvError:  # the toe stays in the air
-            return _with(x, _level(legs), TOE_DOWN)
+            return _with_toe(legs, x, TOE_DOWN, TOE_SPEED)
 
     def outward(self, choice: dict[str, Any], y: Array, phase: Phase) -> Array:
         if not phase.by_toe:
             return y
-        legs = Choice.from_dict(choice)
-        by_toe = self.objective(legs, phase.samples, False, by_toe=True)
-        height = by_toe.measured(y)["leg.hip_height"]
-        return _with(y, _level(legs), height if np.isfinite(height) else 0.0)
+        x = self.objective(Choice.from_dict(choice), phase.samples, False).from_touch_down(y)
+        return np.where(np.isfinite(x), x, 0.0)
 
     def cost(self, choice: dict[str, Any], phase: Phase) -> Callable[[Array], float]:
         legs = Choice.from_dict(choice)
