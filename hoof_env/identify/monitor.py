@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Callable
 from typing import Any
@@ -34,7 +33,7 @@ class Monitor:
         self._budget, self._say = budget, say
         self._weights: dict[str, int] = {}
         self._spent: dict[str, int] = {}
-        self._best = math.inf
+        self._best: dict[int, Standing] = {}
         self._bar: Any = None
         if sys.stderr.isatty() if bar is None else bar:
             from tqdm import tqdm
@@ -53,15 +52,16 @@ class Monitor:
 
     def running(self, progress: Progress) -> None:
         self._count(progress.id, progress.evaluations)
-        self._mark(progress.cost, progress.standing)
+        self._mark(progress.standing)
 
     def finished(self, result: Result) -> None:
         self._count(result.id, result.evaluations)
-        standing = result.both if result.both is not None and result.both.met else result.standing
-        self._mark(result.exact, standing)
+        standings = [result.standing, *([result.both] if result.both and result.standing.met else [])]
+        for standing in standings:
+            self._mark(standing)
         if self._bar is None:
             self._say(
-                f"job {result.id} ({result.phase}): cost {result.exact:.2f}, {describe(standing)}; "
+                f"job {result.id} ({result.phase}): {describe(standings[-1])}; "
                 f"{result.evaluations} evaluations in {result.seconds:.0f} s"
                 + (", confirmed by the full system" if result.confirmed else "")
             )
@@ -72,11 +72,14 @@ class Monitor:
             self._bar.n = min(sum(self._spent.values()), self._budget)
             self._bar.refresh()
 
-    def _mark(self, cost: float, standing: Standing) -> None:
-        if cost < self._best:
-            self._best = cost
+    def _mark(self, standing: Standing) -> None:
+        """Show the best so far, with the exact solver alone and, once there is one, with both."""
+        best = self._best.get(standing.of)
+        if best is None or standing.excess < best.excess:
+            self._best[standing.of] = standing
             if self._bar is not None:
-                rows = f"{standing.within}/{standing.of} rows"
-                self._bar.set_description_str(
-                    f"best cost {cost:.2f}, {rows}, worst {standing.worst} {standing.error:+.1f} bars"
+                parts = (
+                    f"{s.within}/{s.of} rows, worst {s.worst} {s.error:+.2f} bars"
+                    for _, s in sorted(self._best.items())
                 )
+                self._bar.set_description_str(f"best: {'; '.join(parts)}")

@@ -14,14 +14,18 @@ from numpy.typing import NDArray
 
 from hoof_env.errors import HoofEnvError, ParameterError, check_choice, check_number
 from hoof_env.identify.candidate import SPEED, Choice, check_vector, names
+from hoof_env.identify.cycle import DYAD
 from hoof_env.identify.evaluate import (
+    MISSED,
+    MISSED_ROW,
     construction,
     measure_exact,
     measure_paper,
     rate_demands,
     rate_rows,
 )
-from hoof_env.identify.features import FEATURES
+from hoof_env.identify.features import FEATURES, INEL
+from hoof_env.identify.minimax import Rating
 from hoof_env.identify.plausibility import BOTH, LEG, LEG_DEMANDS, MEASURED, WALK_DEMANDS, demands
 from hoof_env.identify.targets import Targets, load_targets
 from hoof_env.leg.linkage import BODIES, POINTS
@@ -30,6 +34,9 @@ Array = NDArray[np.float64]
 
 ILL_CONDITIONED = ("walk.peak_inelastic", "walk.mean_inelastic", "walk.reduction")
 """Rows that the paper's solver need not meet: the walk grazes, and they hang on how it samples touch-down."""
+
+INSIDE = 0.01
+"""By how much `rate` asks for more than a demand, because a descent ends on the border of it [bars]."""
 
 LEVEL = 17
 """Where x holds the hip's height."""
@@ -199,6 +206,43 @@ class Objective:
             cost += self._rate_rows(self._paper.flat, self._paper_weight)
         return cost + self._rate_demands()
 
+    def rate(self, x: Array) -> Rating:
+        """What `minimax.descend` improves: all rows and demands with their signs.
+
+        The inelastic force of walking has up to three peaks of much the same height, and a leg as many dyads:
+        each sample and each dyad is a limit of its own, so that none turns up only when it is the highest.
+        """
+        self._measure(x, self.paper_solver)
+        self._rate_rows(self._exact.flat, self._weight)
+        rows, demands = self._errors.copy(), [_signed(self._exact.flat, self._demand), self._dyads()]
+        if self.choice.link9 != "7":  # whose triad has a transmission too
+            demands[0][self.demands.index("transmission")] = -np.inf
+        peaks = {}
+        force = np.maximum(self._work[0, INEL], 1.0)
+        for name, values in (
+            ("walk.peak_inelastic", force),
+            ("walk.reduction", 100 * (1 - self._exact.records[1][0]["peak_elastic"] / force)),
+        ):
+            if name in self.row_ids:
+                row = self.row_ids.index(name)
+                errors = (values - self._target[row]) * self._per_unit[row]
+                peaks[row] = np.where(np.isfinite(errors), errors, MISSED_ROW)
+                rows[row] = peaks[row].max()
+        if self.paper_solver:
+            self._rate_rows(self._paper.flat, self._paper_weight)
+            rows = np.append(rows, self._errors[self._paper_weight > 0])
+            demands.append(_signed(self._paper.flat, self._paper_demand))
+        return Rating(rows, np.concatenate(demands) + INSIDE, peaks)
+
+    def _dyads(self) -> Array:
+        """Shortage of each dyad's transmission; that of the leg is the largest of these."""
+        steps, at, demand = *self._exact_arguments[1:17:15], self.demands.index("transmission")
+        _, sense, bound, scale = (column[demand] for column in self._demand[:4])
+        dyads = steps[steps[:, 0] == DYAD]
+        one, two = (at[dyads[:, 1]] - at[dyads[:, i]] for i in (2, 3))
+        sine = np.abs((one.conj() * two).imag) / (np.abs(one) * np.abs(two) + 1e-12)
+        return _finite(sense * (bound - sine.min(axis=1)) * scale)
+
     def rows(self, x: Array) -> Array:
         """Signed errors in bars, shape (rows,), with the exact solver; `MISSED_ROW` if there is no value."""
         self._measure(check_vector(x, self.choice), False)
@@ -276,3 +320,13 @@ class Objective:
         worst = max(counted, key=lambda name: abs(counted[name]))
         within = sum(abs(error) <= 1 for error in counted.values())
         return {**result, "within": within, "of": len(counted), "worst": worst, "worst_error": counted[worst]}
+
+
+def _signed(measured: Array, demand: tuple[Any, ...]) -> Array:
+    """Shortages, below 0 where satisfied."""
+    where, sense, bound, scale, _ = demand
+    return _finite(sense * (bound - measured[where]) * scale)
+
+
+def _finite(shortages: Array) -> Array:
+    return np.where(np.isfinite(shortages), shortages, MISSED)

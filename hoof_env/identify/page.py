@@ -93,7 +93,7 @@ def _rows_table(confirmation: Confirmation) -> str:
 def _starts(data: Mapping[str, Any]) -> list[str]:
     reached = {key: sum(s[key] for s in data["starts"]) for key in ("exact", "both", "confirmed")}
     choices = (
-        [c["choice"], *(str(c[key]) for key in ("starts", *reached)), f"{c['cost']:.2f}"]
+        [c["choice"], *(str(c[key]) for key in ("starts", *reached)), f"{c['error']:.2f}"]
         for c in data["counts"]
     )
     lines = (
@@ -103,7 +103,7 @@ def _starts(data: Mapping[str, Any]) -> list[str]:
             "".join("+" if sign > 0 else "-" for sign in s["choice"]["assembly"]),
             *(str(s[key]) for key in ("jobs", "evaluations")),
             f"{s['seconds']:.0f}",
-            f"{s['cost']:.2f}",
+            f"{s['error']:.2f}",
             next((name for name in ("confirmed", "both", "exact") if s[name]), "-"),
         ]
         for s in data["starts"]
@@ -113,10 +113,14 @@ def _starts(data: Mapping[str, Any]) -> list[str]:
         f"Of {len(data['starts'])} independent starts {reached['exact']} reached every bar with the exact "
         f"solver, {reached['both']} with both, and the full system confirmed {reached['confirmed']}. A "
         "search ends at the first confirmed candidate unless told to keep going.",
-        _table(["choice", "starts", "exact", "both", "confirmed", "lowest cost"], choices),
+        _table(["choice", "starts", "exact", "both", "confirmed", "lowest error [bars]"], choices),
         "## Independent starts",
-        "A start counts with all jobs that refined what it found; cost is with the exact solver alone.",
-        _table(["start", "choice", "assembly", "jobs", "evaluations", "s", "lowest cost", "reached"], lines),
+        "A start counts with all jobs that refined what it found; its error is that of the worst row with "
+        "the exact solver alone, and 2 more for a shortage of one.",
+        _table(
+            ["start", "choice", "assembly", "jobs", "evaluations", "s", "lowest error [bars]", "reached"],
+            lines,
+        ),
     ]
 
 

@@ -22,6 +22,8 @@ from hoof_env.identify.candidate import (
     to_preset,
 )
 from hoof_env.identify.confirm import confirm
+from hoof_env.identify.job import PENALTY
+from hoof_env.identify.minimax import Rate
 from hoof_env.identify.objective import Objective
 from hoof_env.identify.records import Standing
 from hoof_env.identify.schedule import Phase
@@ -37,6 +39,9 @@ TOE_DOWN, TOE_SPEED = 0.35, -3.0
 
 TOE_SCALES = (0.1, 0.3)
 """How far these two range."""
+
+TOE_TIMES, TOE_SPEEDS = (0.27, 0.42), (-4.5, -2.0)
+"""Where they lie in cold starts: between the walk's published first contact and its mid-stance."""
 
 SAMPLES = 401
 """Instants a revolution with which candidates of all phases are compared."""
@@ -70,16 +75,25 @@ class LegProblem:
     walk: str
     start: tuple[Choice, tuple[float, ...]] | None
 
-    def given(self) -> tuple[dict[str, Any], Array]:
+    def given(self, rng: np.random.Generator, phase: Phase) -> tuple[dict[str, Any], Array]:
         if self.start is None:
             raise HoofEnvError("a search without a start preset has cold starts only")
-        return self.start[0].to_dict(), np.array(self.start[1])
+        choice, x = self.start[0].to_dict(), np.array(self.start[1])
+        y, spread = self.inward(choice, x, phase), float(rng.choice(phase.spreads))
+        if not spread:
+            return choice, y
+        scales = spread * self.scales(choice, phase)
+        tries = [y + scales * rng.standard_normal(y.size) for _ in range(phase.tries)]
+        return choice, min(tries, key=self.cost(choice, phase))
 
     def cold(self, rng: np.random.Generator, phase: Phase) -> tuple[dict[str, Any], Array]:
-        choice = random_choice(rng) if rng.random() < PRODUCT else random_choice(rng, LINK9, SWINGS)
-        cost = self.objective(choice, phase.samples, phase.paper_solver).cost
-        tries = [random_start(choice, rng) for _ in range(phase.tries)]
-        return choice.to_dict(), min(tries, key=cost)
+        legs = random_choice(rng) if rng.random() < PRODUCT else random_choice(rng, LINK9, SWINGS)
+        choice = legs.to_dict()
+        tries = [random_start(legs, rng) for _ in range(phase.tries)]
+        if phase.by_toe:
+            times, speeds = rng.uniform(*TOE_TIMES, phase.tries), rng.uniform(*TOE_SPEEDS, phase.tries)
+            tries = [_with_toe(legs, *toe) for toe in zip(tries, times, speeds, strict=True)]
+        return choice, min(tries, key=self.cost(choice, phase))
 
     def scales(self, choice: dict[str, Any], phase: Phase) -> Array:
         legs = Choice.from_dict(choice)
@@ -104,16 +118,19 @@ class LegProblem:
     def cost(self, choice: dict[str, Any], phase: Phase) -> Callable[[Array], float]:
         legs = Choice.from_dict(choice)
         objective = self.objective(legs, phase.samples, phase.paper_solver, by_toe=phase.by_toe)
-        cost: Callable[[Array], float] = getattr(objective, phase.loss)
-        return cost
+        return objective.cost
+
+    def rate(self, choice: dict[str, Any], phase: Phase) -> Rate:
+        legs = Choice.from_dict(choice)
+        return self.objective(legs, phase.samples, phase.paper_solver, by_toe=phase.by_toe).rate
 
     def standing(self, choice: dict[str, Any], x: Array, paper_solver: bool) -> Standing:
         return standing(self.objective(Choice.from_dict(choice), SAMPLES, paper_solver), x)
 
     def rank(self, choice: dict[str, Any], x: Array) -> tuple[float, float | None]:
         legs = Choice.from_dict(choice)
-        exact = self.objective(legs, SAMPLES, False).cost(x)
-        return exact, self.objective(legs, SAMPLES, True).cost(x) if legs.simulable else None
+        exact = self.objective(legs, SAMPLES, False).rate(x).merit(PENALTY)
+        return exact, self.objective(legs, SAMPLES, True).rate(x).merit(PENALTY) if legs.simulable else None
 
     def confirm(self, choice: dict[str, Any], x: Array) -> bool:
         try:

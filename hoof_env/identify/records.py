@@ -9,6 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from hoof_env.identify.minimax import Rate
 from hoof_env.identify.schedule import Phase
 
 Array = NDArray[np.float64]
@@ -35,15 +36,20 @@ class Standing:
     def met(self) -> bool:
         return self.within == self.of and self.short <= 0
 
+    @property
+    def excess(self) -> float:
+        """The largest error, and what falls short on top [bars]."""
+        return abs(self.error) + 2.0 * self.short
+
 
 class Problem(Protocol):
     """What is searched. It must pickle; a choice is a JSON object of what cannot vary continuously."""
 
-    def given(self) -> tuple[dict[str, Any], Array]:
-        """Choice and coordinates of the start."""
+    def given(self, rng: np.random.Generator, phase: Phase) -> tuple[dict[str, Any], Array]:
+        """Choice and a phase's coordinates of a start near the start preset."""
 
     def cold(self, rng: np.random.Generator, phase: Phase) -> tuple[dict[str, Any], Array]:
-        """Choice and coordinates of a start anywhere."""
+        """Choice and a phase's coordinates of a start anywhere."""
 
     def scales(self, choice: dict[str, Any], phase: Phase) -> Array:
         """The size of a step in each of a phase's coordinates."""
@@ -57,11 +63,14 @@ class Problem(Protocol):
     def cost(self, choice: dict[str, Any], phase: Phase) -> Callable[[Array], float]:
         """The function to minimise in a phase, of its coordinates."""
 
+    def rate(self, choice: dict[str, Any], phase: Phase) -> Rate:
+        """The rating to improve in a phase, of its coordinates."""
+
     def standing(self, choice: dict[str, Any], x: Array, paper_solver: bool) -> Standing:
         """How far a candidate is from its goal, with the exact solver alone or with both."""
 
     def rank(self, choice: dict[str, Any], x: Array) -> tuple[float, float | None]:
-        """Costs that compare between phases: with the exact solver, and with both (None: no such leg)."""
+        """Merit that compares between phases: with the exact solver, and with both (None: no such leg)."""
 
     def confirm(self, choice: dict[str, Any], x: Array) -> bool:
         """Whether the full system finds every bar met and every claim true."""
@@ -101,8 +110,8 @@ class Result:
         sigma, population: drawn for this job.
         evaluations, seconds: spent. stop: why it ended.
         cost: of the job's own objective.
-        exact, standing: with the exact solver alone. full, both: with both, None where the full system lacks
-            the choice.
+        exact, standing: merit [bars] and more with the exact solver alone. full, both: with both, None where
+            the full system lacks the choice.
         confirmed: the full system finds every bar met and every claim true.
     """
 
@@ -141,7 +150,7 @@ class Result:
 
 @dataclass(frozen=True)
 class Progress:
-    """A running job: evaluations so far, lowest cost and the standing of what costs it."""
+    """A running job: evaluations so far, lowest cost or merit, and the standing of what has it."""
 
     id: str
     evaluations: int

@@ -74,9 +74,9 @@ def starts(results: Iterable[Result]) -> list[dict[str, Any]]:
     """One dictionary for each independent start, with all jobs that go back to it.
 
     Returns:
-        Dictionaries with root (the start's job), start, choice, jobs, evaluations, seconds, cost (lowest with
-        the exact solver alone), exact (some candidate met every bar with that solver), both (with both
-        solvers) and confirmed (and the full system agreed).
+        Dictionaries with root (the job it began with), start, choice, jobs, evaluations, seconds, error (the
+        lowest with the exact solver alone), exact (some candidate met every bar with that solver), both (with
+        both solvers) and confirmed (and the full system agreed).
     """
     families: dict[str, list[Result]] = defaultdict(list)
     for result in results:
@@ -89,7 +89,7 @@ def starts(results: Iterable[Result]) -> list[dict[str, Any]]:
             "jobs": len(family),
             "evaluations": sum(r.evaluations for r in family),
             "seconds": sum(r.seconds for r in family),
-            "cost": min(r.exact for r in family),
+            "error": min(r.exact for r in family),
             "exact": any(r.standing.met for r in family),
             "both": any(r.both is not None and r.both.met for r in family),
             "confirmed": any(r.confirmed for r in family),
@@ -102,7 +102,7 @@ def counts(families: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """How many of the `starts` reached the bar, for each choice but for the signs of its dyads.
 
     Returns:
-        Dictionaries with choice (in words), starts, exact, both, confirmed (how many) and cost (the lowest).
+        Dictionaries with choice (in words), starts, exact, both, confirmed (how many) and error (the lowest).
     """
     kinds: dict[str, list[Mapping[str, Any]]] = defaultdict(list)
     for family in families:
@@ -110,7 +110,7 @@ def counts(families: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
     return [
         {"choice": kind, "starts": len(members)}
         | {key: sum(m[key] for m in members) for key in ("exact", "both", "confirmed")}
-        | {"cost": min(m["cost"] for m in members)}
+        | {"error": min(m["error"] for m in members)}
         for kind, members in sorted(kinds.items())
     ]
 

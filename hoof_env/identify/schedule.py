@@ -10,29 +10,32 @@ PAPER_WEIGHT = 12
 """How many evaluations one with the paper's solver counts for: it takes that much longer."""
 
 
-BUDGET = 20_000_000
+BUDGET = 10_000_000
 """Evaluations of a search unless told otherwise; one takes some 0.1 ms."""
 
 
 @dataclass(frozen=True)
 class Phase:
-    """One or more rounds of equal jobs, each a CMA-ES run from a start of its own.
+    """One or more rounds of equal jobs, each from a start of its own.
 
     Attributes:
         name: in reports.
-        start: "given" (around the start preset), "cold" (anywhere) or "best" (around results so far).
+        start: "given" (around the start preset), "cold" (anywhere) or "best" (from results so far: job i
+            from the i-th best of the independent starts).
+        method: "cma" (CMA-ES on the cost of all errors) or "minimax" (descents of the largest error, each
+            from beside the best so far, see `minimax`).
         jobs, rounds: jobs a round, and rounds.
-        evaluations: at most, a job.
-        sigmas, populations: one of each is drawn for a job; sigma in units of the problem's scales.
-        spreads: "given" only, one is drawn: the start's distance from the preset, in sigmas.
-        tries: "cold" only, how many random legs the best of which is the start.
-        elite, favour: "best" only: the best with this probability, else one of the best `elite` results.
-        below: "best" only: results of other phases that cost more with the exact solver are not refined;
-            without any left the phase is skipped.
+        evaluations: at most, a job; a descent that has begun is finished.
+        sigmas: one is drawn for a job of CMA-ES, or for each hop between descents; in scales.
+        populations: one is drawn for a job of CMA-ES.
+        spreads: "given" only, one is drawn: the start's distance from the preset, in scales.
+        tries: how many random legs the best of which is the start; "given" and "cold" only.
+        elite: "best" only: how many independent starts are kept.
+        below: "best" only: results of other phases that are further out with the exact solver [bars] are
+            not refined; without any left the phase is skipped.
         give_up: pairs (evaluations, cost): a job that costs more after so many evaluations ends.
         samples: instants a revolution.
-        by_toe: search the time of the walking toe's touch-down instead of the ground level, see `Objective`.
-        loss: what is minimised, a method of `Objective`.
+        by_toe: search the walking toe's touch-down instead of ground level and offset, see `Objective`.
         paper_solver: the objective contains the paper's solver too.
         ends_at_bar: a job ends as soon as all rows are clear within their bars and nothing falls short.
     """
@@ -42,17 +45,16 @@ class Phase:
     jobs: int
     evaluations: int
     sigmas: tuple[float, ...]
-    populations: tuple[int, ...] = (20, 40, 60)
+    method: str = "cma"
+    populations: tuple[int, ...] = (20,)
     rounds: int = 1
-    spreads: tuple[float, ...] = (0.0, 0.5, 1.0)
-    tries: int = 3000
+    spreads: tuple[float, ...] = (0.0, 0.15, 0.3, 0.5)
+    tries: int = 300
     elite: int = 6
-    favour: float = 0.4
     below: float = float("inf")
     give_up: tuple[tuple[int, float], ...] = ()
     samples: int = 201
-    by_toe: bool = False
-    loss: str = "cost"
+    by_toe: bool = True
     paper_solver: bool = False
     ends_at_bar: bool = False
 
@@ -65,57 +67,42 @@ class Phase:
 Schedule = tuple[Phase, ...]
 """Phases, run again and again until the bar is reached or the budget spent."""
 
-_REFINE = Phase(
-    "refine",
+_HOPS = (0.003, 0.01, 0.03, 0.1)
+_AROUND = Phase("around", "given", jobs=24, evaluations=4_000, sigmas=(0.1,), samples=101)
+_COLD = Phase("cold", "cold", jobs=24, evaluations=4_000, sigmas=(0.2,), tries=1500, samples=101)
+_SETTLE = Phase("settle", "best", jobs=8, elite=8, evaluations=8_000, sigmas=(0.05,), samples=101)
+_DESCEND = Phase(
+    "descend", "best", jobs=8, elite=8, evaluations=4_000, sigmas=_HOPS, method="minimax", samples=401
+)
+_POLISH = Phase(
+    "polish",
     "best",
-    jobs=6,
-    rounds=3,
-    evaluations=60_000,
-    sigmas=(0.002, 0.005, 0.01, 0.02, 0.04),
-    populations=(14, 20, 30),
-    elite=8,
-    give_up=((20_000, 40.0),),
-    by_toe=True,
+    jobs=4,
+    elite=4,
+    rounds=2,
+    evaluations=16_000,
+    sigmas=_HOPS,
+    method="minimax",
+    samples=401,
+    ends_at_bar=True,
 )
 _BOTH = Phase(
     "both solvers",
     "best",
-    jobs=4,
-    evaluations=30_000,
-    sigmas=(0.002, 0.005, 0.01, 0.02),
-    populations=(14, 20),
-    below=6.0,
+    jobs=2,
+    elite=2,
+    rounds=2,
+    evaluations=10_000,
+    sigmas=(0.002, 0.005, 0.01, 0.02, 0.04),
+    method="minimax",
+    samples=401,
+    below=1.5,
     paper_solver=True,
     ends_at_bar=True,
-    by_toe=True,
 )
 
-FROM_PRESET: Schedule = (
-    Phase(
-        "around",
-        "given",
-        jobs=6,
-        evaluations=120_000,
-        sigmas=(0.02, 0.04, 0.08, 0.15),
-        populations=(14, 20, 30),
-        give_up=((20_000, 120.0), (60_000, 40.0)),
-        by_toe=True,
-    ),
-    _REFINE,
-    _BOTH,
-)
-COLD: Schedule = (
-    Phase(
-        "cold",
-        "cold",
-        jobs=8,
-        evaluations=300_000,
-        sigmas=(0.25,),
-        give_up=((15_000, 400.0), (40_000, 120.0), (80_000, 60.0), (200_000, 25.0)),
-    ),
-    _REFINE,
-    _BOTH,
-)
+FROM_PRESET: Schedule = (_AROUND, _SETTLE, _DESCEND, _POLISH, _BOTH)
+COLD: Schedule = (_COLD, _SETTLE, _DESCEND, _POLISH, _BOTH)
 
 
 def rounds(schedule: Schedule) -> Iterator[tuple[int, Phase]]:

@@ -114,9 +114,9 @@ def elite(phase: Phase, results: list[Result]) -> tuple[Parent, ...]:
     """The best result of each of the best independent starts, best first, by the phase's solvers."""
     ranked = []
     for result in results:
-        cost = result.full if phase.paper_solver else result.exact
-        if cost is not None and (result.exact < phase.below or result.phase == phase.name):
-            ranked.append((cost, result.parent))
+        merit = result.full if phase.paper_solver else result.exact
+        if merit is not None and (result.exact < phase.below or result.phase == phase.name):
+            ranked.append((merit, result.parent))
     ranked.sort(key=lambda pair: pair[0])
     best: dict[str, Parent] = {}
     for _, parent in ranked:
