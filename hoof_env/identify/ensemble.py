@@ -8,24 +8,26 @@ among them. A member is written as a preset file writes a leg and its gaits, wit
      "members": [{"geometry": ..., "gaits": ..., "errors": {"exact": ..., "paper": ...}, "short": {}}, ...]}
 
 Errors are those of the worst row, in units of its own bar; with the paper's solver the walking inelastic
-rows, which are ill-conditioned, do not count.
+rows, which are ill-conditioned, do not count. "short" names the demands on plausibility that a leg misses.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from hoof_env.errors import DataFileError, HoofEnvError, ParameterError, check_number
+from hoof_env.errors import DataFileError, HoofEnvError, ParameterError, check_choice, check_number
 from hoof_env.gait.parameters import GaitParameters
 from hoof_env.leg.geometry import Geometry
 
 GAITS = ("walk", "run")
 SOLVERS = ("exact", "paper")
+WALKS = ("walks", "brakes")
+"""How the walk of an ensemble may be read."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +45,13 @@ class Member:
     errors: Mapping[str, float]
     short: Mapping[str, float]
 
+    def to_preset(self) -> dict[str, Any]:
+        """The content of a preset file of this leg."""
+        geometry = self.geometry.to_dict()
+        provenance = geometry.pop("provenance")
+        gaits = {gait: asdict(parameters) for gait, parameters in self.gaits.items()}
+        return {"provenance": provenance, "geometry": geometry, "gaits": gaits}
+
 
 @dataclass(frozen=True)
 class Ensemble:
@@ -50,7 +59,7 @@ class Ensemble:
 
     Attributes:
         name: of the preset that it belongs to, or of its file. provenance: where it comes from.
-        walk: the reading of the walk that its members share, "walks" or "brakes".
+        walk: the reading of the walk that its members share, one of `WALKS`.
         members: in the order in which they were found or chosen.
     """
 
@@ -75,8 +84,8 @@ def load_ensemble(source: str | Path) -> Ensemble:
 
     Raises:
         ParameterError: the preset has none.
-        DataFileError: the file is unreadable, lacks a part, holds a leg that does not turn, or its bar is not
-            that of its members.
+        DataFileError: the file is unreadable, lacks a part, holds a leg that does not turn or is there
+            twice, or its bar is not that of its members.
     """
     if isinstance(source, Path) or str(source).endswith(".json"):
         path: Any = Path(source)
@@ -93,14 +102,24 @@ def load_ensemble(source: str | Path) -> Ensemble:
     members = data.get("members") if isinstance(data, dict) else None
     if not isinstance(members, list) or not members:
         raise DataFileError(f"{path}: expected an object with a list 'members' of at least one leg")
-    found = []
+    found: list[Member] = []
     for number, entry in enumerate(members, 1):
         try:
             found.append(read_member(entry, f"member {number}"))
         except HoofEnvError as error:
             raise DataFileError(f"{path}, member {number}: {error}") from None
+    for number, member in enumerate(found, 1):
+        for twin, other in enumerate(found[: number - 1], 1):
+            if member.geometry.replace(name=other.geometry.name) == other.geometry:
+                raise DataFileError(
+                    f"{path}: members {twin} and {number}: expected different legs, got one twice"
+                )
+    try:
+        walk = check_choice("walk", data.get("walk", WALKS[0]), WALKS)
+    except ParameterError as error:
+        raise DataFileError(f"{path}: {error}") from None
     name = source if isinstance(source, str) else source.stem
-    ensemble = Ensemble(name, str(data.get("provenance", "")), str(data.get("walk", "walks")), tuple(found))
+    ensemble = Ensemble(name, str(data.get("provenance", "")), walk, tuple(found))
     if data.get("bar") != ensemble.bar:
         raise DataFileError(
             f"{path}: bar: expected {ensemble.bar}, its members' largest errors, got {data.get('bar')!r}"
@@ -124,6 +143,8 @@ def read_member(entry: Any, name: str) -> Member:
         short = {k: check_number(f"short[{k!r}]", v, low=0) for k, v in entry.get("short", {}).items()}
     except KeyError as error:
         raise ParameterError(f"lacks {error}") from None
+    except HoofEnvError:
+        raise
     except (AttributeError, TypeError, ValueError) as error:
         raise ParameterError(f"is incomplete or has unknown entries: {error}") from None
     return Member(leg, gaits, errors, short)
