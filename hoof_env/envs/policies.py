@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from hoof_env.envs.horse_leg import HorseLegEnv
 from hoof_env.envs.start import hoof_height
 from hoof_env.errors import check_choice
-from hoof_env.gait.parameters import GaitParameters
+from hoof_env.gait.parameters import GaitParameters, paper_gaits
 
 Action = NDArray[np.float32]
 
@@ -79,7 +79,8 @@ def make_policy(name: str, env: Any, seed: int = 0) -> Scripted:
         return Scripted(lambda observation, time: generator.uniform(-1, 1, 4), leg.dt)
     if name == "bang-bang":
         return Scripted(lambda observation, time: np.full(4, 1.0 if int(time / 0.25) % 2 else -1.0), leg.dt)
-    middle = sum(gait.swing_offset for gait in leg.gaits.values()) / len(leg.gaits)
+    offsets = [gait.swing_offset for gait in paper_gaits(leg.gaits).values()]
+    middle = sum(offsets) / len(offsets)
     rest = leg.action_for(GaitParameters(0.0, middle, 0.0, 0.0))
     if name == "idle":
         return Scripted(lambda observation, time: rest, leg.dt)

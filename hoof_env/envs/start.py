@@ -10,7 +10,7 @@ import numpy as np
 
 from hoof_env.dynamics.trunk import Trunk
 from hoof_env.errors import ParameterError, check_choice, check_number
-from hoof_env.gait.parameters import GaitParameters
+from hoof_env.gait.parameters import GaitParameters, paper_gaits
 from hoof_env.leg.geometry import Geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
 
@@ -53,8 +53,8 @@ def draw_start(
     other the crank angle is drawn again.
     """
     mix, turn, rolling = generator.random(3)
-    names = sorted(gaits)
-    one, two = gaits[names[0]].to_array(), gaits[names[-1]].to_array()
+    ends = [end.to_array() for end in paper_gaits(gaits).values()]
+    one, two = ends[0], ends[-1]
     gait = options.get("gait") or GaitParameters.from_array(one + mix * (two - one))
     theta = options.get("crank_angle", 2 * np.pi * turn)
     speed = options.get("speed", START_SPEED * rolling if trunk.kind != "fixed" else 0.0)

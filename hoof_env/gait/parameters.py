@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.errors import DataFileError, ParameterError, check_choice, check_number
 from hoof_env.leg.geometry import read_preset
+
+Gait = TypeVar("Gait")
 
 LIMITS = MappingProxyType(
     {
@@ -74,7 +77,7 @@ PARAMETERS = tuple(item.name for item in fields(GaitParameters))
 
 
 def gait_names(preset: str | Path = "first_fit") -> list[str]:
-    """Names of the gaits in a preset.
+    """Names of the gaits in a preset: the paper's walk and run, and what was found for that leg beside them.
 
     Raises:
         ParameterError: unknown preset name.
@@ -98,6 +101,15 @@ def load_gait(name: str, preset: str | Path = "first_fit") -> GaitParameters:
         raise DataFileError(
             f"preset {preset}, gait {name!r}: expected {', '.join(PARAMETERS)}: {error}"
         ) from None
+
+
+def paper_gaits(gaits: Mapping[str, Gait]) -> dict[str, Gait]:
+    """The paper's own gaits among those of a preset, by name and in alphabetic order; all, if it has neither.
+
+    What an environment draws or derives from the gaits of a preset must not change when one is added.
+    """
+    names = sorted(set(gaits) & {"walk", "run"} or gaits)
+    return {name: gaits[name] for name in names}
 
 
 def _read_gaits(preset: str | Path) -> dict[str, Any]:

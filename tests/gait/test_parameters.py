@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hoof_env.errors import DataFileError, ParameterError
-from hoof_env.gait.parameters import LIMITS, PARAMETERS, GaitParameters, gait_names, load_gait
+from hoof_env.gait.parameters import LIMITS, PARAMETERS, GaitParameters, gait_names, load_gait, paper_gaits
+from hoof_env.leg.geometry import read_preset
 
 inside = st.tuples(*(st.floats(low, high) for low, high in LIMITS.values()))
 
@@ -80,3 +81,30 @@ def test_a_bad_preset_is_named(tmp_path, gaits, error, message):
     if not gaits or not isinstance(gaits, dict):
         with pytest.raises(DataFileError, match="expected an object 'gaits'"):
             gait_names(path)
+
+
+def test_a_preset_holds_more_gaits_than_the_papers(tmp_path):
+    preset = read_preset("first_fit")
+    given = {"crank_speed": 5.0, "swing_offset": 0.7, "swing_sin": 0.1, "swing_cos": -0.3}
+    preset["gaits"]["carrying_walk"] = given
+    path = tmp_path / "three.json"
+    path.write_text(json.dumps(preset))
+    assert gait_names(path) == ["carrying_walk", "run", "walk"]
+    assert load_gait("carrying_walk", path) == GaitParameters(**given)
+    assert load_gait("walk", path) == load_gait("walk", "first_fit")
+    with pytest.raises(ParameterError, match="gait: expected one of run, walk, got 'carrying_walk'"):
+        load_gait("carrying_walk", "first_fit")
+
+
+@pytest.mark.parametrize(
+    ("gaits", "names"),
+    [
+        ("walk run", ["run", "walk"]),
+        ("walk zigzag run carrying_walk", ["run", "walk"]),
+        ("run amble", ["run"]),
+        ("trot amble", ["amble", "trot"]),
+    ],
+)
+def test_the_papers_gaits_stand_apart_from_those_found_later(gaits, names):
+    chosen = paper_gaits({name: name.upper() for name in gaits.split()})
+    assert list(chosen.items()) == [(name, name.upper()) for name in names]
