@@ -29,14 +29,13 @@ from hoof_env.identify.minimax import Rating
 from hoof_env.identify.plausibility import BOTH, LEG, LEG_DEMANDS, MEASURED, WALK_DEMANDS, demands
 from hoof_env.identify.targets import Targets, load_targets
 from hoof_env.leg.linkage import BODIES, POINTS
+from hoof_env.paper.rows import ILL_CONDITIONED as ILL_CONDITIONED
 
 Array = NDArray[np.float64]
 
-ILL_CONDITIONED = ("walk.peak_inelastic", "walk.mean_inelastic", "walk.reduction")
-"""Rows that the paper's solver need not meet: the walk grazes, and they hang on how it samples touch-down."""
-
 INSIDE = 0.01
-"""By how much `rate` asks for more than a demand, because a descent ends on the border of it [bars]."""
+"""By how much `rate` asks for more than a demand, because a descent ends on the border of it [bars].
+Those that cannot be exceeded are 0 where they are met."""
 
 LEVEL = 17
 """Where x holds the hip's height."""
@@ -232,7 +231,8 @@ class Objective:
             self._rate_rows(self._paper.flat, self._paper_weight)
             rows = np.append(rows, self._errors[self._paper_weight > 0])
             demands.append(_signed(self._paper.flat, self._paper_demand))
-        return Rating(rows, np.concatenate(demands) + INSIDE, peaks)
+        shortages = np.concatenate(demands)
+        return Rating(rows, np.where(shortages == 0.0, 0.0, shortages + INSIDE), peaks)
 
     def _dyads(self) -> Array:
         """Shortage of each dyad's transmission; that of the leg is the largest of these."""

@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from hoof_env.errors import DataFileError, ParameterError, check_number
-from hoof_env.paper.published import PublishedRow, load_published
-from hoof_env.paper.published import _row as read_row
+from hoof_env.paper.published import PublishedRow, load_published, read_row
 
 PERIOD = 1.0
 """Duration of the cycle that the rows describe [s]."""

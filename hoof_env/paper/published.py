@@ -127,7 +127,7 @@ def load_published(path: Path | None = None) -> Published:
         published = Published(
             data["source"],
             data["parameters"],
-            tuple(_row(entry) for entry in data["rows"]),
+            tuple(read_row(entry) for entry in data["rows"]),
             tuple(Claim(entry["id"], entry["claim"], entry.get("reading", "")) for entry in data["shapes"]),
         )
     except OSError as error:
@@ -144,7 +144,12 @@ def load_published(path: Path | None = None) -> Published:
     return published
 
 
-def _row(entry: dict[str, Any]) -> PublishedRow:
+def read_row(entry: dict[str, Any]) -> PublishedRow:
+    """A row from its JSON object.
+
+    Raises:
+        ParameterError: a bar or condition that is none. KeyError, ValueError, TypeError: an incomplete entry.
+    """
     condition = entry.get("condition")
     if condition not in (None, *CONDITIONS):
         raise ParameterError(f"condition: expected one of {', '.join(CONDITIONS)} or none, got {condition!r}")

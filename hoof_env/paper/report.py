@@ -8,7 +8,7 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from hoof_env import __version__
-from hoof_env.paper.rows import severity
+from hoof_env.paper.rows import ILL, counted, severity
 
 if TYPE_CHECKING:
     from hoof_env.paper.reproduce import Reproduction
@@ -20,8 +20,17 @@ _DIGITS = {"s": 4, "deg": 2, "N": 1, "%": 2, "-": 3, "point": 2, "": 3}
 _PACKAGES = ("gymnasium", "numpy", "numba")
 
 
-def markdown(reproduction: Reproduction, *, command: str, figures: bool) -> str:
-    """The whole page; `command` is named as what wrote it, `figures` says whether pictures lie beside it."""
+def markdown(
+    reproduction: Reproduction, conditions: Mapping[str, Any], *, command: str, figures: bool
+) -> str:
+    """The whole page.
+
+    Args:
+        conditions: how the rows answer to step, beta and ground level, see `Reproduction.conditions`; empty
+            if that was not measured.
+        command: named as what wrote the page.
+        figures: whether pictures lie beside it.
+    """
     solvers = list(dict.fromkeys(row["solver"] for row in reproduction.rows))
     versions = ", ".join(
         [f"Python {platform.python_version()}", *(f"{name} {version(name)}" for name in _PACKAGES)]
@@ -38,9 +47,13 @@ def markdown(reproduction: Reproduction, *, command: str, figures: bool) -> str:
         f"Written by `{command}` with hoof-env {__version__}, {versions}.",
         "## Published beside simulated",
         *(_summary(reproduction, solver) for solver in solvers),
-        "Errors are in the measure of the bar; ✗ marks a row outside its bar, and bold its solver's worst.",
+        "Errors are in the measure of the bar; ✗ marks a row outside its bar, and bold its solver's worst. "
+        "Counted are the rows that have a bar with the solver: not those whose bar is 'reported', and not "
+        "the ill-conditioned ones, marked †.",
         _rows_table(reproduction, solvers),
+        *_conditioning(reproduction, conditions, solvers),
         "## Other readings of the same rows",
+        _resultants(reproduction, solvers),
         _beside_table(reproduction, solvers),
         "## Claims about shape",
         *(_shape(reproduction, claim.id, figures) for claim in reproduction.published.claims),
@@ -77,13 +90,11 @@ def _worst(reproduction: Reproduction, solver: str) -> list[dict[str, Any]]:
 
 
 def _summary(reproduction: Reproduction, solver: str) -> str:
-    barred = [row for row in _of(reproduction.rows, solver=solver) if row["within_bar"] is not None]
-    within = sum(row["within_bar"] for row in barred)
     worst = ", ".join(
         f"{row['id']} {format_error(row, reproduction)} (bar {row['bar']})"
         for row in _worst(reproduction, solver)
     )
-    counts = f"{within} of {len(barred)} rows within their bar"
+    counts = counted(reproduction.rows, reproduction.shapes, solver)
     return f"Solver `{solver}`: {counts}. Worst: {worst or 'none outside'}."
 
 
@@ -105,7 +116,8 @@ def _rows_table(reproduction: Reproduction, solvers: list[str]) -> str:
         ]
         for solver in solvers:
             (row,) = _of(reproduction.rows, id=published.id, solver=solver)
-            error = format_error(row, reproduction) + (" ✗" if row["within_bar"] is False else "")
+            mark = " ✗" if row["within_bar"] is False else " †" if row["spared"] == ILL else ""
+            error = format_error(row, reproduction) + mark
             line += [
                 format_number(row["simulated"], row["unit"]),
                 f"**{error}**" if (row["id"], solver) in worst else error,
@@ -113,6 +125,61 @@ def _rows_table(reproduction: Reproduction, solvers: list[str]) -> str:
         lines.append(line)
     head = ["row", "quantity", "unit", "published", "bar"]
     return _table(head + [text for solver in solvers for text in (f"solver {solver}", "error")], lines)
+
+
+def _conditioning(reproduction: Reproduction, conditions: Mapping[str, Any], solvers: list[str]) -> list[str]:
+    """Section on the rows that a solver is spared for being ill-conditioned."""
+    spared = list(dict.fromkeys(row["id"] for row in _of(reproduction.rows, spared=ILL)))
+    if not (spared and conditions):
+        return []
+    from hoof_env.paper.study.conditions import LEVEL_WINDOW
+    from hoof_env.paper.study.conditions_text import conditions_text, number  # import this module
+
+    columns = {"step": ("paper", "step"), "β": ("paper", "beta")}
+    columns |= {f"hip height, {solver}": (solver, "ground") for solver in solvers}
+    lines = []
+    for name in spared:
+        published = reproduction.published.row(name)
+        line = [f"`{name}`", published.unit, format_number(published.value, published.unit)]
+        for solver in solvers:
+            (row,) = _of(reproduction.rows, id=name, solver=solver)
+            line += [format_number(row["simulated"], row["unit"]), format_error(row, reproduction)]
+        line += [
+            number(conditions[name][of][parameter]["relative"], "+.3g") for of, parameter in columns.values()
+        ]
+        ends = (conditions[name][solvers[0]]["ground"][end] for end in ("low", "high"))
+        lines.append([*line, " to ".join(format_number(end, published.unit) for end in ends)])
+    head = ["row", "unit", "published"]
+    head += [text for solver in solvers for text in (f"solver {solver}", "error")]
+    return [
+        "## Ill-conditioned rows",
+        "Inelastic walking hangs on the approach speed at a touch-down that grazes, and the paper's loop "
+        "takes it at the first step inside the ground. So these rows are shown with both solvers and have "
+        "no bar with the paper's. Their condition is the relative change of the row per relative change of "
+        "the time step, of β and of the hip's height above the ground, whose level is identified; the last "
+        f"column is where the paper's solver puts the row within ±{1e3 * LEVEL_WINDOW:g} mm of that level.",
+        _table([*head, *columns, f"{solvers[0]}, ±{1e3 * LEVEL_WINDOW:g} mm"], lines),
+        "The same for every row, to compare:",
+        conditions_text(reproduction.published, conditions),
+    ]
+
+
+def _resultants(reproduction: Reproduction, solvers: list[str]) -> str:
+    """Which reading of 'maximum force' is used, and what the other one would change."""
+    parts = []
+    for solver in solvers:
+        readings = []
+        for row in _of(reproduction.rows, solver=solver, spared=""):
+            bar = reproduction.published.row(row["id"]).bar
+            other = [value for name, value in row["beside"].items() if name.startswith("resultant")]
+            readings += [(row["within_bar"], bar.holds(bar.error(v, row["published"]))) for v in other]
+        used, other_used = (sum(map(bool, verdicts)) for verdicts in zip(*readings, strict=True))
+        parts.append(f"{used} and {other_used} of {len(readings)} counted with solver `{solver}`")
+    return (
+        "'Maximum force' is the normal force summed over toe and heel throughout, in both gaits and both "
+        "conditions. The other reading, the resultant with friction, stands here beside every peak and "
+        f"reduction. Within their bars are, as read and as resultants, {', '.join(parts)}."
+    )
 
 
 def _beside_table(reproduction: Reproduction, solvers: list[str]) -> str:
@@ -140,10 +207,10 @@ def _shape(reproduction: Reproduction, claim_id: str, figures: bool) -> str:
     lines = [f"**`{claim_id}`**: {first['claim']}"]
     if first["reading"]:
         lines.append(f"- Reading: {first['reading']}.")
-    lines += [
-        f"- Solver `{e['solver']}`: **{'holds' if e['holds'] else 'does not hold'}**. {e['evidence']}."
-        for e in entries
-    ]
+    for e in entries:
+        verdict = "holds" if e["holds"] else "does not hold"
+        read_as = f", read as '{e['used']}'" if e["used"] else ""
+        lines.append(f"- Solver `{e['solver']}`: **{verdict}**{read_as}. {e['evidence']}.")
     if figures:
         lines.append(f"- Picture: [{first['figure']}]({first['figure']})")
     return "\n".join(lines)

@@ -7,8 +7,9 @@ which the results no longer change. The trunk is fixed and the action is zero, w
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -19,12 +20,13 @@ from numpy.typing import NDArray
 import hoof_env  # noqa: F401  (registers the environments)
 from hoof_env._output import staged
 from hoof_env.errors import HoofEnvError
+from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import Geometry
 from hoof_env.paper import report
 from hoof_env.paper.measure import measure_stance
 from hoof_env.paper.published import CONDITIONS, Published, load_published
-from hoof_env.paper.rows import compare
-from hoof_env.paper.shapes import DEPTHS, judge, sole_velocity
+from hoof_env.paper.rows import compare, counted
+from hoof_env.paper.shapes import DEPTHS, judge, sole_velocity, walk_brakes
 
 ENVIRONMENT = "hoof_env/HorseLegFixed-v0"
 GAITS = ("walk", "run")
@@ -39,6 +41,7 @@ FIGURES = {
     "walk.direction": "figure6",
     "run.direction": "figure6",
     "walk.walks": "figure3",
+    "run.walks": "figure3",
 }
 """The picture that shows each claim about shape."""
 
@@ -52,11 +55,15 @@ class Reproduction:
     Attributes:
         rows: one dictionary for each published row and solver, see `hoof_env.paper.rows.compare`.
         shapes: one dictionary for each claim about shape and solver: kind ("shape"), id, claim, reading,
-            solver, holds, evidence, figure.
+            solver, holds, evidence, readings (verdict by reading, where there are several), used (the reading
+            that holds is of), figure.
         traces: one cycle of dtype `hoof_env.dynamics.trace.TRACE`, its first row at t = 0, by (gait,
             condition, solver).
         geometry: the leg, identified and not published.
         published: what was compared with.
+        conditions: measures how every row answers to step, beta and ground level, as
+            `hoof_env.paper.study.conditions.conditions` returns it. Some seconds, at the first call only, and
+            only a report spends them; without it the result is empty.
     """
 
     rows: list[dict[str, Any]]
@@ -64,6 +71,7 @@ class Reproduction:
     traces: dict[tuple[str, str, str], Trace]
     geometry: Geometry
     published: Published
+    conditions: Callable[[], Mapping[str, Any]] = dict
 
 
 def run_cycle(gait: str, solver: str, **settings: Any) -> Trace:
@@ -106,7 +114,7 @@ def reproduce(progress: Callable[[str], None] | None = None, *, preset: str | No
     Raises:
         HoofEnvError: a preset that is unknown or does not walk and run.
     """
-    tell = progress or (lambda line: None)
+    tell = progress or _silent
     settings: dict[str, Any] = {} if preset is None else {"preset": preset}
     geometry, published = (
         gymnasium.make(ENVIRONMENT, **settings).get_wrapper_attr("geometry"),
@@ -114,24 +122,41 @@ def reproduce(progress: Callable[[str], None] | None = None, *, preset: str | No
     )
     traces: dict[tuple[str, str, str], Trace] = {}
     rows: list[dict[str, Any]] = []
-    shapes: list[dict[str, Any]] = []
+    medians: dict[str, dict[str, dict[float, float]]] = {}
     for solver in SOLVERS:
-        stances, medians = {}, {}
+        stances, medians[solver] = {}, {}
         for gait in GAITS:
             for condition, restitution in CONDITIONS.items():
                 trace = run_cycle(gait, solver, restitution=restitution, **settings)
                 traces[gait, condition, solver] = trace
                 stance = stances[gait, condition] = measure_stance(trace)
                 tell(f"{solver}, {gait}, {condition}: peak {stance.peak:.1f} N, mean {stance.mean:.1f} N")
-            medians[gait] = _sole_velocities(
-                traces[gait, "elastic", solver], gait, solver, geometry.hip_height, settings
-            )
-            tell(f"{solver}, {gait}, 0, 5, 10 cm deep: sole moves at {_listed(medians[gait].values())} m/s")
-        cycles = {
-            (gait, condition): traces[gait, condition, solver] for gait in GAITS for condition in CONDITIONS
-        }
+            by_depth = medians[solver][gait] = _sole_velocities(traces[gait, "elastic", solver])
+            values = ", ".join(f"{value:+.2f}" for value in by_depth.values())
+            tell(f"{solver}, {gait}, 0, 5, 10 cm deep: sole moves at {values} m/s")
         rows += compare(published, stances, solver)
-        verdicts = judge(cycles, medians)
+    shapes = _judge_all(traces, medians, published)
+    for solver in SOLVERS:
+        tell(f"{solver}: {counted(rows, shapes, solver)}")
+    return Reproduction(rows, shapes, traces, geometry, published, cache(partial(_conditions, preset, tell)))
+
+
+def _silent(line: str) -> None:
+    pass
+
+
+def _judge_all(
+    traces: Mapping[tuple[str, str, str], Trace],
+    medians: Mapping[str, Mapping[str, Mapping[float, float]]],
+    published: Published,
+) -> list[dict[str, Any]]:
+    """Every claim with every solver; the exact one's walk decides how `walk.direction` is read."""
+    walk = traces["walk", "elastic", "exact"]
+    brakes = walk_brakes(measure_stance(walk), walk)
+    shapes: list[dict[str, Any]] = []
+    for solver in SOLVERS:
+        cycles = {key[:2]: trace for key, trace in traces.items() if key[2] == solver}
+        verdicts = judge(cycles, medians[solver], brakes)
         shapes += [
             {
                 "kind": "shape",
@@ -139,28 +164,25 @@ def reproduce(progress: Callable[[str], None] | None = None, *, preset: str | No
                 "claim": claim.claim,
                 "reading": claim.reading,
                 "solver": solver,
-                "holds": verdicts[claim.id].holds,
-                "evidence": verdicts[claim.id].evidence,
+                **asdict(verdicts[claim.id]),
                 "figure": f"{FIGURES[claim.id]}.png",
             }
             for claim in published.claims
         ]
-    return Reproduction(rows, shapes, traces, geometry, published)
+    return shapes
 
 
-def _listed(values: Any) -> str:
-    return ", ".join(f"{value:+.2f}" for value in values)
+def _sole_velocities(trace: Trace) -> dict[float, float]:
+    """`sole_velocity` [m/s] by depth [m]: on a fixed trunk the motion is the same on every ground."""
+    from hoof_env.paper.study.replay import replay  # imports this module
+
+    return {depth: sole_velocity(replay(trace, Ground(), depth)) for depth in DEPTHS}
 
 
-def _sole_velocities(
-    trace: Trace, gait: str, solver: str, height: float, settings: dict[str, Any]
-) -> dict[float, float]:
-    """`sole_velocity` [m/s] by depth [m]; `trace` is the elastic cycle at depth 0, hip at `height` [m]."""
-    medians = {0.0: sole_velocity(trace)}
-    for depth in DEPTHS[1:]:
-        deeper = run_cycle(gait, solver, restitution=1.0, hip_height=height - depth, **settings)
-        medians[depth] = sole_velocity(deeper)
-    return medians
+def _conditions(preset: str | None, tell: Callable[[str], None]) -> Mapping[str, Any]:
+    from hoof_env.paper.study.conditions import conditions  # imports this module
+
+    return conditions(preset, tell)
 
 
 def write_reproduction(
@@ -185,14 +207,22 @@ def write_reproduction(
     """
     out_dir = Path(out_dir)
     with staged(out_dir) as stage:
-        entries = [*reproduction.rows, *reproduction.shapes]
+        conditions = reproduction.conditions()
+        rows = [{**row, "answers": _answers(conditions, row)} for row in reproduction.rows]
+        entries = [*rows, *reproduction.shapes]
         text = json.dumps(entries, indent=1, ensure_ascii=False, allow_nan=False)
         (stage / "reproduction.json").write_text(text + "\n", encoding="utf-8")
         if figures:
             from hoof_env.paper.figures import draw_all
 
             draw_all(reproduction, stage)
-        markdown = report.markdown(reproduction, command=command, figures=figures)
+        markdown = report.markdown(reproduction, conditions, command=command, figures=figures)
         (stage / "reproduction.md").write_text(markdown, encoding="utf-8")
         names = sorted(file.name for file in stage.iterdir())
     return [out_dir / name for name in names]
+
+
+def _answers(conditions: Mapping[str, Any], row: Mapping[str, Any]) -> dict[str, Any]:
+    """How a row answers to step, beta and ground level, of all that was measured with its solver."""
+    by_solver = conditions.get(row["id"], {}).items()
+    return {name: answer for name, answer in by_solver if name.split(",")[0] == row["solver"]}

@@ -1,12 +1,21 @@
 """The paper's claims about shape, each decided by numbers: pure functions of measured cycles.
 
 Every function returns a `Verdict`; its thresholds are the constants below.
+
+`walk.direction` has two readings. Figure 6 shows a 'braking force' in walking, the ground reaction force
+'directed to the against moving direction'. Literally (`BRAKING`) the ground pushes the leg back throughout
+its stance. Under Coulomb friction that takes a hoof that slides forward under load, and such a walk cannot
+move an animal forward: it contradicts `walk.walks`. The arrows may also be the force of the hoof on the
+ground (`HOOF_ON_GROUND`): they point back while the ground pushes the leg forward. Both readings get a
+verdict, and the claim is counted by one of them, the same for both solvers, which `walk_brakes` chooses from
+the leg: the net impulse of its walking stance leaves only that one possible. A leg whose walk brakes in one
+half of stance and propels in the other fulfils neither.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,15 +32,27 @@ FLAT_DEG = 3.0
 """A hoof is flat within this angle [deg]: the bar of the published angle at mid-stance."""
 
 DEPTHS = (0.0, 0.05, 0.1)
-"""How much deeper than the identified level the leg is put for the claim `walk.walks` [m]."""
+"""How much deeper than the identified level the leg is put for `walk.walks` and `run.walks` [m]."""
+
+BACKWARD = 0.3
+"""How fast the sole must go back there under load [m/s]."""
+
+BRAKING, HOOF_ON_GROUND = "braking", "hoof on ground"
+"""Readings of `walk.direction`, see above."""
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """Whether a claim holds, and the numbers that decide."""
+    """Whether a claim holds, and the numbers that decide.
+
+    Attributes:
+        readings: where there are several, whether it holds under each; `used` is the one that `holds` is of.
+    """
 
     holds: bool
     evidence: str
+    readings: dict[str, bool] = field(default_factory=dict)
+    used: str = ""
 
 
 Trace = NDArray[np.void]
@@ -162,22 +183,32 @@ def half_impulses(trace: Trace, stance: Stance) -> list[tuple[float, float]]:
     ]
 
 
-def walk_direction(walk: Stance, trace: Trace) -> Verdict:
-    """Braking through the walking stance, literally: the ground pushes back in both halves of stance."""
+def walk_brakes(walk: Stance, trace: Trace) -> bool:
+    """Whether the ground pushes the leg back over the walking stance as a whole."""
+    return sum(along for along, _ in half_impulses(trace, walk)) < 0
+
+
+def walk_direction(walk: Stance, trace: Trace, brakes: bool) -> Verdict:
+    """Braking through the walking stance: the force points back in both halves, under either reading.
+
+    Args:
+        brakes: what `walk_brakes` says of the leg; `BRAKING` is used if so, else `HOOF_ON_GROUND`.
+    """
     (first, _), (second, _) = half_impulses(trace, walk)
-    if first < 0 and second < 0:
-        supports = "supports 'the hoof slides forward'"
-    elif first > 0 and second > 0:
-        supports = "supports 'the force of the hoof on the ground' (that one points backward throughout)"
-    else:
-        supports = (
-            "supports neither 'the hoof slides forward' nor 'the force of the hoof on the ground' throughout "
-            "the stance; only 'against the hoof's own motion', which sliding friction always is"
-        )
+    readings = {BRAKING: first < 0 and second < 0, HOOF_ON_GROUND: first > 0 and second > 0}
+    used, why = (
+        (BRAKING, "this walk is braked over its stance as a whole, and cannot move its animal forward")
+        if brakes
+        else (HOOF_ON_GROUND, "a walk that literally brakes cannot move its animal forward, see walk.walks")
+    )
+    verdicts = ", ".join(f"'{name}' {'holds' if ok else 'does not hold'}" for name, ok in readings.items())
     return Verdict(
-        first < 0 and second < 0,
+        readings[used],
         f"horizontal impulse on the leg {first:+.2f} N s in the first half of stance, {second:+.2f} N s in "
-        f"the second, {first + second:+.2f} N s in all (forward positive); {supports}",
+        f"the second, {first + second:+.2f} N s in all (forward positive): {verdicts}; used is '{used}': "
+        f"{why}",
+        readings,
+        used,
     )
 
 
@@ -205,34 +236,33 @@ def sole_velocity(trace: Trace) -> float:
     return float(velocity[order][np.searchsorted(below, below[-1] / 2)]) if below[-1] > 0 else float("nan")
 
 
-def walk_walks(medians: Mapping[str, Mapping[float, float]]) -> Verdict:
-    """A gait must move its animal: the load-weighted median velocity of the sole is backward in both gaits,
-    at the ground level and deeper.
+def gait_walks(medians: Mapping[float, float]) -> Verdict:
+    """A gait must move its animal: the load-weighted median velocity of the sole is backward by `BACKWARD` or
+    more, at the ground level and deeper, where a trunk with weight would settle.
 
     Args:
-        medians: by gait, `sole_velocity` [m/s] by depth [m].
+        medians: `sole_velocity` [m/s] by depth [m].
     """
-    parts = [
-        f"{gait} "
-        + ", ".join(
-            f"{v:+.2f} m/s" + (f" ({100 * depth:.0f} cm deeper)" if depth else "") for depth, v in by.items()
-        )
-        for gait, by in medians.items()
-    ]
+    values = ", ".join(
+        f"{v:+.2f} m/s" + (f" {100 * depth:.0f} cm deeper" if depth else "") for depth, v in medians.items()
+    )
     return Verdict(
-        all(v < 0 for by in medians.values() for v in by.values()),
-        "load-weighted median velocity of the sole (backward negative): " + "; ".join(parts),
+        all(v <= -BACKWARD for v in medians.values()),
+        f"load-weighted median velocity of the sole {values}; {-BACKWARD:+.1f} m/s or less is asked for",
     )
 
 
 def judge(
-    traces: Mapping[tuple[str, str], Trace], medians: Mapping[str, Mapping[float, float]]
+    traces: Mapping[tuple[str, str], Trace],
+    medians: Mapping[str, Mapping[float, float]],
+    brakes: bool,
 ) -> dict[str, Verdict]:
     """Every claim by id.
 
     Args:
         traces: one cycle for each (gait, condition).
-        medians: see `walk_walks`.
+        medians: by gait, see `gait_walks`.
+        brakes: see `walk_direction`.
     """
     walk_trace, run_trace = traces["walk", "elastic"], traces["run", "elastic"]
     walk, run = measure_stance(walk_trace), measure_stance(run_trace)
@@ -242,7 +272,8 @@ def judge(
         "run.order": run_order(run, walk, run_trace, walk_trace),
         "run.peaks": run_peaks(run_trace, traces["run", "inelastic"]),
         "run.step": run_step(run, walk, run_trace, walk_trace),
-        "walk.direction": walk_direction(walk, walk_trace),
+        "walk.direction": walk_direction(walk, walk_trace, brakes),
         "run.direction": run_direction(run, run_trace),
-        "walk.walks": walk_walks(medians),
+        "walk.walks": gait_walks(medians["walk"]),
+        "run.walks": gait_walks(medians["run"]),
     }

@@ -1,5 +1,6 @@
 import json
 import math
+import re
 
 import numpy as np
 import pytest
@@ -12,14 +13,15 @@ from hoof_env.gait.parameters import load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.paper import report
-from hoof_env.paper.measure import measure_stance
+from hoof_env.paper.measure import integral, measure_stance
 from hoof_env.paper.published import CONDITIONS, load_published
 from hoof_env.paper.reproduce import GAITS, SOLVERS, reproduce, run_cycle, write_reproduction
-from hoof_env.paper.rows import compare, severity
+from hoof_env.paper.rows import ILL_CONDITIONED, compare, counted, severity
+from hoof_env.paper.shapes import BACKWARD, BRAKING, DEPTHS, HOOF_ON_GROUND, sole_velocity
 
 ROW_KEYS = {"kind", "id", "gait", "quantity", "unit", "condition", "reading", "definition", "published",
-            "bar", "solver", "simulated", "error", "within_bar", "beside"}  # fmt: skip
-SHAPE_KEYS = {"kind", "id", "claim", "reading", "solver", "holds", "evidence", "figure"}
+            "bar", "solver", "simulated", "error", "spared", "within_bar", "beside", "answers"}  # fmt: skip
+SHAPE_KEYS = {"kind", "id", "claim", "reading", "solver", "holds", "evidence", "readings", "used", "figure"}
 
 
 @pytest.fixture(scope="module")
@@ -50,10 +52,80 @@ def test_errors_and_bars_follow_from_the_numbers_beside_them(reproduction):
         error = 100 * difference / row["published"] if row["unit"] == "N" else difference
         assert row["error"] == pytest.approx(error)
         assert math.isfinite(row["error"])
-        assert row["within_bar"] is (None if limit == "reported" else abs(error) <= float(limit)), (
-            row,
-            measure,
-        )
+        ill = row["solver"] == "paper" and row["id"] in ILL_CONDITIONED
+        assert row["spared"] == ("reported" if limit == "reported" else "ill-conditioned" if ill else "")
+        assert row["within_bar"] is (None if row["spared"] else abs(error) <= float(limit)), (row, measure)
+
+
+def test_the_paper_solver_is_spared_three_rows_that_the_exact_one_must_meet(reproduction):
+    counts = {s: counted(reproduction.rows, reproduction.shapes, s) for s in SOLVERS}
+    barred = sum(row.bar.limit is not None for row in reproduction.published.rows)
+    assert f" of {barred - 3} rows within their bar (not counted: 2 reported and 3 ill-" in counts["paper"]
+    assert f" of {barred} rows within their bar (not counted: 2 reported), " in counts["exact"]
+    spared = {(row["id"], row["solver"]) for row in reproduction.rows if row["spared"] == "ill-conditioned"}
+    assert spared == {(name, "paper") for name in ILL_CONDITIONED}
+    for solver in SOLVERS:
+        within = [row["within_bar"] for row in reproduction.rows if row["solver"] == solver].count(True)
+        holds = [shape["holds"] for shape in reproduction.shapes if shape["solver"] == solver]
+        assert counts[solver].startswith(f"{within} of ")
+        assert counts[solver].endswith(f"{sum(holds)} of {len(holds)} claims about shape hold")
+
+
+def test_every_maximum_force_is_normal_and_its_resultant_stands_beside_it(reproduction, written):
+    for row in reproduction.rows:
+        name = row["id"].split(".")[1]
+        if name.startswith("peak"):
+            trace = reproduction.traces[row["gait"], row["condition"], row["solver"]]
+            friction = trace["toe_friction"] + trace["heel_friction"]
+            resultant = np.hypot(trace["normal"], friction).max()
+            assert row["beside"]["resultant_N"] == pytest.approx(resultant)
+            assert row["beside"]["resultant_N"] > row["simulated"]
+        assert ("resultant_%" in row["beside"]) is (name == "reduction")
+    page = (written / "reproduction.md").read_text(encoding="utf-8")
+    assert "is the normal force summed over toe and heel throughout" in page
+
+
+def test_deeper_ground_levels_are_those_of_a_lower_hip(reproduction):
+    """The claims re-use one motion; here every level is run once more."""
+    height = load_geometry().hip_height
+    for shape in reproduction.shapes:
+        gait, name = shape["id"].split(".")
+        if name == "walks":
+            found = [float(v) for v in re.findall(r"([+-]\d+\.\d\d) m/s", shape["evidence"])]
+            runs = (run_cycle(gait, shape["solver"], hip_height=height - depth) for depth in DEPTHS)
+            expected = [sole_velocity(run) for run in runs]
+            assert found == pytest.approx(expected, abs=0.0051)
+            assert shape["holds"] is all(value <= -BACKWARD for value in expected)
+
+
+def test_both_solvers_read_the_direction_of_the_force_alike(reproduction):
+    found = [shape for shape in reproduction.shapes if shape["id"] == "walk.direction"]
+    assert len({shape["used"] for shape in found}) == 1
+    exact = reproduction.traces["walk", "elastic", "exact"]
+    braked = integral(exact, exact["friction"], 0.0, 1.0) < 0
+    assert found[0]["used"] == (BRAKING if braked else HOOF_ON_GROUND)
+    assert all(shape["holds"] is shape["readings"][shape["used"]] for shape in found)
+
+
+def test_every_row_is_written_with_how_it_answers_to_step_beta_and_ground(written, reproduction):
+    entries = json.loads((written / "reproduction.json").read_text(encoding="utf-8"))
+    page = (written / "reproduction.md").read_text(encoding="utf-8")
+    section = page[page.index("## Ill-conditioned rows") : page.index("## Other readings")]
+    assert "| step | β | hip height, paper | hip height, exact |" in section
+    for row in (entry for entry in entries if entry["kind"] == "row"):
+        answers = row["answers"]
+        assert set(answers) == ({"exact"} if row["solver"] == "exact" else {"paper", "paper, probable beta"})
+        assert answers[row["solver"]]["value"] == pytest.approx(row["simulated"], rel=1e-6, abs=1e-9)
+        if row["spared"] == "ill-conditioned":
+            (line,) = (x for x in section.splitlines() if x.startswith(f"| `{row['id']}` | {row['unit']} |"))
+            for parameter in ("step", "beta", "ground"):
+                assert f"{answers['paper'][parameter]['relative']:+.3g}" in line
+
+
+def test_without_its_conditions_the_page_has_no_section_of_them(reproduction):
+    page = report.markdown(reproduction, {}, command="c", figures=False)
+    assert "## Ill-conditioned rows" not in page
+    assert "†" in page
 
 
 def test_rows_are_what_a_reader_would_measure_on_the_trace(reproduction):
@@ -147,6 +219,7 @@ def test_the_page_names_command_versions_worst_rows_and_identified_geometry(writ
             worst = max(rows, key=lambda row: severity(row, reproduction.published))
             assert f"Worst: {worst['id']}" in page
     assert page.count("✗") == 1 + sum(row["within_bar"] is False for row in reproduction.rows)
+    assert page.count("†") == 1 + len(ILL_CONDITIONED)
 
 
 def test_progress_tells_of_every_condition(monkeypatch, reproduction):
@@ -158,6 +231,9 @@ def test_progress_tells_of_every_condition(monkeypatch, reproduction):
     again = reproduce(lines.append)
     assert all(any(f"{solver}, {gait}, {c}:" in line for line in lines) for gait, c, solver in again.traces)
     assert again.rows == reproduction.rows
+    assert again.shapes == reproduction.shapes
+    for solver in SOLVERS:
+        assert f"{solver}: {counted(again.rows, again.shapes, solver)}" in lines
 
 
 def test_an_unknown_preset_is_refused():

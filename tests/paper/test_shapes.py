@@ -116,19 +116,26 @@ def friction(first, second):
 
 
 @pytest.mark.parametrize(
-    ("first", "second", "holds", "word"),
+    ("first", "second", "braking", "hoof_on_ground", "used"),
     [
-        (-10, -20, True, "supports 'the hoof slides forward'"),
-        (10, 20, False, "supports 'the force of the hoof on the ground'"),
-        (-10, 20, False, "supports neither"),
-        (10, -20, False, "supports neither"),
+        (-10, -20, True, False, shapes.BRAKING),
+        (10, 20, False, True, shapes.HOOF_ON_GROUND),
+        (-10, 20, False, False, shapes.HOOF_ON_GROUND),
+        (10, -20, False, False, shapes.BRAKING),
     ],
 )
-def test_walk_direction(cycle, first, second, holds, word):
+def test_walk_direction_has_a_verdict_per_reading_and_the_leg_chooses(
+    cycle, first, second, braking, hoof_on_ground, used
+):
     trace = cycle((0.3, 0.6), None, friction=friction(first, second))
-    verdict = shapes.walk_direction(measure_stance(trace), trace)
-    assert verdict.holds is holds
-    assert word in verdict.evidence
+    walk = measure_stance(trace)
+    verdict = shapes.walk_direction(walk, trace, shapes.walk_brakes(walk, trace))
+    assert verdict.readings == {shapes.BRAKING: braking, shapes.HOOF_ON_GROUND: hoof_on_ground}
+    assert verdict.used == used
+    assert verdict.holds is verdict.readings[used]
+    for reading, holds in verdict.readings.items():
+        assert f"'{reading}' {'holds' if holds else 'does not hold'}" in verdict.evidence
+    assert f"used is '{used}'" in verdict.evidence
     impulses = [horizontal for horizontal, _ in shapes.half_impulses(trace, measure_stance(trace))]
     assert impulses == pytest.approx([0.15 * first, 0.15 * second], rel=0.02)
 
@@ -162,15 +169,31 @@ def test_under_coulomb_friction_the_median_gives_the_direction_of_the_impulse(cy
         assert np.sign(median) == -np.sign(impulse)
 
 
+def test_the_reading_of_the_leg_counts_also_where_a_solver_sees_the_other_one(cycle):
+    trace = cycle((0.3, 0.6), None, friction=friction(-10, -20))
+    verdict = shapes.walk_direction(measure_stance(trace), trace, False)
+    assert (verdict.holds, verdict.readings[shapes.BRAKING]) == (False, True)
+
+
 @pytest.mark.parametrize(
-    ("walk", "run", "holds"),
+    ("medians", "holds"),
     [
-        ((-0.1, -0.2, -0.3), (-5, -5, -5), True),
-        ((-0.1, 0.2, -0.3), (-5, -5, -5), False),
-        ((-0.1, -0.2, -0.3), (-5, -5, 5), False),
-        ((float("nan"), -0.2, -0.3), (-5, -5, -5), False),
+        ((-0.3, -0.4, -5.0), True),
+        ((-0.29, -0.4, -5.0), False),
+        ((-0.3, -0.29, -5.0), False),
+        ((-0.3, -0.4, 5.0), False),
+        ((float("nan"), -0.4, -0.5), False),
     ],
 )
-def test_walk_walks(walk, run, holds):
-    medians = {name: dict(zip(shapes.DEPTHS, v, strict=True)) for name, v in (("walk", walk), ("run", run))}
-    assert shapes.walk_walks(medians).holds is holds
+def test_a_gait_walks_if_its_sole_goes_back_fast_enough_at_every_level(medians, holds):
+    verdict = shapes.gait_walks(dict(zip(shapes.DEPTHS, medians, strict=True)))
+    assert verdict.holds is holds
+    for words in (f"{medians[0]:+.2f} m/s,", f"{medians[1]:+.2f} m/s 5 cm", f"{medians[2]:+.2f} m/s 10 cm"):
+        assert words in verdict.evidence
+    assert "-0.3 m/s or less" in verdict.evidence
+
+
+def test_the_search_asks_for_the_same_speed():
+    from hoof_env.identify.features import BACKWARD
+
+    assert BACKWARD == shapes.BACKWARD

@@ -6,7 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from hoof_env.ground.normal_force import SMALLEST_RESTITUTION
+from hoof_env.paper.published import Bar
 from hoof_env.paper.reproduce import GAITS, SOLVERS, Reproduction
+from hoof_env.paper.rows import counted
 from hoof_env.paper.study.case import NAMES
 from hoof_env.paper.study.claim import CONTRADICTED, STATUSES
 from hoof_env.paper.study.section import listed
@@ -34,27 +36,18 @@ def findings(reproduction: Reproduction, data: Mapping[str, Data]) -> list[str]:
 
 
 def _rows(reproduction: Reproduction) -> str:
-    parts = []
-    for solver in SOLVERS:
-        barred = [r for r in reproduction.rows if r["solver"] == solver and r["within_bar"] is not None]
-        shapes = [s for s in reproduction.shapes if s["solver"] == solver]
-        parts.append(
-            f"`{solver}` has {sum(r['within_bar'] for r in barred)} of {len(barred)} printed numbers "
-            f"within their bar and {sum(s['holds'] for s in shapes)} of {len(shapes)} claims about shape"
-        )
-    name = reproduction.geometry.name
-    return f"**One leg on one ground level** (preset `{name}`). Solver {'; solver '.join(parts)}."
+    counts = (f"Solver `{s}`: {counted(reproduction.rows, reproduction.shapes, s)}." for s in SOLVERS)
+    return f"**One leg on one ground level** (preset `{reproduction.geometry.name}`). {' '.join(counts)}"
 
 
 def _numerics(reproduction: Reproduction, data: Data) -> str:
-    counts = {}
-    for name in data["betas"]:
-        outside = 0
-        for row, values in data["rows"].items():
-            bar = reproduction.published.row(row).bar
-            error = bar.error(values[name][0], values["exact"])
-            outside += bar.holds(error) is False
-        counts[name] = outside
+    counts = {
+        name: sum(
+            _moved(reproduction.published.row(row).bar, values[name][0], values["exact"])
+            for row, values in data["rows"].items()
+        )
+        for name in data["betas"]
+    }
     words = listed(f"{count} rows ({name} β)" for name, count in counts.items())
     verdict = (
         "the paper's integration is part of its numbers"
@@ -62,6 +55,13 @@ def _numerics(reproduction: Reproduction, data: Data) -> str:
         else "the paper's integration does not touch its numbers"
     )
     return f"**Method.** Euler at 1 ms alone moves {words} further than their bar: {verdict}."
+
+
+def _moved(bar: Bar, value: float | None, exact: float | None) -> bool:
+    """Whether a value is further than a bar from the exact one; None is a leg without that feature."""
+    if value is None or exact is None:
+        return bar.limit is not None and value is not exact
+    return bar.holds(bar.error(value, exact)) is False
 
 
 def _laws(data: Data) -> str:

@@ -107,6 +107,16 @@ def test_findings_count_what_the_parts_found(result):
     assert any(f"{len(claims)} claims" in line for line in lines)
 
 
+def test_a_leg_without_a_feature_has_moved_where_only_one_solver_sees_it(result):
+    data = data_of(result)
+    rows = data["numerics"]["rows"]
+    for values in rows.values():
+        values["printed"] = values["probable"] = [values["exact"]] * 4
+    rows["walk.angle_flat"] |= {"exact": None, "printed": [None] * 4}  # with the printed beta too
+    rows["walk.angle_variation"] |= {"exact": None}  # this row has no bar
+    assert "moves 0 rows (printed β) and 1 rows (probable β)" in findings(result.reproduction, data)[1]
+
+
 def test_findings_turn_with_the_data(result):
     data = data_of(result)
     for values in data["numerics"]["rows"].values():
