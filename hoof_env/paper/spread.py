@@ -159,6 +159,7 @@ def _measure(preset: str, time: Array) -> _Leg:
     geometry = load_geometry(preset)
     values = {f"length.{name}": length for name, length in geometry.lengths.items()}
     values |= {"length.OC": abs(complex(*geometry.pivot)), "hip_height": geometry.hip_height}
+    values["mass"] = geometry.mass
     values |= dict(zip(COORDINATES, geometry.pivot, strict=True))
     leg = _Leg(geometry, values, {}, {}, {})
     for gait in GAITS:

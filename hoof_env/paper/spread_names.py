@@ -5,10 +5,10 @@ from __future__ import annotations
 from hoof_env.leg.linkage import BODIES, BODY_LENGTHS, LENGTHS
 from hoof_env.paper.published import CONDITIONS
 
-DIGITS = {"m": 3, "rad": 3, "s": 4, "N": 1, "N m": 1, "N s": 2}
+DIGITS = {"m": 3, "rad": 3, "s": 4, "N": 1, "N m": 1, "N s": 2, "kg": 2}
 """Decimals by unit."""
 
-ZEROED = ("m", "N", "N m", "N s")
+ZEROED = ("m", "N", "N m", "N s", "kg")
 """Units of quantities whose zero means something, but for `COORDINATES`."""
 
 COORDINATES = ("pivot.x", "pivot.y")
@@ -33,6 +33,7 @@ IDENTIFIED = {
 """What the paper does not print of a leg and its gaits: name and unit by id."""
 
 FOLLOWING = {
+    "mass": ("mass of the leg", "kg"),
     **{
         f"{gait}.{key}": (f"{GAIT_NAMES[gait]}, {name}", "m")
         for gait in GAITS

@@ -50,7 +50,7 @@ def markdown(data: Data, figure: str | None = None) -> str:
         _table(head, (_line(data, key) for key in IDENTIFIED)),
         "### What follows from it",
         "One cycle of each gait, exact solver. Peaks and impulses of the force are held by the bars of the "
-        "printed peaks and means; nothing printed holds the torques. Those are for links of "
+        "printed peaks and means; nothing printed holds the torques. These and the mass are for links of "
         f"{' or '.join(f'{d:g}' for d in data['linear_density'])} kg/m, which is assumed and not identified.",
         _table(head, (_line(data, key) for key in FOLLOWING)),
         "### How far the curves of two members are apart",

@@ -86,8 +86,10 @@ def test_similar_legs_have_similar_lengths_and_paths(reproduction, spread):
     """Everything geometric is in proportion to the leg's size."""
     part = max(SCALES) - min(SCALES)
     quantities = spread.data["quantities"]
-    sized = [key for key in IDENTIFIED if key.startswith("length.") or key == "hip_height"]
-    assert {key.removeprefix("length.") for key in sized} == {*LENGTHS, "OC", "hip_height"}
+    sized = [
+        key for key in (*IDENTIFIED, "mass") if key.startswith("length.") or key in ("hip_height", "mass")
+    ]
+    assert {key.removeprefix("length.") for key in sized} == {*LENGTHS, "OC", "hip_height", "mass"}
     for key in [*sized, *(f"{gait}.{name}" for gait in GAITS for name in ("step", "reach", "lift"))]:
         entry = quantities[key]
         assert entry["median"] == pytest.approx(entry["preset"], rel=1e-6), key
