@@ -13,6 +13,7 @@ from hoof_env.paper.figure_angles import draw_angles
 from hoof_env.paper.figure_forces import draw_forces
 from hoof_env.paper.figure_mechanism import draw_mechanism
 from hoof_env.paper.figure_paths import draw_paths
+from hoof_env.paper.figure_spread import draw_spread
 from hoof_env.paper.figure_style import PRINT
 from hoof_env.paper.figure_vectors import draw_vectors
 
@@ -39,7 +40,8 @@ def draw_all(
     Args:
         reproduction: what to draw.
         folder: made if need be.
-        ensemble: figures 3 and 5 show the range of its members too.
+        ensemble: figures 3 and 5 show the range of its members too, and if it has their lengths, "spread"
+            shows what they leave open.
 
     Returns:
         The paths of the files.
@@ -59,6 +61,8 @@ def draw_all(
         "figure5": partial(draw_forces, ensemble=ensemble),
         "figure6": draw_vectors,
     }
+    if ensemble and ensemble.lengths:
+        drawings["spread"] = partial(draw_spread, ensemble=ensemble)
     paths = []
     with staged(folder) as stage, style.context(["default", PRINT]):
         for name, draw in drawings.items():

@@ -8,6 +8,7 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from hoof_env import __version__
+from hoof_env.paper import spread_text
 from hoof_env.paper.rows import ILL, counted, severity
 
 if TYPE_CHECKING:
@@ -21,13 +22,19 @@ _PACKAGES = ("gymnasium", "numpy", "numba")
 
 
 def markdown(
-    reproduction: Reproduction, conditions: Mapping[str, Any], *, command: str, figures: bool
+    reproduction: Reproduction,
+    conditions: Mapping[str, Any],
+    spread: Mapping[str, Any] | None = None,
+    *,
+    command: str,
+    figures: bool,
 ) -> str:
     """The whole page.
 
     Args:
         conditions: how the rows answer to step, beta and ground level, see `Reproduction.conditions`; empty
             if that was not measured.
+        spread: of the preset's ensemble, the data of a `hoof_env.paper.spread.Spread`.
         command: named as what wrote the page.
         figures: whether pictures lie beside it.
     """
@@ -41,6 +48,11 @@ def markdown(
         f"{reproduction.published.source}.",
         f"**The leg's geometry and its gaits are identified, not published** (preset `{geometry.name}`). "
         f"{geometry.provenance}",
+        *(
+            [f"What the printed numbers leave open of it stands under '{spread_text.TITLE}'."]
+            if spread
+            else []
+        ),
         "Each condition is one cycle of 1 s on a fixed trunk under the zero action. Solver `paper` is "
         "the paper's Eq. 8 with its Baumgarte terms and explicit Euler at 1 ms; solver `exact` is the same "
         "motion in closed form, at a step at which its results have converged.",
@@ -57,6 +69,7 @@ def markdown(
         _beside_table(reproduction, solvers),
         "## Claims about shape",
         *(_shape(reproduction, claim.id, figures) for claim in reproduction.published.claims),
+        *([spread_text.markdown(spread, "spread" if figures else None)] if spread else []),
         "## How each row is measured",
         _definitions(reproduction, solvers[0]),
     ]

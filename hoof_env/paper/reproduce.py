@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from functools import cache, partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium
 import numpy as np
@@ -27,6 +27,9 @@ from hoof_env.paper.measure import measure_stance
 from hoof_env.paper.published import CONDITIONS, Published, load_published
 from hoof_env.paper.rows import compare, counted
 from hoof_env.paper.shapes import DEPTHS, judge, sole_velocity, walk_brakes
+
+if TYPE_CHECKING:
+    from hoof_env.paper.spread import Spread
 
 ENVIRONMENT = "hoof_env/HorseLegFixed-v0"
 GAITS = ("walk", "run")
@@ -64,6 +67,8 @@ class Reproduction:
         conditions: measures how every row answers to step, beta and ground level, as
             `hoof_env.paper.study.conditions.conditions` returns it. Some seconds, at the first call only, and
             only a report spends them; without it the result is empty.
+        spread: measures how far the ensemble of the preset leaves the leg open; None if it has none. Some
+            seconds too.
     """
 
     rows: list[dict[str, Any]]
@@ -72,6 +77,7 @@ class Reproduction:
     geometry: Geometry
     published: Published
     conditions: Callable[[], Mapping[str, Any]] = dict
+    spread: Callable[[], Spread | None] = lambda: None
 
 
 def run_cycle(gait: str, solver: str, **settings: Any) -> Trace:
@@ -138,7 +144,8 @@ def reproduce(progress: Callable[[str], None] | None = None, *, preset: str | No
     shapes = _judge_all(traces, medians, published)
     for solver in SOLVERS:
         tell(f"{solver}: {counted(rows, shapes, solver)}")
-    return Reproduction(rows, shapes, traces, geometry, published, cache(partial(_conditions, preset, tell)))
+    later = cache(partial(_conditions, preset, tell)), cache(partial(_spread, geometry.name, progress))
+    return Reproduction(rows, shapes, traces, geometry, published, *later)
 
 
 def _silent(line: str) -> None:
@@ -185,6 +192,13 @@ def _conditions(preset: str | None, tell: Callable[[str], None]) -> Mapping[str,
     return conditions(preset, tell)
 
 
+def _spread(preset: str, progress: Callable[[str], None] | None) -> Spread | None:
+    from hoof_env.identify.ensemble import has_ensemble
+    from hoof_env.paper.spread import measure_spread  # imports this module
+
+    return measure_spread(preset, progress=progress) if has_ensemble(preset) else None
+
+
 def write_reproduction(
     reproduction: Reproduction,
     out_dir: Path | str,
@@ -194,7 +208,8 @@ def write_reproduction(
 ) -> list[Path]:
     """Write `reproduction.json`, `reproduction.md` and the figures; returns their paths.
 
-    Nothing replaces an older result unless everything could be written.
+    A preset with an ensemble gets its spread too: a section of the page, `spread.json` and a figure. Nothing
+    replaces an older result unless everything could be written.
 
     Args:
         reproduction: what to write.
@@ -212,11 +227,17 @@ def write_reproduction(
         entries = [*rows, *reproduction.shapes]
         text = json.dumps(entries, indent=1, ensure_ascii=False, allow_nan=False)
         (stage / "reproduction.json").write_text(text + "\n", encoding="utf-8")
+        spread = reproduction.spread()
+        if spread:
+            text = json.dumps(spread.data, indent=1, ensure_ascii=False, allow_nan=False)
+            (stage / "spread.json").write_text(text + "\n", encoding="utf-8")
         if figures:
             from hoof_env.paper.figures import draw_all
 
-            draw_all(reproduction, stage)
-        markdown = report.markdown(reproduction, conditions, command=command, figures=figures)
+            draw_all(reproduction, stage, spread.curves if spread else None)
+        markdown = report.markdown(
+            reproduction, conditions, spread.data if spread else None, command=command, figures=figures
+        )
         (stage / "reproduction.md").write_text(markdown, encoding="utf-8")
         names = sorted(file.name for file in stage.iterdir())
     return [out_dir / name for name in names]

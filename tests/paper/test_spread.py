@@ -7,15 +7,17 @@ import pytest
 
 from hoof_env.errors import HoofEnvError
 from hoof_env.gait.parameters import load_gait
-from hoof_env.identify.ensemble import Ensemble, Member
+from hoof_env.identify.ensemble import Ensemble, Member, to_data, write_member
+from hoof_env.leg.geometry import read_preset
 from hoof_env.leg.linkage import LENGTHS
+from hoof_env.paper import reproduce as reproduce_module
 from hoof_env.paper.figure_spread import draw_spread
 from hoof_env.paper.figure_style import PRINT, SOLVER
 from hoof_env.paper.published import CONDITIONS
-from hoof_env.paper.reproduce import GAITS
+from hoof_env.paper.reproduce import GAITS, write_reproduction
 from hoof_env.paper.spread import compare_pairs, measure_spread, summarise
 from hoof_env.paper.spread_names import FOLLOWING, IDENTIFIED
-from hoof_env.paper.spread_text import markdown, with_spread
+from hoof_env.paper.spread_text import TITLE, markdown, with_spread
 
 SCALES = (1.0, 1.01, 0.97)
 """Sizes of three similar legs; the first is the preset itself."""
@@ -220,3 +222,30 @@ def test_curves_that_do_not_fit_the_members_are_refused(spread):
         dataclasses.replace(spread.curves, crank_torque=torque)
     with pytest.raises(HoofEnvError, match="lengths"):
         dataclasses.replace(spread.curves, lengths={"OP": np.zeros(2)})
+
+
+def test_the_report_of_a_preset_with_an_ensemble_has_its_spread(reproduction, spread, tmp_path):
+    without = dataclasses.replace(reproduction, conditions=dict, spread=lambda: None)
+    names = {path.name for path in write_reproduction(without, tmp_path / "without")}
+    within = dataclasses.replace(without, spread=lambda: spread)
+    paths = write_reproduction(within, tmp_path / "with")
+    assert {path.name for path in paths} - names == {"spread.json", "spread.png", "spread.svg"}
+    assert json.loads((tmp_path / "with" / "spread.json").read_text(encoding="utf-8")) == spread.data
+    page = (tmp_path / "with" / "reproduction.md").read_text(encoding="utf-8")
+    assert markdown(spread.data, "spread") in page
+    assert TITLE not in (tmp_path / "without" / "reproduction.md").read_text(encoding="utf-8")
+
+
+def test_reproduce_finds_the_ensemble_of_its_preset(monkeypatch, reproduction, tmp_path):
+    """By the preset's name; a preset in a file has none."""
+    preset = reproduction.geometry.name
+    members = [write_member(read_preset(preset), {"exact": 0.5, "paper": 0.5}, {}) for _ in range(2)]
+    members[1]["geometry"] = {**members[1]["geometry"], "linear_density": 2.0}
+    file = tmp_path / "legs.json"
+    file.write_text(json.dumps(to_data(members, "made by hand", "walks")), encoding="utf-8")
+    assert reproduce_module._spread(str(tmp_path / f"{preset}.json"), None) is None
+    monkeypatch.setattr("hoof_env.identify.ensemble._file_of", {preset: file}.__getitem__)
+    lines = []
+    spread = reproduce_module._spread(preset, lines.append)
+    assert (spread.data["preset"], spread.data["members"]) == (preset, 2)
+    assert lines == ["ensemble: 2 legs simulated in the four conditions"]
