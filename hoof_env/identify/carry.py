@@ -45,6 +45,9 @@ CANDIDATES = 10
 PENALTY = 10.0
 """What missing a demand by its tolerance costs, in loads of peak force."""
 
+MARGIN = 0.02
+"""By how many tolerances the search keeps within the demands: the judging starts differ a little."""
+
 FALL = 1000.0
 """Cost of losing the trunk at the last moment; losing it at once costs twice that."""
 
@@ -54,11 +57,11 @@ SLOWEST, FASTEST = 0.5, 1.5
 
 def cost(carriage: Carriage) -> float:
     """What is minimised, dimensionless: the peak force in loads, and for each demand `PENALTY` times
-    ln(1 + its miss in tolerances) / ln 2. The logarithm keeps one demand that is missed by far from hiding
-    the others."""
+    log2(1 + its miss in tolerances). The logarithm keeps one demand that is missed by far from hiding the
+    others; a gait on the very edge of a demand misses it by `MARGIN`."""
     if carriage.survived < 1:
         return FALL * (2 - carriage.survived)
-    return carriage.peak_share + PENALTY * sum(float(np.log2(1 + d.miss(carriage))) for d in DEMANDS)
+    return carriage.peak_share + PENALTY * sum(float(np.log2(1 + d.miss(carriage, MARGIN))) for d in DEMANDS)
 
 
 @dataclass(frozen=True)

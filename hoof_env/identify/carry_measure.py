@@ -80,20 +80,20 @@ class Demand:
     tolerance: float
     text: str
 
-    def miss(self, carriage: Carriage) -> float:
-        """By how many tolerances the demand is missed; 0 if it is met."""
+    def miss(self, carriage: Carriage, margin: float = 0.0) -> float:
+        """By how many tolerances the demand is missed; 0 if it is met with a `margin` [tolerances]."""
         value = float(getattr(carriage, self.quantity))
-        return max(0.0, self.low - value, value - self.high) / self.tolerance
+        return max(0.0, margin + max(self.low - value, value - self.high) / self.tolerance)
 
 
 DEMANDS = (
     Demand("load_share", 0.95, 1.05, 0.05, "bears {:.2f} of its load"),
     Demand("speed_m_s", 1.2, 1.8, 0.1, "moves at {:.2f} m/s"),
-    Demand("unsteady_m", 0.0, 0.005, 0.005, "its strides differ by {:.3f} m"),
-    Demand("speed_spread_m_s", 0.0, 0.02, 0.02, "its speeds differ by {:.2f} m/s"),
+    Demand("unsteady_m", -math.inf, 0.005, 0.005, "its strides differ by {:.3f} m"),
+    Demand("speed_spread_m_s", -math.inf, 0.02, 0.02, "its speeds differ by {:.2f} m/s"),
     Demand("stances", 0.9, 1.1, 0.5, "has {:.1f} stances a stride"),
     Demand("clearance_m", 0.05, math.inf, 0.05, "lifts its hoof {:.2f} m"),
-    Demand("hoof_angle_deg", 0.0, 15.0, 5.0, "stands on a hoof tilted by {:.0f} deg"),
+    Demand("hoof_angle_deg", -math.inf, 15.0, 5.0, "stands on a hoof tilted by {:.0f} deg"),
 )
 """What a carrying walk is; a gait that misses the first bears too little, or more than it must. By the
 balance above, a twentieth of the load is 9 mm of the default suspension. 1.2 to 1.8 m/s is a horse's walk."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import shlex
 import sys
 from collections.abc import Callable, Iterator, Mapping
@@ -121,7 +122,7 @@ def table(rows: Mapping[str, Carriage]) -> str:
 def page(rows: Mapping[str, Carriage], found: Found, course: Course, command: str) -> str:
     """The table with what its words mean, in Markdown."""
     trunk = course.trunk
-    demands = "\n".join(f"* `{d.quantity}`: {d.low:g} to {d.high:g}" for d in DEMANDS)
+    demands = "\n".join(f"* `{d.quantity}` {_range(d.low, d.high)}" for d in DEMANDS)
     numbers = ", ".join(f"{name} {value:.4f}" for name, value in asdict(found.gait).items())
     return f"""# A walk that carries
 
@@ -142,6 +143,12 @@ A gait carries if it meets every demand:
 
 {demands}
 """
+
+
+def _range(low: float, high: float) -> str:
+    if math.isinf(low) or math.isinf(high):
+        return f"at most {high:g}" if math.isinf(low) else f"at least {low:g}"
+    return f"{low:g} to {high:g}"
 
 
 @contextmanager
