@@ -113,6 +113,45 @@ def carry(
     _say(f"{len(paths)} files written: {', '.join(map(str, paths))}")
 
 
+def ensemble(
+    out: Path,
+    preset: str,
+    starts: tuple[str, ...] = (),
+    size: int = 24,
+    bar: float = 1.0,
+    both: bool = False,
+    walk: Literal["walks", "brakes"] = "walks",
+    targets: Path | None = None,
+    seed: int = 0,
+    attempts: int = 240,
+    workers: int = 2,
+    resume: bool = False,
+) -> None:
+    """Collect legs that fit the published numbers, far apart: what those leave open (needs 'identify').
+
+    Args:
+        out: folder for ensemble.json; made if need be.
+        preset: the leg to begin with, a name or a JSON file.
+        starts: more of them, or folders of `hoof-env identify`, whose independent starts all count.
+        size: members wanted.
+        bar: largest error of a row, in units of its own bar.
+        both: rows count with the paper's solver too, all but the ill-conditioned.
+        walk: a walk that moves its animal, or one that brakes through its stance (figure 6 read literally).
+        targets: JSON file of the rows to meet, as published.json.
+        seed: the same seed and options find the same legs, with any number of workers.
+        attempts: to find a further leg; the members are chosen among all that were found.
+        workers: processes.
+        resume: go on with a collection in this folder that was interrupted or killed.
+    """
+    from hoof_env.identify.ensemble_command import ensemble
+
+    paths = ensemble(
+        out, _say, preset=preset, starts=starts, size=size, bar=bar, both=both, walk=walk, targets=targets,
+        seed=seed, attempts=attempts, workers=workers, resume=resume,
+    )  # fmt: skip
+    _say(f"{paths[0]} written")
+
+
 def trunks() -> None:
     """Measure how the scripted walk and run move a rail and differently suspended trunks; prints a table."""
     from hoof_env.envs.trunk_study import study
@@ -123,6 +162,7 @@ def trunks() -> None:
 COMMANDS: dict[str, Callable[..., None]] = {
     "reproduce": reproduce,
     "identify": identify,
+    "ensemble": ensemble,
     "carry": carry,
     "trunks": trunks,
 }

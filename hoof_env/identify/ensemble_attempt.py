@@ -1,0 +1,243 @@
+"""One attempt at a further member of an ensemble: a push through the region of legs that fit, and a verdict.
+
+That region is thin and bent: at the bar a dozen rows are at their limits at once, and a leg that is moved at
+random and then repaired hardly ever comes back to it. So a leg is pushed inside it instead, as far in a given
+direction as it goes, by sequential linear programming with the rows and demands as limits (`minimax.descend`
+with the push as its only row and everything else as a demand). Between two pushes it is drawn to the middle a
+little, which often opens the way on.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from hoof_env.errors import HoofEnvError
+from hoof_env.identify.candidate import Choice, to_preset
+from hoof_env.identify.confirm import confirm
+from hoof_env.identify.evaluate import MISSED_ROW
+from hoof_env.identify.job import CLEAR, PENALTY
+from hoof_env.identify.minimax import Rate, Rating, descend
+from hoof_env.identify.objective import Objective
+from hoof_env.identify.problem import LegProblem
+from hoof_env.identify.records import Array
+from hoof_env.identify.schedule import Phase
+from hoof_env.identify.targets import Targets
+from hoof_env.paper.rows import severity
+
+HOPS = (0.002, 0.005, 0.01, 0.03)
+"""Sizes of the hops, in a search's scales, between descents of a start that is outside the bar."""
+
+TRIES = 12
+"""Descents at most of such a start, with each solver."""
+
+REACH = 0.5
+"""How far a push wants to go, in a search's scales: further than it ever gets."""
+
+FIRM = 100.0
+"""What a shortage of one costs a push, in scales: enough that none is worth its while."""
+
+PUSHES, STEPS, RECENTRE = 2, 15, 3
+"""Pushes of an attempt, steps of a push, and steps towards the middle between two."""
+
+PHASE = Phase("ensemble", "given", jobs=1, evaluations=0, sigmas=(), samples=801)
+"""How coordinates are to be read. Fewer samples miss part of a spike, and pushes would use that."""
+
+FINE = 2001
+"""Instants a revolution at which the demands on a member are checked."""
+
+
+@dataclass(frozen=True)
+class Aim:
+    """What a member must meet.
+
+    Attributes:
+        targets: the rows. walk: "walks" or "brakes".
+        bar: largest error of a row, in units of its own bar.
+        both: the paper's solver counts too, all rows but the ill-conditioned.
+    """
+
+    targets: Targets
+    walk: str
+    bar: float
+    both: bool
+
+    def problem(self) -> LegProblem:
+        return LegProblem(self.targets, self.walk, None)
+
+    def rate(self, choice: Mapping[str, Any], both: bool) -> Rate:
+        """Rating of y: that of `Objective.rate`, whose peaks are those of samples, and all rows with their
+        peaks between samples, as the full system has them."""
+        objective = self.problem().objective(Choice.from_dict(choice), PHASE.samples, both, by_toe=True)
+
+        def rate(y: Array) -> Rating:
+            rating = objective.rate(y)
+            return replace(rating, rows=np.append(rating.rows, objective.rows(y)))
+
+        return rate
+
+
+@dataclass(frozen=True)
+class Task:
+    """An attempt to be made.
+
+    Attributes:
+        round, index: its place. seed: of its random numbers, with its place.
+        origin, start: the attempt that it goes on from, and the start behind that; the same for a start.
+        choice, y: the leg that it goes on from, y as a search by touch-down has it; for a start x.
+        direction: unit vector, shape as y, in a search's scales; empty for a start.
+    """
+
+    round: int
+    index: int
+    seed: int
+    origin: str
+    start: str
+    choice: Mapping[str, Any]
+    y: tuple[float, ...]
+    direction: tuple[float, ...] = ()
+
+    @property
+    def id(self) -> str:
+        return f"{self.round:04d}-{self.index:02d}"
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """A made attempt; see `Task`.
+
+    Attributes:
+        merit: largest error [bars] and what shortages cost. evaluations, seconds: spent.
+        errors: by solver, the largest error of a row [bars], by the full system; empty before its verdict.
+        short: demands that fall short, by name. untrue: claims that the full system finds untrue, of the
+            solvers that count.
+    """
+
+    id: str
+    origin: str
+    start: str
+    choice: Mapping[str, Any]
+    y: tuple[float, ...]
+    merit: float
+    evaluations: int
+    seconds: float
+    errors: Mapping[str, float]
+    short: Mapping[str, float]
+    untrue: tuple[str, ...] = ()
+
+    def holds(self, aim: Aim) -> bool:
+        """Whether the full system has found it a member."""
+        counted = [error for solver, error in self.errors.items() if aim.both or solver == "exact"]
+        return bool(counted) and max(counted) <= aim.bar and not self.short and not self.untrue
+
+    def to_dict(self) -> dict[str, Any]:
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Attempt:
+        """Inverse of `to_dict`; KeyError or TypeError for anything else."""
+        return cls(**{**data, "y": tuple(data["y"]), "untrue": tuple(data["untrue"])})
+
+    def preset(self, aim: Aim, provenance: str = "a candidate of an ensemble") -> dict[str, Any]:
+        """The content of a preset file.
+
+        Raises:
+            HoofEnvError: the leg does not turn, or a gait is beyond its limits.
+        """
+        return to_preset(self.x(aim), Choice.from_dict(self.choice), provenance, "candidate")
+
+    def x(self, aim: Aim) -> Array:
+        return aim.problem().outward(dict(self.choice), np.array(self.y), PHASE)
+
+
+def attempt(task: Task, aim: Aim) -> Attempt:
+    """Make an attempt; the same task and aim give the same result."""
+    began = time.monotonic()
+    problem, choice, rate = aim.problem(), dict(task.choice), aim.rate(task.choice, aim.both)
+    scales = problem.scales(choice, PHASE)
+    if task.direction:
+        y, spent = _push(rate, np.array(task.y), scales, np.array(task.direction), aim)
+    else:
+        y, spent = problem.inward(choice, np.array(task.y), PHASE), 0
+        rng = np.random.default_rng([task.seed, task.round, task.index])
+        for both in (False, True) if aim.both else (False,):
+            y, more = _enter(aim.rate(choice, both), y, scales, rng, aim)
+            spent += more
+    merit, seconds = rate(y).merit(PENALTY), time.monotonic() - began
+    origin = (task.id, task.origin, task.start, task.choice)
+    return Attempt(*origin, tuple(y.tolist()), merit, spent, seconds, {}, {})
+
+
+def _enter(rate: Rate, y: Array, scales: Array, rng: np.random.Generator, aim: Aim) -> tuple[Array, int]:
+    """Descents from y, then from beside the best so far, until one is within the bar."""
+    lowest, goal, spent, start = np.inf, CLEAR * aim.bar, 0, y
+    for _ in range(TRIES):
+        found = descend(rate, start, scales, penalty=PENALTY, central=True, goal=goal)
+        spent += found.evaluations
+        if (merit := found.rating.merit(PENALTY)) < lowest:
+            y, lowest = found.y, merit
+        if lowest <= goal:
+            break
+        start = y + float(rng.choice(HOPS)) * scales * rng.standard_normal(y.size)
+    return y, spent
+
+
+def _push(rate: Rate, y: Array, scales: Array, direction: Array, aim: Aim) -> tuple[Array, int]:
+    """The leg that lies furthest in a direction, of those that pushes from y reach within the bar."""
+    best, spent = y, 0
+    for push in range(PUSHES):
+        if push:
+            inner = descend(
+                rate, best, scales, radius=0.01, penalty=PENALTY, central=True, iterations=RECENTRE
+            )
+            y, spent = inner.y, spent + inner.evaluations
+        pushed = _Pushed(rate, y, direction / scales, CLEAR * aim.bar)
+        found = descend(pushed, y, scales, penalty=FIRM, central=True, iterations=STEPS)
+        spent += found.evaluations
+        further = (found.y - best) @ (direction / scales) > 0
+        if further and rate(found.y).merit(PENALTY) <= aim.bar:
+            best = found.y
+    return best, spent
+
+
+@dataclass(frozen=True)
+class _Pushed:
+    """A rating of what is still missing to `REACH` from y in a direction, limited by rows and demands."""
+
+    rate: Rate
+    y: Array
+    direction: Array
+    limit: float
+
+    def __call__(self, y: Array) -> Rating:
+        rating = self.rate(y)
+        errors = [rating.rows, -rating.rows, *rating.peaks.values()]
+        missing = REACH - (y - self.y) @ self.direction
+        return Rating(
+            np.array([missing]), np.concatenate([*(e - self.limit for e in errors), rating.demands]), {}
+        )
+
+
+def judge(made: Attempt, aim: Aim) -> Attempt:
+    """The same with the verdict of the full system, and of demands sampled finely."""
+    objective = Objective(
+        Choice.from_dict(made.choice), aim.targets, samples=FINE, paper_solver=aim.both, walk=aim.walk
+    )
+    shortages = zip(objective.demands, objective.plausibility(made.x(aim)).tolist(), strict=True)
+    short = {name: shortage for name, shortage in shortages if shortage > 0}
+    errors = {"exact": 0.0, "paper": 0.0}
+    try:
+        verdict = confirm(made.preset(aim), aim.targets, aim.walk)
+    except HoofEnvError as error:  # a dead point between two samples, a gait beyond its limits
+        missed = dict.fromkeys(errors, MISSED_ROW)
+        return replace(made, errors=missed, short=short, untrue=(f"cannot be simulated: {error}",))
+    for row in verdict.reproduction.rows:
+        if not row["spared"]:
+            bars = min(severity(row, verdict.reproduction.published), MISSED_ROW)
+            errors[row["solver"]] = max(errors[row["solver"]], bars)
+    untrue = tuple(f"{name} ({solver})" for name, solver in verdict.untrue if aim.both or solver == "exact")
+    return replace(made, errors=errors, short=short, untrue=untrue)
