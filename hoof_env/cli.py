@@ -56,6 +56,8 @@ def identify(
     seed: int = 0,
     targets: Path | None = None,
     walk: Literal["walks", "brakes"] = "walks",
+    exponent: float = 1.375,
+    beta: Literal["printed", "probable"] = "probable",
     workers: int = 2,
     budget: int | None = None,
     resume: bool = False,
@@ -71,6 +73,8 @@ def identify(
         seed: the same seed and options find the same leg, with any number of workers.
         targets: JSON file of the rows to meet, as published.json, each with an optional weight.
         walk: a walk that moves its animal, or one that brakes through its stance (figure 6 read literally).
+        exponent: of the contact law (Eq. 14), which the paper does not print.
+        beta: Baumgarte's, of the paper's solver: as printed, sqrt(2 alpha), or as probably meant, sqrt(2) alpha.
         workers: processes.
         budget: evaluations at most; one with the paper's solver counts for several.
         resume: go on with a search in this folder that was interrupted or killed.
@@ -79,8 +83,8 @@ def identify(
     from hoof_env.identify.command import identify
 
     paths = identify(
-        out, _say, start=start, seed=seed, targets=targets, walk=walk, workers=workers, budget=budget,
-        resume=resume, keep_going=keep_going,
+        out, _say, start=start, seed=seed, targets=targets, walk=walk, exponent=exponent, beta=beta,
+        workers=workers, budget=budget, resume=resume, keep_going=keep_going,
     )  # fmt: skip
     _say(f"{len(paths)} files written; read {out / 'identify.md'} first")
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.errors import HoofEnvError, ParameterError, check_choice
+from hoof_env.errors import HoofEnvError, ParameterError, check_choice, check_number
 from hoof_env.gait.parameters import LIMITS, GaitParameters
 from hoof_env.leg.geometry import Geometry
 from hoof_env.leg.linkage import DYADS, LENGTHS
@@ -47,6 +47,7 @@ class Choice:
         travel: +1 or -1, as `Geometry.travel`.
         link9: where link 9 ends: "F", "E", or "6", "7" for an inner point of that link.
         swing: "crank" turns the frame about O, "pivot" about C; "oval" moves C on an ellipse instead.
+        exponent: n of Eq. 14, which the paper does not print [-]; 1.5 is Lankarani and Nikravesh's.
 
     Raises:
         ParameterError: another value.
@@ -57,6 +58,7 @@ class Choice:
     travel: int
     link9: str = "F"
     swing: str = "crank"
+    exponent: float = 1.5
 
     def __post_init__(self) -> None:
         signs = tuple(self.assembly) if isinstance(self.assembly, Sequence) else ()
@@ -69,6 +71,7 @@ class Choice:
             raise ParameterError(f"travel: expected +1 or -1, got {self.travel!r}")
         check_choice("link9", self.link9, LINK9)
         check_choice("swing", self.swing, SWINGS)
+        object.__setattr__(self, "exponent", check_number("exponent", self.exponent, low=1, high=3))
         free = ("E", "F") if self.link9 == "7" else ()
         signs = tuple(1 if name in free else int(sign) for name, sign in zip(SIGNS, signs, strict=True))
         object.__setattr__(self, "assembly", signs)
@@ -97,7 +100,7 @@ class Choice:
         try:
             return cls(**{**data, "assembly": tuple(data["assembly"])})
         except (KeyError, TypeError) as error:
-            expected = "assembly, toe, travel, link9, swing"
+            expected = "assembly, toe, travel, link9, swing, exponent"
             raise ParameterError(f"choice: expected {expected}, got {data!r}: {error}") from None
 
 
@@ -135,12 +138,16 @@ def standard_deviations(choice: Choice) -> Vector:
 
 
 def random_choice(
-    rng: np.random.Generator, link9: Sequence[str] = ("F",), swing: Sequence[str] = ("crank",)
+    rng: np.random.Generator,
+    link9: Sequence[str] = ("F",),
+    swing: Sequence[str] = ("crank",),
+    exponent: float = 1.5,
 ) -> Choice:
     """A choice with every assembly, toe, travel and each of the given laws equally likely."""
     return Choice(
         tuple(int(sign) for sign in rng.choice([-1, 1], len(SIGNS))),
         str(rng.choice(["I", "J"])), int(rng.choice([-1, 1])), str(rng.choice(link9)), str(rng.choice(swing)),
+        exponent,
     )  # fmt: skip
 
 
@@ -174,8 +181,10 @@ def random_start(choice: Choice, rng: np.random.Generator) -> Vector:
     return np.array([draw(name) for name in names(choice)])
 
 
-def encode(geometry: Geometry, walk: GaitParameters, run: GaitParameters) -> tuple[Choice, Vector]:
-    """A leg and its two gaits as (choice, x).
+def encode(
+    geometry: Geometry, walk: GaitParameters, run: GaitParameters, exponent: float = 1.5
+) -> tuple[Choice, Vector]:
+    """A leg and its two gaits, on a ground with this exponent, as (choice, x).
 
     Raises:
         ParameterError: a gait whose crank does not turn at the paper's speed.
@@ -185,7 +194,8 @@ def encode(geometry: Geometry, walk: GaitParameters, run: GaitParameters) -> tup
             raise ParameterError(
                 f"{name}.crank_speed: expected the paper's {SPEED:.6f} rad/s, got {gait.crank_speed!r}"
             )
-    choice = Choice(tuple(geometry.assembly[p] for p in SIGNS), geometry.toe, geometry.travel)
+    signs = tuple(geometry.assembly[p] for p in SIGNS)
+    choice = Choice(signs, geometry.toe, geometry.travel, exponent=exponent)
     logs = [np.log(geometry.lengths[name]) for name in LENGTHS]
     swings = [*walk.to_array()[1:], *run.to_array()[1:]]
     return choice, np.array([*logs, *geometry.pivot, geometry.hip_height, *swings])
@@ -283,5 +293,6 @@ def to_preset(x: Any, choice: Choice, provenance: str, name: str) -> dict[str, A
         "provenance": provenance,
         "units": "m, rad, rad/s",
         "geometry": {key: geometry[key] for key in kept},
+        "ground": {"exponent": choice.exponent},
         "gaits": gaits,
     }

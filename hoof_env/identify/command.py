@@ -18,10 +18,10 @@ import numpy as np
 from hoof_env.errors import HoofEnvError, check_choice, check_number
 from hoof_env.gait.parameters import load_gait
 from hoof_env.identify.candidate import Choice, encode, to_preset
-from hoof_env.identify.confirm import GIVEN_UP, confirm
+from hoof_env.identify.confirm import GIVEN_UP, JUDGED, confirm
 from hoof_env.identify.job import CHECKPOINT_EVERY
 from hoof_env.identify.monitor import Monitor
-from hoof_env.identify.problem import SAMPLES, LegProblem
+from hoof_env.identify.problem import EXPONENT, SAMPLES, LegProblem
 from hoof_env.identify.report import Shipped, plausibility_table, versions, write_results
 from hoof_env.identify.schedule import BUDGET, COLD, FROM_PRESET, Schedule
 from hoof_env.identify.search import Outcome, search
@@ -39,8 +39,8 @@ def check_extras() -> None:
             raise HoofEnvError(f'identify needs {name}: pip install "hoof-env[identify]"') from None
 
 
-def load_start(start: str) -> tuple[Choice, tuple[float, ...]] | None:
-    """Choice and x of a preset, by name or file; None for "cold".
+def load_start(start: str, exponent: float = EXPONENT) -> tuple[Choice, tuple[float, ...]] | None:
+    """Choice, with this exponent, and x of a preset, by name or file; None for "cold".
 
     Raises:
         HoofEnvError: there is no such preset, or its leg does not turn; the message names it.
@@ -48,7 +48,8 @@ def load_start(start: str) -> tuple[Choice, tuple[float, ...]] | None:
     if start == "cold":
         return None
     try:
-        choice, x = encode(load_geometry(start), load_gait("walk", start), load_gait("run", start))
+        gaits = (load_gait(gait, start) for gait in ("walk", "run"))
+        choice, x = encode(load_geometry(start), *gaits, exponent)
     except HoofEnvError as error:
         raise type(error)(f"start {start}: {error}") from None
     return choice, tuple(x.tolist())
@@ -62,6 +63,8 @@ def identify(
     seed: int = 0,
     targets: Path | None = None,
     walk: str = "walks",
+    exponent: float = EXPONENT,
+    beta: str = "probable",
     workers: int = 2,
     budget: int | None = None,
     resume: bool = False,
@@ -78,6 +81,7 @@ def identify(
         seed: two searches with the same seed and options find the same.
         targets: file of rows; the paper's own if None.
         walk: "walks" or "brakes".
+        exponent: n of Eq. 14, not published. beta: of the paper's solver, "printed" or "probable".
         workers: processes; their number changes nothing in what is found.
         budget: evaluations, one with the paper's solver by its weight; `BUDGET` if None.
         resume: go on with the search in `out`.
@@ -90,22 +94,26 @@ def identify(
     """
     check_extras()
     check_choice("walk", walk, GIVEN_UP)
+    check_choice("beta", beta, JUDGED)
+    exponent = check_number("exponent", exponent, low=1, high=3)
     seed = int(check_number("seed", seed, low=0, high=2**53))
     workers = int(check_number("workers", workers, low=1, high=1024))
     budget = int(check_number("budget", BUDGET if budget is None else budget, low=1, high=1e15))
-    problem = LegProblem(load_targets(targets), walk, load_start(start))
+    problem = LegProblem(load_targets(targets), walk, load_start(start, exponent), beta, exponent)
     phases = phases or (COLD if problem.start is None else FROM_PRESET)
     about = {
         "start": start if problem.start is None else f"{Path(start).stem} ({_start_digest(problem)})",
         "targets": problem.targets.digest,
         "walk": walk,
+        "exponent": exponent,
+        "beta": beta,
         "seed": seed,
         "budget": budget,
         "schedule": _digest([asdict(phase) for phase in phases]),
         "versions": versions(),
     }
     command = f"hoof-env identify --out {shlex.quote(str(out))} --start {shlex.quote(start)} --seed {seed}"
-    command += f" --walk {walk} --budget {budget}"
+    command += f" --walk {walk} --exponent {exponent:g} --beta {beta} --budget {budget}"
     command += f" --targets {shlex.quote(str(targets))}" if targets else ""
     state = open_state(out, about, _digest(about), resume=resume)
     began = time.monotonic()
@@ -134,14 +142,15 @@ def ship(problem: LegProblem, outcome: Outcome, about: Mapping[str, Any]) -> Shi
         "Identified, not published: found by hoof-env identify from the results printed in Batbaatar & "
         "Wagatsuma 2021 (doi 10.2991/jrnal.k.210713.002), which prints neither lengths nor swing parameters; "
         f"start {about['start']}, seed {about['seed']}, budget {about['budget']}, a walk that "
-        f"{about['walk']}, targets {about['targets']}; {used}; job "
+        f"{about['walk']}, exponent {about['exponent']:g}, {about['beta']} beta, targets {about['targets']}; "
+        f"{used}; job "
     )
     ranked = sorted((r for r in outcome.results if r.full is not None), key=lambda r: r.full or 0.0)
     for result in [*([outcome.winner] if outcome.winner else []), *ranked]:
         choice, x = Choice.from_dict(result.choice), np.array(result.x)
         try:
             preset = to_preset(x, choice, f"{provenance}{result.id}.", "identified")
-            verdict = confirm(preset, problem.targets, problem.walk)
+            verdict = confirm(preset, problem.targets, problem.walk, problem.beta)
         except HoofEnvError:  # it does not turn, or a gait is beyond its limits
             continue
         objective = problem.objective(choice, SAMPLES, True)

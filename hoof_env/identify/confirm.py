@@ -9,15 +9,21 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from hoof_env.identify.objective import ILL_CONDITIONED
 from hoof_env.identify.targets import Targets
 from hoof_env.paper.measure import measure_stance
 from hoof_env.paper.published import Published
 from hoof_env.paper.reproduce import SOLVERS, Reproduction, reproduce
 from hoof_env.paper.rows import compare
+from hoof_env.paper.shapes import BRAKING, HOOF_ON_GROUND
 
-GIVEN_UP: Mapping[str, tuple[str, ...]] = {"walks": ("walk.direction",), "brakes": ("walk.walks",)}
-"""The claim that each reading of the walk gives up: a hoof that slides forward brakes and does not walk."""
+GIVEN_UP: Mapping[str, tuple[str, ...]] = {"walks": (), "brakes": ("walk.walks",)}
+"""Claims that a walk gives up: a hoof that slides forward brakes and does not walk."""
+
+JUDGED = {"printed": ("exact", "paper"), "probable": ("exact", "paper, probable beta")}
+"""Solvers that count, by the reading of Baumgarte's beta; the other reading is only shown."""
+
+READ_AS = {"walks": HOOF_ON_GROUND, "brakes": BRAKING}
+"""How `walk.direction` must hold, see `hoof_env.paper.shapes`."""
 
 
 @dataclass(frozen=True)
@@ -26,13 +32,12 @@ class Confirmation:
 
     Attributes:
         reproduction: as `hoof_env.paper.reproduce` returns it, its rows compared with the targets.
-        outside: (id, solver) of the rows outside their bars that are required; `shown` of those that are not.
-        untrue: (id, solver) of the required claims that do not hold.
+        outside: (id, solver) of the rows outside their bars, of the solvers that count.
+        untrue: likewise of the required claims that do not hold.
     """
 
     reproduction: Reproduction
     outside: tuple[tuple[str, str], ...]
-    shown: tuple[tuple[str, str], ...]
     untrue: tuple[tuple[str, str], ...]
 
     @property
@@ -45,12 +50,12 @@ class Confirmation:
         return judged.count(True), len(judged) - judged.count(None)
 
 
-def confirm(preset: Mapping[str, Any], targets: Targets, walk: str) -> Confirmation:
+def confirm(preset: Mapping[str, Any], targets: Targets, walk: str, beta: str = "probable") -> Confirmation:
     """Run a preset through the full system.
 
     Args:
         preset: content of a preset file. targets: what its rows are compared with.
-        walk: "walks" or "brakes".
+        walk: "walks" or "brakes". beta: "printed" or "probable".
 
     Raises:
         HoofEnvError: the leg does not turn, or its simulation stops.
@@ -64,13 +69,14 @@ def confirm(preset: Mapping[str, Any], targets: Targets, walk: str) -> Confirmat
     for solver in SOLVERS:
         stances = {key[:2]: measure_stance(trace) for key, trace in run.traces.items() if key[2] == solver}
         rows += compare(aims, stances, solver)
-    out = [(row["id"], row["solver"]) for row in rows if row["within_bar"] is False]
-    required = [(name, solver) for name, solver in out if not (solver == "paper" and name in ILL_CONDITIONED)]
+    counts = JUDGED[beta]
+    outside = [(r["id"], r["solver"]) for r in rows if r["within_bar"] is False and r["solver"] in counts]
     untrue = [
         (claim["id"], claim["solver"])
         for claim in run.shapes
-        if not claim["holds"] and claim["id"] not in GIVEN_UP[walk]
+        if claim["solver"] in counts
+        and claim["id"] not in GIVEN_UP[walk]
+        and not claim["readings"].get(READ_AS[walk], claim["holds"])
     ]
     result = replace(run, rows=rows, published=aims, geometry=run.geometry.replace(name="identified"))
-    shown = tuple(pair for pair in out if pair not in required)
-    return Confirmation(result, tuple(required), shown, tuple(untrue))
+    return Confirmation(result, tuple(outside), tuple(untrue))

@@ -40,6 +40,10 @@ Those that cannot be exceeded are 0 where they are met."""
 LEVEL = 17
 """Where x holds the hip's height."""
 
+BETAS = {"printed": math.sqrt(2 * 15.0), "probable": math.sqrt(2) * 15.0}
+"""Baumgarte's beta of the paper's solver as Table 1 prints it, sqrt(2 alpha), and as it is probably meant,
+sqrt(2) alpha [1/s]."""
+
 PAPER_SAMPLES = 1001
 """Instants of the paper's solver in its one second."""
 
@@ -68,7 +72,7 @@ class Objective:
             instead of the walk's offset the logarithm of the toe's approach speed there [log m/s]; level and
             offset follow: for searches. That contact grazes: a tenth of a millimetre of height, or a
             milliradian, is a large step of the inelastic force. See `to_touch_down`, `from_touch_down`.
-        stiffness, exponent: of Eq. 14 [N/m^n, -].
+        stiffness: of Eq. 14 [N/m^n].
         beta: Baumgarte's, of the paper's solver [1/s].
 
     Attributes:
@@ -88,12 +92,11 @@ class Objective:
         walk: str = "walks",
         by_toe: bool = False,
         stiffness: float = 2e4,
-        exponent: float = 1.5,
-        beta: float = math.sqrt(30),
+        beta: float = BETAS["probable"],
     ) -> None:
         self._settings: dict[str, Any] = {
             "choice": choice, "targets": targets, "samples": samples, "paper_solver": paper_solver,
-            "walk": walk, "by_toe": by_toe, "stiffness": stiffness, "exponent": exponent, "beta": beta,
+            "walk": walk, "by_toe": by_toe, "stiffness": stiffness, "beta": beta,
         }  # fmt: skip
         self.choice, self.paper_solver, self.by_toe = choice, bool(paper_solver), bool(by_toe)
         self.names = names(choice)
@@ -103,7 +106,7 @@ class Objective:
         n = int(check_number("samples", samples, low=21, high=100_001))
         self._law = (
             check_number("stiffness", stiffness, low=0, exclusive_low=True),
-            check_number("exponent", exponent, low=1, high=3),
+            choice.exponent,
         )
         self._beta = check_number("beta", beta, low=0)
         self._read_targets(load_targets() if targets is None else targets)

@@ -6,9 +6,9 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from hoof_env.identify.confirm import Confirmation
-from hoof_env.identify.objective import ILL_CONDITIONED
 from hoof_env.paper.report import format_error, format_number
 from hoof_env.paper.reproduce import SOLVERS
+from hoof_env.paper.rows import ILL
 
 
 def describe_choice(choice: Mapping[str, Any]) -> str:
@@ -32,8 +32,8 @@ def page(data: Mapping[str, Any], confirmation: Confirmation | None) -> str:
         )
         parts += [
             "## Targets beside simulated",
-            "By the full system. Errors are in the measure of the bar; ✗ marks a row outside its bar, (✗) an "
-            "inelastic walking row with the paper's solver: these are ill-conditioned and not required.",
+            "By the full system. Errors are in the measure of the bar; ✗ marks a row outside its bar, † an "
+            "inelastic walking row with the paper's solver: these are ill-conditioned and have no bar.",
             _rows_table(confirmation),
             "## Claims",
             "\n".join(claims),
@@ -82,8 +82,7 @@ def _rows_table(confirmation: Confirmation) -> str:
         line = [f"`{aim.id}`", aim.unit, format_number(aim.value, aim.unit), aim.bar_text]
         for solver in SOLVERS:
             row = of[aim.id, solver]
-            spared = solver == "paper" and aim.id in ILL_CONDITIONED
-            mark = "" if row["within_bar"] is not False else " (✗)" if spared else " ✗"
+            mark = " ✗" if row["within_bar"] is False else " †" if row["spared"] == ILL else ""
             line += [format_number(row["simulated"], aim.unit), format_error(row, run) + mark]
         lines.append(line)
     head = ["row", "unit", "target", "bar"]
