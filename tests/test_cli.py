@@ -48,7 +48,7 @@ def test_reproduce_writes_its_results(tmp_path):
         "reproduction.md",
     }
     assert (
-        len(json.loads((tmp_path / "new" / "folder" / "reproduction.json").read_text(encoding="utf-8"))) == 64
+        len(json.loads((tmp_path / "new" / "folder" / "reproduction.json").read_text(encoding="utf-8"))) == 66
     )
     page = (tmp_path / "new" / "folder" / "reproduction.md").read_text(encoding="utf-8")
     assert f"hoof-env reproduce --out {tmp_path / 'new' / 'folder'} --no-figures" in page

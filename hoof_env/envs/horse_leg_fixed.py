@@ -17,6 +17,7 @@ from hoof_env.envs.start import Start
 from hoof_env.errors import check_choice, check_number
 from hoof_env.gait.parameters import LIMITS, GaitParameters
 from hoof_env.ground.contact import Ground
+from hoof_env.ground.preset import load_ground
 
 SOLVERS = ("exact", "paper")
 
@@ -71,6 +72,7 @@ class HorseLegFixedEnv(HorseLegEnv):
     |---|---|---|---|
     | `gait` | "walk" | | "walk" or "run": a gait of the preset |
     | `solver` | "exact" | | "exact" or "paper" |
+    | `stiffness`, `exponent` | None | N/m^n, - | K and n of Eq. 14; None for the preset's, or 2e4 and 1.5 |
     | `restitution` | 1 | - | 1 is the paper's elastic condition, 0 its inelastic one |
     | `approach_floor` | 1e-4 | m/s | smallest approach speed in Eq. 14: the walk grazes |
     | `friction_fast` | 1e-2 | m/s | upper threshold of Ambrosio's correction; assumed |
@@ -79,8 +81,8 @@ class HorseLegFixedEnv(HorseLegEnv):
     | `sim_dt` | None | s | None for the solver's own, 1e-3 or 1e-4 |
     | `episode_seconds` | 1 | s | time limit |
 
-    `preset`, `hip_height`, `stiffness`, `exponent`, `normal_law`, `friction_law`, `friction`,
-    `friction_slow`, `dt`, `reward_weights` and `render_mode` as in `hoof_env/HorseLeg-v0`.
+    `preset`, `hip_height`, `normal_law`, `friction_law`, `friction`, `friction_slow`, `dt`,
+    `reward_weights` and `render_mode` as in `hoof_env/HorseLeg-v0`.
 
     ## Version history
 
@@ -94,8 +96,8 @@ class HorseLegFixedEnv(HorseLegEnv):
         solver: str = "exact",
         preset: str = "first_fit",
         hip_height: float | None = None,
-        stiffness: float = 2e4,
-        exponent: float = 1.5,
+        stiffness: float | None = None,
+        exponent: float | None = None,
         normal_law: str = "lankarani-nikravesh",
         restitution: float = 1.0,
         approach_floor: float = 1e-4,
@@ -120,9 +122,10 @@ class HorseLegFixedEnv(HorseLegEnv):
         }
         if sim_dt is None:
             sim_dt = 1e-3 if solver == "paper" else 1e-4
+        ground = load_ground(preset, stiffness=stiffness, exponent=exponent)
         super().__init__(
-            preset=preset, trunk="fixed", hip_height=hip_height, stiffness=stiffness, exponent=exponent,
-            normal_law=normal_law, restitution=restitution, approach_floor=approach_floor, friction_law=friction_law,
+            preset=preset, trunk="fixed", hip_height=hip_height,
+            stiffness=ground.stiffness, exponent=ground.exponent, normal_law=normal_law, restitution=restitution, approach_floor=approach_floor, friction_law=friction_law,
             friction=friction, friction_slow=friction_slow, friction_fast=friction_fast, sim_dt=sim_dt, dt=dt,
             episode_seconds=episode_seconds, reward_weights=reward_weights, render_mode=render_mode,
         )  # fmt: skip

@@ -3,25 +3,28 @@
 The ensemble of a preset lies in `hoof_env/data/ensembles` under the preset's name, beside the presets and not
 among them. A member is written as a preset file writes a leg and its gaits, with how well it fits:
 
-    {"provenance": ..., "units": ..., "walk": "walks",
+    {"provenance": ..., "units": ..., "walk": "walks", "ground": {"exponent": ...},
      "bar": {"exact": 0.97, "paper": 0.99},
      "members": [{"geometry": ..., "gaits": ..., "errors": {"exact": ..., "paper": ...}, "short": {}}, ...]}
 
 Errors are those of the worst row, in units of its own bar; with the paper's solver the walking inelastic
 rows, which are ill-conditioned, do not count. "short" names the demands on plausibility that a leg misses.
+All legs share the preset's ground, written as in a preset file; without it they have the default one.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from hoof_env.errors import DataFileError, HoofEnvError, ParameterError, check_choice, check_number
 from hoof_env.gait.parameters import GaitParameters
+from hoof_env.ground.contact import Ground
+from hoof_env.ground.preset import read_ground, write_ground
 from hoof_env.leg.geometry import Geometry
 
 GAITS = ("walk", "run")
@@ -38,19 +41,22 @@ class Member:
         geometry: the leg. gaits: "walk" and "run".
         errors: by solver, the largest error of a row [bars].
         short: by name, shortage of the demands on plausibility that the leg misses; empty if none.
+        ground: what it stands on.
     """
 
     geometry: Geometry
     gaits: Mapping[str, GaitParameters]
     errors: Mapping[str, float]
     short: Mapping[str, float]
+    ground: Ground = field(default_factory=Ground)
 
     def to_preset(self) -> dict[str, Any]:
         """The content of a preset file of this leg."""
         geometry = self.geometry.to_dict()
         provenance = geometry.pop("provenance")
         gaits = {gait: asdict(parameters) for gait, parameters in self.gaits.items()}
-        return {"provenance": provenance, "geometry": geometry, "gaits": gaits}
+        ground = write_ground(self.ground)
+        return {"provenance": provenance, "geometry": geometry, "gaits": gaits, "ground": ground}
 
 
 @dataclass(frozen=True)
@@ -102,10 +108,11 @@ def load_ensemble(source: str | Path) -> Ensemble:
     members = data.get("members") if isinstance(data, dict) else None
     if not isinstance(members, list) or not members:
         raise DataFileError(f"{path}: expected an object with a list 'members' of at least one leg")
+    ground = read_ground(data, str(path))
     found: list[Member] = []
     for number, entry in enumerate(members, 1):
         try:
-            found.append(read_member(entry, f"member {number}"))
+            found.append(read_member(entry, f"member {number}", ground))
         except HoofEnvError as error:
             raise DataFileError(f"{path}, member {number}: {error}") from None
     for number, member in enumerate(found, 1):
@@ -127,8 +134,8 @@ def load_ensemble(source: str | Path) -> Ensemble:
     return ensemble
 
 
-def read_member(entry: Any, name: str) -> Member:
-    """A member as an ensemble's file writes it; `name` becomes that of its leg.
+def read_member(entry: Any, name: str, ground: Ground) -> Member:
+    """A member as an ensemble's file writes it, on the ensemble's ground; `name` becomes that of its leg.
 
     Raises:
         HoofEnvError: something is missing, unknown or out of range, or the leg does not turn.
@@ -147,7 +154,7 @@ def read_member(entry: Any, name: str) -> Member:
         raise
     except (AttributeError, TypeError, ValueError) as error:
         raise ParameterError(f"is incomplete or has unknown entries: {error}") from None
-    return Member(leg, gaits, errors, short)
+    return Member(leg, gaits, errors, short, ground)
 
 
 def write_member(preset: Mapping[str, Any], errors: Mapping[str, float], short: Mapping[str, float]) -> Any:
@@ -156,13 +163,17 @@ def write_member(preset: Mapping[str, Any], errors: Mapping[str, float], short: 
     return {**parts, "errors": dict(errors), "short": dict(short)}
 
 
-def to_data(members: list[dict[str, Any]], provenance: str, walk: str) -> dict[str, Any]:
-    """The content of an ensemble's file, from members as `write_member` gives them."""
+def to_data(
+    members: list[dict[str, Any]], provenance: str, walk: str, ground: Ground | None = None
+) -> dict[str, Any]:
+    """The content of an ensemble's file, from members as `write_member` gives them, on one ground
+    (by default the one that a preset has which says nothing of it)."""
     bar = {solver: max(member["errors"][solver] for member in members) for solver in SOLVERS}
     return {
         "provenance": provenance,
-        "units": "m, rad, rad/s; errors in bars",
+        "units": "m, rad, rad/s, N/m^n; errors in bars",
         "walk": walk,
+        "ground": write_ground(ground or Ground()),
         "bar": bar,
         "members": members,
     }

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -69,6 +69,7 @@ class Reproduction:
             only a report spends them; without it the result is empty.
         spread: measures how far the ensemble of the preset leaves the leg open; None if it has none. Some
             seconds too.
+        ground: the preset's, elastic, the approach speed interpolated.
     """
 
     rows: list[dict[str, Any]]
@@ -78,6 +79,7 @@ class Reproduction:
     published: Published
     conditions: Callable[[], Mapping[str, Any]] = dict
     spread: Callable[[], Spread | None] = lambda: None
+    ground: Ground = field(default_factory=Ground)
 
 
 def run_cycle(gait: str, solver: str, **settings: Any) -> Trace:
@@ -122,10 +124,8 @@ def reproduce(progress: Callable[[str], None] | None = None, *, preset: str | No
     """
     tell = progress or _silent
     settings: dict[str, Any] = {} if preset is None else {"preset": preset}
-    geometry, published = (
-        gymnasium.make(ENVIRONMENT, **settings).get_wrapper_attr("geometry"),
-        load_published(),
-    )
+    engine, published = gymnasium.make(ENVIRONMENT, **settings).get_wrapper_attr("engine"), load_published()
+    geometry, ground = engine.geometry, engine.ground
     traces: dict[tuple[str, str, str], Trace] = {}
     rows: list[dict[str, Any]] = []
     medians: dict[str, dict[str, dict[float, float]]] = {}
@@ -137,7 +137,7 @@ def reproduce(progress: Callable[[str], None] | None = None, *, preset: str | No
                 traces[gait, condition, solver] = trace
                 stance = stances[gait, condition] = measure_stance(trace)
                 tell(f"{solver}, {gait}, {condition}: peak {stance.peak:.1f} N, mean {stance.mean:.1f} N")
-            by_depth = medians[solver][gait] = _sole_velocities(traces[gait, "elastic", solver])
+            by_depth = medians[solver][gait] = _sole_velocities(traces[gait, "elastic", solver], ground)
             values = ", ".join(f"{value:+.2f}" for value in by_depth.values())
             tell(f"{solver}, {gait}, 0, 5, 10 cm deep: sole moves at {values} m/s")
         rows += compare(published, stances, solver)
@@ -145,7 +145,7 @@ def reproduce(progress: Callable[[str], None] | None = None, *, preset: str | No
     for solver in SOLVERS:
         tell(f"{solver}: {counted(rows, shapes, solver)}")
     later = cache(partial(_conditions, preset, tell)), cache(partial(_spread, geometry.name, progress))
-    return Reproduction(rows, shapes, traces, geometry, published, *later)
+    return Reproduction(rows, shapes, traces, geometry, published, *later, ground)
 
 
 def _silent(line: str) -> None:
@@ -179,11 +179,11 @@ def _judge_all(
     return shapes
 
 
-def _sole_velocities(trace: Trace) -> dict[float, float]:
+def _sole_velocities(trace: Trace, ground: Ground) -> dict[float, float]:
     """`sole_velocity` [m/s] by depth [m]: on a fixed trunk the motion is the same on every ground."""
     from hoof_env.paper.study.replay import replay  # imports this module
 
-    return {depth: sole_velocity(replay(trace, Ground(), depth)) for depth in DEPTHS}
+    return {depth: sole_velocity(replay(trace, ground, depth)) for depth in DEPTHS}
 
 
 def _conditions(preset: str | None, tell: Callable[[str], None]) -> Mapping[str, Any]:

@@ -143,9 +143,9 @@ def _what_not(data: Data) -> str:
     return (
         "**What the ensemble is not.** It is not a posterior: its members have no weights, and where many "
         "lie shows how the searches went, not what is likely. They descend from searches that began near a "
-        f"leg already known, and {shared}; the masses' rule, the law of the swing and the linkage itself are "
-        "the same in all. So its spread is a lower bound for what the numbers leave open, and a value with a "
-        f"narrow range is not thereby known.{source}"
+        f"leg already known, and {shared}; the ground's K and n, the masses' rule, the law of the swing and "
+        "the linkage itself are the same in all. So its spread is a lower bound for what the numbers leave "
+        f"open, and a value with a narrow range is not thereby known.{source}"
     )
 
 

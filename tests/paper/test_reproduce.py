@@ -10,7 +10,7 @@ from hoof_env.dynamics.trace import new_trace
 from hoof_env.dynamics.trunk import Trunk
 from hoof_env.errors import OutputError, ParameterError
 from hoof_env.gait.parameters import load_gait
-from hoof_env.ground.contact import Ground
+from hoof_env.ground.preset import load_ground
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.paper import report
 from hoof_env.paper.measure import integral, measure_stance
@@ -173,7 +173,7 @@ def test_motion_does_not_depend_on_the_contact_law(reproduction):
 def test_the_zero_action_is_the_gait_to_the_last_bit(reproduction):
     geometry, gait = load_geometry(), load_gait("run")
     engine = LegEngine(
-        geometry, Trunk(kind="fixed", height=geometry.hip_height), Ground(restitution=0.0), 1e-4
+        geometry, Trunk(kind="fixed", height=geometry.hip_height), load_ground(restitution=0.0), 1e-4
     )
     parts = [engine.reset(gait)]
     for _ in range(50):

@@ -5,9 +5,10 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from hoof_env.errors import HoofEnvError
+from hoof_env.errors import DataFileError, HoofEnvError
 from hoof_env.gait.parameters import load_gait
-from hoof_env.identify.ensemble import Ensemble, Member, to_data, write_member
+from hoof_env.ground.contact import Ground
+from hoof_env.identify.ensemble import Ensemble, Member, load_ensemble, to_data, write_member
 from hoof_env.leg.geometry import read_preset
 from hoof_env.leg.linkage import LENGTHS
 from hoof_env.paper import reproduce as reproduce_module
@@ -38,7 +39,10 @@ def make(reproduction):
     def make(*geometries, errors=(0.5, 0.75)):
         judged = dict(zip(("exact", "paper"), errors, strict=True))
         return Ensemble(
-            preset, "made by hand", "walks", tuple(Member(g, gaits, judged, {}) for g in geometries)
+            preset,
+            "made by hand",
+            "walks",
+            tuple(Member(g, gaits, judged, {}, reproduction.ground) for g in geometries),
         )
 
     return make
@@ -112,20 +116,21 @@ def test_similar_legs_have_similar_lengths_and_paths(reproduction, spread):
 
 
 def test_similar_legs_press_as_the_power_of_their_size(reproduction, spread):
-    """K d**1.5 without damping: the elastic force is in proportion to size**1.5, at equal times."""
+    """K d**n without damping: the elastic force is in proportion to size**n, at equal times."""
+    n = reproduction.ground.exponent
     quantities, normal = spread.data["quantities"], spread.curves.normal
     for gait in GAITS:
         curve = own_curve(reproduction, spread.curves, "normal", gait)
         for scale, member in zip(SCALES, normal[gait, "elastic"], strict=True):
-            np.testing.assert_allclose(member, scale**1.5 * curve, rtol=1e-6, atol=1e-6)
+            np.testing.assert_allclose(member, scale**n * curve, rtol=1e-6, atol=1e-6)
         for name in ("peak", "impulse"):
             entry = quantities[f"{gait}.elastic.{name}"]
-            assert entry["range"] == pytest.approx([entry["preset"] * s**1.5 for s in (0.97, 1.01)], rel=1e-6)
+            assert entry["range"] == pytest.approx([entry["preset"] * s**n for s in (0.97, 1.01)], rel=1e-6)
         assert np.ptp(quantities[f"{gait}.elastic.peak_time"]["range"]) < 1e-9
         found = spread.data["differences"][f"{gait}.elastic.normal"]
         mean = reproduction.published.row(f"{gait}.mean_elastic").value
         assert found["relative"] == pytest.approx(found["rms"] / mean)
-        assert found["largest"] == pytest.approx((1.01**1.5 - 0.97**1.5) * curve.max(), rel=1e-6)
+        assert found["largest"] == pytest.approx((1.01**n - 0.97**n) * curve.max(), rel=1e-6)
 
 
 def test_crank_torque_is_linear_in_the_masses_and_nothing_else_knows_them(reproduction, make):
@@ -164,6 +169,34 @@ def test_a_member_that_never_touches_the_ground_is_named(reproduction, make):
     leg = reproduction.geometry
     with pytest.raises(HoofEnvError, match=r"member 2: .*contact"):
         measure_spread(make(leg, leg.replace(hip_height=2 * leg.hip_height)))
+
+
+def test_members_stand_on_the_ground_of_their_ensemble(reproduction, tmp_path):
+    """K d**n without damping, on the depths of the preset's own run."""
+    ground = Ground(stiffness=3e4, exponent=1.25)
+    member = write_member(read_preset(reproduction.geometry.name), {"exact": 0.5, "paper": 0.5}, {})
+    file = tmp_path / "legs.json"
+    file.write_text(json.dumps(to_data([member], "made by hand", "walks", ground)), encoding="utf-8")
+    ensemble = load_ensemble(file)
+    assert ensemble.members[0].ground == ground
+    spread = measure_spread(ensemble, reproduction.geometry.name)
+    for gait in GAITS:
+        trace = reproduction.traces[gait, "elastic", SOLVER]
+        force = sum(3e4 * trace[f"{point}_penetration"].clip(0) ** 1.25 for point in ("toe", "heel"))
+        entry = spread.data["quantities"][f"{gait}.elastic.peak"]
+        assert entry["median"] == pytest.approx(force.max(), rel=1e-9)
+        assert entry["preset"] == pytest.approx(trace["normal"].max(), rel=1e-9)
+
+
+def test_an_ensembles_ground_that_is_none_is_refused(reproduction, tmp_path):
+    member = write_member(read_preset(reproduction.geometry.name), {"exact": 0.5, "paper": 0.5}, {})
+    data = to_data([member], "", "walks")
+    (tmp_path / "bad.json").write_text(json.dumps({**data, "ground": {"n": 1}}), encoding="utf-8")
+    with pytest.raises(DataFileError, match=r"bad\.json: ground: .*'n'"):
+        load_ensemble(tmp_path / "bad.json")
+    del data["ground"]
+    (tmp_path / "old.json").write_text(json.dumps(data), encoding="utf-8")
+    assert load_ensemble(tmp_path / "old.json").members[0].ground == Ground()
 
 
 def test_progress_tells_when_it_is_done(make, reproduction):

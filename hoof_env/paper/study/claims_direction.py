@@ -40,7 +40,11 @@ ON_THE_LEG, ON_THE_GROUND = "force of the ground on the leg", "force of the hoof
 
 def _braking(case: Case) -> Examined:
     findings = (
-        *case.judged("walk.direction", f"{ON_THE_LEG}, backward in both halves of stance"),
+        *by_solver(
+            f"{ON_THE_LEG}, backward in both halves of stance",
+            lambda solver: _signs(case, "walk", solver, 1),
+            case.asked("walk.direction"),
+        ),
         *by_solver(
             f"{ON_THE_GROUND}, backward in both halves of stance",
             lambda solver: _signs(case, "walk", solver, -1),

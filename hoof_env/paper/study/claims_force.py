@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from hoof_env.ground.contact import Ground
 from hoof_env.ground.normal_force import lankarani_nikravesh
 from hoof_env.paper.measure import POINTS
 from hoof_env.paper.published import CONDITIONS
@@ -38,13 +38,14 @@ def _peak(trace: Trace) -> float:
 def on_ground(case: Case, gait: str, solver: str, **settings: Any) -> Trace:
     """The elastic cycle of a solver on another ground."""
     approach = "sampled" if solver == "paper" else "interpolated"
-    return replay(case.trace(gait, solver), Ground(approach=approach, **settings))
+    return replay(case.trace(gait, solver), replace(case.reproduction.ground, approach=approach, **settings))
 
 
 def _stiffness(case: Case) -> Examined:
     def softer(solver: str) -> tuple[bool, str]:
+        twice = 2 * case.reproduction.ground.stiffness
         ratios = {
-            gait: _peak(on_ground(case, gait, solver, stiffness=4e4)) / _peak(case.trace(gait, solver))
+            gait: _peak(on_ground(case, gait, solver, stiffness=twice)) / _peak(case.trace(gait, solver))
             for gait in GAITS
         }
         words = listed(f"{ratio:.2f} ({NAMES[gait]})" for gait, ratio in ratios.items())
@@ -83,7 +84,7 @@ def _reduction(case: Case) -> Examined:
             two < one for one, two in peaks.values()
         ), f"peak {words}; the damper absorbs {energy} a cycle"
 
-    free = free_peak(lankarani_nikravesh(0.0), Ground().exponent)
+    free = free_peak(lankarani_nikravesh(0.0), case.reproduction.ground.exponent)
     findings = (
         *by_solver(
             "the elastic peak is lower than the inelastic one",

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from hoof_env.ground.contact import Ground
 from hoof_env.paper.published import Published, load_published
 from hoof_env.paper.reproduce import GAITS
-from hoof_env.paper.study.replay import Cycles, euler_cycle, exact_cycle, row_values, stances_on
+from hoof_env.paper.study.replay import Cycles, euler_cycle, exact_cycle, ground_of, row_values, stances_on
 from hoof_env.paper.study.section import for_json
 
 STEPS = 1000
@@ -29,8 +29,6 @@ PART, POINTS = 0.1, 41
 
 LEVEL_LINE, LEVEL_WINDOW = 1e-4, 1e-3
 """How far the ground moves to either side for the line and for the window of the extremes [m]."""
-
-SAMPLED = Ground(approach="sampled")
 
 Values = dict[str, float]
 
@@ -64,7 +62,7 @@ def conditions(
     published = load_published()
     exact = {gait: exact_cycle(gait, preset) for gait in GAITS}
     progress("condition of each row, exact solver")
-    answers = {"exact": _ground(published, exact, Ground())}
+    answers = {"exact": _ground(published, exact, ground_of(preset))}
     for name, beta in betas(published).items():
         progress(f"condition of each row, paper's solver with the {name} beta")
         answers["paper" if name == "printed" else f"paper, {name} beta"] = _euler(published, preset, beta)
@@ -80,12 +78,12 @@ def conditions(
 def euler_rows(published: Published, preset: str | None, steps: int, beta: float) -> Values:
     """Every row of the paper's solver with `steps` steps to the second."""
     cycles = {gait: euler_cycle(gait, preset, steps, beta) for gait in GAITS}
-    return row_values(published, stances_on(cycles, SAMPLED))
+    return row_values(published, stances_on(cycles, ground_of(preset, approach="sampled")))
 
 
 def _euler(published: Published, preset: str | None, beta: float) -> dict[str, dict[str, Any]]:
     cycles = {gait: euler_cycle(gait, preset, STEPS, beta) for gait in GAITS}
-    answers = _ground(published, cycles, SAMPLED)
+    answers = _ground(published, cycles, ground_of(preset, approach="sampled"))
     steps = np.unique(np.round(STEPS / np.linspace(1 - PART, 1 + PART, POINTS))).astype(int)
     rows = [euler_rows(published, preset, int(n), beta) for n in steps]
     _add(answers, "step", 1e3 / steps, 1e3 / STEPS, rows)

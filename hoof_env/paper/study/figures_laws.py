@@ -18,7 +18,8 @@ LAW_COLOURS = {
     "exact": "black",
 }
 GAIT_COLOURS = {"walk": ORANGE, "run": BLUE}
-EXPONENT_LINES = ("--", "-", ":")
+OTHER_LINES = ("--", ":", "-.")
+"""Of exponents that are not the preset's, whose line is solid."""
 
 
 def _figure(width: float, height: float) -> Any:
@@ -28,7 +29,7 @@ def _figure(width: float, height: float) -> Any:
 
 
 def _laws(data: Mapping[str, Any]) -> dict[str, Any]:
-    """The sweeps of every law with the simulator's exponent."""
+    """The sweeps of every law with the preset's exponent."""
     laws: dict[str, Any] = data["exponents"][data["exponent"]]["laws"]
     return laws
 
@@ -89,7 +90,9 @@ def draw_free(data: Mapping[str, Any]) -> Any:
     """Peak over the elastic peak, prescribed motion beside free impacts; the reduction by exponent."""
     figure = _figure(7.5, 3.6)
     left, right = figure.subplots(1, 2)
-    for (exponent, entry), line in zip(data["exponents"].items(), EXPONENT_LINES, strict=True):
+    others = iter(OTHER_LINES)
+    for exponent, entry in data["exponents"].items():
+        line = "-" if exponent == data["exponent"] else next(others)
         sweep = entry["laws"]["exact"]
         for gait, title in GAITS.items():
             style = {"color": GAIT_COLOURS[gait], "ls": line, "lw": 1.2}

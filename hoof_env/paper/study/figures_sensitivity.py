@@ -87,7 +87,7 @@ def draw_sweeps(published: Published, data: Mapping[str, Any]) -> Any:
         stiff.plot(
             factors, ratios, color=CONDITION_COLOURS[condition], ls=GAIT_LINES[gait], marker="o", ms=3, lw=1.2
         )
-    stiff.set(xlabel="K over the paper's lower limit [-]", ylabel="peak over the published peak [-]")
+    stiff.set(xlabel="K over the preset's [-]", ylabel="peak over the published peak [-]")
     stiff.set_title("level moved to keep the elastic walking peak", fontsize=8)
     for gait, title in GAITS.items():
         style = {"color": GAIT_COLOURS[gait], "label": title.lower(), "lw": 1.4}

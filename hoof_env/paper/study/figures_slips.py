@@ -13,6 +13,7 @@ from hoof_env.paper.study.slips_contact import NAMES, Traces, force_in_the_air
 from hoof_env.paper.study.slips_friction import literal_friction
 
 if TYPE_CHECKING:
+    from hoof_env.ground.contact import Ground
     from hoof_env.paper.study.slips_motion import Drift
 
 CASES = {"read": BLUE, "printed": ORANGE, "printed, probable beta": PURPLE}
@@ -38,7 +39,7 @@ def draw_drift(cycles: Mapping[tuple[str, str], Drift]) -> Any:
     return figure
 
 
-def draw_literal_forces(traces: Traces) -> Any:
+def draw_literal_forces(traces: Traces, ground: Ground) -> Any:
     """Normal force by the letter of Eq. 11, friction by that of Eq. 15, beside those read; elastic."""
     from matplotlib.figure import Figure
 
@@ -49,7 +50,7 @@ def draw_literal_forces(traces: Traces) -> Any:
         stance = measure_stance(trace)
         above, below = axes[:, column]
         above.plot(trace["t"], trace["normal"] / 1000, color=BLUE, label="as read")
-        above.plot(trace["t"], force_in_the_air(trace) / 1000, color=ORANGE, label="by the letter")
+        above.plot(trace["t"], force_in_the_air(trace, ground) / 1000, color=ORANGE, label="by the letter")
         above.axvspan(stance.start, stance.end, color=GREY, alpha=0.12, lw=0, label="hoof in the ground")
         above.set(title=f"{name.capitalize()}: Eq. 11", xlim=(0, 1), ylim=(0, None), xlabel="time [s]")
         below.plot(trace["t"], trace["friction"] / 1000, color=BLUE)

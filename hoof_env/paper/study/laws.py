@@ -17,7 +17,7 @@ from hoof_env.paper.published import CONDITIONS, Published, load_published
 from hoof_env.paper.reproduce import GAITS
 from hoof_env.paper.study import figures_laws as figures
 from hoof_env.paper.study.laws_text import laws_text
-from hoof_env.paper.study.replay import Cycles, Trace, exact_cycle, replay
+from hoof_env.paper.study.replay import Cycles, Trace, exact_cycle, ground_of, replay
 from hoof_env.paper.study.section import Section, for_json
 
 PAPER_LAW = "lankarani-nikravesh"
@@ -26,6 +26,7 @@ RESTITUTIONS = np.concatenate(([0, SMALLEST_RESTITUTION, 2 * SMALLEST_RESTITUTIO
 """Nominal coefficients of restitution of the sweep [-]."""
 
 EXPONENTS = (1.0, 1.5, 2.0)
+"""Exponents n [-] that are tried beside the preset's."""
 
 FLOORS = np.geomspace(1e-4, 3.0, 61)
 """Approach-speed floors of the sweep [m/s]."""
@@ -46,9 +47,9 @@ def examine_laws(preset: str | None, progress: Callable[[str], None]) -> Section
     """
     published = load_published()
     cycles = {gait: exact_cycle(gait, preset) for gait in GAITS}
-    ground = Ground()
+    ground = ground_of(preset)
     data: dict[str, Any] = {"stiffness": ground.stiffness, "exponents": {}}
-    for exponent in EXPONENTS:
+    for exponent in sorted({*EXPONENTS, ground.exponent}):
         progress(f"damping laws, exponent {exponent:g}")
         data["exponents"][f"{exponent:g}"] = _exponent(cycles, replace(ground, exponent=exponent))
     base = data["exponents"][f"{ground.exponent:g}"]

@@ -163,7 +163,8 @@ def _exponents(data: Mapping[str, Any]) -> list[str]:
     }
     ranges = listed(f"{min(values):.1f} to {max(values):.1f} % ({word})" for word, values in spread.items())
     return [
-        f"The exponent n is not printed. Elastic peaks with K = {data['stiffness']:g} N/mⁿ kept, and with K "
+        f"The exponent n is not printed; this preset has n = {data['exponent']}. Elastic peaks with K = "
+        f"{data['stiffness']:g} N/mⁿ kept, and with K "
         "rescaled so that the elastic running peak stays; every normal force is proportional to K, so the "
         f"reductions are the same for both. From n = {lines[0][0]} to {lines[-1][0]} the reductions under "
         f"the paper's law run over {ranges}.",

@@ -27,6 +27,7 @@ from hoof_env.paper.study.replay import (
     closure_error,
     euler_cycle,
     exact_cycle,
+    ground_of,
     replay,
     row_values,
     stances_on,
@@ -56,7 +57,7 @@ def examine_numerics(preset: str | None, progress: Callable[[str], None]) -> Sec
     published = load_published()
     by_name = betas(published)
     exact = {gait: exact_cycle(gait, preset) for gait in GAITS}
-    truth = row_values(published, stances_on(exact, Ground()))
+    truth = row_values(published, stances_on(exact, ground_of(preset)))
     progress("distance of Euler from the exact motion")
     drift = {name: [_drift(preset, n, beta) for n in LADDER] for name, beta in by_name.items()}
     rows = {
@@ -132,7 +133,7 @@ def _causes(preset: str | None, by_name: dict[str, float]) -> dict[str, Any]:
         motions |= {name: euler_cycle(gait, preset, STEPS, beta) for name, beta in by_name.items()}
         result[gait] = {
             motion: {
-                approach: _peak(trace, Ground(approach=approach, restitution=CONDITIONS["inelastic"]))
+                approach: _peak(trace, _grounds(preset, approach)["inelastic"])
                 for approach in ("interpolated", "sampled")
             }
             for motion, trace in motions.items()
@@ -144,8 +145,8 @@ def _peak(trace: Trace, ground: Ground, rise: float = 0.0) -> float:
     return float(replay(trace, ground, rise)["normal"].max())
 
 
-def _grounds(approach: str) -> dict[str, Ground]:
-    return {name: Ground(approach=approach, restitution=cr) for name, cr in CONDITIONS.items()}
+def _grounds(preset: str | None, approach: str) -> dict[str, Ground]:
+    return {name: ground_of(preset, approach=approach, restitution=cr) for name, cr in CONDITIONS.items()}
 
 
 def _beta_sweep(preset: str | None, truth: dict[str, float]) -> dict[str, Any]:
@@ -155,7 +156,7 @@ def _beta_sweep(preset: str | None, truth: dict[str, float]) -> dict[str, Any]:
         exact = exact_cycle(gait, preset, 1 / STEPS)
         cycles = [euler_cycle(gait, preset, STEPS, float(beta)) for beta in BETA_SWEEP]
         result["hoof_mm"][gait] = [1e3 * float(hoof_error(trace, exact).max()) for trace in cycles]
-        for condition, ground in _grounds("sampled").items():
+        for condition, ground in _grounds(preset, "sampled").items():
             peak = truth[f"{gait}.peak_{condition}"]
             result["peak_ratio"][f"{gait}.{condition}"] = [_peak(trace, ground) / peak for trace in cycles]
     return result
@@ -163,7 +164,7 @@ def _beta_sweep(preset: str | None, truth: dict[str, float]) -> dict[str, Any]:
 
 def _step_sweep(preset: str | None, by_name: dict[str, float]) -> dict[str, Any]:
     """Inelastic peaks [N] by gait and beta over the step."""
-    ground = _grounds("sampled")["inelastic"]
+    ground = _grounds(preset, "sampled")["inelastic"]
     return {
         "step_ms": (1e3 / STEP_SWEEP).tolist(),
         "peaks": {
@@ -174,7 +175,8 @@ def _step_sweep(preset: str | None, by_name: dict[str, float]) -> dict[str, Any]
             for gait in GAITS
         },
         "exact": {
-            gait: _peak(exact_cycle(gait, preset), _grounds("interpolated")["inelastic"]) for gait in GAITS
+            gait: _peak(exact_cycle(gait, preset), _grounds(preset, "interpolated")["inelastic"])
+            for gait in GAITS
         },
     }
 
@@ -184,10 +186,10 @@ def _level_sweep(preset: str | None, by_name: dict[str, float]) -> dict[str, Any
     rises = 3 * LEVEL_WINDOW * np.linspace(-1, 1, 121)
     peaks: dict[str, Any] = {}
     for gait in GAITS:
-        exact, ground = exact_cycle(gait, preset), _grounds("interpolated")["inelastic"]
+        exact, ground = exact_cycle(gait, preset), _grounds(preset, "interpolated")["inelastic"]
         peaks[gait] = {"exact": [_peak(exact, ground, float(rise)) for rise in rises]}
         for name, beta in by_name.items():
-            trace, sampled = euler_cycle(gait, preset, STEPS, beta), _grounds("sampled")["inelastic"]
+            trace, sampled = euler_cycle(gait, preset, STEPS, beta), _grounds(preset, "sampled")["inelastic"]
             peaks[gait][name] = [_peak(trace, sampled, float(rise)) for rise in rises]
     return {"rise_mm": (1e3 * rises).tolist(), "peaks": peaks}
 
@@ -205,9 +207,9 @@ def _errors_over_time(preset: str | None, by_name: dict[str, float]) -> dict[tup
 def _forces(preset: str | None, published: Published, by_name: dict[str, float]) -> tuple[Any, Any]:
     """Curves for the figure: time [s] and inelastic normal force [N] by gait and solver; published peaks."""
     curves: dict[tuple[str, str], Any] = {}
-    inelastic = _grounds("sampled")["inelastic"]
+    inelastic = _grounds(preset, "sampled")["inelastic"]
     for gait in GAITS:
-        trace = replay(exact_cycle(gait, preset), _grounds("interpolated")["inelastic"])
+        trace = replay(exact_cycle(gait, preset), _grounds(preset, "interpolated")["inelastic"])
         curves[gait, "exact"] = trace["t"], trace["normal"]
         for name, beta in by_name.items():
             trace = replay(euler_cycle(gait, preset, STEPS, beta), inelastic)

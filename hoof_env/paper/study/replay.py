@@ -18,6 +18,7 @@ from hoof_env.dynamics.trace import new_trace, record
 from hoof_env.errors import HoofEnvError
 from hoof_env.gait.parameters import GaitParameters, load_gait
 from hoof_env.ground.contact import HEEL, TOE, Ground, new_contacts, touch
+from hoof_env.ground.preset import load_ground
 from hoof_env.identify.drift import DriftCycle, drift_cycle
 from hoof_env.leg.geometry import Geometry, load_geometry
 from hoof_env.paper.measure import POINTS, Stance, measure_stance
@@ -73,7 +74,7 @@ def closure_error(gait: str, preset: str | None, steps: int, beta: float) -> flo
 
 
 def _drift(gait: str, preset: str | None, steps: int, beta: float, until: int) -> DriftCycle:
-    geometry, gaits = _leg(preset)
+    geometry, gaits, _ = _leg(preset)
     motion = drift_cycle(geometry, gaits[gait], sim_dt=1 / steps, steps=until, beta=beta)
     if not motion.finite:
         raise HoofEnvError(f"{gait} in {steps} Euler steps a second with beta {beta:g}: it diverged")
@@ -81,9 +82,18 @@ def _drift(gait: str, preset: str | None, steps: int, beta: float, until: int) -
 
 
 @lru_cache(maxsize=8)
-def _leg(preset: str | None) -> tuple[Geometry, dict[str, GaitParameters]]:
+def _leg(preset: str | None) -> tuple[Geometry, dict[str, GaitParameters], Ground]:
     source = () if preset is None else (preset,)
-    return load_geometry(*source), {gait: load_gait(gait, *source) for gait in GAITS}
+    gaits = {gait: load_gait(gait, *source) for gait in GAITS}
+    return load_geometry(*source), gaits, load_ground(*source)
+
+
+def ground_of(preset: str | None, **changes: Any) -> Ground:
+    """The ground of a preset (the environment's default if None), with changes to its attributes.
+
+    Unchanged it is elastic, with the approach speed at the interpolated touch-down.
+    """
+    return replace(_leg(preset)[2], **changes)
 
 
 def replay(trace: Trace, ground: Ground, rise: float = 0.0) -> Trace:

@@ -20,7 +20,15 @@ from hoof_env.paper.published import CONDITIONS, Published, PublishedRow, load_p
 from hoof_env.paper.reproduce import GAITS
 from hoof_env.paper.study import figures_sensitivity as figures
 from hoof_env.paper.study.by_construction import GROUND_PARAMETERS, confirm
-from hoof_env.paper.study.replay import Cycles, at_speed, exact_cycle, replay, row_values, stances_on
+from hoof_env.paper.study.replay import (
+    Cycles,
+    at_speed,
+    exact_cycle,
+    ground_of,
+    replay,
+    row_values,
+    stances_on,
+)
 from hoof_env.paper.study.section import Section, for_json
 from hoof_env.paper.study.sensitivity_text import sensitivity_text
 
@@ -30,7 +38,7 @@ PART, RISE = 1e-2, 1e-4
 """Parameters vary by this part to either side, the ground level by this much [m]."""
 
 STIFFER = (1.0, 1.5, 2.0, 3.0, 5.0, 10.0)
-"""Stiffness over the paper's lower limit [-]."""
+"""Stiffness over the preset's [-]."""
 
 LEVELS = np.linspace(-20e-3, 20e-3, 201)
 """Rise of the ground in the sweep [m]."""
@@ -55,7 +63,7 @@ def examine_sensitivity(preset: str | None, progress: Callable[[str], None]) -> 
     """
     published = load_published()
     cycles = {gait: exact_cycle(gait, preset) for gait in GAITS}
-    ground = Ground()
+    ground = ground_of(preset)
     progress("answer of every row to every parameter")
     rows = answers(published, cycles, ground)
     data: dict[str, Any] = {

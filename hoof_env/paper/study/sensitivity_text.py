@@ -131,20 +131,24 @@ def _stiffness(published: Published, data: Mapping[str, Any]) -> list[str]:
         "",
         *(format_number(published.row(r).value, published.row(r).unit) for r in SHOWN),
     ]
+    limit, own = published.parameters["stiffness"], data["parameters"]["stiffness"]
+    where = "at the lower limit" if own == limit else f"at {own / limit:.3g} times the lower limit"
     return [
-        "The paper gives K as 'no smaller than' its value. With all else kept, all forces grow in "
+        f"The paper gives K as 'no smaller than' {limit:g}; this preset has {own:g} N/mⁿ with n = "
+        f"{data['parameters']['exponent']:g}. With all else kept, all forces grow in "
         "proportion: ten times K, ten times every force. The ground level is not printed either, so a "
         "stiffer ground may lie lower. With the level chosen to keep the elastic walking peak at its "
         f"published value, {first['factor']:g} to {last['factor']:g} times K moves the ground by "
         f"{last['rise_mm']:+.1f} mm and the elastic running peak{change}. Most rows lie within their bar "
         f"({best['within']} of {best['barred']}) at {best['factor']:g} times K"
         + (
-            ": on this leg, identified at the lower limit, no stiffer ground tried does as well."
+            f": on this leg, identified {where}, no stiffer ground tried does as well."
             if best is first
             else "."
         ),
-        table(["K over the limit", "ground [mm]", *(f"`{row}` [{published.row(row).unit}]" for row in SHOWN),
-               "rows within bar"], [*lines, [*published_line, ""]]),
+        table(["K over the preset's", "ground [mm]",
+               *(f"`{row}` [{published.row(row).unit}]" for row in SHOWN), "rows within bar"],
+              [*lines, [*published_line, ""]]),
     ]  # fmt: skip
 
 

@@ -44,7 +44,7 @@ def examine_slips(
     slips = linkage_slips(result.geometry)
     progress("slips: Eq. 8 with gamma as printed")
     cycles = drifts(preset)
-    slips += motion_slips(preset, cycles) + contact_slips(traces, result.published)
+    slips += motion_slips(preset, cycles) + contact_slips(traces, result.published, result.ground)
     slips += friction_slips(traces) + result_slips(result)
     return Section(
         TITLE,
@@ -52,7 +52,7 @@ def examine_slips(
         {"slips": [asdict(slip) for slip in slips]},
         {
             "slips_drift": lambda: draw_drift(cycles),
-            "slips_forces": lambda: draw_literal_forces(traces),
+            "slips_forces": lambda: draw_literal_forces(traces, result.ground),
         },
     )
 

@@ -6,6 +6,7 @@ On a fixed trunk the ground moves nothing, so every reading is a function of the
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,21 +28,24 @@ Traces = Mapping[tuple[str, str], Trace]
 SOLVER = "exact"
 """The solver whose cycles are examined."""
 
+HERTZ = 1.5
+"""Exponent n of Hertz and of Lankarani and Nikravesh [-]."""
+
 NAMES = {"walk": "walking", "run": "running"}
 FIRST_POINT = {"walk": "heel", "run": "toe"}
 """The point that the text below Eq. 10 names for each gait: H for heel-first, K for toe-first contact."""
 
 
-def contact_slips(traces: Traces, published: Published) -> list[Slip]:
-    """The slips of Eqs. 10 to 14 and of the stiffness in Table 1."""
+def contact_slips(traces: Traces, published: Published, ground: Ground) -> list[Slip]:
+    """The slips of Eqs. 10 to 14 and of the stiffness in Table 1; `ground` is that of the traces."""
     return [
-        _level(traces),
+        _level(traces, ground),
         _one_point(traces),
-        _sign_of_penetration(traces),
+        _sign_of_penetration(traces, ground),
         _same_index(traces, published),
-        _restitution_names(traces),
+        _restitution_names(traces, ground),
         _plastic(),
-        _stiffness_unit(traces),
+        _stiffness_unit(traces, ground),
     ]
 
 
@@ -54,19 +58,18 @@ def over_cycle(trace: Trace, values: NDArray[np.float64]) -> float:
     return integral(trace, values, float(trace["t"][0]), float(trace["t"][-1]))
 
 
-def force_in_the_air(trace: Trace) -> NDArray[np.float64]:
+def force_in_the_air(trace: Trace, ground: Ground) -> NDArray[np.float64]:
     """Eq. 14, elastic, under the condition of Eq. 11 with delta of Eq. 10: force on a hoof in the air [N]."""
-    ground = Ground()
     heights = (np.maximum(-trace[f"{name}_penetration"], 0) for name in POINTS)
     return np.asarray(sum(ground.stiffness * height**ground.exponent for height in heights))
 
 
-def _level(traces: Traces) -> Slip:
+def _level(traces: Traces, ground: Ground) -> Slip:
     depth = {
         gait: max(float(traces[gait, "elastic"][f"{name}_penetration"].max()) for name in POINTS)
         for gait in GAITS
     }
-    run = _peak(replay(traces["run", "elastic"], Ground(), rise=-depth["walk"]))
+    run = _peak(replay(traces["run", "elastic"], ground, rise=-depth["walk"]))
     read = _peak(traces["run", "elastic"])
     return Slip(
         "eq10.level",
@@ -113,10 +116,10 @@ def _one_point(traces: Traces) -> Slip:
     )
 
 
-def _sign_of_penetration(traces: Traces) -> Slip:
-    air = {gait: float(force_in_the_air(traces[gait, "elastic"]).max()) for gait in GAITS}
+def _sign_of_penetration(traces: Traces, ground: Ground) -> Slip:
+    air = {gait: float(force_in_the_air(traces[gait, "elastic"], ground).max()) for gait in GAITS}
     words = listed(f"{air[gait]:.0f} N in {NAMES[gait]}" for gait in GAITS)
-    value: complex = (-0.01) ** 1.5
+    value: complex = (-0.01) ** ground.exponent
     return Slip(
         "eq11.sign",
         "Eqs. 10, 11",
@@ -124,9 +127,9 @@ def _sign_of_penetration(traces: Traces) -> Slip:
         "force where δ = y_G - P_n > 0",
         "Eq. 10 is positive inside the ground, Eq. 11 asks for the opposite",
         f"both together: no force in the ground, and one of up to {words} while the hoof is in the air. "
-        "Taking δ of Eq. 11, negative inside, into Eq. 14 gives no real force: (-0.01)^1.5 is "
-        f"{value.imag:.3f} i. With -δ and its rate throughout, Eq. 14 is as read: the ratio of the rates "
-        "keeps its sign",
+        "Taking δ of Eq. 11, negative inside, into Eq. 14 gives no real force: (-0.01)^"
+        f"{ground.exponent:g} has the imaginary part {value.imag:.2g}. With -δ and its rate throughout, Eq. "
+        "14 is as read: the ratio of the rates keeps its sign",
         CHANGES,
         {"air_N": air},
     )
@@ -166,8 +169,8 @@ def _departures(trace: Trace, name: str) -> NDArray[np.float64]:
     return result
 
 
-def _restitution_names(traces: Traces) -> Slip:
-    ground, chi = Ground(), lankarani_nikravesh(0.0)
+def _restitution_names(traces: Traces, ground: Ground) -> Slip:
+    chi = lankarani_nikravesh(0.0)
     peaks, ratios = {}, {}
     for gait in GAITS:
         trace, total = traces[gait, "inelastic"], np.zeros(len(traces[gait, "inelastic"]))
@@ -210,9 +213,16 @@ def _plastic() -> Slip:
     )
 
 
-def _stiffness_unit(traces: Traces) -> Slip:
+def _stiffness_unit(traces: Traces, ground: Ground) -> Slip:
+    n = ground.exponent
+    whose = (
+        "Lankarani and Nikravesh's" if n == HERTZ else f"identified ({HERTZ:g} is Lankarani and Nikravesh's)"
+    )
     peaks = {
-        gait: (_peak(replay(traces[gait, "elastic"], Ground(exponent=1.0))), _peak(traces[gait, "elastic"]))
+        gait: (
+            _peak(replay(traces[gait, "elastic"], replace(ground, exponent=1.0))),
+            _peak(traces[gait, "elastic"]),
+        )
         for gait in GAITS
     }
     words = listed(f"{NAMES[gait]} {one:.0f} N instead of {two:.0f}" for gait, (one, two) in peaks.items())
@@ -220,7 +230,7 @@ def _stiffness_unit(traces: Traces) -> Slip:
         "table1.stiffness",
         "Table 1, Eq. 14",
         "K in N/m, and δ^n with n not printed",
-        f"n = {Ground().exponent}, Lankarani and Nikravesh's, and K in N/m^{Ground().exponent}",
+        f"n = {n:g}, {whose}, and K in N/m^{n:g}",
         "N/m fits n = 1 only",
         f"n = 1 on this leg gives elastic peaks of {words}. Another leg could be identified for n = 1, so "
         "the unit decides nothing; the part on damping laws shows exponents between",

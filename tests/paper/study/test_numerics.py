@@ -6,7 +6,6 @@ from importlib import resources
 import numpy as np
 import pytest
 
-from hoof_env.ground.contact import Ground
 from hoof_env.paper.measure import measure_stance
 from hoof_env.paper.published import load_published
 from hoof_env.paper.reproduce import GAITS
@@ -14,7 +13,7 @@ from hoof_env.paper.study import numerics
 from hoof_env.paper.study.conditions import betas, conditions
 from hoof_env.paper.study.conditions_text import bars_spanned, conditions_text
 from hoof_env.paper.study.numerics_text import observed_order
-from hoof_env.paper.study.replay import exact_cycle, replay
+from hoof_env.paper.study.replay import exact_cycle, ground_of, replay
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +62,7 @@ def test_betas_are_the_two_readings():
 def test_causes_are_those_of_the_motion_and_of_the_sampling(section):
     for gait in GAITS:
         exact = section.data["causes"][gait]["exact"]
-        peak = replay(exact_cycle(gait, None, 1e-3), Ground(restitution=0.0))["normal"].max()
+        peak = replay(exact_cycle(gait, None, 1e-3), ground_of(None, restitution=0.0))["normal"].max()
         assert exact["interpolated"] == peak
         assert exact["sampled"] != peak
 
@@ -77,7 +76,7 @@ def test_conditions_know_every_row_with_the_value_of_the_reproduction(answers, r
 
 def test_slopes_over_the_ground_level_are_those_of_the_law(answers):
     """An elastic peak K d^n grows by K n d^(n - 1) as d does; touch-down is earlier by 1 / approach speed."""
-    ground = Ground()
+    ground = ground_of(None)
     for gait in GAITS:
         trace = replay(exact_cycle(gait, None), ground)
         top = trace[int(trace["normal"].argmax())]

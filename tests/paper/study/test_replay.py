@@ -13,7 +13,14 @@ from hoof_env.ground.contact import Ground
 from hoof_env.paper.measure import measure_stance
 from hoof_env.paper.published import load_published
 from hoof_env.paper.reproduce import GAITS, run_cycle
-from hoof_env.paper.study.replay import at_speed, closure_error, euler_cycle, exact_cycle, replay
+from hoof_env.paper.study.replay import (
+    at_speed,
+    closure_error,
+    euler_cycle,
+    exact_cycle,
+    ground_of,
+    replay,
+)
 
 PRINTED = math.sqrt(30.0)
 MADE = ("t", "toe_x", "toe_vx", "toe_penetration", "toe_rate", "toe_approach", "toe_normal", "toe_friction",
@@ -30,7 +37,10 @@ LAWS = (
 @pytest.mark.parametrize("gait", GAITS)
 @pytest.mark.parametrize("settings", LAWS)
 def test_on_the_exact_motion_it_is_the_environment_to_the_last_bit(gait, settings):
-    made, run = replay(exact_cycle(gait, None), Ground(**settings)), run_cycle(gait, "exact", **settings)
+    made, run = (
+        replay(exact_cycle(gait, None), ground_of(None, **settings)),
+        run_cycle(gait, "exact", **settings),
+    )
     for name in MADE:
         np.testing.assert_array_equal(made[name], run[name], err_msg=name)
     assert np.isnan(made["crank_torque"]).all()
@@ -40,14 +50,16 @@ def test_on_the_exact_motion_it_is_the_environment_to_the_last_bit(gait, setting
 def test_a_rising_ground_is_a_lower_hip(gait):
     cycle = exact_cycle(gait, None)
     run = run_cycle(gait, "exact", restitution=0.0, hip_height=float(cycle["trunk_y"][0]) - 0.01)
-    made = replay(cycle, Ground(restitution=0.0), 0.01)
+    made = replay(cycle, ground_of(None, restitution=0.0), 0.01)
     for name in MADE:
         np.testing.assert_allclose(made[name], run[name], rtol=1e-9, atol=1e-9, err_msg=name)
 
 
 @pytest.mark.parametrize("gait", GAITS)
 def test_euler_cycles_are_those_of_the_papers_solver(gait):
-    made = replay(euler_cycle(gait, None, 1000, PRINTED), Ground(restitution=0.0, approach="sampled"))
+    made = replay(
+        euler_cycle(gait, None, 1000, PRINTED), ground_of(None, restitution=0.0, approach="sampled")
+    )
     run = run_cycle(gait, "paper", restitution=0.0, baumgarte_beta=PRINTED)
     for name in MADE:
         np.testing.assert_allclose(made[name], run[name], rtol=1e-7, atol=1e-8, err_msg=name)

@@ -5,13 +5,12 @@ import re
 import numpy as np
 import pytest
 
-from hoof_env.ground.contact import Ground
 from hoof_env.paper.measure import measure_stance
 from hoof_env.paper.published import load_published
 from hoof_env.paper.reproduce import GAITS
 from hoof_env.paper.study import sensitivity
 from hoof_env.paper.study.by_construction import LAWS, confirm
-from hoof_env.paper.study.replay import exact_cycle, replay
+from hoof_env.paper.study.replay import exact_cycle, ground_of, replay
 from hoof_env.paper.study.sensitivity import PARAMETERS, examine_sensitivity
 
 
@@ -50,18 +49,19 @@ def test_every_row_and_resultant_answers_to_every_parameter(section):
 @pytest.mark.parametrize("gait", GAITS)
 def test_elastic_peaks_answer_to_the_exponent_as_the_law_says(section, gait):
     """d log(sum K d^n) / d log n = n sum(d^n ln d) / sum(d^n) at the peak."""
-    trace = replay(exact_cycle(gait, None), Ground())
+    trace = replay(exact_cycle(gait, None), ground_of(None))
     top = trace[int(trace["normal"].argmax())]
     d = np.array([top[f"{name}_penetration"] for name in ("toe", "heel")])
     d = d[d > 0]
-    expected = 1.5 * np.sum(d**1.5 * np.log(d)) / np.sum(d**1.5)
+    n = ground_of(None).exponent
+    expected = n * np.sum(d**n * np.log(d)) / np.sum(d**n)
     measured = section.data["rows"][f"{gait}.peak_elastic"]["exponent"]["elasticity"]
     assert measured == pytest.approx(expected, rel=5e-3)
 
 
 @pytest.mark.parametrize("gait", GAITS)
 def test_resultants_answer_to_friction_as_full_slip_says(section, gait):
-    trace = replay(exact_cycle(gait, None), Ground())
+    trace = replay(exact_cycle(gait, None), ground_of(None))
     top = trace[int(trace["grf"].argmax())]
     assert abs(top["friction"]) == pytest.approx(0.4 * top["normal"])  # both points slip one way
     resultant = section.data["rows"][f"{gait}.peak_elastic.resultant"]["friction"]["elasticity"]
@@ -77,7 +77,7 @@ def test_changes_are_counted_in_bars(section):
 
 @pytest.mark.parametrize("gait", GAITS)
 def test_a_rising_ground_is_met_earlier_by_its_rise_over_the_approach_speed(section, gait):
-    trace = replay(exact_cycle(gait, None), Ground())
+    trace = replay(exact_cycle(gait, None), ground_of(None))
     stance = measure_stance(trace)
     speed = max(trace[f"{name}_approach"].max() for name in stance.first_points)
     change = section.data["rows"][f"{gait}.contact_start"]["ground_level"]["change"]
@@ -89,7 +89,7 @@ def test_stiffer_grounds_keep_the_walking_peak_at_their_level(section):
     rises = [entry["rise_mm"] for entry in section.data["stiffness"]]
     assert np.all(np.diff(rises) < 0)
     for entry in section.data["stiffness"]:
-        ground = Ground(stiffness=entry["stiffness"])
+        ground = ground_of(None, stiffness=entry["stiffness"])
         peak = replay(exact_cycle("walk", None), ground, 1e-3 * entry["rise_mm"])["normal"].max()
         assert peak == pytest.approx(target, rel=2e-3)
         assert entry["rows"]["walk.peak_elastic"] == peak
