@@ -74,7 +74,7 @@ def identify(
         targets: JSON file of the rows to meet, as published.json, each with an optional weight.
         walk: a walk that moves its animal, or one that brakes through its stance (figure 6 read literally).
         exponent: of the contact law (Eq. 14), which the paper does not print.
-        beta: Baumgarte's, of the paper's solver: as printed, sqrt(2 alpha), or as probably meant, sqrt(2) alpha.
+        beta: of the paper's solver: as printed, sqrt(2 alpha), or as it is probably meant, sqrt(2) alpha.
         workers: processes.
         budget: evaluations at most; one with the paper's solver counts for several.
         resume: go on with a search in this folder that was interrupted or killed.
@@ -125,6 +125,7 @@ def ensemble(
     bar: float = 1.0,
     both: bool = False,
     walk: Literal["walks", "brakes"] = "walks",
+    beta: Literal["printed", "probable"] = "probable",
     targets: Path | None = None,
     seed: int = 0,
     attempts: int = 240,
@@ -135,12 +136,13 @@ def ensemble(
 
     Args:
         out: folder for ensemble.json; made if need be.
-        preset: the leg to begin with, a name or a JSON file.
+        preset: the leg to begin with, a name or a JSON file; all members stand on its ground.
         starts: more of them, or folders of `hoof-env identify`, whose independent starts all count.
         size: members wanted.
         bar: largest error of a row, in units of its own bar.
         both: rows count with the paper's solver too, all but the ill-conditioned.
         walk: a walk that moves its animal, or one that brakes through its stance (figure 6 read literally).
+        beta: of the paper's solver: as printed, sqrt(2 alpha), or as it is probably meant, sqrt(2) alpha.
         targets: JSON file of the rows to meet, as published.json.
         seed: the same seed and options find the same legs, with any number of workers.
         attempts: to find a further leg; the members are chosen among all that were found.
@@ -150,8 +152,8 @@ def ensemble(
     from hoof_env.identify.ensemble_command import ensemble
 
     paths = ensemble(
-        out, _say, preset=preset, starts=starts, size=size, bar=bar, both=both, walk=walk, targets=targets,
-        seed=seed, attempts=attempts, workers=workers, resume=resume,
+        out, _say, preset=preset, starts=starts, size=size, bar=bar, both=both, walk=walk, beta=beta,
+        targets=targets, seed=seed, attempts=attempts, workers=workers, resume=resume,
     )  # fmt: skip
     _say(f"{paths[0]} written")
 

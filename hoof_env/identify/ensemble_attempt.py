@@ -18,11 +18,12 @@ import numpy as np
 
 from hoof_env.errors import HoofEnvError
 from hoof_env.identify.candidate import Choice, to_preset
-from hoof_env.identify.confirm import confirm
+from hoof_env.identify.confirm import JUDGED, confirm
+from hoof_env.identify.ensemble import SOLVERS
 from hoof_env.identify.evaluate import MISSED_ROW
-from hoof_env.identify.job import CLEAR, PENALTY
+from hoof_env.identify.job import CLEAR
 from hoof_env.identify.minimax import Rate, Rating, descend
-from hoof_env.identify.objective import Objective
+from hoof_env.identify.objective import INSIDE
 from hoof_env.identify.problem import LegProblem
 from hoof_env.identify.records import Array
 from hoof_env.identify.schedule import Phase
@@ -59,15 +60,25 @@ class Aim:
         targets: the rows. walk: "walks" or "brakes".
         bar: largest error of a row, in units of its own bar.
         both: the paper's solver counts too, all rows but the ill-conditioned.
+        beta: of the paper's solver, "printed" or "probable".
+        steps: of a push, at most.
     """
 
     targets: Targets
     walk: str
     bar: float
     both: bool
+    beta: str = "probable"
+    steps: int = STEPS
+
+    @property
+    def penalty(self) -> float:
+        """Of a shortage of one [bars]: a merit within the bar leaves no demand short, since `Objective.rate`
+        asks for `INSIDE` more than they do."""
+        return self.bar / INSIDE
 
     def problem(self) -> LegProblem:
-        return LegProblem(self.targets, self.walk, None)
+        return LegProblem(self.targets, self.walk, None, self.beta)
 
     def rate(self, choice: Mapping[str, Any], both: bool) -> Rate:
         """Rating of y: that of `Objective.rate`, whose peaks are those of samples, and all rows with their
@@ -79,6 +90,14 @@ class Aim:
             return replace(rating, rows=np.append(rating.rows, objective.rows(y)))
 
         return rate
+
+    def runs(self, choice: Mapping[str, Any], y: Array) -> bool:
+        """Whether the paper's solver comes through both cycles; near a dead point it may not."""
+        problem, legs = self.problem(), Choice.from_dict(choice)
+        rows = problem.objective(legs, PHASE.samples, False).paper_rows(
+            problem.outward(dict(choice), y, PHASE)
+        )
+        return bool(np.abs(rows).max() < MISSED_ROW)
 
 
 @dataclass(frozen=True)
@@ -111,7 +130,8 @@ class Attempt:
     """A made attempt; see `Task`.
 
     Attributes:
-        merit: largest error [bars] and what shortages cost. evaluations, seconds: spent.
+        merit: largest error [bars] and what shortages cost, see `Aim.penalty`; `MISSED_ROW` if the paper's
+            solver cannot simulate the leg. evaluations, seconds: spent.
         errors: by solver, the largest error of a row [bars], by the full system; empty before its verdict.
         short: demands that fall short, by name. untrue: claims that the full system finds untrue, of the
             solvers that count.
@@ -160,46 +180,51 @@ def attempt(task: Task, aim: Aim) -> Attempt:
     problem, choice, rate = aim.problem(), dict(task.choice), aim.rate(task.choice, aim.both)
     scales = problem.scales(choice, PHASE)
     if task.direction:
-        y, spent = _push(rate, np.array(task.y), scales, np.array(task.direction), aim)
+        y, spent = _push(task, rate, scales, aim)
     else:
         y, spent = problem.inward(choice, np.array(task.y), PHASE), 0
-        rng = np.random.default_rng([task.seed, task.round, task.index])
         for both in (False, True) if aim.both else (False,):
-            y, more = _enter(aim.rate(choice, both), y, scales, rng, aim)
+            y, more = _enter(task, both, y, scales, aim)
             spent += more
-    merit, seconds = rate(y).merit(PENALTY), time.monotonic() - began
+    merit = rate(y).merit(aim.penalty) if aim.runs(choice, y) else MISSED_ROW
+    seconds = time.monotonic() - began
     origin = (task.id, task.origin, task.start, task.choice)
     return Attempt(*origin, tuple(y.tolist()), merit, spent, seconds, {}, {})
 
 
-def _enter(rate: Rate, y: Array, scales: Array, rng: np.random.Generator, aim: Aim) -> tuple[Array, int]:
+def _enter(task: Task, both: bool, y: Array, scales: Array, aim: Aim) -> tuple[Array, int]:
     """Descents from y, then from beside the best so far, until one is within the bar."""
-    lowest, goal, spent, start = np.inf, CLEAR * aim.bar, 0, y
+    rate, rng = aim.rate(task.choice, both), np.random.default_rng([task.seed, task.round, task.index])
+    lowest, goal, spent, start = rate(y).merit(aim.penalty), CLEAR * aim.bar, 1, y
+    if not aim.runs(task.choice, y):
+        lowest = np.inf
     for _ in range(TRIES):
-        found = descend(rate, start, scales, penalty=PENALTY, central=True, goal=goal)
-        spent += found.evaluations
-        if (merit := found.rating.merit(PENALTY)) < lowest:
-            y, lowest = found.y, merit
         if lowest <= goal:
             break
+        found = descend(rate, start, scales, penalty=aim.penalty, central=True, goal=goal)
+        spent += found.evaluations
+        merit = found.rating.merit(aim.penalty)
+        if merit < lowest and aim.runs(task.choice, found.y):
+            y, lowest = found.y, merit
         start = y + float(rng.choice(HOPS)) * scales * rng.standard_normal(y.size)
     return y, spent
 
 
-def _push(rate: Rate, y: Array, scales: Array, direction: Array, aim: Aim) -> tuple[Array, int]:
-    """The leg that lies furthest in a direction, of those that pushes from y reach within the bar."""
-    best, spent = y, 0
+def _push(task: Task, rate: Rate, scales: Array, aim: Aim) -> tuple[Array, int]:
+    """The leg that lies furthest in the direction, of those within the bar that pushes reach."""
+    best, direction, spent = np.array(task.y), np.array(task.direction) / scales, 0
+    y = best
     for push in range(PUSHES):
         if push:
             inner = descend(
-                rate, best, scales, radius=0.01, penalty=PENALTY, central=True, iterations=RECENTRE
+                rate, best, scales, radius=0.01, penalty=aim.penalty, central=True, iterations=RECENTRE
             )
             y, spent = inner.y, spent + inner.evaluations
-        pushed = _Pushed(rate, y, direction / scales, CLEAR * aim.bar)
-        found = descend(pushed, y, scales, penalty=FIRM, central=True, iterations=STEPS)
+        pushed = _Pushed(rate, y, direction, CLEAR * aim.bar)
+        found = descend(pushed, y, scales, penalty=FIRM, central=True, iterations=aim.steps)
         spent += found.evaluations
-        further = (found.y - best) @ (direction / scales) > 0
-        if further and rate(found.y).merit(PENALTY) <= aim.bar:
+        within = rate(found.y).merit(aim.penalty) <= aim.bar and aim.runs(task.choice, found.y)
+        if within and (found.y - best) @ direction > 0:
             best = found.y
     return best, spent
 
@@ -224,20 +249,25 @@ class _Pushed:
 
 def judge(made: Attempt, aim: Aim) -> Attempt:
     """The same with the verdict of the full system, and of demands sampled finely."""
-    objective = Objective(
-        Choice.from_dict(made.choice), aim.targets, samples=FINE, paper_solver=aim.both, walk=aim.walk
-    )
+    objective = aim.problem().objective(Choice.from_dict(made.choice), FINE, aim.both)
     shortages = zip(objective.demands, objective.plausibility(made.x(aim)).tolist(), strict=True)
     short = {name: shortage for name, shortage in shortages if shortage > 0}
-    errors = {"exact": 0.0, "paper": 0.0}
+    solvers = dict(zip(SOLVERS, JUDGED[aim.beta], strict=True))
     try:
-        verdict = confirm(made.preset(aim), aim.targets, aim.walk)
+        verdict = confirm(made.preset(aim), aim.targets, aim.walk, aim.beta)
     except HoofEnvError as error:  # a dead point between two samples, a gait beyond its limits
-        missed = dict.fromkeys(errors, MISSED_ROW)
+        missed = dict.fromkeys(SOLVERS, MISSED_ROW)
         return replace(made, errors=missed, short=short, untrue=(f"cannot be simulated: {error}",))
-    for row in verdict.reproduction.rows:
-        if not row["spared"]:
-            bars = min(severity(row, verdict.reproduction.published), MISSED_ROW)
-            errors[row["solver"]] = max(errors[row["solver"]], bars)
-    untrue = tuple(f"{name} ({solver})" for name, solver in verdict.untrue if aim.both or solver == "exact")
+    run = verdict.reproduction
+    errors = {
+        name: max(
+            (severity(r, run.published) for r in run.rows if r["solver"] == solver and not r["spared"]),
+            default=MISSED_ROW,
+        )
+        for name, solver in solvers.items()
+    }
+    errors = {name: min(error, MISSED_ROW) for name, error in errors.items()}
+    untrue = tuple(
+        f"{claim} ({solver})" for claim, solver in verdict.untrue if aim.both or solver == solvers["exact"]
+    )
     return replace(made, errors=errors, short=short, untrue=untrue)

@@ -20,9 +20,10 @@ from hoof_env.errors import (
     check_choice,
     check_number,
 )
+from hoof_env.ground.preset import load_ground
 from hoof_env.identify.candidate import Choice, names
 from hoof_env.identify.command import _digest, check_extras, load_start
-from hoof_env.identify.confirm import GIVEN_UP
+from hoof_env.identify.confirm import GIVEN_UP, JUDGED
 from hoof_env.identify.ensemble import SOLVERS, to_data, write_member
 from hoof_env.identify.ensemble_attempt import Aim, Attempt
 from hoof_env.identify.ensemble_search import Collection, Start, collect, distance
@@ -47,6 +48,7 @@ def ensemble(
     bar: float = 1.0,
     both: bool = False,
     walk: str = "walks",
+    beta: str = "probable",
     targets: Path | None = None,
     seed: int = 0,
     attempts: int = 240,
@@ -58,12 +60,13 @@ def ensemble(
     Args:
         out: folder; its sub-folder `state` holds what a killed collection is resumed from.
         say: takes a line of progress or of the table at the end.
-        preset: the leg to begin with, by name or file.
+        preset: the leg to begin with, by name or file; all members stand on its ground.
         starts: more of them, or folders of `identify`, whose independent starts all count.
         size: members wanted.
         bar: largest error of a row, in units of its own bar.
         both: rows count with the paper's solver too, all but the ill-conditioned.
-        walk: "walks" or "brakes". targets: file of rows; the paper's own if None.
+        walk: "walks" or "brakes". beta: of the paper's solver, "printed" or "probable".
+        targets: file of rows; the paper's own if None.
         seed: two collections with the same seed and options find the same.
         attempts: to find a further leg. workers: processes; their number changes nothing in what is found.
         resume: go on with the collection in `out`.
@@ -73,14 +76,14 @@ def ensemble(
     """
     check_extras()
     check_choice("walk", walk, GIVEN_UP)
+    check_choice("beta", beta, JUDGED)
     size = int(check_number("size", size, low=1, high=1e4))
     attempts = int(check_number("attempts", attempts, low=0, high=1e6))
     seed = int(check_number("seed", seed, low=0, high=2**53))
     workers = int(check_number("workers", workers, low=1, high=1024))
-    aim = Aim(
-        load_targets(targets), walk, check_number("bar", bar, low=0, high=100, exclusive_low=True), both
-    )
-    legs = load_starts([preset, *starts], aim)
+    bar = check_number("bar", bar, low=0, high=100, exclusive_low=True)
+    aim, ground = Aim(load_targets(targets), walk, bar, both, beta), load_ground(preset)
+    legs = load_starts([preset, *starts], aim, ground.exponent)
     about = {
         "ensemble of": Path(preset).stem,
         "starts": [f"{leg.name} ({_digest([leg.choice.to_dict(), leg.x])})" for leg in legs],
@@ -88,6 +91,8 @@ def ensemble(
         "walk": walk,
         "bar": aim.bar,
         "both": both,
+        "beta": beta,
+        "exponent": ground.exponent,
         "seed": seed,
         "attempts": attempts,
         "size": size,
@@ -106,7 +111,7 @@ def ensemble(
         raise HoofEnvError(
             f"the full system refuses all legs within {bar:g} bars: {', '.join(why)}; expected a wider --bar"
         )
-    data = to_data([_member(one, aim) for one in found.members], provenance(about, found), walk)
+    data = to_data([_member(one, aim) for one in found.members], provenance(about, found), walk, ground)
     with staged(out) as stage:
         (stage / NAME).write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     for line in table(found, legs[0], aim, size):
@@ -114,8 +119,8 @@ def ensemble(
     return [out / NAME]
 
 
-def load_starts(sources: Sequence[str], aim: Aim) -> list[Start]:
-    """The legs of presets, by name or file, and of the folders of searches.
+def load_starts(sources: Sequence[str], aim: Aim, exponent: float) -> list[Start]:
+    """The legs of presets, by name or file, and of the folders of searches, on ground with this exponent.
 
     Raises:
         HoofEnvError: a preset whose leg does not turn, a folder without a result near the bar, a damaged
@@ -124,9 +129,9 @@ def load_starts(sources: Sequence[str], aim: Aim) -> list[Start]:
     legs: list[Start] = []
     for source in sources:
         if Path(source).is_dir():
-            found = _results(Path(source), aim)
+            found = _results(Path(source), aim, exponent)
         else:
-            start = load_start(source)
+            start = load_start(source, exponent)
             if start is None:
                 raise ParameterError(f"start {source}: expected a preset or the folder of a search")
             found = [Start(Path(source).stem, *start)]
@@ -138,7 +143,7 @@ def load_starts(sources: Sequence[str], aim: Aim) -> list[Start]:
     return legs
 
 
-def _results(source: Path, aim: Aim) -> list[Start]:
+def _results(source: Path, aim: Aim, exponent: float) -> list[Start]:
     """The best result of each independent start of a search, as far as it is near the bar."""
     folder = source / FOLDER if (source / FOLDER).is_dir() else source
     best: dict[str, tuple[float, Result]] = {}
@@ -150,12 +155,14 @@ def _results(source: Path, aim: Aim) -> list[Start]:
         merit = result.full if aim.both else result.exact
         if result.full is None or merit is None or merit > WORTH_TRYING * aim.bar:
             continue
+        if Choice.from_dict(result.choice).exponent != exponent:
+            continue
         if result.root not in best or merit < best[result.root][0]:
             best[result.root] = merit, result
     if not best:
         raise DataFileError(
             f"start {source}: expected the folder of a search with a leg within "
-            f"{WORTH_TRYING * aim.bar:g} bars"
+            f"{WORTH_TRYING * aim.bar:g} bars on ground with exponent {exponent:g}"
         )
     search = (folder.parent if folder.name == FOLDER else folder).resolve().name
     return [
@@ -181,8 +188,8 @@ def provenance(about: dict[str, Any], found: Collection) -> str:
         f"{len(found.attempts) - len(about['starts'])} times; of all that fit, the {len(found.members)} "
         "members are chosen far apart, so that extremes are more frequent among them than among all legs "
         "that fit, and their range is a lower limit of what the numbers leave open. "
-        f"Members: {shares}. Walk that {about['walk']}, seed {about['seed']}, targets {about['targets']}; "
-        f"{used}."
+        f"Members: {shares}. Walk that {about['walk']}, exponent {about['exponent']:g}, "
+        f"seed {about['seed']}, targets {about['targets']}; {used}."
     )
 
 

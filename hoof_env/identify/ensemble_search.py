@@ -120,8 +120,8 @@ def collect(
             if not inside:
                 nearest = min(one.merit for one in made)
                 raise HoofEnvError(
-                    f"no start comes within {aim.bar:g} bars, the nearest has {nearest:.3f}: expected a "
-                    "better start or a wider --bar"
+                    f"no start comes within {aim.bar:g} bars without a shortage, the nearest has "
+                    f"{nearest:.3f}: expected a better start or a wider --bar"
                 )
         return _choose(made, inside, aim, state, run, size)
 
