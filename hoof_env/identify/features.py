@@ -54,8 +54,9 @@ CHI, MU, SLOW, FAST, FLOOR = 0.75, 0.4, 1e-3, 1e-2, 1e-4
 NEAR_TOP = 0.9
 """A maximum of the samples from this part of the highest may be the highest between samples [-]."""
 
-EL, INEL, PUSH_EL, PUSH_INEL, TOE_IN, HEEL_IN = range(6)
-"""Rows of the scratch array of `measure_gait`: forces [N], and approach speeds [m/s], 0 in the air."""
+EL, INEL, PUSH_EL, PUSH_INEL, TOE_IN, HEEL_IN, TOPS = range(7)
+"""Rows of the scratch array of `measure_gait`: forces [N], approach speeds [m/s], 0 in the air, and the
+inelastic force with its maxima as they are between samples [N]."""
 
 
 @kernel
@@ -136,18 +137,22 @@ def refine(at, velocity, height, h, approach, stiffness, exponent, chi, top):  #
 
 
 @kernel
-def peak(at, velocity, height, h, approach, stiffness, exponent, chi, force, sampled):  # type: ignore[no-untyped-def]
-    """Highest force [N] and when [s]: of the samples, or found between them around each maximum near it."""
+def peak(at, velocity, height, h, approach, stiffness, exponent, chi, force, sampled, tops):  # type: ignore[no-untyped-def]
+    """Highest force [N] and when [s]: of the samples, or found between them around each maximum near it.
+
+    `tops`: output, the force with those maxima as found.
+    """
     top = np.argmax(force)
     highest, when = force[top], top * h
+    tops[:] = force
     if sampled:
         return highest, when
     enough = NEAR_TOP * highest
     for k in range(1, force.shape[0] - 1):
         if force[k] >= enough and force[k] >= force[k - 1] and force[k] >= force[k + 1]:
-            found, t = refine(at, velocity, height, h, approach, stiffness, exponent, chi, k)
-            if found > highest:
-                highest, when = found, t
+            tops[k], t = refine(at, velocity, height, h, approach, stiffness, exponent, chi, k)
+            if tops[k] > highest:
+                highest, when = tops[k], t
     return highest, when
 
 
@@ -282,7 +287,7 @@ def until_middle(values, m):  # type: ignore[no-untyped-def]
 def measure_dip(at, velocity, height, h, first, second, stiffness, exponent, work):  # type: ignore[no-untyped-def]
     """Times of the elastic force's two peaks [s], prominence of the lower over the higher one [-], and the
     smaller penetration at the dip between them [m]; `first`, `second`: the samples of the peaks."""
-    force, approach = work[EL], work[TOE_IN:]
+    force, approach = work[EL], work[TOE_IN:TOPS]
     one, t_one = refine(at, velocity, height, h, approach, stiffness, exponent, 0.0, first)
     two, t_two = refine(at, velocity, height, h, approach, stiffness, exponent, 0.0, second)
     low = first + np.argmin(force[first : second + 1])
@@ -326,7 +331,7 @@ def measure_gait(at, velocity, ankle, height, speed, sampled, stiffness, exponen
         sampled: as the paper's solver does it, the approach speed is that of the first sample inside, not of
             the crossing, and the highest force that of a sample.
         stiffness, exponent: of Eq. 14.
-        work: scratch, shape (6, n).
+        work: scratch, shape (7, n).
         out: record of dtype `FEATURES`.
     """
     n = at.shape[1]
@@ -355,9 +360,13 @@ def measure_gait(at, velocity, ankle, height, speed, sampled, stiffness, exponen
         angle = hoof_angle(at[0, k], at[1, k])
         out.flattest = 0.0 if angle * before < 0.0 else min(out.flattest, abs(angle))
         before = angle
-    fast, el, inel = work[TOE_IN:], work[EL], work[INEL]
-    out.peak_elastic, later = peak(at, velocity, height, h, fast, stiffness, exponent, 0.0, el, sampled)
-    out.peak_inelastic, sooner = peak(at, velocity, height, h, fast, stiffness, exponent, CHI, inel, sampled)
+    fast, el, inel = work[TOE_IN:TOPS], work[EL], work[INEL]
+    out.peak_elastic, later = peak(
+        at, velocity, height, h, fast, stiffness, exponent, 0.0, el, sampled, work[TOPS]
+    )
+    out.peak_inelastic, sooner = peak(
+        at, velocity, height, h, fast, stiffness, exponent, CHI, inel, sampled, work[TOPS]
+    )
     out.mean_elastic = average(at, velocity, height, h, fast, stiffness, exponent, 0.0, el, sampled)
     out.mean_inelastic = average(at, velocity, height, h, fast, stiffness, exponent, CHI, inel, sampled)
     out.peak_gap = later - sooner

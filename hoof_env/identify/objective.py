@@ -24,7 +24,7 @@ from hoof_env.identify.evaluate import (
     rate_demands,
     rate_rows,
 )
-from hoof_env.identify.features import FEATURES, INEL
+from hoof_env.identify.features import FEATURES, TOPS
 from hoof_env.identify.minimax import Rating
 from hoof_env.identify.plausibility import BOTH, LEG, LEG_DEMANDS, MEASURED, WALK_DEMANDS, demands
 from hoof_env.identify.targets import Targets, load_targets
@@ -162,7 +162,7 @@ class Objective:
         corners = float(choice.travel), POINTS.index(choice.toe), POINTS.index(choice.heel)
         values, gaits, ovals = np.zeros((len(steps), 7)), np.zeros((2, 4)), np.zeros((2, 2), np.complex128)
         gaits[:, 0] = SPEED
-        work = np.zeros((2, 6, n))
+        work = np.zeros((2, 7, n))
         self._exact, self._paper, self._gaits, self._work = _Measured(), _Measured(), gaits, work
         self._exact_arguments: tuple[Any, ...] = (
             np.array(choice.assembly, dtype=np.float64), steps, sources, extras,
@@ -175,7 +175,7 @@ class Objective:
         self._paper_arguments: tuple[Any, ...] = (
             steps, values, gaits, *corners, *self._law, self._beta,
             *np.zeros((2, len(BODIES), 3)), *np.zeros((2, 2, m), np.complex128),
-            np.zeros(m), np.zeros((6, m)), *self._paper.records[1:],
+            np.zeros(m), np.zeros((7, m)), *self._paper.records[1:],
         )  # fmt: skip
 
     def __getstate__(self) -> dict[str, Any]:
@@ -220,7 +220,7 @@ class Objective:
         if self.choice.link9 != "7":  # whose triad has a transmission too
             demands[0][self.demands.index("transmission")] = -np.inf
         peaks = {}
-        force = np.maximum(self._work[0, INEL], 1.0)
+        force = np.maximum(self._work[0, TOPS], 1.0)
         for name, values in (
             ("walk.peak_inelastic", force),
             ("walk.reduction", 100 * (1 - self._exact.records[1][0]["peak_elastic"] / force)),
