@@ -3,8 +3,7 @@
 That region is thin and bent: at the bar a dozen rows are at their limits at once, and a leg that is moved at
 random and then repaired hardly ever comes back to it. So a leg is pushed inside it instead, as far in a given
 direction as it goes, by sequential linear programming with the rows and demands as limits (`minimax.descend`
-with the push as its only row and everything else as a demand). Between two pushes it is drawn to the middle a
-little, which often opens the way on.
+with the push as its only row and everything else as a demand).
 """
 
 from __future__ import annotations
@@ -42,8 +41,8 @@ REACH = 0.5
 FIRM = 100.0
 """What a shortage of one costs a push, in scales: enough that none is worth its while."""
 
-PUSHES, STEPS, RECENTRE = 2, 15, 3
-"""Pushes of an attempt, steps of a push, and steps towards the middle between two."""
+STEPS = 30
+"""Steps of a push at most."""
 
 PHASE = Phase("ensemble", "given", jobs=1, evaluations=0, sigmas=(), samples=801)
 """How coordinates are to be read. Fewer samples miss part of a spike, and pushes would use that."""
@@ -211,22 +210,12 @@ def _enter(task: Task, both: bool, y: Array, scales: Array, aim: Aim) -> tuple[A
 
 
 def _push(task: Task, rate: Rate, scales: Array, aim: Aim) -> tuple[Array, int]:
-    """The leg that lies furthest in the direction, of those within the bar that pushes reach."""
-    best, direction, spent = np.array(task.y), np.array(task.direction) / scales, 0
-    y = best
-    for push in range(PUSHES):
-        if push:
-            inner = descend(
-                rate, best, scales, radius=0.01, penalty=aim.penalty, central=True, iterations=RECENTRE
-            )
-            y, spent = inner.y, spent + inner.evaluations
-        pushed = _Pushed(rate, y, direction, CLEAR * aim.bar)
-        found = descend(pushed, y, scales, penalty=FIRM, central=True, iterations=aim.steps)
-        spent += found.evaluations
-        within = rate(found.y).merit(aim.penalty) <= aim.bar and aim.runs(task.choice, found.y)
-        if within and (found.y - best) @ direction > 0:
-            best = found.y
-    return best, spent
+    """The leg that a push ends with; that which it goes on from unless the new one is within the bar."""
+    y = np.array(task.y)
+    pushed = _Pushed(rate, y, np.array(task.direction) / scales, CLEAR * aim.bar)
+    found = descend(pushed, y, scales, penalty=FIRM, central=True, iterations=aim.steps)
+    within = rate(found.y).merit(aim.penalty) <= aim.bar and aim.runs(task.choice, found.y)
+    return found.y if within else y, found.evaluations
 
 
 @dataclass(frozen=True)
