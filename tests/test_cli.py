@@ -48,7 +48,7 @@ def test_reproduce_writes_its_results(tmp_path):
         "reproduction.md",
     }
     assert (
-        len(json.loads((tmp_path / "new" / "folder" / "reproduction.json").read_text(encoding="utf-8"))) == 66
+        len(json.loads((tmp_path / "new" / "folder" / "reproduction.json").read_text(encoding="utf-8"))) == 99
     )
     page = (tmp_path / "new" / "folder" / "reproduction.md").read_text(encoding="utf-8")
     assert f"hoof-env reproduce --out {tmp_path / 'new' / 'folder'} --no-figures" in page
@@ -84,7 +84,7 @@ def test_an_interrupt_is_one_line_and_leaves_nothing_behind(tmp_path):
         stderr=subprocess.PIPE,
         text=True,
     ) as process:
-        process.stdout.readline()  # the first condition is done, fifteen runs remain
+        process.stdout.readline()  # the first condition is done, the others remain
         process.send_signal(signal.SIGINT)
         _, errors = process.communicate(timeout=60)
     assert process.returncode == 130

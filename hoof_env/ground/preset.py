@@ -11,6 +11,9 @@ from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import read_preset
 
+HERTZ = 1.5
+"""Exponent n of Hertz's contact and of Lankarani and Nikravesh's law [-]."""
+
 SETTINGS = ("stiffness", "exponent")
 """What the section may give: K [N/m^n] and n [-] of Eq. 14. The paper prints a lower limit of one and nothing
 of the other."""

@@ -156,3 +156,18 @@ def measure_stance(trace: NDArray[np.void]) -> Stance:
         mean=impulse / period,
         mean_stance=impulse / (end - start),
     )
+
+
+def hoof_error(trace: NDArray[np.void], exact: NDArray[np.void]) -> NDArray[np.float64]:
+    """How far toe or heel, whichever is further, is from where another cycle of the motion has it [m].
+
+    Shape of `trace`, at whose instants the other cycle is interpolated.
+    """
+    t = trace["t"]
+    apart = {
+        name: [trace[f"{name}_{part}"] - np.interp(t, exact["t"], exact[f"{name}_{part}"])
+               for part in ("x", "penetration")]
+        for name in POINTS
+    }  # fmt: skip
+    distances = [np.hypot(x, depth) for x, depth in apart.values()]
+    return np.maximum(*distances)

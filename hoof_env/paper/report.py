@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 from hoof_env import __version__
 from hoof_env.paper import spread_text
 from hoof_env.paper.rows import ILL, counted, severity
+from hoof_env.paper.solvers import EULER
+from hoof_env.paper.solvers_text import ground_text, solvers_text, which_beta
 
 if TYPE_CHECKING:
     from hoof_env.paper.reproduce import Reproduction
@@ -53,12 +55,12 @@ def markdown(
             if spread
             else []
         ),
-        "Each condition is one cycle of 1 s on a fixed trunk under the zero action. Solver `paper` is "
-        "the paper's Eq. 8 with its Baumgarte terms and explicit Euler at 1 ms; solver `exact` is the same "
-        "motion in closed form, at a step at which its results have converged.",
+        "Each condition is one cycle of 1 s on a fixed trunk under the zero action. "
+        f"{ground_text(reproduction)} {solvers_text(reproduction.published)}",
         f"Written by `{command}` with hoof-env {__version__}, {versions}.",
         "## Published beside simulated",
         *(_summary(reproduction, solver) for solver in solvers),
+        which_beta(reproduction),
         "Errors are in the measure of the bar; ✗ marks a row outside its bar, and bold its solver's worst. "
         "Counted are the rows that have a bar with the solver: not those whose bar is 'reported', and not "
         "the ill-conditioned ones, marked †.",
@@ -148,30 +150,36 @@ def _conditioning(reproduction: Reproduction, conditions: Mapping[str, Any], sol
     from hoof_env.paper.study.conditions import LEVEL_WINDOW
     from hoof_env.paper.study.conditions_text import conditions_text, number  # import this module
 
-    columns = {"step": ("paper", "step"), "β": ("paper", "beta")}
-    columns |= {f"hip height, {solver}": (solver, "ground") for solver in solvers}
     lines = []
     for name in spared:
         published = reproduction.published.row(name)
-        line = [f"`{name}`", published.unit, format_number(published.value, published.unit)]
         for solver in solvers:
             (row,) = _of(reproduction.rows, id=name, solver=solver)
+            line = [
+                f"`{name}`",
+                format_number(published.value, published.unit),
+                published.unit,
+                f"`{solver}`",
+            ]
             line += [format_number(row["simulated"], row["unit"]), format_error(row, reproduction)]
-        line += [
-            number(conditions[name][of][parameter]["relative"], "+.3g") for of, parameter in columns.values()
-        ]
-        ends = (conditions[name][solvers[0]]["ground"][end] for end in ("low", "high"))
-        lines.append([*line, " to ".join(format_number(end, published.unit) for end in ends)])
-    head = ["row", "unit", "published"]
-    head += [text for solver in solvers for text in (f"solver {solver}", "error")]
+            answers = conditions[name][solver]
+            line += [
+                number(answers[parameter]["relative"], "+.3g") if parameter in answers else ""
+                for parameter in ("step", "beta", "ground")
+            ]
+            ends = (format_number(answers["ground"][end], published.unit) for end in ("low", "high"))
+            lines.append([*line, " to ".join(ends)])
+    window = f"±{1e3 * LEVEL_WINDOW:g} mm"
+    head = ["row", "published", "unit", "solver", "simulated", "error", "step", "β", "hip height", window]
+    spare = " or ".join(f"`{solver}`" for solver in EULER)
     return [
         "## Ill-conditioned rows",
         "Inelastic walking hangs on the approach speed at a touch-down that grazes, and the paper's loop "
-        "takes it at the first step inside the ground. So these rows are shown with both solvers and have "
-        "no bar with the paper's. Their condition is the relative change of the row per relative change of "
-        "the time step, of β and of the hip's height above the ground, whose level is identified; the last "
-        f"column is where the paper's solver puts the row within ±{1e3 * LEVEL_WINDOW:g} mm of that level.",
-        _table([*head, *columns, f"{solvers[0]}, ±{1e3 * LEVEL_WINDOW:g} mm"], lines),
+        "takes it at the first step inside the ground. So these rows are shown with every solver and have no "
+        f"bar with {spare}. Their condition is the relative change of the row per relative change of the "
+        "time step, of β and of the hip's height above the ground, whose level is identified; the last "
+        f"column is where the solver puts the row within {window} of that level.",
+        _table(head, lines),
         "The same for every row, to compare:",
         conditions_text(reproduction.published, conditions),
     ]

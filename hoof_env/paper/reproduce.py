@@ -1,7 +1,7 @@
 """The paper's four conditions, walking and running, elastic and inelastic, through the public environment.
 
-Both solvers run them: "paper" is Eq. 8 with explicit Euler at 1 ms, "exact" the closed form at a step at
-which the results no longer change. The trunk is fixed and the action is zero, which is exactly the gait.
+Every solver of `hoof_env.paper.solvers` runs them: the paper's, with either beta, and the exact one. The
+trunk is fixed and the action is zero, which is exactly the gait.
 """
 
 from __future__ import annotations
@@ -27,13 +27,14 @@ from hoof_env.paper.measure import measure_stance
 from hoof_env.paper.published import CONDITIONS, Published, load_published
 from hoof_env.paper.rows import compare, counted
 from hoof_env.paper.shapes import DEPTHS, judge, sole_velocity, walk_brakes
+from hoof_env.paper.solvers import EXACT, settings_of
+from hoof_env.paper.solvers import SOLVERS as SOLVERS
 
 if TYPE_CHECKING:
     from hoof_env.paper.spread import Spread
 
 ENVIRONMENT = "hoof_env/HorseLegFixed-v0"
 GAITS = ("walk", "run")
-SOLVERS = ("paper", "exact")
 
 FIGURES = {
     "walk.order": "figure4",
@@ -86,7 +87,7 @@ def run_cycle(gait: str, solver: str, **settings: Any) -> Trace:
     """One cycle of a gait on a fixed trunk under the zero action.
 
     Args:
-        gait, solver: as `hoof_env/HorseLegFixed-v0` takes them.
+        gait: as `hoof_env/HorseLegFixed-v0` takes it. solver: one of `SOLVERS`.
         settings: further arguments of that environment.
 
     Returns:
@@ -95,7 +96,7 @@ def run_cycle(gait: str, solver: str, **settings: Any) -> Trace:
     Raises:
         ParameterError: what the environment refuses. HoofEnvError: the simulation stopped before its end.
     """
-    env = gymnasium.make(ENVIRONMENT, gait=gait, solver=solver, **settings)
+    env = gymnasium.make(ENVIRONMENT, gait=gait, **settings_of(solver) | settings)
     try:
         env.reset(seed=0)
         action = np.zeros(env.action_space.shape or (), np.float32)
@@ -113,7 +114,7 @@ def run_cycle(gait: str, solver: str, **settings: Any) -> Trace:
 
 
 def reproduce(progress: Callable[[str], None] | None = None, *, preset: str | None = None) -> Reproduction:
-    """Run the four conditions with both solvers and compare them with the paper.
+    """Run the four conditions with every solver and compare them with the paper.
 
     Args:
         progress: called with one line after each run.
@@ -158,7 +159,7 @@ def _judge_all(
     published: Published,
 ) -> list[dict[str, Any]]:
     """Every claim with every solver; the exact one's walk decides how `walk.direction` is read."""
-    walk = traces["walk", "elastic", "exact"]
+    walk = traces["walk", "elastic", EXACT]
     brakes = walk_brakes(measure_stance(walk), walk)
     shapes: list[dict[str, Any]] = []
     for solver in SOLVERS:
@@ -244,6 +245,6 @@ def write_reproduction(
 
 
 def _answers(conditions: Mapping[str, Any], row: Mapping[str, Any]) -> dict[str, Any]:
-    """How a row answers to step, beta and ground level, of all that was measured with its solver."""
+    """How a row answers to step, beta and ground level with its solver, by the solver's name."""
     by_solver = conditions.get(row["id"], {}).items()
-    return {name: answer for name, answer in by_solver if name.split(",")[0] == row["solver"]}
+    return {name: answer for name, answer in by_solver if name == row["solver"]}

@@ -1,7 +1,7 @@
 """The published rows beside what a simulation gives: one dictionary a row, ready for JSON.
 
 A row is counted as within or outside its bar unless it is spared: its bar is 'reported', or it is one of
-`ILL_CONDITIONED` and the solver is the paper's.
+`ILL_CONDITIONED` and the solver is one of the paper's.
 """
 
 from __future__ import annotations
@@ -12,13 +12,14 @@ from typing import Any
 
 from hoof_env.paper.measure import Stance
 from hoof_env.paper.published import Published, PublishedRow
+from hoof_env.paper.solvers import EULER
 
 Stances = Mapping[tuple[str, str], Stance]
 """Measured cycles by (gait, condition)."""
 
 ILL_CONDITIONED = ("walk.peak_inelastic", "walk.mean_inelastic", "walk.reduction")
-"""Rows without a bar for the paper's solver: the walk grazes, and they hang on how its loop samples
-touch-down (`hoof_env.paper.study.conditions` measures it)."""
+"""Rows without a bar for the paper's solver, with either beta: the walk grazes, and they hang on how its loop
+samples touch-down (`hoof_env.paper.study.conditions` measures it)."""
 
 REPORTED, ILL = "reported", "ill-conditioned"
 """Why a row is spared."""
@@ -116,7 +117,7 @@ def _compare(row: PublishedRow, stances: Stances, solver: str) -> dict[str, Any]
     error = None if simulated is None else row.bar.error(simulated, row.value)
     if row.printed != row.value and simulated is not None:
         beside |= {"printed": row.printed, "error_against_printed": row.bar.error(simulated, row.printed)}
-    ill = solver == "paper" and row.id in ILL_CONDITIONED
+    ill = solver in EULER and row.id in ILL_CONDITIONED
     spared = REPORTED if row.bar.limit is None else ILL if ill else ""
     return {
         "kind": "row",

@@ -7,7 +7,7 @@ Every function returns a `Verdict`; its thresholds are the constants below.
 its stance. Under Coulomb friction that takes a hoof that slides forward under load, and such a walk cannot
 move an animal forward: it contradicts `walk.walks`. The arrows may also be the force of the hoof on the
 ground (`HOOF_ON_GROUND`): they point back while the ground pushes the leg forward. Both readings get a
-verdict, and the claim is counted by one of them, the same for both solvers, which `walk_brakes` chooses from
+verdict, and the claim is counted by one of them, the same for every solver, which `walk_brakes` chooses from
 the leg: the net impulse of its walking stance leaves only that one possible. A leg whose walk brakes in one
 half of stance and propels in the other fulfils neither.
 """

@@ -8,7 +8,7 @@ from hoof_env.dynamics.trace import new_trace
 
 @pytest.fixture(scope="session")
 def reproduction():
-    """The real thing, both solvers."""
+    """The real thing, every solver."""
     from hoof_env.paper.reproduce import reproduce
 
     return reproduce()

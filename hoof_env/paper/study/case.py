@@ -1,4 +1,4 @@
-"""What every claim is held against: the four conditions with both solvers, measured."""
+"""What every claim is held against: the four conditions with every solver, measured."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ NAMES = {"walk": "walking", "run": "running"}
 
 @dataclass(frozen=True)
 class Case:
-    """The four conditions with both solvers.
+    """The four conditions with every solver.
 
     Attributes:
         reproduction: as `reproduce` gave it.

@@ -79,7 +79,7 @@ def _markdown(claims: Sequence[Examined]) -> str:
             "x] bears on x, which the identification asks for: agreement then shows that one leg can do it "
             "all and is no independent proof, and disagreement may be the identification's choice. Only "
             "what was not asked for can confirm or contradict by itself. A claim is confirmed or "
-            "contradicted where every reading and both solvers agree. Where solvers agree the numbers are "
+            "contradicted where every reading and all solvers agree. Where solvers agree the numbers are "
             "those of `exact`; study.json has all.",
             table(["claim", "in the paper", "identification", "verdict"], [_line(claim) for claim in claims]),
             "![Normal force through the stance, with its peaks](claims_peaks.png)",

@@ -12,6 +12,7 @@ from hoof_env.ground.normal_force import lankarani_nikravesh
 from hoof_env.paper.measure import POINTS
 from hoof_env.paper.published import CONDITIONS
 from hoof_env.paper.reproduce import GAITS
+from hoof_env.paper.solvers import EULER
 from hoof_env.paper.study.case import NAMES, Case, Trace, by_solver
 from hoof_env.paper.study.claim import PUBLISHED, Examined, Finding
 from hoof_env.paper.study.laws import free_peak
@@ -37,7 +38,7 @@ def _peak(trace: Trace) -> float:
 
 def on_ground(case: Case, gait: str, solver: str, **settings: Any) -> Trace:
     """The elastic cycle of a solver on another ground."""
-    approach = "sampled" if solver == "paper" else "interpolated"
+    approach = "sampled" if solver in EULER else "interpolated"
     return replay(case.trace(gait, solver), replace(case.reproduction.ground, approach=approach, **settings))
 
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from hoof_env.ground.contact import Ground
 from hoof_env.paper.published import Published, load_published
 from hoof_env.paper.reproduce import GAITS
+from hoof_env.paper.solvers import EULER, EXACT, betas
 from hoof_env.paper.study.replay import Cycles, euler_cycle, exact_cycle, ground_of, row_values, stances_on
 from hoof_env.paper.study.section import for_json
 
@@ -33,12 +34,6 @@ LEVEL_LINE, LEVEL_WINDOW = 1e-4, 1e-3
 Values = dict[str, float]
 
 
-def betas(published: Published) -> dict[str, float]:
-    """Baumgarte's beta [1/s] as printed, and as probably meant: sqrt(2) alpha."""
-    parameters = published.parameters
-    return {"printed": parameters["baumgarte_beta"], "probable": math.sqrt(2) * parameters["baumgarte_alpha"]}
-
-
 def conditions(
     preset: str | None = None, progress: Callable[[str], None] = lambda line: None
 ) -> dict[str, dict[str, Any]]:
@@ -49,8 +44,8 @@ def conditions(
         progress: called with a line now and then.
 
     Returns:
-        By row id a dictionary: "unit", and one dictionary for each solver, "exact" (ground), "paper" and
-        "paper, probable beta" (step, beta, ground). It has "value", the row, and for each parameter
+        By row id a dictionary: "unit", and one dictionary for each solver, the exact one (ground) and the
+        paper's (step, beta, ground). It has "value", the row, and for each parameter
 
         relative: relative change of the row per relative change of the parameter (ground: of the hip height).
         slope: change of the row in its unit per ms (step), per 1/s (beta), per mm that the ground rises.
@@ -62,10 +57,10 @@ def conditions(
     published = load_published()
     exact = {gait: exact_cycle(gait, preset) for gait in GAITS}
     progress("condition of each row, exact solver")
-    answers = {"exact": _ground(published, exact, ground_of(preset))}
-    for name, beta in betas(published).items():
+    answers = {EXACT: _ground(published, exact, ground_of(preset))}
+    for solver, name in EULER.items():
         progress(f"condition of each row, paper's solver with the {name} beta")
-        answers["paper" if name == "printed" else f"paper, {name} beta"] = _euler(published, preset, beta)
+        answers[solver] = _euler(published, preset, betas(published)[name])
     result: dict[str, dict[str, Any]] = for_json(
         {
             row.id: {"unit": row.unit, **{solver: answer[row.id] for solver, answer in answers.items()}}

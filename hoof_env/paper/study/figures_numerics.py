@@ -94,7 +94,7 @@ def draw_step_and_level(data: Mapping[str, Any]) -> Any:
     for (left, right), (gait, title) in zip(axes, GAITS.items(), strict=True):
         left.axhline(steps["exact"][gait], color=COLOURS["exact"], lw=1.2)
         for name, peaks in steps["peaks"][gait].items():
-            left.semilogx(steps["step_ms"], peaks, color=COLOURS[name], lw=0.9)
+            left.semilogx(steps["step_ms"], np.array(peaks, dtype=float), color=COLOURS[name], lw=0.9)
         for name, peaks in levels["peaks"][gait].items():
             right.plot(levels["rise_mm"], peaks, color=COLOURS[name], lw=1.2, label=_label(data, name))
         ticks = [tick for tick in (0.25, 0.5, 1, 2) if min(steps["step_ms"]) <= tick <= max(steps["step_ms"])]

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hoof_env.errors import HoofEnvError
 from hoof_env.ground.contact import Ground
-from hoof_env.paper.measure import POINTS, measure_stance
+from hoof_env.paper.measure import hoof_error, measure_stance
 from hoof_env.paper.published import CONDITIONS, Published, load_published
 from hoof_env.paper.reproduce import GAITS
+from hoof_env.paper.solvers import betas
 from hoof_env.paper.study import figures_numerics as figures
 from hoof_env.paper.study.conditions import (
     LEVEL_WINDOW,
     STEPS,
-    betas,
     conditions,
     euler_rows,
 )
@@ -98,17 +99,6 @@ def examine_numerics(preset: str | None, progress: Callable[[str], None]) -> Sec
     )
 
 
-def hoof_error(trace: Trace, exact: Trace) -> NDArray[np.float64]:
-    """Distance [m] between a hoof point of two cycles sampled at the same instants: the larger of toe's and
-    heel's, shape of the traces."""
-    distances = [
-        np.hypot(trace[f"{name}_x"] - exact[f"{name}_x"],
-                 trace[f"{name}_penetration"] - exact[f"{name}_penetration"])
-        for name in POINTS
-    ]  # fmt: skip
-    return np.maximum(*distances)
-
-
 def _drift(preset: str | None, steps: int, beta: float) -> dict[str, Any]:
     """Errors of one solver setting: hoof over the cycle and in the exact stance, closure [mm], by gait."""
     result: dict[str, Any] = {}
@@ -163,15 +153,19 @@ def _beta_sweep(preset: str | None, truth: dict[str, float]) -> dict[str, Any]:
 
 
 def _step_sweep(preset: str | None, by_name: dict[str, float]) -> dict[str, Any]:
-    """Inelastic peaks [N] by gait and beta over the step."""
+    """Inelastic peaks [N] by gait and beta over the step, NaN where the integration fails."""
     ground = _grounds(preset, "sampled")["inelastic"]
+
+    def peak(gait: str, steps: int, beta: float) -> float:
+        try:
+            return _peak(euler_cycle(gait, preset, steps, beta), ground)
+        except HoofEnvError:
+            return math.nan
+
     return {
         "step_ms": (1e3 / STEP_SWEEP).tolist(),
         "peaks": {
-            gait: {
-                name: [_peak(euler_cycle(gait, preset, int(n), beta), ground) for n in STEP_SWEEP]
-                for name, beta in by_name.items()
-            }
+            gait: {name: [peak(gait, int(n), beta) for n in STEP_SWEEP] for name, beta in by_name.items()}
             for gait in GAITS
         },
         "exact": {

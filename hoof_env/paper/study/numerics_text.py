@@ -10,6 +10,7 @@ import numpy as np
 
 from hoof_env.paper.published import Published, PublishedRow
 from hoof_env.paper.report import format_number
+from hoof_env.paper.solvers import slowest_root
 from hoof_env.paper.study.conditions_text import conditions_text, number
 from hoof_env.paper.study.section import listed, table
 
@@ -63,7 +64,7 @@ def _drift(data: Mapping[str, Any]) -> list[str]:
                 [*line, number(orders[-1], ".2f"), f"{start['stance_mm']:.3g}", f"{start['closure_mm']:.3g}"]
             )
     roots = listed(
-        f"{_slowest(data['alpha'], beta):.2f} 1/s for the {name} β = {beta:.2f} 1/s"
+        f"{slowest_root(data['alpha'], beta):.2f} 1/s for the {name} β = {beta:.2f} 1/s"
         for name, beta in data["betas"].items()
     )
     errors_at_first = listed(
@@ -86,11 +87,6 @@ def _drift(data: Mapping[str, Any]) -> list[str]:
 def _span(values: list[float]) -> str:
     low, high = f"{min(values):.2f}", f"{max(values):.2f}"
     return low if low == high else f"{low} to {high}"
-
-
-def _slowest(alpha: float, beta: float) -> float:
-    """Real part of the root of s² + 2 alpha s + beta² that decays slowest [1/s]."""
-    return max(float(root.real) for root in np.roots([1, 2 * alpha, beta**2]))
 
 
 def _rows(published: Published, data: Mapping[str, Any]) -> list[str]:
@@ -165,7 +161,20 @@ def _sweep(data: Mapping[str, Any]) -> list[str]:
         f"at {best}. The {GAIT_WORDS[gait]} {condition} peak runs from {low:.2f} to {high:.2f} of its exact "
         f"value over that range, the other three from {min(others):.2f} to {max(others):.2f}.",
         _level(data),
+        *_failures(data["step_sweep"]),
     ]
+
+
+def _failures(sweep: Mapping[str, Any]) -> list[str]:
+    """Steps with which the integration does not come to the end of the cycle, if there are any."""
+    shortest = {
+        (gait, name): min(step for step, peak in zip(sweep["step_ms"], peaks, strict=True) if peak is None)
+        for gait, by_name in sweep["peaks"].items()
+        for name, peaks in by_name.items()
+        if None in peaks
+    }
+    words = listed(f"{step:.2f} ms ({GAIT_WORDS[gait]}, {name} β)" for (gait, name), step in shortest.items())
+    return [f"Euler does not come to the end of the cycle with steps from {words} on."] if shortest else []
 
 
 SPIKE = 1.5

@@ -17,6 +17,7 @@ from hoof_env._output import staged
 from hoof_env.errors import OutputError
 from hoof_env.paper.figure_style import STYLE
 from hoof_env.paper.reproduce import Reproduction, reproduce, write_reproduction
+from hoof_env.paper.solvers_text import ground_text, solvers_text
 from hoof_env.paper.study.claims import examine_claims
 from hoof_env.paper.study.findings import findings
 from hoof_env.paper.study.laws import examine_laws
@@ -146,8 +147,8 @@ def markdown(result: Study, *, command: str, figures: bool) -> str:
         f"`{geometry.name}`), found from those results. {geometry.provenance}",
         f"Written by `{command}` with hoof-env {__version__}, {versions}. Every number comes from that run; "
         f"[study.json]({FOLDER}/study.json) has them all, [reproduction.md]({FOLDER}/reproduction.md) the "
-        "printed numbers row by row. Solver `paper` is Eq. 8 with explicit Euler at 1 ms, `exact` the same "
-        "motion in closed form.",
+        "printed numbers row by row.",
+        f"{ground_text(reproduction)} {solvers_text(reproduction.published)}",
         "## Findings",
         "\n".join(f"- {line}" for line in findings(reproduction, data)),
         *(

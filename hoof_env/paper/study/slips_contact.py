@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.normal_force import lankarani_nikravesh, restitution_of_factor
+from hoof_env.ground.preset import HERTZ
 from hoof_env.paper.measure import POINTS, integral
 from hoof_env.paper.published import Published
 from hoof_env.paper.reproduce import GAITS
@@ -27,9 +28,6 @@ Traces = Mapping[tuple[str, str], Trace]
 
 SOLVER = "exact"
 """The solver whose cycles are examined."""
-
-HERTZ = 1.5
-"""Exponent n of Hertz and of Lankarani and Nikravesh [-]."""
 
 NAMES = {"walk": "walking", "run": "running"}
 FIRST_POINT = {"walk": "heel", "run": "toe"}

@@ -75,7 +75,7 @@ def test_every_shape_of_the_paper_is_among_the_claims(reproduction, found):
         assert by_reading[:2] == [shape["readings"][name] for name in (BRAKING, HOOF_ON_GROUND)]
 
 
-def test_both_solvers_speak_wherever_the_leg_is_asked(found):
+def test_every_solver_speaks_wherever_the_leg_is_asked(found):
     for claim in found.values():
         for reading in {f["reading"] for f in claim["findings"]}:
             sources = {f["source"] for f in claim["findings"] if f["reading"] == reading}

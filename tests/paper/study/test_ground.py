@@ -6,10 +6,11 @@ import pytest
 
 from hoof_env.leg.geometry import preset_names, read_preset
 from hoof_env.paper.reproduce import GAITS, reproduce
+from hoof_env.paper.solvers import EULER, betas
 from hoof_env.paper.study import conditions, laws, sensitivity
 from hoof_env.paper.study.case import Case
 from hoof_env.paper.study.claims_force import force_claims
-from hoof_env.paper.study.conditions import betas, euler_rows
+from hoof_env.paper.study.conditions import euler_rows
 from hoof_env.paper.study.laws import free_peak
 from hoof_env.paper.study.numerics import _causes
 from hoof_env.paper.study.replay import exact_cycle, ground_of, row_values, stances_on
@@ -45,10 +46,11 @@ def test_replays_are_the_rows_of_all_solvers(result, preset, rows):
     published = result.published
     found = row_values(published, stances_on({g: exact_cycle(g, preset) for g in GAITS}, ground_of(preset)))
     assert found == {**found, **{name: value for (name, s), value in rows.items() if s == "exact"}}
-    by_euler = euler_rows(published, preset, conditions.STEPS, betas(published)["printed"])
-    for (name, solver), value in rows.items():
-        if solver == "paper":
-            assert by_euler[name] == pytest.approx(value, rel=1e-6, abs=1e-9)
+    for solver, reading in EULER.items():
+        by_euler = euler_rows(published, preset, conditions.STEPS, betas(published)[reading])
+        for (name, of), value in rows.items():
+            if of == solver:
+                assert by_euler[name] == pytest.approx(value, rel=1e-6, abs=1e-9)
 
 
 def test_causes_are_taken_apart_on_it(result, preset, rows):

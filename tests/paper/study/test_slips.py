@@ -6,7 +6,9 @@ import pytest
 
 from hoof_env.dynamics.constrained import ConstrainedLeg
 from hoof_env.dynamics.constraints import DRIVER_ROW, SIZE, Constraints
+from hoof_env.dynamics.result import Result
 from hoof_env.dynamics.trace import new_trace
+from hoof_env.errors import HoofEnvError
 from hoof_env.gait.parameters import GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
@@ -15,7 +17,7 @@ from hoof_env.paper.study.printed_rows import ROWS, Row, assemble, at_rest, misf
 from hoof_env.paper.study.slip import CHANGES, EFFECTS, HARMLESS, IMPOSSIBLE, Slip
 from hoof_env.paper.study.slips_friction import friction_power
 from hoof_env.paper.study.slips_linkage import linkage_slips
-from hoof_env.paper.study.slips_motion import PrintedGamma
+from hoof_env.paper.study.slips_motion import PrintedGamma, _gamma_facts, _gamma_words, drift
 
 GARBLED = {22, 23, 24, 32, 34, 38, 39, 40, 41}
 """Rows of the print that are not those of the mechanism, found by reading."""
@@ -91,6 +93,25 @@ def test_gamma_by_the_letter_slows_the_crank_as_its_equation_says(geometry):
     assert leg.state.qd[2] == pytest.approx(-2 * math.pi * math.exp(-2 * t), rel=1e-9)
     turned = 2 * math.pi * (1 - math.exp(-2 * t)) / 2
     assert leg.closure().error[DRIVER_ROW] == pytest.approx(2 * math.pi * t - turned, rel=1e-6)
+
+
+def test_a_cycle_that_gamma_by_the_letter_does_not_survive_is_a_finding(monkeypatch, found):
+    """One that fails half-way has half the instants; with gamma as it must be it is an error."""
+    calls = []
+
+    def fails(self, command, trace):
+        calls.append(1)
+        return Result.OK if len(calls) % 51 else Result.NOT_FINITE
+
+    full = drift(None, "walk", 21.2, False)
+    monkeypatch.setattr(ConstrainedLeg, "advance", fails)
+    half = drift(None, "walk", 21.2, True)
+    assert (half.failed, len(half.t), len(half.gap)) == (0.5, 50, 50)
+    facts = _gamma_facts(half, full)
+    assert facts["peak_change"] is facts["contact_later_s"] is None
+    assert "fails after 0.50 s" in _gamma_words(facts)
+    with pytest.raises(HoofEnvError, match=r"walk with beta 21\.2: the integration failed"):
+        drift(None, "walk", 21.2, False)
 
 
 def test_drives_pay_for_friction_and_would_be_paid_by_the_letter(reproduction, found):
