@@ -77,7 +77,7 @@ def test_the_paper_solver_is_spared_three_rows_that_the_exact_one_must_meet(repr
 
 
 def test_the_papers_solvers_differ_in_beta_alone():
-    """And only in the trunk's linkage: alpha and step are the environment's own."""
+    """Alpha and step are the environment's own."""
     by_name = betas(load_published())
     made = {s: gymnasium.make(ENVIRONMENT, **settings_of(s)).unwrapped.engine for s in EULER}
     for solver, name in EULER.items():
