@@ -174,9 +174,9 @@ def _results(source: Path, aim: Aim, exponent: float) -> list[Start]:
 def provenance(about: dict[str, Any], found: Collection) -> str:
     """How the members were found, in words."""
     used = ", ".join(f"{name} {number}" for name, number in about["versions"].items())
-    solvers = (
-        "both solvers (the paper's without the ill-conditioned rows)" if about["both"] else "the exact solver"
-    )
+    solvers = "the exact solver"
+    if about["both"]:
+        solvers = f"both solvers (the paper's with {about['beta']} beta, without the ill-conditioned rows)"
     per_start = Counter(one.start for one in found.members)
     shares = ", ".join(f"{count} from {start}" for start, count in per_start.items())
     return (
