@@ -3,7 +3,7 @@
     python -m agents.demo              into runs/demo, a few minutes
     python -m agents.demo --quick      tiny numbers, only to see that everything works
 
-1. The paper's four conditions with both solvers, published beside simulated.
+1. The paper's four conditions with every solver, published beside simulated.
 2. The scripted gaits and the simplest policies in hoof_env/HorseLeg-v0.
 3. A small PPO agent, trained and scored on the same episodes.
 4. report.html: one file with tables, figures and films, to be opened or sent as it is.
@@ -30,7 +30,7 @@ from agents.command import run
 from hoof_env._output import check_folder, staged
 from hoof_env.envs.policies import make_policy
 from hoof_env.errors import check_number
-from hoof_env.paper.reproduce import GAITS, Reproduction, reproduce, write_reproduction
+from hoof_env.paper.reproduce import GAITS, SOLVERS, Reproduction, reproduce, write_reproduction
 
 ENV_ID, FIXED_ID = "hoof_env/HorseLeg-v0", "hoof_env/HorseLegFixed-v0"
 SCRIPTED = ("walk", "run", "idle", "random", "bang-bang")
@@ -195,16 +195,16 @@ def print_reproduction(reproduction: Reproduction) -> None:
     grid = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for title, justify in (
         ("row", "left"), ("unit", "left"), ("published", "right"), ("bar", "right"),
-        ("paper solver", "right"), ("error", "right"), ("exact solver", "right"), ("error", "right"),
+        *(column for solver in SOLVERS for column in ((solver, "right"), ("error", "right"))),
     ):  # fmt: skip
         grid.add_column(title, justify=justify, no_wrap=True)  # type: ignore[arg-type]
     for row in page.rows(reproduction):
         cells = [text for cell in row.cells for text in (cell.value, f"{cell.error} {cell.mark}")]
         grid.add_row(row.id, row.unit, row.published, row.bar, *cells)
     for claim in page.claims(reproduction):
-        marks = [page.MARKS[verdict["holds"]] for verdict in claim.verdicts]
-        grid.add_row(claim.id, "shape", "", "", marks[0], "", marks[1], "")
-    Console(width=None if sys.stdout.isatty() else 160).print(grid)
+        marks = [text for verdict in claim.verdicts for text in (page.MARKS[verdict["holds"]], "")]
+        grid.add_row(claim.id, "shape", "", "", *marks)
+    Console(width=None if sys.stdout.isatty() else 170).print(grid)
 
 
 def main(argv: list[str] | None = None) -> None:

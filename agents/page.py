@@ -77,7 +77,7 @@ class ClaimView:
 
 
 def rows(reproduction: Reproduction) -> list[Row]:
-    """Every published row beside what both solvers gave."""
+    """Every published row beside what each solver gave."""
     found = {(row["id"], row["solver"]): row for row in reproduction.rows}
     views = []
     for published in reproduction.published.rows:
@@ -99,7 +99,7 @@ def rows(reproduction: Reproduction) -> list[Row]:
 
 
 def claims(reproduction: Reproduction) -> list[ClaimView]:
-    """Every claim about shape with both solvers' verdicts."""
+    """Every claim about shape with every solver's verdict."""
     found = {(shape["id"], shape["solver"]): shape for shape in reproduction.shapes}
     return [
         ClaimView(claim.id, claim.claim, claim.reading, [found[claim.id, solver] for solver in SOLVERS])

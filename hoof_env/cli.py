@@ -15,7 +15,7 @@ from hoof_env.errors import HoofEnvError
 
 
 def reproduce(out: Path, figures: bool = True, study: bool = False, preset: str | None = None) -> None:
-    """Run the paper's four conditions with both solvers and compare every published number with them.
+    """Run the paper's four conditions with every solver and compare every published number with them.
 
     Args:
         out: folder for reproduction.json, reproduction.md and the figures; made if need be.
@@ -65,7 +65,7 @@ def identify(
 ) -> None:
     """Search for the leg, the ground level and the gaits that the paper does not print (needs 'identify').
 
-    Ends at the first leg that meets every bar with both solvers, or when the budget is spent.
+    Ends at the first leg that meets every bar with the exact and the paper's solver, or with the budget.
 
     Args:
         out: folder for identified.json (a preset), identify.json and identify.md; made if need be.
@@ -78,7 +78,7 @@ def identify(
         workers: processes.
         budget: evaluations at most; one with the paper's solver counts for several.
         resume: go on with a search in this folder that was interrupted or killed.
-        keep_going: spend the whole budget, to count how many starts meet the bar.
+        keep_going: spend the whole budget: the leg furthest inside the bars, and how many starts meet them.
     """
     from hoof_env.identify.command import identify
 

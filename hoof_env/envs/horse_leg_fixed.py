@@ -18,6 +18,7 @@ from hoof_env.errors import check_choice, check_number
 from hoof_env.gait.parameters import LIMITS, GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.preset import load_ground
+from hoof_env.leg.geometry import DEFAULT_PRESET
 
 SOLVERS = ("exact", "paper")
 
@@ -72,6 +73,7 @@ class HorseLegFixedEnv(HorseLegEnv):
     |---|---|---|---|
     | `gait` | "walk" | | "walk" or "run": a gait of the preset |
     | `solver` | "exact" | | "exact" or "paper" |
+    | `preset` | "identified" | | leg, ground and gaits: a preset's name or a JSON file |
     | `stiffness`, `exponent` | None | N/m^n, - | K and n of Eq. 14; None for the preset's, or 2e4 and 1.5 |
     | `restitution` | 1 | - | 1 is the paper's elastic condition, 0 its inelastic one |
     | `approach_floor` | 1e-4 | m/s | smallest approach speed in Eq. 14: the walk grazes |
@@ -81,7 +83,7 @@ class HorseLegFixedEnv(HorseLegEnv):
     | `sim_dt` | None | s | None for the solver's own, 1e-3 or 1e-4 |
     | `episode_seconds` | 1 | s | time limit |
 
-    `preset`, `hip_height`, `normal_law`, `friction_law`, `friction`, `friction_slow`, `dt`,
+    `hip_height`, `normal_law`, `friction_law`, `friction`, `friction_slow`, `dt`,
     `reward_weights` and `render_mode` as in `hoof_env/HorseLeg-v0`.
 
     ## Version history
@@ -94,7 +96,7 @@ class HorseLegFixedEnv(HorseLegEnv):
         *,
         gait: str = "walk",
         solver: str = "exact",
-        preset: str = "first_fit",
+        preset: str = DEFAULT_PRESET,
         hip_height: float | None = None,
         stiffness: float | None = None,
         exponent: float | None = None,

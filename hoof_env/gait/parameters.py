@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.errors import DataFileError, ParameterError, check_choice, check_number
-from hoof_env.leg.geometry import read_preset
+from hoof_env.leg.geometry import DEFAULT_PRESET, read_preset
 
 Gait = TypeVar("Gait")
 
@@ -76,7 +76,7 @@ PARAMETERS = tuple(item.name for item in fields(GaitParameters))
 """Names of the gait parameters, in the order used by actions and filters."""
 
 
-def gait_names(preset: str | Path = "first_fit") -> list[str]:
+def gait_names(preset: str | Path = DEFAULT_PRESET) -> list[str]:
     """Names of the gaits in a preset: the paper's walk and run, and what was found for that leg beside them.
 
     Raises:
@@ -86,7 +86,7 @@ def gait_names(preset: str | Path = "first_fit") -> list[str]:
     return sorted(_read_gaits(preset))
 
 
-def load_gait(name: str, preset: str | Path = "first_fit") -> GaitParameters:
+def load_gait(name: str, preset: str | Path = DEFAULT_PRESET) -> GaitParameters:
     """A gait of a preset file.
 
     Raises:

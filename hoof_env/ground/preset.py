@@ -9,7 +9,7 @@ from typing import Any
 
 from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.ground.contact import Ground
-from hoof_env.leg.geometry import read_preset
+from hoof_env.leg.geometry import DEFAULT_PRESET, read_preset
 
 HERTZ = 1.5
 """Exponent n of Hertz's contact and of Lankarani and Nikravesh's law [-]."""
@@ -19,7 +19,7 @@ SETTINGS = ("stiffness", "exponent")
 of the other."""
 
 
-def load_ground(preset: str | Path = "first_fit", **overrides: Any) -> Ground:
+def load_ground(preset: str | Path = DEFAULT_PRESET, **overrides: Any) -> Ground:
     """The ground of a preset (by name) or of a preset file (by path).
 
     Args:

@@ -48,8 +48,8 @@ def load_start(start: str, exponent: float = EXPONENT) -> tuple[Choice, tuple[fl
     if start == "cold":
         return None
     try:
-        gaits = (load_gait(gait, start) for gait in ("walk", "run"))
-        choice, x = encode(load_geometry(start), *gaits, exponent)
+        walk, run = (load_gait(gait, start) for gait in ("walk", "run"))
+        choice, x = encode(load_geometry(start), walk, run, exponent)
     except HoofEnvError as error:
         raise type(error)(f"start {start}: {error}") from None
     return choice, tuple(x.tolist())

@@ -101,8 +101,8 @@ class LegProblem:
         return choice, min(tries, key=self.cost(choice, phase))
 
     def cold(self, rng: np.random.Generator, phase: Phase) -> tuple[dict[str, Any], Array]:
-        laws = (("F",), ("crank",)) if rng.random() < PRODUCT else (LINK9, SWINGS)
-        legs = random_choice(rng, *laws, self.exponent)
+        link9, swings = (("F",), ("crank",)) if rng.random() < PRODUCT else (LINK9, SWINGS)
+        legs = random_choice(rng, link9, swings, self.exponent)
         choice = legs.to_dict()
         tries = [random_start(legs, rng) for _ in range(phase.tries)]
         if phase.by_toe:

@@ -48,7 +48,7 @@ class Phase:
     method: str = "cma"
     populations: tuple[int, ...] = (20,)
     rounds: int = 1
-    spreads: tuple[float, ...] = (0.0, 0.15, 0.3, 0.5)
+    spreads: tuple[float, ...] = (0.15, 0.3, 0.5)
     tries: int = 300
     elite: int = 6
     below: float = float("inf")
@@ -68,6 +68,9 @@ Schedule = tuple[Phase, ...]
 """Phases, run again and again until the bar is reached or the budget spent."""
 
 _HOPS = (0.003, 0.01, 0.03, 0.1)
+_START = Phase(
+    "start", "given", jobs=1, evaluations=6_000, sigmas=_HOPS, method="minimax", spreads=(0.0,), samples=401
+)
 _AROUND = Phase("around", "given", jobs=24, evaluations=4_000, sigmas=(0.1,), samples=101)
 _COLD = Phase("cold", "cold", jobs=24, evaluations=4_000, sigmas=(0.2,), tries=1500, samples=101)
 _SETTLE = Phase("settle", "best", jobs=8, elite=8, evaluations=8_000, sigmas=(0.05,), samples=101)
@@ -101,7 +104,7 @@ _BOTH = Phase(
     ends_at_bar=True,
 )
 
-FROM_PRESET: Schedule = (_AROUND, _SETTLE, _DESCEND, _POLISH, _BOTH)
+FROM_PRESET: Schedule = (_START, _AROUND, _SETTLE, _DESCEND, _POLISH, _BOTH)
 COLD: Schedule = (_COLD, _SETTLE, _DESCEND, _POLISH, _BOTH)
 
 

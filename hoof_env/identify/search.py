@@ -3,7 +3,7 @@ a kill and a resumption change nothing in what is found."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 from hoof_env.identify.job import CHECKPOINT_EVERY
@@ -29,7 +29,7 @@ class Outcome:
 
     Attributes:
         results: in the order of the jobs, up to the one that ended the search.
-        winner: the first that the full system confirmed, or None.
+        winner: the first that the full system confirmed, or the best of those if it kept going, or None.
         spent: evaluations, those with the paper's solver by their weight.
     """
 
@@ -55,7 +55,7 @@ def search(
     Args:
         budget: evaluations, one with the paper's solver by its weight; the last round may exceed it a little.
         workers: processes.
-        keep_going: spend the whole budget.
+        keep_going: spend the whole budget; no job ends at the bar, and the winner is the best.
         every: seconds between two checkpoints of a job.
 
     Raises:
@@ -67,6 +67,8 @@ def search(
         for number, phase in rounds(schedule):
             if spent >= budget:
                 break
+            if keep_going:
+                phase = replace(phase, ends_at_bar=False)
             jobs = plan(number, phase, results, seed, budget - spent)
             if not jobs:
                 continue
@@ -90,7 +92,8 @@ def search(
                 spent += phase.weight * found[job.id].evaluations
                 if _ends(found[job.id], keep_going):
                     return Outcome(tuple(results), found[job.id], spent)
-    return Outcome(tuple(results), next((r for r in results if r.confirmed), None), spent)
+    confirmed = [result for result in results if result.confirmed]
+    return Outcome(tuple(results), min(confirmed, key=lambda r: r.full or 0.0, default=None), spent)
 
 
 def _ends(result: Result | None, keep_going: bool) -> bool:

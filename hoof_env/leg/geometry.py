@@ -2,8 +2,8 @@
 
 A `Geometry` is a frozen value; building one checks it. A leg that cannot turn through a full crank revolution
 is refused with the dyad, the crank angle and the missing length. Presets are JSON files with a provenance
-line in `hoof_env/data`; the default, `first_fit`, is *identified* from the paper's results (the paper prints
-no lengths).
+line in `hoof_env/data`. Both are *identified* from the paper's results, for the paper prints no lengths: the
+default, `identified`, meets them, and `first_fit`, from which the search for it set out, nearly does.
 """
 
 from __future__ import annotations
@@ -22,6 +22,9 @@ from numpy.typing import NDArray
 
 from hoof_env.errors import DataFileError, GeometryError, ParameterError, check_choice, check_number
 from hoof_env.leg.linkage import BODIES, BODY_LENGTHS, CONSTRUCTION, DYADS, LENGTHS, POINTS, Dyad
+
+DEFAULT_PRESET = "identified"
+"""The leg of the paper's reproduction."""
 
 INERTIA_RULES = ("uniform_rod", "paper")
 
@@ -267,7 +270,7 @@ def read_preset(source: str | Path) -> dict[str, Any]:
     return data
 
 
-def load_geometry(source: str | Path = "first_fit") -> Geometry:
+def load_geometry(source: str | Path = DEFAULT_PRESET) -> Geometry:
     """The geometry of a preset (by name) or of a preset file (by path).
 
     Raises:

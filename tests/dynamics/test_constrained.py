@@ -23,9 +23,9 @@ from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
 from hoof_env.leg.linkage import BODIES, CRANK, FRAME, JOINTS, LOCK
 
-GEOMETRY = load_geometry()
+GEOMETRY = load_geometry("first_fit")
 MIRRORED = {travel: GEOMETRY.replace(travel=travel) for travel in (1, -1)}
-WALK, RUN = load_gait("walk"), load_gait("run")
+WALK, RUN = load_gait("walk", "first_fit"), load_gait("run", "first_fit")
 PAPER_BETA = math.sqrt(30)
 
 ORDERS = {"euler": 1, "semi_implicit_euler": 1, "midpoint": 2, "rk4": 4}

@@ -13,7 +13,7 @@ from hoof_env.gait.motion_law import MOTION
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.linkage import BODIES, BODY_LENGTHS, JOINTS
 
-GEOMETRY = load_geometry()
+GEOMETRY = load_geometry("first_fit")
 CONSTRAINTS = Constraints(GEOMETRY)
 
 # The joints of Eq. 2 as the paper shares them out: T and H are the tail and the head of a link, A8 is the

@@ -20,8 +20,8 @@ from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
 from hoof_env.leg.linkage import POINTS
 
-LEG = load_geometry()
-GAITS = {name: load_gait(name) for name in ("walk", "run")}
+LEG = load_geometry("first_fit")
+GAITS = {name: load_gait(name, "first_fit") for name in ("walk", "run")}
 RUN = GAITS["run"]
 FIXED = Trunk("fixed", height=LEG.hip_height)
 COMMANDS = [np.array(c) for c in ([9.0, 0.9, -0.4, 0.1], [2.0, 0.2, 0.5, -0.5], [12.0, 1.2, -0.6, -0.4])]

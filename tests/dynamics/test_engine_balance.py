@@ -13,8 +13,8 @@ from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
 
-LEG = load_geometry()
-WALK, RUN = load_gait("walk"), load_gait("run")
+LEG = load_geometry("first_fit")
+WALK, RUN = load_gait("walk", "first_fit"), load_gait("run", "first_fit")
 LOW, HIGH = np.array(list(LIMITS.values())).T
 FLOATING = Trunk(share=0.0, stiffness=0.0, damping=0.0, drag=0.0, height=50.0)
 FILTERS = FilterSettings(swing_rate=4.0, swing_acc=80.0)

@@ -16,9 +16,9 @@ from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
 from hoof_env.leg.linkage import POINTS
 
-WALK, RUN = load_gait("walk"), load_gait("run")
+WALK, RUN = load_gait("walk", "first_fit"), load_gait("run", "first_fit")
 FASTEST = np.array([high for _, high in LIMITS.values()])
-HEAVY = load_geometry().replace(masses=tuple(np.linspace(3.0, 0.5, 14)))
+HEAVY = load_geometry("first_fit").replace(masses=tuple(np.linspace(3.0, 0.5, 14)))
 FREE = {"fixed": [], "rail": [2], "suspended": [2, 3]}
 
 STEP, OFFSETS = 1e-3, (-2, -1, 1, 2)  # central differences of fourth order

@@ -12,18 +12,22 @@ from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
 from hoof_env.leg.linkage import POINTS
 
-RUN = load_gait("run")
+RUN = load_gait("run", "first_fit")
 
 
 @pytest.fixture(scope="module", params=[-1, 1])
 def played(request):
     """A leg, and a trace of it that has stance and flight, commands changing."""
-    leg = load_geometry().replace(travel=request.param)
+    leg = load_geometry("first_fit").replace(travel=request.param)
     ground = Ground(restitution=0.5, approach_floor=0.1)
     engine = LegEngine(leg, Trunk(height=leg.hip_height), ground, 1e-3)
     engine.reset(RUN, speed=1.0, x=4.0)
     rows = []
-    for command in (RUN.to_array(), load_gait("walk").to_array(), np.array([9.0, 1.0, -0.5, 0.3])):
+    for command in (
+        RUN.to_array(),
+        load_gait("walk", "first_fit").to_array(),
+        np.array([9.0, 1.0, -0.5, 0.3]),
+    ):
         rows.append(new_trace(400))
         engine.advance(command, rows[-1])
     return leg, np.concatenate(rows)
@@ -51,7 +55,7 @@ def test_points_are_where_the_pose_has_them(played):
 def test_a_flat_sole_has_its_toe_in_front(played):
     leg, trace = played
     flat = trace[np.argmin(np.abs(np.sin(trace["hoof_angle"])))]
-    forward = leg.travel == load_geometry().travel  # mirrored, the leg stands the wrong way round
+    forward = leg.travel == load_geometry("first_fit").travel  # mirrored, the leg stands the wrong way round
     assert abs(flat["hoof_angle"]) == pytest.approx(0.0 if forward else np.pi, abs=0.1)
     assert (flat["toe_x"] > flat["heel_x"]) == forward
 

@@ -12,7 +12,7 @@ from hoof_env.gait.parameters import GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
 
-LEG = load_geometry()
+LEG = load_geometry("first_fit")
 STILL = GaitParameters(0.0, 0.4, 0.0, 0.0)
 NOTHING = {"share": 0.0, "stiffness": 0.0, "damping": 0.0, "drag": 0.0, "height": 30.0}
 

@@ -38,7 +38,7 @@ def test_commands_span_the_limits_and_contain_both_gaits():
     np.testing.assert_allclose(env.command_of(-np.ones(4, np.float32)), low)
     np.testing.assert_allclose(env.command_of(np.ones(4, np.float32)), high)
     for name in ("walk", "run"):
-        gait = load_gait(name)
+        gait = load_gait(name, "first_fit")
         np.testing.assert_allclose(env.command_of(env.action_for(gait)), gait.to_array(), atol=1e-6)
         assert np.abs(env.action_for(gait)).max() < 1
 
@@ -48,7 +48,7 @@ def test_zero_action_on_the_fixed_trunk_is_the_gait_to_the_bit(name):
     env = gym.make(FIXED, gait=name)
     env.reset(seed=0)
     seen = traces(env, np.zeros(4, np.float32))
-    gait, leg = load_gait(name), env.unwrapped.geometry
+    gait, leg = load_gait(name, "first_fit"), env.unwrapped.geometry
     engine = LegEngine(leg, Trunk(kind="fixed", height=leg.hip_height), Ground(), 1e-4)
     engine.reset(gait)
     expected = new_trace(10_000)
@@ -75,7 +75,7 @@ def test_constant_action_elsewhere_agrees_with_the_reproduction(name, restitutio
         episode_seconds=1.0,
     )
     leg.reset(seed=0, options={"gait": name, "crank_angle": 0.0})
-    other = traces(leg, leg.unwrapped.action_for(load_gait(name)))
+    other = traces(leg, leg.unwrapped.action_for(load_gait(name, "first_fit")))
     for field in ("normal", "grf", "crank_torque", "hip_torque"):
         scale = np.abs(paper[field]).max()
         assert np.abs(other[field] - paper[field]).max() < 1e-5 * scale
@@ -104,7 +104,7 @@ def test_without_friction_and_drag_nothing_pushes_the_animal():
     env = gym.make(LEG, friction=0.0, trunk_drag=0.0)
     env.reset(seed=0, options={"gait": "run", "speed": 0.0})
     momentum = float(env.unwrapped.engine.state.body["px"])
-    trace = traces(env, env.unwrapped.action_for(load_gait("run")))
+    trace = traces(env, env.unwrapped.action_for(load_gait("run", "first_fit")))
     assert trace["normal"].max() > 1000
     assert env.unwrapped.engine.state.body["px"] == pytest.approx(momentum, abs=1e-9)
 
@@ -114,7 +114,7 @@ def test_episodes_with_different_substeps_agree():
     for sim_dt in (1e-3, 2.5e-4):
         env = gym.make(LEG, sim_dt=sim_dt, episode_seconds=4.0)
         env.reset(seed=0, options={"gait": "run", "crank_angle": 0.0, "speed": 0.0, "height": 2.0})
-        speeds.append(traces(env, env.unwrapped.action_for(load_gait("run")))["trunk_x"][-1] / 4)
+        speeds.append(traces(env, env.unwrapped.action_for(load_gait("run", "first_fit")))["trunk_x"][-1] / 4)
     assert speeds[0] == pytest.approx(speeds[1], rel=0.02)
 
 
@@ -137,7 +137,7 @@ def test_the_middle_of_the_ranges_moves_forward_and_no_swing_backward():
 )
 def test_assumed_contact_settings_hardly_matter_to_the_run(change):
     """As docs/environment.md says of floor, friction threshold and substep."""
-    run = load_gait("run")
+    run = load_gait("run", "first_fit")
     assert speed_and_peaks(run, **change) == pytest.approx(speed_and_peaks(run), rel=0.01)
 
 
@@ -205,7 +205,7 @@ def test_policies_have_names_and_do_what_they_say():
 
 
 BAD = [
-    ({"preset": "no_such_leg"}, "preset: expected one of first_fit, got 'no_such_leg'"),
+    ({"preset": "no_such_leg"}, "preset: expected one of first_fit, identified, got 'no_such_leg'"),
     ({"trunk": "floating"}, "trunk: expected one of fixed, rail, suspended, got 'floating'"),
     ({"normal_law": "hertz"}, "normal_law: expected one of .*lankarani-nikravesh.*got 'hertz'"),
     ({"friction_law": "stick"}, "friction_law: expected one of ambrosio.*got 'stick'"),

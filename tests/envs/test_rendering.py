@@ -23,7 +23,7 @@ from hoof_env.leg.geometry import load_geometry
 
 pygame = pytest.importorskip("pygame")
 
-GEOMETRY = load_geometry()
+GEOMETRY = load_geometry("first_fit")
 SCENE = (slice(90, None), slice(0, 640))  # rows and columns of the scene, below its key and left of the panel
 KEY = (slice(10, 31), slice(0, 64))  # of the key's arrow
 VERMILION = (213, 94, 0)

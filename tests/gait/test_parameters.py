@@ -47,8 +47,8 @@ def test_an_array_of_another_shape():
         ("run", 1.111873519500804, 0.7071698802333156, -2.46127843461837),
     ],
 )
-def test_the_gaits_of_the_default_preset(name, offset, amplitude, phase):
-    gait = load_gait(name)
+def test_the_gaits_of_first_fit(name, offset, amplitude, phase):
+    gait = load_gait(name, "first_fit")
     assert gait.crank_speed == 2 * np.pi
     for theta in np.linspace(0, 6, 7):
         swing = gait.swing_offset + gait.swing_sin * np.sin(theta) + gait.swing_cos * np.cos(theta)
@@ -56,9 +56,10 @@ def test_the_gaits_of_the_default_preset(name, offset, amplitude, phase):
 
 
 def test_an_unknown_gait():
-    assert gait_names() == ["run", "walk"]
+    assert gait_names("first_fit") == ["run", "walk"]
+    assert {"run", "walk"} <= set(gait_names())
     with pytest.raises(ParameterError, match="gait: expected one of run, walk, got 'trot'"):
-        load_gait("trot")
+        load_gait("trot", "first_fit")
 
 
 @pytest.mark.parametrize(

@@ -89,7 +89,7 @@ def test_the_page_shows_every_row_claim_demand_and_start(written):
     page = (out / "identify.md").read_text(encoding="utf-8")
     assert data["reached"] is False
     assert "The bar is not met" in page
-    assert len(data["rows"]) == 48
+    assert len(data["rows"]) == 72
     outside = [row for row in data["rows"] if row["within_bar"] is False]
     assert page.count("✗ |") == len(outside) > 0
     for entry in [*data["rows"], *data["claims"]]:

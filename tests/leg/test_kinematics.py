@@ -10,7 +10,7 @@ from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
 from hoof_env.leg.linkage import BODIES, CONSTRUCTION, LOCK, POINTS, Dyad
 
-LEG = load_geometry()
+LEG = load_geometry("first_fit")
 THETAS = np.linspace(-7.0, 7.0, 500)
 
 # Central differences of eighth order: their error is far below the bars here, and they know nothing of the

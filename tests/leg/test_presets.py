@@ -7,7 +7,7 @@ import pytest
 from hoof_env.errors import DataFileError, GeometryError, ParameterError
 from hoof_env.leg.geometry import load_geometry, preset_names, read_preset
 
-LEG = load_geometry()
+LEG = load_geometry("first_fit")
 
 
 def preset_file(tmp_path, change=None, text=None):
@@ -25,10 +25,11 @@ def test_a_preset_by_path_is_the_preset_by_name(tmp_path):
         assert load_geometry(source).replace(name="first_fit") == LEG
 
 
-def test_the_default_is_identified_not_published():
-    assert LEG.provenance.startswith("Identified, not published")
-    assert LEG.name == "first_fit"
-    assert "first_fit" in preset_names()
+def test_every_preset_is_identified_not_published():
+    assert load_geometry().name == "identified"
+    assert {"first_fit", "identified"} <= set(preset_names())
+    for name in preset_names():
+        assert load_geometry(name).provenance.startswith("Identified, not published")
 
 
 def test_a_missing_file_and_an_unknown_name(tmp_path):
