@@ -30,7 +30,7 @@ INERTIA_RULES = ("uniform_rod", "paper")
 
 LINEAR_DENSITY = 1.0
 """Default mass per length of a link [kg/m]. The paper prints no masses. One kilogram a metre gives the
-identified leg 7.3 kg, 9 % of the default trunk; on a fixed trunk masses change torques and reactions only,
+leg of `HorseLeg-v0` 7.3 kg, 9 % of its trunk; on a fixed trunk masses change torques and reactions only,
 never motion or ground force."""
 
 
