@@ -95,7 +95,8 @@ def _readings(reproduction: Reproduction) -> str:
         for row in reproduction.published.rows
         if row.unit == "deg" and row.printed != row.value
     ]
-    return " ".join(["Bars: margin of each row. Flat has no time in print.", *changed])
+    phases = "Flat, roll-over: toe and heel in the ground."
+    return " ".join([phases, "Bars: margin of each row; flat has no time in print.", *changed])
 
 
 def _sketch_shapes(reproduction: Reproduction, trace: Any, stance: Stance) -> NDArray[np.float64]:

@@ -44,7 +44,7 @@ def draw_mechanism(figure: Any, reproduction: Reproduction) -> None:
     set_size(figure, HEAD + 5 + PANEL + 22)
     head(
         figure, reproduction, "Figure 1. Mechanism of the leg and its contact with the ground", "elastic",
-        f"{GAITS[gait]} at {row['t']:.3f} s. Points and numbers of the bodies as in Eq. 2.",
+        f"{GAITS[gait]} at {row['t']:.3f} s. Bodies numbered as in Eq. 2.",
     )  # fmt: skip
     close = LEFT + LEG + GAP
     widths = {LEFT: LEG, close: WIDTH - close - 3}
@@ -92,9 +92,12 @@ def _draw_whole(ax: Any, at: dict[str, Point], sole: dict[str, str]) -> None:
     scene.draw_links(at, 1.8)
     lines = link_lines(at)
     scene.keep_clear(lines)
+    badge = BADGE / LEG * np.ptp(ax.get_xlim())
     places = scene.number(lines[: len(BODIES)], points, BADGE)
     for number, (body, place) in enumerate(zip(BODIES, places, strict=True), start=1):
         colour = ROLE_COLOURS[body.role]
+        if np.linalg.norm(at[body.head] - at[body.tail]) < 1.5 * badge:  # no room on the link: in front of it
+            place = np.array([max(at[body.head][0], at[body.tail][0]) + badge, place[1]])
         ax.plot(*place, "o", ms=BADGE / INCH * 72, mfc="white", mec=colour, mew=0.7, zorder=5)
         ax.text(*place, str(number), fontsize=NUMBER, ha="center", va="center_baseline", zorder=6)
     letters = {sole["toe"]: ("K (toe)", TOE), sole["heel"]: ("H (heel)", HEEL)}

@@ -66,7 +66,7 @@ def draw_paths(figure: Any, reproduction: Reproduction, ensemble: EnsembleCurves
     set_size(figure, HEAD + 5 + tall + 4 + NEAR + 19)
     head(
         figure, reproduction, "Figure 3. Paths of the hoof", "elastic",
-        "Marks lie on the paths at the published instants of first and last contact.",
+        "Marks lie on the paths at the published instants of contact. Below, heights are stretched.",
     )  # fmt: skip
     left = LEFT
     for letter, (gait, (trace, stance)) in zip("ab", cycles.items(), strict=True):
@@ -102,7 +102,7 @@ def draw_paths(figure: Any, reproduction: Reproduction, ensemble: EnsembleCurves
             mark_published(ax, *contacts.T)
         if gait == "walk":
             name_height(whole, "height above the ground [m]", width)
-            name_height(near, "stretched [m]", width)
+            name_height(near, "height [m]", width)
             axes = whole, near
         left += width + GAP
     legend_below(figure, *axes, columns=4)

@@ -29,6 +29,7 @@ from hoof_env.paper.measure import measure_stance
 from hoof_env.paper.published import CONDITIONS, Published, load_published
 from hoof_env.paper.reproduce import GAITS, run_cycle
 from hoof_env.paper.shapes import step_length
+from hoof_env.paper.spread_limits import held_by_demands, one_sided
 from hoof_env.paper.spread_names import COORDINATES, FOLLOWING, GAIT_NAMES, IDENTIFIED, SWING, ZEROED
 
 Array = NDArray[Any]
@@ -75,8 +76,9 @@ def measure_spread(
         `data` holds preset, members, walk, bar (by solver), short (members that miss a demand on
         plausibility), provenance, assemblies (how many members share signs, toe and direction); quantities:
         by id of `IDENTIFIED` and `FOLLOWING`, name, unit, preset, median, middle_half and range (two numbers
-        each), relative (width of the range over |median|, None where zero is arbitrary); and differences:
-        by id, name, unit, largest and rms over all pairs and instants, relative (rms over a scale, or None).
+        each), relative (width of the range over |median|, None where zero is arbitrary); differences:
+        by id, name, unit, largest and rms over all pairs and instants, relative (rms over a scale, or None);
+        held and one_sided, see `hoof_env.paper.spread_limits`.
 
     Raises:
         HoofEnvError: no such ensemble or preset, or a member that does not step on the ground once a cycle.
@@ -103,11 +105,13 @@ def measure_spread(
         crank_torque={key: np.array([leg.torque[key] for leg in legs]) for key in own.torque},
         lengths={name: np.array([leg.geometry.lengths[name] for leg in legs]) for name in LENGTHS},
     )
+    values = {key: [leg.values[key] for leg in legs] for key in IDENTIFIED | FOLLOWING}
     quantities = {
         key: {"name": name, "unit": unit, "preset": own.values[key]}
-        | summarise([leg.values[key] for leg in legs], unit in ZEROED and key not in COORDINATES)
+        | summarise(values[key], unit in ZEROED and key not in COORDINATES)
         for key, (name, unit) in (IDENTIFIED | FOLLOWING).items()
     }
+    published = load_published()
     data = {
         "preset": Path(preset).name,
         "members": len(legs),
@@ -118,7 +122,9 @@ def measure_spread(
         "assemblies": _assemblies(leg.geometry for leg in legs),
         "linear_density": sorted({leg.geometry.linear_density for leg in legs}),
         "quantities": quantities,
-        "differences": _differences(curves, load_published()),
+        "differences": _differences(curves, published),
+        "held": held_by_demands(values),
+        "one_sided": one_sided(values, published),
     }
     if progress:
         progress(f"ensemble: {len(legs)} legs simulated in the four conditions")

@@ -97,7 +97,12 @@ def _who(data: Data) -> str:
 
 def _findings(data: Data) -> list[str]:
     quantities, differences = data["quantities"], data["differences"]
-    lengths = [quantities[key] for key in IDENTIFIED if key.startswith("length.") or key == "hip_height"]
+    held = {entry["key"] for entry in data["held"]}
+    lengths = [
+        quantities[key]
+        for key in IDENTIFIED
+        if (key.startswith("length.") or key == "hip_height") and key not in held
+    ]
     ranked = sorted(
         (entry for entry in lengths if entry["relative"] is not None), key=lambda e: e["relative"]
     )
@@ -105,7 +110,9 @@ def _findings(data: Data) -> list[str]:
     lines = [
         f"Least determined of the lengths: {least['name']}, {_entry_range(least)}, "
         f"{_percent(least['relative'])} of its median. Best: {most['name']}, {_entry_range(most)}, "
-        f"{_percent(most['relative'])}."
+        f"{_percent(most['relative'])}.",
+        *(_held(entry, quantities[entry["key"]], data["members"]) for entry in data["held"]),
+        *_one_sided(data["one_sided"]),
     ]
     for gait, name in GAIT_NAMES.items():
         cycle, stance, shape = (
@@ -130,6 +137,28 @@ def _findings(data: Data) -> list[str]:
         lines.append(f"Largest crank torque, {name}: {' and '.join(torques)}.")
         lines.append(f"Force of the ground, {name}: two members differ by up to {' and '.join(forces)}.")
     return lines
+
+
+def _held(entry: Data, quantity: Data, members: int) -> str:
+    side = "at most" if entry["most"] else "at least"
+    return (
+        f"Held by a demand and not by the numbers: {quantity['name']}, {_entry_range(quantity)}. The search "
+        f"asks for {side} {_number(entry['bound'], quantity['unit'])} {quantity['unit']} ({entry['why']}), "
+        f"and {entry['members']} of {members} members lie within 1 % of that: the range ends there by "
+        "request."
+    )
+
+
+def _one_sided(rows: Iterable[Data]) -> list[str]:
+    """Where the printed numbers pull against each other: rows that no member has on the other side."""
+    words = [f"`{row['row']}` {row['low']:+.1f} to {row['high']:+.1f} %" for row in rows]
+    if not words:
+        return []
+    return [
+        f"Every member errs the same way, by more than half the bar, in {', '.join(words)}: no member has "
+        "these printed numbers in the middle of their bars together with the others, so their narrow ranges "
+        "show where the bars end and not what a leg must have."
+    ]
 
 
 def _what_not(data: Data) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from hoof_env.paper.measure import integral
 from hoof_env.paper.reproduce import GAITS, SOLVERS
 from hoof_env.paper.shapes import half_impulses
 from hoof_env.paper.study.case import Case, by_solver
@@ -35,6 +36,21 @@ def _signs(case: Case, gait: str, solver: str, sign: int) -> tuple[bool, str]:
     ), f"{words} in the halves of stance (forward positive)"
 
 
+def _one_way(case: Case, solver: str) -> tuple[bool, str]:
+    """Whether the horizontal force on the walking leg keeps its sign, by its impulses of either sign."""
+    trace, stance = case.trace("walk", solver), case.stance("walk", solver)
+    back, on = (
+        integral(trace, np.clip(sign * trace["friction"], 0, None), stance.start, stance.end)
+        for sign in (-1, 1)
+    )
+    return min(back, on) <= ONE_WAY * (back + on), (
+        f"on the leg {back:.1f} N s backward and {on:.1f} N s forward"
+    )
+
+
+ONE_WAY = 0.02
+"""A force goes one way if no more than this part of its impulse goes the other [-]."""
+
 ON_THE_LEG, ON_THE_GROUND = "force of the ground on the leg", "force of the hoof on the ground"
 
 
@@ -49,6 +65,9 @@ def _braking(case: Case) -> Examined:
             f"{ON_THE_GROUND}, backward in both halves of stance",
             lambda solver: _signs(case, "walk", solver, -1),
             case.asked("walk.direction"),
+        ),
+        *by_solver(
+            "one way through the whole stance, forward or backward", lambda solver: _one_way(case, solver)
         ),
         *by_solver("against the hoof's own sliding", lambda solver: _friction_opposes(case, "walk", solver)),
     )

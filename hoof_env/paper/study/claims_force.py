@@ -58,7 +58,7 @@ def _stiffness(case: Case) -> Examined:
         "stiffness",
         "to prevent an unnatural rise of ground reaction force, the stiffness is no smaller than 2×10^4 N/m",
         "section 3",
-        "",
+        "sensitivity_map",
         findings,
         "Under prescribed motion force grows with stiffness: a lower limit prevents no rise."
         if rises
@@ -153,7 +153,9 @@ def _body_weight(case: Case) -> Examined:
             )
         return same, f"walking and running: {'; '.join(parts)}"
 
-    reading = "a steady gait carries a weight equal to its mean force over the cycle: the same in both gaits"
+    reading = (
+        "a leg that bears the same part of the weight has the same mean force over the cycle in both gaits"
+    )
     return Examined(
         "body.weight",
         "multiple point support occurring in which hoof loaded the body weight at mid-stance",

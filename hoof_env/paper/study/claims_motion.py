@@ -15,6 +15,9 @@ from hoof_env.paper.study.claim import PUBLISHED, Examined, Finding
 APPROXIMATELY = 0.1
 """'Approximately 2.5 times' holds within this part of 2.5 [-]."""
 
+ONE_WAY = 1.05
+"""A turn goes one way if its angle spans no more than this many times its net change [-]."""
+
 SLIDING = 0.05
 """A loaded point that moves slower than this over the ground rolls, faster it slides [m/s]."""
 
@@ -68,12 +71,24 @@ def _step(case: Case) -> Examined:
 
 
 def _walk_phases(case: Case) -> Examined:
+    def one_way(solver: str) -> tuple[bool, str]:
+        trace, stance = case.trace("walk", solver), case.stance("walk", solver)
+        angle = np.degrees(trace["hoof_angle"][(trace["t"] >= stance.start) & (trace["t"] <= stance.end)])
+        net = stance.angle_end_deg - stance.angle_start_deg
+        return bool(np.ptp(angle) <= ONE_WAY * abs(net)), (
+            f"from {stance.angle_start_deg:.1f} to {stance.angle_end_deg:.1f} deg by way of "
+            f"{angle.min():.1f} and {angle.max():.1f} deg"
+        )
+
     return Examined(
         "walk.order",
         "sub-phases from heel-strike, flat and toe-off were gradually generated",
         "section 3",
         "figure4",
-        case.judged("walk.order", "which point touches first and leaves last, and a flat sole between"),
+        (
+            *case.judged("walk.order", "which point touches first and leaves last, and a flat sole between"),
+            *by_solver("gradually: the hoof turns one way from contact to lift-off", one_way),
+        ),
     )
 
 

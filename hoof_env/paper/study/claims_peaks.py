@@ -8,14 +8,17 @@ import numpy as np
 
 from hoof_env.paper.published import CONDITIONS
 from hoof_env.paper.reproduce import GAITS, SOLVERS
-from hoof_env.paper.shapes import PEAK_GAP, find_peaks
-from hoof_env.paper.study.case import Case, by_solver
+from hoof_env.paper.shapes import PEAK_GAP, PROMINENCE, find_peaks
+from hoof_env.paper.study.case import Case, Trace, by_solver
 from hoof_env.paper.study.claim import PUBLISHED, Examined, Finding
 from hoof_env.paper.study.claims_force import on_ground
 from hoof_env.paper.study.section import listed
 
 NEAR = {"outer thirds of stance": 1 / 3, "outer tenths of stance": 0.1}
 """How far from first or last contact 'when the leg first impacts and leaves the ground' reaches [stance]."""
+
+TIE = 0.01
+"""Maxima this close to the highest one [-] may take its place if the motion changes a little."""
 
 RESTITUTIONS = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.0)
 
@@ -34,6 +37,15 @@ def peak_times(case: Case, gait: str, solver: str) -> dict[float, float]:
     return times
 
 
+def _rivals(trace: Trace) -> str:
+    """Other local maxima of the normal force nearly as high as the highest, in words; "" without any."""
+    force, t = trace["normal"], trace["t"]
+    maxima = 1 + np.flatnonzero((np.diff(force)[:-1] > 0) & (np.diff(force)[1:] <= 0))
+    top = int(np.argmax(force))
+    tied = [k for k in maxima if force[k] >= (1 - TIE) * force[top] and abs(t[k] - t[top]) >= PEAK_GAP]
+    return listed(f"{force[k]:.0f} N at {t[k]:.3f} s" for k in tied) if tied else ""
+
+
 def _two_peaks(case: Case) -> Examined:
     def count(solver: str) -> tuple[bool, str]:
         trace = case.trace("walk", solver, "inelastic")
@@ -50,6 +62,7 @@ def _two_peaks(case: Case) -> Examined:
             *case.judged("walk.peaks", "elastic, one in each half of stance, double support in the dip"),
             *by_solver("inelastic, two peaks", count),
         ),
+        f"A maximum counts as a peak if it stands out by {100 * PROMINENCE:g} % of the highest force.",
     )
 
 
@@ -127,7 +140,9 @@ def _delay(case: Case) -> Examined:
 
     def only(solver: str) -> tuple[bool, str]:
         smaller = abs(gap("walk", solver)) < abs(gap("run", solver))
-        return smaller, f"in walking the highest inelastic peak comes {shift('walk', solver)}"
+        rivals = _rivals(case.trace("walk", solver, "inelastic"))
+        others = f"; within {100 * TIE:g} % of it: {rivals}" if rivals else ""
+        return smaller, f"in walking the highest inelastic force comes {shift('walk', solver)}{others}"
 
     findings = (
         *by_solver(f"the peaks are {1000 * PEAK_GAP:.0f} ms or more apart", apart, case.asked("run.peaks")),

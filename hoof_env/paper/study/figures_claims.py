@@ -73,21 +73,32 @@ def draw_gap(case: Case) -> Any:
     """How much earlier or later than on elastic ground the force is highest, against restitution."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(7.5, 3.0), layout="constrained")
+    figure = Figure(figsize=(7.5, 3.3), layout="constrained")
     axes = figure.subplots(1, 2)
     for ax, (gait, name) in zip(axes, NAMES.items(), strict=True):
-        for solver, colour, marker in (("exact", BLUE, "o"), ("paper", ORANGE, "s")):
+        for solver, colour, marker in (
+            ("exact", BLUE, "o"),
+            ("paper", ORANGE, "s"),
+            ("paper, probable beta", GREEN, "^"),
+        ):
             times = peak_times(case, gait, solver)
             shift = 1000 * (np.array(list(times.values())) - times[1.0])
-            ax.plot(list(times), shift, color=colour, marker=marker, ms=3.5, label=f"solver {solver}")
+            ax.plot(
+                list(times),
+                shift,
+                color=colour,
+                marker=marker,
+                ms=3.5,
+                label=f"solver {solver}".replace("beta", "β"),
+            )
         ax.axhline(0, color=GREY, lw=0.6)
         ax.set(
-            title=f"{name.capitalize()}, highest peak",
+            title=f"{name.capitalize()}, highest force",
             xlabel="restitution cr of Eq. 14 [-]",
             xlim=(1.03, -0.03),
         )
-    axes[0].set_ylabel("later than elastic [ms]")
-    axes[0].legend()
+    axes[0].set_ylabel("later than on elastic ground [ms]")
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     return figure
 
 

@@ -94,13 +94,13 @@ def draw_free(data: Mapping[str, Any]) -> Any:
     for exponent, entry in data["exponents"].items():
         line = "-" if exponent == data["exponent"] else next(others)
         sweep = entry["laws"]["exact"]
-        for gait, title in GAITS.items():
+        for gait in GAITS:
             style = {"color": GAIT_COLOURS[gait], "ls": line, "lw": 1.2}
-            right.plot(sweep["delivered"], sweep[gait]["reduction"], label=f"{title.lower()}, n = {exponent}",
-                       **style)  # fmt: skip
+            right.plot(sweep["delivered"], sweep[gait]["reduction"], **style)
             ratio = np.array(sweep[gait]["peak"]) / entry["elastic"][gait]["peak"]
             left.semilogy(sweep["delivered"], ratio, **style)
         left.semilogy(sweep["delivered"], sweep["free_peak"], color=GREY, ls=line, lw=1.2)
+        right.plot([], [], color="black", ls=line, lw=1.2, label=f"n = {exponent}")
     left.plot([], [], color=GREY, label="free impact")
     for gait, title in GAITS.items():
         left.plot([], [], color=GAIT_COLOURS[gait], label=f"{title.lower()}, prescribed motion")
@@ -121,7 +121,7 @@ def draw_curves(curves: Mapping[Any, Any]) -> Any:
     for (gait, law, cr), trace in curves.items():
         bearing = trace["t"][(trace["toe_penetration"] > 0) | (trace["heel_penetration"] > 0)]
         axes[gait].plot(trace["t"], trace["normal"], color=shades[cr], ls="--" if law == "exact" else "-",
-                        lw=1.2, label=f"{law}, nominal {cr:g}")  # fmt: skip
+                        lw=1.2, label=f"{'law exact' if law == 'exact' else law}, cr = {cr:g}")  # fmt: skip
         axes[gait].set_xlim(bearing.min() - 0.02, bearing.max() + 0.02)
     for gait, ax in axes.items():
         ax.set(title=GAITS[gait], xlabel="time [s]", ylim=(0, None))

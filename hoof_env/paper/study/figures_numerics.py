@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hoof_env.paper.figure_style import BLUE, GAITS, GREY, ORANGE, SKY
+from hoof_env.paper.figure_style import BLUE, GAITS, GREY, ORANGE
 from hoof_env.paper.published import Published
 from hoof_env.paper.study.conditions import LEVEL_WINDOW, PART
 from hoof_env.paper.study.conditions_text import bars_spanned
@@ -63,7 +63,7 @@ def draw_beta(data: Mapping[str, Any]) -> Any:
     left, right = figure.subplots(1, 2)
     sweep = data["beta_sweep"]
     for gait, errors in sweep["hoof_mm"].items():
-        left.semilogy(sweep["beta"], errors, color=GREY, ls=LINES[gait], label=GAITS[gait].lower())
+        left.plot(sweep["beta"], errors, color=GREY, ls=LINES[gait], label=GAITS[gait].lower())
     for key, ratios in sweep["peak_ratio"].items():
         gait, condition = key.split(".")
         colour = {"walk": ORANGE, "run": BLUE}[gait]
@@ -80,6 +80,7 @@ def draw_beta(data: Mapping[str, Any]) -> Any:
             )
     right.axhline(1, color=GREY, lw=0.7)
     left.set_ylabel("largest hoof error [mm]")
+    left.set_ylim(0, None)
     right.set_ylabel("peak force over the exact peak [-]")
     left.legend()
     right.legend()
@@ -100,7 +101,10 @@ def draw_step_and_level(data: Mapping[str, Any]) -> Any:
         ticks = [tick for tick in (0.25, 0.5, 1, 2) if min(steps["step_ms"]) <= tick <= max(steps["step_ms"])]
         left.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
         left.minorticks_off()
-        left.set(title=f"{title}, inelastic", ylabel="peak normal force [N]", ylim=(0, None))
+        left.set(title=f"{title}, inelastic", ylabel="peak normal force [N]")
+        low, high = left.get_ylim()
+        if low < high / 2:  # a curve that hardly moves is shown without its zero
+            left.set_ylim(0, None)
         right.set(title=f"{title}, inelastic", xlim=(min(levels["rise_mm"]), max(levels["rise_mm"])))
     axes[1, 0].set_xlabel("time step [ms]")
     axes[1, 1].set_xlabel("rise of the ground [mm]")
@@ -138,17 +142,18 @@ def draw_conditions(published: Published, data: Mapping[str, Any]) -> Any:
         ("paper", "beta", f"β ±{100 * PART:g} %, printed", ORANGE, "^"),
         ("paper, probable beta", "beta", f"β ±{100 * PART:g} %, probable", BLUE, "^"),
         ("paper", "ground", f"ground ±{1e3 * LEVEL_WINDOW:g} mm, printed β", ORANGE, "s"),
-        ("exact", "ground", f"ground ±{1e3 * LEVEL_WINDOW:g} mm, exact", SKY, "s"),
+        ("paper, probable beta", "ground", f"ground ±{1e3 * LEVEL_WINDOW:g} mm, probable β", BLUE, "s"),
+        ("exact", "ground", f"ground ±{1e3 * LEVEL_WINDOW:g} mm, exact", "black", "x"),
     ]
     for solver, parameter, label, colour, marker in columns:
         spans = [bars_spanned(row, data["conditions"][row.id][solver][parameter]) for row in rows]
         known = [(span, k) for k, span in enumerate(spans) if span is not None]
         ax.plot(*np.transpose(known), marker, color=colour, label=label, ms=5,
-                mfc="none" if marker == "^" else colour)  # fmt: skip
+                mfc=colour if marker == "o" else "none")  # fmt: skip
     ax.axvline(1, color=GREY, lw=0.8)
     ax.set_xscale("log")
     ax.set_yticks(range(len(rows)), [row.id for row in rows])
     ax.set(xlabel="highest minus lowest value in the window, in bars [-]", ylim=(len(rows) - 0.5, -0.5))
     ax.grid(axis="y", color="#DDDDDD", lw=0.5)
-    figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=7)
     return figure

@@ -90,15 +90,15 @@ def draw_sweeps(published: Published, data: Mapping[str, Any]) -> Any:
     stiff.set(xlabel="K over the preset's [-]", ylabel="peak over the published peak [-]")
     stiff.set_title("level moved to keep the elastic walking peak", fontsize=8)
     for gait, title in GAITS.items():
-        style = {"color": GAIT_COLOURS[gait], "label": title.lower(), "lw": 1.4}
+        style = {"color": GAIT_COLOURS[gait], "label": title.lower(), "ls": GAIT_LINES[gait], "lw": 1.6}
         friction.plot(data["friction"]["friction"], data["friction"]["by_friction"][gait], **style)
         fast.semilogx(data["friction"]["fast"], data["friction"]["by_fast"][gait], **style)
     mu = np.array(data["friction"]["friction"])
-    friction.plot(mu, np.sqrt(1 + mu**2), color=GREY, lw=0.8, ls=":", label="full slip")
+    friction.plot(mu, np.sqrt(1 + mu**2), color="black", lw=0.8, ls=":", label="full slip")
     friction.set(xlabel="friction coefficient μ [-]", ylabel="resultant over normal peak [-]", xlim=(0, 1))
     fast.set(xlabel="upper threshold of friction [m/s]", ylabel="resultant over normal peak [-]")
-    fast.axhline(np.sqrt(1 + data["parameters"]["friction"] ** 2), color=GREY, lw=0.8, ls=":")
+    fast.axhline(np.sqrt(1 + data["parameters"]["friction"] ** 2), color="black", lw=0.8, ls=":")
     for ax, name in ((friction, "friction"), (fast, "friction_fast")):
-        ax.axvline(data["parameters"][name], color=GREY, lw=0.7)
+        ax.axvline(data["parameters"][name], color=GREY, lw=0.7, ls="--", label="preset")
     friction.legend()
     return figure

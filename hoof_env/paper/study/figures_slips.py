@@ -17,6 +17,11 @@ if TYPE_CHECKING:
     from hoof_env.paper.study.slips_motion import Drift
 
 CASES = {"read": BLUE, "printed": ORANGE, "printed, probable beta": PURPLE}
+LABELS = {
+    "read": "γ as read, printed β",
+    "printed": "γ as printed, printed β",
+    "printed, probable beta": "γ as printed, probable β",
+}
 
 
 def draw_drift(cycles: Mapping[tuple[str, str], Drift]) -> Any:
@@ -28,7 +33,7 @@ def draw_drift(cycles: Mapping[tuple[str, str], Drift]) -> Any:
     for column, (gait, name) in enumerate(NAMES.items()):
         for case, colour in CASES.items():
             cycle = cycles[gait, case]
-            label = f"γ {case}".replace("beta", "β")
+            label = LABELS[case]
             axes[0, column].plot(cycle.t, np.degrees(cycle.crank), color=colour, label=label)
             axes[1, column].plot(cycle.t, 1000 * cycle.gap, color=colour)
         axes[0, column].set(title=name.capitalize())
@@ -57,7 +62,11 @@ def draw_literal_forces(traces: Traces, ground: Ground) -> Any:
         below.plot(trace["t"], literal_friction(trace) / 1000, color=ORANGE)
         below.axhline(0, color=GREY, lw=0.6)
         margin = 0.1 * (stance.end - stance.start)
-        below.set(title="Eq. 15", xlim=(stance.start - margin, stance.end + margin), xlabel="time [s]")
+        below.set(
+            title=f"{name.capitalize()}: Eq. 15",
+            xlim=(stance.start - margin, stance.end + margin),
+            xlabel="time [s]",
+        )
     axes[0, 0].set_ylabel("normal force [kN]")
     axes[1, 0].set_ylabel("friction, forward [kN]\n(letter: kN m/s)")
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3)

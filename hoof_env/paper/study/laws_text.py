@@ -77,7 +77,7 @@ def _restitution(data: Mapping[str, Any]) -> list[str]:
         f"({data['paper_law']}) with cr = {data['paper_restitution']:g}, its 'inelastic' ground, returns e "
         f"= {sweep['delivered'][k]:.3f}. Largest distance of e from the nominal cr: "
         + listed(f"{distance:.3f} ({law})" for law, distance in worst.items())
-        + ".",
+        + ". Here 'exact' is the law whose χ solves that equation, not the solver.",
         _by_law(data, lambda entry, k: f"{entry['delivered'][k]:.3f}"),
     ]
 
@@ -130,15 +130,32 @@ def _why(data: Mapping[str, Any]) -> str:
     curve = _laws(data)["exact"]
     lowest = int(np.argmin(curve["free_peak"]))
     return (
-        f"The inelastic peak is {ratios} times the elastic one because the "
-        "crank drives the hoof down the same path whatever the ground does. Damping then only adds: in "
-        "compression (v > 0) the factor 1 + χ v/v₀ exceeds 1 at the same δ. In a free impact damping also "
-        "takes speed away, and the hoof goes less deep; with the same law and χ the peak of a free mass is "
-        f"{verdict} (over all e the free peak is smallest at e = {curve['delivered'][lowest]:.2f}, "
-        f"{curve['free_peak'][lowest]:.3f}). Nor does e describe the prescribed stance: of the work put "
-        f"into the ground the elastic one gives back all, the paper's inelastic one {returned}, where a "
-        f"free impact would give back e² = {100 * e * e:.0f} %; drives make up the rest."
+        f"The inelastic peak is {ratios} times the elastic one because the crank drives the hoof down the "
+        "same path whatever the ground does. Damping then only adds: in compression (v > 0) the factor 1 + "
+        "χ v/v₀ exceeds 1 at the same δ. In a free impact damping also takes speed away, and the hoof goes "
+        f"less deep; with the same law and χ the peak of a free mass is {verdict} (over all e the free peak "
+        f"is smallest at e = {curve['delivered'][lowest]:.2f}, {curve['free_peak'][lowest]:.3f}"
+        f"{_harder(curve)}). Nor does e describe the prescribed stance: of the work put into the ground the "
+        f"elastic one gives back all, the paper's inelastic one {returned}, where a free impact would give "
+        f"back e² = {100 * e * e:.0f} %; drives make up the rest."
     )
+
+
+def _harder(curve: Mapping[str, Any]) -> str:
+    """Below which restitution a free impact, too, is harder than the elastic one, in words."""
+    below = hardest_free(curve)
+    return f", and above 1 below e = {below:.2f}: so strong a damping raises it too" if below else ""
+
+
+def hardest_free(curve: Mapping[str, Any]) -> float | None:
+    """Restitution below which damping raises the peak of a free mass [-], None if it never does."""
+    e, peak = np.array(curve["delivered"]), np.array(curve["free_peak"])
+    order = np.argsort(e)
+    e, peak = e[order], peak[order]
+    if peak[0] <= 1:
+        return None
+    k = int(np.argmax(peak <= 1))
+    return float(np.interp(1.0, peak[k - 1 : k + 1][::-1], e[k - 1 : k + 1][::-1]))
 
 
 def _exponents(data: Mapping[str, Any]) -> list[str]:
@@ -195,6 +212,12 @@ def _floor(data: Mapping[str, Any]) -> str:
         peak = float(np.interp(STANDARD_FLOOR, floor["floor"], peaks))
         moved = np.flatnonzero(np.abs(peaks / peaks[0] - 1) > 0.01)
         start = f"from {floor['floor'][moved[0]]:.3g} m/s" if moved.size else "nowhere in the sweep"
+        if abs(peak / peaks[0] - 1) < 1e-3:
+            texts.append(
+                f"in {word} the peak moves by more than 1 % {start} and is unchanged at "
+                f"{STANDARD_FLOOR:g} m/s"
+            )
+            continue
         texts.append(
             f"in {word} the peak moves by more than 1 % {start}; at {STANDARD_FLOOR:g} m/s it is {peak:.0f} "
             f"N instead of {peaks[0]:.0f}, a reduction of {100 * (1 - elastic[gait]['peak'] / peak):.1f} % "

@@ -147,9 +147,11 @@ def _causes(data: Mapping[str, Any]) -> list[str]:
 def _sweep(data: Mapping[str, Any]) -> list[str]:
     sweep = data["beta_sweep"]
     beta = np.array(sweep["beta"])
+    found = {gait: int(np.argmin(errors)) for gait, errors in sweep["hoof_mm"].items()}
     best = listed(
-        f"{beta[int(np.argmin(errors))]:g} 1/s in {GAIT_WORDS[gait]} ({min(errors):.2f} mm)"
-        for gait, errors in sweep["hoof_mm"].items()
+        f"{beta[k]:g} 1/s{', the end of the range,' if k == beta.size - 1 else ''} in {GAIT_WORDS[gait]} "
+        f"({sweep['hoof_mm'][gait][k]:.2f} mm)"
+        for gait, k in found.items()
     )
     ranges = {key: (min(ratios), max(ratios)) for key, ratios in sweep["peak_ratio"].items()}
     worst = max(ranges, key=lambda key: ranges[key][1] / ranges[key][0])
@@ -191,6 +193,12 @@ def _level(data: Mapping[str, Any]) -> str:
     )
     if high < SPIKE * max(peaks[0], peaks[-1]):
         return f"{text}, without a spike."
+    top = float(rise[int(peaks.argmax())])
+    placed = (
+        "The identified level lies on its top"
+        if abs(top) < 0.1
+        else f"It is highest with the ground {top:+.2f} mm from this leg's level"
+    )
     wide = rise[peaks >= (low + high) / 2]
     width = wide.max() - wide.min()
     drifts = {name: ladder[0]["walk"]["stance_mm"] for name, ladder in data["drift"].items()}
@@ -202,7 +210,7 @@ def _level(data: Mapping[str, Any]) -> str:
     )
     return (
         f"{text}: a spike, where a point of the hoof touches the ground so gently that Eq. 14 divides by "
-        f"next to nothing. It is highest with the ground {rise[int(peaks.argmax())]:+.2f} mm from this "
-        f"leg's level and {width:.2f} mm wide at half height, against a drift of {drift} in stance: "
-        f"{verdict}."
+        f"next to nothing. {placed}; it is {width:.2f} mm wide at half height, against a drift of {drift} in "
+        f"stance: {verdict}. A published peak that this leg meets only within so narrow a band is fitted, "
+        "and no prediction."
     )

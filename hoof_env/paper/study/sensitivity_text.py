@@ -72,8 +72,9 @@ def _answers(published: Published, data: Mapping[str, Any]) -> list[str]:
         "by central differences: forces in % of the row, which is the elasticity, reductions in points, "
         "the others in their unit. '.resultant' is the same row for the resultant instead of the normal "
         "force; means are over the cycle, however long it lasts. The row that moves by most bars under "
-        f"each parameter: {leaders}."
-        + (f" No row answers to {listed(idle)}." if idle else ""),
+        f"each parameter: {leaders}. These are slopes: a row on a spike over the ground level moves far more "
+        "within 1 mm than its slope says (part 1, 'Condition of each row')."
+        + (f" No row answers to {listed(idle, 'or')}." if idle else ""),
         table(["row", "value", "change in", *(f"{name} {'+1 mm' if name == 'ground' else step}"
                for name in NAMES.values())], lines),
     ]  # fmt: skip
@@ -145,11 +146,23 @@ def _stiffness(published: Published, data: Mapping[str, Any]) -> list[str]:
             f": on this leg, identified {where}, no stiffer ground tried does as well."
             if best is first
             else "."
-        ),
+        )
+        + _own_level(first),
         table(["K over the preset's", "ground [mm]",
                *(f"`{row}` [{published.row(row).unit}]" for row in SHOWN), "rows within bar"],
               [*lines, [*published_line, ""]]),
     ]  # fmt: skip
+
+
+def _own_level(first: Mapping[str, Any]) -> str:
+    """Why the first line of the table is not the leg as identified."""
+    if first["factor"] != 1 or abs(first["rise_mm"]) < 0.05:
+        return ""
+    return (
+        f" The first line is not the leg as identified: its elastic walking peak is not quite the published "
+        f"one, and the {first['rise_mm']:+.1f} mm that make it so move the inelastic walking rows, which "
+        "hang on the level (part 1)."
+    )
 
 
 def _friction(data: Mapping[str, Any]) -> str:

@@ -64,9 +64,9 @@ def _friction_size(traces: Traces) -> Slip:
         wrong /= over_cycle(trace, np.abs(trace["friction"]))
         changes.append(change(*resultants))
         parts.append(
-            f"{NAMES[gait]} up to {sizes[0]:.0f} instead of {sizes[1]:.0f} (number of N), its resultant's "
-            f"peak {resultants[0]:.0f} instead of {resultants[1]:.0f}, and {100 * wrong:.0f} % of the "
-            "friction's impulse turned round"
+            f"{NAMES[gait]} up to {sizes[0]:.0f} N m/s instead of {sizes[1]:.0f} N; taken for "
+            f"newtons, the resultant's peak is {resultants[0]:.0f} N instead of {resultants[1]:.0f}, and "
+            f"{100 * wrong:.0f} % of the friction's impulse is turned round"
         )
         data[gait] = {"friction_N": sizes, "resultant_N": resultants, "impulse_turned": wrong}
     return Slip(

@@ -174,8 +174,9 @@ def _inertia(loads: dict[str, dict[str, dict[str, float]]]) -> Slip:
         "`J_i = 2l/3`",
         "`m L²/3`, L the half-length (a uniform rod about its centre); masses are the leg's data",
         "a length is no moment of inertia",
-        f"its value with half-length l taken as kg m²: the largest {words}. Accelerations differ by "
-        f"{motion:.0e} at most: the crank is driven, so motion and ground force stay",
+        f"its value with half-length l taken as kg m²: the largest at {ANGLES} crank angles: "
+        f"{words}. Accelerations differ by {motion:.0e} at most: the crank is "
+        "driven, so motion and ground force stay",
         UNPRINTED if largest > NOTICED else HARMLESS,
         {"loads": loads},
     )
@@ -189,7 +190,7 @@ def _ground_load(loads: dict[str, dict[str, dict[str, float]]]) -> Slip:
         "`h_i = [0, -m_i g, 0]`, for every link",
         "the sole link carries the ground force and its moment too",
         "else no contact force enters Eq. 8",
-        f"without it the largest {words}; motion and ground force stay",
+        f"without it the largest at {ANGLES} crank angles: {words}; motion and ground force stay",
         UNPRINTED if largest > NOTICED else HARMLESS,
         {},
     )
@@ -206,7 +207,7 @@ def _gamma(cycles: dict[tuple[str, str], Drift]) -> Slip:
         moved = data[f"{gait}, printed"]["peak_change"]
         changes.append(math.inf if moved is None else moved)
         parts.append(
-            f"{gait}: {words[0]} ({1000 * float(read.gap.max()):.1f} mm as read); with beta "
+            f"{gait} (joints open by {1000 * float(read.gap.max()):.1f} mm as read): {words[0]}; with beta "
             f"{PROBABLE_BETA:.1f} {words[1]}"
         )
     return Slip(

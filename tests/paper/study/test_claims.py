@@ -21,7 +21,7 @@ from hoof_env.paper.study.claim import (
 )
 from hoof_env.paper.study.claims import examine_claims
 from hoof_env.paper.study.claims_motion import slip_speed
-from hoof_env.paper.study.claims_peaks import peak_times
+from hoof_env.paper.study.claims_peaks import _rivals, peak_times
 
 
 @pytest.fixture(scope="module")
@@ -172,3 +172,37 @@ def test_figures_are_drawn_and_named_in_the_text(section):
     for name, draw in section.figures.items():
         assert f"({name}.png)" in section.markdown
         assert all(ax.get_xlabel() or ax.get_title() for ax in draw().axes)
+
+
+def test_maxima_as_high_as_the_highest_are_named(case):
+    trace = case.trace("walk", "exact", "inelastic").copy()
+    t = trace["t"]
+    bumps = ((100, 0.3), (99.5, 0.45), (90, 0.6))
+    trace["normal"] = sum(height * np.exp(-(((t - at) / 0.02) ** 2)) for height, at in bumps)
+    assert _rivals(trace) == "100 N at 0.450 s"
+    trace["normal"] = np.exp(-(((t - 0.3) / 0.02) ** 2))
+    assert _rivals(trace) == ""
+
+
+def test_the_horizontal_force_goes_one_way_or_both_as_its_impulses_say(case, found):
+    trace, stance = case.trace("walk", "exact"), case.stance("walk", "exact")
+    inside = (trace["t"] >= stance.start) & (trace["t"] <= stance.end)
+    force = trace["friction"][inside]
+    parts = np.abs([force[force < 0].sum(), force[force > 0].sum()])
+    (finding,) = (
+        f
+        for f in found["walk.direction"]["findings"]
+        if f["reading"].startswith("one way") and f["source"] == "exact"
+    )
+    assert finding["holds"] == (parts.min() / parts.sum() <= 0.02)
+
+
+def test_the_walking_hoof_turns_gradually_only_if_it_never_turns_back(case, found):
+    (finding,) = (
+        f
+        for f in found["walk.order"]["findings"]
+        if f["reading"].startswith("gradually") and f["source"] == "exact"
+    )
+    stance = case.stance("walk", "exact")
+    net = abs(stance.angle_end_deg - stance.angle_start_deg)
+    assert finding["holds"] == (stance.angle_range_deg <= 1.05 * net)

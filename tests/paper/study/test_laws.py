@@ -11,6 +11,7 @@ from hoof_env.paper.measure import POINTS
 from hoof_env.paper.reproduce import GAITS
 from hoof_env.paper.study import laws
 from hoof_env.paper.study.laws import PAPER_LAW, examine_laws, free_peak
+from hoof_env.paper.study.laws_text import hardest_free
 from hoof_env.paper.study.replay import exact_cycle, replay
 
 
@@ -143,3 +144,14 @@ def test_the_section_is_json_and_draws_all_figures_that_it_shows(section):
     for draw in section.figures.values():
         assert draw().axes
     assert "nan" not in section.markdown
+
+
+def test_damping_strong_enough_raises_the_free_peak_too(section):
+    base = section.data["exponents"][section.data["exponent"]]
+    curve = base["laws"]["exact"]
+    e = hardest_free(curve)
+    for delivered, peak in zip(curve["delivered"], curve["free_peak"], strict=True):
+        if abs(delivered - e) > 0.05 and delivered < 1:
+            assert (peak > 1) == (delivered < e)
+    assert f"above 1 below e = {e:.2f}" in section.markdown
+    assert hardest_free({"delivered": [0.5, 1.0], "free_peak": [0.9, 1.0]}) is None
