@@ -17,13 +17,14 @@ import numpy as np
 
 from hoof_env.errors import HoofEnvError, check_choice, check_number
 from hoof_env.gait.parameters import load_gait
+from hoof_env.ground.preset import load_ground
 from hoof_env.identify.candidate import Choice, encode, to_preset
 from hoof_env.identify.confirm import GIVEN_UP, JUDGED, confirm
 from hoof_env.identify.job import CHECKPOINT_EVERY
 from hoof_env.identify.monitor import Monitor
 from hoof_env.identify.problem import EXPONENT, SAMPLES, LegProblem
 from hoof_env.identify.report import Shipped, plausibility_table, versions, write_results
-from hoof_env.identify.schedule import BUDGET, COLD, FROM_PRESET, Schedule
+from hoof_env.identify.schedule import BEYOND, BUDGET, COLD, FROM_PRESET, Schedule
 from hoof_env.identify.search import Outcome, search
 from hoof_env.identify.state import open_state
 from hoof_env.identify.targets import load_targets
@@ -48,6 +49,7 @@ def load_start(start: str, exponent: float = EXPONENT) -> tuple[Choice, tuple[fl
     if start == "cold":
         return None
     try:
+        load_ground(start)  # it plays no part, but a damaged file is not searched from
         walk, run = (load_gait(gait, start) for gait in ("walk", "run"))
         choice, x = encode(load_geometry(start), walk, run, exponent)
     except HoofEnvError as error:
@@ -100,7 +102,7 @@ def identify(
     workers = int(check_number("workers", workers, low=1, high=1024))
     budget = int(check_number("budget", BUDGET if budget is None else budget, low=1, high=1e15))
     problem = LegProblem(load_targets(targets), walk, load_start(start, exponent), beta, exponent)
-    phases = phases or (COLD if problem.start is None else FROM_PRESET)
+    phases = phases or (COLD if problem.start is None else BEYOND if keep_going else FROM_PRESET)
     about = {
         "start": start if problem.start is None else f"{Path(start).stem} ({_start_digest(problem)})",
         "targets": problem.targets.digest,
@@ -109,13 +111,15 @@ def identify(
         "beta": beta,
         "seed": seed,
         "budget": budget,
-        "schedule": _digest([asdict(phase) for phase in phases]),
+        "keep_going": keep_going,
+        "schedule": digest_of([asdict(phase) for phase in phases]),
         "versions": versions(),
     }
     command = f"hoof-env identify --out {shlex.quote(str(out))} --start {shlex.quote(start)} --seed {seed}"
     command += f" --walk {walk} --exponent {exponent:g} --beta {beta} --budget {budget}"
     command += f" --targets {shlex.quote(str(targets))}" if targets else ""
-    state = open_state(out, about, _digest(about), resume=resume)
+    command += " --keep-going" if keep_going else ""
+    state = open_state(out, about, digest_of(about), resume=resume)
     began = time.monotonic()
     try:
         with Monitor(budget, say) as monitor:
@@ -160,8 +164,9 @@ def ship(problem: LegProblem, outcome: Outcome, about: Mapping[str, Any]) -> Shi
 
 def _start_digest(problem: LegProblem) -> str:
     choice, x = problem.start or (None, ())
-    return _digest([choice and choice.to_dict(), x])
+    return digest_of([choice and choice.to_dict(), x])
 
 
-def _digest(content: Any) -> str:
+def digest_of(content: Any) -> str:
+    """16 hexadecimal digits that tell one JSON value from another."""
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]

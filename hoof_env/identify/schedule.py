@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 PAPER_WEIGHT = 12
 """How many evaluations one with the paper's solver counts for: it takes that much longer."""
@@ -48,7 +48,7 @@ class Phase:
     method: str = "cma"
     populations: tuple[int, ...] = (20,)
     rounds: int = 1
-    spreads: tuple[float, ...] = (0.15, 0.3, 0.5)
+    spreads: tuple[float, ...] = (0.0, 0.15, 0.3, 0.5)
     tries: int = 300
     elite: int = 6
     below: float = float("inf")
@@ -104,7 +104,10 @@ _BOTH = Phase(
     ends_at_bar=True,
 )
 
-FROM_PRESET: Schedule = (_START, _AROUND, _SETTLE, _DESCEND, _POLISH, _BOTH)
+FROM_PRESET: Schedule = (_AROUND, _SETTLE, _DESCEND, _POLISH, _BOTH)
+BEYOND: Schedule = (_START, replace(_AROUND, spreads=(0.15, 0.3, 0.5)), _SETTLE, _DESCEND, _POLISH, _BOTH)
+"""For a search that keeps going, whose start may lie within the bars already."""
+
 COLD: Schedule = (_COLD, _SETTLE, _DESCEND, _POLISH, _BOTH)
 
 
