@@ -234,17 +234,7 @@ def test_a_result_survives_json():
 
 def test_phases_come_round_and_round():
     order = [phase.name for _, phase in zip(range(10), (p for _, p in rounds(FROM_PRESET)), strict=False)]
-    once = [
-        "start",
-        "around",
-        "settle",
-        "descend",
-        "polish",
-        "polish",
-        "polish",
-        "both solvers",
-        "both solvers",
-    ]
+    once = ["around", "settle", "descend", "polish", "polish", "polish", "both solvers", "both solvers"]
     assert order == [*once, "around", "settle"]
     assert COLD[0].start == "cold"
 
