@@ -24,6 +24,7 @@ from hoof_env.errors import HoofEnvError, check_number
 from hoof_env.gait.parameters import LIMITS, GaitParameters, load_gait
 from hoof_env.identify.carry_measure import DEMANDS, Carriage, Course, missed
 from hoof_env.identify.command import check_extras
+from hoof_env.identify.workers import end_with_parent, quiet_start
 
 Evaluate = Callable[[list[NDArray[np.float64]]], list[float]]
 
@@ -180,9 +181,10 @@ def _begin(preset: str) -> None:
     _course = Course(preset, SEARCHED)
 
 
-def _begin_quietly(preset: str) -> None:
-    """Set up a process that leaves an interrupt to its parent."""
+def _begin_process(preset: str) -> None:
+    """Set up a process of its own, which leaves an interrupt to its parent and ends with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    end_with_parent()
     _begin(preset)
 
 
@@ -199,8 +201,14 @@ def _evaluator(preset: str | Path, workers: int) -> Iterator[Evaluate]:
         yield lambda generation: [_evaluate(x) for x in generation]
         return
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, context, initializer=_begin_quietly, initargs=(str(preset),)) as pool:
+    with ProcessPoolExecutor(workers, context, initializer=_begin_process, initargs=(str(preset),)) as pool:
+
+        def evaluate(generation: list[NDArray[np.float64]]) -> list[float]:
+            with quiet_start():  # the pool starts its processes as tasks come
+                costs = pool.map(_evaluate, generation)
+            return list(costs)
+
         try:
-            yield lambda generation: list(pool.map(_evaluate, generation))
+            yield evaluate
         except BrokenProcessPool:
             raise HoofEnvError("a process of the search died (out of memory, or killed)") from None

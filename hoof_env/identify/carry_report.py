@@ -13,8 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from hoof_env._output import check_folder, staged
-from hoof_env.errors import HoofEnvError, ParameterError
+from hoof_env.errors import DataFileError, HoofEnvError, OutputError, ParameterError
 from hoof_env.gait.parameters import gait_names, load_gait, paper_gaits
+from hoof_env.ground.preset import load_ground
 from hoof_env.identify.carry import EVALUATIONS, JUDGED, NAME, Found, find_carrying_walk
 from hoof_env.identify.carry_measure import DEMANDS, SETTLE, STRIDES, Carriage, Course, missed
 from hoof_env.identify.report import versions
@@ -63,17 +64,21 @@ def carry(
         raise ParameterError(
             f"out: expected a folder other than that of the preset {preset}, got {str(out)!r}"
         )
+    if target.exists():
+        raise OutputError(f"{str(target)!r} exists already; name another folder")
     budget = EVALUATIONS if evaluations is None else evaluations
     command = f"hoof-env carry --preset {shlex.quote(preset)} --out {shlex.quote(str(out))} --seed {seed}"
     command += f" --evaluations {budget}" + (" --free-crank" if free_crank else "")
-    read_preset(preset)
+    if not isinstance(read_preset(preset).get("gait_provenance", {}), dict):
+        raise DataFileError(f"preset {preset}: expected an object 'gait_provenance'")
+    course = Course(preset, JUDGED)
+    gaits = paper_gaits({name: load_gait(name, preset) for name in gait_names(preset) if name != NAME})
+    load_ground(preset)  # the trunk's ground is another, but a damaged file is not added to
     check_folder(out)
     with _bar(budget, say) as progress:
         found = find_carrying_walk(
             preset, seed=seed, evaluations=budget, workers=workers, free_crank=free_crank, progress=progress
         )
-    course = Course(preset, JUDGED)
-    gaits = paper_gaits({name: load_gait(name, preset) for name in gait_names(preset) if name != NAME})
     rows = {name: course.measure(gait) for name, gait in gaits.items()} | {NAME: found.carriage}
     say(table(rows))
     if found.missed:

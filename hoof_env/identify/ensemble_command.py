@@ -15,21 +15,21 @@ from hoof_env._output import staged
 from hoof_env.errors import (
     DataFileError,
     HoofEnvError,
-    OutputError,
     ParameterError,
     check_choice,
     check_number,
 )
+from hoof_env.ground.contact import Ground
 from hoof_env.ground.preset import load_ground
 from hoof_env.identify.candidate import Choice, names
-from hoof_env.identify.command import _digest, check_extras, load_start
+from hoof_env.identify.command import check_extras, digest_of, load_start
 from hoof_env.identify.confirm import GIVEN_UP, JUDGED
 from hoof_env.identify.ensemble import SOLVERS, to_data, write_member
 from hoof_env.identify.ensemble_attempt import Aim, Attempt
 from hoof_env.identify.ensemble_search import Collection, Start, collect, distance
 from hoof_env.identify.records import Result
 from hoof_env.identify.report import versions
-from hoof_env.identify.state import FOLDER, _read_json, open_state
+from hoof_env.identify.state import FOLDER, open_state, read_json
 from hoof_env.identify.targets import load_targets
 
 NAME = "ensemble.json"
@@ -83,10 +83,15 @@ def ensemble(
     workers = int(check_number("workers", workers, low=1, high=1024))
     bar = check_number("bar", bar, low=0, high=100, exclusive_low=True)
     aim, ground = Aim(load_targets(targets), walk, bar, both, beta), load_ground(preset)
+    if ground.stiffness != Ground().stiffness:
+        raise ParameterError(
+            f"preset {preset}: expected a ground with the paper's stiffness, {Ground().stiffness:g} N/m^n, "
+            f"got {ground.stiffness:g}"
+        )
     legs = load_starts([preset, *starts], aim, ground.exponent)
     about = {
         "ensemble of": Path(preset).stem,
-        "starts": [f"{leg.name} ({_digest([leg.choice.to_dict(), leg.x])})" for leg in legs],
+        "starts": [f"{leg.name} ({digest_of([leg.choice.to_dict(), leg.x])})" for leg in legs],
         "targets": aim.targets.digest,
         "walk": walk,
         "bar": aim.bar,
@@ -98,9 +103,7 @@ def ensemble(
         "size": size,
         "versions": versions(),
     }
-    if not resume and (out / NAME).exists():
-        raise OutputError(f"{str(out)!r} already holds an ensemble; name another folder")
-    state = open_state(out, about, _digest(about), resume=resume)
+    state = open_state(out, about, digest_of(about), resume=resume, kind="collection", product=NAME)
     try:
         found = collect(legs, aim, state, say, size=size, attempts=attempts, seed=seed, workers=workers)
     except KeyboardInterrupt:
@@ -149,7 +152,7 @@ def _results(source: Path, aim: Aim, exponent: float) -> list[Start]:
     best: dict[str, tuple[float, Result]] = {}
     for path in sorted(folder.glob("job-*.json")):
         try:
-            result = Result.from_dict(_read_json(path, "leave this folder out")["result"])
+            result = Result.from_dict(read_json(path, "leave this folder out")["result"])
         except (KeyError, TypeError):
             raise DataFileError(f"start {source}: {path} is damaged; leave this folder out") from None
         merit = result.full if aim.both else result.exact

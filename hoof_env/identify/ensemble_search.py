@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import json
 import multiprocessing
-import os
-import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -24,8 +22,8 @@ from hoof_env.errors import DataFileError, HoofEnvError
 from hoof_env.identify.candidate import Choice
 from hoof_env.identify.ensemble_attempt import Aim, Attempt, Task, attempt, judge
 from hoof_env.identify.records import Array
-from hoof_env.identify.state import State, _read_json, _write
-from hoof_env.identify.workers import _quiet_start
+from hoof_env.identify.state import State, read_json, write
+from hoof_env.identify.workers import end_with_parent, quiet_start
 from hoof_env.leg.linkage import LENGTHS
 
 ROUND = 8
@@ -209,18 +207,18 @@ def _load(state: State, name: str) -> Attempt | None:
     path = state.folder / f"attempt-{name}.json"
     if not path.exists():
         return None
-    data = _read_json(path, "delete it to repeat the attempt")
+    data = read_json(path, "delete it to repeat the attempt")
     try:
-        if data["problem"] == state.digest:
-            return Attempt.from_dict(data["attempt"])
+        digest, made = data["problem"], data["attempt"]
+        state.check(path, digest)
+        return Attempt.from_dict(made)
     except (KeyError, TypeError):
         raise DataFileError(f"{path} is damaged; delete it to repeat the attempt") from None
-    raise DataFileError(f"{path} belongs to another collection; name another folder or delete this one")
 
 
 def _save(state: State, made: Attempt) -> None:
     text = json.dumps({"problem": state.digest, "attempt": made.to_dict()}, indent=1, allow_nan=False)
-    _write(state.folder / f"attempt-{made.id}.json", text.encode())
+    write(state.folder / f"attempt-{made.id}.json", text.encode())
 
 
 @contextmanager
@@ -230,10 +228,10 @@ def _pool(workers: int) -> Iterator[Run]:
         yield lambda function, tasks: (function(task) for task in tasks)
         return
     context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(min(workers, ROUND), context, _end_with_parent)
+    pool = ProcessPoolExecutor(min(workers, ROUND), context, end_with_parent)
 
     def run(function: Callable[[Any], Attempt], tasks: Sequence[Any]) -> Iterator[Attempt]:
-        with _quiet_start():
+        with quiet_start():
             futures = [pool.submit(function, task) for task in tasks]
         try:
             for future in as_completed(futures):
@@ -251,14 +249,3 @@ def _pool(workers: int) -> Iterator[Run]:
         raise
     finally:
         pool.shutdown(cancel_futures=True)
-
-
-def _end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        threading.Thread(target=_exit_after, args=(parent,), daemon=True).start()
-
-
-def _exit_after(parent: Any) -> None:
-    parent.join()
-    os._exit(1)

@@ -74,7 +74,7 @@ def _with_toe(choice: Choice, x: Array, time: float, speed: float) -> Array:
 
 @dataclass(frozen=True)
 class LegProblem:
-    """See `job.Problem`.
+    """See `records.Problem`.
 
     Attributes:
         targets: what is aimed at.

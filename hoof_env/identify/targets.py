@@ -78,6 +78,9 @@ def _read(entry: Any, known: dict[str, PublishedRow], seen: set[str]) -> Publish
     missing = [key for key in ("id", "gait", "quantity", "unit", "published", "bar") if key not in entry]
     if missing:
         raise ParameterError(f"expected also {', '.join(missing)}")
+    for key in ("id", "unit", "quantity"):
+        if not isinstance(entry[key], str):
+            raise ParameterError(f"{key}: expected a string, got {entry[key]!r}")
     if entry["id"] not in known:
         raise ParameterError(f"id: expected one of {', '.join(known)}, got {entry['id']!r}")
     if entry["id"] in seen:
@@ -90,6 +93,8 @@ def _read(entry: Any, known: dict[str, PublishedRow], seen: set[str]) -> Publish
             raise ParameterError(f"{key}: expected {getattr(paper, key)!r}, got {getattr(row, key)!r}")
     if row.bar.limit == 0:
         raise ParameterError(f"bar: expected more than 0, got {row.bar_text!r}")
+    if row.unit == "s" and not 0 <= row.value <= PERIOD:
+        raise ParameterError(f"published: expected an instant from 0 to {PERIOD:g} s, got {row.value:g}")
     if row.unit == "N" and row.value <= 0:
         raise ParameterError(f"published: expected a force above 0 N, got {row.value:g}")
     return row

@@ -94,7 +94,7 @@ class Workers:
 
     def _start(self, count: int) -> None:
         context = multiprocessing.get_context("spawn")
-        with _quiet_start():
+        with quiet_start():
             while len(self._workers) < count:
                 ours, theirs = context.Pipe()
                 process = context.Process(target=_serve, args=(theirs, *self._arguments), daemon=True)
@@ -104,7 +104,7 @@ class Workers:
 
 
 @contextmanager
-def _quiet_start() -> Iterator[None]:
+def quiet_start() -> Iterator[None]:
     """Processes that are started meanwhile leave an interrupt to their parent and use one thread each."""
     old = {name: os.environ.get(name) for name in _ONE_THREAD}
     os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
@@ -143,3 +143,15 @@ def _serve(pipe: Any, problem: Problem, state: State, every: float) -> None:
                 pipe.send(result)
     except (EOFError, BrokenPipeError, ConnectionResetError):
         return  # the parent is gone
+
+
+def end_with_parent() -> None:
+    """Make this process end when its parent does, however that ends; for the workers of a pool."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_exit_after, args=(parent,), daemon=True).start()
+
+
+def _exit_after(parent: Any) -> None:
+    parent.join()
+    os._exit(1)

@@ -180,6 +180,10 @@ def test_the_command_adds_the_gait_and_leaves_the_rest(tmp_path, monkeypatch, co
     assert "| walk | -1.73 | 0.45 |" in table
     assert table.count("| yes |") == 1
     assert (tmp_path / "carry.md").read_text(encoding="utf-8").count("| carrying_walk | ") == 1
+    before = path.read_bytes()
+    assert cli.main(["carry", "--preset", LEG, "--out", str(tmp_path)]) == 2
+    assert "exists already" in capsys.readouterr().err
+    assert path.read_bytes() == before
     assert cli.main(["carry", "--preset", str(path), "--out", str(tmp_path)]) == 2  # would replace its input
     assert "expected a folder other than that of the preset" in capsys.readouterr().err
 

@@ -56,8 +56,9 @@ def test_a_finished_search_is_neither_begun_anew_nor_mixed_with_another(searched
     preset = tmp_path / "other.json"
     preset.write_text(json.dumps(_moved_preset()))
     for arguments, message in [
-        ([], "already holds a search; add --resume"),
+        ([], "already holds a search"),
         (["--resume", "--seed", "1"], "seed is 0 there and 1 here"),
+        (["--resume", "--keep-going"], "keep_going is False there and True here"),
         (["--resume", "--budget", "300"], "budget is 200 there and 300 here"),
         (["--resume", "--walk", "brakes"], "walk is 'walks' there and 'brakes' here"),
         (["--resume", "--start", "cold"], "start is 'first_fit ("),
@@ -99,6 +100,7 @@ def test_a_leg_found_alone_is_not_written_over(tmp_path, capsys):
         (["--targets", "nowhere.json"], "cannot read nowhere.json"),
         (["--start", "STUCK"], "stuck.json: dyad 1 (C-B-P"),
         (["--start", "nobody"], "start nobody: preset: expected one of first_fit"),
+        (["--start", "GROUND"], "ground.json: preset"),
         (["--start", "GAITLESS"], "gait: expected one of walk, got 'run'"),
         (["--start", "SLOW"], "run.crank_speed: expected the paper's 6.283185 rad/s, got 3.0"),
         (["--workers", "0"], "workers: expected a finite number in [1, 1024], got 0"),
@@ -112,7 +114,9 @@ def test_bad_input_is_one_line_before_anything_is_written(tmp_path, capsys, argu
     stuck["geometry"]["lengths"]["CB"] = 0.05
     del gaitless["gaits"]["run"]
     slow["gaits"]["run"]["crank_speed"] = 3.0
+    ground = {**read_preset("first_fit"), "ground": {"exponent": -1}}
     files = {
+        "GROUND": ground,
         "EMPTY": {"rows": []},
         "CONTRADICTION": {"rows": [_row("walk.contact_start", published=0.6), _row("walk.contact_end")]},
         "WEIGHT": {"rows": [_row("walk.duty", weight=-1)]},
@@ -157,7 +161,7 @@ def test_importing_the_command_line_needs_none_of_them(tmp_path):
 def test_an_interrupt_keeps_the_search_and_says_how_to_go_on(tmp_path):
     out = tmp_path / "out"
     process = subprocess.Popen(
-        [*HOOF_ENV, "--out", str(out)],
+        [*HOOF_ENV, "--out", str(out), "--keep-going"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -176,7 +180,7 @@ def test_an_interrupt_keeps_the_search_and_says_how_to_go_on(tmp_path):
     budget = command.BUDGET
     assert kept == (
         f"the search is kept; go on with: hoof-env identify --out {out} --start first_fit --seed 0 "
-        f"--walk walks --budget {budget} --resume"
+        f"--walk walks --exponent 1.375 --beta probable --budget {budget} --keep-going --resume"
     )
     while _alive(process.pid):
         assert time.monotonic() < deadline

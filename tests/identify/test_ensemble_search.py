@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -54,7 +55,7 @@ def silent(line):
 
 
 def gather(out, starts, aim=AIM, resume=False, workers=1, size=3):
-    state = open_state(out, {"a": 1}, "digest", resume=resume)
+    state = open_state(out, {"a": 1}, "digest", resume=resume, kind="collection")
     with patch.object(ensemble_search, "ROUND", 4):
         return collect(starts, aim, state, silent, size=size, attempts=3, seed=3, workers=workers)
 
@@ -69,8 +70,13 @@ def same(one, other):
 
 
 @pytest.fixture(scope="module")
-def whole(start, tmp_path_factory):
-    return gather(tmp_path_factory.mktemp("whole"), [start])
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("whole")
+
+
+@pytest.fixture(scope="module")
+def whole(start, folder):
+    return gather(folder, [start])
 
 
 # --- attempts --------------------------------------------------------------------------------------------
@@ -182,15 +188,20 @@ def test_a_collection_that_was_killed_goes_on_to_the_same_members(start, whole, 
     assert all(f.read_bytes() == c for f, c in kept.items() if f.stem.removeprefix("attempt-") not in judged)
 
 
-def test_a_leg_that_the_full_system_refuses_is_replaced(start, whole, tmp_path, monkeypatch):
+def test_a_leg_that_the_full_system_refuses_is_replaced(start, whole, folder, tmp_path, monkeypatch):
     refused = whole.members[1].id
+    shutil.copytree(folder / "state", tmp_path / "state")
+    file = tmp_path / "state" / f"attempt-{refused}.json"
+    data = json.loads(file.read_text())
+    data["attempt"] |= {"errors": {}, "short": {}}  # as before its verdict
+    file.write_text(json.dumps(data))
 
     def strict(made, aim):
         judged = judge(made, aim)
         return replace(judged, untrue=("it",)) if made.id == refused else judged
 
     monkeypatch.setattr(ensemble_search, "judge", strict)
-    other = gather(tmp_path, [start])
+    other = gather(tmp_path, [start], resume=True)
     assert len(other.members) == 3
     assert refused in [one.id for one in other.refused]
     assert refused not in [one.id for one in other.members]
@@ -232,10 +243,11 @@ def test_a_damaged_attempt_or_one_of_another_collection_is_named(start, tmp_path
         (["--starts", "cold"], "start cold: expected a preset or the folder of a search"),
         (["--starts", PRESET], "starts: expected different legs, got one twice"),
         (["--starts", "EMPTY"], "expected the folder of a search with a leg within 1.5 bars"),
+        (["--preset", "STIFF"], "expected a ground with the paper's stiffness, 20000 N/m^n, got 30000"),
         (["--bar", "0"], "bar: expected"),
         (["--size", "0"], "size: expected"),
         (["--workers", "0"], "workers: expected"),
-        (["--resume"], "holds no search to resume"),
+        (["--resume"], "holds no collection to resume"),
     ],
 )
 def test_bad_input_is_one_line_before_anything_is_written(tmp_path, capsys, arguments, message):
@@ -243,7 +255,13 @@ def test_bad_input_is_one_line_before_anything_is_written(tmp_path, capsys, argu
     stuck["geometry"]["lengths"]["CB"] = 0.05
     (tmp_path / "stuck.json").write_text(json.dumps(stuck))
     (tmp_path / "empty").mkdir()
-    names = {"STUCK": str(tmp_path / "stuck.json"), "EMPTY": str(tmp_path / "empty")}
+    stiff = {**read_preset(PRESET), "ground": {"stiffness": 3e4}}
+    (tmp_path / "stiff.json").write_text(json.dumps(stiff))
+    names = {
+        "STIFF": str(tmp_path / "stiff.json"),
+        "STUCK": str(tmp_path / "stuck.json"),
+        "EMPTY": str(tmp_path / "empty"),
+    }
     given = [names.get(a, a) for a in arguments]
     if "--preset" not in given:
         given += ["--preset", PRESET]
@@ -276,9 +294,9 @@ def test_the_command_writes_an_ensemble_says_how_it_was_found_and_overwrites_not
     members = json.loads(path.read_text())["members"]
     assert members[0]["found"] == {"attempt": "0000-00", "start": "leg"}
     before = path.read_bytes()
-    with pytest.raises(OutputError, match="already holds an ensemble"):
+    with pytest.raises(OutputError, match="already holds a search or what one found"):
         ensemble(out, silent, **options)
-    with pytest.raises(DataFileError, match="another search: seed is 0 there and 1 here"):
+    with pytest.raises(DataFileError, match="another collection: seed is 0 there and 1 here"):
         ensemble(out, silent, **options, seed=1, resume=True)
     assert path.read_bytes() == before
     ensemble(out, silent, **options, resume=True)

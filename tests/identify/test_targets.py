@@ -80,13 +80,17 @@ def test_a_missing_file_is_named(tmp_path):
         ({"bar": "about 2 %"}, "bar: expected 'reported' or a number"),
         ({"bar": "0 s"}, "bar: expected more than 0"),
         ({"unit": "deg", "bar": "1 deg"}, "unit: expected 's', got 'deg'"),
+        ({"id": ["walk.duty"]}, r"id: expected a string, got \['walk\.duty'\]"),
+        ({"unit": ["s"]}, r"unit: expected a string, got \['s'\]"),
+        ({"quantity": 3}, "quantity: expected a string, got 3"),
+        ({"published": 1.1}, "published: expected an instant from 0 to 1 s, got 1.1"),
         ({"gait": "run"}, "gait: expected 'walk', got 'run'"),
         ({"condition": "elastic"}, "condition: expected None, got 'elastic'"),
     ],
 )
 def test_a_wrong_row_is_named_with_what_was_expected(tmp_path, rows, change, message):
     rows["walk.contact_start"].update(change)
-    with pytest.raises(DataFileError, match=rf"targets\.json: row 1 \(walk\.[a-z_]+\): {message}"):
+    with pytest.raises(DataFileError, match=rf"targets\.json: row 1 \(\S*walk\.[a-z_]+\S*\): {message}"):
         load_targets(written(tmp_path, rows))
 
 
