@@ -32,11 +32,13 @@ class Confirmation:
 
     Attributes:
         reproduction: as `hoof_env.paper.reproduce` returns it, its rows compared with the targets.
+        counted: the solvers that count.
         outside: (id, solver) of the rows outside their bars, of the solvers that count.
         untrue: likewise of the required claims that do not hold.
     """
 
     reproduction: Reproduction
+    counted: tuple[str, ...]
     outside: tuple[tuple[str, str], ...]
     untrue: tuple[tuple[str, str], ...]
 
@@ -79,4 +81,4 @@ def confirm(preset: Mapping[str, Any], targets: Targets, walk: str, beta: str = 
         and not claim["readings"].get(READ_AS[walk], claim["holds"])
     ]
     result = replace(run, rows=rows, published=aims, geometry=run.geometry.replace(name="identified"))
-    return Confirmation(result, tuple(outside), tuple(untrue))
+    return Confirmation(result, counts, tuple(outside), tuple(untrue))

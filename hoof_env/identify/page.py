@@ -64,14 +64,18 @@ def _origin(data: Mapping[str, Any]) -> str:
 def _verdict(data: Mapping[str, Any], confirmation: Confirmation | None) -> str:
     if confirmation is None:
         return "**No candidate was found that the full system can simulate.**"
-    rows = ", ".join(
-        "{1} of {2} rows within their bars with solver `{0}`".format(solver, *confirmation.within(solver))
-        for solver in SOLVERS
+    counted, others = (
+        ", ".join(
+            "{1} of {2} rows within their bars with solver `{0}`".format(solver, *confirmation.within(solver))
+            for solver in SOLVERS
+            if (solver in confirmation.counted) == wanted
+        )
+        for wanted in (True, False)
     )
     if confirmation.holds:
-        return f"**The bar is met**: {rows}, every required claim true."
+        return f"**The bar is met**: {counted}, every required claim true. It does not ask for: {others}."
     missing = ", ".join(f"`{name}` ({solver})" for name, solver in confirmation.outside + confirmation.untrue)
-    return f"**The bar is not met**: {rows}. Missing: {missing}."
+    return f"**The bar is not met**: {counted}. It does not ask for: {others}. Missing: {missing}."
 
 
 def _rows_table(confirmation: Confirmation) -> str:
