@@ -338,8 +338,8 @@ def measure_gait(at, velocity, ankle, height, speed, sampled, stiffness, exponen
     h = 2.0 * np.pi / speed / (n - 1)
     enter, leave = press(at, velocity, height, h, sampled, stiffness, exponent, work, out)
     start, end = enter.min(), leave.max()
-    if not 0.0 < start < end < np.inf:
-        return False
+    if not 0.0 < start < end < np.inf or (enter[0] > leave[0] and enter[1] > leave[1]):
+        return False  # no stance, or none that begins and ends within the cycle
     for i in range(2):  # a point that never touches does as the other, and `missing` tells
         if enter[i] > leave[i]:
             enter[i], leave[i] = enter[1 - i], leave[1 - i]

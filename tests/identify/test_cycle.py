@@ -10,6 +10,7 @@ import pytest
 from hoof_env.identify.candidate import LINK9, SWINGS, decode, names, random_choice, random_start
 from hoof_env.identify.cycle import leg_paths, swing_hoof
 from hoof_env.identify.evaluate import construction
+from hoof_env.identify.features import FEATURES, measure_gait
 from hoof_env.identify.objective import Objective
 from hoof_env.leg.geometry import load_geometry, tables
 from hoof_env.leg.kinematics import FrameMotion, pose
@@ -179,3 +180,19 @@ def test_a_swing_about_the_pivot_is_one_about_the_crank_with_a_moving_origin():
     np.testing.assert_allclose(results[0][0] - origin, results[1][0], atol=1e-12)
     np.testing.assert_allclose(results[0][1] - 1j * rate * origin, results[1][1], atol=1e-11)
     np.testing.assert_allclose(results[0][2] - origin.imag, results[1][2], atol=1e-12)
+
+
+def test_points_that_begin_in_the_ground_and_have_no_whole_contact_have_no_stance():
+    """The toe leaves and comes back, the heel leaves: neither has a first contact before its last."""
+    t = np.linspace(0, 1, 101)
+    at = 1j * np.array([(t - 0.1) * (0.3 - t), t - 0.5])
+    velocity = 1j * np.array([0.4 - 2 * t, np.ones_like(t)])
+    found = np.full(1, np.nan, FEATURES)
+    work, speed = np.zeros((7, 101)), 2 * np.pi
+    assert not measure_gait(at, velocity, np.ones(101), 0.0, speed, False, 2e4, 1.5, work, found[0])
+    assert np.isnan(found["contact_start"][0])
+    assert found["start_depth"][0] == pytest.approx(0.5)
+    whole = 1j * np.array([0.01 - (t - 0.3) * (0.6 - t), 0.02 - (t - 0.3) * (0.6 - t)])  # the same way, once
+    rates = 1j * np.array([2 * t - 0.9, 2 * t - 0.9])
+    assert measure_gait(whole, rates, np.ones(101), 0.0, speed, False, 2e4, 1.5, work, found[0])
+    assert 0.3 < found["contact_start"][0] < found["contact_end"][0] < 0.6
