@@ -71,7 +71,7 @@ class HorseLegFixedEnv(HorseLegEnv):
 
     | Name | Default | Unit | Meaning |
     |---|---|---|---|
-    | `gait` | "walk" | | "walk" or "run": a gait of the preset |
+    | `gait` | "walk" | | "walk", "run" or another gait of the preset |
     | `solver` | "exact" | | "exact" or "paper" |
     | `preset` | "identified" | | leg, ground and gaits: a preset's name or a JSON file |
     | `stiffness`, `exponent` | None | N/m^n, - | K and n of Eq. 14; None for the preset's, or 2e4 and 1.5 |
