@@ -46,6 +46,7 @@ def test_reproduce_writes_its_results(tmp_path):
     assert {file.name for file in (tmp_path / "new" / "folder").iterdir()} == {
         "reproduction.json",
         "reproduction.md",
+        "spread.json",
     }
     assert (
         len(json.loads((tmp_path / "new" / "folder" / "reproduction.json").read_text(encoding="utf-8"))) == 99

@@ -247,7 +247,7 @@ def test_bad_arguments_say_what_came_and_what_was_expected(kwargs, message):
 @pytest.mark.parametrize(
     ("kwargs", "message"),
     [
-        ({"gait": "trot"}, "gait: expected one of run, walk, got 'trot'"),
+        ({"gait": "trot"}, "gait: expected one of carrying_walk, run, walk, got 'trot'"),
         ({"solver": "fast"}, "solver: expected one of exact, paper, got 'fast'"),
     ],
 )

@@ -41,7 +41,7 @@ def test_a_search_writes_a_preset_a_file_and_a_page(searched):
     }
     assert done.stderr == ""
     lines = done.stdout.splitlines()
-    assert all(line.startswith("job 000-0") for line in lines[:-1])
+    assert all(line.startswith("job 0") for line in lines[:-1])
     assert len(lines) == 1 + len(list((out / "state").glob("job-*.json")))
     assert lines[-1] == f"3 files written; read {out / 'identify.md'} first"
     assert "seed 0" in load_geometry(out / "identified.json").provenance
