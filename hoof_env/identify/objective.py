@@ -162,14 +162,15 @@ class Objective:
         corners = float(choice.travel), POINTS.index(choice.toe), POINTS.index(choice.heel)
         values, gaits, ovals = np.zeros((len(steps), 7)), np.zeros((2, 4)), np.zeros((2, 2), np.complex128)
         gaits[:, 0] = SPEED
-        work = np.zeros((2, 7, n))
-        self._exact, self._paper, self._gaits, self._work = _Measured(), _Measured(), gaits, work
+        self._exact, self._paper = _Measured(), _Measured()
+        self._steps, self._gaits, self._work = steps, gaits, np.zeros((2, 7, n))
+        self._points, rates = np.zeros((2, points, n), np.complex128)
         self._exact_arguments: tuple[Any, ...] = (
             np.array(choice.assembly, dtype=np.float64), steps, sources, extras,
             choice.swing == "pivot", choice.swing == "oval", *corners, *self._law, self.by_toe,
             values, gaits, ovals,
-            *np.zeros((2, points, n), np.complex128), *np.zeros((2, 2, n), np.complex128),
-            np.zeros(n), work, *self._exact.records,
+            self._points, rates, *np.zeros((2, 2, n), np.complex128),
+            np.zeros(n), self._work, *self._exact.records,
         )  # fmt: skip
         m = PAPER_SAMPLES
         self._paper_arguments: tuple[Any, ...] = (
@@ -239,7 +240,7 @@ class Objective:
 
     def _dyads(self) -> Array:
         """Shortage of each dyad's transmission; that of the leg is the largest of these."""
-        steps, at, demand = *self._exact_arguments[1:17:15], self.demands.index("transmission")
+        steps, at, demand = self._steps, self._points, self.demands.index("transmission")
         _, sense, bound, scale = (column[demand] for column in self._demand[:4])
         dyads = steps[steps[:, 0] == DYAD]
         one, two = (at[dyads[:, 1]] - at[dyads[:, i]] for i in (2, 3))
@@ -290,7 +291,7 @@ class Objective:
         return self._with(x, time, math.log(found["walk.toe_speed"]))
 
     def from_touch_down(self, y: Array) -> Array:
-        """Inverse of `to_touch_down`."""
+        """Inverse of `to_touch_down`, of a walk whose toe comes in once."""
         by_toe = self._other(by_toe=True)
         height = by_toe.measured(y)["leg.hip_height"]
         return self._with(y, height, float(by_toe._gaits[0, 1]))

@@ -240,8 +240,10 @@ def test_level_and_offset_may_be_given_by_the_toes_touch_down(swing):
         np.testing.assert_allclose(by_toe.rows(y), Objective(choice).rows(x), atol=1e-2)
     slower = y.copy()
     slower[17:19] += [0.01, -0.5]
-    found = Objective(choice).measured(by_toe.from_touch_down(slower))
-    np.testing.assert_allclose(found["walk.toe_speed"], np.exp(slower[18]), rtol=5e-2)
+    fine = {"choice": choice, "samples": 1001}
+    found = Objective(**fine).measured(Objective(**fine, by_toe=True).from_touch_down(slower))
+    if not found["walk.extra_entries"]:  # else the speed measured is that of the last entry
+        np.testing.assert_allclose(found["walk.toe_speed"], np.exp(slower[18]), rtol=1e-3)
     toe_down = found["walk.contact_start"] + max(found["walk.toe_after_heel_in"], 0.0)
     np.testing.assert_allclose(toe_down, slower[17], atol=1e-5)
 
