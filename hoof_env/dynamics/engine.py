@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from hoof_env._jit import kernel
 from hoof_env.dynamics.result import Result
 from hoof_env.dynamics.trace import new_trace, record
-from hoof_env.dynamics.trunk import FIXED, SUSPENDED, Trunk
-from hoof_env.errors import ParameterError, check_number
+from hoof_env.dynamics.trunk import FIXED, ONE_LEG, SUSPENDED, Trunk
+from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait.motion_law import (
     MOTION,
     FilterSettings,
@@ -234,7 +234,8 @@ class LegEngine:
         filters: bounds of the command filters.
 
     Raises:
-        ParameterError: `sim_dt` is out of range or too long for the filters or the suspension.
+        ParameterError: `sim_dt` is out of range or too long for the filters or the suspension, or the trunk is
+            free.
     """
 
     def __init__(
@@ -245,6 +246,7 @@ class LegEngine:
         sim_dt: float = 1e-3,
         filters: FilterSettings | None = None,
     ) -> None:
+        check_choice("trunk", trunk.kind, ONE_LEG)
         self.geometry, self.trunk, self.ground = geometry, trunk, ground
         filters = filters or FilterSettings()
         self.sim_dt = check_number("sim_dt", sim_dt, low=1e-7, high=filters.longest_step)

@@ -1,4 +1,4 @@
-"""What the leg hangs from: a trunk that is fixed, on a rail or suspended by the rest of the animal."""
+"""What the legs hang from: a trunk that is fixed, on a rail, suspended by the rest of the animal, or free."""
 
 from __future__ import annotations
 
@@ -9,35 +9,50 @@ import numpy as np
 
 from hoof_env.errors import ParameterError, check_choice, check_number
 
-TRUNKS = ("fixed", "rail", "suspended")
-"""Kinds of trunk; the kernel takes the position in this tuple."""
+TRUNKS = ("fixed", "rail", "suspended", "free")
+"""Kinds of trunk; the kernels take the position in this tuple."""
 
-FIXED, RAIL, SUSPENDED = range(3)
+FIXED, RAIL, SUSPENDED, FREE = range(4)
+
+ONE_LEG = TRUNKS[:FREE]
+"""The kinds that `LegEngine` knows: a free trunk on one leg is no task."""
 
 TRUNK = np.dtype(
     [("kind", "i8")]
     + [
         (name, "f8")
-        for name in ("mass", "total_mass", "share", "stiffness", "damping", "height", "drag", "gravity")
+        for name in (
+            "mass",
+            "total_mass",
+            "share",
+            "stiffness",
+            "damping",
+            "height",
+            "drag",
+            "gravity",
+            "pitch_inertia",
+        )  # fmt: skip
     ]
 )
 
 
 @dataclass(frozen=True)
 class Trunk:
-    """The trunk over one leg; O, the crank centre, is its point.
+    """The trunk over one leg, or over several; with one, O, the crank centre, is its point by default.
 
     "fixed": O stays where it is. "rail": O slides along x at fixed height. "suspended": O moves along x and
     y; the leg must bear `share` of the weight of trunk and leg, the rest of the animal carries the other part
-    and adds a vertical spring and damper towards `height`. The trunk does not pitch.
+    and adds a vertical spring and damper towards `height`. These three do not pitch. "free": the trunk moves along
+    x and y and pitches, under its weight, its drag and its legs.
 
     Attributes:
         kind: one of `TRUNKS`.
-        mass: trunk mass that goes with this leg [kg], without the leg's own.
+        mass: trunk mass that goes with the legs [kg], without their own.
         share: part of the weight that the leg must bear, 0 to 1; "suspended" only.
         stiffness, damping: vertical spring [N/m] and damper [N s/m]; "suspended" only.
         drag: resistance to forward motion [N s/m].
-        height: height of O above the ground [m] where the spring is at rest, or of the rail.
+        height: height of O above the ground [m] where the spring is at rest, of the rail, or at a start.
+        pitch_inertia: of the trunk about its centre of mass [kg m^2]; "free" only.
 
     Raises:
         ParameterError: an unknown kind or a value out of range.
@@ -50,6 +65,7 @@ class Trunk:
     damping: float = 1130.0
     drag: float = 20.0
     height: float = 1.7
+    pitch_inertia: float = 20.0
 
     def __post_init__(self) -> None:
         check_choice("trunk", self.kind, TRUNKS)
@@ -59,12 +75,13 @@ class Trunk:
         check_number("trunk_damping", self.damping, low=0)
         check_number("trunk_drag", self.drag, low=0)
         check_number("trunk_height", self.height, low=0, exclusive_low=True)
+        check_number("trunk_pitch_inertia", self.pitch_inertia, low=0, exclusive_low=True)
 
     def to_record(self, leg_mass: float, gravity: float) -> Any:
         """The settings as one record of dtype `TRUNK` for the kernels."""
         record = np.zeros(1, dtype=TRUNK)[0]
         record["kind"] = TRUNKS.index(self.kind)
-        for name in ("mass", "share", "stiffness", "damping", "height", "drag"):
+        for name in ("mass", "share", "stiffness", "damping", "height", "drag", "pitch_inertia"):
             record[name] = getattr(self, name)
         record["total_mass"], record["gravity"] = self.mass + leg_mass, gravity
         return record

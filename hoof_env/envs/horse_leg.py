@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from hoof_env.dynamics.engine import GRAVITY, LegEngine
 from hoof_env.dynamics.result import Result
 from hoof_env.dynamics.trace import new_trace
-from hoof_env.dynamics.trunk import TRUNKS, Trunk
+from hoof_env.dynamics.trunk import ONE_LEG, Trunk
 from hoof_env.envs import reward
 from hoof_env.envs.observation import HALF_RANGE, MIDDLE, layout, observe
 from hoof_env.envs.stance import LIFT_OFF, new_account, summarize, take_account
@@ -179,7 +179,7 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     ) -> None:
         if render_mode is not None:
             check_choice("render_mode", render_mode, RENDER_MODES)
-        check_choice("trunk", trunk, TRUNKS)
+        check_choice("trunk", trunk, ONE_LEG)
         self.preset, self.geometry = preset, load_geometry(preset)
         self.gaits = {name: load_gait(name, preset) for name in gait_names(preset)}
         self.weights = reward.RewardWeights.of(reward_weights)
