@@ -1,9 +1,9 @@
 """What turns the crank: a prescribed motion, or a motor that can give way.
 
-With a prescribed drive, the paper's, the crank angle is a function of time and of the commands: whatever torque
-that takes is there. A motor is a speed servo with a torque limit, a rotor and a gear, so that a ground force
-slows the crank. The swing is geared to the crank in both: it is a function of the crank angle and of the gait
-parameters.
+With a prescribed drive, the paper's, the crank angle is a function of time and of the commands: whatever
+torque that takes is there. A motor is a speed servo with a torque limit, a rotor and a gear, so that a ground
+force slows the crank. The swing is geared to the crank in both: it is a function of the crank angle and of
+the gait parameters.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ class Prescribed:
 class Motor:
     """A speed servo: torque = speed_gain (commanded - actual crank speed), limited to +-torque_limit.
 
-    The rotor sits on the leg's frame, turns `gear_ratio` times as fast as the crank and in the same sense; what
-    it adds to the crank's inertia is gear_ratio^2 rotor_inertia.
+    The rotor sits on the leg's frame, turns `gear_ratio` times as fast as the crank and in the same sense;
+    what it adds to the crank's inertia is gear_ratio^2 rotor_inertia.
 
     Attributes:
         speed_gain: [N m s/rad], at the crank.

@@ -234,8 +234,8 @@ class LegEngine:
         filters: bounds of the command filters.
 
     Raises:
-        ParameterError: `sim_dt` is out of range or too long for the filters or the suspension, or the trunk is
-            free.
+        ParameterError: `sim_dt` is out of range or too long for the filters or the suspension, or the trunk
+            is free.
     """
 
     def __init__(

@@ -31,7 +31,7 @@ TRUNK = np.dtype(
             "drag",
             "gravity",
             "pitch_inertia",
-        )  # fmt: skip
+        )
     ]
 )
 
@@ -42,8 +42,8 @@ class Trunk:
 
     "fixed": O stays where it is. "rail": O slides along x at fixed height. "suspended": O moves along x and
     y; the leg must bear `share` of the weight of trunk and leg, the rest of the animal carries the other part
-    and adds a vertical spring and damper towards `height`. These three do not pitch. "free": the trunk moves along
-    x and y and pitches, under its weight, its drag and its legs.
+    and adds a vertical spring and damper towards `height`. These three do not pitch. "free": the trunk moves
+    along x and y and pitches, under its weight, its drag and its legs.
 
     Attributes:
         kind: one of `TRUNKS`.
