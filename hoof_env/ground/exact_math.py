@@ -1,0 +1,127 @@
+"""Powers, exponential, cosine and sine that round the same alone and in a vector loop.
+
+Only + - * / and sqrt, which IEEE 754 rounds correctly in scalar and in vector code, and selections; no
+library function, no table, no branch that depends on the data. A loop over lanes that calls these vectorises,
+and its numbers have the bits that one lane alone has. What is not a number stays so.
+
+Sources: Cody & Waite 1980 (Software Manual for the Elementary Functions) for the reduction in two parts;
+the coefficients of sine and cosine are fdlibm's (Sun Microsystems, k_sin.c and k_cos.c, minimax on
+[-pi/4, pi/4]).
+"""
+
+from __future__ import annotations
+
+import math
+
+from hoof_env._jit import kernel
+
+EXPONENT_UNIT = 8
+"""`root_power` knows the exponents that are whole multiples of 1 / EXPONENT_UNIT."""
+
+LOWEST_EXPONENT = -40.0
+"""Below this `exp_of_negative` stays at exp(-40) = 4e-18."""
+
+TWO_OVER_PI = 2 / math.pi
+HALF_PI_HIGH = float.fromhex(
+    "0x1.921fb54400000p+0"
+)  # 33 bits of pi / 2: times a whole number < 2^20 is exact
+HALF_PI_LOW = float.fromhex("0x1.0b4611a626331p-34")  # the rest
+ROUNDER = 1.5 * 2.0**52  # adding and subtracting it rounds to the nearest whole number
+
+
+@kernel
+def root_power(d, eighths):  # type: ignore[no-untyped-def]
+    """d^(eighths / 8) by square roots; 0 for negative d, relative error below 1e-15.
+
+    Args:
+        d: base [any unit].
+        eighths: exponent in eighths, a whole number from 8 to 24 and the same for all lanes.
+    """
+    base = max(d, 0.0)
+    power = base
+    if eighths >= 16:
+        power = power * base
+    if eighths == 24:
+        power = power * base
+    rest = eighths & 7
+    if rest != 0:
+        root = math.sqrt(base)
+        if rest & 4:
+            power = power * root
+        if rest & 3:
+            root = math.sqrt(root)
+            if rest & 2:
+                power = power * root
+            if rest & 1:
+                power = power * math.sqrt(root)
+    return power
+
+
+@kernel
+def root_power_lanes(d, eighths, out):  # type: ignore[no-untyped-def]
+    """`root_power` of each lane: `d` and `out` are rows of one length that do not overlap (it would be slow).
+
+    The compiler takes the branches on `eighths` out of the loop, one loop for each case.
+    """
+    for lane in range(out.size):
+        out[lane] = root_power(d[lane], eighths)
+
+
+@kernel
+def exp_of_negative(x):  # type: ignore[no-untyped-def]
+    """exp(x) for x <= 0, relative error below 1e-13; exp(-40) below -40.
+
+    The series of exp(x / 256), squared eight times.
+    """
+    y = max(x, LOWEST_EXPONENT) * (1 / 256)
+    e = 1 / 3628800
+    e = e * y + 1 / 362880
+    e = e * y + 1 / 40320
+    e = e * y + 1 / 5040
+    e = e * y + 1 / 720
+    e = e * y + 1 / 120
+    e = e * y + 1 / 24
+    e = e * y + 1 / 6
+    e = e * y + 1 / 2
+    e = e * y + 1.0
+    e = e * y + 1.0
+    e = e * e
+    e = e * e
+    e = e * e
+    e = e * e
+    e = e * e
+    e = e * e
+    e = e * e
+    return e * e
+
+
+@kernel
+def cos_sin(angle):  # type: ignore[no-untyped-def]
+    """Cosine and sine of `angle` [rad], error below 2e-16 for |angle| < 1e4."""
+    turns = (angle * TWO_OVER_PI + ROUNDER) - ROUNDER  # quarter turns to the nearest multiple of pi / 2
+    r = (angle - turns * HALF_PI_HIGH) - turns * HALF_PI_LOW
+    z = r * r
+    s = 1.58969099521155010221e-10
+    s = s * z + -2.50507602534068634195e-08
+    s = s * z + 2.75573137070700676789e-06
+    s = s * z + -1.98412698298579493134e-04
+    s = s * z + 8.33333333332248946124e-03
+    s = s * z + -1.66666666666666324348e-01
+    sine = r + r * (z * s)
+    c = -1.13596475577881948265e-11
+    c = c * z + 2.08757232129817482790e-09
+    c = c * z + -2.75573143513906633035e-07
+    c = c * z + 2.48015872894767294178e-05
+    c = c * z + -1.38888888888741095749e-03
+    c = c * z + 4.16666666666666019037e-02
+    half = 0.5 * z
+    main = 1.0 - half
+    cosine = main + (((1.0 - main) - half) + z * (z * c))  # what `main` lost in rounding is put back
+    quadrant = turns - 4.0 * ((turns * 0.25 + ROUNDER) - ROUNDER)  # -2 to 2
+    odd = abs(quadrant) == 1.0
+    x = sine if odd else cosine
+    y = cosine if odd else sine
+    return (
+        -x if (quadrant == 1.0) | (abs(quadrant) == 2.0) else x,
+        -y if (quadrant == -1.0) | (abs(quadrant) == 2.0) else y,
+    )
