@@ -76,7 +76,7 @@ def friction_part(speed, law, slow, fast):  # type: ignore[no-untyped-def]
 
 @kernel
 def friction_part_lanes(speed, law, slow, fast, out):  # type: ignore[no-untyped-def]
-    """`friction_part` of each lane: `speed` and `out` are rows of one length that do not overlap (that is slow).
+    """`friction_part` of each lane: `speed` and `out` are rows of one length that do not overlap (slow).
 
     One loop for each law: the exponential is not computed where the law has none.
     """

@@ -1,4 +1,4 @@
-"""The contact as plain functions is the contact with records: same latch, same forces; energy is accounted for."""
+"""The contact as plain functions is the contact with records: and it accounts for energy."""
 
 import math
 

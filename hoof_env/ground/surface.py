@@ -1,0 +1,65 @@
+"""A terrain as the kernels see it: what the ground is like at x."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoof_env._jit import kernel
+
+
+class TerrainGrid(NamedTuple):
+    """A terrain for the kernels: the arguments of `surface` after x.
+
+    Attributes:
+        cells: one row for each cell, from the level one before the first knot to that behind the last, shape
+            (knots + 1, 8): height, its rise over the cell, normal x and y, factor of stiffness and its rise,
+            factor of friction and its rise.
+        origin: where the first cell begins [m].
+        per_metre: cells in a metre [1/m].
+    """
+
+    cells: NDArray[np.float64]
+    origin: float
+    per_metre: float
+
+
+@kernel
+def surface(x, cells, origin, per_metre):  # type: ignore[no-untyped-def]
+    """The ground at `x` [m]: height [m], normal x and y [-], factors of stiffness and friction [-].
+
+    Args:
+        x: any number; what is not finite gives heights and factors that are none.
+        cells, origin, per_metre: a `TerrainGrid`.
+    """
+    place = (x - origin) * per_metre
+    cell = np.int32(min(max(0.0, place), cells.shape[0] - 1.0))  # this order of arguments sends NaN to cell 0
+    part = place - cell  # the level cells at the ends have no rises: any part will do
+    return (
+        cells[cell, 0] + part * cells[cell, 1],
+        cells[cell, 2],
+        cells[cell, 3],
+        cells[cell, 4] + part * cells[cell, 5],
+        cells[cell, 6] + part * cells[cell, 7],
+    )
+
+
+@kernel
+def surface_lanes(x, cells, origin, per_metre, out):  # type: ignore[no-untyped-def]
+    """`surface` at each of `x`, shape (lanes,), into the five rows of `out`, shape (5, lanes).
+
+    A loop of its own, for its loads from the table are not vector code and would keep the rest from being so;
+    level ground needs none.
+    """
+    if cells.shape[0] == 2:
+        for row, column in ((0, 0), (3, 4), (4, 6)):
+            lanes, value = out[row], cells[0, column]
+            for lane in range(x.size):
+                lanes[lane] = value + 0.0 * ((x[lane] - origin) * per_metre)  # no number where x is none
+        out[1], out[2] = 0.0, 1.0
+    else:
+        for lane in range(x.size):
+            found = surface(x[lane], cells, origin, per_metre)
+            out[0, lane], out[1, lane], out[2, lane], out[3, lane], out[4, lane] = found

@@ -1,0 +1,217 @@
+"""The shape of the ground along x, and where it is softer, harder or more slippery than `Ground` says.
+
+Height and the two factors are given at evenly spaced knots and are linear between them, so that nothing jumps
+but the slope; beyond the first and the last knot the ground goes on level with their values.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hoof_env.errors import ParameterError, check_number
+from hoof_env.ground.surface import TerrainGrid
+
+MOST_KNOTS = 1_000_000
+
+LONG_WAY = 1000.0
+"""How far `Terrain.slope` goes on either side of x = 0 [m]."""
+
+
+@dataclass(frozen=True)
+class Terrain:
+    """Height and factors along x at the knots start + k spacing; `Terrain()` is flat.
+
+    What a point at (x, y) meets is the straight piece at its x, with normal (nx, ny): penetration
+    (height - y) ny, rate -(vx nx + vy ny), sliding velocity vx ny - vy nx. Where two pieces meet at an angle,
+    penetration, normal and so the force on a point inside the ground jump: make a sharp corner of small ones.
+
+    Attributes:
+        height: at the knots [m].
+        stiffness: factor on `Ground.stiffness` at the knots [-]; a number is for all knots.
+        friction: factor on `Ground.friction` at the knots [-]; a number is for all knots.
+        start: x of the first knot [m].
+        spacing: between knots [m].
+
+    Raises:
+        ParameterError: a value is not finite or out of range, or the lengths differ.
+    """
+
+    height: tuple[float, ...] = (0.0,)
+    stiffness: tuple[float, ...] | float = 1.0
+    friction: tuple[float, ...] | float = 1.0
+    start: float = 0.0
+    spacing: float = 1.0
+
+    def __post_init__(self) -> None:
+        height = _row("terrain.height", self.height, -1e4, 1e4, None)
+        object.__setattr__(self, "height", height)
+        for name, low in (("stiffness", 1e-6), ("friction", 0.0)):
+            row = _row(f"terrain.{name}", getattr(self, name), low, 1e6, len(height))
+            object.__setattr__(self, name, row)
+        object.__setattr__(self, "start", check_number("terrain.start", self.start, low=-1e6, high=1e6))
+        object.__setattr__(self, "spacing", check_number("terrain.spacing", self.spacing, low=1e-4, high=1e6))
+
+    @classmethod
+    def flat(cls) -> Terrain:
+        """Level at y = 0, as `Ground` says everywhere."""
+        return cls()
+
+    @classmethod
+    def slope(cls, angle: float) -> Terrain:
+        """One slope through (0, 0), from x = -1 km to 1 km; `angle` [rad], positive uphill, within 1.4."""
+        rise = LONG_WAY * math.tan(check_number("angle", angle, low=-1.4, high=1.4))
+        return cls(height=(-rise, rise), start=-LONG_WAY, spacing=2 * LONG_WAY)
+
+    @classmethod
+    def ramp(cls, angle: float, start: float = 0.0, length: float = 10.0) -> Terrain:
+        """Level at y = 0 up to `start`, a slope of `angle` [rad] over `length` of x, then level [m]."""
+        length = check_number("length", length, low=1e-4, high=1e6)
+        rise = length * math.tan(check_number("angle", angle, low=-1.4, high=1.4))
+        return cls(height=(0.0, rise), start=start, spacing=length)
+
+    @classmethod
+    def through(
+        cls,
+        x: ArrayLike,
+        height: ArrayLike,
+        stiffness: ArrayLike = 1.0,
+        friction: ArrayLike = 1.0,
+        spacing: float = 0.01,
+    ) -> Terrain:
+        """Straight lines through points at any increasing `x` [m], sampled every `spacing` [m].
+
+        A corner that is not a whole number of spacings from the first point is cut off within one spacing.
+
+        Args:
+            x: shape (n,), n >= 2.
+            height, stiffness, friction: as in `Terrain`, at `x`.
+            spacing: [m].
+
+        Raises:
+            ParameterError: as in `Terrain`; x does not increase.
+        """
+        points = np.array(_row("x", x, -1e6, 1e6, None))
+        if points.size < 2 or np.diff(points).min() <= 0:
+            raise ParameterError(f"x: expected two or more increasing numbers, got {_short(x)}")
+        knots = _knots(points[0], points[-1], spacing)
+        rows = {
+            name: np.interp(knots, points, _row(name, values, -np.inf, np.inf, points.size))
+            for name, values in (("height", height), ("stiffness", stiffness), ("friction", friction))
+        }
+        return cls(
+            **{name: tuple(row.tolist()) for name, row in rows.items()}, start=points[0], spacing=spacing
+        )
+
+    @classmethod
+    def patches(cls, patches: Iterable[Sequence[float]], spacing: float = 0.01) -> Terrain:
+        """Flat ground with patches of another kind.
+
+        Args:
+            patches: (x0, x1, factor of stiffness, factor of friction) each; they may touch, not overlap.
+                Edges are rounded to whole spacings from the first x0, and outside them the factors change
+                back over one spacing.
+            spacing: [m].
+
+        Raises:
+            ParameterError: a patch is not of that form, or patches overlap.
+        """
+        rows = []
+        for number, patch in enumerate(patches):
+            values = _row(f"patches[{number}]", patch, -1e6, 1e6, None)
+            if len(values) != 4 or values[0] >= values[1]:
+                raise ParameterError(
+                    f"patches[{number}]: expected (x0, x1, stiffness, friction) with x0 < x1, "
+                    f"got {_short(patch)}"
+                )
+            rows.append(values)
+        rows.sort()
+        if not rows:
+            return cls()
+        for before, after in pairwise(rows):
+            if before[1] > after[0]:
+                raise ParameterError(
+                    f"patches: expected patches apart from each other, got {before} and {after}"
+                )
+        start = rows[0][0] - spacing
+        factors = np.ones((2, _knots(start, rows[-1][1] + spacing, spacing).size))
+        for x0, x1, *pair in rows:
+            inside = slice(round((x0 - start) / spacing), round((x1 - start) / spacing) + 1)
+            factors[:, inside] = np.array(pair)[:, None]
+        stiffness, friction = (tuple(row.tolist()) for row in factors)
+        return cls((0.0,) * len(stiffness), stiffness, friction, start, spacing)
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Terrain:
+        """The terrain that `to_dict` wrote; what is left out is the default.
+
+        Raises:
+            ParameterError: an unknown entry or a bad value.
+        """
+        names = ", ".join(field.name for field in fields(cls))
+        if not isinstance(data, Mapping) or set(data) - set(names.split(", ")):
+            raise ParameterError(
+                f"terrain: expected an object with no other entries than {names}, got {_short(data)}"
+            )
+        return cls(**data)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Entries that JSON can hold; numbers keep their bits."""
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
+
+    @property
+    def x(self) -> NDArray[np.float64]:
+        """Where the knots are [m]."""
+        return self.start + self.spacing * np.arange(len(self.height), dtype=np.float64)
+
+    def height_at(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Height [m] at `x` [m], same shape."""
+        return np.interp(x, self.x, self.height)
+
+    def to_grid(self) -> TerrainGrid:
+        """The terrain for the kernel `surface`."""
+        rows = np.array([self.height, self.stiffness, self.friction])
+        rows = np.pad(rows, ((0, 0), (1, 1)), mode="edge") + 0.0  # no -0.0
+        rises = np.diff(rows, axis=1)
+        slope = rises[0] / self.spacing
+        ny = 1 / np.sqrt(1 + slope**2)
+        (height, stiffness, friction), (rise, harder, rougher) = rows[:, :-1], rises
+        cells = np.column_stack([height, rise, 0.0 - slope * ny, ny, stiffness, harder, friction, rougher])
+        return TerrainGrid(np.ascontiguousarray(cells), self.start - self.spacing, 1 / self.spacing)
+
+
+def _knots(start: float, end: float, spacing: float) -> NDArray[np.float64]:
+    """From `start` to `end` or just beyond it [m]."""
+    check_number("terrain.spacing", spacing, low=1e-4, high=1e6)
+    count = math.ceil((end - start) / spacing - 1e-6) + 1
+    if count > MOST_KNOTS:
+        raise ParameterError(
+            f"terrain.spacing: expected at most {MOST_KNOTS} knots from {start:g} to {end:g} m, "
+            f"got {spacing!r} m"
+        )
+    return start + spacing * np.arange(count, dtype=np.float64)
+
+
+def _row(name: str, values: Any, low: float, high: float, count: int | None) -> tuple[float, ...]:
+    """`values` as `count` floats within [low, high], from one number or as many; any number for None."""
+    if count is not None and np.ndim(values) == 0:
+        return (check_number(name, values, low=low, high=high),) * count
+    try:
+        row = tuple(check_number(f"{name}[{k}]", value, low=low, high=high) for k, value in enumerate(values))
+    except TypeError:
+        row = ()
+    if isinstance(values, (str, bytes)) or not 0 < len(row) <= MOST_KNOTS or (count and len(row) != count):
+        raise ParameterError(f"{name}: expected {count or 'a row of'} numbers, got {_short(values)}")
+    return row
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 80 else f"{text[:80]}..."

@@ -1,0 +1,161 @@
+"""Terrain: the table of the kernel is the piecewise linear ground that was asked for; bad input is named."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hoof_env.errors import ParameterError
+from hoof_env.ground.surface import surface, surface_lanes
+from hoof_env.ground.terrain import LONG_WAY, Terrain
+
+
+@st.composite
+def terrains(draw):
+    count = draw(st.integers(1, 12))
+
+    def row(low, high):
+        return st.lists(st.floats(low, high), min_size=count, max_size=count).map(tuple)
+
+    return Terrain(
+        draw(row(-2, 2)),
+        draw(row(0.1, 10)),
+        draw(row(0, 3)),
+        draw(st.floats(-20, 20)),
+        draw(st.floats(0.01, 5)),
+    )
+
+
+def at(terrain, x):
+    return np.array([surface(v, *terrain.to_grid()) for v in np.atleast_1d(x)]).T
+
+
+@given(terrains(), st.lists(st.floats(-100, 100), min_size=1, max_size=20))
+@settings(deadline=None, max_examples=200)
+def test_it_is_linear_between_the_knots_and_level_beyond(terrain, x):
+    height, nx, ny, stiffness, friction = at(terrain, x)
+    for found, knots in ((height, "height"), (stiffness, "stiffness"), (friction, "friction")):
+        assert found == pytest.approx(np.interp(x, terrain.x, getattr(terrain, knots)), rel=1e-9, abs=1e-9)
+    np.testing.assert_array_equal(terrain.height_at(np.array(x)), np.interp(x, terrain.x, terrain.height))
+    assert nx**2 + ny**2 == pytest.approx(np.ones(len(x)))
+    assert (ny > 0).all()
+
+
+@given(terrains())
+@settings(deadline=None, max_examples=200)
+def test_nothing_jumps_at_a_knot(terrain):
+    near = 1e-9
+    before, after = at(terrain, terrain.x - near), at(terrain, terrain.x + near)
+    assert before[[0, 3, 4]] == pytest.approx(after[[0, 3, 4]], abs=2 * near * 10 / terrain.spacing + 1e-12)
+
+
+@given(terrains(), st.floats(-30, 30))
+@settings(deadline=None, max_examples=200)
+def test_the_normal_stands_on_the_slope(terrain, x):
+    step = terrain.spacing * 1e-4
+    place = (x - terrain.start) / terrain.spacing
+    if abs(place - round(place)) < 2e-4:
+        return
+    behind, here, ahead = at(terrain, [x - step, x, x + step]).T
+    assert here[1] * 2 * step + here[2] * (ahead[0] - behind[0]) == pytest.approx(0, abs=1e-12)
+
+
+def test_flat_ground_is_exactly_that_of_the_laws():
+    assert Terrain.flat() == Terrain()
+    for x in (-1e6, -0.3, 0.0, 1e6):
+        assert surface(x, *Terrain().to_grid()) == (0, 0, 1, 1, 1)
+
+
+@pytest.mark.parametrize("angle", [-0.3, 0.1, 0.5])
+def test_slopes_and_ramps(angle):
+    for x in (-200.0, 0.0, 3.0):
+        height, nx, ny, *_ = surface(x, *Terrain.slope(angle).to_grid())
+        assert height == pytest.approx(x * math.tan(angle), abs=1e-12)
+        assert (nx, ny) == pytest.approx((-math.sin(angle), math.cos(angle)))
+    assert surface(2 * LONG_WAY, *Terrain.slope(angle).to_grid())[2] == 1
+    ramp = Terrain.ramp(angle, start=1.0, length=2.0)
+    assert ramp.height_at(np.array([0.0, 1.0, 2.0, 3.0, 9.0])) == pytest.approx(
+        np.tan(angle) * np.array([0, 0, 1, 2, 2])
+    )
+
+
+def test_patches():
+    soft_then_ice = Terrain.patches([(2.0, 3.0, 1.0, 0.1), (0.5, 1.5, 0.2, 1.5)], spacing=0.05)
+    _, _, _, stiffness, friction = at(
+        soft_then_ice, [0.0, 0.45, 0.5, 1.0, 1.5, 1.55, 1.8, 2.0, 2.99, 3.05, 9.0]
+    )
+    assert stiffness == pytest.approx([1, 1, 0.2, 0.2, 0.2, 1, 1, 1, 1, 1, 1])
+    assert friction == pytest.approx([1, 1, 1.5, 1.5, 1.5, 1, 1, 0.1, 0.1, 1, 1])
+    assert set(soft_then_ice.height) == {0}
+    assert Terrain.patches([]) == Terrain.flat()
+
+
+def test_lines_through_uneven_points():
+    hill = Terrain.through([0, 0.3, 1.0], [0, 0.1, 0.0], friction=[1, 0.5, 0.5], spacing=0.05)
+    x = np.linspace(-1, 2, 301)
+    assert hill.height_at(x) == pytest.approx(np.interp(x, [0, 0.3, 1.0], [0, 0.1, 0.0]), abs=1e-12)
+    assert at(hill, 0.15)[4] == pytest.approx([0.75])
+
+
+@given(terrains())
+@settings(deadline=None, max_examples=100)
+def test_it_comes_back_from_json(terrain):
+    assert Terrain.from_dict(json.loads(json.dumps(terrain.to_dict()))) == terrain
+
+
+def test_what_is_not_a_number_stays_so():
+    for terrain in (Terrain(), Terrain.ramp(0.2)):
+        height, _, _, stiffness, friction = surface(math.nan, *terrain.to_grid())
+        assert np.isnan([height, stiffness, friction]).all()
+        out = np.empty((5, 1))
+        surface_lanes(np.array([math.nan]), *terrain.to_grid(), out)
+        assert np.isnan(out[[0, 3, 4]]).all()
+
+
+@given(terrains(), st.integers(1, 100))
+@settings(deadline=None, max_examples=50)
+def test_a_lane_has_the_bits_that_it_has_alone(terrain, lanes):
+    x = np.random.default_rng(lanes).uniform(-100, 100, lanes)
+    out = np.empty((5, lanes))
+    surface_lanes(x, *terrain.to_grid(), out)
+    np.testing.assert_array_equal(out.view(np.int64), np.ascontiguousarray(at(terrain, x)).view(np.int64))
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Terrain(()), r"terrain.height: expected a row of numbers, got \(\)"),
+        (lambda: Terrain(3.0), "terrain.height: expected a row of numbers, got 3.0"),
+        (lambda: Terrain("012"), "terrain.height"),
+        (lambda: Terrain((0, math.nan)), r"terrain.height\[1\]: expected a finite number"),
+        (
+            lambda: Terrain((0, 1), stiffness=(1, 1, 1)),
+            r"terrain.stiffness: expected 2 numbers, got \(1, 1, 1\)",
+        ),
+        (lambda: Terrain((0, 1), stiffness=0), "terrain.stiffness: expected .*got 0"),
+        (lambda: Terrain((0, 1), friction=(1, -1)), r"terrain.friction\[1\]: expected .*got -1"),
+        (lambda: Terrain((0, 1), spacing=0), "terrain.spacing: expected .*got 0"),
+        (lambda: Terrain((0, 1), start=math.inf), "terrain.start: expected a finite number"),
+        (lambda: Terrain.slope(1.6), "angle: expected .*got 1.6"),
+        (lambda: Terrain.ramp(0.1, length=-1), "length: expected .*got -1"),
+        (
+            lambda: Terrain.through([0, 0], [1, 1]),
+            r"x: expected two or more increasing numbers, got \[0, 0\]",
+        ),
+        (lambda: Terrain.through([0, 1], [1]), "height: expected 2 numbers"),
+        (lambda: Terrain.through([0, 1e6], [1, 1]), "terrain.spacing: expected at most .* knots"),
+        (lambda: Terrain.patches([(1, 0, 1, 1)]), r"patches\[0\]: expected \(x0, x1, .*got \(1, 0, 1, 1\)"),
+        (lambda: Terrain.patches([(0, 1, 1)]), r"patches\[0\]: expected \(x0, x1"),
+        (lambda: Terrain.patches([1]), r"patches\[0\]: expected a row of numbers, got 1"),
+        (lambda: Terrain.patches([(0, 2, 1, 1), (1, 3, 1, 1)]), "patches: expected patches apart"),
+        (lambda: Terrain.patches([(0, 2, 1, 1)], spacing=0), "terrain.spacing"),
+        (lambda: Terrain.from_dict({"heights": [0]}), "no other entries than height, .*got .*heights"),
+        (lambda: Terrain.from_dict([]), "terrain: expected an object"),
+    ],
+)
+def test_bad_input_is_named(make, message):
+    with pytest.raises(ParameterError, match=message):
+        make()
