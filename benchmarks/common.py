@@ -1,0 +1,230 @@
+"""What the peers share: links and pins of the leg, a pose to start from, ground forces from outside.
+
+The peers take this project's world: x forward, y up, angles counter-clockwise; planar vectors are complex.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoof_env.dynamics.limb import Limb
+from hoof_env.ground.contact import Ground, new_contacts, touch
+from hoof_env.leg.kinematics import FrameMotion, Pose, cross, pose
+from hoof_env.leg.linkage import BODIES, FRAME, JOINTS
+
+Pins = dict[tuple[str, str, str], list[tuple[int, int]]]
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """The leg as rigid links and the pins between them.
+
+    Attributes:
+        links: by name, the bodies of `linkage.BODIES` in each, zero-based.
+        tree: every link, the one (or "frame") that carries it and the pin between them, carriers first.
+    """
+
+    links: dict[str, tuple[int, ...]]
+    tree: tuple[tuple[str, str, str], ...]
+
+    @cached_property
+    def pins(self) -> Pins:
+        """(point, link, other) with the rows of `linkage.JOINTS` in it and their signs: the force that `link`
+        feels from `other` is their signed sum."""
+        link_of = {FRAME: "frame"} | {body: link for link, bodies in self.links.items() for body in bodies}
+        pins: Pins = {}
+        for row, joint in enumerate(JOINTS):
+            one, two = link_of[joint.i], link_of[joint.j]
+            if one == two:
+                continue  # the inside of a rigid link
+            if (joint.point, two, one) in pins:
+                pins[joint.point, two, one].append((row, -1))
+            else:
+                pins.setdefault((joint.point, one, two), []).append((row, 1))
+        return pins
+
+    @cached_property
+    def carrier(self) -> dict[str, tuple[str, str]]:
+        """(carrier, pin) of each link."""
+        return {link: (parent, point) for link, parent, point in self.tree}
+
+    @cached_property
+    def loops(self) -> tuple[tuple[str, str, str], ...]:
+        """The pins that the tree leaves open."""
+        carrier = self.carrier
+        return tuple(
+            (point, one, two)
+            for point, one, two in self.pins
+            if carrier[one] != (two, point) and carrier.get(two) != (one, point)
+        )
+
+    def pin_forces(self, joints: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Forces at the pins [N], shape (..., pins, 2), from those at the joints, shape (..., 20, 2)."""
+        signed = [sum(sign * joints[..., row, :] for row, sign in rows) for rows in self.pins.values()]
+        return np.stack(signed, axis=-2)
+
+
+RIGID = Assembly(
+    {
+        "crank": (0,),
+        "coupler": (1,),
+        "triangle": (2, 3, 4),
+        "rod": (5,),
+        "shank": (6, 9),
+        "rocker": (7,),
+        "strut": (8,),
+        "hoof": (10, 12, 13),
+        "tie rod": (11,),
+    },
+    (
+        ("crank", "frame", "O"),
+        ("coupler", "crank", "P"),
+        ("strut", "crank", "P"),
+        ("triangle", "frame", "C"),
+        ("rod", "triangle", "D"),
+        ("rocker", "frame", "C"),
+        ("tie rod", "rocker", "A"),
+        ("shank", "rocker", "F"),
+        ("hoof", "shank", "G"),
+    ),
+)
+"""Both triangles and the locked shank each as one: 9 links, 13 pins, 4 loops."""
+
+_NAMES = {0: "crank", 6: "shank", 10: "hoof"}  # which the peers look for
+
+ALL = Assembly(
+    {_NAMES.get(k, f"link {k + 1}"): (k,) for k in range(len(BODIES))},
+    (
+        ("crank", "frame", "O"),
+        ("link 2", "crank", "P"),
+        ("link 9", "crank", "P"),
+        ("link 3", "frame", "C"),
+        ("link 5", "frame", "C"),
+        ("link 4", "link 5", "D"),
+        ("link 6", "link 4", "D"),
+        ("link 8", "frame", "C"),
+        ("link 12", "link 8", "A"),
+        ("shank", "link 8", "F"),
+        ("link 10", "shank", "F"),
+        ("hoof", "link 10", "G"),
+        ("link 13", "link 10", "G"),
+        ("link 14", "link 13", "I"),
+    ),
+)
+"""As the paper has it: 14 links, 20 pins, 6 loops and a lock."""
+
+LOCKED = "link 10"
+"""The link of `ALL` that the lock holds to its carrier."""
+
+
+@dataclass(frozen=True)
+class Start:
+    """How a horse begins.
+
+    Attributes:
+        crank, crank_speed: of each leg [rad, rad/s].
+        swing: phi of each leg [rad].
+        swing_sin, swing_cos: how phi follows the crank from there, the gait's two coefficients [rad].
+        position, velocity: of the trunk's point, x and y [m, m/s].
+        pitch, pitch_rate: of the trunk [rad, rad/s].
+    """
+
+    crank: tuple[float, ...]
+    crank_speed: tuple[float, ...]
+    swing: tuple[float, ...]
+    swing_sin: tuple[float, ...] = ()
+    swing_cos: tuple[float, ...] = ()
+    position: tuple[float, float] = (0.0, 0.0)
+    velocity: tuple[float, float] = (0.0, 0.0)
+    pitch: float = 0.0
+    pitch_rate: float = 0.0
+
+    @property
+    def swings(self) -> bool:
+        """Whether phi moves at all."""
+        return any(self.swing_sin) or any(self.swing_cos)
+
+    def phi(self, leg: int, theta: float) -> tuple[float, float]:
+        """Swing of a leg at a crank angle, and its slope by the crank angle."""
+        a = self.swing_sin[leg] if self.swing_sin else 0.0
+        b = self.swing_cos[leg] if self.swing_cos else 0.0
+        s0, c0, s, c = *_circle(self.crank[leg]), *_circle(theta)
+        return self.swing[leg] + a * (s - s0) + b * (c - c0), a * c - b * s
+
+    def poses(self, limbs: Sequence[Limb]) -> list[Pose]:
+        """Every point and body of each leg."""
+        poses = []
+        for i, limb in enumerate(limbs):
+            sigma = limb.geometry.travel
+            arm = complex(*limb.hip) * np.exp(1j * self.pitch)
+            at, velocity = complex(*self.position) + arm, complex(*self.velocity) + 1j * self.pitch_rate * arm
+            frame = FrameMotion(
+                phi=self.swing[i] + sigma * self.pitch,
+                phi_rate=self.phi(i, self.crank[i])[1] * self.crank_speed[i] + sigma * self.pitch_rate,
+                position=(at.real, at.imag),
+                velocity=(velocity.real, velocity.imag),
+            )
+            poses.append(pose(limb.geometry, self.crank[i], self.crank_speed[i], frame=frame))
+        return poses
+
+
+def _circle(angle: float) -> tuple[float, float]:
+    return math.sin(angle), math.cos(angle)
+
+
+@dataclass
+class Record:
+    """What a peer saw at each sample; rows are samples, columns legs.
+
+    Attributes:
+        t: [s]. crank, crank_speed: [rad, rad/s]. body: x, y, pitch of the trunk and their rates, (samples, 6).
+        crank_torque, hip_torque: along theta and phi [N m]; the hip's is what the swing takes beside the crank.
+        pins: forces [N], shape (samples, legs, pins, 2), in the order of the assembly's pins.
+        closure: the widest gap of a loop [m].
+    """
+
+    t: NDArray[np.float64]
+    crank: NDArray[np.float64]
+    crank_speed: NDArray[np.float64]
+    body: NDArray[np.float64]
+    crank_torque: NDArray[np.float64]
+    hip_torque: NDArray[np.float64]
+    pins: NDArray[np.float64]
+    closure: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, rows: Sequence[tuple[Any, ...]]) -> Record:
+        """From one tuple a sample, in the order of the attributes."""
+        return cls(*(np.array(column) for column in zip(*rows, strict=True)))
+
+
+Outside = Callable[[int, int, float, complex, complex, bool], complex]
+"""force(limb, point, t, position, velocity, commit): what the world puts on toe (0) or heel (1) of a leg [N].
+Called with `commit` once for every whole step, and without it any number of times between."""
+
+
+class GroundForces:
+    """This project's ground as an `Outside`: contacts latch at whole steps only."""
+
+    def __init__(self, ground: Ground, legs: int) -> None:
+        self._ground = ground.to_record()
+        self.contacts = np.array([new_contacts() for _ in range(legs)])
+
+    def __call__(
+        self, limb: int, point: int, t: float, position: complex, velocity: complex, commit: bool
+    ) -> complex:
+        kept = self.contacts[limb]
+        contact = kept[point] if commit else kept.copy()[point]
+        return complex(touch(contact, position, velocity, self._ground))
+
+
+def corners(limb: Limb) -> tuple[str, str]:
+    """Names of toe and heel."""
+    return limb.geometry.toe, limb.geometry.heel
