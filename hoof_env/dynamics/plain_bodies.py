@@ -1,0 +1,126 @@
+"""How every body of N legs on one trunk moves, in arithmetic that differentiates itself.
+
+Nothing here is a formula for a speed: places of points and turns of links come from the construction of the
+leg, and `Jet` carries their two derivatives by time along.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoof_env.dynamics.drive import Motor
+from hoof_env.dynamics.jet import Jet, concatenate, direction, inverse, root, stack, turn
+from hoof_env.dynamics.limb import Limb
+from hoof_env.dynamics.trunk import Trunk
+from hoof_env.errors import ParameterError
+from hoof_env.gait.motion_law import COS, OFFSET, SIN
+from hoof_env.leg.linkage import BODIES, CONSTRUCTION, Dyad
+
+Array = NDArray[Any]
+
+
+class PlainBodies:
+    """What moves: a trunk, N legs of 14 links and a rotor for each.
+
+    Args:
+        trunk: what the legs hang from. limbs: the legs, where they hang and what turns them.
+
+    Raises:
+        ParameterError: no leg.
+    """
+
+    def __init__(self, trunk: Trunk, limbs: Sequence[Limb]) -> None:
+        if not limbs:
+            raise ParameterError("limbs: expected at least one leg, got none")
+        self.limbs = tuple(limbs)
+        legs = [limb.geometry for limb in limbs]
+        # columns: one row a leg, against the many motions that are computed at a time
+        self._lengths = {name: _column(leg.lengths[name] for leg in legs) for name in legs[0].lengths}
+        self._side = {name: _column(leg.assembly[name] for leg in legs) for name in legs[0].assembly}
+        self._pivot = _column(complex(*leg.pivot) for leg in legs)
+        self._hips = _column(complex(*limb.hip) for limb in limbs)
+        self._travel = _column(leg.travel for leg in legs)
+        self._toe_is_i = _column(leg.toe == "I" for leg in legs)
+        rotors = [limb.drive if isinstance(limb.drive, Motor) else Motor(0, 0, 0, 0) for limb in limbs]
+        self._ratio = _column(rotor.gear_ratio for rotor in rotors)
+        # bodies: trunk; first link of every leg, second ...; rotors, whose mass is in the trunk's
+        links = np.transpose([leg.body_masses for leg in legs]).ravel()
+        self.masses = np.concatenate([[trunk.mass], links, np.zeros(len(legs))])
+        links = np.transpose([leg.body_inertias for leg in legs]).ravel()
+        self.inertias = np.concatenate([[trunk.pitch_inertia], links, [r.rotor_inertia for r in rotors]])
+
+    @property
+    def size(self) -> int:
+        """Number of legs."""
+        return len(self.limbs)
+
+    def motion(self, u: Array, ud: Array, udd: Array) -> tuple[Jet, Jet, Jet]:
+        """Every body's centre (complex) and turn, and every hoof point, for B accelerations at a time.
+
+        Args:
+            u, ud: coordinates x, y, pitch, theta of each leg, phi of each leg, and rates, shape (3 + 2 N,).
+            udd: accelerations, shape (B, 3 + 2 N).
+
+        Returns:
+            Jets of shapes (1 + 15 N, B), twice, and (N, 2, B).
+        """
+        n, count = self.size, len(udd)
+        a = udd.T
+        trunk = Jet(complex(u[0], u[1]), complex(ud[0], ud[1]), a[0] + 1j * a[1])
+        pitch = Jet(u[2], ud[2], a[2])
+        theta, phi = (Jet(u[k : k + n, None], ud[k : k + n, None], a[k : k + n]) for k in (3, 3 + n))
+        z: dict[str, Jet] = {"O": Jet(np.zeros_like(self._pivot)), "C": Jet(self._pivot)}
+        z["P"] = self._lengths["OP"] * turn(theta * -1.0)
+        for step in CONSTRUCTION:
+            start, span = z[step.first], z[step.second] - z[step.first]
+            if isinstance(step, Dyad):
+                r1, r2 = self._lengths[step.from_first], self._lengths[step.from_second]
+                per_d2 = inverse((span * span.part(np.conj)).part(np.real))
+                along = 0.5 + per_d2 * ((r1**2 - r2**2) / 2)
+                across = self._side[step.point] * root(per_d2 * r1**2 - along * along)
+                z[step.point] = start + span * (along + 1j * across)
+            else:
+                part = self._lengths[step.distance] / self._lengths[step.span]
+                z[step.point] = z[step.origin] + span * part
+
+        def mirrored(w: Any) -> Any:
+            return self._travel * np.real(w) + 1j * np.imag(w)
+
+        swing, tilt = turn(phi), turn(pitch)
+        at = {name: trunk + tilt * (self._hips + (swing * p).part(mirrored)) for name, p in z.items()}
+        centres = stack([0.5 * (at[body.tail] + at[body.head]) for body in BODIES], (n, count))
+        turns = stack([direction(at[body.head] - at[body.tail]) for body in BODIES], (n, count))
+        rotors = stack([pitch + self._travel * (phi - self._ratio * theta)], (n, count))
+        hooves = stack([at["I"], at["J"]], (n, count))
+
+        def all_bodies(*jets: Jet) -> Jet:
+            return concatenate([jet.part(lambda x: x.reshape(-1, count)) for jet in jets])
+
+        return (
+            all_bodies(stack([trunk], (count,)), centres, stack([Jet(0j)], (n, count))),
+            all_bodies(stack([pitch], (count,)), turns, rotors),
+            hooves.part(lambda x: np.where(self._toe_is_i, x, x[::-1]).swapaxes(0, 1)),
+        )
+
+    def swing(self, theta: Jet, filters: Array) -> Jet:
+        """phi = offset + A sin theta + B cos theta, `filters` of shape (N, 4, 3)."""
+        offset, a, b = (Jet(*filters[:, k].T) for k in (OFFSET, SIN, COS))
+        e = turn(theta)
+        return offset + a * e.part(np.imag) + b * e.part(np.real)
+
+    def hooves(
+        self, trunk: Any, trunk_rate: Any, theta: Any, theta_rate: Any, gaits: Any
+    ) -> tuple[Array, Array]:
+        """Place and velocity [m, m/s] of hoof points under steady gaits (N, 4); complex, shapes (N, 2)."""
+        phi = self.swing(Jet(np.asarray(theta), theta_rate), gaits[:, :, None] * [1.0, 0.0, 0.0])
+        u, ud = np.concatenate([trunk, theta, phi.value]), np.concatenate([trunk_rate, theta_rate, phi.rate])
+        at = self.motion(u, ud, np.zeros((1, len(u))))[2]
+        return at.value[..., 0], at.rate[..., 0]
+
+
+def _column(values: Any) -> Array:
+    return np.array(list(values))[:, None]

@@ -1,0 +1,67 @@
+"""The ground under the plain horse: one point at a time, on any terrain."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hoof_env.ground.contact import Ground
+from hoof_env.ground.friction import FRICTION_LAWS, friction_force
+from hoof_env.ground.normal_force import damping, normal_force
+
+if TYPE_CHECKING:
+    from hoof_env.ground.terrain import Terrain
+
+
+class PlainGround:
+    """The laws of a `Ground` (Eqs. 10-15) on a terrain, or on the level y = 0.
+
+    Args:
+        ground: laws and their constants. terrain: heights and factors along x.
+    """
+
+    def __init__(self, ground: Ground, terrain: Terrain | None = None) -> None:
+        self.ground = ground
+        self.chi, self.dashpot = damping(
+            ground.normal_law, ground.restitution, ground.stiffness, ground.reference_mass
+        )
+        self.law = FRICTION_LAWS.index(ground.friction_law)
+        self.terrain = terrain if terrain is not None and len(terrain.height) > 1 else None
+        self.level = terrain.height[0] if terrain is not None else 0.0
+
+    def surface(self, x: float) -> tuple[float, complex]:
+        """Height [m] of the ground at `x` [m] and its unit normal."""
+        if self.terrain is None:
+            return self.level, 1j
+        knots, height = self.terrain.x, self.terrain.height
+        cell = int(np.searchsorted(knots, x, side="right"))
+        slope = 0.0
+        if 0 < cell < len(knots):
+            slope = (height[cell] - height[cell - 1]) / (knots[cell] - knots[cell - 1])
+        return float(np.interp(x, knots, height)), complex(-slope, 1.0) / abs(complex(-slope, 1.0))
+
+    def depth(self, position: complex, velocity: complex) -> tuple[float, float]:
+        """Penetration of a point along the normal [m] and its rate [m/s]."""
+        height, normal = self.surface(position.real)
+        return (height - position.imag) * normal.imag, -(velocity * normal.conjugate()).real
+
+    def forces(self, position: complex, velocity: complex, approach: float) -> tuple[complex, complex]:
+        """Normal force and friction [N] on a point that touched down at `approach` [m/s]."""
+        ground, (_, normal) = self.ground, self.surface(position.real)
+        harder, rougher = 1.0, 1.0
+        if self.terrain is not None:
+            harder, rougher = (
+                float(np.interp(position.real, self.terrain.x, factors))
+                for factors in (self.terrain.stiffness, self.terrain.friction)
+            )
+        d, rate = self.depth(position, velocity)
+        push = normal_force(
+            d, rate, approach, ground.stiffness * harder, ground.exponent, self.chi, self.dashpot
+        )
+        along = normal / 1j
+        grip = friction_force(
+            (velocity * along.conjugate()).real, push,
+            self.law, ground.friction * rougher, ground.friction_slow, ground.friction_fast,
+        )  # fmt: skip
+        return push * normal, grip * along
