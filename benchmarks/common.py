@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.limb import Limb
 from hoof_env.ground.contact import Ground, new_contacts, touch
-from hoof_env.leg.kinematics import FrameMotion, Pose, cross, pose
+from hoof_env.leg.kinematics import FrameMotion, Pose, pose
 from hoof_env.leg.linkage import BODIES, FRAME, JOINTS
 
 Pins = dict[tuple[str, str, str], list[tuple[int, int]]]
@@ -184,8 +184,10 @@ class Record:
     """What a peer saw at each sample; rows are samples, columns legs.
 
     Attributes:
-        t: [s]. crank, crank_speed: [rad, rad/s]. body: x, y, pitch of the trunk and their rates, (samples, 6).
-        crank_torque, hip_torque: along theta and phi [N m]; the hip's is what the swing takes beside the crank.
+        t: [s].
+        crank, crank_speed: [rad, rad/s].
+        body: x, y and pitch of the trunk and their rates, shape (samples, 6).
+        crank_torque, hip_torque: what drive and swing take, along theta and phi [N m].
         pins: forces [N], shape (samples, legs, pins, 2), in the order of the assembly's pins.
         closure: the widest gap of a loop [m].
     """

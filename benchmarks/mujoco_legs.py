@@ -40,8 +40,8 @@ RADIUS = 0.01
 SLIDES = {"fixed": (), "rail": ("x",), "suspended": ("x", "y"), "free": ("x", "y", "pitch")}
 
 _SPEED = 'solver="Newton" jacobian="dense" integrator="Euler" iterations="5" tolerance="1e-8"'
-"""The fastest that holds the loops. One Newton iteration loses the horse, and so do 50 of CG; PGS is slower; a
-sparse Jacobian is, too, but for 14 hinges a leg on four legs; implicitfast is 3 % slower."""
+"""The fastest that holds the loops. One Newton iteration loses the horse, and so do 50 of CG; PGS is slower,
+a sparse Jacobian is, too, but for 14 hinges a leg on four legs, and implicitfast by 3 %."""
 
 _TRUTH = 'solver="Newton" jacobian="dense" integrator="RK4" iterations="50" tolerance="0"'
 
@@ -311,13 +311,17 @@ class MujocoLegs:
 
     @property
     def hip_torque(self) -> NDArray[np.float64]:
-        """What holds each leg's frame about O [N m], along phi, against its pins at C and its drive."""
-        torque, pins = -self.crank_torque, self.pins()
+        """What holds each leg's frame about O [N m], along phi, against its pins at C, its drive and rotor."""
+        torque, pins, spin = -self.crank_torque, self.pins(), self.data.qacc[self._cranks]
+        pitch = self.data.qacc[self._slides[2]] if self.trunk.kind == "free" else 0.0
         for i, limb in enumerate(self.limbs):
             sigma, (x, y) = limb.geometry.travel, limb.geometry.pivot
             c = complex(sigma * x, y) * np.exp(1j * (self.body[2] + sigma * self.start.swing[i]))
             at_c = pins[i][[point == "C" for point, _, _ in self.assembly.pins]].sum(axis=0)
             torque[i] += sigma * cross(c, complex(*at_c))
+            if isinstance(limb.drive, Motor):
+                n = limb.drive.gear_ratio
+                torque[i] += limb.drive.rotor_inertia * (n - 1) * (n * spin[i] - sigma * pitch)
         return torque
 
     def pins(self) -> NDArray[np.float64]:

@@ -1,0 +1,346 @@
+"""Legs on a trunk in Exudyn: 42 absolute coordinates a leg, exact joints, generalised alpha.
+
+Every leg has the paper's 14 rigid bodies, 20 revolute joints and the lock, and a massless body for its frame, which
+carries the pivot C and swings about O. A prescribed crank and its swing are functions of time; with a motor the
+swing is a constraint between trunk, frame and crank, and the rotor a constant mass matrix over frame and crank.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import exudyn as exu
+import exudyn.itemInterface as eii
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.common import ALL, Assembly, Outside, Record, Start
+from hoof_env.dynamics.drive import Motor, Prescribed
+from hoof_env.dynamics.engine import GRAVITY
+from hoof_env.dynamics.limb import Limb
+from hoof_env.dynamics.trunk import Trunk
+from hoof_env.leg.linkage import BODIES, FRAME, JOINTS, LOCK
+
+SOLE = 13
+FREE = {"fixed": (), "rail": (0,), "suspended": (0, 1), "free": (0, 1, 2)}
+"""Which of x, y and pitch each kind of trunk leaves free."""
+
+
+class ExudynLegs:
+    """A horse in Exudyn, ready to run once.
+
+    Args:
+        limbs, trunk: the horse.
+        start: its first pose; a prescribed crank keeps the speed that it has there.
+        dt: time step [s].
+        outside: forces at toe and heel; none if None. Called without `commit` within a step, with it after.
+        command: speed [rad/s] that each motor is to keep; that of the start if None.
+        spectral_radius: of generalised alpha, below 1.
+    """
+
+    assembly: Assembly = ALL
+
+    def __init__(
+        self,
+        limbs: Sequence[Limb],
+        trunk: Trunk,
+        start: Start,
+        dt: float = 1e-3,
+        outside: Outside | None = None,
+        command: Sequence[float] | None = None,
+        spectral_radius: float = 0.6,
+    ) -> None:
+        self.limbs, self.trunk, self.start, self.dt, self.outside = tuple(limbs), trunk, start, dt, outside
+        self.command = tuple(command or start.crank_speed)
+        self.spectral_radius = spectral_radius
+        self._container = exu.SystemContainer()
+        self.mbs = self._container.AddSystem()
+        self._reference: list[float] = []
+        self._rows: dict[int, int] = {}  # of bodies, among the coordinates
+        self._ground = self.mbs.AddObject(eii.ObjectGround())
+        self._still = self.mbs.AddMarker(
+            eii.MarkerNodeCoordinate(nodeNumber=self.mbs.AddNode(eii.NodePointGround()), coordinate=0)
+        )
+        pose = (*start.position, start.pitch)
+        self._trunk = self._body(trunk.mass, trunk.pitch_inertia, pose, (*start.velocity, start.pitch_rate))
+        self._hang()
+        self._legs = [self._leg(i) for i in range(len(limbs))]
+        self.mbs.Assemble()
+
+    def run(self, duration: float, samples: int) -> Record:
+        """Simulate `duration` [s] and look `samples` times besides the beginning, evenly.
+
+        Raises:
+            RuntimeError: Exudyn did not converge.
+        """
+        steps = round(duration / self.dt)
+        every = steps // samples
+        rows: list[tuple[Any, ...]] = []
+        count = 0
+
+        def after_step(mbs: Any, t: float) -> bool:
+            nonlocal count
+            if count and self.outside is not None:
+                self._touch(t)
+            if count % every == 0:
+                rows.append(self._look(t))
+            count += 1
+            return True
+
+        settings = exu.SimulationSettings()
+        time = settings.timeIntegration
+        time.numberOfSteps, time.endTime, time.verboseMode = steps, steps * self.dt, 0
+        time.generalizedAlpha.spectralRadius = self.spectral_radius
+        time.newton.useModifiedNewton = False
+        time.newton.absoluteTolerance, time.newton.relativeTolerance = 1e-10, 1e-10
+        settings.solutionSettings.writeSolutionToFile = False
+        settings.linearSolverType = exu.LinearSolverType.EigenSparse
+        if self.outside is not None:
+            self._touch(0.0)
+        self.mbs.SetPostStepUserFunction(after_step)
+        if not self.mbs.SolveDynamic(settings):
+            raise RuntimeError("Exudyn did not converge")
+        return Record.of(rows)
+
+    # The parts
+
+    def _body(self, mass: float, inertia: float, pose: Sequence[float], rates: Sequence[float]) -> int:
+        """A rigid body under its weight; all have three coordinates, in the order in which they are added."""
+        self._reference += pose
+        node = self.mbs.AddNode(
+            eii.NodeRigidBody2D(referenceCoordinates=list(pose), initialVelocities=list(rates))
+        )
+        body = self.mbs.AddObject(eii.ObjectRigidBody2D(mass=mass, inertia=inertia, nodeNumber=node))
+        self._rows[int(body)] = len(self._rows)
+        if mass:
+            marker = self.mbs.AddMarker(eii.MarkerBodyMass(bodyNumber=body))
+            self.mbs.AddLoad(eii.LoadMassProportional(markerNumber=marker, loadVector=[0, -GRAVITY, 0]))
+        return int(body)
+
+    def _coordinate(self, body: int, axis: int) -> int:
+        """Marker of one coordinate of a body; its value is the change since the start."""
+        node = self.mbs.GetObjectParameter(body, "nodeNumber")
+        return int(self.mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=node, coordinate=axis)))
+
+    def _hold(self, one: int, two: int, offset: Callable[[float], float] | None = None) -> int:
+        """Constraint: coordinate `two` less `one` is the offset."""
+        law = {"offsetUserFunction": lambda mbs, t, item, _: offset(t)} if offset else {}
+        return int(self.mbs.AddObject(eii.CoordinateConstraint(markerNumbers=[one, two], **law)))
+
+    def _hang(self) -> None:
+        """What the trunk hangs from."""
+        trunk = self.trunk
+        for axis in range(3):
+            at = self._coordinate(self._trunk, axis)
+            if axis not in FREE[trunk.kind]:
+                self._hold(self._still, at)
+            elif axis == 0:
+                self._spring(at, 0.0, trunk.drag, 0.0)
+            elif axis == 1 and trunk.kind == "suspended":
+                self._spring(at, trunk.stiffness, trunk.damping, trunk.height - self.start.position[1])
+                total = trunk.mass + sum(limb.geometry.mass for limb in self.limbs)
+                lift = (1 - trunk.share) * total * GRAVITY  # the rest of the animal's part of the weight
+                self.mbs.AddLoad(eii.LoadCoordinate(markerNumber=at, load=lift))
+
+    def _spring(self, at: int, stiffness: float, damping: float, offset: float) -> None:
+        self.mbs.AddObject(
+            eii.CoordinateSpringDamper(
+                markerNumbers=[self._still, at], stiffness=stiffness, damping=damping, offset=offset
+            )
+        )
+
+    def _point(self, body: int, x: float, y: float) -> int:
+        return int(self.mbs.AddMarker(eii.MarkerBodyPosition(bodyNumber=body, localPosition=[x, y, 0])))
+
+    def _leg(self, i: int) -> dict[str, Any]:
+        limb, start = self.limbs[i], self.start
+        geometry, sigma = limb.geometry, limb.geometry.travel
+        pose = start.poses(self.limbs)[i]
+        swing_rate = start.phi(i, start.crank[i])[1] * start.crank_speed[i]
+        beta = start.pitch + sigma * start.swing[i]
+        frame = self._body(
+            0.0, 0.0, (*pose.point("O"), beta),
+            (*pose.point_velocities[0], start.pitch_rate + sigma * swing_rate),
+        )  # fmt: skip
+        bodies = [
+            self._body(
+                float(geometry.body_masses[k]), float(geometry.body_inertias[k]),
+                (*pose.centres[k], pose.angles[k]), (*pose.centre_velocities[k], pose.angular_velocities[k]),
+            )
+            for k in range(len(BODIES))
+        ]  # fmt: skip
+        half = geometry.body_lengths / 2
+
+        def local(k: int, point: str) -> tuple[float, float]:
+            if k == FRAME:
+                return (sigma * geometry.pivot[0], geometry.pivot[1]) if point == "C" else (0.0, 0.0)
+            out = complex(*(pose.point(point) - pose.centres[k])) * np.exp(-1j * pose.angles[k])
+            return out.real, out.imag
+
+        hip = [self._point(self._trunk, *limb.hip), self._point(frame, 0.0, 0.0)]
+        self.mbs.AddObject(eii.ObjectJointRevolute2D(markerNumbers=hip))
+        joints, ends = [], []
+        for joint in JOINTS:
+            one, two = bodies[joint.i], frame if joint.j == FRAME else bodies[joint.j]
+            pair = [
+                self._point(two, *local(joint.j, joint.point)),
+                self._point(one, *local(joint.i, joint.point)),
+            ]
+            joints.append(self.mbs.AddObject(eii.ObjectJointRevolute2D(markerNumbers=pair)))
+            ends.append((one, local(joint.i, joint.point), two, local(joint.j, joint.point)))
+        self._hold(self._coordinate(bodies[LOCK[1]], 2), self._coordinate(bodies[LOCK[0]], 2))
+
+        axes = [self._coordinate(body, 2) for body in (self._trunk, frame, bodies[0])]
+        drives = (self._motor if isinstance(limb.drive, Motor) else self._prescribe)(
+            i, frame, bodies[0], axes
+        )
+        corners = (
+            [-half[SOLE], half[SOLE]] if geometry.toe == BODIES[SOLE].tail else [half[SOLE], -half[SOLE]]
+        )
+        if self.outside is not None:
+            for point, x in enumerate(corners):
+                self.mbs.AddLoad(
+                    eii.Force(
+                        markerNumber=self._point(bodies[SOLE], x, 0.0),
+                        loadVectorUserFunction=self._push(i, point, bodies[SOLE], x),
+                    )
+                )
+        return {"frame": frame, "bodies": bodies, "joints": joints, "ends": ends, "corners": corners} | drives
+
+    def _prescribe(self, i: int, frame: int, crank: int, axes: list[int]) -> dict[str, Any]:
+        """Crank and swing as functions of time."""
+        sigma, start = self.limbs[i].geometry.travel, self.start
+        theta, speed = start.crank[i], start.crank_speed[i]
+        return {
+            "swing": self._hold(
+                axes[0], axes[1], lambda t: sigma * (start.phi(i, theta + speed * t)[0] - start.swing[i])
+            ),
+            "driver": self._hold(axes[1], axes[2], lambda t: -sigma * speed * t),
+        }
+
+    def _motor(self, i: int, frame: int, crank: int, axes: list[int]) -> dict[str, Any]:
+        """A torque between frame and crank, the rotor, and the swing geared to the crank."""
+        limb, sigma, start = self.limbs[i], self.limbs[i].geometry.travel, self.start
+        motor, speed = limb.drive, self.command[i]
+        assert isinstance(motor, Motor)
+
+        def torque(
+            mbs: Any, t: float, item: int, u: float, v: float, k: float, d: float, offset: float
+        ) -> float:
+            """On the crank, against the clock; Exudyn's force pulls marker 1 back."""
+            return sigma * float(
+                np.clip(motor.speed_gain * (speed + sigma * v), -motor.torque_limit, motor.torque_limit)
+            )
+
+        nodes = [self.mbs.GetObjectParameter(body, "nodeNumber") for body in (self._trunk, frame, crank)]
+        self.mbs.AddObject(
+            eii.CoordinateSpringDamper(markerNumbers=[axes[1], axes[2]], springForceUserFunction=torque)
+        )
+        turns = np.array([0, 0, 0, 0, 0, 1 - motor.gear_ratio, 0, 0, motor.gear_ratio])  # of the rotor
+        rotor = self.mbs.AddObject(
+            eii.ObjectGenericODE2(
+                nodeNumbers=nodes, massMatrix=motor.rotor_inertia * np.outer(turns, turns),
+                forceVector=np.zeros(9),
+            )
+        )  # fmt: skip
+        if not start.swings:
+            return {"swing": self._hold(axes[0], axes[1])}
+        crank_at = self._reference[-3 * len(BODIES) + 2] - self._reference[-3 * len(BODIES) - 1]
+
+        def swung(q: NDArray[np.float64]) -> tuple[float, float]:
+            return start.phi(i, start.crank[i] - sigma * (q[8] - q[5] - crank_at))
+
+        def error(mbs: Any, t: float, item: int, q: Any, q_t: Any, velocity: bool) -> list[float]:
+            return [q[5] - q[2] - sigma * swung(q)[0]]
+
+        def jacobian(mbs: Any, t: float, item: int, q: Any, q_t: Any, velocity: bool) -> Any:
+            slope = swung(q)[1]  # sigma * d theta = d frame - d crank
+            row = np.zeros((1, len(q)))
+            row[0, [2, 5, 8]] = -1.0, 1.0 - slope, slope
+            return row
+
+        return {
+            "swing": int(
+                self.mbs.AddObject(
+                    eii.CoordinateVectorConstraint(
+                        markerNumbers=[
+                            self.mbs.AddMarker(eii.MarkerObjectODE2Coordinates(objectNumber=rotor)),
+                            self.mbs.AddMarker(eii.MarkerNodeCoordinates(nodeNumber=self._none())),
+                        ],
+                        scalingMarker0=np.zeros((1, 9)),
+                        constraintUserFunction=error,
+                        jacobianUserFunction=jacobian,
+                    )
+                )
+            )
+        }
+
+    def _none(self) -> int:
+        return int(self.mbs.AddNode(eii.NodePointGround()))
+
+    # The forces
+
+    def _sole(self, body: int, x: float, configuration: Any = None) -> tuple[complex, complex]:
+        """Place and velocity of a point on the sole."""
+        values = [
+            self.mbs.GetObjectOutputBody(body, kind, [x, 0, 0], exu.ConfigurationType.Current)
+            for kind in (exu.OutputVariableType.Position, exu.OutputVariableType.Velocity)
+        ]
+        return complex(*values[0][:2]), complex(*values[1][:2])
+
+    def _push(self, i: int, point: int, body: int, x: float) -> Callable[..., list[float]]:
+        def force(mbs: Any, t: float, load: Any) -> list[float]:
+            assert self.outside is not None
+            f = self.outside(i, point, t, *self._sole(body, x), False)
+            return [f.real, f.imag, 0.0]
+
+        return force
+
+    def _touch(self, t: float) -> None:
+        assert self.outside is not None
+        for i, leg in enumerate(self._legs):
+            for point, x in enumerate(leg["corners"]):
+                self.outside(i, point, t, *self._sole(leg["bodies"][SOLE], x), True)
+
+    # What is to be seen
+
+    def _look(self, t: float) -> tuple[Any, ...]:
+        """What `Record` has of the present instant."""
+        system = self.mbs.systemData
+        q = (np.array(self._reference) + system.GetODE2Coordinates()).reshape(-1, 3)
+        v = np.array(system.GetODE2Coordinates_t()).reshape(-1, 3)
+        tied = np.array(system.GetAECoordinates())
+        rows: list[tuple[Any, ...]] = []
+        for i, (limb, leg) in enumerate(zip(self.limbs, self._legs, strict=True)):
+            sigma, drive = limb.geometry.travel, limb.drive
+
+            def multiplier(item: int) -> Any:
+                return -tied[list(system.GetObjectLTGAE(item))]
+
+            row = self._rows
+            frame, crank = row[leg["frame"]], row[leg["bodies"][0]]
+            start = self._reference[3 * crank + 2] - self._reference[3 * frame + 2]
+            theta = self.start.crank[i] - sigma * (q[crank, 2] - q[frame, 2] - start)
+            speed = -sigma * (v[crank, 2] - v[frame, 2])
+            swing = sigma * float(multiplier(leg["swing"])[0])
+            if isinstance(drive, Motor):
+                torque = float(
+                    np.clip(
+                        drive.speed_gain * (self.command[i] - speed), -drive.torque_limit, drive.torque_limit
+                    )
+                )
+            else:
+                torque = -sigma * float(multiplier(leg["driver"])[0])
+            gaps = []
+            for one, at_one, two, at_two in leg["ends"]:
+                ends = [
+                    complex(*q[row[body], :2]) + complex(*at) * np.exp(1j * q[row[body], 2])
+                    for body, at in ((one, at_one), (two, at_two))
+                ]
+                gaps.append(abs(ends[0] - ends[1]))
+            pins = np.array([multiplier(joint) for joint in leg["joints"]])
+            rows.append((theta, speed, torque, swing, pins, max(gaps)))
+        theta, speed, torque, swing, pins, gap = (np.array(column) for column in zip(*rows, strict=True))
+        body = np.concatenate([q[0], v[0]])
+        return t, theta, speed, body, torque, swing, pins, gap.max()
