@@ -8,7 +8,8 @@ from hoof_env.dynamics.engine import GRAVITY, LegEngine
 from hoof_env.dynamics.limb import Limb
 from hoof_env.dynamics.plain import PlainHorse
 from hoof_env.dynamics.plain_crank import PlainCrank
-from hoof_env.dynamics.plain_run import simulate
+from hoof_env.dynamics.plain_ground import PlainGround
+from hoof_env.dynamics.plain_run import depths, follow, simulate
 from hoof_env.dynamics.trace import new_trace
 from hoof_env.dynamics.trunk import TRUNKS, Trunk
 from hoof_env.errors import ParameterError
@@ -187,7 +188,40 @@ def test_a_limp_horse_falls_as_one():
     assert now.hip_torque == pytest.approx(0, abs=1e-9)
 
 
+def test_a_slope_is_level_ground_turned():
+    turn = np.exp(0.3j)
+    level, slope = PlainGround(GROUND), PlainGround(GROUND, Terrain.slope(0.3))
+    for place, velocity in ((0.5 - 0.02j, 0.4 - 0.3j), (-0.2 - 0.001j, -0.02 + 0.1j)):
+        expected = np.multiply(level.forces(place, velocity, 0.4), turn)
+        found = np.array(slope.forces(place * turn, velocity * turn, 0.4))
+        assert found == pytest.approx(expected, rel=1e-9)
+        assert slope.depth(place * turn, velocity * turn) == pytest.approx((-place.imag, -velocity.imag))
+    soft = PlainGround(GROUND, Terrain((0.0, 0.0), (0.5, 1.5), (0.0, 2.0), start=1.0, spacing=2.0))
+    found, expected = (np.array(kind.forces(1.5 - 0.01j, 1 + 0j, 0.4)) for kind in (soft, level))
+    assert found == pytest.approx(expected * [0.75, 0.75 * 0.5], rel=1e-12)
+
+
 # -- runs ------------------------------------------------------------------------------------------------
+
+
+def test_a_ball_comes_down_on_time_and_leaves_as_its_law_says():
+    """Dropped from 1 m without weight in the ground: touch-down by the textbook, bounce by the law."""
+    ground = PlainGround(Ground(normal_law="exact", restitution=0.5))
+
+    def rate(y, approach):
+        touching = not np.isnan(approach[0])
+        push = ground.forces(1j * y[0], 1j * y[1], approach[0])[0].imag / 5.0 if touching else -GRAVITY
+        return np.array([y[1], push])
+
+    def depth(y):
+        return depths(ground, 1j * y[:1], 1j * y[1:])
+
+    y, approach, (down, up) = follow(rate, depth, np.array([1.0, 0.0]), np.array([0, 0.2, 0.6]), 1e-4)
+    fall = np.sqrt(2 * GRAVITY)
+    assert (down.t, down.approach, down.down, up.down) == pytest.approx((fall / GRAVITY, fall, True, False))
+    assert y[1] == pytest.approx([1 - GRAVITY * 0.02, -GRAVITY * 0.2])
+    assert y[2, 1] == pytest.approx(0.5 * fall - GRAVITY * (0.6 - up.t), rel=1e-8)
+    assert np.isnan(approach).all()
 
 
 def test_flight_keeps_momentum_and_the_energy_account():
