@@ -200,10 +200,10 @@ class ExudynLegs:
         )
         if self.outside is not None:
             for point, x in enumerate(corners):
-                self.mbs.AddLoad(
-                    eii.Force(
-                        markerNumber=self._point(bodies[SOLE], x, 0.0),
-                        loadVectorUserFunction=self._push(i, point, bodies[SOLE], x),
+                ends_at = [self._point(self._ground, 0.0, 0.0), self._point(bodies[SOLE], x, 0.0)]
+                self.mbs.AddObject(
+                    eii.CartesianSpringDamper(
+                        markerNumbers=ends_at, springForceUserFunction=self._push(i, point)
                     )
                 )
         return {"frame": frame, "bodies": bodies, "joints": joints, "ends": ends, "corners": corners} | drives
@@ -281,7 +281,7 @@ class ExudynLegs:
 
     # The forces
 
-    def _sole(self, body: int, x: float, configuration: Any = None) -> tuple[complex, complex]:
+    def _sole(self, body: int, x: float) -> tuple[complex, complex]:
         """Place and velocity of a point on the sole."""
         values = [
             self.mbs.GetObjectOutputBody(body, kind, [x, 0, 0], exu.ConfigurationType.Current)
@@ -289,11 +289,13 @@ class ExudynLegs:
         ]
         return complex(*values[0][:2]), complex(*values[1][:2])
 
-    def _push(self, i: int, point: int, body: int, x: float) -> Callable[..., list[float]]:
-        def force(mbs: Any, t: float, load: Any) -> list[float]:
+    def _push(self, i: int, point: int) -> Callable[..., list[float]]:
+        """A connector's law, which Exudyn differentiates for Newton; its force pulls marker 1 back."""
+
+        def force(mbs: Any, t: float, item: int, at: Any, velocity: Any, *unused: Any) -> list[float]:
             assert self.outside is not None
-            f = self.outside(i, point, t, *self._sole(body, x), False)
-            return [f.real, f.imag, 0.0]
+            f = self.outside(i, point, t, complex(at[0], at[1]), complex(velocity[0], velocity[1]), False)
+            return [-f.real, -f.imag, 0.0]
 
         return force
 
