@@ -1,0 +1,176 @@
+"""How fast a contact is, and the longest step with which an explicit scheme still follows it.
+
+A mass m on the ground has three rates. The spring's is the frequency w = sqrt(n K d^(n - 1) / m) at the
+deepest penetration. Damping is chi K d^n / (v0 m) + c / m, where v0 is the approach speed. Friction is the
+slope of its law times F / m: between the threshold speeds a few millimetres a second change it from nothing
+to all, which makes it the fastest of the three under a light hoof.
+
+The spring decides on accuracy. tests/ground/test_stiffness.py drops a mass on the contact of `lane_contact`
+and measures the error e of its state after it has left, that of the speed over the touch-down speed or that
+of the place over the deepest penetration, whichever is larger, against an adaptive scheme of eighth order.
+For n from 1 to 3, chi from 0 to 3, weights up to 0.3 of the peak force, steps h w of 0.025 to 0.4 and 16
+places of the touch-down within a step, all of one law:
+
+    e < C (h w)^p,   p = min(order, n + 1),
+
+for d^n has a kink at touch-down that limits the order. `SCHEMES` holds the largest C, which n = 1 has,
+rounded up; at n = 1.5 less than 0.7 of it is enough for semi-implicit Euler and the midpoint rule, less than
+0.4 for the others.
+
+Damping and friction decay: explicit schemes are stable up to h rate = 2 (Euler, midpoint), 2.51 (third order)
+and 2.79 (RK4), and half of that is the limit here. Past its limit friction does not blow up, for its force is
+bounded, but leaves the point sliding to and fro with a speed of up to some 1.5 mu F h / m.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hoof_env.errors import ParameterError, check_choice, check_number
+from hoof_env.ground.contact import Ground
+from hoof_env.ground.normal_force import damping
+from hoof_env.ground.terrain import Terrain
+
+
+class SchemeLimits(NamedTuple):
+    """What a fixed-step scheme does in a contact.
+
+    Attributes:
+        order: of the scheme on a smooth force [-].
+        error: C of the module's text [-].
+        decay: longest step times the rate of a damped motion [-].
+    """
+
+    order: int
+    error: float
+    decay: float
+
+
+SCHEMES: Mapping[str, SchemeLimits] = MappingProxyType(
+    {
+        "semi_implicit_euler": SchemeLimits(1, 0.8, 1.0),
+        "midpoint": SchemeLimits(2, 0.65, 1.0),
+        "rk3": SchemeLimits(3, 0.2, 1.25),
+        "rk4": SchemeLimits(4, 0.2, 1.39),
+    }
+)
+"""Schemes by name; "rk3" is Heun's of third order, "rk4" the classical one."""
+
+LARGEST_ANGLE = 0.4
+"""Largest h w [-]: up to here the errors were measured."""
+
+
+@dataclass(frozen=True)
+class ContactRates:
+    """Rates of a contact [1/s], and the exponent n of its force [-]."""
+
+    elastic: float
+    damping: float
+    friction: float
+    exponent: float
+
+    @property
+    def fastest(self) -> float:
+        """The largest of them [1/s]."""
+        return max(self.elastic, self.damping, self.friction)
+
+    def longest_steps(self, scheme: str, tolerance: float = 1e-2) -> dict[str, float]:
+        """Longest step [s] that each of the three allows; infinite for a rate of zero.
+
+        Args:
+            scheme: one of `SCHEMES`.
+            tolerance: error of the state after a contact [-], see the module's text.
+
+        Raises:
+            ParameterError: an unknown scheme or a tolerance out of range.
+        """
+        limits = SCHEMES[check_choice("scheme", scheme, SCHEMES)]
+        tolerance = check_number("tolerance", tolerance, low=0, high=1, exclusive_low=True)
+        order = min(limits.order, self.exponent + 1)
+        angle = min((tolerance / limits.error) ** (1 / order), LARGEST_ANGLE)
+        allowed = {"elastic": angle, "damping": limits.decay, "friction": limits.decay}
+        rates = {name: getattr(self, name) for name in allowed}
+        return {name: allowed[name] / rate if rate > 0 else math.inf for name, rate in rates.items()}
+
+
+def contact_rates(
+    ground: Ground,
+    mass: float,
+    load: float,
+    speed: float = 0.1,
+    sliding_mass: float | None = None,
+    terrain: Terrain | None = None,
+) -> ContactRates:
+    """Rates of the contact of one hoof point at its deepest.
+
+    Args:
+        ground: its laws.
+        mass: that the hoof point sets against a normal force [kg], see `effective_mass`.
+        load: force that presses the point down from outside [N], as a part of the weight; the spring is taken
+            to overshoot under it.
+        speed: with which the point touches down [m/s]. Fast ones go deep, slow ones are damped strongly:
+            where both occur, ask for both and take the larger rates.
+        sliding_mass: that it sets against friction [kg]; None, the same.
+        terrain: whose stiffest and roughest places count; None, flat.
+
+    Raises:
+        ParameterError: a value is not finite or out of range.
+    """
+    mass = check_number("mass", mass, low=0, exclusive_low=True)
+    load = check_number("load", load, low=0)
+    speed = max(check_number("speed", speed, low=0), ground.approach_floor)
+    sliding_mass = mass if sliding_mass is None else sliding_mass
+    sliding_mass = check_number("sliding_mass", sliding_mass, low=0, exclusive_low=True)
+    terrain = terrain or Terrain()
+    n, stiffness = ground.exponent, ground.stiffness * float(np.max(terrain.stiffness))
+    mu = ground.friction * float(np.max(terrain.friction))
+    chi, dashpot = damping(ground.normal_law, ground.restitution, ground.stiffness, ground.reference_mass)
+    # K d^(n+1) / (n+1) = m v^2 / 2 + load d; the sum of the two depths alone is not less than d
+    depth = ((n + 1) * mass * speed**2 / (2 * stiffness)) ** (1 / (n + 1))
+    depth += ((n + 1) * load / stiffness) ** (1 / n)
+    force = stiffness * depth**n
+    steepest = {
+        "ambrosio": 1 / (ground.friction_fast - ground.friction_slow),
+        "threlfall": 3 / ground.friction_fast,
+        "tanh": 1 / ground.friction_fast,
+    }[ground.friction_law]
+    return ContactRates(
+        elastic=math.sqrt(n * force / depth / mass),
+        damping=(chi * force / speed + dashpot) / mass,
+        friction=mu * force * steepest / sliding_mass,
+        exponent=n,
+    )
+
+
+def substeps(h: float, rates: ContactRates, scheme: str, tolerance: float = 1e-2) -> int:
+    """Into how many parts a step of `h` [s] must be cut for `rates`; see `ContactRates.longest_steps`."""
+    h = check_number("h", h, low=0, exclusive_low=True)
+    return max(1, math.ceil(h / min(rates.longest_steps(scheme, tolerance).values())))
+
+
+def effective_mass(jacobian: ArrayLike, inertia: ArrayLike) -> float:
+    """Mass [kg] that a point sets against a force in one direction, 1 / (j M^-1 j).
+
+    Args:
+        jacobian: derivative j of the point's place in that direction by each coordinate, shape (n,).
+        inertia: mass matrix M, shape (n, n).
+
+    Raises:
+        ParameterError: shapes do not fit, or nothing moves the point that way.
+    """
+    j, m = np.asarray(jacobian, dtype=float), np.asarray(inertia, dtype=float)
+    if j.ndim != 1 or m.shape != (j.size, j.size):
+        raise ParameterError(
+            f"jacobian, inertia: expected shapes (n,) and (n, n), got {j.shape} and {m.shape}"
+        )
+    mobility = float(j @ np.linalg.solve(m, j))
+    if not mobility > 0:
+        raise ParameterError(f"jacobian: expected a direction in which the point can move, got {j.tolist()}")
+    return 1 / mobility
