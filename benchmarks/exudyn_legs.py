@@ -1,11 +1,11 @@
 """Legs on a trunk in Exudyn: 42 absolute coordinates a leg, exact joints, generalised alpha.
 
 Every leg has the paper's 14 rigid bodies, 20 revolute joints and the lock, and a massless body for its
-frame, which carries the pivot C and swings about O. A prescribed crank and its swing are functions of time; with
-a motor the swing is a constraint between trunk, frame and crank, and the rotor a constant mass matrix over
-frame and crank. The tolerances are tight, so that what remains is the scheme's own error, which falls with the
-square of the step. Only the first sample's forces leave out what a swing that accelerates adds: Exudyn starts
-without it.
+frame, which carries the pivot C and swings about O. A prescribed crank and its swing are functions of time;
+with a motor the swing is a constraint between trunk, frame and crank, and the rotor a constant mass matrix
+over frame and crank. The tolerances are tight, so that what remains is the error of the scheme, which falls
+with the square of the step. Only the first sample's forces leave out what a swing that accelerates adds: Exudyn
+starts without it.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import exudyn as exu
-import exudyn.itemInterface as eii
+import exudyn.itemInterface
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,6 +24,8 @@ from hoof_env.dynamics.engine import GRAVITY
 from hoof_env.dynamics.limb import Limb
 from hoof_env.dynamics.trunk import Trunk
 from hoof_env.leg.linkage import BODIES, FRAME, JOINTS, LOCK
+
+eii: Any = exudyn.itemInterface  # its types ask for protocols that closures do not meet by name
 
 SOLE = 13
 FREE = {"fixed": (), "rail": (0,), "suspended": (0, 1), "free": (0, 1, 2)}
@@ -91,14 +93,18 @@ class ExudynLegs:
             count += 1
             return True
 
-        settings = exu.SimulationSettings()
+        settings: Any = exu.SimulationSettings()
         time = settings.timeIntegration
         time.numberOfSteps, time.endTime, time.verboseMode = steps, steps * self.dt, 0
         time.generalizedAlpha.spectralRadius = self.spectral_radius
         time.newton.useModifiedNewton = False
         time.newton.absoluteTolerance, time.newton.relativeTolerance = 1e-10, 1e-10
-        settings.solutionSettings.writeSolutionToFile = False
-        settings.linearSolverType = exu.LinearSolverType.EigenSparse
+        if hasattr(settings, "solution"):  # 1.11 and later, say
+            settings.solution.file.write = False
+            settings.linearSolver.solverType = exu.LinearSolverType.EigenSparse
+        else:
+            settings.solutionSettings.writeSolutionToFile = False
+            settings.linearSolverType = exu.LinearSolverType.EigenSparse
         if self.outside is not None:
             self._touch(0.0)
         self.mbs.SetPostStepUserFunction(after_step)
@@ -346,6 +352,5 @@ class ExudynLegs:
                 gaps.append(abs(ends[0] - ends[1]))
             pins = np.array([multiplier(joint) for joint in leg["joints"]])
             rows.append((theta, speed, torque, swing, pins, max(gaps)))
-        theta, speed, torque, swing, pins, gap = (np.array(column) for column in zip(*rows, strict=True))
-        body = np.concatenate([q[0], v[0]])
-        return t, theta, speed, body, torque, swing, pins, gap.max()
+        thetas, speeds, torques, swings, forces, widest = map(np.array, zip(*rows, strict=True))
+        return t, thetas, speeds, np.concatenate([q[0], v[0]]), torques, swings, forces, widest.max()

@@ -1,4 +1,4 @@
-"""Legs on a trunk in MuJoCo: state, drives, forces from outside and what is to be seen; see `mujoco_model`."""
+"""Legs on a trunk in MuJoCo: state, drives, forces from outside and read-outs of a `mujoco_model`."""
 
 from __future__ import annotations
 
@@ -192,10 +192,14 @@ class MujocoLegs:
                     forces[i, k] = -self.data.cfrc_int[bodies[two]][3:5]
         return forces
 
-    def points(self, leg: int, names: Sequence[str] = ("B", "D", "E", "F", "G", "A")) -> NDArray[np.float64]:
-        """Where pins of a leg are [m]: those that begin a link, on the tree."""
-        tree = {point: link for link, _, point in self.assembly.tree}
-        return np.array([self.data.xpos[self._bodies[leg][tree[name]]][:2] for name in names])
+    def points(self, leg: int) -> dict[str, complex]:
+        """Where the pins that begin a link are, and the toe and the heel [m]."""
+        bodies = self._bodies[leg]
+        at = {point: complex(*self.data.xpos[bodies[link]][:2]) for link, _, point in self.assembly.tree}
+        turn = complex(*self.data.xmat[bodies["hoof"]][[0, 3]])
+        for name, arm in zip(corners(self.limbs[leg]), self._arms[leg], strict=True):
+            at[name] = at["G"] + turn * complex(*arm)
+        return at
 
     def closure(self) -> float:
         """The widest gap of a loop [m]."""
