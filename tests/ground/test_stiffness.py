@@ -93,7 +93,9 @@ def test_the_error_of_a_bounce_is_within_the_rule_and_near_it(eighths):
         for scheme, limits in SCHEMES.items():
             for angle in (0.4, 0.1, 0.025):
                 bound = limits.error * angle ** min(limits.order, n + 1)
-                share[scheme].append(error(scheme, angle / rates.elastic, bounce, 1.0, law) / bound)
+                h = rates.longest_steps(scheme, bound)["elastic"]
+                assert h == pytest.approx(angle / rates.elastic)
+                share[scheme].append(error(scheme, h, bounce, 1.0, law) / bound)
     for scheme, shares in share.items():
         assert max(shares) < 1, scheme
         if n == 1:
