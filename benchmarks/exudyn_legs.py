@@ -4,8 +4,8 @@ Every leg has the paper's 14 rigid bodies, 20 revolute joints and the lock, and 
 frame, which carries the pivot C and swings about O. A prescribed crank and its swing are functions of time;
 with a motor the swing is a constraint between trunk, frame and crank, and the rotor a constant mass matrix
 over frame and crank. The tolerances are tight, so that what remains is the error of the scheme, which falls
-with the square of the step. Only the first sample's forces leave out what a swing that accelerates adds: Exudyn
-starts without it.
+with the square of the step. Only the first sample's forces leave out what a swing that accelerates adds:
+Exudyn starts without it.
 """
 
 from __future__ import annotations
@@ -99,12 +99,8 @@ class ExudynLegs:
         time.generalizedAlpha.spectralRadius = self.spectral_radius
         time.newton.useModifiedNewton = False
         time.newton.absoluteTolerance, time.newton.relativeTolerance = 1e-10, 1e-10
-        if hasattr(settings, "solution"):  # 1.11 and later, say
-            settings.solution.file.write = False
-            settings.linearSolver.solverType = exu.LinearSolverType.EigenSparse
-        else:
-            settings.solutionSettings.writeSolutionToFile = False
-            settings.linearSolverType = exu.LinearSolverType.EigenSparse
+        settings.solution.file.write = False
+        settings.linearSolver.solverType = exu.LinearSolverType.EigenSparse
         if self.outside is not None:
             self._touch(0.0)
         self.mbs.SetPostStepUserFunction(after_step)
