@@ -51,6 +51,14 @@ def kernel(function: F) -> F:
     return cast(F, compiled)
 
 
+def inlined(function: F) -> F:
+    """A part of a kernel that is compiled into whatever calls it, so that the shapes of the caller's arrays
+    are known there and its loops over lanes become vector code."""
+    import numba
+
+    return cast(F, numba.njit(error_model="numpy", forceinline=True)(function))
+
+
 @cache
 def _check_writable(folder: str) -> None:
     os.makedirs(folder, exist_ok=True)

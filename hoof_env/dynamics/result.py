@@ -11,6 +11,8 @@ class Result(IntEnum):
     OK = 0
     NOT_FINITE = 1
     SINGULAR = 2
+    DEAD_POINT = 3
+    FALLEN = 4
 
     @property
     def message(self) -> str:
@@ -22,4 +24,9 @@ _MESSAGES = {
     Result.OK: "ok",
     Result.NOT_FINITE: "the state stopped being finite; it was put back to the last good one",
     Result.SINGULAR: "the equations of motion are singular; the state was put back to the last good one",
+    Result.DEAD_POINT: (
+        "a crank was driven to an angle at which its linkage does not close; "
+        "the state was put back to the last good one"
+    ),
+    Result.FALLEN: "the trunk fell through the ground; the state was put back to the last good one",
 }

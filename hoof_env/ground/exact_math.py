@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 
-from hoof_env._jit import kernel
+from hoof_env._jit import inlined
 
 EXPONENT_UNIT = 8
 """`root_power` knows the exponents that are whole multiples of 1 / EXPONENT_UNIT."""
@@ -29,7 +29,7 @@ HALF_PI_LOW = float.fromhex("0x1.0b4611a626331p-34")  # the rest
 ROUNDER = 1.5 * 2.0**52  # adding and subtracting it rounds to the nearest whole number
 
 
-@kernel
+@inlined
 def root_power(d, eighths):  # type: ignore[no-untyped-def]
     """d^(eighths / 8) by square roots; 0 for negative d, relative error below 1e-15.
 
@@ -57,7 +57,7 @@ def root_power(d, eighths):  # type: ignore[no-untyped-def]
     return power
 
 
-@kernel
+@inlined
 def root_power_lanes(d, eighths, out):  # type: ignore[no-untyped-def]
     """`root_power` of each lane: `d` and `out` are rows of one length that do not overlap (it would be slow).
 
@@ -67,7 +67,7 @@ def root_power_lanes(d, eighths, out):  # type: ignore[no-untyped-def]
         out[lane] = root_power(d[lane], eighths)
 
 
-@kernel
+@inlined
 def exp_of_negative(x):  # type: ignore[no-untyped-def]
     """exp(x) for x <= 0, relative error below 1e-13; exp(-40) below -40.
 
@@ -95,7 +95,7 @@ def exp_of_negative(x):  # type: ignore[no-untyped-def]
     return e * e
 
 
-@kernel
+@inlined
 def cos_sin(angle):  # type: ignore[no-untyped-def]
     """Cosine and sine of `angle` [rad], error below 2e-16 for |angle| < 1e4."""
     turns = (angle * TWO_OVER_PI + ROUNDER) - ROUNDER  # quarter turns to the nearest multiple of pi / 2

@@ -9,13 +9,13 @@ Symbols: d penetration [m], positive inside; rate [m/s], positive while going in
 
 from __future__ import annotations
 
-from hoof_env._jit import kernel
+from hoof_env._jit import inlined
 from hoof_env.ground.exact_math import exp_of_negative
 
 AMBROSIO, THRELFALL, TANH = range(3)  # positions in friction.FRICTION_LAWS
 
 
-@kernel
+@inlined
 def approach_speed(inside, stored, d_before, rate_before, d, rate, floor, interpolated):  # type: ignore[no-untyped-def]
     """Approach speed v0 [m/s] of a point after a step, 0 outside; `contact.latch` without the record.
 
@@ -39,7 +39,7 @@ def approach_speed(inside, stored, d_before, rate_before, d, rate, floor, interp
     return kept if d > 0.0 else 0.0
 
 
-@kernel
+@inlined
 def normal_force(d, rate, approach, power, stiffness, chi, dashpot):  # type: ignore[no-untyped-def]
     """Normal force [N] on a point: max(0, K d^n (1 + chi rate / v0) + c rate) inside, 0 outside (Eq. 14).
 
@@ -55,7 +55,7 @@ def normal_force(d, rate, approach, power, stiffness, chi, dashpot):  # type: ig
     return 0.0 if d <= 0.0 else force
 
 
-@kernel
+@inlined
 def friction_part(speed, law, slow, fast):  # type: ignore[no-untyped-def]
     """Friction coefficient over its kinetic value [-], 0 to 1; 0 at rest.
 
@@ -74,7 +74,7 @@ def friction_part(speed, law, slow, fast):  # type: ignore[no-untyped-def]
     return min(max(part, 0.0), 1.0)
 
 
-@kernel
+@inlined
 def friction_part_lanes(speed, law, slow, fast, out):  # type: ignore[no-untyped-def]
     """`friction_part` of each lane: `speed` and `out` are rows of one length that do not overlap (slow).
 
@@ -91,13 +91,13 @@ def friction_part_lanes(speed, law, slow, fast, out):  # type: ignore[no-untyped
             out[lane] = friction_part(speed[lane], TANH, slow, fast)
 
 
-@kernel
+@inlined
 def friction_coefficient(speed, law, kinetic, slow, fast):  # type: ignore[no-untyped-def]
     """Friction coefficient mu(|v|) [-], as `friction.friction_coefficient` to rounding of its exponential."""
     return kinetic * friction_part(speed, law, slow, fast)
 
 
-@kernel
+@inlined
 def friction_force(velocity, normal, coefficient):  # type: ignore[no-untyped-def]
     """Friction force [N] along the ground on a point that slides with `velocity` [m/s] (Eq. 15).
 
@@ -110,7 +110,7 @@ def friction_force(velocity, normal, coefficient):  # type: ignore[no-untyped-de
     return -size if velocity > 0.0 else size
 
 
-@kernel
+@inlined
 def contact_power(d, rate, power, normal, stiffness, velocity, friction):  # type: ignore[no-untyped-def]
     """What a contact stores and loses: elastic, damping and friction power [W].
 
@@ -127,7 +127,7 @@ def contact_power(d, rate, power, normal, stiffness, velocity, friction):  # typ
     return elastic * rate, (normal - elastic) * rate, -friction * velocity
 
 
-@kernel
+@inlined
 def elastic_energy(d, power, stiffness, exponent):  # type: ignore[no-untyped-def]
     """Energy [J] in the ground's spring, K d^(n + 1) / (n + 1), 0 outside."""
     energy = stiffness * power * d / (exponent + 1.0)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env._jit import kernel
+from hoof_env._jit import inlined
 
 
 class TerrainGrid(NamedTuple):
@@ -26,7 +26,7 @@ class TerrainGrid(NamedTuple):
     per_metre: float
 
 
-@kernel
+@inlined
 def surface(x, cells, origin, per_metre):  # type: ignore[no-untyped-def]
     """The ground at `x` [m]: height [m], normal x and y [-], factors of stiffness and friction [-].
 
@@ -46,7 +46,7 @@ def surface(x, cells, origin, per_metre):  # type: ignore[no-untyped-def]
     )
 
 
-@kernel
+@inlined
 def surface_lanes(x, cells, origin, per_metre, out):  # type: ignore[no-untyped-def]
     """`surface` at each of `x`, shape (lanes,), into the five rows of `out`, shape (5, lanes).
 

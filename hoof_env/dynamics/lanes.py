@@ -1,0 +1,308 @@
+"""The equations of motion of N legs on one trunk, for a tile of environments side by side.
+
+Every function is one stage of the mechanics: a loop over the lanes of a tile, which do not know of each other.
+Compiled for a tile of one lane or of many these loops become scalar or vector code from one source, and a
+number has the same bits in both: only + - * / and sqrt, no fast-math, no branch that depends on a lane. Planar
+vectors are complex numbers, kept in two rows (`trunk_rows` as t, `limb_rows` as b).
+
+A leg enters as functions of its crank angle theta (`leg.profile` as f): toe and heel, the first moment s and
+the inertias a, b, c. With the world angle beta = pitch + side phi(theta, t) of its frame, the velocity v of O
+and w = theta', its kinetic energy is
+
+    T = m |v|^2 / 2 + v . e^(i beta) (s' w + i s beta') + (a w^2 + 2 b w beta' + c beta'^2) / 2,
+
+and Lagrange's equations follow (docs/engine.md). The trunk's state is the momentum, linear and angular, of all
+bodies together: in flight it stays to the last bit, whatever the scheme.
+"""
+
+from __future__ import annotations
+
+from numba import carray
+
+from hoof_env._jit import inlined
+from hoof_env.dynamics import limb_rows as b
+from hoof_env.dynamics import trunk_rows as t
+from hoof_env.dynamics.lanes_ground import clear_ground, meet_ground, push_back
+from hoof_env.dynamics.trunk import FIXED, FREE, RAIL, SUSPENDED
+from hoof_env.dynamics.vectors import across, put, vector
+from hoof_env.gait.motion_law import COS, OFFSET, SIN, SPEED, clip
+from hoof_env.ground.exact_math import cos_sin
+from hoof_env.leg import profile as f
+from hoof_env.leg.kinematics import cross, dot
+from hoof_env.leg.profile import find_cell, look_up
+
+
+@inlined
+def evaluate(trunk, limbs, model, scratch, elapsed):  # type: ignore[no-untyped-def]
+    """All forces and accelerations at the present stage, `elapsed` [s] after the step's start."""
+    kind = model.kind
+    if kind != FIXED:
+        clear_trunk(trunk, kind)
+    for i in range(limbs.shape[0]):
+        look_up_functions(trunk, limbs[i], model.tables, model.cells, int(model.first[i]), scratch)
+        place_frame(trunk, limbs[i], elapsed)
+        if kind != FIXED:
+            gather_leg(trunk, limbs[i])
+    if kind != FIXED:
+        move_trunk(trunk, kind)
+    for i in range(limbs.shape[0]):
+        clear_ground(limbs[i])
+        for point in range(2):
+            meet_ground(trunk, limbs[i], point, model)
+            push_back(trunk, limbs[i], point, model)
+        feel_leg(trunk, limbs[i], model.motors[i] != 0.0, elapsed, kind)
+    if kind != FIXED:
+        accelerate_trunk(trunk, kind)
+    for i in range(limbs.shape[0]):
+        accelerate_crank(trunk, limbs[i])
+
+
+@inlined
+def look_up_functions(trunk, limb, table, cells, first, scratch):  # type: ignore[no-untyped-def]
+    """The functions of the crank angle and their derivatives, from the table whose first row is `first`."""
+    for lane in range(limb.shape[1]):
+        limb[b.CELL, lane], limb[b.CELL + 1, lane] = find_cell(limb[b.ANGLE, lane], cells)
+    row = carray(scratch, 2 * f.WIDTH)
+    for lane in range(limb.shape[1]):
+        look_up(table, first + (int(limb[b.CELL, lane]) & (cells - 1)), limb[b.CELL + 1, lane], scratch)
+        for k in range(f.COS + 1):
+            limb[b.VALUES + k, lane] = row[k]
+            limb[b.SLOPES + k, lane] = row[f.WIDTH + k]
+    for lane in range(limb.shape[1]):
+        angle, value = limb[b.ANGLE, lane], limb[b.VALUES, lane]
+        trunk[t.STUCK, lane] = 1.0 if (angle == angle) & (value != value) else trunk[t.STUCK, lane]
+
+
+@inlined
+def place_frame(trunk, limb, elapsed):  # type: ignore[no-untyped-def]
+    """The leg's frame: its turn and how that changes with crank angle and time, and the leg's inertia with it.
+
+    The swing is phi = offset + A sin(theta) + B cos(theta), each parameter moving as its filter does.
+    """
+    half = 0.5 * elapsed
+    for lane in range(limb.shape[1]):
+        bend, bend_a, bend_b = limb[b.BEND + OFFSET, lane], limb[b.BEND + SIN, lane], limb[b.BEND + COS, lane]
+        rate = limb[b.RATE + OFFSET, lane] + elapsed * bend
+        rate_a = limb[b.RATE + SIN, lane] + elapsed * bend_a
+        rate_b = limb[b.RATE + COS, lane] + elapsed * bend_b
+        offset = limb[b.VALUE + OFFSET, lane] + elapsed * (limb[b.RATE + OFFSET, lane] + half * bend)
+        part_a = limb[b.VALUE + SIN, lane] + elapsed * (limb[b.RATE + SIN, lane] + half * bend_a)
+        part_b = limb[b.VALUE + COS, lane] + elapsed * (limb[b.RATE + COS, lane] + half * bend_b)
+        sine, cosine = limb[b.VALUES + f.SIN, lane], limb[b.VALUES + f.COS, lane]
+        swing = part_a * sine + part_b * cosine
+        w, side = limb[b.SPIN, lane], limb[b.SIDE, lane]
+        k = side * (part_a * cosine - part_b * sine)
+        limb[b.PHI, lane] = offset + swing
+        limb[b.K, lane] = k
+        limb[b.SWAY, lane] = side * (rate + rate_a * sine + rate_b * cosine)
+        limb[b.SWAY_RATE, lane] = side * (
+            bend + bend_a * sine + bend_b * cosine + (2.0 * (rate_a * cosine - rate_b * sine) - swing * w) * w
+        )
+        cos_beta, sin_beta = cos_sin(trunk[t.NOW_PITCH, lane] + side * (offset + swing))
+        turn = complex(cos_beta, sin_beta)
+        s, ds = turn * vector(limb, b.VALUES + f.S_X, lane), turn * vector(limb, b.VALUES + f.DS_X, lane)
+        put(limb, b.TURN, lane, turn)
+        put(limb, b.HIP, lane, vector(trunk, t.TURN, lane) * vector(limb, b.HIP_ON_TRUNK, lane))
+        put(limb, b.S, lane, s)
+        put(limb, b.DS, lane, ds)
+        put(limb, b.U, lane, ds + across(s) * k)
+        frame = limb[b.VALUES + f.C, lane] + limb[b.ROTOR_C, lane]
+        coupling = limb[b.VALUES + f.B, lane] + limb[b.ROTOR_B, lane]
+        limb[b.COUPLING, lane] = coupling + k * frame
+        limb[b.INERTIA, lane] = (
+            limb[b.VALUES + f.A, lane] + limb[b.ROTOR_A, lane] + k * (2.0 * coupling + k * frame)
+        )
+
+
+@inlined
+def keep_still(trunk):  # type: ignore[no-untyped-def]
+    """What never changes in a trunk that cannot move, or not pitch."""
+    for lane in range(trunk.shape[1]):
+        for k in range(t.MOVING):
+            trunk[t.FLOW + k, lane] = 0.0
+        put(trunk, t.PLACE, lane, vector(trunk, t.CENTRE, lane))
+        put(trunk, t.VELOCITY, lane, 0j)
+        put(trunk, t.ACC, lane, 0j)
+        trunk[t.PITCH_ACC, lane] = 0.0
+        trunk[t.STUCK, lane] = 0.0
+        put(trunk, t.TURN, lane, complex(1.0, 0.0))
+
+
+@inlined
+def clear_trunk(trunk, kind):  # type: ignore[no-untyped-def]
+    """Before the legs are gathered."""
+    for lane in range(trunk.shape[1]):
+        if kind == FREE:
+            cosine, sine = cos_sin(trunk[t.NOW_PITCH, lane])
+            put(trunk, t.TURN, lane, complex(cosine, sine))
+        put(trunk, t.MOMENT, lane, 0j)
+        put(trunk, t.DRIFT, lane, 0j)
+        trunk[t.ROUND, lane] = trunk[t.PITCH_INERTIA, lane]
+        trunk[t.SWIRL, lane] = 0.0
+
+
+@inlined
+def gather_leg(trunk, limb):  # type: ignore[no-untyped-def]
+    """Add a leg to the first moment, momentum, inertia and spin of all about the trunk's centre of mass."""
+    for lane in range(limb.shape[1]):
+        hip, mass = vector(limb, b.HIP, lane), limb[b.MASS, lane]
+        s, u = vector(limb, b.S, lane), vector(limb, b.U, lane)
+        w, sway = limb[b.SPIN, lane], limb[b.SWAY, lane]
+        frame = limb[b.VALUES + f.C, lane] + limb[b.ROTOR_C, lane]
+        own = u * w + across(s) * sway
+        put(trunk, t.MOMENT, lane, vector(trunk, t.MOMENT, lane) + (mass * hip + s))
+        put(trunk, t.DRIFT, lane, vector(trunk, t.DRIFT, lane) + own)
+        trunk[t.ROUND, lane] += mass * dot(hip, hip) + 2.0 * dot(hip, s) + frame
+        trunk[t.SWIRL, lane] += cross(hip, own) + limb[b.COUPLING, lane] * w + frame * sway
+
+
+@inlined
+def move_trunk(trunk, kind):  # type: ignore[no-untyped-def]
+    """Place and velocity of the trunk from centre of mass and momentum of all; what acts on it but its legs.
+
+    A trunk on a rail has a place and no velocity along y.
+    """
+    for lane in range(trunk.shape[1]):
+        centre, moment = vector(trunk, t.NOW_CENTRE, lane), vector(trunk, t.MOMENT, lane)
+        drift, per_mass = vector(trunk, t.DRIFT, lane), trunk[t.PER_MASS, lane]
+        place = centre - moment * per_mass
+        velocity = (vector(trunk, t.NOW_MOMENTUM, lane) - drift) * per_mass
+        rate = 0.0
+        if kind == RAIL:
+            place, velocity = complex(place.real, centre.imag), complex(velocity.real, 0.0)
+        if kind == FREE:
+            spin = trunk[t.NOW_SPIN, lane] - trunk[t.SWIRL, lane] + cross(moment, drift) * per_mass
+            rate = spin / (trunk[t.ROUND, lane] - dot(moment, moment) * per_mass)
+            velocity -= across(moment) * (rate * per_mass)
+        put(trunk, t.PLACE, lane, place)
+        put(trunk, t.VELOCITY, lane, velocity)
+        trunk[t.PITCH_RATE, lane] = rate
+        put(trunk, t.CENTRE_FLOW, lane, vector(trunk, t.NOW_MOMENTUM, lane) * per_mass)
+        force = complex(
+            -trunk[t.DRAG, lane] * velocity.real,
+            trunk[t.SUPPORT, lane]
+            - trunk[t.TOTAL_MASS, lane] * trunk[t.GRAVITY, lane]
+            - trunk[t.SPRING, lane] * (place.imag - trunk[t.HEIGHT, lane])
+            - trunk[t.DAMPER, lane] * velocity.imag,
+        )
+        put(trunk, t.FORCE, lane, force)
+        trunk[t.TWIST, lane] = -force.real * (place.imag - centre.imag)  # the drag acts on the trunk
+        put(trunk, t.LOAD, lane, 0j)
+        trunk[t.LOAD_TURN, lane] = 0.0
+        trunk[t.M_XX, lane] = trunk[t.TOTAL_MASS, lane]
+        trunk[t.M_YY, lane] = trunk[t.TOTAL_MASS, lane]
+        trunk[t.M_XY, lane] = 0.0
+        trunk[t.M_XP, lane] = -moment.imag
+        trunk[t.M_YP, lane] = moment.real
+        trunk[t.M_PP, lane] = trunk[t.ROUND, lane]
+
+
+@inlined
+def feel_leg(trunk, limb, is_motor, elapsed, kind):  # type: ignore[no-untyped-def]
+    """A leg's equation of motion and its part in the trunk's.
+
+    INERTIA theta'' + U . a + LEVER pitch'' = torque + ground - rest, a the trunk's acceleration. A motor's crank is
+    eliminated, so that the trunk's equations keep the trunk's accelerations alone.
+    """
+    for lane in range(limb.shape[1]):
+        w, frame_rate, k = limb[b.SPIN, lane], limb[b.FRAME_RATE, lane], limb[b.K, lane]
+        s, ds, u = vector(limb, b.S, lane), vector(limb, b.DS, lane), vector(limb, b.U, lane)
+        hip, pitch_rate = vector(limb, b.HIP, lane), trunk[t.PITCH_RATE, lane]
+        frame = limb[b.VALUES + f.C, lane] + limb[b.ROTOR_C, lane]
+        coupling, sway_rate = limb[b.COUPLING, lane], limb[b.SWAY_RATE, lane]
+        da, db, dc = (
+            limb[b.SLOPES + f.A, lane], limb[b.SLOPES + f.B, lane], limb[b.SLOPES + f.C, lane]
+        )  # fmt: skip
+        weight = complex(0.0, trunk[t.GRAVITY, lane]) - (pitch_rate * pitch_rate) * hip  # of O, per mass
+        rest_theta = (
+            (coupling - k * frame) * sway_rate
+            + 0.5 * (da * (w * w) - dc * (frame_rate * frame_rate))
+            + dot(weight, ds)
+        )
+        rest_beta = frame * sway_rate + (db * w + dc * frame_rate) * w + dot(weight, across(s))
+        limb[b.REST_THETA, lane], limb[b.REST_BETA, lane] = rest_theta, rest_beta
+        q_theta, q_beta = limb[b.Q_THETA, lane], limb[b.Q_BETA, lane]
+        value, rate, bend = (
+            limb[b.VALUE + SPEED, lane],
+            limb[b.RATE + SPEED, lane],
+            limb[b.BEND + SPEED, lane],
+        )
+        if is_motor:
+            wanted = value + elapsed * (rate + 0.5 * elapsed * bend)
+            torque = clip(limb[b.GAIN, lane] * (wanted - w), limb[b.LIMIT, lane])
+            softness = 1.0 / limb[b.INERTIA, lane]
+            free = softness * (torque + q_theta - rest_theta + k * (q_beta - rest_beta))
+            limb[b.CRANK_TORQUE, lane] = torque
+        else:
+            softness = 0.0
+            free = rate + elapsed * bend
+        limb[b.SOFTNESS, lane], limb[b.SPIN_RATE_FREE, lane] = softness, free
+        lever = coupling + cross(hip, u)
+        limb[b.LEVER, lane] = lever
+        if kind != FIXED:
+            push = vector(limb, b.PUSH, lane)
+            slope = vector(limb, b.TURN, lane) * vector(limb, b.SLOPES + f.DS_X, lane)
+            throw = (  # what the first moment does at rest of all accelerations
+                across(s) * sway_rate
+                + slope * (w * w)
+                + (across(ds) * (2.0 * w) - s * frame_rate) * frame_rate
+            )
+            shake = hip * (pitch_rate * pitch_rate * limb[b.MASS, lane]) - throw
+            put(trunk, t.LOAD, lane, vector(trunk, t.LOAD, lane) + (shake - u * free))
+            put(trunk, t.FORCE, lane, vector(trunk, t.FORCE, lane) + push)
+            soft_u = softness * u
+            trunk[t.M_XX, lane] -= soft_u.real * u.real
+            trunk[t.M_XY, lane] -= soft_u.real * u.imag
+            trunk[t.M_YY, lane] -= soft_u.imag * u.imag
+            if kind == FREE:
+                trunk[t.M_XP, lane] -= soft_u.real * lever
+                trunk[t.M_YP, lane] -= soft_u.imag * lever
+                trunk[t.M_PP, lane] -= softness * lever * lever
+                trunk[t.LOAD_TURN, lane] += (
+                    (q_beta - rest_beta)
+                    + cross(hip, push - limb[b.MASS, lane] * weight - throw)
+                    - lever * free
+                )
+                off = hip + vector(trunk, t.PLACE, lane) - vector(trunk, t.NOW_CENTRE, lane)
+                trunk[t.TWIST, lane] += q_beta + cross(off, push)
+
+
+@inlined
+def accelerate_trunk(trunk, kind):  # type: ignore[no-untyped-def]
+    """Solve the trunk's equations for its accelerations, by Cramer's rule."""
+    for lane in range(trunk.shape[1]):
+        acc, pitch_acc = 0j, 0.0
+        load = vector(trunk, t.FORCE, lane) + vector(trunk, t.LOAD, lane)
+        xx, xy, yy = trunk[t.M_XX, lane], trunk[t.M_XY, lane], trunk[t.M_YY, lane]
+        if kind == RAIL:
+            acc = complex(load.real / xx, 0.0)
+            trunk[t.FORCE + 1, lane] = 0.0  # the rail takes it
+        elif kind == SUSPENDED:
+            per = 1.0 / (xx * yy - xy * xy)
+            acc = complex((yy * load.real - xy * load.imag) * per, (xx * load.imag - xy * load.real) * per)
+        else:
+            xp, yp, pp = trunk[t.M_XP, lane], trunk[t.M_YP, lane], trunk[t.M_PP, lane]
+            turning = trunk[t.LOAD_TURN, lane]
+            c_xx, c_xy, c_xp = yy * pp - yp * yp, xp * yp - xy * pp, xy * yp - yy * xp
+            c_yy, c_yp, c_pp = xx * pp - xp * xp, xy * xp - xx * yp, xx * yy - xy * xy
+            per = 1.0 / (xx * c_xx + xy * c_xy + xp * c_xp)
+            acc = complex(
+                (c_xx * load.real + c_xy * load.imag + c_xp * turning) * per,
+                (c_xy * load.real + c_yy * load.imag + c_yp * turning) * per,
+            )
+            pitch_acc = (c_xp * load.real + c_yp * load.imag + c_pp * turning) * per
+        if kind != FREE:
+            trunk[t.TWIST, lane] = 0.0
+        put(trunk, t.ACC, lane, acc)
+        trunk[t.PITCH_ACC, lane] = pitch_acc
+
+
+@inlined
+def accelerate_crank(trunk, limb):  # type: ignore[no-untyped-def]
+    """The crank's acceleration: a motor's gives way to the trunk's."""
+    for lane in range(limb.shape[1]):
+        pull = (
+            dot(vector(limb, b.U, lane), vector(trunk, t.ACC, lane))
+            + limb[b.LEVER, lane] * trunk[t.PITCH_ACC, lane]
+        )
+        limb[b.SPIN_RATE, lane] = limb[b.SPIN_RATE_FREE, lane] - limb[b.SOFTNESS, lane] * pull

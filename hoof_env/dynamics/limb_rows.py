@@ -1,0 +1,63 @@
+"""Rows of the engine's arrays that belong to one leg; one column is one environment.
+
+Names are row numbers; a vector takes two rows, x at its name and y at the next. SI units and radians. The leg
+enters through its functions of the crank angle (`leg.profile`); beta = pitch + side phi is the world angle
+of its frame.
+"""
+
+from __future__ import annotations
+
+from hoof_env.leg.profile import WIDTH
+
+# The state.
+THETA, OMEGA, VALUE, _, _, _, RATE, _, _, _, MEMORY, _, _, _, _, _ = range(16)
+STATE = (
+    "theta", "theta_rate",
+    "crank_speed", "swing_offset", "swing_sin", "swing_cos",
+    "crank_speed_rate", "swing_offset_rate", "swing_sin_rate", "swing_cos_rate",
+    "toe_penetration", "toe_rate", "toe_approach", "heel_penetration", "heel_rate", "heel_approach",
+)  # fmt: skip
+"""Crank angle and rate; command filters; what each hoof point remembers of the last whole step: penetration,
+its rate, and the approach speed while it is in the ground, else 0."""
+
+VALUES = 16  # the leg's functions at the present stage, in the profile's order
+SLOPES = VALUES + WIDTH  # their derivatives by the crank angle
+(
+    COMMAND, _, _, _,  # what is commanded of the filters
+    BEND, _, _, _,  # and the acceleration that this gives them
+    ANGLE, SPIN, SPIN_RATE,  # crank angle, rate and acceleration at the present stage
+    CELL, _,  # cell of the table and the angle from its middle
+    SPIN_MEAN, SPIN_RATE_MEAN,  # weighted means over the stages so far
+    PHI, K, SWAY, SWAY_RATE,  # swing; then beta's slope by theta, its rate with the crank held, steady
+    FRAME_RATE,  # rate of beta
+    TURN, _, HIP, _,  # e^(i beta); from the trunk's centre of mass to O
+    S, _, DS, _, U, _,  # first moment about O, its derivative by theta in the frame, and with the swing [kg m]
+    INERTIA, COUPLING,  # of the crank with the swing geared to it; of crank and frame [kg m^2]
+    LEVER,  # of crank and pitch [kg m^2]
+    Q_THETA, Q_BETA, PUSH, _,  # the ground: generalised forces [N m], force [N]
+    REST_THETA, REST_BETA,  # generalised inertia forces at rest of the accelerations, weight included [N m]
+    SPIN_RATE_FREE, SOFTNESS,  # crank acceleration if the trunk kept still; 1 / INERTIA, 0 if prescribed
+    CRANK_TORQUE, FRAME_TORQUE, CRANK_POWER, SWING_POWER,  # drives [N m, W]; of the frame in the world's sense
+) = range(SLOPES + WIDTH, SLOPES + WIDTH + 45)  # fmt: skip
+
+CONTACT = SLOPES + WIDTH + 45
+CONTACT_ROWS = 22
+"""Toe's rows begin at CONTACT, heel's at CONTACT + CONTACT_ROWS; the names below count from there."""
+(
+    SPOT, _, SPOT_RATE, _,  # where the point is and how it moves [m, m/s]
+    HEIGHT, NORMAL_X, NORMAL_Y, FIRMNESS, ROUGHNESS,  # the ground there: height, normal, factors of K and mu
+    DEPTH, DEPTH_RATE, SLIDE, SLIDING,  # penetration and rate [m, m/s]; velocity along the ground and its size
+    POWER, GRIP, SLOWNESS,  # depth^n [m^n]; part of the kinetic friction; 1 / approach speed [s/m]
+    NORMAL, RUB,  # force along the ground's normal and along the ground [N]
+    BY_THETA, _, ARM, _,  # the point's place by theta; from O to it [m]
+) = range(22)  # fmt: skip
+
+_P = CONTACT + 2 * CONTACT_ROWS
+HIP_ON_TRUNK, _, MASS, SIDE, GAIN, LIMIT, ROTOR_A, ROTOR_B, ROTOR_C = range(_P, _P + 9)
+PARAMETERS = (
+    "hip_x", "hip_y", "mass", "side", "speed_gain", "torque_limit", "rotor_a", "rotor_b", "rotor_c"
+)  # fmt: skip
+"""Settings of a leg: its place on the trunk, mass, which way it travels, motor, and what the rotor adds to the
+inertias a, b, c."""
+
+ROWS = _P + 9

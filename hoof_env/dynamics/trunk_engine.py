@@ -1,0 +1,406 @@
+"""N legs on one trunk in minimal coordinates, for any number of environments at once: the fast, exact engine.
+
+What can move is integrated: the trunk, as momentum and centre of mass of all bodies together, and the crank of every
+leg whose drive is a motor. Everything inside a leg follows from its crank angle in closed form, so loops are closed
+to round-off at every step of any run. `lanes` holds the mechanics, `advance` runs it; this module is the border:
+checks, settings, state. A number has the same bits alone and in a batch of any size.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hoof_env.dynamics import limb_rows as b
+from hoof_env.dynamics import trunk_rows as t
+from hoof_env.dynamics.advance import Arrays, Model, advance_batch, advance_one, advance_one_leg
+from hoof_env.dynamics.drive import Motor
+from hoof_env.dynamics.engine import GRAVITY
+from hoof_env.dynamics.lanes_report import ACCOUNT, LIMB_REPORT, TRUNK_REPORT
+from hoof_env.dynamics.limb import Limb
+from hoof_env.dynamics.result import Result
+from hoof_env.dynamics.schemes import SCHEMES
+from hoof_env.dynamics.step_length import StepWarning, longest_steps
+from hoof_env.dynamics.tally import Tally, tally
+from hoof_env.dynamics.trunk import FREE, RAIL, SUSPENDED, TRUNKS, Trunk
+from hoof_env.errors import ParameterError, check_choice, check_number
+from hoof_env.gait.motion_law import FilterSettings
+from hoof_env.gait.parameters import GaitParameters
+from hoof_env.ground.contact import Ground
+from hoof_env.ground.exact_math import EXPONENT_UNIT
+from hoof_env.ground.friction import FRICTION_LAWS
+from hoof_env.ground.terrain import Terrain
+from hoof_env.leg.profile import LegProfile
+
+FEW = 6
+"""Up to so many environments are run one by one: a tile would be mostly empty."""
+
+BATCH_OF_LEGS = 4096
+
+Floats = NDArray[np.float64]
+
+
+class TrunkEngine:
+    """Legs on a trunk over the ground; see the module docstring.
+
+    Args:
+        limbs: the legs in their places; their order is that of every array with a leg axis.
+        trunk: what they hang from. Its height is that of its centre of mass.
+        ground: laws of contact. Its exponent must be a multiple of 1/8, so that square roots are enough.
+        terrain: heights, and where the ground is softer or more slippery; level if None.
+        sim_dt: the step [s] after which contacts are remembered and results can be read.
+        integrator: one of `schemes.SCHEMES`.
+        substeps: parts of `sim_dt` that are integrated; None chooses as many as the stiffness of the ground asks.
+        num_envs: environments side by side, which share all of the above.
+        filters: bounds of the command filters.
+
+    Raises:
+        ParameterError: a value is out of range or of the wrong type.
+        GeometryError: a leg has no place for its links at any crank angle.
+
+    Warns:
+        StepWarning: `substeps` is given and too few.
+    """
+
+    def __init__(
+        self,
+        limbs: Limb | Sequence[Limb],
+        trunk: Trunk,
+        ground: Ground | None = None,
+        terrain: Terrain | None = None,
+        *,
+        sim_dt: float = 1e-3,
+        integrator: str = "midpoint",
+        substeps: int | None = None,
+        num_envs: int = 1,
+        filters: FilterSettings | None = None,
+    ) -> None:
+        self.limbs = (limbs,) if isinstance(limbs, Limb) else tuple(limbs)
+        if not self.limbs or not all(isinstance(limb, Limb) for limb in self.limbs):
+            raise ParameterError(f"limbs: expected one Limb or more, got {limbs!r}")
+        self.trunk, self.ground = trunk, ground or Ground()
+        self.terrain, self.filters = terrain or Terrain.flat(), filters or FilterSettings()
+        self.integrator = check_choice("integrator", integrator, SCHEMES)
+        self.sim_dt = check_number("sim_dt", sim_dt, low=1e-7, high=self.filters.longest_step)
+        self.num_envs = _count("num_envs", num_envs)
+        self.profiles = _profiles(self.limbs)
+        self.step_limits = longest_steps(
+            self.limbs, self.profiles, trunk, self.ground, self.terrain, integrator
+        )
+        needed = max(
+            1, int(np.ceil(self.sim_dt / min(self.step_limits["elastic"], self.step_limits["damping"])))
+        )
+        self.substeps = needed if substeps is None else _count("substeps", substeps)
+        if self.substeps < needed:
+            warnings.warn(
+                f"steps of {self.sim_dt / self.substeps:.3g} s are too long for this ground and these masses: "
+                f"expected at most {self.sim_dt / needed:.3g} s, that is substeps={needed} of sim_dt = {sim_dt:g} s",
+                StepWarning,
+                stacklevel=2,
+            )
+        self._arrays = self._new_arrays()
+        self._model = self._new_model()
+        self._run = advance_batch
+        if self.num_envs <= FEW:
+            self._run = advance_one_leg if len(self.limbs) == 1 else advance_one
+
+    # What it is like
+
+    @property
+    def total_mass(self) -> float:
+        """Mass of trunk and legs [kg]."""
+        return self.trunk.mass + sum(limb.geometry.mass for limb in self.limbs)
+
+    @property
+    def weight(self) -> float:
+        """Weight of trunk and legs [N]."""
+        return self.total_mass * GRAVITY
+
+    # State
+
+    def reset(
+        self,
+        gaits: GaitParameters | Sequence[GaitParameters],
+        theta: ArrayLike = 0.0,
+        *,
+        x: ArrayLike = 0.0,
+        y: ArrayLike | None = None,
+        pitch: ArrayLike = 0.0,
+        vx: ArrayLike = 0.0,
+        vy: ArrayLike = 0.0,
+        pitch_rate: ArrayLike = 0.0,
+        theta_rate: ArrayLike | None = None,
+        envs: ArrayLike | None = None,
+    ) -> None:
+        """Start with the filters at rest at a gait, the same for all legs or one each.
+
+        A hoof point that starts inside the ground has entered it at its present rate.
+
+        Args:
+            gaits: gait parameters of each leg.
+            theta: crank angles [rad], of shape (), (legs,) or (legs, n) with n the environments that start.
+            x, y, pitch, vx, vy, pitch_rate: of the trunk's centre of mass [m, rad, s], shape () or (n,); a `y` of
+                None is the trunk's height.
+            theta_rate: of motor-driven cranks [rad/s], as theta; None is the commanded speed.
+            envs: which environments start, as indices or as a mask of shape (num_envs,); None is all.
+
+        Raises:
+            ParameterError: a value is not finite, of the wrong shape or forbidden by the trunk's kind.
+        """
+        where, legs = self._which(envs), len(self.limbs)
+        n, kind = where.size, TRUNKS.index(self.trunk.kind)
+        each = [gaits] * legs if isinstance(gaits, GaitParameters) else list(gaits)
+        if len(each) != legs or not all(isinstance(gait, GaitParameters) for gait in each):
+            raise ParameterError(f"gaits: expected GaitParameters, one or {legs}, got {gaits!r}")
+        values = np.array([gait.to_array() for gait in each])
+        angle = _spread("theta", theta, (legs, n))
+        rate = values[:, :1] if theta_rate is None else theta_rate
+        spin = _spread("theta_rate", rate, (legs, n))
+        place = {"x": x, "y": self.trunk.height if y is None else y, "pitch": pitch}
+        speed = {"vx": vx, "vy": vy, "pitch_rate": pitch_rate}
+        at = {name: _spread(name, value, (n,)) for name, value in (place | speed).items()}
+        for name, kinds in (
+            ("vx", (RAIL, SUSPENDED, FREE)), ("vy", (SUSPENDED, FREE)), ("pitch", (FREE,)), ("pitch_rate", (FREE,))
+        ):  # fmt: skip
+            if kind not in kinds and np.any(at[name] != 0):
+                raise ParameterError(f"{name}: expected 0 of a {self.trunk.kind} trunk, got {at[name]}")
+        if kind <= RAIL and np.any(at["y"] != self.trunk.height):
+            raise ParameterError(f"y: a {self.trunk.kind} trunk is at {self.trunk.height:g} m, got {at['y']}")
+        for i, limb in enumerate(self.limbs):
+            if not isinstance(limb.drive, Motor) and np.any(spin[i] != values[i, 0]):
+                raise ParameterError(
+                    f"theta_rate: leg {i} is prescribed to turn at {values[i, 0]:g} rad/s, got {spin[i]}"
+                )
+        swing = values[:, 1:2] + values[:, 2:3] * np.sin(angle) + values[:, 3:] * np.cos(angle)
+        slope = values[:, 2:3] * np.cos(angle) - values[:, 3:] * np.sin(angle)
+        whole = tally(self, angle, spin, swing, slope * spin, at)
+        trunk, limbs = self._arrays.trunk, self._arrays.limbs
+        moves = np.array([kind != 0, kind in (SUSPENDED, FREE), kind == FREE], dtype=float)
+        new = np.zeros((len(t.STATE), n))
+        new[t.CENTRE] = np.where(moves[0], whole.centre.real, at["x"])
+        new[t.CENTRE + 1] = np.where(moves[1], whole.centre.imag, at["y"])
+        new[t.MOMENTUM], new[t.MOMENTUM + 1] = moves[0] * whole.momentum.real, moves[1] * whole.momentum.imag
+        new[t.PITCH], new[t.SPIN] = at["pitch"], moves[2] * whole.spin
+        trunk[:, where] = new
+        leg = np.zeros((legs, len(b.STATE), n))
+        leg[:, b.THETA], leg[:, b.OMEGA] = angle, spin
+        leg[:, b.VALUE : b.VALUE + 4] = values[:, :, None]
+        limbs[:, :, where] = leg
+        self._arrays.command[:, :, where] = values[:, :, None]
+        self._arrays.account[:, where] = 0.0
+        self._go(0)
+
+    def get_state(self) -> dict[str, Any]:
+        """Everything that changes, as arrays of their own: continuing from it is bit-identical."""
+        a = self._arrays
+        return {name: getattr(a, name).copy() for name in _STATE} | {"layout": self._layout()}
+
+    def set_state(self, state: Mapping[str, Any]) -> None:
+        """Put back what `get_state` gave.
+
+        Raises:
+            ParameterError: the state belongs to another engine or lacks a part.
+        """
+        missing = {*_STATE, "layout"} - set(state)
+        if missing:
+            raise ParameterError(
+                f"state: expected what get_state gives, but {', '.join(sorted(missing))} is missing"
+            )
+        if dict(state["layout"]) != self._layout():
+            raise ParameterError(f"state: expected one of {self._layout()}, got one of {state['layout']}")
+        for name in _STATE:
+            array = getattr(self._arrays, name)
+            given = np.asarray(state[name], dtype=np.float64)
+            if given.shape != array.shape:
+                raise ParameterError(f"state[{name!r}]: expected shape {array.shape}, got {given.shape}")
+        for name in _STATE:
+            getattr(self._arrays, name)[:] = state[name]
+
+    # Motion
+
+    def advance(
+        self, command: ArrayLike | None = None, steps: int = 1, *, account: bool = True
+    ) -> NDArray[np.int64]:
+        """Advance by `steps` of `sim_dt` under a command.
+
+        Args:
+            command: gait parameters, of shape (4,), (legs, 4) or (legs, 4, num_envs); None keeps the last.
+            steps: how many; 0 evaluates forces and accelerations where the state is.
+            account: whether to keep `account`.
+
+        Returns:
+            How each environment ended, shape (num_envs,), values of `result.Result`. One that did not end OK
+            is left in its last good state.
+
+        Raises:
+            ParameterError: the command has a wrong shape or is not finite.
+        """
+        if command is not None:
+            self._command(command)
+        self._go(_count("steps", steps, low=0), account)
+        return self._arrays.result.copy()
+
+    def _command(self, command: ArrayLike) -> None:
+        given, whole = np.asarray(command, dtype=np.float64), self._arrays.command
+        legs = len(self.limbs)
+        if given.shape == (4,) or given.shape == (legs, 4):
+            given = given[..., None]
+        elif given.shape != whole.shape:
+            raise ParameterError(
+                f"command: expected shape (4,), ({legs}, 4) or {whole.shape}, got {given.shape}"
+            )
+        if not np.isfinite(given).all():
+            raise ParameterError(f"command: expected finite numbers, got {command!r}")
+        whole[:] = given
+
+    def _go(self, steps: int, account: bool = False) -> None:
+        self._run(self._arrays, self._model, self.sim_dt / self.substeps, steps * self.substeps, account)
+
+    # What it reports
+
+    @property
+    def state(self) -> dict[str, Floats]:
+        """The state by name: rows of `trunk_rows.STATE`, shape (num_envs,), and of `limb_rows.STATE`, shape
+        (legs, num_envs)."""
+        a = self._arrays
+        return {name: a.trunk[k].copy() for k, name in enumerate(t.STATE)} | {
+            name: a.limbs[:, k].copy() for k, name in enumerate(b.STATE)
+        }
+
+    @property
+    def report(self) -> dict[str, Floats]:
+        """What acts at the present instant: `lanes_report.TRUNK_REPORT` and `LIMB_REPORT` by name."""
+        a = self._arrays
+        return {name: a.trunk_report[k].copy() for k, name in enumerate(TRUNK_REPORT)} | {
+            name: a.limb_report[:, k].copy() for k, name in enumerate(LIMB_REPORT)
+        }
+
+    @property
+    def account(self) -> dict[str, Floats]:
+        """Integrals since the reset by name, `lanes_report.ACCOUNT`, shape (num_envs,)."""
+        return {name: self._arrays.account[k].copy() for k, name in enumerate(ACCOUNT)}
+
+    def tally(self) -> Tally:
+        """Momentum, spin and energy of all bodies at the present instant, added up anew from their motion."""
+        r, s = self.report, self.state
+        at = {"x": r["x"], "y": r["y"], "pitch": s["pitch"]} | {k: r[k] for k in ("vx", "vy", "pitch_rate")}
+        return tally(self, s["theta"], s["theta_rate"], r["phi"], r["phi_rate"], at)
+
+    def messages(self) -> list[str]:
+        """How each environment ended, for people."""
+        return [Result(int(code)).message for code in self._arrays.result]
+
+    # Arrays for the kernels
+
+    def _new_arrays(self) -> Arrays:
+        n, legs = self.num_envs, len(self.limbs)
+        trunk_settings = np.repeat(self._trunk_settings()[:, None], n, 1)
+        limb_settings = np.array([_limb_settings(limb) for limb in self.limbs])
+        return Arrays(
+            np.full((len(t.STATE), n), np.nan),  # nowhere, until reset
+            np.full((legs, len(b.STATE), n), np.nan),
+            trunk_settings,
+            np.repeat(limb_settings[:, :, None], n, 2),
+            np.zeros((legs, 4, n)),
+            np.zeros((len(ACCOUNT), n)),
+            np.zeros((len(TRUNK_REPORT), n)),
+            np.zeros((legs, len(LIMB_REPORT), n)),
+            np.zeros(n, dtype=np.int64),
+        )
+
+    def _trunk_settings(self) -> Floats:
+        trunk, ground, mass = self.trunk, self.ground.to_record(), self.total_mass
+        hangs = trunk.kind == "suspended"
+        values = {
+            "total_mass": mass, "per_mass": 1 / mass, "pitch_inertia": trunk.pitch_inertia,
+            "support": (1 - trunk.share) * mass * GRAVITY if hangs else 0.0,
+            "spring": trunk.stiffness if hangs else 0.0, "damper": trunk.damping if hangs else 0.0,
+            "height": trunk.height, "drag": trunk.drag, "gravity": GRAVITY,
+            "bottom": float(np.min(self.terrain.height)),
+        } | {name: ground[name] for name in (
+            "stiffness", "chi", "dashpot", "approach_floor", "friction", "friction_slow", "friction_fast"
+        )}  # fmt: skip
+        return np.array([values[name] for name in t.PARAMETERS])
+
+    def _new_model(self) -> Model:
+        eighths = self.ground.exponent * EXPONENT_UNIT
+        if eighths != round(eighths):
+            raise ParameterError(
+                f"exponent: this engine takes multiples of 1/{EXPONENT_UNIT}, got {self.ground.exponent!r}"
+            )
+        unique = list(dict.fromkeys(self.profiles))
+        cells = max(profile.cells for profile in unique)
+        tables = [profile.with_cells(cells).table for profile in unique]
+        scheme, grid = SCHEMES[self.integrator], self.terrain.to_grid()
+        return Model(
+            TRUNKS.index(self.trunk.kind), int(eighths), FRICTION_LAWS.index(self.ground.friction_law),
+            self.ground.approach == "interpolated", self.terrain != Terrain.flat(), scheme.new_rates,
+            cells, np.concatenate(tables), np.array([unique.index(p) * cells for p in self.profiles], dtype=float),
+            np.array([isinstance(limb.drive, Motor) for limb in self.limbs], dtype=float),
+            self.filters.to_array(), np.array(scheme.fractions), np.array(scheme.weights),
+            grid.cells, grid.origin, grid.per_metre,
+        )  # fmt: skip
+
+    def _layout(self) -> dict[str, Any]:
+        return {
+            "trunk": self.trunk.kind,
+            "legs": [limb.geometry.name for limb in self.limbs],
+            "num_envs": self.num_envs,
+        }
+
+    def _which(self, envs: ArrayLike | None) -> NDArray[np.int64]:
+        if envs is None:
+            return np.arange(self.num_envs)
+        given = np.asarray(envs)
+        if given.dtype == bool and given.shape == (self.num_envs,):
+            return np.flatnonzero(given)
+        if given.dtype.kind in "iu" and given.ndim == 1 and np.all((given >= 0) & (given < self.num_envs)):
+            return given.astype(np.int64)
+        raise ParameterError(
+            f"envs: expected indices below {self.num_envs} or a mask of shape ({self.num_envs},), got {envs!r}"
+        )
+
+
+_STATE = ("trunk", "limbs", "command", "account")
+
+
+def _profiles(limbs: Sequence[Limb]) -> list[LegProfile]:
+    """One profile for each leg, the same object for the same geometry."""
+    known: list[LegProfile] = []
+    for limb in limbs:
+        if not any(profile.geometry == limb.geometry for profile in known):
+            known.append(LegProfile(limb.geometry))
+    return [next(p for p in known if p.geometry == limb.geometry) for limb in limbs]
+
+
+def _limb_settings(limb: Limb) -> Floats:
+    motor = limb.drive if isinstance(limb.drive, Motor) else Motor(0.0, 0.0, 0.0, 0.0)
+    side, rotor = float(limb.geometry.travel), motor.rotor_inertia
+    values = (
+        *limb.hip, limb.geometry.mass, side, motor.speed_gain, motor.torque_limit,
+        motor.reflected_inertia, -side * motor.gear_ratio * rotor, rotor,
+    )  # fmt: skip
+    return np.array(values)
+
+
+def _count(name: str, value: Any, low: int = 1) -> int:
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)) or value < low:
+        raise ParameterError(f"{name}: expected a whole number, {low} or more, got {value!r}")
+    return int(value)
+
+
+def _spread(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
+    try:
+        given = np.asarray(value, dtype=np.float64)
+        if given.ndim == 1 and len(shape) == 2:
+            given = given[:, None]
+        array = np.broadcast_to(given, shape)
+    except (TypeError, ValueError):
+        raise ParameterError(f"{name}: expected numbers that fit shape {shape}, got {value!r}") from None
+    if not np.isfinite(array).all():
+        raise ParameterError(f"{name}: expected finite numbers, got {value!r}")
+    return array
