@@ -1,0 +1,183 @@
+"""Joint reactions by dyads against Eq. 8's multipliers, Newton and Euler's laws and themselves in batches."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hoof_env.dynamics.constrained import ConstrainedLeg
+from hoof_env.dynamics.constraints import closed_form
+from hoof_env.dynamics.engine import GRAVITY
+from hoof_env.dynamics.reactions import (
+    DRIVER,
+    HIP,
+    LOCK,
+    OUTPUTS,
+    STATE,
+    TILE,
+    leg_constants,
+    leg_reactions,
+    leg_reactions_lanes,
+)
+from hoof_env.gait.motion_law import evaluate_motion
+from hoof_env.gait.parameters import load_gait
+from hoof_env.ground.contact import Ground
+from hoof_env.identify.ensemble import load_ensemble
+from hoof_env.leg.geometry import load_geometry
+from hoof_env.leg.kinematics import FrameMotion, pose
+from hoof_env.leg.linkage import BODIES, CRANK, FRAME, JOINTS
+from hoof_env.leg.linkage import LOCK as LOCKED
+
+PRESETS = {name: load_geometry(name) for name in ("first_fit", "identified")}
+LEGS = {
+    **PRESETS,
+    "mirrored": PRESETS["first_fit"].replace(travel=-PRESETS["first_fit"].travel),
+    "other toe": PRESETS["identified"].replace(
+        toe=PRESETS["identified"].heel, heel=PRESETS["identified"].toe
+    ),
+    "own masses": PRESETS["identified"].replace(masses=tuple(np.linspace(3, 0.2, 14)), inertia="paper"),
+    **{
+        f"ensemble {k}": member.geometry
+        for k, member in enumerate(load_ensemble("identified").members)
+        if k % 5 == 0
+    },
+}
+RUN = load_gait("run", "first_fit")
+GROUND = ((-40.0, 900.0), (25.0, 1700.0))
+AIR = ((0.0, 0.0), (0.0, 0.0))
+
+
+def columns(count, seed=0):
+    """Random states of legs, shape (len(STATE), count), with their angles theta and beta."""
+    rng = np.random.default_rng(seed)
+    theta, beta = rng.uniform(0, 2 * np.pi, count), rng.uniform(-0.5, 0.5, count)
+    rates = rng.normal(0, 10, (4, count))
+    state = [np.cos(theta), np.sin(theta), rates[0], rates[1], np.cos(beta), np.sin(beta), rates[2], rates[3]]
+    return np.array([*state, *rng.normal(0, 5, (2, count)), *rng.normal(0, 500, (4, count))]), theta, beta
+
+
+def cross(arms, forces):
+    """Moments, shape (...), of forces at arms, shape (..., 2)."""
+    return arms[..., 0] * forces[..., 1] - arms[..., 1] * forces[..., 0]
+
+
+def solved(geometry, state):
+    """Outputs of one leg or of several alike."""
+    out = np.full((OUTPUTS, state.shape[1]), np.nan)
+    leg_reactions_lanes(np.ascontiguousarray(state), leg_constants(geometry), out)
+    return out
+
+
+def assert_close(value, expected, scale, rtol=1e-9):
+    np.testing.assert_allclose(value, expected, rtol=0, atol=rtol * scale)
+
+
+@pytest.mark.parametrize("forces", [AIR, GROUND], ids=["air", "ground"])
+@pytest.mark.parametrize("geometry", LEGS.values(), ids=LEGS)
+def test_reactions_are_the_multipliers_of_eq_8(geometry, forces):
+    leg = ConstrainedLeg(geometry, Ground())
+    sigma, state = geometry.travel, leg.state
+    for theta in np.linspace(0.1, 6.2, 12):
+        leg.reset(RUN, theta)
+        state.filters["rate"], state.filters["acc"] = (3.0, 1.0, -0.7, 0.4), (0.0, 5.0, 8.0, -3.0)
+        evaluate_motion(state.motion, state.filters)
+        state.q, state.qd = closed_form(geometry, state.motion)
+        for contact, (friction, normal) in zip(state.contacts, forces, strict=True):
+            contact["friction"], contact["normal"] = friction, normal
+        turn, beta = np.exp(1j * theta), np.exp(1j * sigma * state.motion["phi"])
+        motion = state.motion
+        found = solved(geometry, np.array([[
+            turn.real, turn.imag, motion["theta_rate"], motion["theta_acc"],
+            beta.real, beta.imag, sigma * motion["phi_rate"], sigma * motion["phi_acc"],
+            0.0, GRAVITY, *forces[0], *forces[1],
+        ]]).T)[:, 0]  # fmt: skip
+        expected = leg.reactions()
+        scale = np.abs(expected.joints).max()
+        assert_close(found[:LOCK].reshape(-1, 2), expected.joints, scale)
+        assert_close(found[LOCK], expected.lock, scale * geometry.lengths["EF"])
+        assert_close(found[DRIVER], expected.driver, scale * geometry.lengths["OP"])
+        hip = sigma * leg.solve()[1] @ leg.closure().by_phi
+        assert_close(found[HIP], hip, scale * geometry.lengths["EF"])
+
+
+@pytest.mark.parametrize("name", ["first_fit", "identified", "mirrored", "other toe", "own masses"])
+def test_every_body_obeys_newton_and_euler(name):
+    """With a hip that accelerates, and a frame that turns: forces and moments from positions by `pose`."""
+    geometry = LEGS[name]
+    state, theta, beta = columns(20)
+    outputs = solved(geometry, state)
+    sigma = geometry.travel
+    for k in range(state.shape[1]):
+        found, column = outputs[:, k], state[:, k]
+        lift = column[8:10]
+        frame = FrameMotion(
+            sigma * beta[k], sigma * column[6], sigma * column[7], acceleration=(lift[0], lift[1])
+        )
+        motion = pose(geometry, theta[k], column[2], column[3], frame)
+        need = geometry.body_masses[:, None] * motion.centre_accelerations
+        turn = geometry.body_inertias * motion.angular_accelerations
+        force, moment = np.zeros((15, 2)), np.zeros(15)  # the last is the leg's frame, about O
+        centres = np.vstack([motion.centres, [0, 0]])
+
+        def act(body, point, push, force=force, moment=moment, motion=motion, centres=centres):
+            force[body] += push
+            moment[body] += cross(motion.point(point) - centres[body], push)
+
+        for joint, push in zip(JOINTS, found[:LOCK].reshape(-1, 2), strict=True):
+            act(joint.i, joint.point, push)
+            act(joint.j, joint.point, -push)
+        moment[LOCKED[0]] += found[LOCK]
+        moment[LOCKED[1]] -= found[LOCK]
+        moment[CRANK] += found[DRIVER]
+        moment[FRAME] += found[HIP] - found[DRIVER]
+        sole = next(i for i, body in enumerate(BODIES) if (body.tail, body.head) == ("I", "J"))
+        act(sole, geometry.toe, column[10:12])
+        act(sole, geometry.heel, column[12:14])
+        scale = np.abs(found[:LOCK]).max()
+        assert_close(force[:14], need, scale)
+        assert_close(moment[:14], turn, scale)
+        assert_close(moment[FRAME], 0, scale)
+
+        # The whole leg: what the trunk gives at the hip and the ground at the hoof moves all its links.
+        ground = column[10:12] + column[12:14]
+        assert_close(-force[FRAME] + ground, need.sum(axis=0), scale)
+        about = cross(motion.centres, need).sum() + turn.sum()
+        about -= cross(motion.point(geometry.toe), column[10:12])
+        about -= cross(motion.point(geometry.heel), column[12:14])
+        assert_close(found[HIP], about, scale)
+
+
+def test_a_massless_leg_in_the_air_carries_nothing():
+    geometry = PRESETS["identified"].replace(masses=(1e-12,) * 14)
+    state, _, _ = columns(50)
+    state[10:] = 0
+    assert np.abs(solved(geometry, state)).max() < 1e-6
+
+
+@pytest.mark.parametrize("count", [1, 3, TILE - 1, TILE, TILE + 1, 64, 1000])
+@pytest.mark.parametrize("alike", [True, False])
+def test_a_leg_alone_and_in_a_batch_gives_the_same_bits(count, alike):
+    geometries = [PRESETS["identified"]] if alike else list(LEGS.values())
+    constants = np.hstack([leg_constants(g) for g in geometries])
+    which = np.arange(count) % len(geometries)
+    state, _, _ = columns(count, seed=count)
+    batch = np.full((OUTPUTS, count), np.nan)
+    leg_reactions_lanes(state, constants if alike else np.ascontiguousarray(constants[:, which]), batch)
+    alone = np.empty_like(batch)
+    for k in range(0, count, max(1, count // 50)):
+        c = state[:, k]
+        joints, *moments = leg_reactions(
+            constants, which[k], complex(c[0], c[1]), c[2], c[3], complex(c[4], c[5]), c[6], c[7],
+            complex(c[8], c[9]), complex(c[10], c[11]), complex(c[12], c[13]),
+        )  # fmt: skip
+        alone[:, k] = [*np.array(joints).view(float), *moments]
+        assert alone[:, k].tobytes() == batch[:, k].tobytes()
+
+
+def test_any_batch_can_be_cut_in_pieces():
+    state, _, _ = columns(100)
+    assert len(STATE) == state.shape[0]
+    whole = solved(PRESETS["identified"], state)
+    for cut in (0, 1, 40, 99):
+        pieces = [solved(PRESETS["identified"], part) for part in np.split(state, [cut], axis=1)]
+        assert np.hstack(pieces).tobytes() == whole.tobytes()
