@@ -20,16 +20,17 @@ from __future__ import annotations
 from numba import carray
 
 from hoof_env._jit import inlined
+from hoof_env._memory import address, offset
 from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
 from hoof_env.dynamics.lanes_ground import clear_ground, meet_ground, push_back
 from hoof_env.dynamics.trunk import FIXED, FREE, RAIL, SUSPENDED
-from hoof_env.dynamics.vectors import across, put, vector
+from hoof_env.dynamics.vectors import across, add_row, put, times, vector
 from hoof_env.gait.motion_law import COS, OFFSET, SIN, SPEED, clip
-from hoof_env.ground.exact_math import cos_sin
+from hoof_env.ground.exact_math import ROUNDER, cos_sin
 from hoof_env.leg import profile as f
 from hoof_env.leg.kinematics import cross, dot
-from hoof_env.leg.profile import find_cell, look_up
+from hoof_env.leg.profile import find_cell, look_up, look_up_group
 
 
 @inlined
@@ -60,14 +61,25 @@ def evaluate(trunk, limbs, model, scratch, elapsed):  # type: ignore[no-untyped-
 @inlined
 def look_up_functions(trunk, limb, table, cells, first, scratch):  # type: ignore[no-untyped-def]
     """The functions of the crank angle and their derivatives, from the table whose first row is `first`."""
-    for lane in range(limb.shape[1]):
-        limb[b.CELL, lane], limb[b.CELL + 1, lane] = find_cell(limb[b.ANGLE, lane], cells)
-    row = carray(scratch, 2 * f.WIDTH)
-    for lane in range(limb.shape[1]):
-        look_up(table, first + (int(limb[b.CELL, lane]) & (cells - 1)), limb[b.CELL + 1, lane], scratch)
+    lanes = limb.shape[1]
+    for lane in range(lanes):
+        cell, limb[b.CELL + 1, lane] = find_cell(limb[b.ANGLE, lane], cells)
+        turns = (cell * (1.0 / cells) - 0.5 + ROUNDER) - ROUNDER  # whole ones below
+        row = cell - turns * cells
+        limb[b.CELL, lane] = first + (row if (row >= 0.0) & (row < cells) else 0.0)  # no number: the first row
+    if lanes == 1:
+        row = carray(scratch, 2 * f.WIDTH)
+        look_up(table, int(limb[b.CELL, 0]), limb[b.CELL + 1, 0], scratch)
         for k in range(f.COS + 1):
-            limb[b.VALUES + k, lane] = row[k]
-            limb[b.SLOPES + k, lane] = row[f.WIDTH + k]
+            limb[b.VALUES + k, 0] = row[k]
+            limb[b.SLOPES + k, 0] = row[f.WIDTH + k]
+    else:
+        at = address(limb)
+        for lane in range(0, lanes, f.GROUP):
+            look_up_group(
+                table, offset(at, b.CELL * lanes + lane), offset(at, (b.CELL + 1) * lanes + lane),
+                offset(at, b.VALUES * lanes + lane), lanes,
+            )  # fmt: skip
     for lane in range(limb.shape[1]):
         angle, value = limb[b.ANGLE, lane], limb[b.VALUES, lane]
         trunk[t.STUCK, lane] = 1.0 if (angle == angle) & (value != value) else trunk[t.STUCK, lane]
@@ -105,7 +117,7 @@ def place_frame(trunk, limb, elapsed):  # type: ignore[no-untyped-def]
         put(limb, b.HIP, lane, vector(trunk, t.TURN, lane) * vector(limb, b.HIP_ON_TRUNK, lane))
         put(limb, b.S, lane, s)
         put(limb, b.DS, lane, ds)
-        put(limb, b.U, lane, ds + across(s) * k)
+        put(limb, b.U, lane, ds + times(k, across(s)))
         frame = limb[b.VALUES + f.C, lane] + limb[b.ROTOR_C, lane]
         coupling = limb[b.VALUES + f.B, lane] + limb[b.ROTOR_B, lane]
         limb[b.COUPLING, lane] = coupling + k * frame
@@ -145,15 +157,21 @@ def clear_trunk(trunk, kind):  # type: ignore[no-untyped-def]
 def gather_leg(trunk, limb):  # type: ignore[no-untyped-def]
     """Add a leg to the first moment, momentum, inertia and spin of all about the trunk's centre of mass."""
     for lane in range(limb.shape[1]):
-        hip, mass = vector(limb, b.HIP, lane), limb[b.MASS, lane]
-        s, u = vector(limb, b.S, lane), vector(limb, b.U, lane)
+        hip, s, u = vector(limb, b.HIP, lane), vector(limb, b.S, lane), vector(limb, b.U, lane)
         w, sway = limb[b.SPIN, lane], limb[b.SWAY, lane]
         frame = limb[b.VALUES + f.C, lane] + limb[b.ROTOR_C, lane]
-        own = u * w + across(s) * sway
-        put(trunk, t.MOMENT, lane, vector(trunk, t.MOMENT, lane) + (mass * hip + s))
-        put(trunk, t.DRIFT, lane, vector(trunk, t.DRIFT, lane) + own)
-        trunk[t.ROUND, lane] += mass * dot(hip, hip) + 2.0 * dot(hip, s) + frame
-        trunk[t.SWIRL, lane] += cross(hip, own) + limb[b.COUPLING, lane] * w + frame * sway
+        drift = times(w, u) + times(sway, across(s))
+        moment = times(limb[b.MASS, lane], hip)
+        put(limb, b.PART_MOMENT, lane, moment + s)
+        put(limb, b.PART_DRIFT, lane, drift)
+        limb[b.PART_ROUND, lane] = dot(hip, moment + times(2.0, s)) + frame
+        limb[b.PART_SWIRL, lane] = cross(hip, drift) + limb[b.COUPLING, lane] * w + frame * sway
+    add_row(trunk, t.MOMENT, limb, b.PART_MOMENT)
+    add_row(trunk, t.MOMENT + 1, limb, b.PART_MOMENT + 1)
+    add_row(trunk, t.DRIFT, limb, b.PART_DRIFT)
+    add_row(trunk, t.DRIFT + 1, limb, b.PART_DRIFT + 1)
+    add_row(trunk, t.ROUND, limb, b.PART_ROUND)
+    add_row(trunk, t.SWIRL, limb, b.PART_SWIRL)
 
 
 @inlined
@@ -165,19 +183,19 @@ def move_trunk(trunk, kind):  # type: ignore[no-untyped-def]
     for lane in range(trunk.shape[1]):
         centre, moment = vector(trunk, t.NOW_CENTRE, lane), vector(trunk, t.MOMENT, lane)
         drift, per_mass = vector(trunk, t.DRIFT, lane), trunk[t.PER_MASS, lane]
-        place = centre - moment * per_mass
-        velocity = (vector(trunk, t.NOW_MOMENTUM, lane) - drift) * per_mass
+        place = centre - times(per_mass, moment)
+        velocity = times(per_mass, vector(trunk, t.NOW_MOMENTUM, lane) - drift)
         rate = 0.0
         if kind == RAIL:
             place, velocity = complex(place.real, centre.imag), complex(velocity.real, 0.0)
         if kind == FREE:
             spin = trunk[t.NOW_SPIN, lane] - trunk[t.SWIRL, lane] + cross(moment, drift) * per_mass
             rate = spin / (trunk[t.ROUND, lane] - dot(moment, moment) * per_mass)
-            velocity -= across(moment) * (rate * per_mass)
+            velocity -= times(rate * per_mass, across(moment))
         put(trunk, t.PLACE, lane, place)
         put(trunk, t.VELOCITY, lane, velocity)
         trunk[t.PITCH_RATE, lane] = rate
-        put(trunk, t.CENTRE_FLOW, lane, vector(trunk, t.NOW_MOMENTUM, lane) * per_mass)
+        put(trunk, t.CENTRE_FLOW, lane, times(per_mass, vector(trunk, t.NOW_MOMENTUM, lane)))
         force = complex(
             -trunk[t.DRAG, lane] * velocity.real,
             trunk[t.SUPPORT, lane]
@@ -213,7 +231,7 @@ def feel_leg(trunk, limb, is_motor, elapsed, kind):  # type: ignore[no-untyped-d
         da, db, dc = (
             limb[b.SLOPES + f.A, lane], limb[b.SLOPES + f.B, lane], limb[b.SLOPES + f.C, lane]
         )  # fmt: skip
-        weight = complex(0.0, trunk[t.GRAVITY, lane]) - (pitch_rate * pitch_rate) * hip  # of O, per mass
+        weight = complex(0.0, trunk[t.GRAVITY, lane]) - times(pitch_rate * pitch_rate, hip)  # of O, per mass
         rest_theta = (
             (coupling - k * frame) * sway_rate
             + 0.5 * (da * (w * w) - dc * (frame_rate * frame_rate))
@@ -243,14 +261,14 @@ def feel_leg(trunk, limb, is_motor, elapsed, kind):  # type: ignore[no-untyped-d
             push = vector(limb, b.PUSH, lane)
             slope = vector(limb, b.TURN, lane) * vector(limb, b.SLOPES + f.DS_X, lane)
             throw = (  # what the first moment does at rest of all accelerations
-                across(s) * sway_rate
-                + slope * (w * w)
-                + (across(ds) * (2.0 * w) - s * frame_rate) * frame_rate
+                times(sway_rate, across(s))
+                + times(w * w, slope)
+                + times(frame_rate, times(2.0 * w, across(ds)) - times(frame_rate, s))
             )
-            shake = hip * (pitch_rate * pitch_rate * limb[b.MASS, lane]) - throw
-            put(trunk, t.LOAD, lane, vector(trunk, t.LOAD, lane) + (shake - u * free))
+            shake = times(pitch_rate * pitch_rate * limb[b.MASS, lane], hip) - throw
+            put(trunk, t.LOAD, lane, vector(trunk, t.LOAD, lane) + (shake - times(free, u)))
             put(trunk, t.FORCE, lane, vector(trunk, t.FORCE, lane) + push)
-            soft_u = softness * u
+            soft_u = times(softness, u)
             trunk[t.M_XX, lane] -= soft_u.real * u.real
             trunk[t.M_XY, lane] -= soft_u.real * u.imag
             trunk[t.M_YY, lane] -= soft_u.imag * u.imag
@@ -260,7 +278,7 @@ def feel_leg(trunk, limb, is_motor, elapsed, kind):  # type: ignore[no-untyped-d
                 trunk[t.M_PP, lane] -= softness * lever * lever
                 trunk[t.LOAD_TURN, lane] += (
                     (q_beta - rest_beta)
-                    + cross(hip, push - limb[b.MASS, lane] * weight - throw)
+                    + cross(hip, push - times(limb[b.MASS, lane], weight) - throw)
                     - lever * free
                 )
                 off = hip + vector(trunk, t.PLACE, lane) - vector(trunk, t.NOW_CENTRE, lane)

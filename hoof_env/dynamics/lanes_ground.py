@@ -5,9 +5,9 @@ from __future__ import annotations
 from hoof_env._jit import inlined
 from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
-from hoof_env.dynamics.vectors import across, put, vector
+from hoof_env.dynamics.vectors import across, put, times, vector
 from hoof_env.ground.exact_math import root_power
-from hoof_env.ground.lane_contact import friction_part
+from hoof_env.ground.lane_contact import AMBROSIO, TANH, THRELFALL, friction_part
 from hoof_env.ground.surface import surface
 from hoof_env.leg import profile as f
 from hoof_env.leg.kinematics import dot
@@ -50,7 +50,7 @@ def meet_ground(trunk, limb, point, model):  # type: ignore[no-untyped-def]
         put(limb, c + b.BY_THETA, lane, dz)
         put(limb, c + b.SPOT, lane, vector(trunk, t.PLACE, lane) + hip + z)
         velocity = (
-            vector(trunk, t.VELOCITY, lane) + across(hip) * pitch_rate + (dz * w + across(z) * frame_rate)
+            vector(trunk, t.VELOCITY, lane) + times(pitch_rate, across(hip)) + (times(w, dz) + times(frame_rate, across(z)))
         )
         put(limb, c + b.SPOT_RATE, lane, velocity)
     if model.is_terrain:
@@ -68,11 +68,26 @@ def meet_ground(trunk, limb, point, model):  # type: ignore[no-untyped-def]
         slide = velocity.real * normal.imag - velocity.imag * normal.real
         limb[c + b.SLIDE, lane] = slide
         limb[c + b.SLIDING, lane] = abs(slide)
-    for lane in range(limb.shape[1]):
-        limb[c + b.POWER, lane] = root_power(limb[c + b.DEPTH, lane], model.eighths)
+    if model.eighths == 12:
+        for lane in range(limb.shape[1]):
+            limb[c + b.POWER, lane] = root_power(limb[c + b.DEPTH, lane], 12)
+    else:
+        for lane in range(limb.shape[1]):
+            limb[c + b.POWER, lane] = root_power(limb[c + b.DEPTH, lane], model.eighths)
+    if model.friction_law == AMBROSIO:
+        grip_ground(trunk, limb, c, AMBROSIO)
+    elif model.friction_law == THRELFALL:
+        grip_ground(trunk, limb, c, THRELFALL)
+    else:
+        grip_ground(trunk, limb, c, TANH)
+
+
+@inlined
+def grip_ground(trunk, limb, c, law):  # type: ignore[no-untyped-def]
+    """Which part of the kinetic friction acts at the sliding speed."""
     for lane in range(limb.shape[1]):
         limb[c + b.GRIP, lane] = friction_part(
-            limb[c + b.SLIDING, lane], model.friction_law, trunk[t.SLOW, lane], trunk[t.FAST, lane]
+            limb[c + b.SLIDING, lane], law, trunk[t.SLOW, lane], trunk[t.FAST, lane]
         )
 
 
@@ -81,7 +96,7 @@ def push_back(trunk, limb, point, model):  # type: ignore[no-untyped-def]
     """Forces of the ground on a hoof point (Eqs. 14, 15) and their generalised forces.
 
     The approach speed v0 is that at the crossing, interpolated between the last whole step and now, or the
-    one kept from there: 1 / v0 = over / under, with one division for both.
+    one kept from there, both as slowness 1 / v0.
     """
     c, memory, interpolated = b.CONTACT + point * b.CONTACT_ROWS, b.MEMORY + 3 * point, model.interpolated
     for lane in range(limb.shape[1]):
@@ -91,9 +106,8 @@ def push_back(trunk, limb, point, model):  # type: ignore[no-untyped-def]
         crossed = (before < 0.0) & interpolated
         span = depth - before if crossed else 1.0
         entry = rate_before * span - before * (rate - rate_before) if crossed else rate
-        over = 1.0 if kept > 0.0 else span
-        under = kept if kept > 0.0 else max(entry, floor * span)
-        slowness = over / under
+        fresh = span / max(entry, floor * span)
+        slowness = kept if kept > 0.0 else fresh
         limb[c + b.SLOWNESS, lane] = slowness
         stiffness = trunk[t.STIFFNESS, lane] * limb[c + b.FIRMNESS, lane]
         push = (
@@ -106,7 +120,7 @@ def push_back(trunk, limb, point, model):  # type: ignore[no-untyped-def]
         limb[c + b.NORMAL, lane] = push
         limb[c + b.RUB, lane] = rub
         normal = vector(limb, c + b.NORMAL_X, lane)
-        force = push * normal - rub * across(normal)
+        force = times(push, normal) - times(rub, across(normal))
         limb[b.Q_THETA, lane] += dot(force, vector(limb, c + b.BY_THETA, lane))
         limb[b.Q_BETA, lane] += dot(force, across(vector(limb, c + b.ARM, lane)))
         put(limb, b.PUSH, lane, vector(limb, b.PUSH, lane) + force)
@@ -114,12 +128,11 @@ def push_back(trunk, limb, point, model):  # type: ignore[no-untyped-def]
 
 @inlined
 def remember_contacts(limb):  # type: ignore[no-untyped-def]
-    """At a whole step: keep penetration and rate, and the approach speed of a point that is in the ground."""
+    """At a whole step: keep penetration and rate, and the slowness at entry of a point in the ground."""
     for point in range(2):
         c, memory = b.CONTACT + point * b.CONTACT_ROWS, b.MEMORY + 3 * point
         for lane in range(limb.shape[1]):
-            depth, kept = limb[c + b.DEPTH, lane], limb[memory + 2, lane]
-            entered = kept if kept > 0.0 else 1.0 / limb[c + b.SLOWNESS, lane]
+            depth, slowness = limb[c + b.DEPTH, lane], limb[c + b.SLOWNESS, lane]
             limb[memory, lane] = depth
             limb[memory + 1, lane] = limb[c + b.DEPTH_RATE, lane]
-            limb[memory + 2, lane] = entered if depth > 0.0 else 0.0
+            limb[memory + 2, lane] = slowness if depth > 0.0 else 0.0

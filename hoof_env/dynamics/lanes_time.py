@@ -6,6 +6,7 @@ from hoof_env._jit import inlined
 from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
 from hoof_env.dynamics.trunk import FIXED
+from hoof_env.dynamics.vectors import copy_row, fill_row, set_four_rows, set_row, set_six_rows
 from hoof_env.gait.motion_law import INNER, SPEED, clip
 
 
@@ -26,47 +27,38 @@ def begin_step(trunk, limbs, model):  # type: ignore[no-untyped-def]
     """The first stage is at the state itself."""
     if model.kind != FIXED:
         for k in range(t.MOVING):
-            for lane in range(trunk.shape[1]):
-                trunk[t.NOW + k, lane] = trunk[t.FIRST + k, lane]
-                trunk[t.MEAN + k, lane] = 0.0
+            copy_row(trunk, t.NOW + k, t.FIRST + k)
+            fill_row(trunk, t.MEAN + k, 0.0)
     for i in range(limbs.shape[0]):
-        limb = limbs[i]
-        for lane in range(limb.shape[1]):
-            limb[b.ANGLE, lane] = limb[b.THETA, lane]
-            limb[b.SPIN, lane] = limb[b.OMEGA, lane]
-            limb[b.SPIN_MEAN, lane] = 0.0
-            limb[b.SPIN_RATE_MEAN, lane] = 0.0
+        copy_row(limbs[i], b.ANGLE, b.THETA)
+        copy_row(limbs[i], b.SPIN, b.OMEGA)
+        fill_row(limbs[i], b.SPIN_MEAN, 0.0)
+        fill_row(limbs[i], b.SPIN_RATE_MEAN, 0.0)
 
 
 @inlined
 def weigh_stage(trunk, limbs, model, weight):  # type: ignore[no-untyped-def]
     """Add the derivatives at the present stage to their means."""
+    if weight == 0.0:
+        return
     if model.kind != FIXED:
-        for k in range(t.MOVING):
-            for lane in range(trunk.shape[1]):
-                trunk[t.MEAN + k, lane] += weight * trunk[t.FLOW + k, lane]
+        set_six_rows(trunk, t.MEAN, t.MEAN, weight, t.FLOW)
     for i in range(limbs.shape[0]):
-        limb = limbs[i]
-        for lane in range(limb.shape[1]):
-            limb[b.SPIN_MEAN, lane] += weight * limb[b.SPIN, lane]
-            limb[b.SPIN_RATE_MEAN, lane] += weight * limb[b.SPIN_RATE, lane]
+        set_row(limbs[i], b.SPIN_MEAN, b.SPIN_MEAN, weight, b.SPIN)
+        set_row(limbs[i], b.SPIN_RATE_MEAN, b.SPIN_RATE_MEAN, weight, b.SPIN_RATE)
 
 
 @inlined
 def next_stage(trunk, limbs, model, elapsed):  # type: ignore[no-untyped-def]
     """Go `elapsed` [s] from the step's start with the derivatives of the present stage."""
     if model.kind != FIXED:
-        for k in range(t.MOVING):
-            for lane in range(trunk.shape[1]):
-                trunk[t.NOW + k, lane] = trunk[t.FIRST + k, lane] + elapsed * trunk[t.FLOW + k, lane]
+        set_six_rows(trunk, t.NOW, t.FIRST, elapsed, t.FLOW)
     for i in range(limbs.shape[0]):
-        limb = limbs[i]
         if model.motors[i] != 0.0:
-            for lane in range(limb.shape[1]):
-                limb[b.ANGLE, lane] = limb[b.THETA, lane] + elapsed * limb[b.SPIN, lane]
-                limb[b.SPIN, lane] = limb[b.OMEGA, lane] + elapsed * limb[b.SPIN_RATE, lane]
+            set_row(limbs[i], b.ANGLE, b.THETA, elapsed, b.SPIN)
+            set_row(limbs[i], b.SPIN, b.OMEGA, elapsed, b.SPIN_RATE)
         else:
-            prescribe(limb, b.ANGLE, b.SPIN, elapsed)
+            prescribe(limbs[i], b.ANGLE, b.SPIN, elapsed)
 
 
 @inlined
@@ -82,37 +74,33 @@ def prescribe(limb, angle, spin, elapsed):  # type: ignore[no-untyped-def]
 
 
 @inlined
+def use_new_rates(trunk, h):  # type: ignore[no-untyped-def]
+    """Semi-implicit Euler: place and pitch go with the velocities that the step ends with."""
+    for lane in range(trunk.shape[1]):
+        for k in range(2):
+            trunk[t.MEAN + k, lane] += h * trunk[t.FORCE + k, lane] * trunk[t.PER_MASS, lane]
+        trunk[t.MEAN + t.PITCH - t.FIRST, lane] += h * trunk[t.PITCH_ACC, lane]
+
+
+@inlined
 def end_step(trunk, limbs, model, h):  # type: ignore[no-untyped-def]
     """The state a step later; the filters advance exactly."""
     for lane in range(trunk.shape[1]):
         trunk[t.TIME, lane] += h
     if model.kind != FIXED:
         if model.new_rates:
-            for lane in range(trunk.shape[1]):
-                for k in range(2):
-                    gain = h * trunk[t.FORCE + k, lane]
-                    trunk[t.MOMENTUM + k, lane] += gain
-                    trunk[t.MEAN + k, lane] += gain * trunk[t.PER_MASS, lane]
-                trunk[t.MEAN + t.PITCH - t.FIRST, lane] += h * trunk[t.PITCH_ACC, lane]
-                trunk[t.MEAN + t.MOMENTUM - t.FIRST, lane] = 0.0
-                trunk[t.MEAN + t.MOMENTUM - t.FIRST + 1, lane] = 0.0
-        for k in range(t.MOVING):
-            for lane in range(trunk.shape[1]):
-                trunk[t.FIRST + k, lane] += h * trunk[t.MEAN + k, lane]
+            use_new_rates(trunk, h)
+        set_six_rows(trunk, t.FIRST, t.FIRST, h, t.MEAN)
     for i in range(limbs.shape[0]):
         limb = limbs[i]
         if model.motors[i] == 0.0:
             prescribe(limb, b.THETA, b.OMEGA, h)
         elif model.new_rates:
-            for lane in range(limb.shape[1]):
-                limb[b.OMEGA, lane] += h * limb[b.SPIN_RATE_MEAN, lane]
-                limb[b.THETA, lane] += h * limb[b.OMEGA, lane]
+            set_row(limb, b.OMEGA, b.OMEGA, h, b.SPIN_RATE_MEAN)
+            set_row(limb, b.THETA, b.THETA, h, b.OMEGA)
         else:
-            for lane in range(limb.shape[1]):
-                limb[b.THETA, lane] += h * limb[b.SPIN_MEAN, lane]
-                limb[b.OMEGA, lane] += h * limb[b.SPIN_RATE_MEAN, lane]
-        for k in range(4):
-            for lane in range(limb.shape[1]):
-                rate, bend = limb[b.RATE + k, lane], limb[b.BEND + k, lane]
-                limb[b.VALUE + k, lane] += h * (rate + 0.5 * h * bend)
-                limb[b.RATE + k, lane] = rate + h * bend
+            set_row(limb, b.THETA, b.THETA, h, b.SPIN_MEAN)
+            set_row(limb, b.OMEGA, b.OMEGA, h, b.SPIN_RATE_MEAN)
+        set_four_rows(limb, b.VALUE, b.VALUE, 0.5 * h * h, b.BEND)
+        set_four_rows(limb, b.VALUE, b.VALUE, h, b.RATE)
+        set_four_rows(limb, b.RATE, b.RATE, h, b.BEND)

@@ -15,10 +15,10 @@ STATE = (
     "theta", "theta_rate",
     "crank_speed", "swing_offset", "swing_sin", "swing_cos",
     "crank_speed_rate", "swing_offset_rate", "swing_sin_rate", "swing_cos_rate",
-    "toe_penetration", "toe_rate", "toe_approach", "heel_penetration", "heel_rate", "heel_approach",
+    "toe_penetration", "toe_rate", "toe_slowness", "heel_penetration", "heel_rate", "heel_slowness",
 )  # fmt: skip
 """Crank angle and rate; command filters; what each hoof point remembers of the last whole step: penetration,
-its rate, and the approach speed while it is in the ground, else 0."""
+its rate, and while it is in the ground its slowness at entry, 1 / approach speed [s/m], else 0."""
 
 VALUES = 16  # the leg's functions at the present stage, in the profile's order
 SLOPES = VALUES + WIDTH  # their derivatives by the crank angle
@@ -33,14 +33,15 @@ SLOPES = VALUES + WIDTH  # their derivatives by the crank angle
     TURN, _, HIP, _,  # e^(i beta); from the trunk's centre of mass to O
     S, _, DS, _, U, _,  # first moment about O, its derivative by theta in the frame, and with the swing [kg m]
     INERTIA, COUPLING,  # of the crank with the swing geared to it; of crank and frame [kg m^2]
+    PART_MOMENT, _, PART_DRIFT, _, PART_ROUND, PART_SWIRL,  # in the trunk's MOMENT ... SWIRL
     LEVER,  # of crank and pitch [kg m^2]
     Q_THETA, Q_BETA, PUSH, _,  # the ground: generalised forces [N m], force [N]
     REST_THETA, REST_BETA,  # generalised inertia forces at rest of the accelerations, weight included [N m]
     SPIN_RATE_FREE, SOFTNESS,  # crank acceleration if the trunk kept still; 1 / INERTIA, 0 if prescribed
     CRANK_TORQUE, FRAME_TORQUE, CRANK_POWER, SWING_POWER,  # drives [N m, W]; of the frame in the world's sense
-) = range(SLOPES + WIDTH, SLOPES + WIDTH + 45)  # fmt: skip
+) = range(SLOPES + WIDTH, SLOPES + WIDTH + 51)  # fmt: skip
 
-CONTACT = SLOPES + WIDTH + 45
+CONTACT = SLOPES + WIDTH + 51
 CONTACT_ROWS = 22
 """Toe's rows begin at CONTACT, heel's at CONTACT + CONTACT_ROWS; the names below count from there."""
 (

@@ -170,42 +170,92 @@ def find_cell(theta, cells):  # type: ignore[no-untyped-def]
     return cell, theta - cell * (6.283185307179586 / cells)
 
 
+# The look-up is written as vector instructions, which the compiler cuts to the processor's size: whether it finds
+# them by itself in a plain loop hangs on the code around. Horner's scheme runs through many functions at once:
+#
+#     for p in 1 ... DEGREE:  slope = slope x + value;  value = value x + coefficient[p]
+
+GROUP = 8
+"""Lanes that `look_up_group` takes."""
+
+_INDEX, _DOUBLE = ir.IntType(64), ir.DoubleType()
+
+
+def _place(builder: Any, start: Any, offset: Any, width: int) -> Any:
+    """Pointer to `width` doubles, `offset` doubles after `start`."""
+    offset = ir.Constant(_INDEX, offset) if isinstance(offset, int) else offset
+    return builder.bitcast(builder.gep(start, [offset]), ir.VectorType(_DOUBLE, width).as_pointer())
+
+
+def _horner(builder: Any, table: Any, row: Any, x: Any, begin: int, width: int) -> tuple[Any, Any]:
+    """Values and derivatives of functions `begin` to `begin` + `width` in a row of the table."""
+    vector = ir.VectorType(_DOUBLE, width)
+    nothing, zeros = ir.Constant(vector, ir.Undefined), ir.Constant(ir.VectorType(ir.IntType(32), width), [0] * width)
+    x = builder.insert_element(nothing, x, ir.Constant(ir.IntType(32), 0))
+    x = builder.shuffle_vector(x, nothing, zeros)
+    first = builder.gep(table, [builder.mul(row, ir.Constant(_INDEX, WIDTH * (DEGREE + 1)))])
+    coefficients = [
+        builder.load(_place(builder, first, p * WIDTH + begin, width), align=8) for p in range(DEGREE + 1)
+    ]
+    slope = coefficients[0]
+    value = builder.fadd(builder.fmul(slope, x), coefficients[1])
+    for coefficient in coefficients[2:]:
+        slope = builder.fadd(builder.fmul(slope, x), value)
+        value = builder.fadd(builder.fmul(value, x), coefficient)
+    return value, slope
+
+
 @intrinsic
 def look_up(context: Any, table: Any, row: Any, x: Any, out: Any) -> Any:
     """Fill `out`, 2 WIDTH doubles, with all functions and then their derivatives, `x` [rad] from the middle of
-    the cell in `row` of a table of any number of legs. `table` and `out` are pointers.
-
-    Horner's scheme runs through all functions at once, values and derivatives together:
-
-        for p in 1 ... DEGREE:  slope = slope x + value;  value = value x + coefficient[p]
-
-    It is written as vector instructions of `WIDTH` doubles, which the compiler cuts to the processor's size:
-    whether it finds them by itself hangs on the code around.
-    """
+    the cell in `row` of a table. `table` and `out` are pointers."""
 
     def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        vector, index = ir.VectorType(ir.DoubleType(), WIDTH), ir.IntType(64)
         table, row, x, out = values
-
-        def place(start: Any, offset: int) -> Any:
-            return builder.bitcast(builder.gep(start, [ir.Constant(index, offset)]), vector.as_pointer())
-
-        nothing = ir.Constant(vector, ir.Undefined)
-        lanes = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
-        xs = builder.insert_element(nothing, x, ir.Constant(ir.IntType(32), 0))
-        xs = builder.shuffle_vector(xs, nothing, lanes)
-        first = builder.gep(table, [builder.mul(row, ir.Constant(index, WIDTH * (DEGREE + 1)))])
-        coefficients = [builder.load(place(first, p * WIDTH), align=8) for p in range(DEGREE + 1)]
-        slope = coefficients[0]
-        value = builder.fadd(builder.fmul(slope, xs), coefficients[1])
-        for coefficient in coefficients[2:]:
-            slope = builder.fadd(builder.fmul(slope, xs), value)
-            value = builder.fadd(builder.fmul(value, xs), coefficient)
-        builder.store(value, place(out, 0), align=8)
-        builder.store(slope, place(out, WIDTH), align=8)
+        value, slope = _horner(builder, table, row, x, 0, WIDTH)
+        builder.store(value, _place(builder, out, 0, WIDTH), align=8)
+        builder.store(slope, _place(builder, out, WIDTH, WIDTH), align=8)
         return context.get_dummy_value()
 
     return types.void(table, row, x, out), emit
+
+
+@intrinsic
+def look_up_group(context: Any, table: Any, rows: Any, xs: Any, out: Any, stride: Any) -> Any:
+    """`look_up` for `GROUP` lanes: row numbers (as doubles) and angles at the pointers `rows` and `xs`; function k
+    of lane j goes to out[k stride + j], its derivative to out[(WIDTH + k) stride + j]."""
+
+    def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        table, rows, xs, out, stride = values
+        for begin in range(0, WIDTH, GROUP):
+            lanes = []
+            for lane in range(GROUP):
+                row, x = (builder.load(builder.gep(p, [ir.Constant(_INDEX, lane)])) for p in (rows, xs))
+                lanes.append(_horner(builder, table, builder.fptosi(row, _INDEX), x, begin, GROUP))
+            for part, columns in enumerate(zip(*lanes, strict=True)):
+                for k, column in enumerate(_transpose(builder, list(columns))):
+                    number = ir.Constant(_INDEX, part * WIDTH + begin + k)
+                    builder.store(column, _place(builder, out, builder.mul(number, stride), GROUP), align=8)
+        return context.get_dummy_value()
+
+    return types.void(table, rows, xs, out, stride), emit
+
+
+def _transpose(builder: Any, rows: list[Any]) -> list[Any]:
+    """Swap rows and columns of a square of vectors, in log2 steps of exchanging blocks between pairs of rows."""
+    size = len(rows)
+    block = 1
+    while block < size:
+        swapped = list(rows)
+        low = [i + (size - block if i & block else 0) for i in range(size)]
+        high = [i + block if not i & block else size + i for i in range(size)]
+        for i in range(size):
+            if not i & block:
+                for target, mask in ((i, low), (i + block, high)):
+                    indices = ir.Constant(ir.VectorType(ir.IntType(32), size), mask)
+                    swapped[target] = builder.shuffle_vector(rows[i], rows[i + block], indices)
+        rows, block = swapped, 2 * block
+    return rows
 
 
 @kernel
