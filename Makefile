@@ -11,12 +11,12 @@ PYTHONS := $(or $(PYTHON),$(PY) python3 python3.13 python3.12 python3.11)
 IS_SUPPORTED := import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))
 
 help:
-	@echo 'make demo    reproduce the paper, train an agent, write runs/demo/report.html'
-	@echo 'make test    lint, types and tests'
+	@echo 'make demo        reproduce the paper, train an agent, write runs/demo/report.html'
+	@echo 'make test        lint, types and tests'
 	@echo 'make test-peers  the engine against MuJoCo and Exudyn, which it installs'
-	@echo 'make lint    lint and types alone'
-	@echo 'make setup   make .venv and nothing more'
-	@echo 'make clean   remove .venv and the caches; runs/ stays'
+	@echo 'make lint        lint and types alone'
+	@echo 'make setup       make .venv and nothing more'
+	@echo 'make clean       remove .venv and the caches; runs/ stays'
 
 setup:
 	@for python in $(PYTHONS); do \
