@@ -4,7 +4,7 @@
 #   TORCH_INDEX=URL     where Linux takes PyTorch from; empty for pip's own index, which has the CUDA build
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-peers lint clean
+.PHONY: help setup demo test test-peers bench lint clean
 
 PY := .venv/bin/python
 PYTHONS := $(or $(PYTHON),$(PY) python3 python3.13 python3.12 python3.11)
@@ -14,6 +14,7 @@ help:
 	@echo 'make demo        reproduce the paper, train an agent, write runs/demo/report.html'
 	@echo 'make test        lint, types and tests'
 	@echo 'make test-peers  the engine against MuJoCo and Exudyn, which it installs'
+	@echo 'make bench       how fast the engine is beside MuJoCo and Exudyn, which it installs'
 	@echo 'make lint        lint and types alone'
 	@echo 'make setup       make .venv and nothing more'
 	@echo 'make clean       remove .venv and the caches; runs/ stays'
@@ -34,6 +35,11 @@ test: lint
 test-peers: setup
 	@echo 'pip install mujoco exudyn' && $(PY) -m pip install -q -c constraints.txt -e '.[peers]'
 	@echo 'pytest tests/peers' && $(PY) -m pytest -q -m '' tests/peers
+
+bench: setup
+	@echo 'pip install mujoco exudyn' && $(PY) -m pip install -q -c constraints.txt -e '.[peers]' || \
+	  echo 'some are not there: fewer comparisons'
+	@$(PY) -m benchmarks.speed
 
 lint: setup
 	@echo 'ruff check' && $(PY) -m ruff check -q --output-format concise
