@@ -199,6 +199,9 @@ differ by; fine steps in ms, air and ground: {steps}.
 as well as they agree with themselves. The first {early:.0%} of a run is left out: Exudyn settles. Loops of
 this project's engine: toe and heel against the closed linkage at the same crank angle.
 
+Where a hoof stands, 1 ms tracks the motion but not the forces: friction that sets in between 1 and 10 mm/s
+is too stiff for such a step (`TrunkEngine.step_limits["friction"]`) and changes sign from step to step.
+
 ## Relative differences and the worst share
 
 {summary}

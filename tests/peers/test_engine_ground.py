@@ -10,18 +10,17 @@ from benchmarks.cases import CASES
 from benchmarks.trunk_legs import TrunkLegs
 
 GROUND = [case for case in CASES if case.ground]
-STEPS = {"ours": 2e-5, "MuJoCo": 5e-5, "Exudyn": 1e-4}
-
 pytestmark = pytest.mark.peers
 
 
 @pytest.mark.parametrize("case", GROUND, ids=lambda case: case.name)
-@pytest.mark.parametrize("preset", ["first_fit", "identified"])
-def test_engine_agrees_with_the_peers(preset, case):
-    for row in compare(preset, case, STEPS):
+def test_engine_agrees_with_the_peers(case):
+    """On one leg, for time; `python -m benchmarks.agreement` has both."""
+    for row in compare("identified", case):
         label = f"{row.engine}, {row.quantity}: {row}"
         if row.engine in PEERS:
-            assert row.share < 1, label
+            assert row.share < 1.5, label
+            assert row.relative < (1e-5 if row.unit in ("m", "rad") else 1e-4), label
             assert row.closure < 1e-8, label
         else:
             assert row.closure < 1e-12, label
