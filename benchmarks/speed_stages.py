@@ -7,6 +7,7 @@ every selection, as vector code has them.
 from __future__ import annotations
 
 from collections import Counter
+from functools import cache
 from typing import Any
 
 import numba
@@ -237,15 +238,18 @@ def _stage_alone(stage: Any, made: TrunkEngine, kind: int) -> Any:
     return numba.njit(error_model="numpy")(alone)
 
 
+@cache
+def _operations(stage: Any, made: TrunkEngine, kind: int) -> Counter[str]:
+    compiled = _stage_alone(stage, made, kind)
+    compiled(made._model, 1e-6)
+    return count_operations(assembly(compiled))
+
+
 def _count(stage: Any, made: TrunkEngine, kind: int) -> Counter[str]:
     """What a stage does to one lane of one leg, under a trunk of some kind."""
-    counts = []
-    for what in (stage, _none):
-        compiled = _stage_alone(what, made, kind)
-        compiled(made._model, 1e-6)
-        counts.append(count_operations(assembly(compiled)))
-    counts[0].subtract(counts[1])
-    return counts[0]
+    found = Counter(_operations(stage, made, kind))
+    found.subtract(_operations(_none, made, kind))
+    return found
 
 
 def count_stage(name: str, made: TrunkEngine) -> Counter[str]:
@@ -253,8 +257,8 @@ def count_stage(name: str, made: TrunkEngine) -> Counter[str]:
     stage, calls, whose = STAGES[name]
     kind, legs = TRUNKS.index(made.trunk.kind), len(made.limbs)
     found = _count(stage, made, kind)
-    if whose == BOTH and legs > 1:
-        for of_leg in [_count(stage, made, FIXED)] * (legs - 1):
-            found.update(of_leg)
+    if whose == BOTH:
+        for _ in range(legs - 1):
+            found.update(_count(stage, made, FIXED))
     times = calls * (legs if whose == LEG else 1)
     return Counter({k: times * n for k, n in found.items()})
