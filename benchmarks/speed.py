@@ -103,7 +103,7 @@ def measure(preset: str, quick: bool, peers: bool, rounds: int) -> dict[str, Any
     _say("what limits it")
     limited = limits(preset, quick, max(2, rounds // 2))
     _say("cost against size")
-    curves = scaling(preset, quick, max(2, rounds // 4))
+    curves = scaling(preset, quick, max(2, rounds // 2))
     for curve in curves.values():
         curve["line_error"] = line_error(curve)
     start = None
