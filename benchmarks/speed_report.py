@@ -109,13 +109,13 @@ def _walking(rows: list[dict[str, Any]]) -> str:
 
 
 def _start(start: dict[str, Any]) -> str:
-    warm, cold = start["warm_start_s"], start["first_compile_s"]
+    warm, cold, every = (start[f"{k}_s"] for k in ("warm_start", "first_compile", "warm_start_all_kernels"))
     rows = [
-        ["import, construct, first step; cached", told(warm), _under(1, warm["median"])],
-        ["the same with every kernel, cached", f"{start['warm_start_all_kernels_s']:.2f}", ""],
-        ["the same with every kernel, compiled", f"{cold:.1f}", _under(30, cold)],
+        ["import, construct, first step; cached", *map(told, warm), _under(1, warm[0]["median"])],
+        ["the same with every kernel, cached", *(f"{s:.2f}" for s in every), ""],
+        ["the same with every kernel, compiled", *(f"{s:.1f}" for s in cold), _under(30, cold[0])],
     ]
-    return "## Start\n\n" + table(["in a fresh process", "s", "bar"], rows)
+    return "## Start\n\n" + table(["in a fresh process", "wall time s", "processor s", "bar"], rows)
 
 
 def _under(bar: float, value: float) -> str:

@@ -33,28 +33,33 @@ for options in [{{}}] + [{{"reactions": True}}] * HAS_REACTIONS:
             break
     if not {everything}:
         break
-print(time.perf_counter() - begin)
+print(time.perf_counter() - begin, time.process_time())
 """
 
 
-def _start(preset: str, folder: str, everything: bool) -> float:
-    """Seconds of import, construction and first steps in a fresh process."""
+def _start(preset: str, folder: str, everything: bool) -> tuple[float, float]:
+    """Wall time of import, construction and first steps in a fresh process, and its processor time [s]."""
     environment = os.environ | {"NUMBA_CACHE_DIR": folder}
     code = _START.format(preset=preset, everything=everything)
     root = Path(__file__).resolve().parents[1]
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=root, env=environment, capture_output=True, text=True, check=True
     )
-    return float(done.stdout.split()[-1])
+    wall, processor = done.stdout.split()[-2:]
+    return float(wall), float(processor)
 
 
 def startup(preset: str, starts: int = 5) -> dict[str, Any]:
-    """First compile of all kernels with an empty cache, then starts with a full one [s]."""
+    """Compiling all kernels into an empty cache, then starts with a full one: wall and processor time [s]."""
     with tempfile.TemporaryDirectory() as folder:
         compiled = _start(preset, folder, everything=True)
         warm = np.array([_start(preset, folder, everything=False) for _ in range(starts)])
         everything = _start(preset, folder, everything=True)
-    return {"first_compile_s": compiled, "warm_start_s": spread(warm), "warm_start_all_kernels_s": everything}
+    return {
+        "first_compile_s": compiled,
+        "warm_start_s": [spread(column) for column in warm.T],
+        "warm_start_all_kernels_s": everything,
+    }
 
 
 def _advance(made: TrunkEngine, steps: int) -> Callable[[], float]:
