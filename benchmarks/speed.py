@@ -111,10 +111,10 @@ def measure(preset: str, quick: bool, peers: bool, rounds: int) -> dict[str, Any
         _say("start")
         start = startup(preset)
     return {
-        "machine": machine(), "preset": preset, "quick": quick, "rounds": rounds, "dt_s": cases.DT,
+        "machine": machine(), "preset": preset, "quick": quick, "clock": cases.CLOCK,
+        "rounds": rounds, "dt_s": cases.DT,
         "cases": rows, "notes": notes, "walking": walks, "walking_steps": walk_steps,
-        "limits": limited, "scaling": curves,
-        "startup": start,
+        "limits": limited, "scaling": curves, "startup": start,
     }  # fmt: skip
 
 
@@ -153,9 +153,11 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--out", type=Path, default=RESULTS, help="folder for the results")
     parser.add_argument("--preset", default=DEFAULT_PRESET, help="whose leg")
     parser.add_argument("--rounds", type=int, help=f"how many; {ROUNDS} if not given")
+    parser.add_argument("--clock", choices=cases.CLOCKS, default="wall", help="processor: on a busy machine")
     parser.add_argument("--quick", action="store_true", help="a smoke test: small numbers that mean nothing")
     parser.add_argument("--no-peers", action="store_true", help="this engine alone")
     given = parser.parse_args(arguments)
+    cases.CLOCK = given.clock
     rounds = given.rounds or (2 if given.quick else ROUNDS)
     result = measure(given.preset, given.quick, not given.no_peers, rounds)
     with staged(given.out) as folder:

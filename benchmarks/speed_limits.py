@@ -16,7 +16,7 @@ import numba
 import numpy as np
 from numba import carray
 
-from benchmarks.speed_cases import BATCH, DT, engine, scenes, timed
+from benchmarks.speed_cases import BATCH, DT, engine, scenes, worked
 from benchmarks.speed_code import KINDS, assembly, packed_and_not, vector_widths
 from benchmarks.speed_rounds import interleave, spread
 from benchmarks.speed_stages import NOT_FIXED, STAGES, count_stage, fence, filled_tile, stage_loop
@@ -106,7 +106,7 @@ def limits(preset: str, quick: bool, rounds: int) -> dict[str, Any]:
     result: dict[str, Any] = {} if quick else _vectors(engine(at["leg"], preset, TILE))
     turns, steps = (200, 10) if quick else (20000, 40)
     runs: dict[str, Callable[[], float]] = {
-        f"ceiling {name}": partial(timed, _nothing, partial(loop, turns))
+        f"ceiling {name}": partial(worked, _nothing, partial(loop, turns))
         for name, (loop, _) in CEILINGS.items()
     }
     found: dict[str, dict[str, Counter[str]]] = {}
@@ -118,7 +118,7 @@ def limits(preset: str, quick: bool, rounds: int) -> dict[str, Any]:
                 found[scene][name] = count_stage(name, made)
                 loop = stage_loop(stage, len(made.limbs))
                 work = partial(loop, *tile, made._model, 1e-6, turns // 20)
-                runs[f"{scene} {name}"] = partial(timed, _nothing, work)
+                runs[f"{scene} {name}"] = partial(worked, _nothing, work)
         runs[f"{scene} whole"] = _whole(engine(at[scene], preset, BATCH), steps)
     seconds = interleave(runs, rounds)
     rates = {name: per * turns / seconds[f"ceiling {name}"] for name, (_, per) in CEILINGS.items()}
@@ -158,7 +158,7 @@ def _nothing() -> None:
 def _whole(made: TrunkEngine, steps: int) -> Callable[[], float]:
     made.advance(steps=1, account=False)
     state = made.get_state()
-    return partial(timed, partial(made.set_state, state), partial(made.advance, steps=steps, account=False))
+    return partial(worked, partial(made.set_state, state), partial(made.advance, steps=steps, account=False))
 
 
 def experiments(preset: str, rounds: int) -> dict[str, Any]:
@@ -181,7 +181,7 @@ def experiments(preset: str, rounds: int) -> dict[str, Any]:
             work = partial(kernel, made._arrays, made._model, DT, steps, False)
             work()
             made.set_state(state)
-            runs[f"tiles of {tile}"] = partial(timed, partial(made.set_state, state), work), BATCH * steps
+            runs[f"tiles of {tile}"] = partial(worked, partial(made.set_state, state), work), BATCH * steps
     seconds = interleave({name: r for name, (r, _) in runs.items()}, rounds)
     base = seconds["plain"] / runs["plain"][1]
     return {

@@ -11,8 +11,9 @@ INTRO = """\
 # How fast it is
 
 Written by `make bench`; run it again for the numbers of your machine. Everything runs in one process on one
-thread, interleaved: {rounds} rounds, each with every case once in a new order, wall time. A ratio is taken
-within a round; given are the median and in brackets quartiles and extremes. Only ratios count."""
+thread, interleaved: {rounds} rounds, each with every case once in a new order, {clock} time. A ratio is taken
+within a round; given are the median and in brackets quartiles and extremes. Only ratios count. Stages and
+costs against size are in processor time."""
 
 RATIOS = """\
 ## Ratios
@@ -174,7 +175,7 @@ def _stages(found: dict[str, Any], ceilings: dict[str, float]) -> str:
 def markdown(result: dict[str, Any]) -> str:
     """The whole page."""
     parts = [
-        INTRO.format(rounds=result["rounds"]),
+        INTRO.format(**result),
         table(["", ""], [[k, v] for k, v in result["machine"].items()]),
     ]
     parts += [RATIOS, speed_table(result["cases"]), *(f"- {note}" for note in result["notes"])]

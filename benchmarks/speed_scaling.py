@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.speed_cases import Scene, engine, scenes, timed
+from benchmarks.speed_cases import Scene, engine, scenes, worked
 from benchmarks.speed_rounds import interleave, spread
 from hoof_env.dynamics.trunk_engine import TrunkEngine
 
@@ -65,7 +65,7 @@ def startup(preset: str, starts: int = 5) -> dict[str, Any]:
 def _advance(made: TrunkEngine, steps: int) -> Callable[[], float]:
     made.advance(steps=1, account=False)
     state = made.get_state()
-    return partial(timed, partial(made.set_state, state), partial(made.advance, steps=steps, account=False))
+    return partial(worked, partial(made.set_state, state), partial(made.advance, steps=steps, account=False))
 
 
 def _legs(scene: Scene, count: int) -> Scene:
