@@ -80,5 +80,5 @@ def test_machine_code_is_counted_by_width():
 def test_departure_from_a_straight_line():
     x = [1, 10, 100]
     straight = [{"median": (5 + 2 * n) / n} for n in x]
-    assert line_error({"x": x, "per_unit_s": straight}) < 1e-9
-    assert line_error({"x": x, "per_unit_s": [{"median": n} for n in x]}) > 0.1
+    assert line_error({"x": x, "line_from": 1, "per_unit_s": straight}) < 1e-9
+    assert line_error({"x": x, "line_from": 1, "per_unit_s": [{"median": n} for n in x]}) > 0.1
