@@ -15,8 +15,8 @@ from hoof_env.paper.figures import save
 
 COLOURS = dict(zip(SCHEMES, (ORANGE, BLUE, GREEN, PURPLE), strict=True))
 PLACES = {"air": "in air", "natural": "on the ground"}
-SLOPES = {"air": (1, 2, 3, 4), "natural": (1, 2)}
-"""Reference slopes of each place."""
+SLOPES = {"air": (1, 2, 3, 4), "natural": (1, 0, 0, 2)}
+"""Reference slope under the line of each scheme, 0 for none."""
 
 NOISE = 1e-11
 """Errors below this are the reference's and round-off's [rad]."""
@@ -36,26 +36,24 @@ def draw_convergence(
         at = 1e3 * np.array(steps)
         for case, by_scheme in errors.items():
             ax = axes[presets.index(case.preset), list(PLACES).index(case.ground)]
-            for scheme, found in by_scheme.items():
-                worst = np.maximum([e.max() for e in found], NOISE)
-                median = np.maximum([np.median(e) for e in found], NOISE)
-                ax.plot(
-                    at, median, "o-", ms=3.5, lw=1.2, color=COLOURS[scheme], label=scheme.replace("_", " ")
-                )
+            for (scheme, found), order in zip(by_scheme.items(), SLOPES[case.ground], strict=True):
+                worst, median = (np.array([f(e) for e in found]) for f in (np.max, np.median))
+                worst, median = (np.where(e < NOISE, np.nan, e) for e in (worst, median))
+                ax.plot(at, median, "o-", ms=3.5, lw=1.2, color=COLOURS[scheme], label=scheme)
                 ax.fill_between(at, median, worst, color=COLOURS[scheme], alpha=0.18, lw=0)
-            last = [np.median(found[-1]) for found in by_scheme.values()]
-            for order in SLOPES[case.ground]:
-                start = max(last[order - 1], NOISE) / 3
-                ax.plot(at, start * (at / at[-1]) ** order, ":", lw=0.8, color=GREY)
-                ax.annotate(f"{order}", (at[2], start * (at[2] / at[-1]) ** order), color=GREY, fontsize=8,
-                            xytext=(2, -8), textcoords="offset points")  # fmt: skip
+                if order:
+                    line = median[0] / 2.5 * (at / at[0]) ** order
+                    ax.plot(at[line > NOISE], line[line > NOISE], ":", lw=0.9, color=GREY)
+                    ax.annotate(f"slope {order}", (at[0], line[0]), color=GREY, fontsize=7,
+                                xytext=(4, -3), textcoords="offset points")  # fmt: skip
             ax.set(xscale="log", yscale="log", title=f"{case.preset}, {case.gait} {PLACES[case.ground]}")
             ax.set_xticks(at, [f"{x:g}" for x in at])
             ax.minorticks_off()
-            ax.set_ylim(NOISE / 2, 1e-1)
+            ax.set_ylim(NOISE / 2, 1e-2)
         for ax in axes[-1]:
             ax.set_xlabel("step [ms]")
         for ax in axes[:, 0]:
             ax.set_ylabel("crank angle error after 2 s [rad]")
-        axes[0, 0].legend(loc="upper left")
+        handles, labels = axes[0, 0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
         save(figure, path)

@@ -71,8 +71,9 @@ def fly(preset: str, scheme: str, step: float, seconds: float = 0.5) -> Kept:
     command, first, weight = load_gait("run", preset).to_array(), engine.tally(), engine.weight
     closure, momentum, spin, energy, work, now = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for _ in range(10):
-        assert not engine.advance(command, steps=round(seconds / 10 / step)).any()
-        now += seconds / 10
+        steps = round(seconds / 10 / step)
+        assert not engine.advance(command, steps=steps).any()
+        now += steps * step
         t, account = engine.tally(), engine.account
         closure = max(closure, gap(engine))
         momentum = max(momentum, float(np.abs(t.momentum - first.momentum + 1j * weight * now)[0]))
