@@ -126,7 +126,7 @@ def _under(bar: float, value: float) -> str:
 def _scaling(curves: dict[str, dict[str, Any]]) -> str:
     head = ["curve", "from", "to", "largest departure from a straight line"]
     rows = [
-        [title, f"{c['x'][0]}", f"{c['x'][-1]}", f"{100 * c['line_error']:.0f} %"]
+        [title, f"{c['line_from']}", f"{c['x'][-1]}", f"{100 * c['line_error']:.0f} %"]
         for title, c in curves.items()
     ]
     return SCALING + "\n\n" + table(head, rows)
