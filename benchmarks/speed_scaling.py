@@ -116,7 +116,7 @@ def scaling(preset: str, quick: bool, rounds: int) -> dict[str, dict[str, Any]]:
 
 
 def line_error(curve: dict[str, Any]) -> float:
-    """Largest relative departure of the total cost from a straight line through the medians past `line_from`."""
+    """Largest relative departure of the total cost from a straight line; from `line_from` on."""
     x = np.array(curve["x"], dtype=float)
     y = x * [s["median"] for s in curve["per_unit_s"]]
     x, y = x[x >= curve["line_from"]], y[x >= curve["line_from"]]
