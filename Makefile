@@ -4,18 +4,20 @@
 #   TORCH_INDEX=URL     where Linux takes PyTorch from; empty for pip's own index, which has the CUDA build
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint clean
+.PHONY: help setup demo test test-peers bench lint clean
 
 PY := .venv/bin/python
 PYTHONS := $(or $(PYTHON),$(PY) python3 python3.13 python3.12 python3.11)
 IS_SUPPORTED := import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))
 
 help:
-	@echo 'make demo    reproduce the paper, train an agent, write runs/demo/report.html'
-	@echo 'make test    lint, types and tests'
-	@echo 'make lint    lint and types alone'
-	@echo 'make setup   make .venv and nothing more'
-	@echo 'make clean   remove .venv and the caches; runs/ stays'
+	@echo 'make demo        reproduce the paper, train an agent, write runs/demo/report.html'
+	@echo 'make test        lint, types and tests'
+	@echo 'make test-peers  the engine against MuJoCo and Exudyn, which it installs'
+	@echo 'make bench       how fast the engine is beside MuJoCo and Exudyn, which it installs'
+	@echo 'make lint        lint and types alone'
+	@echo 'make setup       make .venv and nothing more'
+	@echo 'make clean       remove .venv and the caches; runs/ stays'
 
 setup:
 	@for python in $(PYTHONS); do \
@@ -29,6 +31,15 @@ demo: setup
 
 test: lint
 	@echo 'pytest' && $(PY) -m pytest -q -n auto
+
+test-peers: setup
+	@echo 'pip install mujoco exudyn' && $(PY) -m pip install -q -c constraints.txt -e '.[peers]'
+	@echo 'pytest tests/peers' && $(PY) -m pytest -q -m '' tests/peers
+
+bench: setup
+	@echo 'pip install mujoco exudyn' && $(PY) -m pip install -q -c constraints.txt -e '.[peers]' || \
+	  echo 'some are not there: fewer comparisons'
+	@$(PY) -m benchmarks.speed
 
 lint: setup
 	@echo 'ruff check' && $(PY) -m ruff check -q --output-format concise

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -42,6 +42,7 @@ FEW = 6
 BATCH_OF_LEGS = 4096
 
 Floats = NDArray[np.float64]
+Kind = TypeVar("Kind")
 
 
 class TrunkEngine:
@@ -79,11 +80,11 @@ class TrunkEngine:
         num_envs: int = 1,
         filters: FilterSettings | None = None,
     ) -> None:
-        self.limbs = (limbs,) if isinstance(limbs, Limb) else tuple(limbs)
-        if not self.limbs or not all(isinstance(limb, Limb) for limb in self.limbs):
-            raise ParameterError(f"limbs: expected one Limb or more, got {limbs!r}")
-        self.trunk, self.ground = trunk, ground or Ground()
-        self.terrain, self.filters = terrain or Terrain.flat(), filters or FilterSettings()
+        self.limbs = _all_of("limbs", limbs, Limb)
+        self.trunk = _a("trunk", trunk, Trunk)
+        self.ground = Ground() if ground is None else _a("ground", ground, Ground)
+        self.terrain = Terrain.flat() if terrain is None else _a("terrain", terrain, Terrain)
+        self.filters = FilterSettings() if filters is None else _a("filters", filters, FilterSettings)
         self.integrator = check_choice("integrator", integrator, SCHEMES)
         self.sim_dt = check_number("sim_dt", sim_dt, low=1e-7, high=self.filters.longest_step)
         self.num_envs = _count("num_envs", num_envs)
@@ -153,9 +154,11 @@ class TrunkEngine:
         """
         where, legs = self._which(envs), len(self.limbs)
         n, kind = where.size, TRUNKS.index(self.trunk.kind)
-        each = [gaits] * legs if isinstance(gaits, GaitParameters) else list(gaits)
-        if len(each) != legs or not all(isinstance(gait, GaitParameters) for gait in each):
-            raise ParameterError(f"gaits: expected GaitParameters, one or {legs}, got {gaits!r}")
+        each = _all_of(
+            "gaits", [gaits] * legs if isinstance(gaits, GaitParameters) else gaits, GaitParameters
+        )
+        if len(each) != legs:
+            raise ParameterError(f"gaits: expected one or {legs}, got {len(each)}")
         values = np.array([gait.to_array() for gait in each])
         angle = _spread("theta", theta, (legs, n))
         rate = values[:, :1] if theta_rate is None else theta_rate
@@ -203,22 +206,22 @@ class TrunkEngine:
         """Put back what `get_state` gave.
 
         Raises:
-            ParameterError: the state belongs to another engine or lacks a part.
+            ParameterError: the state belongs to another engine, lacks a part or is not finite.
         """
         missing = {*_STATE, "layout"} - set(state)
         if missing:
             raise ParameterError(
                 f"state: expected what get_state gives, but {', '.join(sorted(missing))} is missing"
             )
-        if dict(state["layout"]) != self._layout():
+        if state["layout"] != self._layout():
             raise ParameterError(f"state: expected one of {self._layout()}, got one of {state['layout']}")
-        for name in _STATE:
-            array = getattr(self._arrays, name)
-            given = np.asarray(state[name], dtype=np.float64)
-            if given.shape != array.shape:
-                raise ParameterError(f"state[{name!r}]: expected shape {array.shape}, got {given.shape}")
-        for name in _STATE:
-            getattr(self._arrays, name)[:] = state[name]
+        arrays = {name: _finite(f"state[{name!r}]", state[name]) for name in _STATE}
+        for name, given in arrays.items():
+            shape = getattr(self._arrays, name).shape
+            if given.shape != shape:
+                raise ParameterError(f"state[{name!r}]: expected shape {shape}, got {given.shape}")
+        for name, given in arrays.items():
+            getattr(self._arrays, name)[:] = given
 
     # Motion
 
@@ -245,7 +248,7 @@ class TrunkEngine:
         return self._arrays.result.copy()
 
     def _command(self, command: ArrayLike) -> None:
-        given, whole = np.asarray(command, dtype=np.float64), self._arrays.command
+        given, whole = _finite("command", command), self._arrays.command
         legs = len(self.limbs)
         if given.shape == (4,) or given.shape == (legs, 4):
             given = given[..., None]
@@ -253,8 +256,6 @@ class TrunkEngine:
             raise ParameterError(
                 f"command: expected shape (4,), ({legs}, 4) or {whole.shape}, got {given.shape}"
             )
-        if not np.isfinite(given).all():
-            raise ParameterError(f"command: expected finite numbers, got {command!r}")
         whole[:] = given
 
     def _go(self, steps: int, account: bool = False) -> None:
@@ -394,13 +395,37 @@ def _count(name: str, value: Any, low: int = 1) -> int:
 
 
 def _spread(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
+    given = _finite(name, value)
+    if given.ndim == 1 and len(shape) == 2:
+        given = given[:, None]
+    try:
+        return np.broadcast_to(given, shape)
+    except ValueError:
+        raise ParameterError(f"{name}: expected numbers that fit shape {shape}, got {value!r}") from None
+
+
+def _finite(name: str, value: Any) -> Floats:
     try:
         given = np.asarray(value, dtype=np.float64)
-        if given.ndim == 1 and len(shape) == 2:
-            given = given[:, None]
-        array = np.broadcast_to(given, shape)
     except (TypeError, ValueError):
-        raise ParameterError(f"{name}: expected numbers that fit shape {shape}, got {value!r}") from None
-    if not np.isfinite(array).all():
+        given = np.array(np.nan)
+    if value is None or not np.isfinite(given).all():
         raise ParameterError(f"{name}: expected finite numbers, got {value!r}")
-    return array
+    return given
+
+
+def _a(name: str, value: Any, kind: type[Kind]) -> Kind:
+    if not isinstance(value, kind):
+        raise ParameterError(f"{name}: expected {kind.__name__}, got {value!r}")
+    return value
+
+
+def _all_of(name: str, values: Any, kind: type[Kind]) -> tuple[Kind, ...]:
+    """One `kind` or several of them as a tuple."""
+    try:
+        several = (values,) if isinstance(values, kind) else tuple(values)
+    except TypeError:
+        several = ()
+    if not several or not all(isinstance(value, kind) for value in several):
+        raise ParameterError(f"{name}: expected {kind.__name__}, one or more, got {values!r}")
+    return several

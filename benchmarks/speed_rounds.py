@@ -1,0 +1,41 @@
+"""Many short rounds, each with every case once in a new order, so that a busy machine slows all alike."""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+def interleave(runs: Mapping[str, Callable[[], float]], rounds: int, seed: int = 0) -> dict[str, Floats]:
+    """Seconds that each of `runs` took, shape (rounds,), after one round to warm up."""
+    rng, names = np.random.default_rng(seed), list(runs)
+    seconds = {name: np.empty(rounds) for name in names}
+    for run in runs.values():
+        run()
+    gc.collect()
+    gc.disable()
+    try:
+        for k in range(rounds):
+            for i in rng.permutation(len(names)):
+                seconds[names[i]][k] = runs[names[i]]()
+    finally:
+        gc.enable()
+    return seconds
+
+
+def spread(values: Floats) -> dict[str, float]:
+    """Median, quartiles and extremes."""
+    low, q1, median, q3, high = np.quantile(values, [0, 0.25, 0.5, 0.75, 1])
+    return {"median": median, "q1": q1, "q3": q3, "min": low, "max": high}
+
+
+def told(s: Mapping[str, Any], digits: int = 3) -> str:
+    """'median (q1 to q3; min to max)'."""
+    number = {name: f"{value:.{digits}g}" for name, value in s.items()}
+    return f"{number['median']} ({number['q1']} to {number['q3']}; {number['min']} to {number['max']})"

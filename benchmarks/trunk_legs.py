@@ -1,0 +1,113 @@
+"""This project's engine with the face of a peer: the same start, the same record."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.common import ALL, Assembly, Record, Start
+from hoof_env.dynamics.engine import GRAVITY
+from hoof_env.dynamics.limb import Limb
+from hoof_env.dynamics.reactions import LOCK, OUTPUTS, leg_constants, leg_reactions_lanes
+from hoof_env.dynamics.result import Result
+from hoof_env.dynamics.trunk import Trunk
+from hoof_env.dynamics.trunk_engine import TrunkEngine
+from hoof_env.gait.parameters import GaitParameters
+from hoof_env.ground.contact import Ground
+from hoof_env.leg.kinematics import FrameMotion, pose
+
+POINTS = ("toe", "heel")
+
+
+class TrunkLegs:
+    """A horse in `TrunkEngine`.
+
+    Args:
+        limbs, trunk, start: as for the peers.
+        dt, integrator: of the engine, which divides a step that is too long for the ground.
+        ground: the default if None; to be in the air, hang the trunk high.
+    """
+
+    assembly: Assembly = ALL
+
+    def __init__(
+        self,
+        limbs: Sequence[Limb],
+        trunk: Trunk,
+        start: Start,
+        dt: float = 1e-4,
+        ground: Ground | None = None,
+        integrator: str = "rk4",
+    ) -> None:
+        self.limbs, self.start = tuple(limbs), start
+        self.engine = TrunkEngine(limbs, trunk, ground, sim_dt=dt, integrator=integrator)
+        none = [0.0] * len(self.limbs)
+        rows = (start.crank, start.crank_speed, start.swing, start.swing_sin or none, start.swing_cos or none)
+        gaits = [
+            GaitParameters(speed, swing - a * np.sin(theta) - b * np.cos(theta), a, b)
+            for theta, speed, swing, a, b in zip(*rows, strict=True)
+        ]
+        self.engine.reset(
+            gaits, np.array(start.crank)[:, None],
+            x=start.position[0], y=start.position[1], pitch=start.pitch,
+            vx=start.velocity[0], vy=start.velocity[1], pitch_rate=start.pitch_rate,
+        )  # fmt: skip
+
+    def run(self, duration: float, samples: int) -> Record:
+        """Advance by `duration` [s] and look `samples` times besides the beginning, evenly.
+
+        Raises:
+            RuntimeError: the engine stopped, with its message.
+        """
+        steps = round(duration / self.engine.sim_dt / samples)
+        rows = [self.look()]
+        for _ in range(samples):
+            if self.engine.advance(steps=steps)[0] != Result.OK:
+                raise RuntimeError(self.engine.messages()[0])
+            rows.append(self.look())
+        return Record.of(rows)
+
+    def look(self) -> tuple[Any, ...]:
+        """What `Record` has of the present instant."""
+        s = {name: value[..., 0] for name, value in self.engine.state.items()}
+        r = {name: value[..., 0] for name, value in self.engine.report.items()}
+        body = np.array([r["x"], r["y"], s["pitch"], r["vx"], r["vy"], r["pitch_rate"]])
+        return (
+            s["time"], s["theta"], s["theta_rate"], body, r["crank_torque"], r["hip_torque"],
+            np.array([self._joints(i, s, r) for i in range(len(self.limbs))]),
+            max(self._gap(i, s, r) for i in range(len(self.limbs))),
+        )  # fmt: skip
+
+    def _joints(self, i: int, s: dict[str, Any], r: dict[str, Any]) -> NDArray[np.float64]:
+        """Forces at the joints of a leg [N], shape (20, 2)."""
+        limb = self.limbs[i]
+        sigma, hip = limb.geometry.travel, complex(*limb.hip) * np.exp(1j * s["pitch"])
+        lift = complex(r["ax"], r["ay"] + GRAVITY) + complex(-(r["pitch_rate"] ** 2), r["pitch_acc"]) * hip
+        beta, theta = s["pitch"] + sigma * r["phi"][i], s["theta"][i]
+        rate, acc = (
+            r["pitch_rate"] + sigma * r["phi_rate"][i],
+            r["pitch_acc"] + sigma * r["phi_acc"][i],
+        )
+        state = np.array([
+            np.cos(theta), np.sin(theta), s["theta_rate"][i], r["theta_acc"][i],
+            np.cos(beta), np.sin(beta), rate, acc, lift.real, lift.imag,
+            *(r[f"{point}_{part}"][i] for point in POINTS for part in ("friction", "normal")),
+        ])[:, None]  # fmt: skip
+        out = np.empty((OUTPUTS, 1))
+        leg_reactions_lanes(state, leg_constants(limb.geometry), out)
+        return out[:LOCK, 0].reshape(-1, 2)
+
+    def _gap(self, i: int, s: dict[str, Any], r: dict[str, Any]) -> float:
+        """From where the engine has toe and heel to where the closed linkage has them [m]."""
+        limb = self.limbs[i]
+        at = complex(r["x"], r["y"]) + complex(*limb.hip) * np.exp(1j * s["pitch"])
+        frame = FrameMotion(phi=r["phi"][i] + limb.geometry.travel * s["pitch"], position=(at.real, at.imag))
+        closed = pose(limb.geometry, s["theta"][i], frame=frame)
+        names = (limb.geometry.toe, limb.geometry.heel)
+        return max(
+            float(np.hypot(*(closed.point(name) - (r[f"{point}_x"][i], r[f"{point}_y"][i]))))
+            for name, point in zip(names, POINTS, strict=True)
+        )

@@ -1,0 +1,169 @@
+"""The engine of several legs against d'Alembert with a dense mass matrix (`PlainHorse`), at instants."""
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hoof_env.dynamics.drive import Motor, Prescribed
+from hoof_env.dynamics.limb import Limb
+from hoof_env.dynamics.plain import PlainHorse
+from hoof_env.dynamics.trunk import TRUNKS, Trunk
+from hoof_env.dynamics.trunk_engine import TrunkEngine
+from hoof_env.gait.motion_law import FILTER, FilterSettings, command_filters
+from hoof_env.gait.parameters import LIMITS, PARAMETERS, GaitParameters
+from hoof_env.ground.contact import Ground
+from hoof_env.ground.friction import FRICTION_LAWS
+from hoof_env.ground.terrain import Terrain
+from hoof_env.leg.geometry import load_geometry
+
+FIRST, IDENTIFIED = load_geometry("first_fit"), load_geometry("identified")
+LEGS = (
+    FIRST,
+    IDENTIFIED,
+    FIRST.replace(travel=-FIRST.travel),
+    FIRST.replace(inertia="paper", lengths={"FG": 0.6}, linear_density=2.0),
+    IDENTIFIED.replace(toe=IDENTIFIED.heel, heel=IDENTIFIED.toe, masses=tuple(np.linspace(3, 0.2, 14))),
+)
+TERRAINS = (
+    Terrain.flat(),
+    Terrain(height=(0.02,)),
+    Terrain.slope(-0.2),
+    Terrain.ramp(0.15, start=-0.3, length=0.7),
+    Terrain.patches([(-1.0, -0.2, 0.5, 0.2), (0.1, 0.9, 3.0, 1.5)]),
+    Terrain((0.0, 0.03, -0.02, 0.01), (1.0, 0.4, 2.0, 1.0), (1.0, 0.1, 0.0, 2.0), start=-0.6, spacing=0.37),
+)
+LOW, HIGH = np.array(list(LIMITS.values())).T
+STATES = 7  # one more than are run one by one
+
+drives = st.one_of(
+    st.just(Prescribed()),
+    st.builds(Motor, st.floats(0, 200), st.floats(5, 900), st.floats(0, 2e-3), st.floats(0, 60)),
+)
+limbs = st.builds(Limb, st.sampled_from(LEGS), st.tuples(st.floats(-0.8, 0.8), st.floats(-0.2, 0.2)), drives)
+trunks = st.builds(
+    Trunk,
+    st.sampled_from(TRUNKS),
+    mass=st.floats(50, 500),
+    share=st.floats(0, 1),
+    drag=st.floats(0, 40),
+    pitch_inertia=st.floats(10, 100),
+)
+grounds = st.builds(
+    Ground,
+    stiffness=st.sampled_from((2e4, 3e5)),
+    exponent=st.integers(8, 24).map(lambda eighths: eighths / 8),
+    restitution=st.floats(0.2, 1),
+    approach_floor=st.just(0.1),
+    approach=st.sampled_from(("interpolated", "sampled")),
+    friction_law=st.sampled_from(FRICTION_LAWS),
+    friction_slow=st.just(0.01),
+    friction_fast=st.floats(0.1, 0.3),
+)
+
+
+def reach(limbs, gaits, theta):
+    """How far below the trunk's centre of mass the lowest hoof point is [m]."""
+    horse = PlainHorse(Trunk("fixed"), limbs)
+    at, _ = horse.hooves((0.0, 0.0, 0.0), (0, 0, 0), theta, 0 * theta, gaits)
+    return -at.imag.min()
+
+
+def put_somewhere(engine, rng, depth):
+    """Every environment in a state of its own, hoofs in the ground or above it, filters on the move."""
+    kind, legs, n = engine.trunk.kind, len(engine.limbs), engine.num_envs
+    still = GaitParameters(*(LOW + HIGH) / 2)
+    theta = rng.uniform(-10, 10, (legs, n))
+    command, value = (rng.uniform(LOW[:, None], HIGH[:, None], (legs, 4, n)) for _ in range(2))
+    start = {"x": rng.uniform(-1, 1, n)}
+    if kind != "fixed":
+        start["vx"] = rng.normal(size=n)
+    if kind in ("suspended", "free"):
+        height = [reach(engine.limbs, value[..., e], theta[:, e]) for e in range(n)]
+        start |= {"vy": rng.normal(size=n), "y": np.array(height) - rng.uniform(-0.5, 1, n) * depth}
+    if kind == "free":
+        start |= {"pitch": rng.normal(0, 0.1, n), "pitch_rate": rng.normal(size=n)}
+    engine.reset(still, theta, **start)
+    state = engine.get_state()
+    names = list(engine.state)[7:]
+    rows = {name: state["limbs"][:, names.index(name)] for name in names}
+    for k, name in enumerate(PARAMETERS):
+        rows[name][:] = value[:, k]
+        rows[f"{name}_rate"][:] = rng.normal(0, 3, (legs, n))
+    motors = np.array([isinstance(limb.drive, Motor) for limb in engine.limbs])[:, None]
+    rows["theta_rate"][:] = np.where(motors, rng.normal(5, 4, (legs, n)), rows["crank_speed"])
+    for point in ("toe", "heel"):
+        rows[f"{point}_penetration"][:], rows[f"{point}_approach"][:] = 1.0, rng.uniform(0.1, 1.5, (legs, n))
+    engine.set_state(state)
+    assert not engine.advance(command, 0).any()
+
+
+def oracle(engine, horse, e):
+    """`PlainHorse.at` where environment `e` is."""
+    s, r = engine.state, engine.report
+    filters = np.zeros((len(engine.limbs), 4), FILTER)
+    command, bounds = engine.get_state()["command"], engine.filters.to_array()
+    for k, name in enumerate(PARAMETERS):
+        filters[:, k]["value"], filters[:, k]["rate"] = s[name][:, e], s[f"{name}_rate"][:, e]
+    for i, row in enumerate(filters):
+        command_filters(row, command[i, :, e], bounds)
+    steady = np.stack([filters["value"], filters["rate"], filters["acc"]], axis=-1)
+    approach = np.stack([s["toe_approach"][:, e], s["heel_approach"][:, e]], axis=1)
+    approach[approach == 0] = np.nan
+    place = r["x"][e], r["y"][e], s["pitch"][e]
+    velocity = r["vx"][e], r["vy"][e], r["pitch_rate"][e]
+    return horse.at(place, velocity, s["theta"][:, e], s["theta_rate"][:, e], steady, approach)
+
+
+def assert_close(found, expected, scale, name, rtol=1e-9):
+    np.testing.assert_allclose(found, expected, rtol=0, atol=rtol * scale, err_msg=name)
+
+
+@settings(max_examples=24, deadline=None)
+@given(
+    legs=st.lists(limbs, min_size=1, max_size=4),
+    trunk=trunks,
+    ground=grounds,
+    terrain=st.sampled_from(TERRAINS),
+    depth=st.sampled_from((0.05, 0.02, -1.0)),
+    seed=st.integers(0, 2**32 - 1),
+)
+def test_every_instant_is_d_alembert_s(legs, trunk, ground, terrain, depth, seed):
+    """Accelerations, torques, momenta, energies, forces and powers, to 1e-9."""
+    rng = np.random.default_rng(seed)
+    theta, gait = rng.uniform(0, 6, len(legs)), np.tile((LOW + HIGH) / 2, (len(legs), 1))
+    trunk = Trunk(**{**vars(trunk), "height": reach(legs, gait, theta) - depth})
+    engine = TrunkEngine(
+        legs, trunk, ground, terrain, substeps=1000, num_envs=STATES, filters=FilterSettings()
+    )
+    put_somewhere(engine, rng, depth)
+    horse, r, s, tally = PlainHorse(trunk, legs, ground, terrain), engine.report, engine.state, engine.tally()
+    for e in range(STATES):
+        now = oracle(engine, horse, e)
+        force = np.stack(
+            [r["toe_normal"] - 1j * r["toe_friction"], r["heel_normal"] - 1j * r["heel_friction"]], 1
+        )
+        force = force[..., e] * np.vectorize(lambda x: horse.ground.surface(x)[1])(now.hoof.real)
+        hoof = np.stack([r["toe_x"] + 1j * r["toe_y"], r["heel_x"] + 1j * r["heel_y"]], 1)[..., e]
+        push = max(engine.weight, np.abs(now.hoof_force).max())
+        turn = max(push, np.abs(now.crank_torque).max(), np.abs(now.hip_torque).max())
+        quick = max(1.0, np.abs(now.theta_acc).max(), np.abs(now.phi_acc).max(), np.abs(now.trunk_acc).max())
+        fast = max(1.0, np.abs(s["theta_rate"][:, e]).max())
+        for name, found, expected, scale in (
+            ("hoof", hoof, now.hoof, 1.0),
+            ("force", force, now.hoof_force, push),
+            ("trunk_acc", [r[k][e] for k in ("ax", "ay", "pitch_acc")], now.trunk_acc, quick),
+            ("theta_acc", r["theta_acc"][:, e], now.theta_acc, quick),
+            ("phi", r["phi"][:, e], now.phi, 1.0),
+            ("phi_rate", r["phi_rate"][:, e], now.phi_rate, fast),
+            ("phi_acc", r["phi_acc"][:, e], now.phi_acc, quick),
+            ("crank_torque", r["crank_torque"][:, e], now.crank_torque, turn),
+            ("hip_torque", r["hip_torque"][:, e], now.hip_torque, turn),
+            ("crank_power", r["crank_power"][:, e].sum(), now.power["crank"], turn * fast),
+            ("hip_power", r["hip_power"][:, e].sum(), now.power["hip"], turn * fast),
+            ("centre", tally.centre[e], now.centre, 1.0),
+            ("momentum", tally.momentum[e], now.momentum, np.abs(now.momentum) + 1.0),
+            ("angular momentum", tally.spin[e], now.angular_momentum, np.abs(now.momentum) + 1.0),
+            ("kinetic", tally.kinetic[e], now.kinetic, now.kinetic),
+            ("potential", tally.potential[e], now.potential, abs(now.potential) + now.kinetic),
+        ):
+            assert_close(found, expected, scale, f"{name}, environment {e}")

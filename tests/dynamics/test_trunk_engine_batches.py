@@ -1,0 +1,181 @@
+"""A number of the engine of several legs has the same bits alone, in any batch, in parts and put back."""
+
+import numpy as np
+import pytest
+
+from hoof_env.dynamics.drive import Motor, Prescribed
+from hoof_env.dynamics.limb import Limb
+from hoof_env.dynamics.result import Result
+from hoof_env.dynamics.schemes import SCHEMES
+from hoof_env.dynamics.trunk import TRUNKS, Trunk
+from hoof_env.dynamics.trunk_engine import FEW, TrunkEngine
+from hoof_env.errors import ParameterError
+from hoof_env.gait.parameters import load_gait
+from hoof_env.ground.contact import Ground
+from hoof_env.ground.friction import FRICTION_LAWS
+from hoof_env.ground.terrain import Terrain
+from hoof_env.leg.geometry import load_geometry
+
+LEG, OTHER = load_geometry("first_fit"), load_geometry("identified")
+RUN, WALK = load_gait("run", "first_fit"), load_gait("walk", "first_fit")
+ALL, STEPS = 100, 200
+ROUGH = Terrain(
+    (0.0, 0.03, -0.02, 0.01), (1.0, 0.4, 2.0, 1.0), (1.0, 0.1, 0.5, 2.0), start=-0.6, spacing=0.37
+)
+COMMAND = np.array([[9.0, 0.4, -0.3, 0.1], [11.0, 0.9, 0.2, -0.2]])
+
+
+def engine(kind, n, legs=2, **changes):
+    limbs = (Limb(LEG, (0.4, 0.0), Motor()), Limb(OTHER, (-0.4, 0.1), Prescribed()))[:legs]
+    k = TRUNKS.index(kind)  # another ground, law and scheme with each kind
+    ground = Ground(exponent=(1.5, 1.125, 2.0, 1.75)[k], friction_law=FRICTION_LAWS[k % 3])
+    settings = {
+        "integrator": list(SCHEMES)[-k],
+        "terrain": ROUGH if k % 2 else None,
+        "substeps": (3, 1, 2, 2)[k],
+    }
+    trunk = Trunk(kind, mass=150.0, height=LEG.hip_height - 0.03, pitch_inertia=30.0)
+    return TrunkEngine(limbs, trunk, ground, num_envs=n, **(settings | changes))
+
+
+def start(engine, which):
+    """Environments `which` of `ALL` different ones, commands on the move."""
+    rng, legs = np.random.default_rng(7), len(engine.limbs)
+    theta, draw = rng.uniform(-9, 9, (2, ALL))[:legs], rng.normal(size=(5, ALL))
+    k = TRUNKS.index(engine.trunk.kind)
+    moves = {"vx": draw[0], "vy": 0.3 * draw[1], "pitch": 0.1 * draw[2], "pitch_rate": 0.3 * draw[3]}
+    moves = {name: row[which] for name, row in moves.items() if k >= {"vx": 1, "vy": 2}.get(name, 3)}
+    engine.reset([RUN, WALK][:legs], theta[:, which], x=draw[4][which], **moves)
+    scale = 1 + 0.1 * draw[4][which]
+    engine._command(COMMAND[:legs, :, None] * scale)
+
+
+def bits(engine):
+    """State and report of every environment as integers, shape (rows, num_envs)."""
+    rows = [
+        np.atleast_2d(row) for part in (engine.state, engine.report, engine.account) for row in part.values()
+    ]
+    return np.concatenate(rows).view(np.int64)
+
+
+def run(kind, which, legs=2, steps=STEPS, **changes):
+    e = engine(kind, len(which), legs, **changes)
+    start(e, which)
+    assert not e.advance(steps=steps).any()
+    return e
+
+
+@pytest.mark.parametrize("legs", [1, 2])
+@pytest.mark.parametrize("kind", TRUNKS)
+def test_alone_and_in_any_batch(kind, legs):
+    whole = run(kind, np.arange(ALL), legs)
+    expected = bits(whole)
+    touched = whole.account["ground_stored"] != 0
+    assert touched.mean() > 0.4
+    assert len(np.unique(expected[1])) == ALL or kind in ("fixed", "rail")
+    rng = np.random.default_rng(3)
+    for size in (1, 2, FEW, FEW + 1, 31, 32, 33):
+        which = rng.permutation(ALL)[:size]
+        np.testing.assert_array_equal(bits(run(kind, which, legs)), expected[:, which], err_msg=str(size))
+
+
+@pytest.mark.parametrize("n", [2, 33])
+@pytest.mark.parametrize("kind", TRUNKS)
+def test_one_advance_and_many_short_ones(kind, n):
+    """The start of an advance evaluates anew where the last one ended, and finds the same."""
+    once, often = run(kind, np.arange(n)), run(kind, np.arange(n), steps=0)
+    for _ in range(STEPS // 10):
+        often.advance(steps=10)
+        often.advance(steps=0)
+    sums = len(once.account)  # are taken in another order
+    np.testing.assert_array_equal(bits(once)[:-sums], bits(often)[:-sums])
+    for name, total in once.account.items():
+        np.testing.assert_allclose(often.account[name], total, rtol=1e-10, atol=1e-10, err_msg=name)
+
+
+@pytest.mark.parametrize("n", [2, 33])
+@pytest.mark.parametrize("kind", TRUNKS)
+def test_the_account_changes_nothing(kind, n):
+    kept, left = run(kind, np.arange(n)), run(kind, np.arange(n), steps=0)
+    left.advance(steps=STEPS, account=False)
+    sums = len(kept.account)
+    np.testing.assert_array_equal(bits(kept)[:-sums], bits(left)[:-sums])
+    assert all((total == 0).all() for total in left.account.values())
+
+
+@pytest.mark.parametrize("n", [2, 33])
+@pytest.mark.parametrize("kind", TRUNKS)
+def test_a_state_goes_on_as_if_it_had_never_been_away(kind, n):
+    first = run(kind, np.arange(n), steps=77)
+    kept = first.get_state()
+    first.advance(steps=60)
+    other = engine(kind, n)
+    other.set_state(kept)
+    other.advance(steps=60)
+    np.testing.assert_array_equal(bits(first), bits(other))
+    first.set_state(kept)  # what advanced since is not in it
+    first.advance(steps=60)
+    np.testing.assert_array_equal(bits(first), bits(other))
+
+
+def test_a_state_can_be_read_before_it_is_advanced():
+    first, other = run("free", np.arange(2)), engine("free", 2)
+    other.set_state(first.get_state())
+    other.advance(steps=0)
+    np.testing.assert_array_equal(bits(first), bits(other))
+
+
+@pytest.mark.parametrize("n", [4, 40])
+def test_some_environments_start_anew_and_the_others_do_not_notice(n):
+    expected = run("free", np.arange(n))
+    e, last = engine("free", n), np.arange(n) >= n - 2
+    start(e, np.arange(n))
+    e.advance(steps=0)
+    before = bits(e)
+    e.reset(RUN, 1.0, x=5.0, envs=last)
+    assert e.state["centre_x"][last] == pytest.approx(5.0, abs=0.3)
+    np.testing.assert_array_equal(bits(e)[:, ~last], before[:, ~last])
+    e.advance(steps=STEPS)
+    np.testing.assert_array_equal(bits(e)[:, ~last], bits(expected)[:, ~last])
+    e.reset(RUN, [0.5, 0.7], envs=[n - 1])
+    assert e.state["time"].tolist() == pytest.approx([0.2] * (n - 1) + [0.0])
+    assert e.account["impulse_y"][-1] == 0
+
+
+@pytest.mark.parametrize("n", [4, 40])
+def test_an_environment_that_fails_leaves_the_others_alone(n):
+    expected, e = run("free", np.arange(n)), engine("free", n)
+    start(e, np.arange(n))
+    state = e.get_state()
+    state["limbs"][0, 1, 2] = 1e200  # the crank's rate, whose square is no number
+    e.set_state(state)
+    result = e.advance(steps=STEPS)
+    assert result.tolist() == [0, 0, Result.NOT_FINITE] + [0] * (n - 3)
+    well = np.arange(n) != 2
+    np.testing.assert_array_equal(bits(e)[:, well], bits(expected)[:, well])
+    np.testing.assert_array_equal(e.get_state()["limbs"][..., 2], state["limbs"][..., 2])
+    np.testing.assert_array_equal(e.get_state()["trunk"][..., 2], state["trunk"][..., 2])
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda s: s.pop("limbs"), "state: .* limbs is missing"),
+        (lambda s: s.update(limbs=s["limbs"][:, :-1]), r"state\['limbs'\]: expected shape \(2, 16, 3\)"),
+        (lambda s: s.update(trunk=None), r"state\['trunk'\]: expected .* None"),
+        (lambda s: s["limbs"].__setitem__((1, 0, 2), np.nan), r"state\['limbs'\]: expected finite"),
+        (lambda s: s["trunk"].__setitem__((1, 0), np.inf), r"state\['trunk'\]: expected finite"),
+        (lambda s: s.update(layout=engine("rail", 3).get_state()["layout"]), "state: expected one of .*rail"),
+        (lambda s: s.update(layout=engine("free", 4).get_state()["layout"]), "state: expected one of .*4"),
+        (lambda s: s.update(layout=engine("free", 3, 1).get_state()["layout"]), "state: expected one of"),
+        (lambda s: s.update(layout=7), "state: expected one of .*7"),
+    ],
+)
+def test_a_state_of_another_engine_is_refused(change, message):
+    e = run("free", np.arange(3), steps=0)
+    before, state = bits(e), e.get_state()
+    change(state)
+    with pytest.raises(ParameterError, match=message):
+        e.set_state(state)
+    e.advance(steps=0)
+    np.testing.assert_array_equal(bits(e), before)

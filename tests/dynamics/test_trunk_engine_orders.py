@@ -1,0 +1,97 @@
+"""Runs of the engine of several legs against the oracle's: each scheme converges at its order, in air."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from hoof_env.dynamics.drive import Motor, Prescribed
+from hoof_env.dynamics.limb import Limb
+from hoof_env.dynamics.plain import PlainHorse
+from hoof_env.dynamics.plain_run import simulate
+from hoof_env.dynamics.schemes import SCHEMES
+from hoof_env.dynamics.trunk import Trunk
+from hoof_env.dynamics.trunk_engine import TrunkEngine
+from hoof_env.gait.parameters import GaitParameters, load_gait
+from hoof_env.ground.contact import Ground
+from hoof_env.leg.geometry import load_geometry
+
+LEG = load_geometry("first_fit")
+OTHER = LEG.replace(travel=-LEG.travel, lengths={"FG": 0.6})
+GAITS = (load_gait("run", "first_fit"), load_gait("walk", "first_fit"))
+MOTOR = Motor(speed_gain=60.0, torque_limit=1e4, rotor_inertia=4e-4)
+FAR = Ground(stiffness=100.0)  # out of reach, and soft enough for any step
+THETA, RATE, SECONDS = (1.0, 4.0), (6.0, 9.0), 0.05
+MOVES = {
+    "fixed": ((0.0, 3.0, 0.0), (0.0, 0.0, 0.0)),
+    "suspended": ((0.0, 3.2, 0.0), (1.0, -0.5, 0.0)),
+    "free": ((0.0, 3.0, 0.2), (1.0, 0.5, -0.8)),
+}
+DRIVES = {"motor": (MOTOR, MOTOR), "prescribed": (Prescribed(), Prescribed()), "mixed": (MOTOR, Prescribed())}
+CASES = (("fixed", "motor"), ("suspended", "mixed"), ("free", "motor"), ("free", "prescribed"))
+
+
+def horse(kind, drives):
+    limbs = (Limb(LEG, (0.5, 0.1), DRIVES[drives][0]), Limb(OTHER, (-0.4, -0.05), DRIVES[drives][1]))
+    return limbs, Trunk(kind, mass=60.0, height=3.0, drag=25.0, pitch_inertia=8.0)
+
+
+def spin(drives):
+    return np.where([isinstance(d, Motor) for d in DRIVES[drives]], RATE, [g.crank_speed for g in GAITS])
+
+
+@cache
+def true_end(kind, drives):
+    """Trunk, its rates, crank angles and rates after `SECONDS`."""
+    limbs, trunk = horse(kind, drives)
+    run = simulate(PlainHorse(trunk, limbs), GAITS, [0.0, SECONDS], THETA, spin(drives), *MOVES[kind])
+    return np.concatenate([run.trunk[-1], run.trunk_rate[-1], run.theta[-1], run.theta_rate[-1]])
+
+
+def end(kind, drives, scheme, steps):
+    limbs, trunk = horse(kind, drives)
+    engine = TrunkEngine(limbs, trunk, FAR, sim_dt=SECONDS / steps, integrator=scheme, substeps=1)
+    place, rates = MOVES[kind]
+    start = dict(zip(("x", "y", "pitch", "vx", "vy", "pitch_rate"), place + rates, strict=True))
+    engine.reset(GAITS, THETA, theta_rate=spin(drives), **start)
+    assert not engine.advance(steps=steps).any()
+    r, s = engine.report, engine.state
+    trunk = [r["x"], r["y"], s["pitch"], r["vx"], r["vy"], r["pitch_rate"]]
+    return np.concatenate([*trunk, s["theta"][:, 0], s["theta_rate"][:, 0]])
+
+
+@pytest.mark.parametrize(("kind", "drives"), CASES)
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_it_converges_to_the_oracle_at_the_order_of_the_scheme(scheme, kind, drives):
+    order, finest = SCHEMES[scheme].order, 160
+    if order > 2:
+        finest = 12 if drives == "prescribed" else 48  # finer ones are as good as the oracle
+    errors = [
+        np.abs(end(kind, drives, scheme, n) - true_end(kind, drives)).max() for n in (finest // 2, finest)
+    ]
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.15)
+    assert errors[1] < 0.3 * (SECONDS / finest * 100) ** order
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_what_is_prescribed_is_exact(scheme):
+    limbs, trunk = horse("fixed", "prescribed")
+    engine = TrunkEngine(limbs, trunk, FAR, sim_dt=5e-3, integrator=scheme, substeps=1)
+    engine.reset(GAITS, THETA)
+    engine.advance(steps=100)
+    speeds = np.array([gait.crank_speed for gait in GAITS])
+    assert engine.state["theta"][:, 0] == pytest.approx(THETA + 0.5 * speeds, rel=1e-14)
+
+
+def test_all_schemes_move_the_filters_alike():
+    """Commands on the move: what the filters do is exact for the accelerations that each step holds."""
+    limbs, trunk = horse("free", "prescribed")
+    ends = []
+    for scheme in SCHEMES:
+        engine = TrunkEngine(limbs, trunk, FAR, integrator=scheme, substeps=1)
+        engine.reset(GaitParameters(3.0, 0.5, 0.0, 0.0), y=3.0)
+        engine.advance([g.to_array() for g in GAITS], 150)
+        state = engine.state
+        ends.append([state[k] for k in ("theta", "crank_speed", "swing_sin", "swing_cos_rate")])
+    for other in ends[1:]:
+        np.testing.assert_array_equal(ends[0], other)
