@@ -92,7 +92,7 @@ def put_somewhere(engine, rng, depth):
     motors = np.array([isinstance(limb.drive, Motor) for limb in engine.limbs])[:, None]
     rows["theta_rate"][:] = np.where(motors, rng.normal(5, 4, (legs, n)), rows["crank_speed"])
     for point in ("toe", "heel"):
-        rows[f"{point}_penetration"][:], rows[f"{point}_approach"][:] = 1.0, rng.uniform(0.1, 1.5, (legs, n))
+        rows[f"{point}_penetration"][:], rows[f"{point}_slowness"][:] = 1.0, 1 / rng.uniform(0.1, 1.5, (legs, n))
     engine.set_state(state)
     assert not engine.advance(command, 0).any()
 
@@ -107,8 +107,8 @@ def oracle(engine, horse, e):
     for i, row in enumerate(filters):
         command_filters(row, command[i, :, e], bounds)
     steady = np.stack([filters["value"], filters["rate"], filters["acc"]], axis=-1)
-    approach = np.stack([s["toe_approach"][:, e], s["heel_approach"][:, e]], axis=1)
-    approach[approach == 0] = np.nan
+    slowness = np.stack([s["toe_slowness"][:, e], s["heel_slowness"][:, e]], axis=1)
+    approach = np.where(slowness > 0, 1 / np.where(slowness > 0, slowness, 1), np.nan)
     place = r["x"][e], r["y"][e], s["pitch"][e]
     velocity = r["vx"][e], r["vy"][e], r["pitch_rate"][e]
     return horse.at(place, velocity, s["theta"][:, e], s["theta_rate"][:, e], steady, approach)
