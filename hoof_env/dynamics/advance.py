@@ -1,8 +1,8 @@
 """The engine's kernels: environments go through a tile, step after step, and come back.
 
-`advance_one_leg`, `advance_one` and `advance_batch` are one function, compiled for one leg of one environment, for
-several legs of one, and for `TILE` environments at a time. A tile lives on the stack: for one leg of one
-environment the compiler keeps most of it in registers, for a batch each loop over its lanes is vector code.
+`advance_one_leg`, `advance_four_legs` and `advance_batch` are one function. The first is compiled for one lane,
+the second for four that are the legs of one trunk, the third for `TILE` environments side by side. A tile lives
+on the stack: of one lane the compiler keeps most in registers, of many each loop becomes vector code.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ class Model(NamedTuple):
     Attributes:
         kind, eighths, friction_law: of trunk, contact exponent and friction.
         interpolated, is_terrain, new_rates: see `Ground`, `Terrain` and `schemes`.
-        tables: shape (profiles * cells, coefficients); `first` the row where each leg's begins, shape (legs,).
-        motors: 1 for each leg with a motor, shape (legs,).
+        together: the lanes of a tile are the legs of one trunk.
+        cells, tables: cells of a leg's table; the tables one after the other, shape (profiles cells, coefficients).
         settings: of the filters, shape (4, 3).
         fractions, weights: of the scheme.
         ground_cells, ground_origin, ground_per_metre: the terrain's grid.
@@ -50,10 +50,9 @@ class Model(NamedTuple):
     interpolated: bool
     is_terrain: bool
     new_rates: bool
+    together: bool
     cells: int
     tables: Any
-    first: Any
-    motors: Any
     settings: Any
     fractions: Any
     weights: Any
@@ -67,7 +66,7 @@ class Arrays(NamedTuple):
 
     Attributes:
         trunk, limbs: the state, shapes (7, n) and (legs, 16, n).
-        trunk_settings, limb_settings: parameters, shapes (16, n) and (legs, 9, n).
+        trunk_settings, limb_settings: parameters, shapes (17, n) and (legs, 11, n).
         command: shape (legs, 4, n).
         account: shape (9, n), added to.
         trunk_report, limb_report: at the end, shapes (8, n) and (legs, 18, n).
@@ -86,34 +85,31 @@ class Arrays(NamedTuple):
 
 
 @inlined
-def inner(model, legs, small):  # type: ignore[no-untyped-def]
+def inner(model, small, together):  # type: ignore[no-untyped-def]
     """The same model with its small arrays in `small`, on the stack, and a pointer to the large one."""
     stages = model.weights.shape[0]
-    first, motors = carray(small, (legs,)), carray(offset(small, legs), (legs,))
-    for i in range(legs):
-        first[i], motors[i] = model.first[i], model.motors[i]
-    settings = carray(offset(small, 2 * legs), (4, 3))
+    settings = carray(small, (4, 3))
     for k in range(4):
         for j in range(3):
             settings[k, j] = model.settings[k, j]
-    weights = carray(offset(small, 2 * legs + 12), (stages,))
-    fractions = carray(offset(small, 2 * legs + 12 + MOST_STAGES), (stages,))
+    weights, fractions = carray(offset(small, 12), (stages,)), carray(offset(small, 16), (stages,))
     for j in range(stages):
         weights[j] = model.weights[j]
         fractions[j] = model.fractions[j] if j < stages - 1 else 1.0
     cells = model.ground_cells
     return Model(
         model.kind, model.eighths, model.friction_law, model.interpolated, model.is_terrain, model.new_rates,
-        model.cells, address(model.tables), first, motors, settings, fractions, weights,
+        together, model.cells, address(model.tables), settings, fractions, weights,
         carray(address(cells), cells.shape), model.ground_origin, model.ground_per_metre,
     )  # fmt: skip
 
 
 @inlined
-def load(arrays, trunk, limbs, account, n, last):  # type: ignore[no-untyped-def]
-    """Fill a tile with environments n, n + 1, ...; lanes past the last one repeat it."""
+def load(arrays, trunk, limbs, account, n, together):  # type: ignore[no-untyped-def]
+    """Fill a tile with environments n, n + 1, ..., the last one repeated where there are no more, or with n alone."""
+    last = arrays.result.shape[0] - 1
     for lane in range(trunk.shape[1]):
-        e = min(n + lane, last)
+        e = n if together else min(n + lane, last)
         for k in range(len(t.STATE)):
             trunk[k, lane] = arrays.trunk[k, e]
         for k in range(len(t.PARAMETERS)):
@@ -121,12 +117,13 @@ def load(arrays, trunk, limbs, account, n, last):  # type: ignore[no-untyped-def
         for k in range(len(ACCOUNT)):
             account[k, lane] = 0.0
         for i in range(limbs.shape[0]):
+            leg = lane if together else i
             for k in range(len(b.STATE)):
-                limbs[i, k, lane] = arrays.limbs[i, k, e]
+                limbs[i, k, lane] = arrays.limbs[leg, k, e]
             for k in range(len(b.PARAMETERS)):
-                limbs[i, b.HIP_ON_TRUNK + k, lane] = arrays.limb_settings[i, k, e]
+                limbs[i, b.HIP_ON_TRUNK + k, lane] = arrays.limb_settings[leg, k, e]
             for k in range(4):
-                limbs[i, b.COMMAND + k, lane] = arrays.command[i, k, e]
+                limbs[i, b.COMMAND + k, lane] = arrays.command[leg, k, e]
     for k in range(t.MOVING):
         for lane in range(trunk.shape[1]):
             trunk[t.NOW + k, lane] = trunk[t.FIRST + k, lane]
@@ -136,36 +133,41 @@ def load(arrays, trunk, limbs, account, n, last):  # type: ignore[no-untyped-def
 
 
 @inlined
-def judge(trunk, limbs, kind, lane):  # type: ignore[no-untyped-def]
-    """How a lane ended, one of `result.Result`."""
-    total = 0.0
-    for k in range(len(t.STATE)):
-        total += trunk[k, lane]
-    for i in range(limbs.shape[0]):
-        for k in range(len(b.STATE)):
-            total += limbs[i, k, lane]
-        total += limbs[i, b.SPIN_RATE, lane]
+def judge(trunk, limbs, model, first, lanes):  # type: ignore[no-untyped-def]
+    """How the environment in `lanes` lanes from `first` on ended, one of `result.Result`."""
+    total, stuck = 0.0, 0.0
+    for lane in range(first, first + lanes):
+        stuck += trunk[t.STUCK, lane]
+        for k in range(len(t.STATE)):
+            total += trunk[k, lane]
+        for i in range(limbs.shape[0]):
+            for k in range(len(b.STATE)):
+                total += limbs[i, k, lane]
+            total += limbs[i, b.SPIN_RATE, lane]
     if total - total != 0.0:
-        return DEAD_POINT if trunk[t.STUCK, lane] > 0.0 else NOT_FINITE
-    if kind != FIXED and trunk[t.PLACE + 1, lane] < trunk[t.BOTTOM, lane]:
+        return DEAD_POINT if stuck > 0.0 else NOT_FINITE
+    if model.kind != FIXED and trunk[t.PLACE + 1, first] < trunk[t.BOTTOM, first]:
         return FALLEN
     return OK
 
 
 @inlined
-def store(arrays, model, trunk, limbs, account, n, lanes):  # type: ignore[no-untyped-def]
-    """Write back the lanes that ended well, and how each ended."""
-    for lane in range(lanes):
-        result = judge(trunk, limbs, model.kind, lane)
-        arrays.result[n + lane] = result
+def store(arrays, model, trunk, limbs, account, n, envs):  # type: ignore[no-untyped-def]
+    """Write back the environments that ended well, and how each ended."""
+    lanes = trunk.shape[1] if model.together else 1
+    for e in range(envs):
+        result = judge(trunk, limbs, model, e, lanes)
+        arrays.result[n + e] = result
         if result == OK:
             for k in range(len(t.STATE)):
-                arrays.trunk[k, n + lane] = trunk[k, lane]
+                arrays.trunk[k, n + e] = trunk[k, e]
             for k in range(len(ACCOUNT)):
-                arrays.account[k, n + lane] += account[k, lane]
-            for i in range(limbs.shape[0]):
-                for k in range(len(b.STATE)):
-                    arrays.limbs[i, k, n + lane] = limbs[i, k, lane]
+                arrays.account[k, n + e] += account[k, e]
+            for lane in range(lanes):
+                for i in range(limbs.shape[0]):
+                    leg = lane if model.together else i
+                    for k in range(len(b.STATE)):
+                        arrays.limbs[leg, k, n + e] = limbs[i, k, e + lane]
 
 
 @inlined
@@ -196,35 +198,35 @@ def run_tile(arrays, model, trunk, limbs, account, scratch, h, steps, keeps_acco
 
 
 @inlined
-def run(arrays, model, h, steps, keeps_account, legs, tile):  # type: ignore[no-untyped-def]
-    """Advance all environments, a tile at a time."""
+def run(arrays, model, h, steps, keeps_account, legs, tile, together):  # type: ignore[no-untyped-def]
+    """Advance all environments, a tile at a time: `tile` of them, or one whose legs are the lanes."""
     trunk = carray(doubles(t.ROWS * tile), (t.ROWS, tile))
     limbs = carray(doubles(legs * b.ROWS * tile), (legs, b.ROWS, tile))
     account = carray(doubles(len(ACCOUNT) * tile), (len(ACCOUNT), tile))
     scratch = doubles(2 * WIDTH)
-    small = inner(model, legs, doubles(2 * legs + 12 + 2 * MOST_STAGES))
-    count = arrays.result.shape[0]
-    for n in range(0, count, tile):
-        load(arrays, trunk, limbs, account, n, count - 1)
+    small = inner(model, doubles(12 + 2 * MOST_STAGES), together)
+    count, envs = arrays.result.shape[0], 1 if together else tile
+    for n in range(0, count, envs):
+        load(arrays, trunk, limbs, account, n, together)
         run_tile(arrays, small, trunk, limbs, account, scratch, h, steps, keeps_account)
-        lanes = min(tile, count - n)
-        report(trunk, limbs, small, arrays.trunk_report, arrays.limb_report, n, lanes)
-        store(arrays, small, trunk, limbs, account, n, lanes)
+        here = min(envs, count - n)
+        report(trunk, limbs, together, arrays.trunk_report, arrays.limb_report, n, here)
+        store(arrays, small, trunk, limbs, account, n, here)
 
 
 @kernel
 def advance_one_leg(arrays, model, h, steps, keeps_account):  # type: ignore[no-untyped-def]
     """Each environment by itself; they have one leg."""
-    run(arrays, model, h, steps, keeps_account, 1, 1)
+    run(arrays, model, h, steps, keeps_account, 1, 1, False)
 
 
 @kernel
-def advance_one(arrays, model, h, steps, keeps_account):  # type: ignore[no-untyped-def]
-    """Each environment by itself."""
-    run(arrays, model, h, steps, keeps_account, arrays.limbs.shape[0], 1)
+def advance_four_legs(arrays, model, h, steps, keeps_account):  # type: ignore[no-untyped-def]
+    """Each environment by itself; they have four legs, side by side."""
+    run(arrays, model, h, steps, keeps_account, 1, 4, True)
 
 
 @kernel
 def advance_batch(arrays, model, h, steps, keeps_account):  # type: ignore[no-untyped-def]
-    """`TILE` environments at a time."""
-    run(arrays, model, h, steps, keeps_account, arrays.limbs.shape[0], TILE)
+    """`TILE` environments at a time, with any number of legs."""
+    run(arrays, model, h, steps, keeps_account, arrays.limbs.shape[0], TILE, False)

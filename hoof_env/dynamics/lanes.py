@@ -25,12 +25,12 @@ from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
 from hoof_env.dynamics.lanes_ground import clear_ground, meet_ground, push_back
 from hoof_env.dynamics.trunk import FIXED, FREE, RAIL, SUSPENDED
-from hoof_env.dynamics.vectors import across, add_row, put, times, vector
+from hoof_env.dynamics.vectors import across, gather_row, put, times, vector
 from hoof_env.gait.motion_law import COS, OFFSET, SIN, SPEED, clip
 from hoof_env.ground.exact_math import ROUNDER, cos_sin
 from hoof_env.leg import profile as f
 from hoof_env.leg.kinematics import cross, dot
-from hoof_env.leg.profile import find_cell, look_up, look_up_group
+from hoof_env.leg.profile import find_cell, look_up, look_up_eight, look_up_four
 
 
 @inlined
@@ -40,10 +40,10 @@ def evaluate(trunk, limbs, model, scratch, elapsed):  # type: ignore[no-untyped-
     if kind != FIXED:
         clear_trunk(trunk, kind)
     for i in range(limbs.shape[0]):
-        look_up_functions(trunk, limbs[i], model.tables, model.cells, int(model.first[i]), scratch)
+        look_up_functions(trunk, limbs[i], model.tables, model.cells, scratch)
         place_frame(trunk, limbs[i], elapsed)
         if kind != FIXED:
-            gather_leg(trunk, limbs[i])
+            gather_leg(trunk, limbs[i], model.together)
     if kind != FIXED:
         move_trunk(trunk, kind)
     for i in range(limbs.shape[0]):
@@ -51,7 +51,9 @@ def evaluate(trunk, limbs, model, scratch, elapsed):  # type: ignore[no-untyped-
         for point in range(2):
             meet_ground(trunk, limbs[i], point, model)
             push_back(trunk, limbs[i], point, model)
-        feel_leg(trunk, limbs[i], model.motors[i] != 0.0, elapsed, kind)
+        feel_leg(trunk, limbs[i], elapsed)
+        if kind != FIXED:
+            load_trunk(trunk, limbs[i], kind, model.together)
     if kind != FIXED:
         accelerate_trunk(trunk, kind)
     for i in range(limbs.shape[0]):
@@ -59,27 +61,32 @@ def evaluate(trunk, limbs, model, scratch, elapsed):  # type: ignore[no-untyped-
 
 
 @inlined
-def look_up_functions(trunk, limb, table, cells, first, scratch):  # type: ignore[no-untyped-def]
-    """The functions of the crank angle and their derivatives, from the table whose first row is `first`."""
+def look_up_functions(trunk, limb, table, cells, scratch):  # type: ignore[no-untyped-def]
+    """The functions of the crank angle and their derivatives."""
     lanes = limb.shape[1]
     for lane in range(lanes):
         cell, limb[b.CELL + 1, lane] = find_cell(limb[b.ANGLE, lane], cells)
-        turns = (cell * (1.0 / cells) - 0.5 + ROUNDER) - ROUNDER  # whole ones below
-        row = cell - turns * cells
-        limb[b.CELL, lane] = first + (row if (row >= 0.0) & (row < cells) else 0.0)  # no number: the first row
-    if lanes == 1:
-        row = carray(scratch, 2 * f.WIDTH)
-        look_up(table, int(limb[b.CELL, 0]), limb[b.CELL + 1, 0], scratch)
-        for k in range(f.COS + 1):
-            limb[b.VALUES + k, 0] = row[k]
-            limb[b.SLOPES + k, 0] = row[f.WIDTH + k]
-    else:
-        at = address(limb)
-        for lane in range(0, lanes, f.GROUP):
-            look_up_group(
+        row = cell - ((cell * (1.0 / cells) - 0.5 + ROUNDER) - ROUNDER) * cells  # less whole turns
+        row = row if (row >= 0.0) & (row < cells) else 0.0  # what is not a number has the first row
+        limb[b.CELL, lane] = limb[b.FIRST, lane] + row
+    at = address(limb)
+    if lanes % 8 == 0:
+        for lane in range(0, lanes, 8):
+            look_up_eight(
                 table, offset(at, b.CELL * lanes + lane), offset(at, (b.CELL + 1) * lanes + lane),
                 offset(at, b.VALUES * lanes + lane), lanes,
             )  # fmt: skip
+    elif lanes == 4:
+        look_up_four(
+            table, offset(at, b.CELL * 4), offset(at, (b.CELL + 1) * 4), offset(at, b.VALUES * 4), 4
+        )  # fmt: skip
+    else:
+        row = carray(scratch, 2 * f.WIDTH)
+        for lane in range(lanes):
+            look_up(table, int(limb[b.CELL, lane]), limb[b.CELL + 1, lane], scratch)
+            for k in range(f.COS + 1):
+                limb[b.VALUES + k, lane] = row[k]
+                limb[b.SLOPES + k, lane] = row[f.WIDTH + k]
     for lane in range(limb.shape[1]):
         angle, value = limb[b.ANGLE, lane], limb[b.VALUES, lane]
         trunk[t.STUCK, lane] = 1.0 if (angle == angle) & (value != value) else trunk[t.STUCK, lane]
@@ -154,7 +161,7 @@ def clear_trunk(trunk, kind):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def gather_leg(trunk, limb):  # type: ignore[no-untyped-def]
+def gather_leg(trunk, limb, together):  # type: ignore[no-untyped-def]
     """Add a leg to the first moment, momentum, inertia and spin of all about the trunk's centre of mass."""
     for lane in range(limb.shape[1]):
         hip, s, u = vector(limb, b.HIP, lane), vector(limb, b.S, lane), vector(limb, b.U, lane)
@@ -162,16 +169,16 @@ def gather_leg(trunk, limb):  # type: ignore[no-untyped-def]
         frame = limb[b.VALUES + f.C, lane] + limb[b.ROTOR_C, lane]
         drift = times(w, u) + times(sway, across(s))
         moment = times(limb[b.MASS, lane], hip)
-        put(limb, b.PART_MOMENT, lane, moment + s)
-        put(limb, b.PART_DRIFT, lane, drift)
-        limb[b.PART_ROUND, lane] = dot(hip, moment + times(2.0, s)) + frame
-        limb[b.PART_SWIRL, lane] = cross(hip, drift) + limb[b.COUPLING, lane] * w + frame * sway
-    add_row(trunk, t.MOMENT, limb, b.PART_MOMENT)
-    add_row(trunk, t.MOMENT + 1, limb, b.PART_MOMENT + 1)
-    add_row(trunk, t.DRIFT, limb, b.PART_DRIFT)
-    add_row(trunk, t.DRIFT + 1, limb, b.PART_DRIFT + 1)
-    add_row(trunk, t.ROUND, limb, b.PART_ROUND)
-    add_row(trunk, t.SWIRL, limb, b.PART_SWIRL)
+        put(limb, b.PART, lane, moment + s)
+        put(limb, b.PART + 2, lane, drift)
+        limb[b.PART + 4, lane] = dot(hip, moment + times(2.0, s)) + frame
+        limb[b.PART + 5, lane] = cross(hip, drift) + limb[b.COUPLING, lane] * w + frame * sway
+    gather_row(trunk, t.MOMENT, limb, b.PART, 1.0, together)
+    gather_row(trunk, t.MOMENT + 1, limb, b.PART + 1, 1.0, together)
+    gather_row(trunk, t.DRIFT, limb, b.PART + 2, 1.0, together)
+    gather_row(trunk, t.DRIFT + 1, limb, b.PART + 3, 1.0, together)
+    gather_row(trunk, t.ROUND, limb, b.PART + 4, 1.0, together)
+    gather_row(trunk, t.SWIRL, limb, b.PART + 5, 1.0, together)
 
 
 @inlined
@@ -216,21 +223,18 @@ def move_trunk(trunk, kind):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def feel_leg(trunk, limb, is_motor, elapsed, kind):  # type: ignore[no-untyped-def]
-    """A leg's equation of motion and its part in the trunk's.
+def feel_leg(trunk, limb, elapsed):  # type: ignore[no-untyped-def]
+    """A leg's equation of motion: INERTIA theta'' + U . a + LEVER pitch'' = torque + ground - rest.
 
-    INERTIA theta'' + U . a + LEVER pitch'' = torque + ground - rest, a the trunk's acceleration. A motor's crank is
-    eliminated, so that the trunk's equations keep the trunk's accelerations alone.
+    a is the trunk's acceleration. A motor's crank is solved for theta'', a prescribed one's is given.
     """
     for lane in range(limb.shape[1]):
         w, frame_rate, k = limb[b.SPIN, lane], limb[b.FRAME_RATE, lane], limb[b.K, lane]
-        s, ds, u = vector(limb, b.S, lane), vector(limb, b.DS, lane), vector(limb, b.U, lane)
-        hip, pitch_rate = vector(limb, b.HIP, lane), trunk[t.PITCH_RATE, lane]
+        s, ds, hip = vector(limb, b.S, lane), vector(limb, b.DS, lane), vector(limb, b.HIP, lane)
         frame = limb[b.VALUES + f.C, lane] + limb[b.ROTOR_C, lane]
         coupling, sway_rate = limb[b.COUPLING, lane], limb[b.SWAY_RATE, lane]
-        da, db, dc = (
-            limb[b.SLOPES + f.A, lane], limb[b.SLOPES + f.B, lane], limb[b.SLOPES + f.C, lane]
-        )  # fmt: skip
+        pitch_rate, dc = trunk[t.PITCH_RATE, lane], limb[b.SLOPES + f.C, lane]
+        da, db = limb[b.SLOPES + f.A, lane], limb[b.SLOPES + f.B, lane]
         weight = complex(0.0, trunk[t.GRAVITY, lane]) - times(pitch_rate * pitch_rate, hip)  # of O, per mass
         rest_theta = (
             (coupling - k * frame) * sway_rate
@@ -239,50 +243,64 @@ def feel_leg(trunk, limb, is_motor, elapsed, kind):  # type: ignore[no-untyped-d
         )
         rest_beta = frame * sway_rate + (db * w + dc * frame_rate) * w + dot(weight, across(s))
         limb[b.REST_THETA, lane], limb[b.REST_BETA, lane] = rest_theta, rest_beta
-        q_theta, q_beta = limb[b.Q_THETA, lane], limb[b.Q_BETA, lane]
-        value, rate, bend = (
-            limb[b.VALUE + SPEED, lane],
-            limb[b.RATE + SPEED, lane],
-            limb[b.BEND + SPEED, lane],
+        limb[b.LEVER, lane] = coupling + cross(hip, vector(limb, b.U, lane))
+        value, rate = limb[b.VALUE + SPEED, lane], limb[b.RATE + SPEED, lane]
+        bend = limb[b.BEND + SPEED, lane]
+        wanted = value + elapsed * (rate + 0.5 * elapsed * bend)
+        torque = clip(limb[b.GAIN, lane] * (wanted - w), limb[b.LIMIT, lane])
+        softness = 1.0 / limb[b.INERTIA, lane]
+        is_motor = limb[b.MOTOR, lane] > 0.0
+        free = softness * (
+            torque + limb[b.Q_THETA, lane] - rest_theta + k * (limb[b.Q_BETA, lane] - rest_beta)
         )
-        if is_motor:
-            wanted = value + elapsed * (rate + 0.5 * elapsed * bend)
-            torque = clip(limb[b.GAIN, lane] * (wanted - w), limb[b.LIMIT, lane])
-            softness = 1.0 / limb[b.INERTIA, lane]
-            free = softness * (torque + q_theta - rest_theta + k * (q_beta - rest_beta))
-            limb[b.CRANK_TORQUE, lane] = torque
-        else:
-            softness = 0.0
-            free = rate + elapsed * bend
-        limb[b.SOFTNESS, lane], limb[b.SPIN_RATE_FREE, lane] = softness, free
-        lever = coupling + cross(hip, u)
-        limb[b.LEVER, lane] = lever
-        if kind != FIXED:
-            push = vector(limb, b.PUSH, lane)
-            slope = vector(limb, b.TURN, lane) * vector(limb, b.SLOPES + f.DS_X, lane)
-            throw = (  # what the first moment does at rest of all accelerations
-                times(sway_rate, across(s))
-                + times(w * w, slope)
-                + times(frame_rate, times(2.0 * w, across(ds)) - times(frame_rate, s))
-            )
-            shake = times(pitch_rate * pitch_rate * limb[b.MASS, lane], hip) - throw
-            put(trunk, t.LOAD, lane, vector(trunk, t.LOAD, lane) + (shake - times(free, u)))
-            put(trunk, t.FORCE, lane, vector(trunk, t.FORCE, lane) + push)
-            soft_u = times(softness, u)
-            trunk[t.M_XX, lane] -= soft_u.real * u.real
-            trunk[t.M_XY, lane] -= soft_u.real * u.imag
-            trunk[t.M_YY, lane] -= soft_u.imag * u.imag
-            if kind == FREE:
-                trunk[t.M_XP, lane] -= soft_u.real * lever
-                trunk[t.M_YP, lane] -= soft_u.imag * lever
-                trunk[t.M_PP, lane] -= softness * lever * lever
-                trunk[t.LOAD_TURN, lane] += (
-                    (q_beta - rest_beta)
-                    + cross(hip, push - times(limb[b.MASS, lane], weight) - throw)
-                    - lever * free
-                )
-                off = hip + vector(trunk, t.PLACE, lane) - vector(trunk, t.NOW_CENTRE, lane)
-                trunk[t.TWIST, lane] += q_beta + cross(off, push)
+        limb[b.CRANK_TORQUE, lane] = torque
+        limb[b.SOFTNESS, lane] = softness if is_motor else 0.0
+        limb[b.SPIN_RATE_FREE, lane] = free if is_motor else rate + elapsed * bend
+
+
+@inlined
+def load_trunk(trunk, limb, kind, together):  # type: ignore[no-untyped-def]
+    """A leg's part in the trunk's equations, its crank eliminated, and in the outer force."""
+    for lane in range(limb.shape[1]):
+        w, frame_rate, u = limb[b.SPIN, lane], limb[b.FRAME_RATE, lane], vector(limb, b.U, lane)
+        s, ds, hip = vector(limb, b.S, lane), vector(limb, b.DS, lane), vector(limb, b.HIP, lane)
+        push, mass, lever = vector(limb, b.PUSH, lane), limb[b.MASS, lane], limb[b.LEVER, lane]
+        free, softness = limb[b.SPIN_RATE_FREE, lane], limb[b.SOFTNESS, lane]
+        slope = vector(limb, b.TURN, lane) * vector(limb, b.SLOPES + f.DS_X, lane)
+        throw = (  # what the first moment does at rest of all accelerations
+            times(limb[b.SWAY_RATE, lane], across(s))
+            + times(w * w, slope)
+            + times(frame_rate, times(2.0 * w, across(ds)) - times(frame_rate, s))
+        )
+        sling = times(trunk[t.PITCH_RATE, lane] * trunk[t.PITCH_RATE, lane], hip)  # of O, towards the trunk
+        put(limb, b.PART, lane, times(mass, sling) - throw - times(free, u))
+        limb[b.PART + 2, lane] = (
+            (limb[b.Q_BETA, lane] - limb[b.REST_BETA, lane])
+            + cross(hip, push - times(mass, complex(0.0, trunk[t.GRAVITY, lane]) - sling) - throw)
+            - lever * free
+        )
+        soft_u = times(softness, u)
+        limb[b.PART + 3, lane] = soft_u.real * u.real
+        limb[b.PART + 4, lane] = soft_u.real * u.imag
+        limb[b.PART + 5, lane] = soft_u.imag * u.imag
+        limb[b.PART + 6, lane] = soft_u.real * lever
+        limb[b.PART + 7, lane] = soft_u.imag * lever
+        limb[b.PART + 8, lane] = softness * lever * lever
+        off = hip + vector(trunk, t.PLACE, lane) - vector(trunk, t.NOW_CENTRE, lane)
+        limb[b.PART + 9, lane] = limb[b.Q_BETA, lane] + cross(off, push)
+    gather_row(trunk, t.LOAD, limb, b.PART, 1.0, together)
+    gather_row(trunk, t.LOAD + 1, limb, b.PART + 1, 1.0, together)
+    gather_row(trunk, t.M_XX, limb, b.PART + 3, -1.0, together)
+    gather_row(trunk, t.M_XY, limb, b.PART + 4, -1.0, together)
+    gather_row(trunk, t.M_YY, limb, b.PART + 5, -1.0, together)
+    gather_row(trunk, t.FORCE, limb, b.PUSH, 1.0, together)
+    gather_row(trunk, t.FORCE + 1, limb, b.PUSH + 1, 1.0, together)
+    if kind == FREE:
+        gather_row(trunk, t.LOAD_TURN, limb, b.PART + 2, 1.0, together)
+        gather_row(trunk, t.M_XP, limb, b.PART + 6, -1.0, together)
+        gather_row(trunk, t.M_YP, limb, b.PART + 7, -1.0, together)
+        gather_row(trunk, t.M_PP, limb, b.PART + 8, -1.0, together)
+        gather_row(trunk, t.TWIST, limb, b.PART + 9, 1.0, together)
 
 
 @inlined

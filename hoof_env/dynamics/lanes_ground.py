@@ -50,7 +50,9 @@ def meet_ground(trunk, limb, point, model):  # type: ignore[no-untyped-def]
         put(limb, c + b.BY_THETA, lane, dz)
         put(limb, c + b.SPOT, lane, vector(trunk, t.PLACE, lane) + hip + z)
         velocity = (
-            vector(trunk, t.VELOCITY, lane) + times(pitch_rate, across(hip)) + (times(w, dz) + times(frame_rate, across(z)))
+            vector(trunk, t.VELOCITY, lane)
+            + times(pitch_rate, across(hip))
+            + (times(w, dz) + times(frame_rate, across(z)))
         )
         put(limb, c + b.SPOT_RATE, lane, velocity)
     if model.is_terrain:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from hoof_env._jit import inlined
 from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
-from hoof_env.dynamics.vectors import across, vector
+from hoof_env.dynamics.vectors import across, gather_row, vector
 from hoof_env.leg import profile as f
 from hoof_env.leg.kinematics import dot
 
@@ -35,7 +35,7 @@ carries, and the hip's power is that of the actuator which changes the swing's p
 
 
 @inlined
-def feel_drives(trunk, limb, is_motor):  # type: ignore[no-untyped-def]
+def feel_drives(trunk, limb):  # type: ignore[no-untyped-def]
     """Torques and powers of crank and swing from the accelerations (Lagrange's equations)."""
     for lane in range(limb.shape[1]):
         w, acc, k = limb[b.SPIN, lane], limb[b.SPIN_RATE, lane], limb[b.K, lane]
@@ -51,18 +51,18 @@ def feel_drives(trunk, limb, is_motor):  # type: ignore[no-untyped-def]
             - limb[b.Q_BETA, lane]
         )
         limb[b.FRAME_TORQUE, lane] = by_frame
-        if is_motor:
-            torque, sway = limb[b.CRANK_TORQUE, lane], limb[b.SWAY, lane]
-        else:
-            torque = (
-                (limb[b.VALUES + f.A, lane] + limb[b.ROTOR_A, lane]) * acc
-                + coupling * turning
-                + limb[b.REST_THETA, lane]
-                + dot(lift, vector(limb, b.DS, lane))
-                - limb[b.Q_THETA, lane]
-            )
-            limb[b.CRANK_TORQUE, lane] = torque
-            sway = k * w + limb[b.SWAY, lane]
+        needed = (
+            (limb[b.VALUES + f.A, lane] + limb[b.ROTOR_A, lane]) * acc
+            + coupling * turning
+            + limb[b.REST_THETA, lane]
+            + dot(lift, vector(limb, b.DS, lane))
+            - limb[b.Q_THETA, lane]
+        )
+        is_motor = limb[b.MOTOR, lane] > 0.0
+        given, held = limb[b.CRANK_TORQUE, lane], limb[b.SWAY, lane]
+        torque = given if is_motor else needed
+        sway = held if is_motor else k * w + held
+        limb[b.CRANK_TORQUE, lane] = torque
         limb[b.CRANK_POWER, lane] = torque * w
         limb[b.SWING_POWER, lane] = by_frame * sway
 
@@ -76,50 +76,57 @@ def keep_account(trunk, limbs, model, account, weight):  # type: ignore[no-untyp
         account[DAMPER_LOSS, lane] += weight * (trunk[t.DAMPER, lane] * (velocity.imag * velocity.imag))
     for i in range(limbs.shape[0]):
         limb = limbs[i]
-        feel_drives(trunk, limb, model.motors[i] != 0.0)
+        feel_drives(trunk, limb)
         for lane in range(limb.shape[1]):
-            account[CRANK_WORK, lane] += weight * limb[b.CRANK_POWER, lane]
-            account[SWING_WORK, lane] += weight * limb[b.SWING_POWER, lane]
-            account[IMPULSE, lane] += weight * limb[b.PUSH, lane]
-            account[IMPULSE + 1, lane] += weight * limb[b.PUSH + 1, lane]
+            for k in range(3):
+                limb[b.PART + k, lane] = 0.0
         for point in range(2):
             c = b.CONTACT + point * b.CONTACT_ROWS
             for lane in range(limb.shape[1]):
                 spring = trunk[t.STIFFNESS, lane] * limb[c + b.FIRMNESS, lane] * limb[c + b.POWER, lane]
                 spring = spring if limb[c + b.DEPTH, lane] > 0.0 else 0.0
                 rate = limb[c + b.DEPTH_RATE, lane]
-                account[GROUND_STORED, lane] += weight * (spring * rate)
-                account[GROUND_LOSS, lane] += weight * ((limb[c + b.NORMAL, lane] - spring) * rate)
-                account[FRICTION_LOSS, lane] -= weight * (limb[c + b.RUB, lane] * limb[c + b.SLIDE, lane])
+                limb[b.PART, lane] += spring * rate
+                limb[b.PART + 1, lane] += (limb[c + b.NORMAL, lane] - spring) * rate
+                limb[b.PART + 2, lane] -= limb[c + b.RUB, lane] * limb[c + b.SLIDE, lane]
+        gather_row(account, CRANK_WORK, limb, b.CRANK_POWER, weight, model.together)
+        gather_row(account, SWING_WORK, limb, b.SWING_POWER, weight, model.together)
+        gather_row(account, GROUND_STORED, limb, b.PART, weight, model.together)
+        gather_row(account, GROUND_LOSS, limb, b.PART + 1, weight, model.together)
+        gather_row(account, FRICTION_LOSS, limb, b.PART + 2, weight, model.together)
+        gather_row(account, IMPULSE, limb, b.PUSH, weight, model.together)
+        gather_row(account, IMPULSE + 1, limb, b.PUSH + 1, weight, model.together)
 
 
 @inlined
-def report(trunk, limbs, model, trunk_out, limb_out, n, lanes):  # type: ignore[no-untyped-def]
-    """Write `TRUNK_REPORT` and `LIMB_REPORT` of the first `lanes` lanes into columns n, n + 1, ... of the outputs."""
-    for lane in range(lanes):
-        for k in range(2):
-            trunk_out[k, n + lane] = trunk[t.PLACE + k, lane]
-            trunk_out[2 + k, n + lane] = trunk[t.VELOCITY + k, lane]
-            trunk_out[4 + k, n + lane] = trunk[t.ACC + k, lane]
-        trunk_out[6, n + lane] = trunk[t.PITCH_RATE, lane]
-        trunk_out[7, n + lane] = trunk[t.PITCH_ACC, lane]
+def report(trunk, limbs, together, trunk_out, limb_out, n, lanes):  # type: ignore[no-untyped-def]
+    """Write `TRUNK_REPORT` and `LIMB_REPORT` into columns n, n + 1, ... of the outputs: of `lanes` environments,
+    or of one whose legs the lanes are."""
     for i in range(limbs.shape[0]):
-        limb = limbs[i]
-        feel_drives(trunk, limb, model.motors[i] != 0.0)
-        for lane in range(lanes):
+        feel_drives(trunk, limbs[i])
+    for lane in range(limbs.shape[2] if together else lanes):
+        e = n if together else n + lane
+        for k in range(2):
+            trunk_out[k, e] = trunk[t.PLACE + k, lane]
+            trunk_out[2 + k, e] = trunk[t.VELOCITY + k, lane]
+            trunk_out[4 + k, e] = trunk[t.ACC + k, lane]
+        trunk_out[6, e] = trunk[t.PITCH_RATE, lane]
+        trunk_out[7, e] = trunk[t.PITCH_ACC, lane]
+        for i in range(limbs.shape[0]):
+            limb, leg = limbs[i], lane if together else i
             side, w, acc = limb[b.SIDE, lane], limb[b.SPIN, lane], limb[b.SPIN_RATE, lane]
-            limb_out[i, 0, n + lane] = acc
-            limb_out[i, 1, n + lane] = limb[b.PHI, lane]
-            limb_out[i, 2, n + lane] = side * (limb[b.K, lane] * w + limb[b.SWAY, lane])
-            limb_out[i, 3, n + lane] = side * (limb[b.K, lane] * acc + limb[b.SWAY_RATE, lane])
-            limb_out[i, 4, n + lane] = limb[b.CRANK_TORQUE, lane]
-            limb_out[i, 5, n + lane] = side * limb[b.FRAME_TORQUE, lane]
-            limb_out[i, 6, n + lane] = limb[b.CRANK_POWER, lane]
-            limb_out[i, 7, n + lane] = limb[b.SWING_POWER, lane]
+            limb_out[leg, 0, e] = acc
+            limb_out[leg, 1, e] = limb[b.PHI, lane]
+            limb_out[leg, 2, e] = side * (limb[b.K, lane] * w + limb[b.SWAY, lane])
+            limb_out[leg, 3, e] = side * (limb[b.K, lane] * acc + limb[b.SWAY_RATE, lane])
+            limb_out[leg, 4, e] = limb[b.CRANK_TORQUE, lane]
+            limb_out[leg, 5, e] = side * limb[b.FRAME_TORQUE, lane]
+            limb_out[leg, 6, e] = limb[b.CRANK_POWER, lane]
+            limb_out[leg, 7, e] = limb[b.SWING_POWER, lane]
             for point in range(2):
                 c, first = b.CONTACT + point * b.CONTACT_ROWS, 8 + 5 * point
-                limb_out[i, first, n + lane] = limb[c + b.SPOT, lane]
-                limb_out[i, first + 1, n + lane] = limb[c + b.SPOT + 1, lane]
-                limb_out[i, first + 2, n + lane] = limb[c + b.SLIDE, lane]
-                limb_out[i, first + 3, n + lane] = limb[c + b.NORMAL, lane]
-                limb_out[i, first + 4, n + lane] = limb[c + b.RUB, lane]
+                limb_out[leg, first, e] = limb[c + b.SPOT, lane]
+                limb_out[leg, first + 1, e] = limb[c + b.SPOT + 1, lane]
+                limb_out[leg, first + 2, e] = limb[c + b.SLIDE, lane]
+                limb_out[leg, first + 3, e] = limb[c + b.NORMAL, lane]
+                limb_out[leg, first + 4, e] = limb[c + b.RUB, lane]

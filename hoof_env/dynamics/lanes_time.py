@@ -6,7 +6,7 @@ from hoof_env._jit import inlined
 from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
 from hoof_env.dynamics.trunk import FIXED
-from hoof_env.dynamics.vectors import copy_row, fill_row, set_four_rows, set_row, set_six_rows
+from hoof_env.dynamics.vectors import set_six
 from hoof_env.gait.motion_law import INNER, SPEED, clip
 
 
@@ -26,14 +26,16 @@ def bend_filters(limbs, settings):  # type: ignore[no-untyped-def]
 def begin_step(trunk, limbs, model):  # type: ignore[no-untyped-def]
     """The first stage is at the state itself."""
     if model.kind != FIXED:
-        for k in range(t.MOVING):
-            copy_row(trunk, t.NOW + k, t.FIRST + k)
-            fill_row(trunk, t.MEAN + k, 0.0)
+        for lane in range(trunk.shape[1]):
+            set_six(trunk, t.NOW, t.FIRST, 0.0, t.FIRST, lane)
+            set_six(trunk, t.MEAN, t.FIRST, -1.0, t.FIRST, lane)
     for i in range(limbs.shape[0]):
-        copy_row(limbs[i], b.ANGLE, b.THETA)
-        copy_row(limbs[i], b.SPIN, b.OMEGA)
-        fill_row(limbs[i], b.SPIN_MEAN, 0.0)
-        fill_row(limbs[i], b.SPIN_RATE_MEAN, 0.0)
+        limb = limbs[i]
+        for lane in range(limb.shape[1]):
+            limb[b.ANGLE, lane] = limb[b.THETA, lane]
+            limb[b.SPIN, lane] = limb[b.OMEGA, lane]
+            limb[b.SPIN_MEAN, lane] = 0.0
+            limb[b.SPIN_RATE_MEAN, lane] = 0.0
 
 
 @inlined
@@ -42,35 +44,39 @@ def weigh_stage(trunk, limbs, model, weight):  # type: ignore[no-untyped-def]
     if weight == 0.0:
         return
     if model.kind != FIXED:
-        set_six_rows(trunk, t.MEAN, t.MEAN, weight, t.FLOW)
+        for lane in range(trunk.shape[1]):
+            set_six(trunk, t.MEAN, t.MEAN, weight, t.FLOW, lane)
     for i in range(limbs.shape[0]):
-        set_row(limbs[i], b.SPIN_MEAN, b.SPIN_MEAN, weight, b.SPIN)
-        set_row(limbs[i], b.SPIN_RATE_MEAN, b.SPIN_RATE_MEAN, weight, b.SPIN_RATE)
+        limb = limbs[i]
+        for lane in range(limb.shape[1]):
+            limb[b.SPIN_MEAN, lane] += weight * limb[b.SPIN, lane]
+            limb[b.SPIN_RATE_MEAN, lane] += weight * limb[b.SPIN_RATE, lane]
+
+
+@inlined
+def prescribed(limb, lane, elapsed):  # type: ignore[no-untyped-def]
+    """Angle and rate of a prescribed crank, `elapsed` [s] into the step, as the speed filter moves them, exactly."""
+    value, rate = limb[b.VALUE + SPEED, lane], limb[b.RATE + SPEED, lane]
+    bend = limb[b.BEND + SPEED, lane]
+    theta = limb[b.THETA, lane] + elapsed * (value + elapsed * (rate / 2.0 + elapsed * bend / 6.0))
+    return theta, value + elapsed * (rate + elapsed * bend / 2.0)
 
 
 @inlined
 def next_stage(trunk, limbs, model, elapsed):  # type: ignore[no-untyped-def]
     """Go `elapsed` [s] from the step's start with the derivatives of the present stage."""
     if model.kind != FIXED:
-        set_six_rows(trunk, t.NOW, t.FIRST, elapsed, t.FLOW)
+        for lane in range(trunk.shape[1]):
+            set_six(trunk, t.NOW, t.FIRST, elapsed, t.FLOW, lane)
     for i in range(limbs.shape[0]):
-        if model.motors[i] != 0.0:
-            set_row(limbs[i], b.ANGLE, b.THETA, elapsed, b.SPIN)
-            set_row(limbs[i], b.SPIN, b.OMEGA, elapsed, b.SPIN_RATE)
-        else:
-            prescribe(limbs[i], b.ANGLE, b.SPIN, elapsed)
-
-
-@inlined
-def prescribe(limb, angle, spin, elapsed):  # type: ignore[no-untyped-def]
-    """Crank angle and rate as the speed filter moves them, exactly."""
-    for lane in range(limb.shape[1]):
-        value, rate = limb[b.VALUE + SPEED, lane], limb[b.RATE + SPEED, lane]
-        bend = limb[b.BEND + SPEED, lane]
-        limb[angle, lane] = limb[b.THETA, lane] + elapsed * (
-            value + elapsed * (rate / 2.0 + elapsed * bend / 6.0)
-        )
-        limb[spin, lane] = value + elapsed * (rate + elapsed * bend / 2.0)
+        limb = limbs[i]
+        for lane in range(limb.shape[1]):
+            is_motor = limb[b.MOTOR, lane] > 0.0
+            angle, spin = prescribed(limb, lane, elapsed)
+            theta = limb[b.THETA, lane] + elapsed * limb[b.SPIN, lane]
+            omega = limb[b.OMEGA, lane] + elapsed * limb[b.SPIN_RATE, lane]
+            limb[b.ANGLE, lane] = theta if is_motor else angle
+            limb[b.SPIN, lane] = omega if is_motor else spin
 
 
 @inlined
@@ -85,22 +91,26 @@ def use_new_rates(trunk, h):  # type: ignore[no-untyped-def]
 @inlined
 def end_step(trunk, limbs, model, h):  # type: ignore[no-untyped-def]
     """The state a step later; the filters advance exactly."""
-    for lane in range(trunk.shape[1]):
-        trunk[t.TIME, lane] += h
     if model.kind != FIXED:
         if model.new_rates:
             use_new_rates(trunk, h)
-        set_six_rows(trunk, t.FIRST, t.FIRST, h, t.MEAN)
+        for lane in range(trunk.shape[1]):
+            set_six(trunk, t.FIRST, t.FIRST, h, t.MEAN, lane)
+    for lane in range(trunk.shape[1]):
+        trunk[t.TIME, lane] += h
+    new_rates = model.new_rates
     for i in range(limbs.shape[0]):
         limb = limbs[i]
-        if model.motors[i] == 0.0:
-            prescribe(limb, b.THETA, b.OMEGA, h)
-        elif model.new_rates:
-            set_row(limb, b.OMEGA, b.OMEGA, h, b.SPIN_RATE_MEAN)
-            set_row(limb, b.THETA, b.THETA, h, b.OMEGA)
-        else:
-            set_row(limb, b.THETA, b.THETA, h, b.SPIN_MEAN)
-            set_row(limb, b.OMEGA, b.OMEGA, h, b.SPIN_RATE_MEAN)
-        set_four_rows(limb, b.VALUE, b.VALUE, 0.5 * h * h, b.BEND)
-        set_four_rows(limb, b.VALUE, b.VALUE, h, b.RATE)
-        set_four_rows(limb, b.RATE, b.RATE, h, b.BEND)
+        for lane in range(limb.shape[1]):
+            is_motor = limb[b.MOTOR, lane] > 0.0
+            angle, spin = prescribed(limb, lane, h)
+            omega = limb[b.OMEGA, lane] + h * limb[b.SPIN_RATE_MEAN, lane]
+            mean = omega if new_rates else limb[b.SPIN_MEAN, lane]
+            theta = limb[b.THETA, lane] + h * mean
+            limb[b.THETA, lane] = theta if is_motor else angle
+            limb[b.OMEGA, lane] = omega if is_motor else spin
+        for k in range(4):
+            for lane in range(limb.shape[1]):
+                limb[b.VALUE + k, lane] += h * (limb[b.RATE + k, lane] + 0.5 * h * limb[b.BEND + k, lane])
+            for lane in range(limb.shape[1]):
+                limb[b.RATE + k, lane] += h * limb[b.BEND + k, lane]

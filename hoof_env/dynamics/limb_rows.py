@@ -33,15 +33,15 @@ SLOPES = VALUES + WIDTH  # their derivatives by the crank angle
     TURN, _, HIP, _,  # e^(i beta); from the trunk's centre of mass to O
     S, _, DS, _, U, _,  # first moment about O, its derivative by theta in the frame, and with the swing [kg m]
     INERTIA, COUPLING,  # of the crank with the swing geared to it; of crank and frame [kg m^2]
-    PART_MOMENT, _, PART_DRIFT, _, PART_ROUND, PART_SWIRL,  # in the trunk's MOMENT ... SWIRL
+    PART, _, _, _, _, _, _, _, _, _, _, _,  # what a leg adds to the trunk's rows
     LEVER,  # of crank and pitch [kg m^2]
     Q_THETA, Q_BETA, PUSH, _,  # the ground: generalised forces [N m], force [N]
     REST_THETA, REST_BETA,  # generalised inertia forces at rest of the accelerations, weight included [N m]
     SPIN_RATE_FREE, SOFTNESS,  # crank acceleration if the trunk kept still; 1 / INERTIA, 0 if prescribed
     CRANK_TORQUE, FRAME_TORQUE, CRANK_POWER, SWING_POWER,  # drives [N m, W]; of the frame in the world's sense
-) = range(SLOPES + WIDTH, SLOPES + WIDTH + 51)  # fmt: skip
+) = range(SLOPES + WIDTH, SLOPES + WIDTH + 57)  # fmt: skip
 
-CONTACT = SLOPES + WIDTH + 51
+CONTACT = SLOPES + WIDTH + 57
 CONTACT_ROWS = 22
 """Toe's rows begin at CONTACT, heel's at CONTACT + CONTACT_ROWS; the names below count from there."""
 (
@@ -54,11 +54,12 @@ CONTACT_ROWS = 22
 ) = range(22)  # fmt: skip
 
 _P = CONTACT + 2 * CONTACT_ROWS
-HIP_ON_TRUNK, _, MASS, SIDE, GAIN, LIMIT, ROTOR_A, ROTOR_B, ROTOR_C = range(_P, _P + 9)
+HIP_ON_TRUNK, _, MASS, SIDE, FIRST, MOTOR, GAIN, LIMIT, ROTOR_A, ROTOR_B, ROTOR_C = range(_P, _P + 11)
 PARAMETERS = (
-    "hip_x", "hip_y", "mass", "side", "speed_gain", "torque_limit", "rotor_a", "rotor_b", "rotor_c"
+    "hip_x", "hip_y", "mass", "side", "first_row", "is_motor", "speed_gain", "torque_limit",
+    "rotor_a", "rotor_b", "rotor_c",
 )  # fmt: skip
-"""Settings of a leg: its place on the trunk, mass, which way it travels, motor, and what the rotor adds to the
+"""Settings of a leg: its place on the trunk, mass, which way it travels, where its table begins, its motor, and what the rotor adds to the
 inertias a, b, c."""
 
-ROWS = _P + 9
+ROWS = _P + 11

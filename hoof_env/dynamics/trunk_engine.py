@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
-from hoof_env.dynamics.advance import Arrays, Model, advance_batch, advance_one, advance_one_leg
+from hoof_env.dynamics.advance import Arrays, Model, advance_batch, advance_four_legs, advance_one_leg
 from hoof_env.dynamics.drive import Motor
 from hoof_env.dynamics.engine import GRAVITY
 from hoof_env.dynamics.lanes_report import ACCOUNT, LIMB_REPORT, TRUNK_REPORT
@@ -105,9 +105,8 @@ class TrunkEngine:
             )
         self._arrays = self._new_arrays()
         self._model = self._new_model()
-        self._run = advance_batch
-        if self.num_envs <= FEW:
-            self._run = advance_one_leg if len(self.limbs) == 1 else advance_one
+        alone = {1: advance_one_leg, 4: advance_four_legs}.get(len(self.limbs), advance_batch)
+        self._run = alone if self.num_envs <= FEW else advance_batch
 
     # What it is like
 
@@ -300,7 +299,9 @@ class TrunkEngine:
     def _new_arrays(self) -> Arrays:
         n, legs = self.num_envs, len(self.limbs)
         trunk_settings = np.repeat(self._trunk_settings()[:, None], n, 1)
-        limb_settings = np.array([_limb_settings(limb) for limb in self.limbs])
+        limb_settings = np.array(
+            [_limb_settings(*pair) for pair in zip(self.limbs, self._first_rows(), strict=True)]
+        )
         return Arrays(
             np.full((len(t.STATE), n), np.nan),  # nowhere, until reset
             np.full((legs, len(b.STATE), n), np.nan),
@@ -333,18 +334,21 @@ class TrunkEngine:
             raise ParameterError(
                 f"exponent: this engine takes multiples of 1/{EXPONENT_UNIT}, got {self.ground.exponent!r}"
             )
-        unique = list(dict.fromkeys(self.profiles))
-        cells = max(profile.cells for profile in unique)
-        tables = [profile.with_cells(cells).table for profile in unique]
+        cells = max(profile.cells for profile in self.profiles)
+        tables = [profile.with_cells(cells).table for profile in dict.fromkeys(self.profiles)]
         scheme, grid = SCHEMES[self.integrator], self.terrain.to_grid()
         return Model(
             TRUNKS.index(self.trunk.kind), int(eighths), FRICTION_LAWS.index(self.ground.friction_law),
             self.ground.approach == "interpolated", self.terrain != Terrain.flat(), scheme.new_rates,
-            cells, np.concatenate(tables), np.array([unique.index(p) * cells for p in self.profiles], dtype=float),
-            np.array([isinstance(limb.drive, Motor) for limb in self.limbs], dtype=float),
+            False, cells, np.concatenate(tables),
             self.filters.to_array(), np.array(scheme.fractions), np.array(scheme.weights),
             grid.cells, grid.origin, grid.per_metre,
         )  # fmt: skip
+
+    def _first_rows(self) -> list[int]:
+        """Where the table of each leg begins in the model's."""
+        unique, cells = list(dict.fromkeys(self.profiles)), max(profile.cells for profile in self.profiles)
+        return [unique.index(profile) * cells for profile in self.profiles]
 
     def _layout(self) -> dict[str, Any]:
         return {
@@ -378,11 +382,12 @@ def _profiles(limbs: Sequence[Limb]) -> list[LegProfile]:
     return [next(p for p in known if p.geometry == limb.geometry) for limb in limbs]
 
 
-def _limb_settings(limb: Limb) -> Floats:
+def _limb_settings(limb: Limb, first_row: int) -> Floats:
     motor = limb.drive if isinstance(limb.drive, Motor) else Motor(0.0, 0.0, 0.0, 0.0)
     side, rotor = float(limb.geometry.travel), motor.rotor_inertia
     values = (
-        *limb.hip, limb.geometry.mass, side, motor.speed_gain, motor.torque_limit,
+        *limb.hip, limb.geometry.mass, side, first_row, float(isinstance(limb.drive, Motor)),
+        motor.speed_gain, motor.torque_limit,
         motor.reflected_inertia, -side * motor.gear_ratio * rotor, rotor,
     )  # fmt: skip
     return np.array(values)

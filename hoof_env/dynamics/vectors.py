@@ -1,6 +1,7 @@
 """Planar vectors in the engine's arrays, a complex number in two rows; and sums of whole rows.
 
-Rows are named by constants, one loop a row: where a row number is computed, a loop over the lanes may stay scalar.
+Rows are named by constants: a loop over lanes may stay scalar where a row's number is computed, or where it is so
+short that the compiler unrolls it.
 """
 
 from __future__ import annotations
@@ -34,45 +35,26 @@ def across(z):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def set_row(rows, to, start, factor, slope):  # type: ignore[no-untyped-def]
-    """rows[to] = rows[start] + factor rows[slope]."""
-    for lane in range(rows.shape[1]):
-        rows[to, lane] = rows[start, lane] + factor * rows[slope, lane]
+def set_six(rows, to, start, factor, slope, lane):  # type: ignore[no-untyped-def]
+    """rows[to + k] = rows[start + k] + factor rows[slope + k] for k below 6, in one lane."""
+    rows[to, lane] = rows[start, lane] + factor * rows[slope, lane]
+    rows[to + 1, lane] = rows[start + 1, lane] + factor * rows[slope + 1, lane]
+    rows[to + 2, lane] = rows[start + 2, lane] + factor * rows[slope + 2, lane]
+    rows[to + 3, lane] = rows[start + 3, lane] + factor * rows[slope + 3, lane]
+    rows[to + 4, lane] = rows[start + 4, lane] + factor * rows[slope + 4, lane]
+    rows[to + 5, lane] = rows[start + 5, lane] + factor * rows[slope + 5, lane]
 
 
 @inlined
-def set_four_rows(rows, to, start, factor, slope):  # type: ignore[no-untyped-def]
-    """`set_row` for four rows from each of these on."""
-    set_row(rows, to, start, factor, slope)
-    set_row(rows, to + 1, start + 1, factor, slope + 1)
-    set_row(rows, to + 2, start + 2, factor, slope + 2)
-    set_row(rows, to + 3, start + 3, factor, slope + 3)
-
-
-@inlined
-def set_six_rows(rows, to, start, factor, slope):  # type: ignore[no-untyped-def]
-    """`set_row` for six rows from each of these on."""
-    set_four_rows(rows, to, start, factor, slope)
-    set_row(rows, to + 4, start + 4, factor, slope + 4)
-    set_row(rows, to + 5, start + 5, factor, slope + 5)
-
-
-@inlined
-def fill_row(rows, name, value):  # type: ignore[no-untyped-def]
-    """rows[name] = value."""
-    for lane in range(rows.shape[1]):
-        rows[name, lane] = value
-
-
-@inlined
-def copy_row(rows, to, start):  # type: ignore[no-untyped-def]
-    """rows[to] = rows[start]."""
-    for lane in range(rows.shape[1]):
-        rows[to, lane] = rows[start, lane]
-
-
-@inlined
-def add_row(rows, to, others, name):  # type: ignore[no-untyped-def]
-    """rows[to] += others[name]."""
-    for lane in range(rows.shape[1]):
-        rows[to, lane] += others[name, lane]
+def gather_row(rows, to, legs, name, weight, together):  # type: ignore[no-untyped-def]
+    """rows[to] += weight legs[name]: lane by lane, or, where the lanes are the legs of one trunk, all of them
+    one after the other, as in a loop over legs."""
+    if together:
+        total = rows[to, 0]
+        for lane in range(legs.shape[1]):
+            total += weight * legs[name, lane]
+        for lane in range(legs.shape[1]):
+            rows[to, lane] = total
+    else:
+        for lane in range(legs.shape[1]):
+            rows[to, lane] += weight * legs[name, lane]

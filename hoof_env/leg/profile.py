@@ -175,9 +175,6 @@ def find_cell(theta, cells):  # type: ignore[no-untyped-def]
 #
 #     for p in 1 ... DEGREE:  slope = slope x + value;  value = value x + coefficient[p]
 
-GROUP = 8
-"""Lanes that `look_up_group` takes."""
-
 _INDEX, _DOUBLE = ir.IntType(64), ir.DoubleType()
 
 
@@ -190,7 +187,10 @@ def _place(builder: Any, start: Any, offset: Any, width: int) -> Any:
 def _horner(builder: Any, table: Any, row: Any, x: Any, begin: int, width: int) -> tuple[Any, Any]:
     """Values and derivatives of functions `begin` to `begin` + `width` in a row of the table."""
     vector = ir.VectorType(_DOUBLE, width)
-    nothing, zeros = ir.Constant(vector, ir.Undefined), ir.Constant(ir.VectorType(ir.IntType(32), width), [0] * width)
+    nothing, zeros = (
+        ir.Constant(vector, ir.Undefined),
+        ir.Constant(ir.VectorType(ir.IntType(32), width), [0] * width),
+    )
     x = builder.insert_element(nothing, x, ir.Constant(ir.IntType(32), 0))
     x = builder.shuffle_vector(x, nothing, zeros)
     first = builder.gep(table, [builder.mul(row, ir.Constant(_INDEX, WIDTH * (DEGREE + 1)))])
@@ -220,27 +220,6 @@ def look_up(context: Any, table: Any, row: Any, x: Any, out: Any) -> Any:
     return types.void(table, row, x, out), emit
 
 
-@intrinsic
-def look_up_group(context: Any, table: Any, rows: Any, xs: Any, out: Any, stride: Any) -> Any:
-    """`look_up` for `GROUP` lanes: row numbers (as doubles) and angles at the pointers `rows` and `xs`; function k
-    of lane j goes to out[k stride + j], its derivative to out[(WIDTH + k) stride + j]."""
-
-    def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        table, rows, xs, out, stride = values
-        for begin in range(0, WIDTH, GROUP):
-            lanes = []
-            for lane in range(GROUP):
-                row, x = (builder.load(builder.gep(p, [ir.Constant(_INDEX, lane)])) for p in (rows, xs))
-                lanes.append(_horner(builder, table, builder.fptosi(row, _INDEX), x, begin, GROUP))
-            for part, columns in enumerate(zip(*lanes, strict=True)):
-                for k, column in enumerate(_transpose(builder, list(columns))):
-                    number = ir.Constant(_INDEX, part * WIDTH + begin + k)
-                    builder.store(column, _place(builder, out, builder.mul(number, stride), GROUP), align=8)
-        return context.get_dummy_value()
-
-    return types.void(table, rows, xs, out, stride), emit
-
-
 def _transpose(builder: Any, rows: list[Any]) -> list[Any]:
     """Swap rows and columns of a square of vectors, in log2 steps of exchanging blocks between pairs of rows."""
     size = len(rows)
@@ -256,6 +235,32 @@ def _transpose(builder: Any, rows: list[Any]) -> list[Any]:
                     swapped[target] = builder.shuffle_vector(rows[i], rows[i + block], indices)
         rows, block = swapped, 2 * block
     return rows
+
+
+def _group_look_up(size: int) -> Any:
+    """`look_up` for `size` lanes: row numbers (as doubles) and angles at the pointers `rows` and `xs`; function k
+    of lane j goes to out[k stride + j], its derivative to out[(WIDTH + k) stride + j]."""
+
+    def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        table, rows, xs, out, stride = values
+        for begin in range(0, WIDTH, size):
+            lanes = []
+            for lane in range(size):
+                row, x = (builder.load(builder.gep(p, [ir.Constant(_INDEX, lane)])) for p in (rows, xs))
+                lanes.append(_horner(builder, table, builder.fptosi(row, _INDEX), x, begin, size))
+            for part, columns in enumerate(zip(*lanes, strict=True)):
+                for k, column in enumerate(_transpose(builder, list(columns))):
+                    number = ir.Constant(_INDEX, part * WIDTH + begin + k)
+                    builder.store(column, _place(builder, out, builder.mul(number, stride), size), align=8)
+        return context.get_dummy_value()
+
+    def look_up_group(context: Any, table: Any, rows: Any, xs: Any, out: Any, stride: Any) -> Any:
+        return types.void(table, rows, xs, out, stride), emit
+
+    return intrinsic(look_up_group)
+
+
+look_up_four, look_up_eight = _group_look_up(4), _group_look_up(8)
 
 
 @kernel
