@@ -59,6 +59,17 @@ def inlined(function: F) -> F:
     return cast(F, numba.njit(error_model="numpy", forceinline=True)(function))
 
 
+def pasted(function: F) -> F:
+    """A part of a kernel whose text is put in the place of each call, before types are known.
+
+    For the large parts that call `inlined` ones: those would be optimised by themselves first, which takes
+    seconds, and then again inside the kernel.
+    """
+    import numba
+
+    return cast(F, numba.njit(error_model="numpy", inline="always")(function))
+
+
 @cache
 def _check_writable(folder: str) -> None:
     os.makedirs(folder, exist_ok=True)

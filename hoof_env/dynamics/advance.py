@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from numba import carray
 
-from hoof_env._jit import inlined, kernel
+from hoof_env._jit import inlined, kernel, pasted
 from hoof_env._memory import address, doubles, offset
 from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
@@ -104,7 +104,7 @@ def inner(model, small, together):  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@inlined
+@pasted
 def load(arrays, trunk, limbs, account, n, together):  # type: ignore[no-untyped-def]
     """Fill a tile with environments n, n + 1, ..., the last one repeated where there are no more, or with n alone."""
     last = arrays.result.shape[0] - 1
@@ -151,7 +151,7 @@ def judge(trunk, limbs, model, first, lanes):  # type: ignore[no-untyped-def]
     return OK
 
 
-@inlined
+@pasted
 def store(arrays, model, trunk, limbs, account, n, envs):  # type: ignore[no-untyped-def]
     """Write back the environments that ended well, and how each ended."""
     lanes = trunk.shape[1] if model.together else 1
@@ -170,7 +170,7 @@ def store(arrays, model, trunk, limbs, account, n, envs):  # type: ignore[no-unt
                         arrays.limbs[leg, k, n + e] = limbs[i, k, e + lane]
 
 
-@inlined
+@pasted
 def run_tile(arrays, model, trunk, limbs, account, scratch, h, steps, keeps_account):  # type: ignore[no-untyped-def]
     """Advance what is in the tile by `steps` of `h` [s], and evaluate it there."""
     stages = model.weights.shape[0]
@@ -197,7 +197,7 @@ def run_tile(arrays, model, trunk, limbs, account, scratch, h, steps, keeps_acco
                 stage, elapsed = 0, 0.0
 
 
-@inlined
+@pasted
 def run(arrays, model, h, steps, keeps_account, legs, tile, together):  # type: ignore[no-untyped-def]
     """Advance all environments, a tile at a time: `tile` of them, or one whose legs are the lanes."""
     trunk = carray(doubles(t.ROWS * tile), (t.ROWS, tile))

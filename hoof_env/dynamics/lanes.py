@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from numba import carray
 
-from hoof_env._jit import inlined
+from hoof_env._jit import inlined, pasted
 from hoof_env._memory import address, offset
 from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
@@ -33,7 +33,7 @@ from hoof_env.leg.kinematics import cross, dot
 from hoof_env.leg.profile import find_cell, look_up, look_up_eight, look_up_four
 
 
-@inlined
+@pasted
 def evaluate(trunk, limbs, model, scratch, elapsed):  # type: ignore[no-untyped-def]
     """All forces and accelerations at the present stage, `elapsed` [s] after the step's start."""
     kind = model.kind

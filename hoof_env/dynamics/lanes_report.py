@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hoof_env._jit import inlined
+from hoof_env._jit import inlined, pasted
 from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
 from hoof_env.dynamics.vectors import across, gather_row, vector
@@ -67,7 +67,7 @@ def feel_drives(trunk, limb):  # type: ignore[no-untyped-def]
         limb[b.SWING_POWER, lane] = by_frame * sway
 
 
-@inlined
+@pasted
 def keep_account(trunk, limbs, model, account, weight):  # type: ignore[no-untyped-def]
     """Add the present stage's powers and forces, times `weight` [s], to the rows of `ACCOUNT`."""
     for lane in range(trunk.shape[1]):
@@ -98,7 +98,7 @@ def keep_account(trunk, limbs, model, account, weight):  # type: ignore[no-untyp
         gather_row(account, IMPULSE + 1, limb, b.PUSH + 1, weight, model.together)
 
 
-@inlined
+@pasted
 def report(trunk, limbs, together, trunk_out, limb_out, n, lanes):  # type: ignore[no-untyped-def]
     """Write `TRUNK_REPORT` and `LIMB_REPORT` into columns n, n + 1, ... of the outputs: of `lanes` environments,
     or of one whose legs the lanes are."""
