@@ -17,8 +17,10 @@ from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
 from hoof_env.dynamics.lanes import evaluate, keep_still
 from hoof_env.dynamics.lanes_ground import level_ground, remember_contacts
+from hoof_env.dynamics.lanes_reactions import react
 from hoof_env.dynamics.lanes_report import ACCOUNT, keep_account, report
 from hoof_env.dynamics.lanes_time import begin_step, bend_filters, end_step, next_stage, weigh_stage
+from hoof_env.dynamics.reactions import CONSTANTS, OUTPUTS
 from hoof_env.dynamics.trunk import FIXED
 from hoof_env.leg.profile import WIDTH
 
@@ -71,6 +73,8 @@ class Arrays(NamedTuple):
         account: shape (9, n), added to.
         trunk_report, limb_report: at the end, shapes (8, n) and (legs, 18, n).
         result: how it ended, shape (n,); where it is not OK the state is left as it was.
+        constants, reactions: of `reactions`, shapes (legs, CONSTANTS) and (legs, OUTPUTS, n); the latter is
+            filled by the kernels that react.
     """
 
     trunk: Any
@@ -82,6 +86,8 @@ class Arrays(NamedTuple):
     trunk_report: Any
     limb_report: Any
     result: Any
+    constants: Any
+    reactions: Any
 
 
 @inlined
@@ -171,14 +177,15 @@ def store(arrays, model, trunk, limbs, account, n, envs):  # type: ignore[no-unt
 
 
 @pasted
-def run_tile(arrays, model, trunk, limbs, account, scratch, h, steps, keeps_account):  # type: ignore[no-untyped-def]
-    """Advance what is in the tile by `steps` of `h` [s], and evaluate it there."""
+def run_tile(model, trunk, limbs, account, scratch, h, steps, keeps_account, evaluated):  # type: ignore[no-untyped-def]
+    """Advance what is in the tile by `steps` of `h` [s], and evaluate it there; `evaluated` where it is already."""
     stages = model.weights.shape[0]
     stage, elapsed = 0, 0.0
     bend_filters(limbs, model.settings)
     begin_step(trunk, limbs, model)
     for turn in range(steps * stages + 1):
-        evaluate(trunk, limbs, model, scratch, elapsed)
+        if turn > 0 or not evaluated:
+            evaluate(trunk, limbs, model, scratch, elapsed)
         if stage == 0:
             for i in range(limbs.shape[0]):
                 remember_contacts(limbs[i])
@@ -208,10 +215,43 @@ def run(arrays, model, h, steps, keeps_account, legs, tile, together):  # type: 
     count, envs = arrays.result.shape[0], 1 if together else tile
     for n in range(0, count, envs):
         load(arrays, trunk, limbs, account, n, together)
-        run_tile(arrays, small, trunk, limbs, account, scratch, h, steps, keeps_account)
+        run_tile(small, trunk, limbs, account, scratch, h, steps, keeps_account, False)
         here = min(envs, count - n)
         report(trunk, limbs, together, arrays.trunk_report, arrays.limb_report, n, here)
         store(arrays, small, trunk, limbs, account, n, here)
+
+
+@pasted
+def run_reacting(arrays, model, h, steps, keeps_account, legs, tile, together):  # type: ignore[no-untyped-def]
+    """`run` with the joint reactions of every step; those of the last are kept."""
+    trunk = carray(doubles(t.ROWS * tile), (t.ROWS, tile))
+    limbs = carray(doubles(legs * b.ROWS * tile), (legs, b.ROWS, tile))
+    account = carray(doubles(len(ACCOUNT) * tile), (len(ACCOUNT), tile))
+    constants = carray(doubles(legs * CONSTANTS * tile), (legs, CONSTANTS, tile))
+    found = carray(doubles(legs * OUTPUTS * tile), (legs, OUTPUTS, tile))
+    scratch = doubles(2 * WIDTH)
+    small = inner(model, doubles(12 + 2 * MOST_STAGES), together)
+    count, envs = arrays.result.shape[0], 1 if together else tile
+    for i in range(legs):
+        for lane in range(tile):
+            for k in range(CONSTANTS):
+                constants[i, k, lane] = arrays.constants[lane if together else i, k]
+    for n in range(0, count, envs):
+        load(arrays, trunk, limbs, account, n, together)
+        for step in range(max(steps, 1)):
+            run_tile(small, trunk, limbs, account, scratch, h, min(steps, 1), keeps_account, step > 0)
+            for i in range(legs):
+                react(trunk, limbs[i], constants[i], found[i])
+        here = min(envs, count - n)
+        report(trunk, limbs, together, arrays.trunk_report, arrays.limb_report, n, here)
+        store(arrays, small, trunk, limbs, account, n, here)
+        for i in range(legs):
+            for k in range(OUTPUTS):
+                for lane in range(tile if together else here):
+                    if together:
+                        arrays.reactions[lane, k, n] = found[i, k, lane]
+                    else:
+                        arrays.reactions[i, k, n + lane] = found[i, k, lane]
 
 
 @kernel
@@ -230,3 +270,21 @@ def advance_four_legs(arrays, model, h, steps, keeps_account):  # type: ignore[n
 def advance_batch(arrays, model, h, steps, keeps_account):  # type: ignore[no-untyped-def]
     """`TILE` environments at a time, with any number of legs."""
     run(arrays, model, h, steps, keeps_account, arrays.limbs.shape[0], TILE, False)
+
+
+@kernel
+def react_one_leg(arrays, model, h, steps, keeps_account):  # type: ignore[no-untyped-def]
+    """`advance_one_leg` with reactions."""
+    run_reacting(arrays, model, h, steps, keeps_account, 1, 1, False)
+
+
+@kernel
+def react_four_legs(arrays, model, h, steps, keeps_account):  # type: ignore[no-untyped-def]
+    """`advance_four_legs` with reactions."""
+    run_reacting(arrays, model, h, steps, keeps_account, 1, 4, True)
+
+
+@kernel
+def react_batch(arrays, model, h, steps, keeps_account):  # type: ignore[no-untyped-def]
+    """`advance_batch` with reactions."""
+    run_reacting(arrays, model, h, steps, keeps_account, arrays.limbs.shape[0], TILE, False)

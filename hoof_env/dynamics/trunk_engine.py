@@ -10,18 +10,28 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
-from hoof_env.dynamics.advance import Arrays, Model, advance_batch, advance_four_legs, advance_one_leg
+from hoof_env.dynamics.advance import (
+    Arrays,
+    Model,
+    advance_batch,
+    advance_four_legs,
+    advance_one_leg,
+    react_batch,
+    react_four_legs,
+    react_one_leg,
+)
 from hoof_env.dynamics.drive import Motor
 from hoof_env.dynamics.engine import GRAVITY
 from hoof_env.dynamics.lanes_report import ACCOUNT, LIMB_REPORT, TRUNK_REPORT
 from hoof_env.dynamics.limb import Limb
+from hoof_env.dynamics.reactions import DRIVER, HIP, LOCK, OUTPUTS, leg_constants
 from hoof_env.dynamics.result import Result
 from hoof_env.dynamics.schemes import SCHEMES
 from hoof_env.dynamics.step_length import StepWarning, longest_steps
@@ -45,6 +55,22 @@ Floats = NDArray[np.float64]
 Kind = TypeVar("Kind")
 
 
+class Reactions(NamedTuple):
+    """What joints and drives do to the links, in the world; a motor's rotor is not among the links.
+
+    Attributes:
+        joints: force on body `i` of each joint of `linkage.JOINTS`, shape (legs, 20, 2, num_envs) [N].
+        lock: moment on body 10 by body 7, shape (legs, num_envs) [N m].
+        driver: moment on the crank by the leg's frame, shape (legs, num_envs) [N m].
+        hip: moment on the leg's frame by the trunk, about O, shape (legs, num_envs) [N m].
+    """
+
+    joints: Floats
+    lock: Floats
+    driver: Floats
+    hip: Floats
+
+
 class TrunkEngine:
     """Legs on a trunk over the ground; see the module docstring.
 
@@ -58,6 +84,7 @@ class TrunkEngine:
         substeps: parts of `sim_dt` that are integrated; None chooses as many as the stiffness of the ground asks.
         num_envs: environments side by side, which share all of the above.
         filters: bounds of the command filters.
+        reactions: compute the joint reactions of every step; `reactions()` has those of the last.
 
     Raises:
         ParameterError: a value is out of range or of the wrong type.
@@ -79,6 +106,7 @@ class TrunkEngine:
         substeps: int | None = None,
         num_envs: int = 1,
         filters: FilterSettings | None = None,
+        reactions: bool = False,
     ) -> None:
         self.limbs = _all_of("limbs", limbs, Limb)
         self.trunk = _a("trunk", trunk, Trunk)
@@ -103,10 +131,14 @@ class TrunkEngine:
                 StepWarning,
                 stacklevel=2,
             )
+        self._reacts = bool(reactions)
         self._arrays = self._new_arrays()
         self._model = self._new_model()
-        alone = {1: advance_one_leg, 4: advance_four_legs}.get(len(self.limbs), advance_batch)
-        self._run = alone if self.num_envs <= FEW else advance_batch
+        alone = {1: (advance_one_leg, react_one_leg), 4: (advance_four_legs, react_four_legs)}
+        kernels = advance_batch, react_batch
+        if self.num_envs <= FEW:
+            kernels = alone.get(len(self.limbs), kernels)
+        self._run = kernels[self._reacts]
 
     # What it is like
 
@@ -284,6 +316,19 @@ class TrunkEngine:
         """Integrals since the reset by name, `lanes_report.ACCOUNT`, shape (num_envs,)."""
         return {name: self._arrays.account[k].copy() for k, name in enumerate(ACCOUNT)}
 
+    def reactions(self) -> Reactions:
+        """Joint reactions at the present instant.
+
+        Raises:
+            ParameterError: the engine was not made with `reactions=True`.
+        """
+        if not self._reacts:
+            raise ParameterError("reactions: expected an engine made with reactions=True, got one without")
+        found = self._arrays.reactions
+        legs, _, n = found.shape
+        joints = found[:, :LOCK].reshape(legs, -1, 2, n).copy()
+        return Reactions(joints, found[:, LOCK].copy(), found[:, DRIVER].copy(), found[:, HIP].copy())
+
     def tally(self) -> Tally:
         """Momentum, spin and energy of all bodies at the present instant, added up anew from their motion."""
         r, s = self.report, self.state
@@ -312,6 +357,8 @@ class TrunkEngine:
             np.zeros((len(TRUNK_REPORT), n)),
             np.zeros((legs, len(LIMB_REPORT), n)),
             np.zeros(n, dtype=np.int64),
+            np.array([leg_constants(limb.geometry)[:, 0] for limb in self.limbs]),
+            np.zeros((legs, OUTPUTS, n)) if self._reacts else np.zeros((0, 0, 0)),
         )
 
     def _trunk_settings(self) -> Floats:
