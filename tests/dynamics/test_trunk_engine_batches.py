@@ -22,11 +22,16 @@ ALL, STEPS = 100, 200
 ROUGH = Terrain(
     (0.0, 0.03, -0.02, 0.01), (1.0, 0.4, 2.0, 1.0), (1.0, 0.1, 0.5, 2.0), start=-0.6, spacing=0.37
 )
-COMMAND = np.array([[9.0, 0.4, -0.3, 0.1], [11.0, 0.9, 0.2, -0.2]])
+COMMAND = np.array(
+    [[9.0, 0.4, -0.3, 0.1], [11.0, 0.9, 0.2, -0.2], [5.0, 0.5, 0.1, 0.0], [7.0, 0.2, 0.0, 0.1]]
+)
 
 
 def engine(kind, n, legs=2, **changes):
-    limbs = (Limb(LEG, (0.4, 0.0), Motor()), Limb(OTHER, (-0.4, 0.1), Prescribed()))[:legs]
+    limbs = [Limb(LEG, (0.4, 0.0), Motor()), Limb(OTHER, (-0.4, 0.1), Prescribed())]
+    limbs = [*limbs, Limb(OTHER, (0.6, 0.0), Motor()), Limb(LEG, (-0.6, 0.0), Motor(rotor_inertia=0.0))][
+        :legs
+    ]
     k = TRUNKS.index(kind)  # another ground, law and scheme with each kind
     ground = Ground(exponent=(1.5, 1.125, 2.0, 1.75)[k], friction_law=FRICTION_LAWS[k % 3])
     settings = {
@@ -41,11 +46,11 @@ def engine(kind, n, legs=2, **changes):
 def start(engine, which):
     """Environments `which` of `ALL` different ones, commands on the move."""
     rng, legs = np.random.default_rng(7), len(engine.limbs)
-    theta, draw = rng.uniform(-9, 9, (2, ALL))[:legs], rng.normal(size=(5, ALL))
+    theta, draw = rng.uniform(-9, 9, (4, ALL))[:legs], rng.normal(size=(5, ALL))
     k = TRUNKS.index(engine.trunk.kind)
     moves = {"vx": draw[0], "vy": 0.3 * draw[1], "pitch": 0.1 * draw[2], "pitch_rate": 0.3 * draw[3]}
     moves = {name: row[which] for name, row in moves.items() if k >= {"vx": 1, "vy": 2}.get(name, 3)}
-    engine.reset([RUN, WALK][:legs], theta[:, which], x=draw[4][which], **moves)
+    engine.reset([RUN, WALK, WALK, RUN][:legs], theta[:, which], x=draw[4][which], **moves)
     scale = 1 + 0.1 * draw[4][which]
     engine._command(COMMAND[:legs, :, None] * scale)
 
@@ -65,7 +70,7 @@ def run(kind, which, legs=2, steps=STEPS, **changes):
     return e
 
 
-@pytest.mark.parametrize("legs", [1, 2])
+@pytest.mark.parametrize("legs", [1, 2, 4])
 @pytest.mark.parametrize("kind", TRUNKS)
 def test_alone_and_in_any_batch(kind, legs):
     whole = run(kind, np.arange(ALL), legs)
