@@ -47,7 +47,7 @@ from hoof_env.gait.motion_law import (
 )
 from hoof_env.gait.parameters import PARAMETERS, GaitParameters
 from hoof_env.ground.contact import HEEL, TOE, Ground, new_contacts, touch
-from hoof_env.leg.geometry import Geometry
+from hoof_env.leg.geometry import Geometry, check_full_revolution
 from hoof_env.leg.kinematics import cross, mirror
 from hoof_env.leg.linkage import BODIES
 
@@ -114,6 +114,8 @@ class ConstrainedLeg:
         integrator: str = "euler",
         height: float | None = None,
     ) -> None:
+        if not geometry.full_turn:
+            check_full_revolution(geometry)
         self.geometry, self.ground = geometry, ground
         filters = filters or FilterSettings()
         self.sim_dt = check_number("sim_dt", sim_dt, low=1e-7, high=filters.longest_step)

@@ -34,7 +34,7 @@ from hoof_env.gait.motion_law import (
 )
 from hoof_env.gait.parameters import PARAMETERS, GaitParameters
 from hoof_env.ground.contact import HEEL, TOE, Ground, new_contacts, touch
-from hoof_env.leg.geometry import Geometry, tables
+from hoof_env.leg.geometry import Geometry, check_full_revolution, tables
 from hoof_env.leg.kinematics import dot, place, solve_points
 from hoof_env.leg.linkage import BODIES, POINTS
 
@@ -247,6 +247,8 @@ class LegEngine:
         filters: FilterSettings | None = None,
     ) -> None:
         check_choice("trunk", trunk.kind, ONE_LEG)
+        if not geometry.full_turn:
+            check_full_revolution(geometry)
         self.geometry, self.trunk, self.ground = geometry, trunk, ground
         filters = filters or FilterSettings()
         self.sim_dt = check_number("sim_dt", sim_dt, low=1e-7, high=filters.longest_step)

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from hoof_env.dynamics.trunk_engine import TrunkEngine
 
 Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
 
 
 class Tally(NamedTuple):
@@ -28,8 +29,8 @@ class Tally(NamedTuple):
         potential: of weight and, on a suspended trunk, of spring and support [J].
     """
 
-    centre: NDArray[np.complex128]
-    momentum: NDArray[np.complex128]
+    centre: Complexes
+    momentum: Complexes
     spin: Floats
     kinetic: Floats
     potential: Floats
@@ -51,7 +52,8 @@ def tally(
         trunk: x, y, pitch, vx, vy, pitch_rate of the trunk's centre of mass, shape (n,) each [m, rad, s].
     """
     own = engine.trunk
-    place, velocity = trunk["x"] + 1j * trunk["y"], trunk["vx"] + 1j * trunk["vy"]
+    place: Complexes = trunk["x"] + 1j * trunk["y"]
+    velocity: Complexes = trunk["vx"] + 1j * trunk["vy"]
     pitch_rate, turn = trunk["pitch_rate"], np.exp(1j * trunk["pitch"])
     moment, momentum = own.mass * place, own.mass * velocity  # first moment about the origin
     spin = own.pitch_inertia * pitch_rate + own.mass * _cross(place, velocity)  # about the origin
@@ -91,5 +93,5 @@ def tally(
     return Tally(centre, momentum, spin - _cross(centre, momentum), kinetic, potential)
 
 
-def _cross(a: NDArray[np.complex128], b: NDArray[np.complex128]) -> Floats:
+def _cross(a: Complexes, b: Complexes) -> Floats:
     return (np.conj(a) * b).imag

@@ -50,11 +50,13 @@ class Geometry:
         masses: 14 link masses [kg], or None for `linear_density` times length.
         inertia: "uniform_rod" (J = m L^2 / 3 with half-length L) or "paper" (the printed J = 2 l / 3 with
             half-length l, in kg m^2 though its units do not match; it needs no mass).
+        full_turn: whether the crank must be able to turn fully. If not, it may rock between dead points, and
+            `TrunkEngine` alone takes such a leg.
         name, provenance: where the numbers come from.
 
     Raises:
         ParameterError: a value is missing, unknown, not finite or out of range.
-        GeometryError: the linkage cannot be assembled at some crank angle.
+        GeometryError: `full_turn`, and the linkage cannot be assembled at some crank angle.
     """
 
     lengths: Mapping[str, float]
@@ -67,6 +69,7 @@ class Geometry:
     linear_density: float = LINEAR_DENSITY
     masses: tuple[float, ...] | None = None
     inertia: str = "uniform_rod"
+    full_turn: bool = True
     name: str = "custom"
     provenance: str = field(default="", compare=False)
 
@@ -100,7 +103,10 @@ class Geometry:
         object.__setattr__(self, "lengths", MappingProxyType(lengths))
         object.__setattr__(self, "pivot", pivot)
         object.__setattr__(self, "assembly", MappingProxyType({p: int(self.assembly[p]) for p in points}))
-        check_full_revolution(self)
+        if not isinstance(self.full_turn, bool):
+            raise ParameterError(f"full_turn: expected True or False, got {self.full_turn!r}")
+        if self.full_turn:
+            check_full_revolution(self)
 
     def __hash__(self) -> int:
         return hash((tuple(self.lengths.items()), self.pivot, tuple(self.assembly.items()), self.name))
@@ -132,7 +138,8 @@ class Geometry:
     @cached_property
     def transmission_margin(self) -> float:
         """Smallest |sine| of the angle between a dyad's two links over a revolution (0: a dead point) [-]."""
-        return min(float(np.min(s)) for s in _dyad_sines(self, np.linspace(0, 2 * np.pi, 3600)).values())
+        sines = _dyad_sines(self, np.linspace(0, 2 * np.pi, 3600)).values()
+        return min(float(np.min(np.nan_to_num(s))) for s in sines)
 
     def to_dict(self) -> dict[str, Any]:
         """Everything that `from_dict` needs, JSON-serialisable."""
@@ -149,6 +156,7 @@ class Geometry:
             "inertia": self.inertia,
             "name": self.name,
             "provenance": self.provenance,
+            **({} if self.full_turn else {"full_turn": False}),
         }
 
     def replace(self, **changes: Any) -> Geometry:

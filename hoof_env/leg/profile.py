@@ -2,9 +2,9 @@
 
 Nothing about the linkage enters the equations of motion but a few functions of the crank angle: where toe and
 heel are, the first moment of the links about O, and three inertias. `LegProfile` computes them from the
-closed form of `leg.kinematics` and keeps each as one polynomial of degree 7 a cell of crank angle. A polynomial
-costs neither square root nor division, and all functions share one look-up. Values are good to some 1e-13,
-derivatives to `derivative_error` (some 1e-10) of their largest value.
+closed form of `leg.kinematics` and keeps each as one polynomial of degree 7 a cell of crank angle. A
+polynomial costs neither square root nor division, and all functions share one look-up. Values are good to
+some 1e-13, derivatives to `derivative_error` (some 1e-10) of their largest value.
 
 Everything is in the frame of the leg with O at the origin, after the mirror into the world's sense
 (`kinematics.mirror`), so that the world's x points forward and angles are counter-clockwise.
@@ -12,6 +12,7 @@ Everything is in the frame of the leg with O at the origin, after the mirror int
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -109,24 +110,35 @@ class LegProfile:
         geometry: the leg.
         cells: number of cells of a revolution.
         table: shape (cells, (DEGREE + 1) * WIDTH): row j belongs to the crank angles within half a cell of
-            2 pi j / cells and holds, highest power of the angle from there first, `WIDTH` coefficients a power.
+            2 pi j / cells and holds, highest power of the angle from there first, `WIDTH` coefficients a
+            power. Of a crank that rocks, rows are NaN where its links have no place, and in some 7 cells
+            beside each end, for derivatives grow there without bound.
         derivative_error: largest error of a derivative over its largest value, between the nodes [-].
 
     Raises:
-        GeometryError: a function is not finite somewhere in the revolution.
+        GeometryError: the links have no place at some crank angle, or at any if the leg need not turn fully.
     """
 
     def __init__(self, geometry: Geometry, cells: int | None = None) -> None:
         self.geometry = geometry
-        for tried in (cells,) if cells else CELLS:
+        finest = CELLS if geometry.full_turn else CELLS[-1:]  # a rocking crank: as near to its ends as can be
+        for tried in (cells,) if cells else finest:
             self.cells, self.table = tried, _fit(geometry, tried)
-            self.derivative_error = self._check()
+            error = self._errors()
+            while not geometry.full_turn and np.nanmax(error, initial=0.0) > DERIVATIVE_ERROR:
+                self.table[~(error <= DERIVATIVE_ERROR)] = np.nan
+                error = self._errors()
+            self.derivative_error = float(np.nanmax(error, initial=0.0))
             if self.derivative_error < DERIVATIVE_ERROR:
                 break
+        if not np.isfinite(self.table).any():
+            raise GeometryError(
+                f"geometry {geometry.name!r}: expected a leg whose links have a place at some crank angle"
+            )
 
     def with_cells(self, cells: int) -> LegProfile:
         """The same leg with so many cells, a power of two."""
-        return self if cells == self.cells else LegProfile(self.geometry, cells)
+        return self if cells == self.cells else leg_profile(self.geometry, cells)
 
     def __call__(self, theta: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """All `FUNCTIONS` and their derivatives by theta from the table, each of shape (len(theta), 13)."""
@@ -135,12 +147,23 @@ class LegProfile:
         _look_up_all(theta, self.table, value, slope)
         return value[:, : len(FUNCTIONS)], slope[:, : len(FUNCTIONS)]
 
-    def _check(self) -> float:
-        step = 2 * np.pi / self.cells
-        theta = (np.arange(self.cells)[:, None] + (-0.49, -0.23, 0.06, 0.31, 0.48)).ravel() * step
-        _, exact = functions(self.geometry, theta)
-        error = np.abs(self(theta)[1] - exact).max(0) / np.abs(exact).max(0)
-        return float(error.max())
+    def _errors(self) -> NDArray[np.float64]:
+        """Largest error of a derivative in each cell over its largest value [-], NaN without a place."""
+        between = np.array([-0.49, -0.23, 0.06, 0.31, 0.48])
+        theta = (np.arange(self.cells)[:, None] + between).ravel() * (2 * np.pi / self.cells)
+        slope = self(theta)[1]
+        known = np.isfinite(slope[:, 0])
+        error = np.full(len(theta), np.nan)
+        if known.any():
+            _, exact = functions(self.geometry, theta[known])
+            error[known] = (np.abs(slope[known] - exact) / np.nanmax(np.abs(exact), 0)).max(1)
+        return error.reshape(self.cells, -1).max(1)
+
+
+@lru_cache(maxsize=16)
+def leg_profile(geometry: Geometry, cells: int | None = None) -> LegProfile:
+    """`LegProfile`, fitted once for legs that are equal."""
+    return LegProfile(geometry, cells)
 
 
 def _fit(geometry: Geometry, cells: int) -> NDArray[np.float64]:
@@ -149,7 +172,7 @@ def _fit(geometry: Geometry, cells: int) -> NDArray[np.float64]:
     nodes = np.cos(np.pi * (2 * np.arange(DEGREE + 1) + 1) / (2 * DEGREE + 2))
     theta = 2 * half * np.arange(cells)[:, None] + half * nodes
     value, _ = functions(geometry, theta.ravel())
-    if not np.isfinite(value).all():
+    if geometry.full_turn and not np.isfinite(value).all():
         where = theta.ravel()[~np.isfinite(value).all(1)][0]
         raise GeometryError(
             f"geometry {geometry.name!r}: expected a leg whose links have a place at every crank angle, "
@@ -160,6 +183,7 @@ def _fit(geometry: Geometry, cells: int) -> NDArray[np.float64]:
     powers /= (half ** np.arange(DEGREE, -1, -1))[:, None, None]
     table = np.zeros((cells, DEGREE + 1, WIDTH))
     table[:, :, : powers.shape[2]] = powers.transpose(1, 0, 2)
+    table[~np.isfinite(table).all((1, 2))] = np.nan
     return np.ascontiguousarray(table.reshape(cells, -1))
 
 

@@ -52,7 +52,8 @@ def test_forces_and_moments_at_the_hips_move_the_trunk():
         found, r, s = engine.reactions(), engine.report, engine.state
         at_frame = [k for k, joint in enumerate(JOINTS) if joint.j == FRAME]
         on_trunk = -found.joints[..., 0][:, at_frame].sum(1)  # (legs, 2): by each leg's frame
-        outer = on_trunk.sum(0) + [-engine.trunk.drag * r["vx"][0], -engine.trunk.mass * GRAVITY]
+        others = np.array([-engine.trunk.drag * r["vx"][0], -engine.trunk.mass * GRAVITY])
+        outer = on_trunk.sum(0) + others
         scale = np.abs(on_trunk).sum()
         np.testing.assert_allclose(
             outer, engine.trunk.mass * np.array([r["ax"][0], r["ay"][0]]), rtol=0, atol=1e-8 * scale

@@ -1,0 +1,62 @@
+"""Checks of arguments at the border of an engine: each error names what was given and what was expected."""
+
+from __future__ import annotations
+
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hoof_env.errors import ParameterError
+
+Floats = NDArray[np.float64]
+Kind = TypeVar("Kind")
+
+
+def count(name: str, value: Any, low: int = 1) -> int:
+    """`value` as a whole number of `low` or more."""
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)) or value < low:
+        raise ParameterError(f"{name}: expected a whole number, {low} or more, got {value!r}")
+    return int(value)
+
+
+def spread(name: str, value: ArrayLike, shape: tuple[int, ...], most: float = np.inf) -> Floats:
+    """`value` as `finite` does, broadcast to `shape`; one number a leg serves all environments."""
+    given = finite(name, value, most)
+    if given.ndim == 1 and len(shape) == 2:
+        given = given[:, None]
+    try:
+        return np.broadcast_to(given, shape)
+    except ValueError:
+        raise ParameterError(f"{name}: expected numbers that fit shape {shape}, got {value!r}") from None
+
+
+def finite(name: str, value: Any, most: float = np.inf) -> Floats:
+    """`value` as finite numbers, from -`most` to `most`."""
+    try:
+        given = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        given = np.array(np.nan)
+    if value is None or not np.isfinite(given).all():
+        raise ParameterError(f"{name}: expected finite numbers, got {value!r}")
+    if np.any(np.abs(given) > most):
+        raise ParameterError(f"{name}: expected numbers within +-{most:g}, got {value!r}")
+    return given
+
+
+def one_of(name: str, value: Any, kind: type[Kind]) -> Kind:
+    """`value`, if it is a `kind`."""
+    if not isinstance(value, kind):
+        raise ParameterError(f"{name}: expected {kind.__name__}, got {value!r}")
+    return value
+
+
+def all_of(name: str, values: Any, kind: type[Kind]) -> tuple[Kind, ...]:
+    """One `kind` or several of them as a tuple."""
+    try:
+        several = (values,) if isinstance(values, kind) else tuple(values)
+    except TypeError:
+        several = ()
+    if not several or not all(isinstance(value, kind) for value in several):
+        raise ParameterError(f"{name}: expected {kind.__name__}, one or more, got {values!r}")
+    return several

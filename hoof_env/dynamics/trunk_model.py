@@ -1,0 +1,134 @@
+"""What the kernels of `TrunkEngine` work on: its settings as arrays, and what makes one engine another."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoof_env.dynamics import limb_rows as b
+from hoof_env.dynamics import trunk_rows as t
+from hoof_env.dynamics.advance import Arrays, Model
+from hoof_env.dynamics.drive import Motor
+from hoof_env.dynamics.engine import GRAVITY
+from hoof_env.dynamics.lanes_report import ACCOUNT, LIMB_REPORT, TRUNK_REPORT
+from hoof_env.dynamics.limb import Limb
+from hoof_env.dynamics.reactions import OUTPUTS, leg_constants
+from hoof_env.dynamics.schemes import SCHEMES
+from hoof_env.dynamics.trunk import TRUNKS
+from hoof_env.errors import ParameterError
+from hoof_env.ground.exact_math import EXPONENT_UNIT
+from hoof_env.ground.friction import FRICTION_LAWS
+from hoof_env.ground.terrain import Terrain
+
+if TYPE_CHECKING:
+    from hoof_env.dynamics.trunk_engine import TrunkEngine
+
+Floats = NDArray[np.float64]
+
+
+def new_arrays(engine: TrunkEngine) -> Arrays:
+    """Arrays of an engine whose environments are nowhere, that is not a number, until they are reset."""
+    n, legs = engine.num_envs, len(engine.limbs)
+    settings = [_limb_settings(*pair) for pair in zip(engine.limbs, _first_rows(engine), strict=True)]
+    limb_settings = np.array(settings)
+    return Arrays(
+        np.full((len(t.STATE), n), np.nan),
+        np.full((legs, len(b.STATE), n), np.nan),
+        np.repeat(_trunk_settings(engine)[:, None], n, 1),
+        np.repeat(limb_settings[:, :, None], n, 2),
+        np.zeros((legs, 4, n)),
+        np.zeros((len(ACCOUNT), n)),
+        np.zeros((len(TRUNK_REPORT), n)),
+        np.zeros((legs, len(LIMB_REPORT), n)),
+        np.zeros(n, dtype=np.int64),
+        np.array([leg_constants(limb.geometry)[:, 0] for limb in engine.limbs]),
+        np.zeros((legs, OUTPUTS, n if engine.reacts else 0)),
+    )
+
+
+def new_model(engine: TrunkEngine) -> Model:
+    """What does not change while it runs.
+
+    Raises:
+        ParameterError: the ground's exponent is not a multiple of 1/8.
+    """
+    ground, terrain = engine.ground, engine.terrain
+    eighths = ground.exponent * EXPONENT_UNIT
+    if eighths != round(eighths):
+        raise ParameterError(
+            f"exponent: this engine takes multiples of 1/{EXPONENT_UNIT}, got {ground.exponent!r}"
+        )
+    cells = max(profile.cells for profile in engine.profiles)
+    tables = [profile.with_cells(cells).table for profile in dict.fromkeys(engine.profiles)]
+    scheme, grid = SCHEMES[engine.integrator], terrain.to_grid()
+    return Model(
+        TRUNKS.index(engine.trunk.kind), int(eighths), FRICTION_LAWS.index(ground.friction_law),
+        ground.approach == "interpolated", terrain != Terrain.flat(), scheme.new_rates,
+        False, cells, np.concatenate(tables),
+        engine.filters.to_array(), np.array(scheme.fractions), np.array(scheme.weights),
+        grid.cells, grid.origin, grid.per_metre,
+    )  # fmt: skip
+
+
+def layout(engine: TrunkEngine) -> dict[str, Any]:
+    """Everything on which the bits of a run depend, by name, as values that JSON can hold."""
+    found: dict[str, Any] = {
+        name: getattr(engine, name) for name in ("num_envs", "sim_dt", "substeps", "integrator")
+    }
+    for name in ("trunk", "ground", "filters"):
+        found |= {f"{name}.{key}": value for key, value in asdict(getattr(engine, name)).items()}
+    found["terrain"] = _digest(engine.terrain.to_dict())
+    for i, limb in enumerate(engine.limbs):
+        shape = {
+            key: value for key, value in limb.geometry.to_dict().items() if key not in ("name", "provenance")
+        }
+        found |= {f"limbs[{i}].hip": list(limb.hip), f"limbs[{i}].drive": repr(limb.drive)}
+        found[f"limbs[{i}].geometry"] = _digest(shape)
+    return found
+
+
+def differences(expected: dict[str, Any], given: dict[str, Any]) -> str:
+    """Where two layouts differ, for people; empty if nowhere."""
+    names = [name for name in {**expected, **given} if expected.get(name) != given.get(name)]
+    return "; ".join(f"{name}: expected {expected.get(name)!r}, got {given.get(name)!r}" for name in names)
+
+
+def _digest(value: Any) -> str:
+    return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()[:16]
+
+
+def _trunk_settings(engine: TrunkEngine) -> Floats:
+    trunk, ground, mass = engine.trunk, engine.ground.to_record(), engine.total_mass
+    hangs = trunk.kind == "suspended"
+    values = {
+        "total_mass": mass, "per_mass": 1 / mass, "pitch_inertia": trunk.pitch_inertia,
+        "support": (1 - trunk.share) * mass * GRAVITY if hangs else 0.0,
+        "spring": trunk.stiffness if hangs else 0.0, "damper": trunk.damping if hangs else 0.0,
+        "height": trunk.height, "drag": trunk.drag, "gravity": GRAVITY,
+        "bottom": float(np.min(engine.terrain.height)),
+    } | {name: ground[name] for name in (
+        "stiffness", "chi", "dashpot", "approach_floor", "friction", "friction_slow", "friction_fast"
+    )}  # fmt: skip
+    return np.array([values[name] for name in t.PARAMETERS])
+
+
+def _first_rows(engine: TrunkEngine) -> list[int]:
+    """Where the table of each leg begins in the model's."""
+    unique, cells = list(dict.fromkeys(engine.profiles)), max(profile.cells for profile in engine.profiles)
+    return [unique.index(profile) * cells for profile in engine.profiles]
+
+
+def _limb_settings(limb: Limb, first_row: int) -> Floats:
+    motor = limb.drive if isinstance(limb.drive, Motor) else Motor(0.0, 0.0, 0.0, 0.0)
+    side, rotor = float(limb.geometry.travel), motor.rotor_inertia
+    values = (
+        *limb.hip, limb.geometry.mass, side, first_row, float(isinstance(limb.drive, Motor)),
+        motor.speed_gain, motor.torque_limit,
+        motor.reflected_inertia, -side * motor.gear_ratio * rotor, rotor,
+    )  # fmt: skip
+    return np.array(values)

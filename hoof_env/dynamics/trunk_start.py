@@ -1,0 +1,81 @@
+"""Where `TrunkEngine` starts: its state from gaits, crank angles and the place and speed of the trunk."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hoof_env.dynamics import limb_rows as b
+from hoof_env.dynamics import trunk_rows as t
+from hoof_env.dynamics.arguments import Floats, spread
+from hoof_env.dynamics.drive import Motor
+from hoof_env.dynamics.tally import tally
+from hoof_env.dynamics.trunk import FREE, RAIL, SUSPENDED, TRUNKS
+from hoof_env.errors import ParameterError
+
+if TYPE_CHECKING:
+    from hoof_env.dynamics.trunk_engine import TrunkEngine
+
+FARTHEST = 1e9
+"""Largest angles [rad] and places [m] of a state, which are as good as numbers are fine there: to 6e-10 at
+1e6, to 6e-7 at 1e9."""
+
+
+def start(
+    engine: TrunkEngine,
+    gaits: Floats,
+    theta: ArrayLike,
+    theta_rate: ArrayLike | None,
+    trunk: Mapping[str, ArrayLike],
+    n: int,
+) -> tuple[Floats, Floats]:
+    """State of `n` environments with filters at rest: of the trunk, shape (7, n), and legs, (legs, 16, n).
+
+    Args:
+        engine: that is to start.
+        gaits: gait parameters of each leg, shape (legs, 4).
+        theta, theta_rate: as in `TrunkEngine.reset`.
+        trunk: x, y, pitch, vx, vy, pitch_rate there.
+
+    Raises:
+        ParameterError: as there.
+    """
+    legs = len(engine.limbs)
+    angle = spread("theta", theta, (legs, n), FARTHEST)
+    spin = spread("theta_rate", gaits[:, :1] if theta_rate is None else theta_rate, (legs, n))
+    for i, limb in enumerate(engine.limbs):
+        if not isinstance(limb.drive, Motor) and np.any(spin[i] != gaits[i, 0]):
+            raise ParameterError(
+                f"theta_rate: leg {i} is prescribed to turn at {gaits[i, 0]:g} rad/s, got {spin[i]}"
+            )
+        if not np.isfinite(engine.profiles[i](angle[i])[0]).all():
+            raise ParameterError(f"theta: the links of leg {i} have no place at some of {angle[i]} rad")
+    at = {
+        name: spread(name, value, (n,), FARTHEST if name in ("x", "y", "pitch") else np.inf)
+        for name, value in trunk.items()
+    }
+    kind = TRUNKS.index(engine.trunk.kind)
+    for name, kinds in (
+        ("vx", (RAIL, SUSPENDED, FREE)), ("vy", (SUSPENDED, FREE)), ("pitch", (FREE,)),
+        ("pitch_rate", (FREE,)),
+    ):  # fmt: skip
+        if kind not in kinds and np.any(at[name] != 0):
+            raise ParameterError(f"{name}: expected 0 of a {engine.trunk.kind} trunk, got {at[name]}")
+    if kind <= RAIL and np.any(at["y"] != engine.trunk.height):
+        raise ParameterError(f"y: a {engine.trunk.kind} trunk is at {engine.trunk.height:g} m, got {at['y']}")
+    swing = gaits[:, 1:2] + gaits[:, 2:3] * np.sin(angle) + gaits[:, 3:] * np.cos(angle)
+    slope = gaits[:, 2:3] * np.cos(angle) - gaits[:, 3:] * np.sin(angle)
+    whole = tally(engine, angle, spin, swing, slope * spin, at)
+    moves = np.array([kind != 0, kind in (SUSPENDED, FREE), kind == FREE], dtype=float)
+    state = np.zeros((len(t.STATE), n))
+    state[t.CENTRE] = np.where(moves[0], whole.centre.real, at["x"])
+    state[t.CENTRE + 1] = np.where(moves[1], whole.centre.imag, at["y"])
+    state[t.MOMENTUM], state[t.MOMENTUM + 1] = moves[0] * whole.momentum.real, moves[1] * whole.momentum.imag
+    state[t.PITCH], state[t.SPIN] = at["pitch"], moves[2] * whole.spin
+    leg = np.zeros((legs, len(b.STATE), n))
+    leg[:, b.THETA], leg[:, b.OMEGA] = angle, spin
+    leg[:, b.VALUE : b.VALUE + 4] = gaits[:, :, None]
+    return state, leg

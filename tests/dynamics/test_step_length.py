@@ -1,0 +1,158 @@
+"""How long a step may be: slow touch-downs, servos, supports, and what friction asks for."""
+
+import re
+import warnings
+
+import numpy as np
+import pytest
+
+from hoof_env.dynamics.drive import Motor, Prescribed
+from hoof_env.dynamics.limb import Limb
+from hoof_env.dynamics.schemes import SCHEMES
+from hoof_env.dynamics.step_length import MOST_SUBSTEPS, StepWarning
+from hoof_env.dynamics.trunk import TRUNKS, Trunk
+from hoof_env.dynamics.trunk_engine import TrunkEngine
+from hoof_env.gait.parameters import GaitParameters, load_gait
+from hoof_env.ground.contact import Ground
+from hoof_env.ground.terrain import Terrain
+from hoof_env.leg.geometry import load_geometry
+
+LEG = load_geometry("first_fit")
+WALK = load_gait("walk", "first_fit")
+THETA, LOWEST = np.array([4.02, 4.18, 4.1, 4.14]), 1.389  # soles level, and how far they are below O [m]
+HIPS = (-0.75, -0.65, 0.65, 0.75)
+FAR = 60.0  # above the ground [m]
+
+
+def damped(floor, restitution=0.5):
+    return Ground(restitution=restitution, approach_floor=floor, friction_fast=0.05)
+
+
+def horse(ground, drive=None, substeps=None, num_envs=1, **trunk):
+    trunk = {"kind": "free", "mass": 320.0, "height": LOWEST, "pitch_inertia": 80.0, "drag": 0.0} | trunk
+    limbs = [Limb(LEG, (x, 0.0), drive or Motor()) for x in HIPS]
+    return TrunkEngine(limbs, Trunk(**trunk), ground, substeps=substeps, num_envs=num_envs)
+
+
+def quiet_horse(*args, **settings):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", StepWarning)
+        return horse(*args, **settings)
+
+
+def walk(engine):
+    """How far the energy account is from closing after 0.5 s, over the work [-]; infinite for failures."""
+    n = engine.num_envs
+    engine.reset(WALK, np.linspace(0, 2 * np.pi, n, endpoint=False) + np.arange(4)[:, None] * 1.57)
+    first = engine.tally()
+    result = engine.advance(steps=500)
+    last, total = engine.tally(), engine.account
+    works = total["crank_work"] + total["swing_work"]
+    losses = sum(total[name] for name in total if name.endswith("_loss"))
+    change = last.kinetic + last.potential - first.kinetic - first.potential
+    gap = np.abs(change - (works - total["ground_stored"] - losses))
+    size = np.abs(total["crank_work"]) + np.abs(total["swing_work"]) + losses
+    return np.where(result == 0, gap / size, np.inf)
+
+
+def test_slow_touch_downs_get_the_substeps_that_they_need():
+    chosen = horse(damped(1e-2), num_envs=24)
+    assert 5 < chosen.substeps < MOST_SUBSTEPS
+    assert chosen.step_limits["damping"] * chosen.substeps >= 1e-3
+    assert walk(chosen).max() < 1e-4
+    assert walk(quiet_horse(damped(1e-2), substeps=1, num_envs=24)).max() > 0.1
+
+
+def test_a_floor_too_low_for_any_substeps_is_named_with_one_that_would_do():
+    with pytest.warns(StepWarning, match=r"damping of this ground") as caught:
+        engine = horse(damped(1e-4), num_envs=24)
+    assert engine.substeps == MOST_SUBSTEPS
+    found = re.search(r"or an approach_floor of (\S+) m/s, not 0.0001$", str(caught[0].message))
+    assert walk(engine).max() > 0.1  # the warning is true
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", StepWarning)
+        assert horse(damped(float(found[1]))).substeps <= MOST_SUBSTEPS
+
+
+def test_without_damping_a_floor_asks_for_nothing():
+    engine = horse(damped(1e-4, restitution=1.0))
+    assert engine.step_limits["damping"] == np.inf
+    assert engine.substeps == 1
+
+
+def test_a_dashpot_does_not_hang_on_the_floor():
+    floors = (1e-4, 1e-2)
+    grounds = [Ground(normal_law="kelvin-voigt", restitution=0.5, approach_floor=floor) for floor in floors]
+    one, other = (horse(ground).step_limits["damping"] for ground in grounds)
+    assert one == pytest.approx(other)
+
+
+def test_what_nothing_can_push_away_asks_for_nothing():
+    limb = Limb(LEG, (0.0, 0.0), Prescribed())
+    fixed = TrunkEngine(limb, Trunk("fixed"), damped(1e-4))
+    assert set(fixed.step_limits.values()) == {np.inf}
+    rail = TrunkEngine(limb, Trunk("rail"), damped(1e-4))
+    assert rail.step_limits["damping"] == np.inf
+    assert rail.step_limits["friction"] < 0.1
+    with pytest.warns(StepWarning, match="damping"):
+        TrunkEngine(limb, Trunk("rail"), damped(1e-4), Terrain((0.0, 0.1)))
+
+
+def test_a_trunk_that_pitches_easily_asks_for_shorter_steps():
+    limits = [horse(Ground(), Prescribed(), pitch_inertia=j).step_limits["elastic"] for j in (1e9, 10.0)]
+    assert limits[1] < limits[0] / 2
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("motor", [Motor(1e4, 1e9), Motor(1e3, 1e9, 0.0)])
+def test_a_servo_gets_the_substeps_that_it_needs(scheme, motor):
+    def left(substeps=None, kind="free"):
+        """How far the crank is from the commanded speed after 0.3 s in the air [rad/s]."""
+        trunk = Trunk(kind, mass=80.0, height=FAR, drag=0.0)
+        engine = TrunkEngine(Limb(LEG, drive=motor), trunk, integrator=scheme, substeps=substeps)
+        engine.reset(WALK, 0.3, theta_rate=0.0)
+        failed = engine.advance(steps=300)[0]
+        return engine, np.inf if failed else abs(engine.state["theta_rate"][0, 0] - WALK.crank_speed)
+
+    for kind in TRUNKS:
+        engine, error = left(kind=kind)
+        assert engine.substeps == np.ceil(1e-3 / engine.step_limits["servo"]) > 4
+        assert error < 0.01
+    with pytest.warns(StepWarning, match=f"speed gain of a motor .* substeps={engine.substeps} of"):
+        assert left(1)[1] > 0.01 or scheme == "rk4"
+
+
+@pytest.mark.parametrize("change", [{"stiffness": 3e8}, {"damping": 4e5}])
+def test_a_stiff_support_gets_the_substeps_that_it_needs(change):
+    def height(substeps=None):
+        trunk = Trunk("suspended", height=FAR, **change)
+        engine = TrunkEngine(Limb(LEG), trunk, substeps=substeps)
+        engine.reset(WALK, y=FAR + 0.01)
+        failed = engine.advance(steps=100)[0]
+        return engine, np.inf if failed else abs(engine.report["y"][0] - FAR)
+
+    engine, off = height()
+    assert engine.substeps > 1
+    assert off < 0.02
+    with pytest.warns(StepWarning, match="spring, damper or drag of the trunk"):
+        assert height(1)[1] > 0.02
+
+
+def test_standing_forces_are_clean_at_the_step_that_friction_asks_for():
+    """The numbers in the docstring of `TrunkEngine`."""
+    stand = GaitParameters(0.0, WALK.swing_offset, 0.0, 0.0)
+
+    def forces(substeps):
+        engine = quiet_horse(damped(0.1), substeps=substeps)
+        engine.reset(stand, THETA)
+        engine.advance(steps=500)
+        record = engine.run(steps=300)
+        return engine, record["toe_friction"] + record["heel_friction"]
+
+    engine, coarse = forces(1)
+    asked = int(np.ceil(1e-3 / engine.step_limits["friction"]))
+    assert asked == 8
+    (_, fine), (_, finest) = forces(asked), forces(4 * asked)
+    size = np.sqrt((finest**2).mean())
+    assert np.sqrt(((fine - finest) ** 2).mean()) < 1e-3 * size
+    assert np.sqrt(((coarse - finest) ** 2).mean()) > 0.5 * size

@@ -1,0 +1,92 @@
+"""The functions of the crank angle in polynomials: good everywhere, fitted once, also if the crank rocks."""
+
+import json
+import pickle
+
+import numpy as np
+import pytest
+
+from hoof_env.dynamics.constrained import ConstrainedLeg
+from hoof_env.dynamics.engine import LegEngine
+from hoof_env.dynamics.trunk import Trunk
+from hoof_env.errors import GeometryError, ParameterError
+from hoof_env.ground.contact import Ground
+from hoof_env.leg.geometry import Geometry, load_geometry
+from hoof_env.leg.profile import DERIVATIVE_ERROR, LegProfile, functions, leg_profile
+
+LEG = load_geometry("first_fit")
+SHORT = {"CF": 0.8 * LEG.lengths["CF"]}
+ROCKER = LEG.replace(lengths=SHORT, full_turn=False)
+
+
+def errors(profile, theta):
+    """Of values and derivatives, over the largest ones."""
+    found, exact = profile(theta), functions(profile.geometry, theta)
+    return [(np.abs(a - b).max(0) / np.abs(b).max(0)).max() for a, b in zip(found, exact, strict=True)]
+
+
+@pytest.mark.parametrize("preset", ["first_fit", "identified"])
+def test_it_is_the_closed_form(preset):
+    profile = leg_profile(load_geometry(preset))
+    value, slope = errors(profile, np.random.default_rng(0).uniform(-10, 10, 5000))
+    assert value < 1e-11
+    assert slope < 2 * profile.derivative_error < 2 * DERIVATIVE_ERROR
+
+
+@pytest.mark.parametrize(("far", "bound"), [(1e6, 1e-9), (1e9, 1e-6)])
+def test_a_crank_that_has_turned_far_is_as_good_as_its_angle(far, bound):
+    theta = np.linspace(0, 2 * np.pi, 1000) + np.round(far / (2 * np.pi)) * (2 * np.pi)
+    two_pi = np.longdouble("6.28318530717958647692528676655900577")
+    if np.finfo(np.longdouble).eps > 1e-18:
+        pytest.skip("needs longer numbers")
+    back = (theta.astype(np.longdouble) - np.round(theta / (2 * np.pi)) * two_pi).astype(float)
+    assert np.abs(leg_profile(LEG)(theta)[0] - functions(LEG, back)[0]).max() < bound
+
+
+def test_legs_that_are_equal_share_it():
+    assert leg_profile(LEG) is leg_profile(LEG.replace())
+    assert leg_profile(LEG) is not leg_profile(LEG.replace(linear_density=2.0))
+    finer = leg_profile(LEG).with_cells(2048)
+    assert finer is leg_profile(LEG).with_cells(2048)
+    assert finer.cells == 2048
+
+
+def test_a_leg_that_cannot_turn_may_be_asked_for():
+    with pytest.raises(GeometryError, match="does not close at crank angle"):
+        LEG.replace(lengths=SHORT)
+    assert not ROCKER.full_turn
+    assert ROCKER != LEG
+    assert Geometry(**json.loads(json.dumps(ROCKER.to_dict()))) == ROCKER
+    assert pickle.loads(pickle.dumps(ROCKER)) == ROCKER
+    assert "full_turn" not in LEG.to_dict()
+    assert ROCKER.transmission_margin == 0.0
+    with pytest.raises(ParameterError, match="full_turn: expected True or False, got 1"):
+        LEG.replace(full_turn=1)
+
+
+def test_of_a_crank_that_rocks_it_knows_where_the_links_have_a_place():
+    profile, theta = LegProfile(ROCKER), np.linspace(0, 2 * np.pi, 7200)
+    has_place = np.isfinite(functions(ROCKER, theta)[0]).all(1)
+    known = np.isfinite(profile(theta)[0])
+    assert (known.all(1) == known.any(1)).all()
+    assert not (known[:, 0] & ~has_place).any()
+    lost = np.degrees(np.ptp(theta[has_place & ~known[:, 0] & (theta < np.pi)]))
+    assert 0 < lost < 1.5  # beside the end, where derivatives grow without bound
+    value, slope = errors(profile, theta[known[:, 0]])
+    assert value < 1e-11
+    assert slope < 2 * DERIVATIVE_ERROR
+    assert profile.derivative_error <= DERIVATIVE_ERROR
+
+
+def test_a_leg_without_a_place_anywhere():
+    geometry = LEG.replace(lengths={"GJ": 0.8 * LEG.lengths["GJ"]}, full_turn=False)
+    with pytest.raises(GeometryError, match="a place at some crank angle"):
+        LegProfile(geometry)
+
+
+def test_other_engines_refuse_a_crank_that_rocks():
+    with pytest.raises(GeometryError, match="expected a leg that turns through a full revolution"):
+        LegEngine(ROCKER, Trunk("fixed"), Ground())
+    with pytest.raises(GeometryError, match="expected a leg that turns through a full revolution"):
+        ConstrainedLeg(ROCKER, Ground())
+    LegEngine(LEG.replace(full_turn=False), Trunk("fixed"), Ground())  # it need not, but does
