@@ -76,7 +76,6 @@ def demo(args: Args) -> Path:
     check_number("seed", args.seed, low=0, high=FIRST_SEED - 1)
     check_folder(args.out)
     budget = QUICK if args.quick else FULL
-    runs.announce_compiling()
     with staged(args.out) as stage:
         with announced(1, "the paper's four conditions, walking and running, elastic and inelastic"):
             reproduction = reproduce(say)

@@ -20,7 +20,6 @@ import subprocess
 import sys
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -49,27 +48,8 @@ def make_env(env_id: str, **kwargs: Any) -> gym.Env[Any, Any]:
         raise ParameterError(f"environment {env_id!r} with {kwargs or 'no arguments'}: {error}") from None
 
 
-@cache
-def announce_compiling() -> None:
-    """From now on, say so once if numba compiles kernels rather than reading them from its cache."""
-    from numba.core import event
-
-    class Announce(event.Listener):
-        told = False
-
-        def on_start(self, event: Any) -> None:
-            if not self.told:
-                self.told = True
-                print("compiling the kernels, about 10 s, once", file=sys.stderr, flush=True)
-
-        def on_end(self, event: Any) -> None: ...
-
-    event.register("numba:compile", Announce())
-
-
 def warm_up(env: gym.Env[Any, Any]) -> None:
-    """Reset and step once, so that kernels are compiled, and said to be, before anything is timed."""
-    announce_compiling()
+    """Reset and step once, so that kernels are compiled before anything is timed."""
     env.reset(seed=0)
     env.step(env.action_space.sample())
 

@@ -8,8 +8,11 @@ from __future__ import annotations
 
 import hashlib
 import os
+import sys
 import tempfile
+import time
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -20,6 +23,9 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 MECHANICS = ("leg", "ground", "gait", "dynamics", "identify")
 """The rooms whose sources end up in kernels."""
+
+QUIET = "HOOF_ENV_QUIET"
+"""Environment variable; set to 1 it silences what is said while kernels compile."""
 
 
 def kernel(function: F) -> F:
@@ -32,6 +38,7 @@ def kernel(function: F) -> F:
     """
     import numba
 
+    _announce_compiling()
     given = os.environ.get("NUMBA_CACHE_DIR")
     try:
         if given:
@@ -68,6 +75,42 @@ def pasted(function: F) -> F:
     import numba
 
     return cast(F, numba.njit(error_model="numpy", inline="always")(function))
+
+
+@cache
+def _announce_compiling() -> None:
+    """From now on, say on stderr that kernels of this package are compiled, not read from the cache, and how
+    long the long ones took. numba tells when it compiles; it costs nothing when it does not."""
+    from numba.core import event
+
+    class Announcer(event.Listener):
+        depth, started, is_told = 0, 0.0, False
+
+        def on_start(self, event: Any) -> None:
+            function = getattr(event.data["dispatcher"], "py_func", None)
+            if self.depth or str(getattr(function, "__module__", "")).startswith("hoof_env."):
+                self.depth += 1  # a kernel compiles those that it calls
+            if self.depth == 1:
+                self.started = time.monotonic()
+                if not self.is_told:
+                    _say("compiling kernels for this machine, once (about 20 s) ...")
+                self.is_told = True
+
+        def on_end(self, event: Any) -> None:
+            if not self.depth:
+                return  # not ours
+            self.depth -= 1
+            seconds = time.monotonic() - self.started
+            if not self.depth and seconds > 1:
+                _say(f"{event.data['dispatcher'].py_func.__name__} compiled in {seconds:.1f} s")
+
+    event.register("numba:compile", Announcer())
+
+
+def _say(text: str) -> None:
+    if os.environ.get(QUIET, "") in ("", "0"):
+        with suppress(OSError, ValueError):  # nobody listens
+            print(f"hoof-env: {text}", file=sys.stderr, flush=True)
 
 
 @cache

@@ -1,6 +1,7 @@
 """Compiled kernels: where they are kept, what happens where they cannot be, and when they are made anew."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -25,6 +26,17 @@ import hoof_env
 from hoof_env.ground.contact import Ground, new_contacts, touch
 assert hoof_env.__file__.startswith({root!r}), hoof_env.__file__
 print(touch(new_contacts()[0], -0.04j, 0j, Ground().to_record()).imag)
+"""
+
+
+SOUNDS = """
+import numba
+numba.njit(lambda x: x + 1)(1)  # not ours
+import sys
+print("---", file=sys.stderr)
+from hoof_env.ground.contact import Ground, new_contacts, touch
+for _ in range(2):
+    touch(new_contacts()[0], -0.04j, 0j, Ground().to_record())
 """
 
 
@@ -82,3 +94,18 @@ def test_kernels_are_kept_and_made_anew_when_a_kernel_they_call_changes(tmp_path
     law = tmp_path / "hoof_env" / "ground" / "normal_force.py"
     law.write_text(law.read_text().replace("return max(force, 0.0)", "return max(2.0 * force, 0.0)"))
     assert force() == pytest.approx(2 * 2e4 * 0.04**1.5)
+
+
+def test_compiling_is_said_once_and_only_when_it_happens(tmp_path):
+    def said(**environment):
+        settings = {"NUMBA_CACHE_DIR": str(tmp_path), "HOOF_ENV_QUIET": "0"} | environment
+        result = python(SOUNDS, PACKAGE.parent, **settings)
+        assert result.returncode == 0, result.stderr
+        return result.stderr.splitlines()
+
+    before, first, *rest = said()
+    assert before == "---"
+    assert first == "hoof-env: compiling kernels for this machine, once (about 20 s) ..."
+    assert all(re.fullmatch(r"hoof-env: \w+ compiled in \d+\.\d s", line) for line in rest)
+    assert said() == ["---"]  # from the cache
+    assert said(NUMBA_CACHE_DIR=str(tmp_path / "new"), HOOF_ENV_QUIET="1") == ["---"]
