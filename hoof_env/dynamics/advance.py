@@ -1,8 +1,9 @@
 """The engine's kernels: environments go through a tile, step after step, and come back.
 
-`advance_one_leg`, `advance_four_legs` and `advance_batch` are one function. The first is compiled for one lane,
-the second for four that are the legs of one trunk, the third for `TILE` environments side by side. A tile lives
-on the stack: of one lane the compiler keeps most in registers, of many each loop becomes vector code.
+`advance_one_leg`, `advance_four_legs` and `advance_batch` are one function. The first is compiled for one
+lane, the second for four that are the legs of one trunk, the third for `TILE` environments side by side. A
+tile lives on the stack: of one lane the compiler keeps most in registers, of many each loop becomes vector
+code.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ class Model(NamedTuple):
         kind, eighths, friction_law: of trunk, contact exponent and friction.
         interpolated, is_terrain, new_rates: see `Ground`, `Terrain` and `schemes`.
         together: the lanes of a tile are the legs of one trunk.
-        cells, tables: cells of a leg's table; the tables one after the other, shape (profiles cells, coefficients).
+        cells, tables: cells of a leg's table; all tables, one after the other, shape (rows, coefficients).
         settings: of the filters, shape (4, 3).
         fractions, weights: of the scheme.
         ground_cells, ground_origin, ground_per_metre: the terrain's grid.
@@ -112,7 +113,7 @@ def inner(model, small, together):  # type: ignore[no-untyped-def]
 
 @pasted
 def load(arrays, trunk, limbs, account, n, together):  # type: ignore[no-untyped-def]
-    """Fill a tile with environments n, n + 1, ..., the last one repeated where there are no more, or with n alone."""
+    """Fill a tile with environments n, n + 1, ..., the last one repeated if need be, or with n alone."""
     last = arrays.result.shape[0] - 1
     for lane in range(trunk.shape[1]):
         e = n if together else min(n + lane, last)
@@ -178,7 +179,7 @@ def store(arrays, model, trunk, limbs, account, n, envs):  # type: ignore[no-unt
 
 @pasted
 def run_tile(model, trunk, limbs, account, scratch, h, steps, keeps_account, evaluated):  # type: ignore[no-untyped-def]
-    """Advance what is in the tile by `steps` of `h` [s], and evaluate it there; `evaluated` where it is already."""
+    """Advance what is in the tile by `steps` of `h` [s] and evaluate it there; `evaluated` if it is now."""
     stages = model.weights.shape[0]
     stage, elapsed = 0, 0.0
     bend_filters(limbs, model.settings)

@@ -1,9 +1,9 @@
 """The equations of motion of N legs on one trunk, for a tile of environments side by side.
 
-Every function is one stage of the mechanics: a loop over the lanes of a tile, which do not know of each other.
-Compiled for a tile of one lane or of many these loops become scalar or vector code from one source, and a
-number has the same bits in both: only + - * / and sqrt, no fast-math, no branch that depends on a lane. Planar
-vectors are complex numbers, kept in two rows (`trunk_rows` as t, `limb_rows` as b).
+Every function is one stage of the mechanics: a loop over the lanes of a tile, which do not know of each
+other. Compiled for a tile of one lane or of many these loops become scalar or vector code from one source,
+and a number has the same bits in both: only + - * / and sqrt, no fast-math, no branch that depends on a lane.
+Planar vectors are complex numbers, kept in two rows (`trunk_rows` as t, `limb_rows` as b).
 
 A leg enters as functions of its crank angle theta (`leg.profile` as f): toe and heel, the first moment s and
 the inertias a, b, c. With the world angle beta = pitch + side phi(theta, t) of its frame, the velocity v of O
@@ -11,8 +11,8 @@ and w = theta', its kinetic energy is
 
     T = m |v|^2 / 2 + v . e^(i beta) (s' w + i s beta') + (a w^2 + 2 b w beta' + c beta'^2) / 2,
 
-and Lagrange's equations follow (docs/engine.md). The trunk's state is the momentum, linear and angular, of all
-bodies together: in flight it stays to the last bit, whatever the scheme.
+and Lagrange's equations follow (docs/engine.md). The trunk's state is the momentum, linear and angular, of
+all bodies together: in flight it stays to the last bit, whatever the scheme.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ def look_up_functions(trunk, limb, table, cells, scratch):  # type: ignore[no-un
 
 @inlined
 def place_frame(trunk, limb, elapsed):  # type: ignore[no-untyped-def]
-    """The leg's frame: its turn and how that changes with crank angle and time, and the leg's inertia with it.
+    """The leg's frame: its turn, how that changes with crank angle and time, and the leg's inertia then.
 
     The swing is phi = offset + A sin(theta) + B cos(theta), each parameter moving as its filter does.
     """

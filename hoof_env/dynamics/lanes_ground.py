@@ -37,7 +37,7 @@ def level_ground(limb):  # type: ignore[no-untyped-def]
 
 @inlined
 def meet_ground(trunk, limb, point, model):  # type: ignore[no-untyped-def]
-    """Where a hoof point is, how deep in the ground, how fast it goes in and slides. `point`: 0 toe, 1 heel."""
+    """Where a hoof point is, how deep in the ground, how fast it goes in and slides; 0 is the toe."""
     c = b.CONTACT + point * b.CONTACT_ROWS
     for lane in range(limb.shape[1]):
         turn, hip = vector(limb, b.TURN, lane), vector(limb, b.HIP, lane)

@@ -30,8 +30,8 @@ LIMB_REPORT = (
     "toe_x", "toe_y", "toe_slide", "toe_normal", "toe_friction",  # [m, m/s, N], along the ground's normal
     "heel_x", "heel_y", "heel_slide", "heel_normal", "heel_friction",  # and its tangent
 )  # fmt: skip
-"""Of each leg. A motor turns crank and swing: its torque is the crank's, the hip's is what the gear between them
-carries, and the hip's power is that of the actuator which changes the swing's parameters."""
+"""Of each leg. A motor turns crank and swing: its torque is the crank's, the hip's is what the gear between
+them carries, and the hip's power is that of the actuator which changes the swing's parameters."""
 
 
 @inlined
@@ -100,8 +100,8 @@ def keep_account(trunk, limbs, model, account, weight):  # type: ignore[no-untyp
 
 @pasted
 def report(trunk, limbs, together, trunk_out, limb_out, n, lanes):  # type: ignore[no-untyped-def]
-    """Write `TRUNK_REPORT` and `LIMB_REPORT` into columns n, n + 1, ... of the outputs: of `lanes` environments,
-    or of one whose legs the lanes are."""
+    """Write `TRUNK_REPORT` and `LIMB_REPORT` into columns n, n + 1, ... of the outputs: of `lanes`
+    environments, or of one whose legs the lanes are."""
     for i in range(limbs.shape[0]):
         feel_drives(trunk, limbs[i])
     for lane in range(limbs.shape[2] if together else lanes):

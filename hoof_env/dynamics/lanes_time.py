@@ -55,7 +55,7 @@ def weigh_stage(trunk, limbs, model, weight):  # type: ignore[no-untyped-def]
 
 @inlined
 def prescribed(limb, lane, elapsed):  # type: ignore[no-untyped-def]
-    """Angle and rate of a prescribed crank, `elapsed` [s] into the step, as the speed filter moves them, exactly."""
+    """Angle and rate of a prescribed crank `elapsed` [s] into the step, exactly as the filter moves them."""
     value, rate = limb[b.VALUE + SPEED, lane], limb[b.RATE + SPEED, lane]
     bend = limb[b.BEND + SPEED, lane]
     theta = limb[b.THETA, lane] + elapsed * (value + elapsed * (rate / 2.0 + elapsed * bend / 6.0))

@@ -31,14 +31,14 @@ SLOPES = VALUES + WIDTH  # their derivatives by the crank angle
     PHI, K, SWAY, SWAY_RATE,  # swing; then beta's slope by theta, its rate with the crank held, steady
     FRAME_RATE,  # rate of beta
     TURN, _, HIP, _,  # e^(i beta); from the trunk's centre of mass to O
-    S, _, DS, _, U, _,  # first moment about O, its derivative by theta in the frame, and with the swing [kg m]
+    S, _, DS, _, U, _,  # first moment about O, its derivative by theta in the frame, with the swing [kg m]
     INERTIA, COUPLING,  # of the crank with the swing geared to it; of crank and frame [kg m^2]
     PART, _, _, _, _, _, _, _, _, _, _, _,  # what a leg adds to the trunk's rows
     LEVER,  # of crank and pitch [kg m^2]
     Q_THETA, Q_BETA, PUSH, _,  # the ground: generalised forces [N m], force [N]
     REST_THETA, REST_BETA,  # generalised inertia forces at rest of the accelerations, weight included [N m]
     SPIN_RATE_FREE, SOFTNESS,  # crank acceleration if the trunk kept still; 1 / INERTIA, 0 if prescribed
-    CRANK_TORQUE, FRAME_TORQUE, CRANK_POWER, SWING_POWER,  # drives [N m, W]; of the frame in the world's sense
+    CRANK_TORQUE, FRAME_TORQUE, CRANK_POWER, SWING_POWER,  # drives [N m, W]; FRAME_: in the world's sense
 ) = range(SLOPES + WIDTH, SLOPES + WIDTH + 57)  # fmt: skip
 
 CONTACT = SLOPES + WIDTH + 57
@@ -47,7 +47,7 @@ CONTACT_ROWS = 22
 (
     SPOT, _, SPOT_RATE, _,  # where the point is and how it moves [m, m/s]
     HEIGHT, NORMAL_X, NORMAL_Y, FIRMNESS, ROUGHNESS,  # the ground there: height, normal, factors of K and mu
-    DEPTH, DEPTH_RATE, SLIDE, SLIDING,  # penetration and rate [m, m/s]; velocity along the ground and its size
+    DEPTH, DEPTH_RATE, SLIDE, SLIDING,  # penetration and rate [m, m/s]; speed along the ground, its size
     POWER, GRIP, SLOWNESS,  # depth^n [m^n]; part of the kinetic friction; 1 / approach speed [s/m]
     NORMAL, RUB,  # force along the ground's normal and along the ground [N]
     BY_THETA, _, ARM, _,  # the point's place by theta; from O to it [m]
@@ -59,7 +59,7 @@ PARAMETERS = (
     "hip_x", "hip_y", "mass", "side", "first_row", "is_motor", "speed_gain", "torque_limit",
     "rotor_a", "rotor_b", "rotor_c",
 )  # fmt: skip
-"""Settings of a leg: its place on the trunk, mass, which way it travels, where its table begins, its motor, and what the rotor adds to the
-inertias a, b, c."""
+"""Settings of a leg: its place on the trunk, mass, which way it travels, where its table begins, its motor,
+and what the rotor adds to the inertias a, b, c."""
 
 ROWS = _P + 11

@@ -74,7 +74,8 @@ class StepLength:
     @cached_property
     def limits(self) -> dict[str, float]:
         """Longest step [s] for each cause, infinite where there is none: "elastic", "damping" and "friction"
-        of the ground (`ground.stiffness`), "servo" of the motors, "support" of what holds or drags the trunk."""
+        of the ground (`ground.stiffness`), "servo" of the motors, "support" of what holds or drags the
+        trunk."""
         trunk, decay = self.trunk, SCHEMES[self.scheme].decay
         mass, is_held = trunk.mass + sum(limb.geometry.mass for limb in self.limbs), trunk.kind == "suspended"
         damper, spring = (trunk.damping, trunk.stiffness) if is_held else (0.0, 0.0)

@@ -9,10 +9,10 @@ from __future__ import annotations
 # The state. Where the trunk cannot move, the centre is the trunk's place and a momentum is 0.
 TIME, CENTRE, _, MOMENTUM, _, PITCH, SPIN = range(7)
 STATE = ("time", "centre_x", "centre_y", "momentum_x", "momentum_y", "pitch", "spin")
-"""Time; centre of mass of all and their momentum; pitch of the trunk; angular momentum of all about the centre."""
+"""Time; centre of mass and momentum of all; pitch of the trunk; angular momentum of all about the centre."""
 
 FIRST, MOVING = 1, 6
-"""Rows FIRST to FIRST + MOVING - 1 of the state are integrated; those of NOW, FLOW and MEAN belong to them."""
+"""The `MOVING` rows from `FIRST` on are integrated; those from NOW, FLOW and MEAN on belong to them."""
 
 NOW = 7  # the same at the present stage of a step
 NOW_CENTRE, _, NOW_MOMENTUM, _, NOW_PITCH, NOW_SPIN = range(NOW, NOW + 6)
@@ -27,7 +27,7 @@ MEAN = 19  # weighted mean of the derivatives at the stages so far
     TURN, _,  # e^(i pitch)
     MOMENT, _,  # first moment of all about the trunk's centre of mass [kg m]
     DRIFT, _,  # its rate [kg m/s], but for the pitch's part
-    ROUND, SWIRL,  # inertia of all about the trunk's centre [kg m^2]; their spin about it, but for the pitch's
+    ROUND, SWIRL,  # inertia of all about the trunk's centre [kg m^2]; their spin, but for the pitch's
     LOAD, _, LOAD_TURN,  # right side of the trunk's equations [N, N m]
     M_XX, M_XY, M_YY, M_XP, M_YP, M_PP,  # and their matrix, with the cranks of the motors eliminated
     STUCK,  # 1 once a crank was where its linkage does not close
@@ -42,8 +42,8 @@ PARAMETERS = (
     "stiffness", "chi", "dashpot", "approach_floor", "friction", "friction_slow", "friction_fast",
     "bottom",
 )  # fmt: skip
-"""Settings of an environment: mass of all and its inverse, what the rest of the animal bears [N] and its spring
-and damper, ..., the ground's (`ground.contact.Ground`),
-and the height below which the trunk has fallen through it [m]."""
+"""Settings of an environment: mass of all and its inverse, what the rest of the animal bears [N] and its
+spring and damper, ..., the ground's (`ground.contact.Ground`), and the height below which the trunk has
+fallen through it [m]."""
 
 ROWS = 67

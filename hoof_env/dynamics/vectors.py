@@ -1,7 +1,7 @@
 """Planar vectors in the engine's arrays, a complex number in two rows; and sums of whole rows.
 
-Rows are named by constants: a loop over lanes may stay scalar where a row's number is computed, or where it is so
-short that the compiler unrolls it.
+Rows are named by constants: a loop over lanes may stay scalar where a row's number is computed, or where it
+is so short that the compiler unrolls it.
 """
 
 from __future__ import annotations

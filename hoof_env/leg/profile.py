@@ -194,8 +194,9 @@ def find_cell(theta, cells):  # type: ignore[no-untyped-def]
     return cell, theta - cell * (6.283185307179586 / cells)
 
 
-# The look-up is written as vector instructions, which the compiler cuts to the processor's size: whether it finds
-# them by itself in a plain loop hangs on the code around. Horner's scheme runs through many functions at once:
+# The look-up is written as vector instructions, which the compiler cuts to the processor's size: whether it
+# finds them by itself in a plain loop hangs on the code around. Horner's scheme runs through many functions
+# at once:
 #
 #     for p in 1 ... DEGREE:  slope = slope x + value;  value = value x + coefficient[p]
 
@@ -231,8 +232,8 @@ def _horner(builder: Any, table: Any, row: Any, x: Any, begin: int, width: int) 
 
 @intrinsic
 def look_up(context: Any, table: Any, row: Any, x: Any, out: Any) -> Any:
-    """Fill `out`, 2 WIDTH doubles, with all functions and then their derivatives, `x` [rad] from the middle of
-    the cell in `row` of a table. `table` and `out` are pointers."""
+    """Fill `out`, 2 WIDTH doubles, with all functions and then their derivatives, `x` [rad] from the middle
+    of the cell in `row` of a table. `table` and `out` are pointers."""
 
     def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         table, row, x, out = values
@@ -245,7 +246,8 @@ def look_up(context: Any, table: Any, row: Any, x: Any, out: Any) -> Any:
 
 
 def _transpose(builder: Any, rows: list[Any]) -> list[Any]:
-    """Swap rows and columns of a square of vectors, in log2 steps of exchanging blocks between pairs of rows."""
+    """Swap rows and columns of a square of vectors, in log2 steps of exchanging blocks between pairs of
+    rows."""
     size = len(rows)
     block = 1
     while block < size:
@@ -262,8 +264,8 @@ def _transpose(builder: Any, rows: list[Any]) -> list[Any]:
 
 
 def _group_look_up(size: int) -> Any:
-    """`look_up` for `size` lanes: row numbers (as doubles) and angles at the pointers `rows` and `xs`; function k
-    of lane j goes to out[k stride + j], its derivative to out[(WIDTH + k) stride + j]."""
+    """`look_up` for `size` lanes: row numbers (as doubles) and angles at the pointers `rows` and `xs`;
+    function k of lane j goes to out[k stride + j], its derivative to out[(WIDTH + k) stride + j]."""
 
     def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         table, rows, xs, out, stride = values
