@@ -31,10 +31,11 @@ from hoof_env.dynamics.lanes import (
     evaluate,
     feel_leg,
     gather_leg,
+    load_trunk,
     look_up_functions,
     move_trunk,
     place_frame,
-)  # fmt: skip
+)
 from hoof_env.dynamics.lanes_ground import clear_ground, meet_ground, push_back, remember_contacts
 from hoof_env.dynamics.lanes_report import ACCOUNT
 from hoof_env.dynamics.lanes_time import begin_step, bend_filters, end_step, next_stage, weigh_stage
@@ -55,7 +56,7 @@ def _none(trunk, limbs, model, scratch, h):  # type: ignore[no-untyped-def]
 @inlined
 def _look_up(trunk, limbs, model, scratch, h):  # type: ignore[no-untyped-def]
     for i in range(limbs.shape[0]):
-        look_up_functions(trunk, limbs[i], model.tables, model.cells, int(model.first[i]), scratch)
+        look_up_functions(trunk, limbs[i], model.tables, model.cells, scratch)
 
 
 @inlined
@@ -72,7 +73,7 @@ def _clear(trunk, limbs, model, scratch, h):  # type: ignore[no-untyped-def]
 @inlined
 def _gather(trunk, limbs, model, scratch, h):  # type: ignore[no-untyped-def]
     for i in range(limbs.shape[0]):
-        gather_leg(trunk, limbs[i])
+        gather_leg(trunk, limbs[i], model.together)
 
 
 @inlined
@@ -98,7 +99,13 @@ def _push(trunk, limbs, model, scratch, h):  # type: ignore[no-untyped-def]
 @inlined
 def _feel(trunk, limbs, model, scratch, h):  # type: ignore[no-untyped-def]
     for i in range(limbs.shape[0]):
-        feel_leg(trunk, limbs[i], model.motors[i] != 0.0, h, model.kind)
+        feel_leg(trunk, limbs[i], h)
+
+
+@inlined
+def _load(trunk, limbs, model, scratch, h):  # type: ignore[no-untyped-def]
+    for i in range(limbs.shape[0]):
+        load_trunk(trunk, limbs[i], model.kind, model.together)
 
 
 @inlined
@@ -153,18 +160,19 @@ STAGES: dict[str, tuple[Any, int, str]] = {
     "meet the ground": (_meet, 2, LEG),
     "push back": (_push, 2, LEG),
     "feel the leg": (_feel, 2, LEG),
+    "load the trunk": (_load, 2, LEG),
     "accelerate the trunk": (_solve, 2, TRUNK),
     "accelerate the crank": (_turn, 2, LEG),
     "remember contacts": (_remember, 1, LEG),
     "bend the filters": (_filters, 1, LEG),
     "begin the step": (_begin, 1, BOTH),
-    "weigh the stage": (_weigh, 2, BOTH),
+    "weigh the stage": (_weigh, 1, BOTH),
     "next stage": (_next, 1, BOTH),
     "end the step": (_end, 1, BOTH),
 }
 """By name: the stage, its calls in a step of midpoint, and whose lanes it works on."""
 
-NOT_FIXED = ("clear the trunk", "gather the legs", "move the trunk", "accelerate the trunk")
+NOT_FIXED = ("clear the trunk", "gather the legs", "move the trunk", "load the trunk", "accelerate the trunk")
 
 
 @intrinsic
@@ -186,8 +194,8 @@ def filled_tile(made: TrunkEngine) -> tuple[NDArray[np.float64], NDArray[np.floa
 
     def fill(arrays, model, trunk, limbs):  # type: ignore[no-untyped-def]
         account, scratch = carray(doubles(accounts * TILE), (accounts, TILE)), doubles(2 * WIDTH)
-        small = inner(model, legs, doubles(2 * legs + 20))
-        load(arrays, trunk, limbs, account, 0, arrays.result.shape[0] - 1)
+        small = inner(model, doubles(20), False)
+        load(arrays, trunk, limbs, account, 0, False)
         bend_filters(limbs, small.settings)
         begin_step(trunk, limbs, small)
         evaluate(trunk, limbs, small, scratch, 0.0)
@@ -206,7 +214,7 @@ def stage_loop(stage: Any, legs: int) -> Any:
             at_trunk[k] = trunk_rows.flat[k]
         for k in range(limbs.size):
             at_limbs[k] = limb_rows.flat[k]
-        small, scratch = inner(model, legs, doubles(2 * legs + 20)), doubles(2 * WIDTH)
+        small, scratch = inner(model, doubles(20), False), doubles(2 * WIDTH)
         for _ in range(n):
             fence(at_trunk)
             fence(at_limbs)
@@ -221,12 +229,12 @@ def _stage_alone(stage: Any, made: TrunkEngine, kind: int) -> Any:
     """stage(...) once for one lane of one leg, with the settings as constants: its code has no loops."""
     ground, cells = made.ground, made.profiles[0].cells
     eighths, law = int(ground.exponent * EXPONENT_UNIT), FRICTION_LAWS.index(ground.friction_law)
-    motors, first, interpolated = (1.0,), (0.0,), ground.approach == "interpolated"
+    interpolated = ground.approach == "interpolated"
 
     def alone(model, h):  # type: ignore[no-untyped-def]
         at_trunk, at_limbs, scratch = doubles(t.ROWS), doubles(b.ROWS), doubles(2 * WIDTH)
         fixed = Model(
-            kind, eighths, law, interpolated, False, False, cells, address(model.tables), first, motors,
+            kind, eighths, law, interpolated, False, False, False, cells, address(model.tables),
             model.settings, model.fractions, model.weights, model.ground_cells, 0.0, 1.0,
         )  # fmt: skip
         fence(at_trunk)
