@@ -64,24 +64,25 @@ def test_drag_slows_it_exponentially(kind):
 
 
 def test_the_record_holds_the_settings():
-    trunk = Trunk("rail", mass=70.0, share=0.3, stiffness=1.0, damping=2.0, drag=3.0, height=1.6)
+    trunk = Trunk("rail", 70.0, 0.3, stiffness=1.0, damping=2.0, drag=3.0, height=1.6, pitch_inertia=9.0)
     record = trunk.to_record(leg_mass=7.0, gravity=GRAVITY)
     assert dict(zip(TRUNK.names, record.item(), strict=True)) == {
         "kind": 1, "mass": 70.0, "total_mass": 77.0, "share": 0.3, "stiffness": 1.0, "damping": 2.0,
-        "height": 1.6, "drag": 3.0, "gravity": GRAVITY,
+        "height": 1.6, "drag": 3.0, "gravity": GRAVITY, "pitch_inertia": 9.0,
     }  # fmt: skip
 
 
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"kind": "free"}, "trunk: expected one of fixed, rail, suspended, got 'free'"),
+        ({"kind": "loose"}, "trunk: expected one of fixed, free, rail, suspended, got 'loose'"),
         ({"mass": 0.0}, "trunk_mass: expected"),
         ({"share": 1.1}, r"trunk_share: expected a finite number in \[0, 1\], got 1.1"),
         ({"stiffness": -1.0}, "trunk_stiffness: expected"),
         ({"damping": float("nan")}, "trunk_damping: expected"),
         ({"drag": -1.0}, "trunk_drag: expected"),
         ({"height": 0.0}, "trunk_height: expected"),
+        ({"pitch_inertia": 0.0}, "trunk_pitch_inertia: expected"),
     ],
 )
 def test_bad_settings_are_named(settings, message):
