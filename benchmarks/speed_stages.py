@@ -43,53 +43,52 @@ from hoof_env.dynamics.trunk import FIXED, TRUNKS
 from hoof_env.dynamics.trunk_engine import TrunkEngine
 from hoof_env.ground.exact_math import EXPONENT_UNIT
 from hoof_env.ground.friction import FRICTION_LAWS
-from hoof_env.leg.profile import WIDTH
 
-# The stages, all called as stage(trunk, limbs, model, scratch, h).
+# The stages, all called as stage(trunk, limbs, model, h).
 
 
 @inlined
-def _none(trunk, limbs, model, scratch, h):  # type: ignore[no-untyped-def]
+def _none(trunk, limbs, model, h):  # type: ignore[no-untyped-def]
     pass
 
 
 @inlined
-def _look_up(trunk, limbs, model, scratch, h):  # type: ignore[no-untyped-def]
+def _look_up(trunk, limbs, model, h):  # type: ignore[no-untyped-def]
     for i in range(limbs.shape[0]):
-        look_up_functions(trunk, limbs[i], model.tables, model.cells, scratch)
+        look_up_functions(trunk, limbs[i], model.tables, model.cells)
 
 
 @inlined
-def _place(trunk, limbs, model, scratch, h):  # type: ignore[no-untyped-def]
+def _place(trunk, limbs, model, h):  # type: ignore[no-untyped-def]
     for i in range(limbs.shape[0]):
         place_frame(trunk, limbs[i], h)
 
 
 @inlined
-def _clear(trunk, limbs, model, scratch, h):  # type: ignore[no-untyped-def]
+def _clear(trunk, limbs, model, h):  # type: ignore[no-untyped-def]
     clear_trunk(trunk, model.kind)
 
 
 @inlined
-def _gather(trunk, limbs, model, scratch, h):  # type: ignore[no-untyped-def]
+def _gather(trunk, limbs, model, h):  # type: ignore[no-untyped-def]
     for i in range(limbs.shape[0]):
         gather_leg(trunk, limbs[i], model.together)
 
 
 @inlined
-def _move(trunk, limbs, model, scratch, h):  # type: ignore[no-untyped-def]
+def _move(trunk, limbs, model, h):  # type: ignore[no-untyped-def]
     move_trunk(trunk, model.kind)
 
 
 @inlined
-def _meet(trunk, limbs, model, scratch, h):  # type: ignore[no-untyped-def]
+def _meet(trunk, limbs, model, h):  # type: ignore[no-untyped-def]
     for i in range(limbs.shape[0]):
         for point in range(2):
             meet_ground(trunk, limbs[i], point, model)
 
 
 @inlined
-def _push(trunk, limbs, model, scratch, h):  # type: ignore[no-untyped-def]
+def _push(trunk, limbs, model, h):  # type: ignore[no-untyped-def]
     for i in range(limbs.shape[0]):
         clear_ground(limbs[i])
         for point in range(2):
@@ -97,56 +96,56 @@ def _push(trunk, limbs, model, scratch, h):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _feel(trunk, limbs, model, scratch, h):  # type: ignore[no-untyped-def]
+def _feel(trunk, limbs, model, h):  # type: ignore[no-untyped-def]
     for i in range(limbs.shape[0]):
         feel_leg(trunk, limbs[i], h)
 
 
 @inlined
-def _load(trunk, limbs, model, scratch, h):  # type: ignore[no-untyped-def]
+def _load(trunk, limbs, model, h):  # type: ignore[no-untyped-def]
     for i in range(limbs.shape[0]):
         load_trunk(trunk, limbs[i], model.kind, model.together)
 
 
 @inlined
-def _solve(trunk, limbs, model, scratch, h):  # type: ignore[no-untyped-def]
+def _solve(trunk, limbs, model, h):  # type: ignore[no-untyped-def]
     accelerate_trunk(trunk, model.kind)
 
 
 @inlined
-def _turn(trunk, limbs, model, scratch, h):  # type: ignore[no-untyped-def]
+def _turn(trunk, limbs, model, h):  # type: ignore[no-untyped-def]
     for i in range(limbs.shape[0]):
         accelerate_crank(trunk, limbs[i])
 
 
 @inlined
-def _remember(trunk, limbs, model, scratch, h):  # type: ignore[no-untyped-def]
+def _remember(trunk, limbs, model, h):  # type: ignore[no-untyped-def]
     for i in range(limbs.shape[0]):
         remember_contacts(limbs[i])
 
 
 @inlined
-def _filters(trunk, limbs, model, scratch, h):  # type: ignore[no-untyped-def]
+def _filters(trunk, limbs, model, h):  # type: ignore[no-untyped-def]
     bend_filters(limbs, model.settings)
 
 
 @inlined
-def _begin(trunk, limbs, model, scratch, h):  # type: ignore[no-untyped-def]
+def _begin(trunk, limbs, model, h):  # type: ignore[no-untyped-def]
     begin_step(trunk, limbs, model)
 
 
 @inlined
-def _weigh(trunk, limbs, model, scratch, h):  # type: ignore[no-untyped-def]
+def _weigh(trunk, limbs, model, h):  # type: ignore[no-untyped-def]
     weigh_stage(trunk, limbs, model, 0.5)
 
 
 @inlined
-def _next(trunk, limbs, model, scratch, h):  # type: ignore[no-untyped-def]
+def _next(trunk, limbs, model, h):  # type: ignore[no-untyped-def]
     next_stage(trunk, limbs, model, h)
 
 
 @inlined
-def _end(trunk, limbs, model, scratch, h):  # type: ignore[no-untyped-def]
+def _end(trunk, limbs, model, h):  # type: ignore[no-untyped-def]
     end_step(trunk, limbs, model, h)
 
 
@@ -193,12 +192,12 @@ def filled_tile(made: TrunkEngine) -> tuple[NDArray[np.float64], NDArray[np.floa
     trunk, limbs = np.zeros((t.ROWS, TILE)), np.zeros((legs, b.ROWS, TILE))
 
     def fill(arrays, model, trunk, limbs):  # type: ignore[no-untyped-def]
-        account, scratch = carray(doubles(accounts * TILE), (accounts, TILE)), doubles(2 * WIDTH)
+        account = carray(doubles(accounts * TILE), (accounts, TILE))
         small = inner(model, doubles(20), False)
         load(arrays, trunk, limbs, account, 0, False)
         bend_filters(limbs, small.settings)
         begin_step(trunk, limbs, small)
-        evaluate(trunk, limbs, small, scratch, 0.0)
+        evaluate(trunk, limbs, small, 0.0)
 
     numba.njit(error_model="numpy")(fill)(made._arrays, made._model, trunk, limbs)
     return trunk, limbs
@@ -214,11 +213,11 @@ def stage_loop(stage: Any, legs: int) -> Any:
             at_trunk[k] = trunk_rows.flat[k]
         for k in range(limbs.size):
             at_limbs[k] = limb_rows.flat[k]
-        small, scratch = inner(model, doubles(20), False), doubles(2 * WIDTH)
+        small = inner(model, doubles(20), False)
         for _ in range(n):
             fence(at_trunk)
             fence(at_limbs)
-            stage(trunk, limbs, small, scratch, h)
+            stage(trunk, limbs, small, h)
         fence(at_trunk)
         fence(at_limbs)
 
@@ -232,14 +231,14 @@ def _stage_alone(stage: Any, made: TrunkEngine, kind: int) -> Any:
     interpolated = ground.approach == "interpolated"
 
     def alone(model, h):  # type: ignore[no-untyped-def]
-        at_trunk, at_limbs, scratch = doubles(t.ROWS), doubles(b.ROWS), doubles(2 * WIDTH)
+        at_trunk, at_limbs = doubles(t.ROWS), doubles(b.ROWS)
         fixed = Model(
             kind, eighths, law, interpolated, False, False, False, cells, address(model.tables),
             model.settings, model.fractions, model.weights, model.ground_cells, 0.0, 1.0,
         )  # fmt: skip
         fence(at_trunk)
         fence(at_limbs)
-        stage(carray(at_trunk, (t.ROWS, 1)), carray(at_limbs, (1, b.ROWS, 1)), fixed, scratch, h)
+        stage(carray(at_trunk, (t.ROWS, 1)), carray(at_limbs, (1, b.ROWS, 1)), fixed, h)
         fence(at_trunk)
         fence(at_limbs)
 

@@ -1,9 +1,9 @@
 """The engine's kernels: environments go through a tile, step after step, and come back.
 
-`advance_one_leg`, `advance_four_legs` and `advance_batch` are one function. The first is compiled for one
-lane, the second for four that are the legs of one trunk, the third for `TILE` environments side by side. A
-tile lives on the stack: of one lane the compiler keeps most in registers, of many each loop becomes vector
-code.
+`advance_one_leg`, `advance_four_legs`, `advance_one` and `advance_batch` are one function, compiled for one
+lane, for four that are the legs of one trunk, for one lane and any number of legs, and for `TILE`
+environments side by side; `react_...` add the joint reactions of every step. A tile lives on the stack: of one lane the
+compiler keeps most in registers, of many each loop becomes vector code.
 """
 
 from __future__ import annotations
@@ -23,7 +23,6 @@ from hoof_env.dynamics.lanes_report import ACCOUNT, keep_account, report
 from hoof_env.dynamics.lanes_time import begin_step, bend_filters, end_step, next_stage, weigh_stage
 from hoof_env.dynamics.reactions import CONSTANTS, OUTPUTS
 from hoof_env.dynamics.trunk import FIXED
-from hoof_env.leg.profile import WIDTH
 
 TILE = 32
 """Environments side by side: whole vectors, few enough that their rows stay in the nearest cache."""
@@ -178,7 +177,7 @@ def store(arrays, model, trunk, limbs, account, n, envs):  # type: ignore[no-unt
 
 
 @pasted
-def run_tile(model, trunk, limbs, account, scratch, h, steps, keeps_account, evaluated):  # type: ignore[no-untyped-def]
+def run_tile(model, trunk, limbs, account, h, steps, keeps_account, evaluated):  # type: ignore[no-untyped-def]
     """Advance what is in the tile by `steps` of `h` [s] and evaluate it there; `evaluated` if it is now."""
     stages = model.weights.shape[0]
     stage, elapsed = 0, 0.0
@@ -186,7 +185,7 @@ def run_tile(model, trunk, limbs, account, scratch, h, steps, keeps_account, eva
     begin_step(trunk, limbs, model)
     for turn in range(steps * stages + 1):
         if turn > 0 or not evaluated:
-            evaluate(trunk, limbs, model, scratch, elapsed)
+            evaluate(trunk, limbs, model, elapsed)
         if stage == 0:
             for i in range(limbs.shape[0]):
                 remember_contacts(limbs[i])
@@ -211,12 +210,11 @@ def run(arrays, model, h, steps, keeps_account, legs, tile, together):  # type: 
     trunk = carray(doubles(t.ROWS * tile), (t.ROWS, tile))
     limbs = carray(doubles(legs * b.ROWS * tile), (legs, b.ROWS, tile))
     account = carray(doubles(len(ACCOUNT) * tile), (len(ACCOUNT), tile))
-    scratch = doubles(2 * WIDTH)
     small = inner(model, doubles(12 + 2 * MOST_STAGES), together)
     count, envs = arrays.result.shape[0], 1 if together else tile
     for n in range(0, count, envs):
         load(arrays, trunk, limbs, account, n, together)
-        run_tile(small, trunk, limbs, account, scratch, h, steps, keeps_account, False)
+        run_tile(small, trunk, limbs, account, h, steps, keeps_account, False)
         here = min(envs, count - n)
         report(trunk, limbs, together, arrays.trunk_report, arrays.limb_report, n, here)
         store(arrays, small, trunk, limbs, account, n, here)
@@ -230,7 +228,6 @@ def run_reacting(arrays, model, h, steps, keeps_account, legs, tile, together): 
     account = carray(doubles(len(ACCOUNT) * tile), (len(ACCOUNT), tile))
     constants = carray(doubles(legs * CONSTANTS * tile), (legs, CONSTANTS, tile))
     found = carray(doubles(legs * OUTPUTS * tile), (legs, OUTPUTS, tile))
-    scratch = doubles(2 * WIDTH)
     small = inner(model, doubles(12 + 2 * MOST_STAGES), together)
     count, envs = arrays.result.shape[0], 1 if together else tile
     for i in range(legs):
@@ -240,7 +237,7 @@ def run_reacting(arrays, model, h, steps, keeps_account, legs, tile, together): 
     for n in range(0, count, envs):
         load(arrays, trunk, limbs, account, n, together)
         for step in range(max(steps, 1)):
-            run_tile(small, trunk, limbs, account, scratch, h, min(steps, 1), keeps_account, step > 0)
+            run_tile(small, trunk, limbs, account, h, min(steps, 1), keeps_account, step > 0)
             for i in range(legs):
                 react(trunk, limbs[i], constants[i], found[i])
         here = min(envs, count - n)
@@ -268,6 +265,12 @@ def advance_four_legs(arrays, model, h, steps, keeps_account):  # type: ignore[n
 
 
 @kernel
+def advance_one(arrays, model, h, steps, keeps_account):  # type: ignore[no-untyped-def]
+    """Each environment by itself; they have any number of legs, one after the other."""
+    run(arrays, model, h, steps, keeps_account, arrays.limbs.shape[0], 1, False)
+
+
+@kernel
 def advance_batch(arrays, model, h, steps, keeps_account):  # type: ignore[no-untyped-def]
     """`TILE` environments at a time, with any number of legs."""
     run(arrays, model, h, steps, keeps_account, arrays.limbs.shape[0], TILE, False)
@@ -283,6 +286,12 @@ def react_one_leg(arrays, model, h, steps, keeps_account):  # type: ignore[no-un
 def react_four_legs(arrays, model, h, steps, keeps_account):  # type: ignore[no-untyped-def]
     """`advance_four_legs` with reactions."""
     run_reacting(arrays, model, h, steps, keeps_account, 1, 4, True)
+
+
+@kernel
+def react_one(arrays, model, h, steps, keeps_account):  # type: ignore[no-untyped-def]
+    """`advance_one` with reactions."""
+    run_reacting(arrays, model, h, steps, keeps_account, arrays.limbs.shape[0], 1, False)
 
 
 @kernel

@@ -17,8 +17,6 @@ all bodies together: in flight it stays to the last bit, whatever the scheme.
 
 from __future__ import annotations
 
-from numba import carray
-
 from hoof_env._jit import inlined, pasted
 from hoof_env._memory import address, offset
 from hoof_env.dynamics import limb_rows as b
@@ -34,13 +32,13 @@ from hoof_env.leg.profile import find_cell, look_up, look_up_eight, look_up_four
 
 
 @pasted
-def evaluate(trunk, limbs, model, scratch, elapsed):  # type: ignore[no-untyped-def]
+def evaluate(trunk, limbs, model, elapsed):  # type: ignore[no-untyped-def]
     """All forces and accelerations at the present stage, `elapsed` [s] after the step's start."""
     kind = model.kind
     if kind != FIXED:
         clear_trunk(trunk, kind)
     for i in range(limbs.shape[0]):
-        look_up_functions(trunk, limbs[i], model.tables, model.cells, scratch)
+        look_up_functions(trunk, limbs[i], model.tables, model.cells)
         place_frame(trunk, limbs[i], elapsed)
         if kind != FIXED:
             gather_leg(trunk, limbs[i], model.together)
@@ -61,7 +59,7 @@ def evaluate(trunk, limbs, model, scratch, elapsed):  # type: ignore[no-untyped-
 
 
 @inlined
-def look_up_functions(trunk, limb, table, cells, scratch):  # type: ignore[no-untyped-def]
+def look_up_functions(trunk, limb, table, cells):  # type: ignore[no-untyped-def]
     """The functions of the crank angle and their derivatives."""
     lanes = limb.shape[1]
     for lane in range(lanes):
@@ -81,12 +79,7 @@ def look_up_functions(trunk, limb, table, cells, scratch):  # type: ignore[no-un
             table, offset(at, b.CELL * 4), offset(at, (b.CELL + 1) * 4), offset(at, b.VALUES * 4), 4
         )  # fmt: skip
     else:
-        row = carray(scratch, 2 * f.WIDTH)
-        for lane in range(lanes):
-            look_up(table, int(limb[b.CELL, lane]), limb[b.CELL + 1, lane], scratch)
-            for k in range(f.COS + 1):
-                limb[b.VALUES + k, lane] = row[k]
-                limb[b.SLOPES + k, lane] = row[f.WIDTH + k]
+        look_up(table, int(limb[b.CELL, 0]), limb[b.CELL + 1, 0], offset(at, b.VALUES))
     for lane in range(limb.shape[1]):
         angle, value = limb[b.ANGLE, lane], limb[b.VALUES, lane]
         trunk[t.STUCK, lane] = 1.0 if (angle == angle) & (value != value) else trunk[t.STUCK, lane]

@@ -19,9 +19,11 @@ from hoof_env.dynamics import trunk_rows as t
 from hoof_env.dynamics.advance import (
     advance_batch,
     advance_four_legs,
+    advance_one,
     advance_one_leg,
     react_batch,
     react_four_legs,
+    react_one,
     react_one_leg,
 )
 from hoof_env.dynamics.arguments import Floats, all_of, count, finite, one_of
@@ -129,7 +131,7 @@ class TrunkEngine:
         alone = {1: (advance_one_leg, react_one_leg), 4: (advance_four_legs, react_four_legs)}
         kernels = advance_batch, react_batch
         if self.num_envs <= FEW:
-            kernels = alone.get(len(self.limbs), kernels)
+            kernels = alone.get(len(self.limbs), (advance_one, react_one))
         self._run = kernels[self.reacts]
 
     # What it is like
