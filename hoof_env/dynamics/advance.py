@@ -2,8 +2,8 @@
 
 `advance_one_leg`, `advance_four_legs`, `advance_one` and `advance_batch` are one function, compiled for one
 lane, for four that are the legs of one trunk, for one lane and any number of legs, and for `TILE`
-environments side by side; `react_...` add the joint reactions of every step. A tile lives on the stack: of one lane the
-compiler keeps most in registers, of many each loop becomes vector code.
+environments side by side; `react_...` add the joint reactions of every step. A tile lives on the stack: of
+one lane the compiler keeps most in registers, of many each loop becomes vector code.
 """
 
 from __future__ import annotations
