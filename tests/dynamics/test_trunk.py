@@ -75,18 +75,24 @@ def test_the_record_holds_the_settings():
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"kind": "free"}, "trunk: expected one of fixed, rail, suspended, got 'free'"),
+        ({"kind": "loose"}, "trunk: expected one of fixed, free, rail, suspended, got 'loose'"),
         ({"mass": 0.0}, "trunk_mass: expected"),
         ({"share": 1.1}, r"trunk_share: expected a finite number in \[0, 1\], got 1.1"),
         ({"stiffness": -1.0}, "trunk_stiffness: expected"),
         ({"damping": float("nan")}, "trunk_damping: expected"),
         ({"drag": -1.0}, "trunk_drag: expected"),
         ({"height": 0.0}, "trunk_height: expected"),
+        ({"pitch_inertia": 0.0}, "trunk_pitch_inertia: expected"),
     ],
 )
 def test_bad_settings_are_named(settings, message):
     with pytest.raises(ParameterError, match=message):
         Trunk(**settings)
+
+
+def test_one_leg_does_not_bear_a_free_trunk():
+    with pytest.raises(ParameterError, match="trunk: expected one of fixed, rail, suspended, got 'free'"):
+        LegEngine(LEG, Trunk("free"), Ground())
 
 
 @pytest.mark.parametrize(
