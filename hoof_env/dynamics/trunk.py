@@ -21,19 +21,10 @@ TRUNK = np.dtype(
     [("kind", "i8")]
     + [
         (name, "f8")
-        for name in (
-            "mass",
-            "total_mass",
-            "share",
-            "stiffness",
-            "damping",
-            "height",
-            "drag",
-            "gravity",
-            "pitch_inertia",
-        )
+        for name in ("mass", "total_mass", "share", "stiffness", "damping", "height", "drag", "gravity")
     ]
 )
+"""What the kernels of `LegEngine` read; those of `TrunkEngine` read rows (`trunk_rows`)."""
 
 
 @dataclass(frozen=True)
@@ -78,10 +69,10 @@ class Trunk:
         check_number("trunk_pitch_inertia", self.pitch_inertia, low=0, exclusive_low=True)
 
     def to_record(self, leg_mass: float, gravity: float) -> Any:
-        """The settings as one record of dtype `TRUNK` for the kernels."""
+        """The settings as one record of dtype `TRUNK` for the kernels of `LegEngine`."""
         record = np.zeros(1, dtype=TRUNK)[0]
         record["kind"] = TRUNKS.index(self.kind)
-        for name in ("mass", "share", "stiffness", "damping", "height", "drag", "pitch_inertia"):
+        for name in ("mass", "share", "stiffness", "damping", "height", "drag"):
             record[name] = getattr(self, name)
         record["total_mass"], record["gravity"] = self.mass + leg_mass, gravity
         return record

@@ -90,6 +90,11 @@ def test_bad_settings_are_named(settings, message):
         Trunk(**settings)
 
 
+def test_one_leg_does_not_bear_a_free_trunk():
+    with pytest.raises(ParameterError, match="trunk: expected one of fixed, rail, suspended, got 'free'"):
+        LegEngine(LEG, Trunk("free"), Ground())
+
+
 @pytest.mark.parametrize(
     ("stiffness", "damping", "drag"),
     [(4.0, 0.0, 0.0), (0.1, 1.95, 0.0), (2.0, 1.0, 0.0), (0.0, 0.0, 2.0)],
