@@ -85,7 +85,7 @@ def _commit() -> str:
 
 def measure(preset: str, quick: bool, peers: bool, rounds: int) -> dict[str, Any]:
     """All of it; what `speed.json` holds."""
-    found, notes = cases.our_cases(preset, quick)
+    found, notes = cases.our_cases(preset, quick), []
     mujoco = peers and has("mujoco")
     if mujoco:
         found += mujoco_cases(preset, quick)

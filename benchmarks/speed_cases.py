@@ -8,7 +8,6 @@ ground. With the usual one, 0.02 s, a leg on a fixed trunk is jammed against the
 
 from __future__ import annotations
 
-import inspect
 import time
 import warnings
 from collections.abc import Callable
@@ -37,8 +36,6 @@ CLOCK = "wall"
 """What cases are timed with; `speed --clock processor` is for a busy machine."""
 
 BAR_SCHEME = "midpoint"
-HAS_REACTIONS = "reactions" in inspect.signature(TrunkEngine).parameters
-NO_REACTIONS = "TrunkEngine has no keyword `reactions` yet"
 
 
 @dataclass(frozen=True)
@@ -159,9 +156,9 @@ STEPS = {("leg", 1): 20000, ("leg", BATCH): 100, ("horse", 1): 1000, ("horse", B
 STEPS |= {("suspended leg", n): STEPS["leg", n] for n in (1, BATCH)}
 
 
-def our_cases(preset: str, quick: bool) -> tuple[list[Case], list[str]]:
-    """Cases of this project's engine, and notes on what is left out."""
-    cases, notes, found = [], [], scenes(preset)
+def our_cases(preset: str, quick: bool) -> list[Case]:
+    """Cases of this project's engine."""
+    cases, found = [], scenes(preset)
     for (name, count), steps in STEPS.items():
         scene, bars = found[name], BARS.get((name, count))
         n, steps = (count, steps) if not quick else (min(count, 64), max(steps // 20, 4))
@@ -169,10 +166,7 @@ def our_cases(preset: str, quick: bool) -> tuple[list[Case], list[str]]:
         variants: list[tuple[str, dict[str, Any], bool, Any]] = [("", {}, False, bars or NO_BARS)]
         if bars:
             half = tuple(bar / 2 if bar else None for bar in bars)
-            if HAS_REACTIONS:
-                variants.append((", all joint reactions", {"reactions": True}, False, half))
-            elif NO_REACTIONS not in notes:
-                notes.append(NO_REACTIONS)
+            variants.append((", all joint reactions", {"reactions": True}, False, half))
             variants.append((", energy account", {}, True, NO_BARS))
             if not quick:
                 others = [s for s in SCHEMES if s != BAR_SCHEME]
@@ -182,4 +176,4 @@ def our_cases(preset: str, quick: bool) -> tuple[list[Case], list[str]]:
             run = _ours(made, steps, account)
             judged = NO_BARS if quick else (required, aimed)
             cases.append(Case(title + what, name, run, n * steps, "", *judged))
-    return cases, notes
+    return cases

@@ -24,10 +24,10 @@ Runs = dict[str, Callable[[], float]]
 _START = """
 import time
 begin = time.perf_counter()
-from benchmarks.speed_cases import HAS_REACTIONS, engine, scenes
+from benchmarks.speed_cases import engine, scenes
 at = scenes({preset!r})
 cases = [("leg", 1), ("horse", 1), ("leg", 1024), ("horse", 1024)]
-for options in [{{}}] + [{{"reactions": True}}] * HAS_REACTIONS:
+for options in {{}}, {{"reactions": True}}:
     for name, n in cases:
         engine(at[name], {preset!r}, n, **options).advance(steps=1)
         if not {everything}:

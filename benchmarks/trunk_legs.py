@@ -6,12 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.common import ALL, Assembly, Record, Start
-from hoof_env.dynamics.engine import GRAVITY
 from hoof_env.dynamics.limb import Limb
-from hoof_env.dynamics.reactions import LOCK, OUTPUTS, leg_constants, leg_reactions_lanes
 from hoof_env.dynamics.result import Result
 from hoof_env.dynamics.trunk import Trunk
 from hoof_env.dynamics.trunk_engine import TrunkEngine
@@ -43,7 +40,7 @@ class TrunkLegs:
         integrator: str = "rk4",
     ) -> None:
         self.limbs, self.start = tuple(limbs), start
-        self.engine = TrunkEngine(limbs, trunk, ground, sim_dt=dt, integrator=integrator)
+        self.engine = TrunkEngine(limbs, trunk, ground, sim_dt=dt, integrator=integrator, reactions=True)
         none = [0.0] * len(self.limbs)
         rows = (start.crank, start.crank_speed, start.swing, start.swing_sin or none, start.swing_cos or none)
         gaits = [
@@ -77,28 +74,9 @@ class TrunkLegs:
         body = np.array([r["x"], r["y"], s["pitch"], r["vx"], r["vy"], r["pitch_rate"]])
         return (
             s["time"], s["theta"], s["theta_rate"], body, r["crank_torque"], r["hip_torque"],
-            np.array([self._joints(i, s, r) for i in range(len(self.limbs))]),
+            self.engine.reactions().joints[..., 0],
             max(self._gap(i, s, r) for i in range(len(self.limbs))),
         )  # fmt: skip
-
-    def _joints(self, i: int, s: dict[str, Any], r: dict[str, Any]) -> NDArray[np.float64]:
-        """Forces at the joints of a leg [N], shape (20, 2)."""
-        limb = self.limbs[i]
-        sigma, hip = limb.geometry.travel, complex(*limb.hip) * np.exp(1j * s["pitch"])
-        lift = complex(r["ax"], r["ay"] + GRAVITY) + complex(-(r["pitch_rate"] ** 2), r["pitch_acc"]) * hip
-        beta, theta = s["pitch"] + sigma * r["phi"][i], s["theta"][i]
-        rate, acc = (
-            r["pitch_rate"] + sigma * r["phi_rate"][i],
-            r["pitch_acc"] + sigma * r["phi_acc"][i],
-        )
-        state = np.array([
-            np.cos(theta), np.sin(theta), s["theta_rate"][i], r["theta_acc"][i],
-            np.cos(beta), np.sin(beta), rate, acc, lift.real, lift.imag,
-            *(r[f"{point}_{part}"][i] for point in POINTS for part in ("friction", "normal")),
-        ])[:, None]  # fmt: skip
-        out = np.empty((OUTPUTS, 1))
-        leg_reactions_lanes(state, leg_constants(limb.geometry), out)
-        return out[:LOCK, 0].reshape(-1, 2)
 
     def _gap(self, i: int, s: dict[str, Any], r: dict[str, Any]) -> float:
         """From where the engine has toe and heel to where the closed linkage has them [m]."""

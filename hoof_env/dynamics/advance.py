@@ -40,10 +40,10 @@ class Model(NamedTuple):
     Attributes:
         kind, eighths, friction_law: of trunk, contact exponent and friction.
         interpolated, is_terrain, new_rates: see `Ground`, `Terrain` and `schemes`.
-        together: the lanes of a tile are the legs of one trunk.
+        together: the lanes of a tile are the legs of one trunk; the kernels set it.
         cells, tables: cells of a leg's table; all tables, one after the other, shape (rows, coefficients).
         settings: of the filters, shape (4, 3).
-        fractions, weights: of the scheme.
+        fractions, weights: of the scheme, shapes (stages - 1,) and (stages,).
         ground_cells, ground_origin, ground_per_metre: the terrain's grid.
     """
 

@@ -1,8 +1,9 @@
-"""Time integration schemes for a second-order system: one function each, from (q, qd) now to one step later.
+"""Schemes of `ConstrainedLeg` for a second-order system: one function each, from (q, qd) to a step later.
 
 Every scheme takes `acceleration(elapsed, q, qd) -> qdd` with `elapsed` the time since the start of the step
 [s], the coordinates `q` and rates `qd` at the start (arrays of one shape) and the step `h` [s], and returns
-new arrays q and qd. Source: Hairer, Norsett & Wanner, Solving Ordinary Differential Equations I.
+new arrays q and qd. `schemes` has those of `TrunkEngine`, as data for its kernels. Source: Hairer, Norsett &
+Wanner, Solving Ordinary Differential Equations I.
 """
 
 from __future__ import annotations

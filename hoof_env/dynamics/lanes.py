@@ -3,16 +3,17 @@
 Every function is one stage of the mechanics: a loop over the lanes of a tile, which do not know of each
 other. Compiled for a tile of one lane or of many these loops become scalar or vector code from one source,
 and a number has the same bits in both: only + - * / and sqrt, no fast-math, no branch that depends on a lane.
+Where the lanes are the legs of one trunk (`together`) each has a copy of the trunk, and sums go over all.
 Planar vectors are complex numbers, kept in two rows (`trunk_rows` as t, `limb_rows` as b).
 
 A leg enters as functions of its crank angle theta (`leg.profile` as f): toe and heel, the first moment s and
-the inertias a, b, c. With the world angle beta = pitch + side phi(theta, t) of its frame, the velocity v of O
-and w = theta', its kinetic energy is
+the inertias a, b, c; ' is d/dtheta, _t and _tt are time derivatives. With the world angle beta = pitch +
+side phi(theta, t) of its frame, the velocity v of O and w = theta_t, its kinetic energy is
 
-    T = m |v|^2 / 2 + v . e^(i beta) (s' w + i s beta') + (a w^2 + 2 b w beta' + c beta'^2) / 2,
+    T = m |v|^2 / 2 + v . e^(i beta) (s' w + i s beta_t) + (a w^2 + 2 b w beta_t + c beta_t^2) / 2,
 
 and Lagrange's equations follow (docs/engine.md). The trunk's state is the momentum, linear and angular, of
-all bodies together: in flight it stays to the last bit, whatever the scheme.
+all bodies together: in flight it is kept to round-off, whatever the scheme.
 """
 
 from __future__ import annotations
@@ -94,7 +95,8 @@ def look_up_functions(trunk, limb, table, cells, scratch):  # type: ignore[no-un
 
 @inlined
 def place_frame(trunk, limb, elapsed):  # type: ignore[no-untyped-def]
-    """The leg's frame: its turn, how that changes with crank angle and time, and the leg's inertia then.
+    """The leg's frame: its turn, how that changes with crank angle and time, and first moment and inertia in
+    the world.
 
     The swing is phi = offset + A sin(theta) + B cos(theta), each parameter moving as its filter does.
     """
@@ -185,7 +187,7 @@ def gather_leg(trunk, limb, together):  # type: ignore[no-untyped-def]
 def move_trunk(trunk, kind):  # type: ignore[no-untyped-def]
     """Place and velocity of the trunk from centre of mass and momentum of all; what acts on it but its legs.
 
-    A trunk on a rail has a place and no velocity along y.
+    On a rail the place along y is given and the velocity along y 0.
     """
     for lane in range(trunk.shape[1]):
         centre, moment = vector(trunk, t.NOW_CENTRE, lane), vector(trunk, t.MOMENT, lane)
@@ -224,9 +226,10 @@ def move_trunk(trunk, kind):  # type: ignore[no-untyped-def]
 
 @inlined
 def feel_leg(trunk, limb, elapsed):  # type: ignore[no-untyped-def]
-    """A leg's equation of motion: INERTIA theta'' + U . a + LEVER pitch'' = torque + ground - rest.
+    """A crank's equation of motion: INERTIA theta_tt + U . a + LEVER pitch_tt = torque + ground - rest.
 
-    a is the trunk's acceleration. A motor's crank is solved for theta'', a prescribed one's is given.
+    a is the trunk's acceleration. Here a motor's crank is solved for theta_tt as if the trunk kept still; a
+    prescribed one's is given.
     """
     for lane in range(limb.shape[1]):
         w, frame_rate, k = limb[b.SPIN, lane], limb[b.FRAME_RATE, lane], limb[b.K, lane]
@@ -235,7 +238,7 @@ def feel_leg(trunk, limb, elapsed):  # type: ignore[no-untyped-def]
         coupling, sway_rate = limb[b.COUPLING, lane], limb[b.SWAY_RATE, lane]
         pitch_rate, dc = trunk[t.PITCH_RATE, lane], limb[b.SLOPES + f.C, lane]
         da, db = limb[b.SLOPES + f.A, lane], limb[b.SLOPES + f.B, lane]
-        weight = complex(0.0, trunk[t.GRAVITY, lane]) - times(pitch_rate * pitch_rate, hip)  # of O, per mass
+        weight = complex(0.0, trunk[t.GRAVITY, lane]) - times(pitch_rate * pitch_rate, hip)  # a + g of O
         rest_theta = (
             (coupling - k * frame) * sway_rate
             + 0.5 * (da * (w * w) - dc * (frame_rate * frame_rate))
@@ -260,7 +263,7 @@ def feel_leg(trunk, limb, elapsed):  # type: ignore[no-untyped-def]
 
 @inlined
 def load_trunk(trunk, limb, kind, together):  # type: ignore[no-untyped-def]
-    """A leg's part in the trunk's equations, its crank eliminated, and in the outer force."""
+    """A leg's part in the trunk's equations, its crank eliminated, and in the outer force and moment."""
     for lane in range(limb.shape[1]):
         w, frame_rate, u = limb[b.SPIN, lane], limb[b.FRAME_RATE, lane], vector(limb, b.U, lane)
         s, ds, hip = vector(limb, b.S, lane), vector(limb, b.DS, lane), vector(limb, b.HIP, lane)
@@ -272,7 +275,7 @@ def load_trunk(trunk, limb, kind, together):  # type: ignore[no-untyped-def]
             + times(w * w, slope)
             + times(frame_rate, times(2.0 * w, across(ds)) - times(frame_rate, s))
         )
-        sling = times(trunk[t.PITCH_RATE, lane] * trunk[t.PITCH_RATE, lane], hip)  # of O, towards the trunk
+        sling = times(trunk[t.PITCH_RATE, lane] * trunk[t.PITCH_RATE, lane], hip)  # less O's acceleration
         put(limb, b.PART, lane, times(mass, sling) - throw - times(free, u))
         limb[b.PART + 2, lane] = (
             (limb[b.Q_BETA, lane] - limb[b.REST_BETA, lane])

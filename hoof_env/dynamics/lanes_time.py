@@ -81,7 +81,7 @@ def next_stage(trunk, limbs, model, elapsed):  # type: ignore[no-untyped-def]
 
 @inlined
 def use_new_rates(trunk, h):  # type: ignore[no-untyped-def]
-    """Semi-implicit Euler: place and pitch go with the velocities that the step ends with."""
+    """Semi-implicit Euler: centre and pitch go with the velocities that the step ends with."""
     for lane in range(trunk.shape[1]):
         for k in range(2):
             trunk[t.MEAN + k, lane] += h * trunk[t.FORCE + k, lane] * trunk[t.PER_MASS, lane]

@@ -26,19 +26,20 @@ SLOPES = VALUES + WIDTH  # their derivatives by the crank angle
     COMMAND, _, _, _,  # what is commanded of the filters
     BEND, _, _, _,  # and the acceleration that this gives them
     ANGLE, SPIN, SPIN_RATE,  # crank angle, rate and acceleration at the present stage
-    CELL, _,  # cell of the table and the angle from its middle
+    CELL, _,  # row of the tables and the angle from its cell's middle
     SPIN_MEAN, SPIN_RATE_MEAN,  # weighted means over the stages so far
-    PHI, K, SWAY, SWAY_RATE,  # swing; then beta's slope by theta, its rate with the crank held, steady
+    PHI, K,  # swing; beta by theta, time and pitch held
+    SWAY, SWAY_RATE,  # beta's rate less pitch_t and K theta_t; its acceleration less pitch_tt and K theta_tt
     FRAME_RATE,  # rate of beta
     TURN, _, HIP, _,  # e^(i beta); from the trunk's centre of mass to O
-    S, _, DS, _, U, _,  # first moment about O, its derivative by theta in the frame, with the swing [kg m]
-    INERTIA, COUPLING,  # of the crank with the swing geared to it; of crank and frame [kg m^2]
+    S, _, DS, _, U, _,  # first moment about O; by theta with the frame held, and swinging: DS + i K S [kg m]
+    INERTIA, COUPLING,  # a + 2 b K + c K^2 of the geared crank, b + c K of it and frame [kg m^2]
     PART, _, _, _, _, _, _, _, _, _, _, _,  # what a leg adds to the trunk's rows
-    LEVER,  # of crank and pitch [kg m^2]
+    LEVER,  # coupling of geared crank and pitch, COUPLING + HIP x U [kg m^2]
     Q_THETA, Q_BETA, PUSH, _,  # the ground: generalised forces [N m], force [N]
     REST_THETA, REST_BETA,  # generalised inertia forces at rest of the accelerations, weight included [N m]
     SPIN_RATE_FREE, SOFTNESS,  # crank acceleration if the trunk kept still; 1 / INERTIA, 0 if prescribed
-    CRANK_TORQUE, FRAME_TORQUE, CRANK_POWER, SWING_POWER,  # drives [N m, W]; FRAME_: in the world's sense
+    CRANK_TORQUE, FRAME_TORQUE, CRANK_POWER, SWING_POWER,  # drives [N m, W]; FRAME_: along beta
 ) = range(SLOPES + WIDTH, SLOPES + WIDTH + 57)  # fmt: skip
 
 CONTACT = SLOPES + WIDTH + 57
@@ -59,7 +60,7 @@ PARAMETERS = (
     "hip_x", "hip_y", "mass", "side", "first_row", "is_motor", "speed_gain", "torque_limit",
     "rotor_a", "rotor_b", "rotor_c",
 )  # fmt: skip
-"""Settings of a leg: its place on the trunk, mass, which way it travels, where its table begins, its motor,
-and what the rotor adds to the inertias a, b, c."""
+"""Settings of a leg: its place on the trunk, mass, which way it travels, the row where its table begins, its
+motor, and what the rotor adds to the inertias a, b, c."""
 
 ROWS = _P + 11

@@ -18,26 +18,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env._jit import inlined, kernel
+from hoof_env._jit import inlined
+from hoof_env.dynamics.vectors import put, times
 from hoof_env.leg.geometry import Geometry
 from hoof_env.leg.kinematics import cross, dot
 from hoof_env.leg.linkage import BODY_LENGTHS, CONSTRUCTION, JOINTS, Dyad
 
-STATE = (
-    "cos theta", "sin theta", "theta rate", "theta acc",
-    "cos beta", "sin beta", "beta rate", "beta acc",
-    "lift x", "lift y", "toe x", "toe y", "heel x", "heel y",
-)  # fmt: skip
-"""Rows of a batch's input: crank angle theta; world angle beta of the leg's frame after the mirror [rad, s];
-lift, the acceleration of O plus g upward [m/s^2]; ground forces [N]."""
-
 LOCK, DRIVER, HIP = 2 * len(JOINTS), 2 * len(JOINTS) + 1, 2 * len(JOINTS) + 2
 OUTPUTS = HIP + 1
-"""Rows of a batch's output: x and y of each joint's force [N] as in `linkage.JOINTS`; then three moments
+"""Rows of what is kept: x and y of each joint's force [N] as in `linkage.JOINTS`; then three moments
 [N m]: on body 10 by body 7, on the crank by the leg's frame, on the leg's frame by the trunk (about O)."""
-
-TILE = 32
-"""Lanes computed together: their rows, next to each other in memory, become vector code and stay in cache."""
 
 _STEPS = {step.point: step for step in CONSTRUCTION}
 _HINGES, _TRIANGLES = ("B", "F", "E", "J"), ("D", "I")  # dyads with a varying and with a constant span
@@ -52,7 +42,7 @@ _OP, _PB, _CB, _BD, _CD, _DE, _EF, _CF, _PF, _FG, _GJ, _AJ, _GI, _IJ = list(_ROW
 
 
 def leg_constants(geometry: Geometry) -> NDArray[np.float64]:
-    """What the kernels need of a leg, shape (CONSTANTS, 1); put several side by side for a batch of legs."""
+    """What the kernels need of a leg, shape (CONSTANTS, 1)."""
     lengths = geometry.lengths
     values = [lengths["OP"], geometry.travel * geometry.pivot[0], geometry.pivot[1], float(geometry.travel)]
     values += [
@@ -97,12 +87,6 @@ class Hinge(NamedTuple):
     one: complex
     two: complex
     inverse: float
-
-
-@inlined
-def scale(k: float, z: complex) -> complex:
-    """k z, without the products with zero that a complex multiplication would make of it."""
-    return complex(k * z.real, k * z.imag)
 
 
 @inlined
@@ -156,9 +140,9 @@ def triangle_point(g, column, row, first, second):  # type: ignore[no-untyped-de
 def beyond(first, second, origin, ratio):  # type: ignore[no-untyped-def]
     """The point at origin + ratio (second - first) of a link."""
     return Point(
-        origin.at + scale(ratio, second.at - first.at),
-        origin.v + scale(ratio, second.v - first.v),
-        origin.a + scale(ratio, second.a - first.a),
+        origin.at + times(ratio, second.at - first.at),
+        origin.v + times(ratio, second.v - first.v),
+        origin.a + times(ratio, second.a - first.a),
     )
 
 
@@ -166,14 +150,14 @@ def beyond(first, second, origin, ratio):  # type: ignore[no-untyped-def]
 def link_loads(g, column, row, tail, head):  # type: ignore[no-untyped-def]
     """Forces at tail and head that move a link as it moves, against its weight."""
     near, far = g[row, column], g[row + 1, column]
-    return scale(near, tail.a) + scale(far, head.a), scale(near, head.a) + scale(far, tail.a)
+    return times(near, tail.a) + times(far, head.a), times(near, head.a) + times(far, tail.a)
 
 
 @inlined
 def hinge_force(hinge, by_one, by_two):  # type: ignore[no-untyped-def]
     """The force that turns link one about its far end like `by_one`, and link two like `by_two`."""
     one, two, inverse = hinge
-    return scale(inverse * cross(one, by_one), two) - scale(inverse * cross(two, by_two), one)
+    return times(inverse * cross(one, by_one), two) - times(inverse * cross(two, by_two), one)
 
 
 # -- one leg -----------------------------------------------------------------------------------
@@ -199,7 +183,7 @@ def leg_reactions(  # type: ignore[no-untyped-def]
     """
     # The crank turns clockwise before the mirror.
     travel = g[_TRAVEL, column]
-    arm = scale(g[_CRANK, column], complex(travel * crank_turn.real, -crank_turn.imag))
+    arm = times(g[_CRANK, column], complex(travel * crank_turn.real, -crank_turn.imag))
     O = Point(0j, 0j, lift)  # noqa: E741
     C = turning(complex(g[_PIVOT, column], g[_PIVOT + 1, column]) * frame_turn, beta_rate, beta_acc, lift)
     P = turning(arm * frame_turn, beta_rate - travel * theta_rate, beta_acc - travel * theta_acc, lift)
@@ -238,10 +222,10 @@ def leg_reactions(  # type: ignore[no-untyped-def]
     ankle = gf_g + gj_gf + ig_gf
     lock = cross(G.at - F.at, ankle)
     gf_fe = gf_f + ankle
-    fe_ed = hinge_force(hinge_e, -ed_e, fe_e - scale(g[_SHANK, column], ankle))
+    fe_ed = hinge_force(hinge_e, -ed_e, fe_e - times(g[_SHANK, column], ankle))
     ed_db = ed_e + ed_d + fe_ed
     knee = fe_ed - gf_fe - fe_f - fe_e
-    fc_fe = hinge_force(hinge_f, fc_f + scale(g[_ROCKER, column], ja_fc), knee - pf_f)
+    fc_fe = hinge_force(hinge_f, fc_f + times(g[_ROCKER, column], ja_fc), knee - pf_f)
     pf_fe = knee - fc_fe
     fc_frame = fc_f + fc_c - fc_fe + ja_fc
     pf_op = pf_p + pf_f - pf_fe
@@ -270,93 +254,27 @@ def leg_reactions(  # type: ignore[no-untyped-def]
     return joints, lock, driver, hip
 
 
-# -- a batch -----------------------------------------------------------------------------------
-
-
-@kernel
-def leg_reactions_lanes(state, constants, out):  # type: ignore[no-untyped-def]
-    """Reactions of L legs, one a column.
-
-    Args:
-        state: shape (len(STATE), L).
-        constants: `leg_constants`, shape (CONSTANTS, L), or (CONSTANTS, 1) if all legs are the same.
-        out: shape (OUTPUTS, L), is filled.
-    """
-    lanes, shared = state.shape[1], constants.shape[1] == 1
-    g, now, found = np.empty((CONSTANTS, TILE)), np.empty((len(STATE), TILE)), np.empty((OUTPUTS, TILE))
-    if shared:
-        _load(constants, 0, g)
-    for start in range(0, lanes, TILE):
-        first = max(0, min(start, lanes - TILE))  # the last tile is full, too: some legs are computed twice
-        if not shared:
-            _load(constants, first, g)
-        _load(state, first, now)
-        for lane in range(TILE):
-            joints, lock, driver, hip = leg_reactions(
-                g, lane,
-                complex(now[0, lane], now[1, lane]), now[2, lane], now[3, lane],
-                complex(now[4, lane], now[5, lane]), now[6, lane], now[7, lane],
-                complex(now[8, lane], now[9, lane]),
-                complex(now[10, lane], now[11, lane]), complex(now[12, lane], now[13, lane]),
-            )  # fmt: skip
-            keep_reactions(found, lane, joints, lock, driver, hip)
-        _save(found, out, first)
-
-
 @inlined
 def keep_reactions(out, lane, joints, lock, driver, hip):  # type: ignore[no-untyped-def]
     """Write what `leg_reactions` returns into a column of `out`, shape (OUTPUTS, any)."""
-    _put(out, 0, lane, joints[0])
-    _put(out, 2, lane, joints[1])
-    _put(out, 4, lane, joints[2])
-    _put(out, 6, lane, joints[3])
-    _put(out, 8, lane, joints[4])
-    _put(out, 10, lane, joints[5])
-    _put(out, 12, lane, joints[6])
-    _put(out, 14, lane, joints[7])
-    _put(out, 16, lane, joints[8])
-    _put(out, 18, lane, joints[9])
-    _put(out, 20, lane, joints[10])
-    _put(out, 22, lane, joints[11])
-    _put(out, 24, lane, joints[12])
-    _put(out, 26, lane, joints[13])
-    _put(out, 28, lane, joints[14])
-    _put(out, 30, lane, joints[15])
-    _put(out, 32, lane, joints[16])
-    _put(out, 34, lane, joints[17])
-    _put(out, 36, lane, joints[18])
-    _put(out, 38, lane, joints[19])
+    put(out, 0, lane, joints[0])
+    put(out, 2, lane, joints[1])
+    put(out, 4, lane, joints[2])
+    put(out, 6, lane, joints[3])
+    put(out, 8, lane, joints[4])
+    put(out, 10, lane, joints[5])
+    put(out, 12, lane, joints[6])
+    put(out, 14, lane, joints[7])
+    put(out, 16, lane, joints[8])
+    put(out, 18, lane, joints[9])
+    put(out, 20, lane, joints[10])
+    put(out, 22, lane, joints[11])
+    put(out, 24, lane, joints[12])
+    put(out, 26, lane, joints[13])
+    put(out, 28, lane, joints[14])
+    put(out, 30, lane, joints[15])
+    put(out, 32, lane, joints[16])
+    put(out, 34, lane, joints[17])
+    put(out, 36, lane, joints[18])
+    put(out, 38, lane, joints[19])
     out[LOCK, lane], out[DRIVER, lane], out[HIP, lane] = lock, driver, hip
-
-
-@inlined
-def _put(out, row, lane, force):  # type: ignore[no-untyped-def]
-    out[row, lane], out[row + 1, lane] = force.real, force.imag
-
-
-@inlined
-def _load(rows, first, tile):  # type: ignore[no-untyped-def]
-    """Copy columns from `first` on; where there are fewer than a tile's, the last one several times."""
-    if first + TILE <= rows.shape[1]:
-        for k in range(tile.shape[0]):
-            row = rows[k, first : first + TILE]
-            for lane in range(TILE):
-                tile[k, lane] = row[lane]
-    else:
-        for k in range(tile.shape[0]):
-            for lane in range(TILE):
-                tile[k, lane] = rows[k, min(first + lane, rows.shape[1] - 1)]
-
-
-@inlined
-def _save(tile, rows, first):  # type: ignore[no-untyped-def]
-    """Copy a tile to the columns from `first` on, as many as there are."""
-    if first + TILE <= rows.shape[1]:
-        for k in range(tile.shape[0]):
-            row = rows[k, first : first + TILE]
-            for lane in range(TILE):
-                row[lane] = tile[k, lane]
-    else:
-        for k in range(tile.shape[0]):
-            for lane in range(rows.shape[1] - first):
-                rows[k, first + lane] = tile[k, lane]

@@ -1,11 +1,12 @@
-"""Time integration at fixed steps: explicit schemes whose stages each start from the one before.
+"""Schemes of `TrunkEngine`, as data: explicit ones whose stages each take the derivatives of the one before.
 
 Stage j + 1 is taken at fraction a_j of the step, from the step's start with the derivatives f_j of stage j,
 
     y_(j+1) = y_0 + a_j h f_j,    y(t + h) = y_0 + h sum of w_j f_j,
 
 which needs one derivative in memory and one sum. Semi-implicit Euler has one stage and moves the
-coordinates with the new rates. Source: Hairer, Norsett & Wanner, Solving Ordinary Differential Equations I.
+coordinates with the new rates. `integrators` has the schemes of `ConstrainedLeg`, as functions; the paper's
+explicit Euler is there alone. Source: Hairer, Norsett & Wanner, Solving Ordinary Differential Equations I.
 """
 
 from __future__ import annotations

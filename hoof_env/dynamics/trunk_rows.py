@@ -17,9 +17,8 @@ FIRST, MOVING = 1, 6
 NOW = 7  # the same at the present stage of a step
 NOW_CENTRE, _, NOW_MOMENTUM, _, NOW_PITCH, NOW_SPIN = range(NOW, NOW + 6)
 FLOW = 13  # time derivatives there
-CENTRE_FLOW, _, FORCE, _, PITCH_RATE, TWIST = range(
-    FLOW, FLOW + 6
-)  # outer force, its moment about the centre
+CENTRE_FLOW, _, FORCE, _, PITCH_RATE, TWIST = range(FLOW, FLOW + 6)
+# FORCE: outer, weight included [N]; TWIST: its moment about the centre [N m]
 MEAN = 19  # weighted mean of the derivatives at the stages so far
 
 (

@@ -58,16 +58,6 @@ def root_power(d, eighths):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def root_power_lanes(d, eighths, out):  # type: ignore[no-untyped-def]
-    """`root_power` of each lane: `d` and `out` are rows of one length that do not overlap (it would be slow).
-
-    The compiler takes the branches on `eighths` out of the loop, one loop for each case.
-    """
-    for lane in range(out.size):
-        out[lane] = root_power(d[lane], eighths)
-
-
-@inlined
 def exp_of_negative(x):  # type: ignore[no-untyped-def]
     """exp(x) for x <= 0, relative error below 1e-13; exp(-40) below -40.
 

@@ -5,8 +5,8 @@ deepest penetration. Damping is chi K d^n / (v0 m) + c / m, where v0 is the appr
 slope of its law times F / m: between the threshold speeds a few millimetres a second change it from nothing
 to all, which makes it the fastest of the three under a light hoof.
 
-The spring decides on accuracy. tests/ground/test_stiffness.py drops a mass on the contact of `lane_contact`
-and measures the error e of its state after it has left, that of the speed over the touch-down speed or that
+The spring decides on accuracy. tests/ground/test_stiffness.py drops a mass on the contact of Eq. 14 and
+measures the error e of its state after it has left, that of the speed over the touch-down speed or that
 of the place over the deepest penetration, whichever is larger, against an adaptive scheme of eighth order.
 For n from 1 to 3, chi from 0 to 3, weights up to 0.3 of the peak force, steps h w of 0.025 to 0.4 and 16
 places of the touch-down within a step, all of one law:
@@ -31,9 +31,8 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from hoof_env.errors import ParameterError, check_choice, check_number
+from hoof_env.errors import check_choice, check_number
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.normal_force import damping
 from hoof_env.ground.terrain import Terrain
@@ -112,7 +111,7 @@ def contact_rates(
 
     Args:
         ground: its laws.
-        mass: that the hoof point sets against a normal force [kg], see `effective_mass`.
+        mass: that the hoof point sets against a normal force [kg].
         load: force that presses the point down from outside [N], as a part of the weight; the spring is taken
             to overshoot under it.
         speed: with which the point touches down [m/s]. Fast ones go deep, slow ones are damped strongly:
@@ -147,30 +146,3 @@ def contact_rates(
         friction=mu * force * steepest / sliding_mass,
         exponent=n,
     )
-
-
-def substeps(h: float, rates: ContactRates, scheme: str, tolerance: float = 1e-2) -> int:
-    """Into how many parts a step of `h` [s] must be cut for `rates`; see `ContactRates.longest_steps`."""
-    h = check_number("h", h, low=0, exclusive_low=True)
-    return max(1, math.ceil(h / min(rates.longest_steps(scheme, tolerance).values())))
-
-
-def effective_mass(jacobian: ArrayLike, inertia: ArrayLike) -> float:
-    """Mass [kg] that a point sets against a force in one direction, 1 / (j M^-1 j).
-
-    Args:
-        jacobian: derivative j of the point's place in that direction by each coordinate, shape (n,).
-        inertia: mass matrix M, shape (n, n).
-
-    Raises:
-        ParameterError: shapes do not fit, or nothing moves the point that way.
-    """
-    j, m = np.asarray(jacobian, dtype=float), np.asarray(inertia, dtype=float)
-    if j.ndim != 1 or m.shape != (j.size, j.size):
-        raise ParameterError(
-            f"jacobian, inertia: expected shapes (n,) and (n, n), got {j.shape} and {m.shape}"
-        )
-    mobility = float(j @ np.linalg.solve(m, j))
-    if not mobility > 0:
-        raise ParameterError(f"jacobian: expected a direction in which the point can move, got {j.tolist()}")
-    return 1 / mobility

@@ -44,22 +44,3 @@ def surface(x, cells, origin, per_metre):  # type: ignore[no-untyped-def]
         cells[cell, 4] + part * cells[cell, 5],
         cells[cell, 6] + part * cells[cell, 7],
     )
-
-
-@inlined
-def surface_lanes(x, cells, origin, per_metre, out):  # type: ignore[no-untyped-def]
-    """`surface` at each of `x`, shape (lanes,), into the five rows of `out`, shape (5, lanes).
-
-    A loop of its own, for its loads from the table are not vector code and would keep the rest from being so;
-    level ground needs none.
-    """
-    if cells.shape[0] == 2:
-        for row, column in ((0, 0), (3, 4), (4, 6)):
-            lanes, value = out[row], cells[0, column]
-            for lane in range(x.size):
-                lanes[lane] = value + 0.0 * ((x[lane] - origin) * per_metre)  # no number where x is none
-        out[1], out[2] = 0.0, 1.0
-    else:
-        for lane in range(x.size):
-            found = surface(x[lane], cells, origin, per_metre)
-            out[0, lane], out[1, lane], out[2, lane], out[3, lane], out[4, lane] = found

@@ -1,9 +1,10 @@
-"""Joint reactions by dyads against Eq. 8's multipliers, Newton and Euler's laws and themselves in batches."""
+"""Joint reactions by dyads against Eq. 8's multipliers and Newton and Euler's laws."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from numba import njit
 
 from hoof_env.dynamics.constrained import ConstrainedLeg
 from hoof_env.dynamics.constraints import closed_form
@@ -13,11 +14,9 @@ from hoof_env.dynamics.reactions import (
     HIP,
     LOCK,
     OUTPUTS,
-    STATE,
-    TILE,
+    keep_reactions,
     leg_constants,
     leg_reactions,
-    leg_reactions_lanes,
 )
 from hoof_env.gait.motion_law import evaluate_motion
 from hoof_env.gait.parameters import load_gait
@@ -48,7 +47,7 @@ AIR = ((0.0, 0.0), (0.0, 0.0))
 
 
 def columns(count, seed=0):
-    """Random states of legs, shape (len(STATE), count), with their angles theta and beta."""
+    """Random states of legs, rows as `solve` has columns, shape (14, count); their angles theta and beta."""
     rng = np.random.default_rng(seed)
     theta, beta = rng.uniform(0, 2 * np.pi, count), rng.uniform(-0.5, 0.5, count)
     rates = rng.normal(0, 10, (4, count))
@@ -61,10 +60,22 @@ def cross(arms, forces):
     return arms[..., 0] * forces[..., 1] - arms[..., 1] * forces[..., 0]
 
 
+@njit(error_model="numpy")
+def solve(state, constants, out):
+    """A leg a row: turn, rate and acceleration of crank and of frame, lift, forces on toe and heel."""
+    z = state[:, 0::2] + 1j * state[:, 1::2]
+    for k in range(len(z)):
+        joints, lock, driver, hip = leg_reactions(
+            constants, 0, z[k, 0], z[k, 1].real, z[k, 1].imag, z[k, 2], z[k, 3].real, z[k, 3].imag,
+            z[k, 4], z[k, 5], z[k, 6],
+        )  # fmt: skip
+        keep_reactions(out, k, joints, lock, driver, hip)
+
+
 def solved(geometry, state):
-    """Outputs of one leg or of several alike."""
+    """Outputs of legs alike, shape (OUTPUTS, count)."""
     out = np.full((OUTPUTS, state.shape[1]), np.nan)
-    leg_reactions_lanes(np.ascontiguousarray(state), leg_constants(geometry), out)
+    solve(np.ascontiguousarray(state.T), leg_constants(geometry), out)
     return out
 
 
@@ -152,32 +163,3 @@ def test_a_massless_leg_in_the_air_carries_nothing():
     state, _, _ = columns(50)
     state[10:] = 0
     assert np.abs(solved(geometry, state)).max() < 1e-6
-
-
-@pytest.mark.parametrize("count", [1, 3, TILE - 1, TILE, TILE + 1, 64, 1000])
-@pytest.mark.parametrize("alike", [True, False])
-def test_a_leg_alone_and_in_a_batch_gives_the_same_bits(count, alike):
-    geometries = [PRESETS["identified"]] if alike else list(LEGS.values())
-    constants = np.hstack([leg_constants(g) for g in geometries])
-    which = np.arange(count) % len(geometries)
-    state, _, _ = columns(count, seed=count)
-    batch = np.full((OUTPUTS, count), np.nan)
-    leg_reactions_lanes(state, constants if alike else np.ascontiguousarray(constants[:, which]), batch)
-    alone = np.empty_like(batch)
-    for k in range(0, count, max(1, count // 50)):
-        c = state[:, k]
-        joints, *moments = leg_reactions(
-            constants, which[k], complex(c[0], c[1]), c[2], c[3], complex(c[4], c[5]), c[6], c[7],
-            complex(c[8], c[9]), complex(c[10], c[11]), complex(c[12], c[13]),
-        )  # fmt: skip
-        alone[:, k] = [*np.array(joints).view(float), *moments]
-        assert alone[:, k].tobytes() == batch[:, k].tobytes()
-
-
-def test_any_batch_can_be_cut_in_pieces():
-    state, _, _ = columns(100)
-    assert len(STATE) == state.shape[0]
-    whole = solved(PRESETS["identified"], state)
-    for cut in (0, 1, 40, 99):
-        pieces = [solved(PRESETS["identified"], part) for part in np.split(state, [cut], axis=1)]
-        assert np.hstack(pieces).tobytes() == whole.tobytes()

@@ -40,7 +40,7 @@ def test_a_prescribed_crank_has_the_reactions_of_eq_8(preset, theta):
 def horse(n=1, **changes):
     limbs = [Limb(LEG, (x, 0.05)) for x in (-0.75, -0.7, 0.7, 0.75)]
     trunk = Trunk("free", mass=320.0, pitch_inertia=80.0, height=LEG.hip_height - 0.05, drag=30.0)
-    made = TrunkEngine(limbs, trunk, GROUND, num_envs=n, substeps=1, **changes)
+    made = TrunkEngine(limbs, trunk, GROUND, num_envs=n, **changes)
     made.reset(WALK, np.linspace(0, 6, n) + 1.5 * np.arange(4)[:, None], vx=1.0)
     return made
 

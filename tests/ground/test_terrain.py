@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hoof_env.errors import ParameterError
-from hoof_env.ground.surface import surface, surface_lanes
+from hoof_env.ground.surface import surface
 from hoof_env.ground.terrain import LONG_WAY, Terrain
 
 
@@ -110,18 +110,6 @@ def test_what_is_not_a_number_stays_so():
     for terrain in (Terrain(), Terrain.ramp(0.2)):
         height, _, _, stiffness, friction = surface(math.nan, *terrain.to_grid())
         assert np.isnan([height, stiffness, friction]).all()
-        out = np.empty((5, 1))
-        surface_lanes(np.array([math.nan]), *terrain.to_grid(), out)
-        assert np.isnan(out[[0, 3, 4]]).all()
-
-
-@given(terrains(), st.integers(1, 100))
-@settings(deadline=None, max_examples=50)
-def test_a_lane_has_the_bits_that_it_has_alone(terrain, lanes):
-    x = np.random.default_rng(lanes).uniform(-100, 100, lanes)
-    out = np.empty((5, lanes))
-    surface_lanes(x, *terrain.to_grid(), out)
-    np.testing.assert_array_equal(out.view(np.int64), np.ascontiguousarray(at(terrain, x)).view(np.int64))
 
 
 @pytest.mark.parametrize(
