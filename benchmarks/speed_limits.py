@@ -95,7 +95,7 @@ CEILINGS: dict[str, tuple[Any, int]] = {
 
 def _kernel(tile: int, legs: int) -> Any:
     def advance(arrays, model, h, steps, account):  # type: ignore[no-untyped-def]
-        run(arrays, model, h, steps, account, legs, tile)
+        run(arrays, model, h, steps, account, legs, tile, False)
 
     return numba.njit(error_model="numpy")(advance)
 
