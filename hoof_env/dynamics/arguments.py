@@ -13,10 +13,12 @@ Floats = NDArray[np.float64]
 Kind = TypeVar("Kind")
 
 
-def count(name: str, value: Any, low: int = 1) -> int:
-    """`value` as a whole number of `low` or more."""
+def count(name: str, value: Any, low: int = 1, most: float = np.inf) -> int:
+    """`value` as a whole number from `low` to `most`."""
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)) or value < low:
         raise ParameterError(f"{name}: expected a whole number, {low} or more, got {value!r}")
+    if value > most:
+        raise ParameterError(f"{name}: expected at most {most:g}, got {value!r}")
     return int(value)
 
 

@@ -48,6 +48,12 @@ from hoof_env.leg.profile import leg_profile
 FEW = 6
 """Up to so many environments are run one by one: a tile would be mostly empty."""
 
+MOST_LEGS = 32
+"""Legs of an engine; its kernels work on the stack, where a tile takes up to 75 kB a leg."""
+
+MOST_STEPS = 10**12
+"""Substeps of a call, which are counted in 64 bits."""
+
 STATE = ("trunk", "limbs", "command", "account")
 """Arrays that hold what changes."""
 
@@ -72,7 +78,7 @@ class TrunkEngine:
     """Legs on a trunk over the ground; see the module docstring.
 
     Args:
-        limbs: the legs in their places; their order is that of every array with a leg axis.
+        limbs: the legs in their places, at most `MOST_LEGS`; in their order every array has them.
         trunk: what they hang from. Its height is that of its centre of mass.
         ground: laws of contact. Its exponent must be a multiple of 1/8, so that square roots are enough.
         terrain: heights, and where the ground is softer or more slippery; level if None.
@@ -114,6 +120,8 @@ class TrunkEngine:
         reactions: bool = False,
     ) -> None:
         self.limbs = all_of("limbs", limbs, Limb)
+        if len(self.limbs) > MOST_LEGS:
+            raise ParameterError(f"limbs: expected at most {MOST_LEGS}, got {len(self.limbs)}")
         self.trunk = one_of("trunk", trunk, Trunk)
         self.ground = Ground() if ground is None else one_of("ground", ground, Ground)
         self.terrain = Terrain.flat() if terrain is None else one_of("terrain", terrain, Terrain)
@@ -124,7 +132,8 @@ class TrunkEngine:
         self.profiles = [leg_profile(limb.geometry) for limb in self.limbs]
         length = StepLength(self.limbs, self.profiles, self.trunk, self.ground, self.terrain, self.integrator)
         self.step_limits = length.limits
-        self.substeps = length.choose(self.sim_dt, None if substeps is None else count("substeps", substeps))
+        asked = None if substeps is None else count("substeps", substeps, most=MOST_STEPS)
+        self.substeps = length.choose(self.sim_dt, asked)
         self.reacts = bool(reactions)
         self._arrays = new_arrays(self)
         self._model = new_model(self)
@@ -176,7 +185,7 @@ class TrunkEngine:
 
         Raises:
             ParameterError: a value is not finite, of the wrong shape or forbidden by the trunk's kind, an
-                angle or place is beyond `trunk_start.FARTHEST`, or a leg's links have no place there.
+                angle, place or rate is beyond `trunk_start.FARTHEST`, or a leg's links have no place there.
         """
         where, legs, a = self._which(envs), len(self.limbs), self._arrays
         one = isinstance(gaits, GaitParameters)
@@ -249,7 +258,7 @@ class TrunkEngine:
         """
         if command is not None:
             self._command(command)
-        self._go(count("steps", steps, low=0), account)
+        self._go(count("steps", steps, 0, MOST_STEPS // self.substeps), account)
         if steps and self._arrays.result.any():
             self._look()
         return self._arrays.result.copy()
@@ -348,7 +357,11 @@ class TrunkEngine:
 
     def messages(self) -> list[str]:
         """How each environment ended, for people."""
-        return [Result(int(code)).message for code in self._arrays.result]
+        never = np.isnan(self._arrays.trunk).all(0)
+        return [
+            "this environment was never reset" if new else Result(int(code)).message
+            for code, new in zip(self._arrays.result, never, strict=True)
+        ]
 
     def _which(self, envs: ArrayLike | None) -> NDArray[np.int64]:
         if envs is None:
@@ -356,6 +369,8 @@ class TrunkEngine:
         given = np.asarray(envs)
         if given.dtype == bool and given.shape == (self.num_envs,):
             return np.flatnonzero(given)
+        if given.shape == (0,):
+            return np.arange(0)
         if given.dtype.kind in "iu" and given.ndim == 1 and np.all((given >= 0) & (given < self.num_envs)):
             return given.astype(np.int64)
         raise ParameterError(

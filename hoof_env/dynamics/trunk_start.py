@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 FARTHEST = 1e9
 """Largest angles [rad] and places [m] of a state, which are as good as numbers are fine there: to 6e-10 at
-1e6, to 6e-7 at 1e9."""
+1e6, to 6e-7 at 1e9; also the largest rates of a start, whose squares are then numbers still."""
 
 
 def start(
@@ -45,7 +45,7 @@ def start(
     """
     legs = len(engine.limbs)
     angle = spread("theta", theta, (legs, n), FARTHEST)
-    spin = spread("theta_rate", gaits[:, :1] if theta_rate is None else theta_rate, (legs, n))
+    spin = spread("theta_rate", gaits[:, :1] if theta_rate is None else theta_rate, (legs, n), FARTHEST)
     for i, limb in enumerate(engine.limbs):
         if not isinstance(limb.drive, Motor) and np.any(spin[i] != gaits[i, 0]):
             raise ParameterError(
@@ -53,10 +53,7 @@ def start(
             )
         if not np.isfinite(engine.profiles[i](angle[i])[0]).all():
             raise ParameterError(f"theta: the links of leg {i} have no place at some of {angle[i]} rad")
-    at = {
-        name: spread(name, value, (n,), FARTHEST if name in ("x", "y", "pitch") else np.inf)
-        for name, value in trunk.items()
-    }
+    at = {name: spread(name, value, (n,), FARTHEST) for name, value in trunk.items()}
     kind = TRUNKS.index(engine.trunk.kind)
     for name, kinds in (
         ("vx", (RAIL, SUSPENDED, FREE)), ("vy", (SUSPENDED, FREE)), ("pitch", (FREE,)),

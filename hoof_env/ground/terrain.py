@@ -122,6 +122,9 @@ class Terrain:
         Raises:
             ParameterError: a patch is not of that form, or patches overlap.
         """
+        spacing = check_number("terrain.spacing", spacing, low=1e-4, high=1e6)
+        if not isinstance(patches, Iterable):
+            raise ParameterError(f"patches: expected a row of patches, got {_short(patches)}")
         rows = []
         for number, patch in enumerate(patches):
             values = _row(f"patches[{number}]", patch, -1e6, 1e6, None)

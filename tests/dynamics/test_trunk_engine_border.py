@@ -38,6 +38,7 @@ def engine(trunk=FREE, n=3, ground=None):
         ({"limbs": ()}, r"limbs: expected Limb, one or more, got \(\)"),
         ({"limbs": LEG}, "limbs: expected Limb, one or more, got Geometry"),
         ({"limbs": [LIMBS[0], None]}, "limbs: expected Limb, one or more, got .*None"),
+        ({"limbs": LIMBS[:1] * 33}, "limbs: expected at most 32, got 33"),
         ({"limbs": 3}, "limbs: expected Limb, one or more, got 3"),
         ({"trunk": "free"}, "trunk: expected Trunk, got 'free'"),
         ({"trunk": None}, "trunk: expected Trunk, got None"),
@@ -92,6 +93,8 @@ def test_an_engine_that_cannot_be(changes, message):
         ("rail", {"y": 1.5}, "y: a rail trunk is at 1.6 m, got"),
         ("fixed", {"vx": 0.1}, "vx: expected 0 of a fixed trunk, got"),
         ("fixed", {"y": 1.7}, "y: a fixed trunk is at 1.6 m, got"),
+        ("free", {"vx": 1e200}, r"vx: expected numbers within \+-1e\+09, got 1e\+200"),
+        ("free", {"theta_rate": [1e200, 1.0]}, r"theta_rate: expected numbers within \+-1e\+09"),
         ("free", {"envs": 1}, r"envs: expected indices below 3 or a mask of shape \(3,\), got 1"),
         ("free", {"envs": [0, 3]}, r"envs: expected indices below 3 or a mask of shape \(3,\), got \[0, 3\]"),
         ("free", {"envs": [-1]}, r"envs: expected indices below 3 or a mask of shape \(3,\), got \[-1\]"),
@@ -118,6 +121,7 @@ def test_a_start_that_cannot_be(kind, changes, message):
         (([1.0, np.nan, 0.0, 0.0],), "command: expected finite numbers, got .*nan"),
         (("trot",), "command: expected finite numbers, got 'trot'"),
         ((None, -1), "steps: expected a whole number, 0 or more, got -1"),
+        ((None, 2**62), r"steps: expected at most 1e\+12, got 4611686018427387904"),
         ((None, 1.0), "steps: expected a whole number, 0 or more, got 1.0"),
     ],
 )
@@ -132,6 +136,9 @@ def test_an_advance_that_cannot_be(arguments, message):
 def test_before_a_reset_it_is_nowhere():
     e = TrunkEngine(LIMBS, FREE, num_envs=2)
     assert e.advance().tolist() == [Result.NOT_FINITE] * 2
+    assert e.messages() == ["this environment was never reset"] * 2
+    e.reset([RUN, WALK], envs=[])
+    assert np.isnan(e.state["theta"]).all()
     e.reset([RUN, WALK], envs=[1])
     assert e.advance(steps=10).tolist() == [Result.NOT_FINITE, Result.OK]
     assert e.messages()[1] == "ok"

@@ -137,6 +137,8 @@ def test_what_is_not_a_number_stays_so():
         (lambda: Terrain.through([0, 1e6], [1, 1]), "terrain.spacing: expected at most .* knots"),
         (lambda: Terrain.patches([(1, 0, 1, 1)]), r"patches\[0\]: expected \(x0, x1, .*got \(1, 0, 1, 1\)"),
         (lambda: Terrain.patches([(0, 1, 1)]), r"patches\[0\]: expected \(x0, x1"),
+        (lambda: Terrain.patches(None), "patches: expected a row of patches, got None"),
+        (lambda: Terrain.patches([(0, 1, 1, 1)], spacing="fine"), "terrain.spacing: .*got 'fine'"),
         (lambda: Terrain.patches([1]), r"patches\[0\]: expected a row of numbers, got 1"),
         (lambda: Terrain.patches([(0, 2, 1, 1), (1, 3, 1, 1)]), "patches: expected patches apart"),
         (lambda: Terrain.patches([(0, 2, 1, 1)], spacing=0), "terrain.spacing"),
