@@ -30,7 +30,6 @@ from benchmarks.speed_report import markdown, speed_table
 from benchmarks.speed_rounds import interleave, spread
 from benchmarks.speed_scaling import draw, line_error, scaling, startup
 from hoof_env._output import staged
-from hoof_env.leg.geometry import DEFAULT_PRESET
 
 RESULTS = Path(__file__).parent / "results"
 ROUNDS = 40
@@ -81,6 +80,10 @@ def _commit() -> str:
         return git("rev-parse", "--short", "HEAD") + (" and changes" if changed else "")
     except (OSError, subprocess.CalledProcessError):
         return "unknown"
+
+
+PRESET = "first_fit"
+"""The leg and the ground of HorseLeg-v0."""
 
 
 def measure(preset: str, quick: bool, peers: bool, rounds: int) -> dict[str, Any]:
@@ -151,7 +154,7 @@ def main(arguments: list[str] | None = None) -> None:
     """The command; see `--help`."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.speed", description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=RESULTS, help="folder for the results")
-    parser.add_argument("--preset", default=DEFAULT_PRESET, help="whose leg")
+    parser.add_argument("--preset", default=PRESET, help="whose leg and ground; the default is HorseLeg-v0's")
     parser.add_argument("--rounds", type=int, help=f"how many; {ROUNDS} if not given")
     parser.add_argument("--clock", choices=cases.CLOCKS, default="wall", help="processor: on a busy machine")
     parser.add_argument("--quick", action="store_true", help="a smoke test: small numbers that mean nothing")

@@ -176,7 +176,9 @@ def markdown(result: dict[str, Any]) -> str:
     """The whole page."""
     parts = [
         INTRO.format(**result),
-        table(["", ""], [[k, v] for k, v in result["machine"].items()]),
+        table(
+            ["", ""], [["leg and ground", result["preset"]], *([k, v] for k, v in result["machine"].items())]
+        ),
     ]
     parts += [RATIOS, speed_table(result["cases"]), *(f"- {note}" for note in result["notes"])]
     parts += [WALKING.format(steps=result["walking_steps"]), _walking(result["walking"])]
