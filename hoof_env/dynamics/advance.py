@@ -1,49 +1,88 @@
-"""The engine's kernels: environments go through a tile, step after step, and come back.
+"""The engine's kernels: environments come from the engine's memory, go step after step, and go back.
 
-`advance_one_leg`, `advance_four_legs`, `advance_one` and `advance_batch` are one function, compiled for one
-lane, for four that are the legs of one trunk, for one lane and any number of legs, and for `TILE`
-environments side by side; `react_...` add the joint reactions of every step. A tile lives on the stack: of
-one lane the compiler keeps most in registers, of many each loop becomes vector code.
+`advance_leg`, `advance_four`, `advance_one` and `advance_batch` are one function, compiled for one leg alone,
+for four lanes that are the legs of one trunk, for one lane and any number of legs, and for `LANES`
+environments side by side. What they work on lives on the stack, where the compiler keeps what it can in
+registers.
+
+An engine's memory is one matrix `data`, a column for each environment: the rows of the trunk, then those of
+each leg, as `TRUNK` and `LIMB` have them.
 """
 
 from __future__ import annotations
 
+from itertools import accumulate, pairwise
 from typing import Any, NamedTuple
 
+import numpy as np
 from numba import carray
 
 from hoof_env._jit import inlined, kernel, pasted
+from hoof_env._lanes import below, choose, fill, lane_sum, level, read, rows, write
 from hoof_env._memory import address, doubles, offset
 from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
 from hoof_env.dynamics.lanes import evaluate, keep_still
 from hoof_env.dynamics.lanes_ground import level_ground, remember_contacts
 from hoof_env.dynamics.lanes_reactions import react
-from hoof_env.dynamics.lanes_report import ACCOUNT, keep_account, report
-from hoof_env.dynamics.lanes_time import begin_step, bend_filters, end_step, next_stage, weigh_stage
+from hoof_env.dynamics.lanes_report import (
+    ACCOUNT,
+    LIMB_REPORT,
+    TRUNK_REPORT,
+    keep_account,
+    report_leg,
+    report_trunk,
+)
+from hoof_env.dynamics.lanes_time import begin_step, end_step, next_stage, weigh_stage
 from hoof_env.dynamics.reactions import CONSTANTS, OUTPUTS
 from hoof_env.dynamics.trunk import FIXED
 
-TILE = 32
-"""Environments side by side: whole vectors, few enough that their rows stay in the nearest cache."""
-
-MOST_STAGES = 4
+LANES = 8
+"""Environments side by side in a batch: one vector of 512 bits."""
 
 OK, NOT_FINITE, DEAD_POINT, FALLEN = 0, 1, 3, 4
 """As in `result.Result`."""
 
 
+def _blocks(**sizes: int) -> dict[str, slice]:
+    """Consecutive rows by name."""
+    ends = accumulate(sizes.values(), initial=0)
+    return {name: slice(*pair) for name, pair in zip(sizes, pairwise(ends), strict=True)}
+
+
+TRUNK = _blocks(
+    state=len(t.STATE), settings=len(t.PARAMETERS), account=len(ACCOUNT), report=len(TRUNK_REPORT), result=1
+)
+LIMB = _blocks(state=len(b.STATE), command=4, settings=len(b.PARAMETERS), report=len(LIMB_REPORT))
+"""Rows of `data`: the engine's state and settings, what it was told, and what it tells."""
+
+TRUNK_ROWS, LIMB_ROWS = TRUNK["result"].stop, LIMB["report"].stop
+TRUNK_STATES, TRUNK_SETTINGS, ACCOUNTS = len(t.STATE), len(t.PARAMETERS), len(ACCOUNT)
+LIMB_STATES, LIMB_SETTINGS = len(b.STATE), len(b.PARAMETERS)
+AT_SETTINGS, AT_ACCOUNT, AT_REPORT, AT_RESULT = (block.start for block in list(TRUNK.values())[1:])
+AT_COMMAND, AT_LIMB_SETTINGS, AT_LIMB_REPORT = (block.start for block in list(LIMB.values())[1:])
+
+MODEL = np.dtype(
+    [
+        ("legs", "i8"), ("cells", "i8"),  # how many; cells of a leg's table
+        ("kind", "i8"), ("eighths", "i8"), ("friction_law", "i8"),  # of trunk, contact exponent, friction
+        ("interpolated", "?"), ("is_terrain", "?"), ("new_rates", "?"),  # see `Ground`, `Terrain`, `schemes`
+        ("stages", "i8"), ("fractions", "f8", (4,)), ("weights", "f8", (4,)),  # of the scheme
+        ("settings", "f8", (12,)),  # of the filters
+        ("ground_origin", "f8"), ("ground_per_metre", "f8"),  # of the terrain's grid
+    ]
+)  # fmt: skip
+"""What does not change while the engine runs, but for large arrays."""
+
+
 class Model(NamedTuple):
-    """What does not change while the engine runs, as the kernels take it.
+    """`MODEL` inside the kernels, small arrays on the stack, with the large ones.
 
     Attributes:
-        kind, eighths, friction_law: of trunk, contact exponent and friction.
-        interpolated, is_terrain, new_rates: see `Ground`, `Terrain` and `schemes`.
-        together: the lanes of a tile are the legs of one trunk; the kernels set it.
-        cells, tables: cells of a leg's table; all tables, one after the other, shape (rows, coefficients).
-        settings: of the filters, shape (4, 3).
-        fractions, weights: of the scheme, shapes (stages - 1,) and (stages,).
-        ground_cells, ground_origin, ground_per_metre: the terrain's grid.
+        together: the lanes are the legs of one trunk.
+        tables: pointer to the tables of all legs, one after the other.
+        settings, fractions, weights: pointers.
+        ground_cells: of the terrain's grid.
     """
 
     kind: int
@@ -56,6 +95,7 @@ class Model(NamedTuple):
     cells: int
     tables: Any
     settings: Any
+    stages: int
     fractions: Any
     weights: Any
     ground_cells: Any
@@ -63,238 +103,159 @@ class Model(NamedTuple):
     ground_per_metre: float
 
 
-class Arrays(NamedTuple):
-    """The engine's arrays; the last axis is the environment.
-
-    Attributes:
-        trunk, limbs: the state, shapes (7, n) and (legs, 16, n).
-        trunk_settings, limb_settings: parameters, shapes (17, n) and (legs, 11, n).
-        command: shape (legs, 4, n).
-        account: shape (9, n), added to.
-        trunk_report, limb_report: at the end, shapes (8, n) and (legs, 18, n).
-        result: how it ended, shape (n,); where it is not OK the state is left as it was.
-        constants, reactions: of `reactions`, shapes (legs, CONSTANTS) and (legs, OUTPUTS, n); the latter is
-            filled by the kernels that react.
-    """
-
-    trunk: Any
-    limbs: Any
-    trunk_settings: Any
-    limb_settings: Any
-    command: Any
-    account: Any
-    trunk_report: Any
-    limb_report: Any
-    result: Any
-    constants: Any
-    reactions: Any
-
-
 @inlined
-def inner(model, small, together):  # type: ignore[no-untyped-def]
-    """The same model with its small arrays in `small`, on the stack, and a pointer to the large one."""
-    stages = model.weights.shape[0]
-    settings = carray(small, (4, 3))
+def inner(model, tables, ground, small, together):  # type: ignore[no-untyped-def]
+    """The model from its record and arrays; `small` points to room for 20 doubles."""
+    given = model[0]
+    for k in range(12):
+        small[k] = given.settings[k]
     for k in range(4):
-        for j in range(3):
-            settings[k, j] = model.settings[k, j]
-    weights, fractions = carray(offset(small, 12), (stages,)), carray(offset(small, 16), (stages,))
-    for j in range(stages):
-        weights[j] = model.weights[j]
-        fractions[j] = model.fractions[j] if j < stages - 1 else 1.0
-    cells = model.ground_cells
+        small[12 + k], small[16 + k] = given.fractions[k], given.weights[k]
     return Model(
-        model.kind, model.eighths, model.friction_law, model.interpolated, model.is_terrain, model.new_rates,
-        together, model.cells, address(model.tables), settings, fractions, weights,
-        carray(address(cells), cells.shape), model.ground_origin, model.ground_per_metre,
+        given.kind, given.eighths, given.friction_law, given.interpolated, given.is_terrain, given.new_rates,
+        together, given.cells, address(tables), small, given.stages, offset(small, 12), offset(small, 16),
+        carray(address(ground), ground.shape), given.ground_origin, given.ground_per_metre,
     )  # fmt: skip
 
 
-@pasted
-def load(arrays, trunk, limbs, account, n, together):  # type: ignore[no-untyped-def]
-    """Fill a tile with environments n, n + 1, ..., the last one repeated if need be, or with n alone."""
-    last = arrays.result.shape[0] - 1
-    for lane in range(trunk.shape[1]):
-        e = n if together else min(n + lane, last)
-        for k in range(len(t.STATE)):
-            trunk[k, lane] = arrays.trunk[k, e]
-        for k in range(len(t.PARAMETERS)):
-            trunk[t.TOTAL_MASS + k, lane] = arrays.trunk_settings[k, e]
-        for k in range(len(ACCOUNT)):
-            account[k, lane] = 0.0
-        for i in range(limbs.shape[0]):
-            leg = lane if together else i
-            for k in range(len(b.STATE)):
-                limbs[i, k, lane] = arrays.limbs[leg, k, e]
-            for k in range(len(b.PARAMETERS)):
-                limbs[i, b.HIP_ON_TRUNK + k, lane] = arrays.limb_settings[leg, k, e]
-            for k in range(4):
-                limbs[i, b.COMMAND + k, lane] = arrays.command[leg, k, e]
-    for k in range(t.MOVING):
-        for lane in range(trunk.shape[1]):
-            trunk[t.NOW + k, lane] = trunk[t.FIRST + k, lane]
+@inlined
+def load_trunk_rows(trunk, data, n, row, stride):  # type: ignore[no-untyped-def]
+    """State and settings of environments n, n + stride, ..."""
+    fill(trunk, 0, TRUNK_STATES, data, n, row, stride)
+    fill(trunk, t.TOTAL_MASS, TRUNK_SETTINGS, data, n + AT_SETTINGS * row, row, stride)
     keep_still(trunk)
-    for i in range(limbs.shape[0]):
-        level_ground(limbs[i])
 
 
 @inlined
-def judge(trunk, limbs, model, first, lanes):  # type: ignore[no-untyped-def]
-    """How the environment in `lanes` lanes from `first` on ended, one of `result.Result`."""
-    total, stuck = 0.0, 0.0
-    for lane in range(first, first + lanes):
-        stuck += trunk[t.STUCK, lane]
-        for k in range(len(t.STATE)):
-            total += trunk[k, lane]
-        for i in range(limbs.shape[0]):
-            for k in range(len(b.STATE)):
-                total += limbs[i, k, lane]
-            total += limbs[i, b.SPIN_RATE, lane]
-    if total - total != 0.0:
-        return DEAD_POINT if stuck > 0.0 else NOT_FINITE
-    if model.kind != FIXED and trunk[t.PLACE + 1, first] < trunk[t.BOTTOM, first]:
-        return FALLEN
-    return OK
+def load_limb_rows(limb, data, start, row, stride):  # type: ignore[no-untyped-def]
+    """State, command and settings of a leg, whose rows begin at `start`."""
+    fill(limb, 0, LIMB_STATES, data, start, row, stride)
+    fill(limb, b.COMMAND, 4, data, start + AT_COMMAND * row, row, stride)
+    fill(limb, b.HIP_ON_TRUNK, LIMB_SETTINGS, data, start + AT_LIMB_SETTINGS * row, row, stride)
+    level_ground(limb)
+
+
+@inlined
+def judge(trunk, limbs, legs, together):  # type: ignore[no-untyped-def]
+    """How the environments ended, numbers of `result.Result`."""
+    total, stuck = level(trunk, 0.0), trunk[t.STUCK]
+    for k in range(TRUNK_STATES):
+        total = total + trunk[k]
+    for i in range(legs):
+        limb = below(limbs, i * b.ROWS)
+        total = total + limb[b.SPIN_RATE]
+        for k in range(LIMB_STATES):
+            total = total + limb[k]
+    if together:
+        total, stuck = lane_sum(level(trunk, 0.0), total), lane_sum(level(trunk, 0.0), stuck)
+    lost = choose(stuck > 0.0, float(DEAD_POINT), float(NOT_FINITE))
+    fell = choose(trunk[t.FELL] > 0.0, float(FALLEN), float(OK))
+    return choose(total - total != 0.0, lost, fell)
+
+
+@inlined
+def replace(old, new, count, data, start, row, stride, result):  # type: ignore[no-untyped-def]
+    """Put `count` rows into memory where all is well."""
+    for k in range(count):
+        at = start + k * row
+        before = read(old, data, at, stride)
+        write(choose(result == float(OK), new[k], before), data, at, stride)
 
 
 @pasted
-def store(arrays, model, trunk, limbs, account, n, envs):  # type: ignore[no-untyped-def]
-    """Write back the environments that ended well, and how each ended."""
-    lanes = trunk.shape[1] if model.together else 1
-    for e in range(envs):
-        result = judge(trunk, limbs, model, e, lanes)
-        arrays.result[n + e] = result
-        if result == OK:
-            for k in range(len(t.STATE)):
-                arrays.trunk[k, n + e] = trunk[k, e]
-            for k in range(len(ACCOUNT)):
-                arrays.account[k, n + e] += account[k, e]
-            for lane in range(lanes):
-                for i in range(limbs.shape[0]):
-                    leg = lane if model.together else i
-                    for k in range(len(b.STATE)):
-                        arrays.limbs[leg, k, n + e] = limbs[i, k, e + lane]
-
-
-@pasted
-def run_tile(model, trunk, limbs, account, h, steps, keeps_account, evaluated):  # type: ignore[no-untyped-def]
-    """Advance what is in the tile by `steps` of `h` [s] and evaluate it there; `evaluated` if it is now."""
-    stages = model.weights.shape[0]
+def run_steps(trunk, limbs, legs, model, account, constants, found, h, steps, keeps_account, reacts):  # type: ignore[no-untyped-def]
+    """Advance by `steps` of `h` [s] and evaluate there."""
     stage, elapsed = 0, 0.0
-    bend_filters(limbs, model.settings)
-    begin_step(trunk, limbs, model)
-    for turn in range(steps * stages + 1):
-        if turn > 0 or not evaluated:
-            evaluate(trunk, limbs, model, elapsed)
+    begin_step(trunk, limbs, legs, model)
+    for turn in range(steps * model.stages + 1):
+        evaluate(trunk, limbs, legs, model, elapsed)
         if stage == 0:
-            for i in range(limbs.shape[0]):
-                remember_contacts(limbs[i])
-        if turn < steps * stages:
+            for i in range(legs):
+                limb = below(limbs, i * b.ROWS)
+                remember_contacts(limb)
+                if reacts and (turn > 0 or steps == 0):
+                    react(trunk, limb, below(constants, i * CONSTANTS), below(found, i * OUTPUTS))
+        if turn < steps * model.stages:
+            weight = model.weights[stage]
             if keeps_account:
-                keep_account(trunk, limbs, model, account, h * model.weights[stage])
-            weigh_stage(trunk, limbs, model, model.weights[stage])
+                keep_account(trunk, limbs, legs, model, account, h * weight)
+            weigh_stage(trunk, limbs, legs, model, weight)
             elapsed = model.fractions[stage] * h
             stage += 1
-            if stage < stages:
-                next_stage(trunk, limbs, model, elapsed)
+            if stage < model.stages:
+                next_stage(trunk, limbs, legs, model, elapsed)
             else:
-                end_step(trunk, limbs, model, h)
-                bend_filters(limbs, model.settings)
-                begin_step(trunk, limbs, model)
+                end_step(trunk, limbs, legs, model, h)
+                begin_step(trunk, limbs, legs, model)
                 stage, elapsed = 0, 0.0
 
 
 @pasted
-def run(arrays, model, h, steps, keeps_account, legs, tile, together):  # type: ignore[no-untyped-def]
-    """Advance all environments, a tile at a time: `tile` of them, or one whose legs are the lanes."""
-    trunk = carray(doubles(t.ROWS * tile), (t.ROWS, tile))
-    limbs = carray(doubles(legs * b.ROWS * tile), (legs, b.ROWS, tile))
-    account = carray(doubles(len(ACCOUNT) * tile), (len(ACCOUNT), tile))
-    small = inner(model, doubles(12 + 2 * MOST_STAGES), together)
-    count, envs = arrays.result.shape[0], 1 if together else tile
-    for n in range(0, count, envs):
-        load(arrays, trunk, limbs, account, n, together)
-        run_tile(small, trunk, limbs, account, h, steps, keeps_account, False)
-        here = min(envs, count - n)
-        report(trunk, limbs, together, arrays.trunk_report, arrays.limb_report, n, here)
-        store(arrays, small, trunk, limbs, account, n, here)
-
-
-@pasted
-def run_reacting(arrays, model, h, steps, keeps_account, legs, tile, together):  # type: ignore[no-untyped-def]
-    """`run` with the joint reactions of every step; those of the last are kept."""
-    trunk = carray(doubles(t.ROWS * tile), (t.ROWS, tile))
-    limbs = carray(doubles(legs * b.ROWS * tile), (legs, b.ROWS, tile))
-    account = carray(doubles(len(ACCOUNT) * tile), (len(ACCOUNT), tile))
-    constants = carray(doubles(legs * CONSTANTS * tile), (legs, CONSTANTS, tile))
-    found = carray(doubles(legs * OUTPUTS * tile), (legs, OUTPUTS, tile))
-    small = inner(model, doubles(12 + 2 * MOST_STAGES), together)
-    count, envs = arrays.result.shape[0], 1 if together else tile
-    for i in range(legs):
-        for lane in range(tile):
-            for k in range(CONSTANTS):
-                constants[i, k, lane] = arrays.constants[lane if together else i, k]
-    for n in range(0, count, envs):
-        load(arrays, trunk, limbs, account, n, together)
-        for step in range(max(steps, 1)):
-            run_tile(small, trunk, limbs, account, h, min(steps, 1), keeps_account, step > 0)
-            for i in range(legs):
-                react(trunk, limbs[i], constants[i], found[i])
-        here = min(envs, count - n)
-        report(trunk, limbs, together, arrays.trunk_report, arrays.limb_report, n, here)
-        store(arrays, small, trunk, limbs, account, n, here)
+def run(data, model, tables, ground, constants, reactions, h, steps, keeps_account, legs, lanes, together):  # type: ignore[no-untyped-def]
+    """Advance all environments: `lanes` at a time, or one whose legs the lanes are."""
+    trunk = rows(doubles(t.ROWS * lanes), lanes)
+    limbs = rows(doubles(legs * b.ROWS * lanes), lanes)
+    account = rows(doubles(ACCOUNTS * lanes), lanes)
+    shape = rows(doubles(legs * CONSTANTS * lanes), lanes)
+    found = rows(doubles(legs * OUTPUTS * lanes), lanes)
+    inside = inner(model, tables, ground, doubles(20), together)
+    at, row, reacts = address(data), data.shape[1], reactions.size > 0
+    # lanes are neighbours, but where they are legs, as far apart as legs are
+    envs, near, far = lanes, 1, 1
+    if together:
+        envs, near, far = 1, 0, LIMB_ROWS * row
+    if reacts:
         for i in range(legs):
-            for k in range(OUTPUTS):
-                for lane in range(tile if together else here):
-                    if together:
-                        arrays.reactions[lane, k, n] = found[i, k, lane]
-                    else:
-                        arrays.reactions[i, k, n + lane] = found[i, k, lane]
+            for k in range(CONSTANTS):
+                one = i * CONSTANTS + k
+                shape[one] = read(shape, address(constants), one, CONSTANTS if together else 0)
+    for n in range(0, row, envs):
+        load_trunk_rows(trunk, at, n, row, near)
+        for k in range(ACCOUNTS):
+            account[k] = 0.0
+        for i in range(legs):
+            first = (TRUNK_ROWS + i * LIMB_ROWS) * row + n
+            load_limb_rows(below(limbs, i * b.ROWS), at, first, row, far)
+        run_steps(trunk, limbs, legs, inside, account, shape, found, h, steps, keeps_account, reacts)
+        report_trunk(trunk, at, AT_REPORT * row + n, row, near)
+        result = judge(trunk, limbs, legs, together)
+        write(result, at, AT_RESULT * row + n, near)
+        replace(trunk, trunk, TRUNK_STATES, at, n, row, near, result)
+        for k in range(ACCOUNTS):
+            place = (AT_ACCOUNT + k) * row + n
+            account[k] = account[k] + read(account, at, place, near)
+        replace(trunk, account, ACCOUNTS, at, AT_ACCOUNT * row + n, row, near, result)
+        for i in range(legs):
+            limb, first = below(limbs, i * b.ROWS), (TRUNK_ROWS + i * LIMB_ROWS) * row + n
+            report_leg(trunk, limb, at, first + AT_LIMB_REPORT * row, row, far)
+            replace(trunk, limb, LIMB_STATES, at, first, row, far, result)
+            if reacts:
+                for k in range(OUTPUTS):
+                    place = (i * OUTPUTS + k) * row + n
+                    write(found[i * OUTPUTS + k], address(reactions), place, OUTPUTS * row if together else 1)
 
 
 @kernel
-def advance_one_leg(arrays, model, h, steps, keeps_account):  # type: ignore[no-untyped-def]
+def advance_leg(data, model, tables, ground, constants, reactions, h, steps, keeps_account):  # type: ignore[no-untyped-def]
     """Each environment by itself; they have one leg."""
-    run(arrays, model, h, steps, keeps_account, 1, 1, False)
+    run(data, model, tables, ground, constants, reactions, h, steps, keeps_account, 1, 1, False)
 
 
 @kernel
-def advance_four_legs(arrays, model, h, steps, keeps_account):  # type: ignore[no-untyped-def]
+def advance_four(data, model, tables, ground, constants, reactions, h, steps, keeps_account):  # type: ignore[no-untyped-def]
     """Each environment by itself; they have four legs, side by side."""
-    run(arrays, model, h, steps, keeps_account, 1, 4, True)
+    run(data, model, tables, ground, constants, reactions, h, steps, keeps_account, 1, 4, True)
 
 
 @kernel
-def advance_one(arrays, model, h, steps, keeps_account):  # type: ignore[no-untyped-def]
+def advance_one(data, model, tables, ground, constants, reactions, h, steps, keeps_account):  # type: ignore[no-untyped-def]
     """Each environment by itself; they have any number of legs, one after the other."""
-    run(arrays, model, h, steps, keeps_account, arrays.limbs.shape[0], 1, False)
+    legs = model[0].legs
+    run(data, model, tables, ground, constants, reactions, h, steps, keeps_account, legs, 1, False)
 
 
 @kernel
-def advance_batch(arrays, model, h, steps, keeps_account):  # type: ignore[no-untyped-def]
-    """`TILE` environments at a time, with any number of legs."""
-    run(arrays, model, h, steps, keeps_account, arrays.limbs.shape[0], TILE, False)
-
-
-@kernel
-def react_one_leg(arrays, model, h, steps, keeps_account):  # type: ignore[no-untyped-def]
-    """`advance_one_leg` with reactions."""
-    run_reacting(arrays, model, h, steps, keeps_account, 1, 1, False)
-
-
-@kernel
-def react_four_legs(arrays, model, h, steps, keeps_account):  # type: ignore[no-untyped-def]
-    """`advance_four_legs` with reactions."""
-    run_reacting(arrays, model, h, steps, keeps_account, 1, 4, True)
-
-
-@kernel
-def react_one(arrays, model, h, steps, keeps_account):  # type: ignore[no-untyped-def]
-    """`advance_one` with reactions."""
-    run_reacting(arrays, model, h, steps, keeps_account, arrays.limbs.shape[0], 1, False)
-
-
-@kernel
-def react_batch(arrays, model, h, steps, keeps_account):  # type: ignore[no-untyped-def]
-    """`advance_batch` with reactions."""
-    run_reacting(arrays, model, h, steps, keeps_account, arrays.limbs.shape[0], TILE, False)
+def advance_batch(data, model, tables, ground, constants, reactions, h, steps, keeps_account):  # type: ignore[no-untyped-def]
+    """`LANES` environments at a time, with any number of legs."""
+    legs = model[0].legs
+    run(data, model, tables, ground, constants, reactions, h, steps, keeps_account, legs, LANES, False)

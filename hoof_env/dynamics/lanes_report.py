@@ -1,13 +1,14 @@
-"""What a tile of environments reports: drive torques, powers and where the energy went; see `lanes`."""
+"""What the kernels report: drive torques, powers and where the energy went; see `lanes`."""
 
 from __future__ import annotations
 
-from hoof_env._jit import inlined, pasted
+from hoof_env._jit import inlined
+from hoof_env._lanes import across, below, choose, dot, write
 from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
-from hoof_env.dynamics.vectors import across, gather_row, vector
+from hoof_env.dynamics.lanes_ground import HEEL, TOE
+from hoof_env.dynamics.vectors import add, add_vector, vector
 from hoof_env.leg import profile as f
-from hoof_env.leg.kinematics import dot
 
 ACCOUNT = (
     "crank_work", "swing_work",  # by the drives [J]
@@ -37,96 +38,85 @@ them carries, and the hip's power is that of the actuator which changes the swin
 @inlined
 def feel_drives(trunk, limb):  # type: ignore[no-untyped-def]
     """Torques and powers of crank and swing from the accelerations (Lagrange's equations)."""
-    for lane in range(limb.shape[1]):
-        w, acc, k = limb[b.SPIN, lane], limb[b.SPIN_RATE, lane], limb[b.K, lane]
-        frame = limb[b.VALUES + f.C, lane] + limb[b.ROTOR_C, lane]
-        coupling = limb[b.COUPLING, lane] - k * frame
-        turning = trunk[t.PITCH_ACC, lane] + k * acc
-        lift = vector(trunk, t.ACC, lane) + across(vector(limb, b.HIP, lane)) * trunk[t.PITCH_ACC, lane]
-        by_frame = (
-            coupling * acc
-            + frame * turning
-            + limb[b.REST_BETA, lane]
-            + dot(lift, across(vector(limb, b.S, lane)))
-            - limb[b.Q_BETA, lane]
-        )
-        limb[b.FRAME_TORQUE, lane] = by_frame
-        needed = (
-            (limb[b.VALUES + f.A, lane] + limb[b.ROTOR_A, lane]) * acc
-            + coupling * turning
-            + limb[b.REST_THETA, lane]
-            + dot(lift, vector(limb, b.DS, lane))
-            - limb[b.Q_THETA, lane]
-        )
-        is_motor = limb[b.MOTOR, lane] > 0.0
-        given, held = limb[b.CRANK_TORQUE, lane], limb[b.SWAY, lane]
-        torque = given if is_motor else needed
-        sway = held if is_motor else k * w + held
-        limb[b.CRANK_TORQUE, lane] = torque
-        limb[b.CRANK_POWER, lane] = torque * w
-        limb[b.SWING_POWER, lane] = by_frame * sway
+    w, acc, k, sway = limb[b.SPIN], limb[b.SPIN_RATE], limb[b.K], limb[b.SWAY]
+    frame, pitch_acc = limb[b.FRAME], trunk[t.PITCH_ACC]
+    coupling = limb[b.COUPLING] - k * frame
+    turning = pitch_acc + k * acc
+    lift = vector(trunk, t.ACC) + pitch_acc * across(vector(limb, b.HIP))
+    by_frame = (
+        coupling * acc
+        + frame * turning
+        + limb[b.REST_BETA]
+        + dot(lift, across(vector(limb, b.S)))
+        - limb[b.Q_BETA]
+    )
+    needed = (
+        (limb[b.VALUES + f.A] + limb[b.ROTOR_A]) * acc
+        + coupling * turning
+        + limb[b.REST_THETA]
+        + dot(lift, vector(limb, b.DS))
+        - limb[b.Q_THETA]
+    )
+    is_motor = limb[b.MOTOR] > 0.0
+    torque = choose(is_motor, limb[b.CRANK_TORQUE], needed)
+    limb[b.FRAME_TORQUE], limb[b.CRANK_TORQUE], limb[b.CRANK_POWER] = by_frame, torque, torque * w
+    limb[b.SWING_POWER] = by_frame * choose(is_motor, sway, k * w + sway)
 
 
-@pasted
-def keep_account(trunk, limbs, model, account, weight):  # type: ignore[no-untyped-def]
+@inlined
+def keep_account(trunk, limbs, legs, model, account, weight):  # type: ignore[no-untyped-def]
     """Add the present stage's powers and forces, times `weight` [s], to the rows of `ACCOUNT`."""
-    for lane in range(trunk.shape[1]):
-        velocity = vector(trunk, t.VELOCITY, lane)
-        account[DRAG_LOSS, lane] += weight * (trunk[t.DRAG, lane] * (velocity.real * velocity.real))
-        account[DAMPER_LOSS, lane] += weight * (trunk[t.DAMPER, lane] * (velocity.imag * velocity.imag))
-    for i in range(limbs.shape[0]):
-        limb = limbs[i]
+    velocity, together = vector(trunk, t.VELOCITY), model.together
+    drag = trunk[t.DRAG] * (velocity.real * velocity.real)
+    damper = trunk[t.DAMPER] * (velocity.imag * velocity.imag)
+    account[DRAG_LOSS] = account[DRAG_LOSS] + weight * drag
+    account[DAMPER_LOSS] = account[DAMPER_LOSS] + weight * damper
+    for i in range(legs):
+        limb = below(limbs, i * b.ROWS)
         feel_drives(trunk, limb)
-        for lane in range(limb.shape[1]):
-            for k in range(3):
-                limb[b.PART + k, lane] = 0.0
-        for point in range(2):
-            c = b.CONTACT + point * b.CONTACT_ROWS
-            for lane in range(limb.shape[1]):
-                spring = trunk[t.STIFFNESS, lane] * limb[c + b.FIRMNESS, lane] * limb[c + b.POWER, lane]
-                spring = spring if limb[c + b.DEPTH, lane] > 0.0 else 0.0
-                rate = limb[c + b.DEPTH_RATE, lane]
-                limb[b.PART, lane] += spring * rate
-                limb[b.PART + 1, lane] += (limb[c + b.NORMAL, lane] - spring) * rate
-                limb[b.PART + 2, lane] -= limb[c + b.RUB, lane] * limb[c + b.SLIDE, lane]
-        gather_row(account, CRANK_WORK, limb, b.CRANK_POWER, weight, model.together)
-        gather_row(account, SWING_WORK, limb, b.SWING_POWER, weight, model.together)
-        gather_row(account, GROUND_STORED, limb, b.PART, weight, model.together)
-        gather_row(account, GROUND_LOSS, limb, b.PART + 1, weight, model.together)
-        gather_row(account, FRICTION_LOSS, limb, b.PART + 2, weight, model.together)
-        gather_row(account, IMPULSE, limb, b.PUSH, weight, model.together)
-        gather_row(account, IMPULSE + 1, limb, b.PUSH + 1, weight, model.together)
+        toe, heel = limb[TOE + b.DEPTH_RATE], limb[HEEL + b.DEPTH_RATE]
+        stored = limb[TOE + b.SPRING] * toe + limb[HEEL + b.SPRING] * heel
+        spent = limb[TOE + b.NORMAL] * toe + limb[HEEL + b.NORMAL] * heel - stored
+        rubbed = limb[TOE + b.RUB] * limb[TOE + b.SLIDE] + limb[HEEL + b.RUB] * limb[HEEL + b.SLIDE]
+        add(account, CRANK_WORK, weight * limb[b.CRANK_POWER], together)
+        add(account, SWING_WORK, weight * limb[b.SWING_POWER], together)
+        add(account, GROUND_STORED, weight * stored, together)
+        add(account, GROUND_LOSS, weight * spent, together)
+        add(account, FRICTION_LOSS, -weight * rubbed, together)
+        add_vector(account, IMPULSE, weight * vector(limb, b.PUSH), together)
 
 
-@pasted
-def report(trunk, limbs, together, trunk_out, limb_out, n, lanes):  # type: ignore[no-untyped-def]
-    """Write `TRUNK_REPORT` and `LIMB_REPORT` into columns n, n + 1, ... of the outputs: of `lanes`
-    environments, or of one whose legs the lanes are."""
-    for i in range(limbs.shape[0]):
-        feel_drives(trunk, limbs[i])
-    for lane in range(limbs.shape[2] if together else lanes):
-        e = n if together else n + lane
-        for k in range(2):
-            trunk_out[k, e] = trunk[t.PLACE + k, lane]
-            trunk_out[2 + k, e] = trunk[t.VELOCITY + k, lane]
-            trunk_out[4 + k, e] = trunk[t.ACC + k, lane]
-        trunk_out[6, e] = trunk[t.PITCH_RATE, lane]
-        trunk_out[7, e] = trunk[t.PITCH_ACC, lane]
-        for i in range(limbs.shape[0]):
-            limb, leg = limbs[i], lane if together else i
-            side, w, acc = limb[b.SIDE, lane], limb[b.SPIN, lane], limb[b.SPIN_RATE, lane]
-            limb_out[leg, 0, e] = acc
-            limb_out[leg, 1, e] = limb[b.PHI, lane]
-            limb_out[leg, 2, e] = side * (limb[b.K, lane] * w + limb[b.SWAY, lane])
-            limb_out[leg, 3, e] = side * (limb[b.K, lane] * acc + limb[b.SWAY_RATE, lane])
-            limb_out[leg, 4, e] = limb[b.CRANK_TORQUE, lane]
-            limb_out[leg, 5, e] = side * limb[b.FRAME_TORQUE, lane]
-            limb_out[leg, 6, e] = limb[b.CRANK_POWER, lane]
-            limb_out[leg, 7, e] = limb[b.SWING_POWER, lane]
-            for point in range(2):
-                c, first = b.CONTACT + point * b.CONTACT_ROWS, 8 + 5 * point
-                limb_out[leg, first, e] = limb[c + b.SPOT, lane]
-                limb_out[leg, first + 1, e] = limb[c + b.SPOT + 1, lane]
-                limb_out[leg, first + 2, e] = limb[c + b.SLIDE, lane]
-                limb_out[leg, first + 3, e] = limb[c + b.NORMAL, lane]
-                limb_out[leg, first + 4, e] = limb[c + b.RUB, lane]
+@inlined
+def report_trunk(trunk, data, start, row, stride):  # type: ignore[no-untyped-def]
+    """Write `TRUNK_REPORT` to the rows of `data`, `row` apart from `start` on; lanes are `stride` apart."""
+    for k in range(6):
+        write(trunk[t.PLACE + k], data, start + k * row, stride)
+    write(trunk[t.PITCH_RATE], data, start + 6 * row, stride)
+    write(trunk[t.PITCH_ACC], data, start + 7 * row, stride)
+
+
+@inlined
+def report_leg(trunk, limb, data, start, row, stride):  # type: ignore[no-untyped-def]
+    """`LIMB_REPORT` likewise."""
+    feel_drives(trunk, limb)
+    side, k, w, acc = limb[b.SIDE], limb[b.K], limb[b.SPIN], limb[b.SPIN_RATE]
+    write(acc, data, start, stride)
+    write(limb[b.PHI], data, start + row, stride)
+    write(side * (k * w + limb[b.SWAY]), data, start + 2 * row, stride)
+    write(side * (k * acc + limb[b.SWAY_RATE]), data, start + 3 * row, stride)
+    write(limb[b.CRANK_TORQUE], data, start + 4 * row, stride)
+    write(side * limb[b.FRAME_TORQUE], data, start + 5 * row, stride)
+    write(limb[b.CRANK_POWER], data, start + 6 * row, stride)
+    write(limb[b.SWING_POWER], data, start + 7 * row, stride)
+    report_point(limb, TOE, data, start + 8 * row, row, stride)
+    report_point(limb, HEEL, data, start + 13 * row, row, stride)
+
+
+@inlined
+def report_point(limb, c, data, start, row, stride):  # type: ignore[no-untyped-def]
+    """The part of `LIMB_REPORT` that belongs to the hoof point with rows `c`."""
+    write(limb[c + b.SPOT], data, start, stride)
+    write(limb[c + b.SPOT + 1], data, start + row, stride)
+    write(limb[c + b.SLIDE], data, start + 2 * row, stride)
+    write(limb[c + b.NORMAL], data, start + 3 * row, stride)
+    write(limb[c + b.RUB], data, start + 4 * row, stride)

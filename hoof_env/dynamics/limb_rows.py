@@ -1,4 +1,4 @@
-"""Rows of the engine's arrays that belong to one leg; one column is one environment.
+"""Rows of memory that belong to one leg, in the kernels and, where they are state or settings, in the engine.
 
 Names are row numbers; a vector takes two rows, x at its name and y at the next. SI units and radians. The leg
 enters through its functions of the crank angle (`leg.profile`); beta = pitch + side phi is the world angle
@@ -7,7 +7,7 @@ of its frame.
 
 from __future__ import annotations
 
-from hoof_env.leg.profile import WIDTH
+from hoof_env.leg.profile import SLOPED, WIDTH
 
 # The state.
 THETA, OMEGA, VALUE, _, _, _, RATE, _, _, _, MEMORY, _, _, _, _, _ = range(16)
@@ -21,38 +21,36 @@ STATE = (
 its rate, and while it is in the ground its slowness at entry, 1 / approach speed [s/m], else 0."""
 
 VALUES = 16  # the leg's functions at the present stage, in the profile's order
-SLOPES = VALUES + WIDTH  # their derivatives by the crank angle
+SLOPES = VALUES + WIDTH  # derivatives of the first of them by the crank angle
 (
     COMMAND, _, _, _,  # what is commanded of the filters
     BEND, _, _, _,  # and the acceleration that this gives them
     ANGLE, SPIN, SPIN_RATE,  # crank angle, rate and acceleration at the present stage
-    CELL, _,  # row of the tables and the angle from its cell's middle
     SPIN_MEAN, SPIN_RATE_MEAN,  # weighted means over the stages so far
     PHI, K,  # swing; beta by theta, time and pitch held
     SWAY, SWAY_RATE,  # beta's rate less pitch_t and K theta_t; its acceleration less pitch_tt and K theta_tt
     FRAME_RATE,  # rate of beta
     TURN, _, HIP, _,  # e^(i beta); from the trunk's centre of mass to O
     S, _, DS, _, U, _,  # first moment about O; by theta with the frame held, and swinging: DS + i K S [kg m]
-    INERTIA, COUPLING,  # a + 2 b K + c K^2 of the geared crank, b + c K of it and frame [kg m^2]
-    PART, _, _, _, _, _, _, _, _, _, _, _,  # what a leg adds to the trunk's rows
+    FRAME, COUPLING, INERTIA,  # of the geared crank and frame: c, b + c K, a + 2 b K + c K^2 [kg m^2]
     LEVER,  # coupling of geared crank and pitch, COUPLING + HIP x U [kg m^2]
     Q_THETA, Q_BETA, PUSH, _,  # the ground: generalised forces [N m], force [N]
     REST_THETA, REST_BETA,  # generalised inertia forces at rest of the accelerations, weight included [N m]
     SPIN_RATE_FREE, SOFTNESS,  # crank acceleration if the trunk kept still; 1 / INERTIA, 0 if prescribed
     CRANK_TORQUE, FRAME_TORQUE, CRANK_POWER, SWING_POWER,  # drives [N m, W]; FRAME_: along beta
-) = range(SLOPES + WIDTH, SLOPES + WIDTH + 57)  # fmt: skip
+) = range(SLOPES + SLOPED, SLOPES + SLOPED + 44)  # fmt: skip
 
-CONTACT = SLOPES + WIDTH + 57
-CONTACT_ROWS = 22
+CONTACT = SLOPES + SLOPED + 44
+CONTACT_ROWS = 15
 """Toe's rows begin at CONTACT, heel's at CONTACT + CONTACT_ROWS; the names below count from there."""
 (
-    SPOT, _, SPOT_RATE, _,  # where the point is and how it moves [m, m/s]
-    HEIGHT, NORMAL_X, NORMAL_Y, FIRMNESS, ROUGHNESS,  # the ground there: height, normal, factors of K and mu
-    DEPTH, DEPTH_RATE, SLIDE, SLIDING,  # penetration and rate [m, m/s]; speed along the ground, its size
-    POWER, GRIP, SLOWNESS,  # depth^n [m^n]; part of the kinetic friction; 1 / approach speed [s/m]
+    SPOT, _, DEPTH, DEPTH_RATE,  # where the point is, penetration and its rate [m, m/s]
+    NORMAL_X, NORMAL_Y, FIRMNESS, ROUGHNESS,  # the ground there: normal, factors of K and mu
+    SLIDE, SPRING,  # speed along the ground [m/s]; the part of the normal force that comes back [N]
+    SLOWNESS,  # 1 / approach speed [s/m]
     NORMAL, RUB,  # force along the ground's normal and along the ground [N]
-    BY_THETA, _, ARM, _,  # the point's place by theta; from O to it [m]
-) = range(22)  # fmt: skip
+    FORCE, _,  # in the world [N]
+) = range(15)  # fmt: skip
 
 _P = CONTACT + 2 * CONTACT_ROWS
 HIP_ON_TRUNK, _, MASS, SIDE, FIRST, MOTOR, GAIN, LIMIT, ROTOR_A, ROTOR_B, ROTOR_C = range(_P, _P + 11)

@@ -5,23 +5,23 @@ that every law of moments reads 'this force turns the link like that one'. Two l
 dyad) then give the force in that point from two such laws, and the forces at their far ends from the balance
 of each. This starts at the hoof, which is loaded by inertia and ground alone, and ends at the crank.
 
-Planar vectors are complex numbers in world axes (x forward, y up, counter-clockwise) from the crank centre O.
-Kernels use +, -, *, and one division and square root per dyad, without branches: so they give the same bits
-for one leg and for a lane of a batch. Forces are named after the link that feels them and the one that exerts
+Planar vectors are in world axes (x forward, y up, counter-clockwise) from the crank centre O.
+Kernels use +, -, *, and one division and square root per dyad, without branches: so a lane has the bits that a
+leg has alone. Forces are named after the link that feels them and the one that exerts
 them: `gj_gf` is the force on link GJ by link GF.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env._jit import inlined
-from hoof_env.dynamics.vectors import put, times
+from hoof_env._lanes import choose, cross, dot, level, plane, root
+from hoof_env.dynamics.vectors import put, vector
 from hoof_env.leg.geometry import Geometry
-from hoof_env.leg.kinematics import cross, dot
 from hoof_env.leg.linkage import BODY_LENGTHS, CONSTRUCTION, JOINTS, Dyad
 
 LOCK, DRIVER, HIP = 2 * len(JOINTS), 2 * len(JOINTS) + 1, 2 * len(JOINTS) + 2
@@ -74,25 +74,25 @@ def leg_constants(geometry: Geometry) -> NDArray[np.float64]:
 
 
 class Point(NamedTuple):
-    """Position from O, velocity relative to O, and acceleration plus g upward; complex."""
+    """Position from O, velocity relative to O, and acceleration plus g upward; planes."""
 
-    at: complex
-    v: complex
-    a: complex
+    at: Any
+    v: Any
+    a: Any
 
 
 class Hinge(NamedTuple):
     """Two links that meet in a point: the point from their far ends, and 1 / cross(one, two)."""
 
-    one: complex
-    two: complex
-    inverse: float
+    one: Any
+    two: Any
+    inverse: Any
 
 
 @inlined
 def turning(p, rate, acc, lift):  # type: ignore[no-untyped-def]
     """A point at p of a body that turns about O."""
-    return Point(p, complex(-rate * p.imag, rate * p.real), complex(-rate * rate, acc) * p + lift)
+    return Point(p, plane(-rate * p.imag, rate * p.real), plane(-rate * rate, acc) * p + lift)
 
 
 @inlined
@@ -105,32 +105,32 @@ def swing(hinge, first, second):  # type: ignore[no-untyped-def]
     acc = inverse * (
         dot(two, second.a - first.a) + rate2 * dot(one, two) - rate_two * rate_two * dot(two, two)
     )
-    v = complex(-rate * one.imag, rate * one.real)
-    return Point(first.at + one, first.v + v, first.a + complex(-rate2, acc) * one)
+    v = plane(-rate * one.imag, rate * one.real)
+    return Point(first.at + one, first.v + v, first.a + plane(-rate2, acc) * one)
 
 
 @inlined
-def hinge_point(g, column, row, first, second):  # type: ignore[no-untyped-def]
+def hinge_point(g, row, first, second):  # type: ignore[no-untyped-def]
     """The hinge of two links of given lengths whose far ends are `first` and `second`."""
-    one2, half, side = g[row, column], g[row + 1, column], g[row + 2, column]
+    one2, half, side = g[row], g[row + 1], g[row + 2]
     span = second.at - first.at
     d2 = dot(span, span)
     k = 0.5 * d2 + half
-    area = side * np.sqrt(one2 * d2 - k * k)  # cross(one, two)
+    area = side * root(one2 * d2 - k * k)  # cross(one, two)
     inverse = 1.0 / (d2 * area)
     over_d2 = area * inverse
-    one = span * complex(k * over_d2, area * over_d2)
+    one = span * plane(k * over_d2, area * over_d2)
     hinge = Hinge(one, one - span, d2 * inverse)
     return hinge, swing(hinge, first, second)
 
 
 @inlined
-def triangle_point(g, column, row, first, second):  # type: ignore[no-untyped-def]
+def triangle_point(g, row, first, second):  # type: ignore[no-untyped-def]
     """The same where `first` and `second` are the ends of a third link."""
-    place = complex(g[row, column], g[row + 1, column])
+    place = vector(g, row)
     span = second.at - first.at
     one = span * place
-    hinge = Hinge(one, one - span, g[row + 2, column])
+    hinge = Hinge(one, one - span, g[row + 2])
     return hinge, Point(
         first.at + one, first.v + (second.v - first.v) * place, first.a + (second.a - first.a) * place
     )
@@ -140,24 +140,24 @@ def triangle_point(g, column, row, first, second):  # type: ignore[no-untyped-de
 def beyond(first, second, origin, ratio):  # type: ignore[no-untyped-def]
     """The point at origin + ratio (second - first) of a link."""
     return Point(
-        origin.at + times(ratio, second.at - first.at),
-        origin.v + times(ratio, second.v - first.v),
-        origin.a + times(ratio, second.a - first.a),
+        origin.at + ratio * (second.at - first.at),
+        origin.v + ratio * (second.v - first.v),
+        origin.a + ratio * (second.a - first.a),
     )
 
 
 @inlined
-def link_loads(g, column, row, tail, head):  # type: ignore[no-untyped-def]
+def link_loads(g, row, tail, head):  # type: ignore[no-untyped-def]
     """Forces at tail and head that move a link as it moves, against its weight."""
-    near, far = g[row, column], g[row + 1, column]
-    return times(near, tail.a) + times(far, head.a), times(near, head.a) + times(far, tail.a)
+    near, far = g[row], g[row + 1]
+    return near * tail.a + far * head.a, near * head.a + far * tail.a
 
 
 @inlined
 def hinge_force(hinge, by_one, by_two):  # type: ignore[no-untyped-def]
     """The force that turns link one about its far end like `by_one`, and link two like `by_two`."""
     one, two, inverse = hinge
-    return times(inverse * cross(one, by_one), two) - times(inverse * cross(two, by_two), one)
+    return inverse * cross(one, by_one) * two - inverse * cross(two, by_two) * one
 
 
 # -- one leg -----------------------------------------------------------------------------------
@@ -165,12 +165,12 @@ def hinge_force(hinge, by_one, by_two):  # type: ignore[no-untyped-def]
 
 @inlined
 def leg_reactions(  # type: ignore[no-untyped-def]
-    g, column, crank_turn, theta_rate, theta_acc, frame_turn, beta_rate, beta_acc, lift, toe_force, heel_force
+    g, crank_turn, theta_rate, theta_acc, frame_turn, beta_rate, beta_acc, lift, toe_force, heel_force
 ):
     """Reactions of one leg.
 
     Args:
-        g, column: `leg_constants`, and the leg's column in it.
+        g: rows of `leg_constants`.
         crank_turn, frame_turn: exp(i theta), exp(i beta).
         theta_rate, theta_acc, beta_rate, beta_acc: [rad/s, rad/s^2].
         lift: acceleration of O plus g upward [m/s^2].
@@ -182,30 +182,31 @@ def leg_reactions(  # type: ignore[no-untyped-def]
         feels the opposite.
     """
     # The crank turns clockwise before the mirror.
-    travel = g[_TRAVEL, column]
-    arm = times(g[_CRANK, column], complex(travel * crank_turn.real, -crank_turn.imag))
-    O = Point(0j, 0j, lift)  # noqa: E741
-    C = turning(complex(g[_PIVOT, column], g[_PIVOT + 1, column]) * frame_turn, beta_rate, beta_acc, lift)
+    travel = g[_TRAVEL]
+    arm = g[_CRANK] * plane(travel * crank_turn.real, -crank_turn.imag)
+    still = plane(level(g, 0.0), 0.0)
+    O = Point(still, still, lift)  # noqa: E741
+    C = turning(vector(g, _PIVOT) * frame_turn, beta_rate, beta_acc, lift)
     P = turning(arm * frame_turn, beta_rate - travel * theta_rate, beta_acc - travel * theta_acc, lift)
 
     # Motion, from the crank to the hoof.
-    hinge_b, B = hinge_point(g, column, _B, C, P)
-    hinge_d, D = triangle_point(g, column, _D, C, B)
-    hinge_f, F = hinge_point(g, column, _F, C, P)
-    hinge_e, E = hinge_point(g, column, _E, D, F)
-    G = beyond(E, F, F, g[_SHANK, column])
-    A = beyond(C, F, C, g[_ROCKER, column])
-    hinge_j, J = hinge_point(g, column, _J, G, A)
-    hinge_i, I = triangle_point(g, column, _I, G, J)  # noqa: E741
+    hinge_b, B = hinge_point(g, _B, C, P)
+    hinge_d, D = triangle_point(g, _D, C, B)
+    hinge_f, F = hinge_point(g, _F, C, P)
+    hinge_e, E = hinge_point(g, _E, D, F)
+    G = beyond(E, F, F, g[_SHANK])
+    A = beyond(C, F, C, g[_ROCKER])
+    hinge_j, J = hinge_point(g, _J, G, A)
+    hinge_i, I = triangle_point(g, _I, G, J)  # noqa: E741
 
     # Hoof triangle and tie rod.
-    gj_g, gj_j = link_loads(g, column, _GJ, G, J)
-    ja_j, ja_a = link_loads(g, column, _AJ, J, A)
-    ig_i, ig_g = link_loads(g, column, _GI, I, G)
-    ij_i, ij_j = link_loads(g, column, _IJ, I, J)
-    toe_at_i = g[_TOE, column] > 0.5
-    ij_i -= toe_force if toe_at_i else heel_force
-    ij_j -= heel_force if toe_at_i else toe_force
+    gj_g, gj_j = link_loads(g, _GJ, G, J)
+    ja_j, ja_a = link_loads(g, _AJ, J, A)
+    ig_i, ig_g = link_loads(g, _GI, I, G)
+    ij_i, ij_j = link_loads(g, _IJ, I, J)
+    toe_at_i = g[_TOE] > 0.5
+    ij_i = ij_i - choose(toe_at_i, toe_force, heel_force)
+    ij_j = ij_j - choose(toe_at_i, heel_force, toe_force)
     ij_ig = hinge_force(hinge_i, -ig_i, ij_i)
     ij_ja = ij_i + ij_j - ij_ig
     ig_gf = ig_i + ig_g + ij_ig
@@ -214,28 +215,28 @@ def leg_reactions(  # type: ignore[no-untyped-def]
     ja_fc = ja_j + ja_a - ja_gj + ij_ja
 
     # Shank, connecting rod, rocker and strut.
-    gf_g, gf_f = link_loads(g, column, _FG, G, F)
-    fe_f, fe_e = link_loads(g, column, _EF, F, E)
-    ed_e, ed_d = link_loads(g, column, _DE, E, D)
-    fc_f, fc_c = link_loads(g, column, _CF, F, C)
-    pf_p, pf_f = link_loads(g, column, _PF, P, F)
+    gf_g, gf_f = link_loads(g, _FG, G, F)
+    fe_f, fe_e = link_loads(g, _EF, F, E)
+    ed_e, ed_d = link_loads(g, _DE, E, D)
+    fc_f, fc_c = link_loads(g, _CF, F, C)
+    pf_p, pf_f = link_loads(g, _PF, P, F)
     ankle = gf_g + gj_gf + ig_gf
     lock = cross(G.at - F.at, ankle)
     gf_fe = gf_f + ankle
-    fe_ed = hinge_force(hinge_e, -ed_e, fe_e - times(g[_SHANK, column], ankle))
+    fe_ed = hinge_force(hinge_e, -ed_e, fe_e - g[_SHANK] * ankle)
     ed_db = ed_e + ed_d + fe_ed
     knee = fe_ed - gf_fe - fe_f - fe_e
-    fc_fe = hinge_force(hinge_f, fc_f + times(g[_ROCKER, column], ja_fc), knee - pf_f)
+    fc_fe = hinge_force(hinge_f, fc_f + g[_ROCKER] * ja_fc, knee - pf_f)
     pf_fe = knee - fc_fe
     fc_frame = fc_f + fc_c - fc_fe + ja_fc
     pf_op = pf_p + pf_f - pf_fe
 
     # Upper triangle, coupler and crank.
-    cd_c, cd_d = link_loads(g, column, _CD, C, D)
-    db_d, db_b = link_loads(g, column, _BD, D, B)
-    cb_c, cb_b = link_loads(g, column, _CB, C, B)
-    pb_p, pb_b = link_loads(g, column, _PB, P, B)
-    op_o, op_p = link_loads(g, column, _OP, O, P)
+    cd_c, cd_d = link_loads(g, _CD, C, D)
+    db_d, db_b = link_loads(g, _BD, D, B)
+    cb_c, cb_b = link_loads(g, _CB, C, B)
+    pb_p, pb_b = link_loads(g, _PB, P, B)
+    op_o, op_p = link_loads(g, _OP, O, P)
     cd_db = hinge_force(hinge_d, cd_d, -ed_db - db_d)
     cd_frame = cd_c + cd_d - cd_db
     db_pb = db_d + db_b + cd_db + ed_db
@@ -255,26 +256,26 @@ def leg_reactions(  # type: ignore[no-untyped-def]
 
 
 @inlined
-def keep_reactions(out, lane, joints, lock, driver, hip):  # type: ignore[no-untyped-def]
-    """Write what `leg_reactions` returns into a column of `out`, shape (OUTPUTS, any)."""
-    put(out, 0, lane, joints[0])
-    put(out, 2, lane, joints[1])
-    put(out, 4, lane, joints[2])
-    put(out, 6, lane, joints[3])
-    put(out, 8, lane, joints[4])
-    put(out, 10, lane, joints[5])
-    put(out, 12, lane, joints[6])
-    put(out, 14, lane, joints[7])
-    put(out, 16, lane, joints[8])
-    put(out, 18, lane, joints[9])
-    put(out, 20, lane, joints[10])
-    put(out, 22, lane, joints[11])
-    put(out, 24, lane, joints[12])
-    put(out, 26, lane, joints[13])
-    put(out, 28, lane, joints[14])
-    put(out, 30, lane, joints[15])
-    put(out, 32, lane, joints[16])
-    put(out, 34, lane, joints[17])
-    put(out, 36, lane, joints[18])
-    put(out, 38, lane, joints[19])
-    out[LOCK, lane], out[DRIVER, lane], out[HIP, lane] = lock, driver, hip
+def keep_reactions(out, joints, lock, driver, hip):  # type: ignore[no-untyped-def]
+    """Write what `leg_reactions` returns into the first OUTPUTS rows of `out`."""
+    put(out, 0, joints[0])
+    put(out, 2, joints[1])
+    put(out, 4, joints[2])
+    put(out, 6, joints[3])
+    put(out, 8, joints[4])
+    put(out, 10, joints[5])
+    put(out, 12, joints[6])
+    put(out, 14, joints[7])
+    put(out, 16, joints[8])
+    put(out, 18, joints[9])
+    put(out, 20, joints[10])
+    put(out, 22, joints[11])
+    put(out, 24, joints[12])
+    put(out, 26, joints[13])
+    put(out, 28, joints[14])
+    put(out, 30, joints[15])
+    put(out, 32, joints[16])
+    put(out, 34, joints[17])
+    put(out, 36, joints[18])
+    put(out, 38, joints[19])
+    out[LOCK], out[DRIVER], out[HIP] = lock, driver, hip

@@ -59,7 +59,7 @@ def tally(
     spin = own.pitch_inertia * pitch_rate + own.mass * _cross(place, velocity)  # about the origin
     kinetic = 0.5 * own.mass * np.abs(velocity) ** 2 + 0.5 * own.pitch_inertia * pitch_rate**2
     for i, limb in enumerate(engine.limbs):
-        value, slope = engine.profiles[i](theta[i])
+        value, _ = engine.profiles[i](theta[i])
         a, b, c = value[:, f.A], value[:, f.B], value[:, f.C]
         side = limb.geometry.travel
         if isinstance(limb.drive, Motor):
@@ -68,7 +68,7 @@ def tally(
         frame = turn * np.exp(1j * side * phi[i])
         frame_rate = pitch_rate + side * phi_rate[i]
         s = frame * (value[:, f.S_X] + 1j * value[:, f.S_Y])
-        own_rate = frame * (slope[:, f.S_X] + 1j * slope[:, f.S_Y]) * theta_rate[i] + 1j * s * frame_rate
+        own_rate = frame * (value[:, f.DS_X] + 1j * value[:, f.DS_Y]) * theta_rate[i] + 1j * s * frame_rate
         arm = turn * complex(*limb.hip)
         hip, hip_rate, mass = place + arm, velocity + 1j * arm * pitch_rate, limb.geometry.mass
         moment = moment + mass * hip + s

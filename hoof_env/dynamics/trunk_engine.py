@@ -16,16 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
-from hoof_env.dynamics.advance import (
-    advance_batch,
-    advance_four_legs,
-    advance_one,
-    advance_one_leg,
-    react_batch,
-    react_four_legs,
-    react_one,
-    react_one_leg,
-)
+from hoof_env.dynamics.advance import LANES, advance_batch, advance_four, advance_leg, advance_one
 from hoof_env.dynamics.arguments import Floats, all_of, count, finite, one_of
 from hoof_env.dynamics.engine import GRAVITY
 from hoof_env.dynamics.lanes_report import ACCOUNT, LIMB_REPORT, TRUNK_REPORT
@@ -36,7 +27,7 @@ from hoof_env.dynamics.schemes import SCHEMES
 from hoof_env.dynamics.step_length import StepLength
 from hoof_env.dynamics.tally import Tally, tally
 from hoof_env.dynamics.trunk import Trunk
-from hoof_env.dynamics.trunk_model import differences, layout, new_arrays, new_model
+from hoof_env.dynamics.trunk_model import differences, layout, new_memory, new_model
 from hoof_env.dynamics.trunk_start import FARTHEST, start
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait.motion_law import FilterSettings
@@ -135,13 +126,11 @@ class TrunkEngine:
         asked = None if substeps is None else count("substeps", substeps, most=MOST_STEPS)
         self.substeps = length.choose(self.sim_dt, asked)
         self.reacts = bool(reactions)
-        self._arrays = new_arrays(self)
+        is_few = self.num_envs <= FEW
+        alone = {1: advance_leg, 4: advance_four}.get(len(self.limbs), advance_one)
+        self._run = alone if is_few else advance_batch
+        self._memory = new_memory(self, self.num_envs if is_few else -(-self.num_envs // LANES) * LANES)
         self._model = new_model(self)
-        alone = {1: (advance_one_leg, react_one_leg), 4: (advance_four_legs, react_four_legs)}
-        kernels = advance_batch, react_batch
-        if self.num_envs <= FEW:
-            kernels = alone.get(len(self.limbs), (advance_one, react_one))
-        self._run = kernels[self.reacts]
 
     # What it is like
 
@@ -187,7 +176,7 @@ class TrunkEngine:
             ParameterError: a value is not finite, of the wrong shape or forbidden by the trunk's kind, an
                 angle, place or rate is beyond `trunk_start.FARTHEST`, or a leg's links have no place there.
         """
-        where, legs, a = self._which(envs), len(self.limbs), self._arrays
+        where, legs, a = self._which(envs), len(self.limbs), self._memory
         one = isinstance(gaits, GaitParameters)
         each = all_of("gaits", [gaits] * legs if one else gaits, GaitParameters)
         if len(each) != legs:
@@ -220,7 +209,7 @@ class TrunkEngine:
             raise ParameterError(f"state: of another engine; {unlike}")
         arrays = {}
         for name in STATE:
-            shape = getattr(self._arrays, name).shape
+            shape = getattr(self._memory, name).shape
             try:
                 arrays[name] = np.array(state[name], dtype=np.float64)
             except (TypeError, ValueError):
@@ -259,9 +248,9 @@ class TrunkEngine:
         if command is not None:
             self._command(command)
         self._go(count("steps", steps, 0, MOST_STEPS // self.substeps), account)
-        if steps and self._arrays.result.any():
+        if steps and self._memory.result.any():
             self._look()
-        return self._arrays.result.copy()
+        return self._memory.result.astype(np.int64)
 
     def run(
         self, command: ArrayLike | None = None, steps: int = 1, every: int = 1
@@ -286,7 +275,7 @@ class TrunkEngine:
         return {name: np.array([row[name] for row in rows]) for name in rows[0]} | {"result": result}
 
     def _command(self, command: ArrayLike) -> None:
-        given, whole = finite("command", command), self._arrays.command
+        given, whole = finite("command", command), self._memory.command
         legs = len(self.limbs)
         if given.shape == (4,) or given.shape == (legs, 4):
             given = given[..., None]
@@ -297,7 +286,9 @@ class TrunkEngine:
         whole[:] = given
 
     def _go(self, steps: int, account: bool = False) -> None:
-        self._run(self._arrays, self._model, self.sim_dt / self.substeps, steps * self.substeps, account)
+        memory, h = self._memory, self.sim_dt / self.substeps
+        arrays = (memory.data, *self._model, memory.constants, memory.reactions)
+        self._run(*arrays, h, steps * self.substeps, account)
 
     def _look(self) -> None:
         """Evaluate where the state is, and change nothing but the report."""
@@ -306,11 +297,11 @@ class TrunkEngine:
         self._put(kept)
 
     def _copy(self, names: Sequence[str]) -> dict[str, NDArray[Any]]:
-        return {name: getattr(self._arrays, name).copy() for name in names}
+        return {name: getattr(self._memory, name).copy() for name in names}
 
     def _put(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         for name, values in arrays.items():
-            getattr(self._arrays, name)[:] = values
+            getattr(self._memory, name)[:] = values
 
     # What it reports
 
@@ -318,7 +309,7 @@ class TrunkEngine:
     def state(self) -> dict[str, Floats]:
         """The state by name: rows of `trunk_rows.STATE`, shape (num_envs,), and of `limb_rows.STATE`, shape
         (legs, num_envs)."""
-        a = self._arrays
+        a = self._memory
         return {name: a.trunk[k].copy() for k, name in enumerate(t.STATE)} | {
             name: a.limbs[:, k].copy() for k, name in enumerate(b.STATE)
         }
@@ -326,7 +317,7 @@ class TrunkEngine:
     @property
     def report(self) -> dict[str, Floats]:
         """What acts at the present instant: `lanes_report.TRUNK_REPORT` and `LIMB_REPORT` by name."""
-        a = self._arrays
+        a = self._memory
         return {name: a.trunk_report[k].copy() for k, name in enumerate(TRUNK_REPORT)} | {
             name: a.limb_report[:, k].copy() for k, name in enumerate(LIMB_REPORT)
         }
@@ -334,7 +325,7 @@ class TrunkEngine:
     @property
     def account(self) -> dict[str, Floats]:
         """Integrals since the reset by name, `lanes_report.ACCOUNT`, shape (num_envs,)."""
-        return {name: self._arrays.account[k].copy() for k, name in enumerate(ACCOUNT)}
+        return {name: self._memory.account[k].copy() for k, name in enumerate(ACCOUNT)}
 
     def reactions(self) -> Reactions:
         """Joint reactions at the present instant.
@@ -344,7 +335,7 @@ class TrunkEngine:
         """
         if not self.reacts:
             raise ParameterError("reactions: expected an engine made with reactions=True, got one without")
-        found = self._arrays.reactions
+        found = self._memory.reactions[:, :, : self.num_envs]
         legs, _, n = found.shape
         joints = found[:, :LOCK].reshape(legs, -1, 2, n).copy()
         return Reactions(joints, found[:, LOCK].copy(), found[:, DRIVER].copy(), found[:, HIP].copy())
@@ -357,10 +348,10 @@ class TrunkEngine:
 
     def messages(self) -> list[str]:
         """How each environment ended, for people."""
-        never = np.isnan(self._arrays.trunk).all(0)
+        never = np.isnan(self._memory.trunk).all(0)
         return [
             "this environment was never reset" if new else Result(int(code)).message
-            for code, new in zip(self._arrays.result, never, strict=True)
+            for code, new in zip(self._memory.result, never, strict=True)
         ]
 
     def _which(self, envs: ArrayLike | None) -> NDArray[np.int64]:

@@ -5,17 +5,15 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
-from hoof_env.dynamics.advance import Arrays, Model
+from hoof_env.dynamics.advance import LIMB, LIMB_ROWS, MODEL, TRUNK, TRUNK_ROWS
 from hoof_env.dynamics.drive import Motor
 from hoof_env.dynamics.engine import GRAVITY
-from hoof_env.dynamics.lanes_report import ACCOUNT, LIMB_REPORT, TRUNK_REPORT
 from hoof_env.dynamics.limb import Limb
 from hoof_env.dynamics.reactions import OUTPUTS, leg_constants
 from hoof_env.dynamics.schemes import SCHEMES
@@ -31,28 +29,57 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 
-def new_arrays(engine: TrunkEngine) -> Arrays:
-    """Arrays of an engine whose environments are nowhere, that is not a number, until they are reset."""
+class Memory(NamedTuple):
+    """An engine's memory: `data` as the kernels take it, and views of its parts; the last axis is the
+    environment.
+
+    Attributes:
+        data: all of it, shape (rows, columns): whole vectors of environments, so some columns may be idle.
+        trunk, limbs: the state, shapes (7, n) and (legs, 16, n).
+        trunk_settings, limb_settings: parameters, shapes (17, n) and (legs, 11, n).
+        command: shape (legs, 4, n).
+        account: shape (9, n), added to.
+        trunk_report, limb_report: at the end, shapes (8, n) and (legs, 18, n).
+        result: how it ended, shape (n,), values of `result.Result`; where it is not OK the state is left as
+            it was.
+        constants, reactions: of `reactions`, shapes (legs, CONSTANTS) and (legs, OUTPUTS, columns).
+    """
+
+    data: Floats
+    trunk: Floats
+    limbs: Floats
+    trunk_settings: Floats
+    limb_settings: Floats
+    command: Floats
+    account: Floats
+    trunk_report: Floats
+    limb_report: Floats
+    result: Floats
+    constants: Floats
+    reactions: Floats
+
+
+def new_memory(engine: TrunkEngine, columns: int) -> Memory:
+    """Memory of an engine whose environments are nowhere, that is not a number, until they are reset."""
     n, legs = engine.num_envs, len(engine.limbs)
+    data = np.zeros((TRUNK_ROWS + legs * LIMB_ROWS, columns))
+    trunk, limbs = data[:TRUNK_ROWS], data[TRUNK_ROWS:].reshape(legs, LIMB_ROWS, columns)
+    trunk[TRUNK["state"]], limbs[:, LIMB["state"]] = np.nan, np.nan
+    trunk[TRUNK["settings"]] = _trunk_settings(engine)[:, None]
     settings = [_limb_settings(*pair) for pair in zip(engine.limbs, _first_rows(engine), strict=True)]
-    limb_settings = np.array(settings)
-    return Arrays(
-        np.full((len(t.STATE), n), np.nan),
-        np.full((legs, len(b.STATE), n), np.nan),
-        np.repeat(_trunk_settings(engine)[:, None], n, 1),
-        np.repeat(limb_settings[:, :, None], n, 2),
-        np.zeros((legs, 4, n)),
-        np.zeros((len(ACCOUNT), n)),
-        np.zeros((len(TRUNK_REPORT), n)),
-        np.zeros((legs, len(LIMB_REPORT), n)),
-        np.zeros(n, dtype=np.int64),
+    limbs[:, LIMB["settings"]] = np.array(settings)[:, :, None]
+    ours, theirs = trunk[:, :n], limbs[:, :, :n]
+    return Memory(
+        data, ours[TRUNK["state"]], theirs[:, LIMB["state"]],
+        ours[TRUNK["settings"]], theirs[:, LIMB["settings"]], theirs[:, LIMB["command"]],
+        ours[TRUNK["account"]], ours[TRUNK["report"]], theirs[:, LIMB["report"]], ours[TRUNK["result"]][0],
         np.array([leg_constants(limb.geometry)[:, 0] for limb in engine.limbs]),
-        np.zeros((legs, OUTPUTS, n if engine.reacts else 0)),
-    )
+        np.zeros((legs, OUTPUTS, columns if engine.reacts else 0)),
+    )  # fmt: skip
 
 
-def new_model(engine: TrunkEngine) -> Model:
-    """What does not change while it runs.
+def new_model(engine: TrunkEngine) -> tuple[NDArray[Any], Floats, Floats]:
+    """What does not change while it runs: a record of dtype `MODEL`, the legs' tables, the terrain's cells.
 
     Raises:
         ParameterError: the ground's exponent is not a multiple of 1/8.
@@ -66,13 +93,19 @@ def new_model(engine: TrunkEngine) -> Model:
     cells = max(profile.cells for profile in engine.profiles)
     tables = [profile.with_cells(cells).table for profile in dict.fromkeys(engine.profiles)]
     scheme, grid = SCHEMES[engine.integrator], terrain.to_grid()
-    return Model(
-        TRUNKS.index(engine.trunk.kind), int(eighths), FRICTION_LAWS.index(ground.friction_law),
-        ground.approach == "interpolated", terrain != Terrain.flat(), scheme.new_rates,
-        False, cells, np.concatenate(tables),
-        engine.filters.to_array(), np.array(scheme.fractions), np.array(scheme.weights),
-        grid.cells, grid.origin, grid.per_metre,
-    )  # fmt: skip
+    model = np.zeros(1, MODEL)
+    record = model[0]
+    record["legs"], record["cells"] = len(engine.limbs), cells
+    record["kind"], record["eighths"] = TRUNKS.index(engine.trunk.kind), int(eighths)
+    record["friction_law"] = FRICTION_LAWS.index(ground.friction_law)
+    record["interpolated"] = ground.approach == "interpolated"
+    record["is_terrain"], record["new_rates"] = terrain != Terrain.flat(), scheme.new_rates
+    record["stages"] = len(scheme.weights)
+    record["fractions"][: len(scheme.fractions)] = scheme.fractions
+    record["weights"][: len(scheme.weights)] = scheme.weights
+    record["settings"] = engine.filters.to_array().ravel()
+    record["ground_origin"], record["ground_per_metre"] = grid.origin, grid.per_metre
+    return model, np.concatenate(tables), grid.cells
 
 
 def layout(engine: TrunkEngine) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Rows of the engine's arrays that belong to the trunk; one column is one environment.
+"""Rows of memory that belong to the trunk, in the kernels and, where they are state or settings, in the engine.
 
 Names are row numbers; a vector takes two rows, x at its name and y at the next. SI units and radians. 'All'
 means trunk and legs together.
@@ -29,13 +29,13 @@ MEAN = 19  # weighted mean of the derivatives at the stages so far
     ROUND, SWIRL,  # inertia of all about the trunk's centre [kg m^2]; their spin, but for the pitch's
     LOAD, _, LOAD_TURN,  # right side of the trunk's equations [N, N m]
     M_XX, M_XY, M_YY, M_XP, M_YP, M_PP,  # and their matrix, with the cranks of the motors eliminated
-    STUCK,  # 1 once a crank was where its linkage does not close
-) = range(25, 50)  # fmt: skip
+    STUCK, FELL,  # 1 once a crank was where its linkage does not close; once the trunk was below BOTTOM
+) = range(25, 51)  # fmt: skip
 
 (
     TOTAL_MASS, PER_MASS, PITCH_INERTIA, SUPPORT, SPRING, DAMPER, HEIGHT, DRAG, GRAVITY,
     STIFFNESS, CHI, DASHPOT, FLOOR, FRICTION, SLOW, FAST, BOTTOM,
-) = range(50, 67)  # fmt: skip
+) = range(51, 68)  # fmt: skip
 PARAMETERS = (
     "total_mass", "per_mass", "pitch_inertia", "support", "spring", "damper", "height", "drag", "gravity",
     "stiffness", "chi", "dashpot", "approach_floor", "friction", "friction_slow", "friction_fast",
@@ -45,4 +45,4 @@ PARAMETERS = (
 spring and damper, ..., the ground's (`ground.contact.Ground`), and the height below which the trunk has
 fallen through it [m]."""
 
-ROWS = 67
+ROWS = 68

@@ -1,8 +1,8 @@
-"""Powers, exponential, cosine and sine that round the same alone and in a vector loop.
+"""Powers, exponential, cosine and sine that round the same alone and in lanes.
 
 Only + - * / and sqrt, which IEEE 754 rounds correctly in scalar and in vector code, and selections; no
-library function, no table, no branch that depends on the data. A loop over lanes that calls these vectorises,
-and its numbers have the bits that one lane alone has. What is not a number stays so.
+library function, no table, no branch that depends on the data. So each takes a float or `Lanes`, and a lane
+has the bits that it would have alone. What is not a number stays so.
 
 Sources: Cody & Waite 1980 (Software Manual for the Elementary Functions) for the reduction in two parts;
 the coefficients of sine and cosine are fdlibm's (Sun Microsystems, k_sin.c and k_cos.c, minimax on
@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 
 from hoof_env._jit import inlined
+from hoof_env._lanes import choose, larger, root, size, smaller
 
 EXPONENT_UNIT = 8
 """`root_power` knows the exponents that are whole multiples of 1 / EXPONENT_UNIT."""
@@ -22,9 +23,7 @@ LOWEST_EXPONENT = -40.0
 """Below this `exp_of_negative` stays at exp(-40) = 4e-18."""
 
 TWO_OVER_PI = 2 / math.pi
-HALF_PI_HIGH = float.fromhex(
-    "0x1.921fb54400000p+0"
-)  # 33 bits of pi / 2: times a whole number < 2^20 is exact
+HALF_PI_HIGH = float.fromhex("0x1.921fb54400000p+0")  # 33 bits of pi / 2: exact times whole numbers < 2^20
 HALF_PI_LOW = float.fromhex("0x1.0b4611a626331p-34")  # the rest
 ROUNDER = 1.5 * 2.0**52  # adding and subtracting it rounds to the nearest whole number
 
@@ -35,9 +34,9 @@ def root_power(d, eighths):  # type: ignore[no-untyped-def]
 
     Args:
         d: base [any unit].
-        eighths: exponent in eighths, a whole number from 8 to 24 and the same for all lanes.
+        eighths: exponent in eighths, a whole number from 8 to 24, the same in all lanes.
     """
-    base = max(d, 0.0)
+    base = larger(d, 0.0)
     power = base
     if eighths >= 16:
         power = power * base
@@ -45,15 +44,15 @@ def root_power(d, eighths):  # type: ignore[no-untyped-def]
         power = power * base
     rest = eighths & 7
     if rest != 0:
-        root = math.sqrt(base)
+        half = root(base)
         if rest & 4:
-            power = power * root
+            power = power * half
         if rest & 3:
-            root = math.sqrt(root)
+            quarter = root(half)
             if rest & 2:
-                power = power * root
+                power = power * quarter
             if rest & 1:
-                power = power * math.sqrt(root)
+                power = power * root(quarter)
     return power
 
 
@@ -63,7 +62,7 @@ def exp_of_negative(x):  # type: ignore[no-untyped-def]
 
     The series of exp(x / 256), squared eight times.
     """
-    y = max(x, LOWEST_EXPONENT) * (1 / 256)
+    y = larger(x, LOWEST_EXPONENT) * (1 / 256)
     e = 1 / 3628800
     e = e * y + 1 / 362880
     e = e * y + 1 / 40320
@@ -108,10 +107,12 @@ def cos_sin(angle):  # type: ignore[no-untyped-def]
     main = 1.0 - half
     cosine = main + (((1.0 - main) - half) + z * (z * c))  # what `main` lost in rounding is put back
     quadrant = turns - 4.0 * ((turns * 0.25 + ROUNDER) - ROUNDER)  # -2 to 2
-    odd = abs(quadrant) == 1.0
-    x = sine if odd else cosine
-    y = cosine if odd else sine
-    return (
-        -x if (quadrant == 1.0) | (abs(quadrant) == 2.0) else x,
-        -y if (quadrant == -1.0) | (abs(quadrant) == 2.0) else y,
-    )
+    odd, back = size(quadrant) == 1.0, size(quadrant) == 2.0
+    x, y = choose(odd, sine, cosine), choose(odd, cosine, sine)
+    return choose((quadrant == 1.0) | back, -x, x), choose((quadrant == -1.0) | back, -y, y)
+
+
+@inlined
+def clip(x, bound):  # type: ignore[no-untyped-def]
+    """`x` limited to [-bound, bound]."""
+    return smaller(larger(x, -bound), bound)

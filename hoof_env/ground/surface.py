@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env._jit import inlined
+from hoof_env._lanes import floor, gather, larger, smaller
+from hoof_env._memory import address
 
 
 class TerrainGrid(NamedTuple):
@@ -31,16 +33,16 @@ def surface(x, cells, origin, per_metre):  # type: ignore[no-untyped-def]
     """The ground at `x` [m]: height [m], normal x and y [-], factors of stiffness and friction [-].
 
     Args:
-        x: any number; what is not finite gives heights and factors that are none.
+        x: any number, or lanes; what is not finite gives heights and factors that are none.
         cells, origin, per_metre: a `TerrainGrid`.
     """
     place = (x - origin) * per_metre
-    cell = np.int32(min(max(0.0, place), cells.shape[0] - 1.0))  # this order of arguments sends NaN to cell 0
-    part = place - cell  # the level cells at the ends have no rises: any part will do
+    cell = floor(smaller(larger(0.0, place), cells.shape[0] - 1.0))  # this order of arguments sends NaN to cell 0
+    at, part, first = address(cells), place - cell, 8.0 * cell  # the level cells at the ends have no rises: any part will do
     return (
-        cells[cell, 0] + part * cells[cell, 1],
-        cells[cell, 2],
-        cells[cell, 3],
-        cells[cell, 4] + part * cells[cell, 5],
-        cells[cell, 6] + part * cells[cell, 7],
+        gather(at, first) + part * gather(at, first + 1.0),
+        gather(at, first + 2.0),
+        gather(at, first + 3.0),
+        gather(at, first + 4.0) + part * gather(at, first + 5.0),
+        gather(at, first + 6.0) + part * gather(at, first + 7.0),
     )

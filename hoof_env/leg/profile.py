@@ -17,30 +17,33 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import carray
 from numba.core import types
-from numba.extending import intrinsic
+from numba.core.extending import intrinsic
 from numpy.typing import NDArray
 
 from hoof_env._jit import inlined, kernel
-from hoof_env._memory import address, doubles
+from hoof_env._lanes import DOUBLE, INDEX, pick, spread, store_row
 from hoof_env.errors import GeometryError
+from hoof_env.ground.exact_math import ROUNDER
 from hoof_env.leg.geometry import Geometry, tables
 from hoof_env.leg.kinematics import solve_points
 from hoof_env.leg.linkage import BODIES, POINTS
 
 FUNCTIONS = (
     "toe_x", "toe_y", "heel_x", "heel_y",  # [m]
-    "s_x", "s_y",  # first moment: sum of m z over the links [kg m]
+    "ds_x", "ds_y",  # derivative of the first moment: a function of its own, for its derivative must be good
     "a",  # inertia of the crank's turning alone: sum of m |z'|^2 + J alpha'^2 [kg m^2]
     "b",  # coupling of crank and frame: sum of m z x z' + J alpha' [kg m^2]
-    "c",  # inertia of the frame's turning: sum of m |z|^2 + J [kg m^2]
-    "ds_x", "ds_y",  # derivative of s: a function of its own, for its derivative must be good too [kg m]
+    "s_x", "s_y",  # first moment: sum of m z over the links [kg m]
+    "c", "dc",  # inertia of the frame's turning: sum of m |z|^2 + J [kg m^2], and its derivative
     "sin", "cos",  # of the crank angle [-]
 )  # fmt: skip
 """The functions in the order of the table; z are the links' centres, alpha their angles, ' is d/dtheta."""
 
-(TOE_X, TOE_Y, HEEL_X, HEEL_Y, S_X, S_Y, A, B, C, DS_X, DS_Y, SIN, COS) = range(len(FUNCTIONS))
+(TOE_X, TOE_Y, HEEL_X, HEEL_Y, DS_X, DS_Y, A, B, S_X, S_Y, C, DC, SIN, COS) = range(len(FUNCTIONS))
+
+SLOPED = 8
+"""The first functions, of which derivatives are looked up too."""
 
 WIDTH = 16
 """Functions of a table row, padded to whole vectors."""
@@ -55,7 +58,6 @@ DERIVATIVE_ERROR = 1e-9
 _NUMBER = {name: i for i, name in enumerate(POINTS)}
 _TAIL = np.array([_NUMBER[body.tail] for body in BODIES])
 _HEAD = np.array([_NUMBER[body.head] for body in BODIES])
-_MAGIC = 6755399441055744.0  # 1.5 * 2^52: adding it rounds a double to the nearest integer
 
 
 @kernel
@@ -67,7 +69,7 @@ def _solve_all(theta, crank, pivot, steps, values, z, dz, ddz):  # type: ignore[
 def functions(
     geometry: Geometry, theta: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """All `FUNCTIONS` and their derivatives by theta in closed form, each of shape (len(theta), 13)."""
+    """All `FUNCTIONS` in closed form, shape (len(theta), 14), and derivatives by theta of the first `SLOPED`."""
     theta = np.asarray(theta, dtype=np.float64)
     z, dz, ddz = (np.empty((theta.size, len(POINTS)), np.complex128) for _ in range(3))
     crank, pivot = geometry.lengths["OP"], complex(*geometry.pivot)
@@ -83,14 +85,13 @@ def functions(
     toe, heel = _NUMBER[geometry.toe], _NUMBER[geometry.heel]
     s, ds, dds = r @ m, v @ m, acc @ m
     value = [
-        z[:, toe].real, z[:, toe].imag, z[:, heel].real, z[:, heel].imag, s.real, s.imag,
+        z[:, toe].real, z[:, toe].imag, z[:, heel].real, z[:, heel].imag, ds.real, ds.imag,
         np.abs(v) ** 2 @ m + turn**2 @ inertia, _cross(r, v) @ m + turn @ inertia,
-        np.abs(r) ** 2 @ m + inertia.sum(), ds.real, ds.imag, np.sin(theta), np.cos(theta),
+        s.real, s.imag, np.abs(r) ** 2 @ m + inertia.sum(), 2 * _dot(r, v) @ m, np.sin(theta), np.cos(theta),
     ]  # fmt: skip
     slope = [
-        dz[:, toe].real, dz[:, toe].imag, dz[:, heel].real, dz[:, heel].imag, ds.real, ds.imag,
+        dz[:, toe].real, dz[:, toe].imag, dz[:, heel].real, dz[:, heel].imag, dds.real, dds.imag,
         2 * (_dot(v, acc) @ m + (turn * dturn) @ inertia), _cross(r, acc) @ m + dturn @ inertia,
-        2 * _dot(r, v) @ m, dds.real, dds.imag, np.cos(theta), -np.sin(theta),
     ]  # fmt: skip
     return np.stack(value, 1), np.stack(slope, 1)
 
@@ -141,11 +142,16 @@ class LegProfile:
         return self if cells == self.cells else leg_profile(self.geometry, cells)
 
     def __call__(self, theta: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """All `FUNCTIONS` and their derivatives by theta from the table, each of shape (len(theta), 13)."""
+        """As `functions`, from the table."""
         theta = np.asarray(theta, dtype=np.float64)
-        value, slope = np.empty((theta.size, WIDTH)), np.empty((theta.size, WIDTH))
-        _look_up_all(theta, self.table, value, slope)
-        return value[:, : len(FUNCTIONS)], slope[:, : len(FUNCTIONS)]
+        cell, x = _find_cell(theta[:, None], self.cells)
+        rows = self.table[cell[:, 0].astype(np.int64) % self.cells].reshape(-1, DEGREE + 1, WIDTH)
+        slope = rows[:, 0]
+        value = slope * x + rows[:, 1]
+        for p in range(2, DEGREE + 1):
+            slope = slope * x + value
+            value = value * x + rows[:, p]
+        return value[:, : len(FUNCTIONS)], slope[:, :SLOPED]
 
     def _errors(self) -> NDArray[np.float64]:
         """Largest error of a derivative in each cell over its largest value [-], NaN without a place."""
@@ -187,114 +193,94 @@ def _fit(geometry: Geometry, cells: int) -> NDArray[np.float64]:
     return np.ascontiguousarray(table.reshape(cells, -1))
 
 
-@inlined
-def find_cell(theta, cells):  # type: ignore[no-untyped-def]
+def _find_cell(theta, cells):  # type: ignore[no-untyped-def]
     """Number of the cell, as a float that counts turns too, and the angle from its middle [rad]."""
-    cell = (theta * (cells * 0.15915494309189535) + _MAGIC) - _MAGIC
+    cell = (theta * (cells * 0.15915494309189535) + ROUNDER) - ROUNDER
     return cell, theta - cell * (6.283185307179586 / cells)
 
 
-# The look-up is written as vector instructions, which the compiler cuts to the processor's size: whether it
-# finds them by itself in a plain loop hangs on the code around. Horner's scheme runs through many functions
-# at once:
+# The look-up: Horner's scheme runs through eight functions at once,
 #
 #     for p in 1 ... DEGREE:  slope = slope x + value;  value = value x + coefficient[p]
+#
+# for each lane by itself, since each has a row of its own; then rows and columns are swapped.
 
-_INDEX, _DOUBLE = ir.IntType(64), ir.DoubleType()
-
-
-def _place(builder: Any, start: Any, offset: Any, width: int) -> Any:
-    """Pointer to `width` doubles, `offset` doubles after `start`."""
-    offset = ir.Constant(_INDEX, offset) if isinstance(offset, int) else offset
-    return builder.bitcast(builder.gep(start, [offset]), ir.VectorType(_DOUBLE, width).as_pointer())
+_HALF = WIDTH // 2
 
 
-def _horner(builder: Any, table: Any, row: Any, x: Any, begin: int, width: int) -> tuple[Any, Any]:
-    """Values and derivatives of functions `begin` to `begin` + `width` in a row of the table."""
-    vector = ir.VectorType(_DOUBLE, width)
-    nothing, zeros = (
-        ir.Constant(vector, ir.Undefined),
-        ir.Constant(ir.VectorType(ir.IntType(32), width), [0] * width),
-    )
-    x = builder.insert_element(nothing, x, ir.Constant(ir.IntType(32), 0))
-    x = builder.shuffle_vector(x, nothing, zeros)
-    first = builder.gep(table, [builder.mul(row, ir.Constant(_INDEX, WIDTH * (DEGREE + 1)))])
-    coefficients = [
-        builder.load(_place(builder, first, p * WIDTH + begin, width), align=8) for p in range(DEGREE + 1)
-    ]
-    slope = coefficients[0]
-    value = builder.fadd(builder.fmul(slope, x), coefficients[1])
+def _horner(builder: Any, first: Any, x: Any, sloped: bool) -> tuple[Any, Any]:
+    """Values of `_HALF` functions whose coefficients begin at `first`; derivatives if `sloped`."""
+    vector = ir.VectorType(DOUBLE, _HALF)
+    x = spread(builder, x, _HALF)
+    coefficients = []
+    for p in range(DEGREE + 1):
+        place = builder.bitcast(builder.gep(first, [ir.Constant(INDEX, p * WIDTH)]), vector.as_pointer())
+        coefficients.append(builder.load(place, align=8))
+    slope, value = coefficients[0], builder.fadd(builder.fmul(coefficients[0], x), coefficients[1])
     for coefficient in coefficients[2:]:
-        slope = builder.fadd(builder.fmul(slope, x), value)
+        if sloped:
+            slope = builder.fadd(builder.fmul(slope, x), value)
         value = builder.fadd(builder.fmul(value, x), coefficient)
     return value, slope
 
 
+def _shuffle(builder: Any, one: Any, two: Any, mask: list[int]) -> Any:
+    return builder.shuffle_vector(one, two, ir.Constant(ir.VectorType(ir.IntType(32), len(mask)), mask))
+
+
+def _columns(builder: Any, rows: list[Any]) -> list[Any]:
+    """The columns of `_HALF` wide rows, one a lane: squares are transposed in log2 steps of exchanging
+    blocks between pairs of rows."""
+    n = len(rows)
+    if n == 1:
+        return [pick(builder, rows[0], k, _HALF) for k in range(_HALF)]
+    found = []
+    for begin in range(0, _HALF, n):
+        square = [_shuffle(builder, row, row, list(range(begin, begin + n))) for row in rows]
+        block = 1
+        while block < n:
+            swapped = list(square)
+            low = [i + (n - block if i & block else 0) for i in range(n)]
+            high = [i + block if not i & block else n + i for i in range(n)]
+            for i in range(n):
+                if not i & block:
+                    one, two = square[i], square[i + block]
+                    swapped[i] = _shuffle(builder, one, two, low)
+                    swapped[i + block] = _shuffle(builder, one, two, high)
+            square, block = swapped, 2 * block
+        found += square
+    return found
+
+
 @intrinsic
-def look_up(context: Any, table: Any, row: Any, x: Any, out: Any) -> Any:
-    """Fill `out`, 2 WIDTH doubles, with all functions and then their derivatives, `x` [rad] from the middle
-    of the cell in `row` of a table. `table` and `out` are pointers."""
+def look_up(context: Any, out: Any, table: Any, row: Any, x: Any) -> Any:
+    """Fill the first WIDTH + SLOPED rows of `out` with all functions and derivatives.
+
+    Args:
+        out: `Rows`.
+        table: pointer to the coefficients.
+        row, x: `Lanes`: the row of the table, and the angle from its cell's middle [rad].
+    """
 
     def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        table, row, x, out = values
-        value, slope = _horner(builder, table, row, x, 0, WIDTH)
-        builder.store(value, _place(builder, out, 0, WIDTH), align=8)
-        builder.store(slope, _place(builder, out, WIDTH, WIDTH), align=8)
+        out, table, row, x = values
+        count = signature.args[0].count
+        parts: dict[int, list[Any]] = {begin: [] for begin in (0, _HALF, WIDTH)}
+        for lane in range(count):
+            number = builder.fptosi(pick(builder, row, lane, count), INDEX)
+            first = builder.gep(table, [builder.mul(number, ir.Constant(INDEX, WIDTH * (DEGREE + 1)))])
+            angle = pick(builder, x, lane, count)
+            value, slope = _horner(builder, first, angle, sloped=True)
+            parts[0].append(value)
+            parts[WIDTH].append(slope)
+            other = builder.gep(first, [ir.Constant(INDEX, _HALF)])
+            parts[_HALF].append(_horner(builder, other, angle, sloped=False)[0])
+        for begin, lanes in parts.items():
+            for k, column in enumerate(_columns(builder, lanes)):
+                store_row(builder, column, out, ir.Constant(INDEX, begin + k), count)
         return context.get_dummy_value()
 
-    return types.void(table, row, x, out), emit
+    return types.void(out, table, row, x), emit
 
 
-def _transpose(builder: Any, rows: list[Any]) -> list[Any]:
-    """Swap rows and columns of a square of vectors, in log2 steps of exchanging blocks between pairs of
-    rows."""
-    size = len(rows)
-    block = 1
-    while block < size:
-        swapped = list(rows)
-        low = [i + (size - block if i & block else 0) for i in range(size)]
-        high = [i + block if not i & block else size + i for i in range(size)]
-        for i in range(size):
-            if not i & block:
-                for target, mask in ((i, low), (i + block, high)):
-                    indices = ir.Constant(ir.VectorType(ir.IntType(32), size), mask)
-                    swapped[target] = builder.shuffle_vector(rows[i], rows[i + block], indices)
-        rows, block = swapped, 2 * block
-    return rows
-
-
-def _group_look_up(size: int) -> Any:
-    """`look_up` for `size` lanes: row numbers (as doubles) and angles at the pointers `rows` and `xs`;
-    function k of lane j goes to out[k stride + j], its derivative to out[(WIDTH + k) stride + j]."""
-
-    def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        table, rows, xs, out, stride = values
-        for begin in range(0, WIDTH, size):
-            lanes = []
-            for lane in range(size):
-                row, x = (builder.load(builder.gep(p, [ir.Constant(_INDEX, lane)])) for p in (rows, xs))
-                lanes.append(_horner(builder, table, builder.fptosi(row, _INDEX), x, begin, size))
-            for part, columns in enumerate(zip(*lanes, strict=True)):
-                for k, column in enumerate(_transpose(builder, list(columns))):
-                    number = ir.Constant(_INDEX, part * WIDTH + begin + k)
-                    builder.store(column, _place(builder, out, builder.mul(number, stride), size), align=8)
-        return context.get_dummy_value()
-
-    def look_up_group(context: Any, table: Any, rows: Any, xs: Any, out: Any, stride: Any) -> Any:
-        return types.void(table, rows, xs, out, stride), emit
-
-    return intrinsic(look_up_group)
-
-
-look_up_four, look_up_eight = _group_look_up(4), _group_look_up(8)
-
-
-@kernel
-def _look_up_all(theta, table, value, slope):  # type: ignore[no-untyped-def]
-    out = doubles(2 * WIDTH)
-    row = carray(out, 2 * WIDTH)
-    cells = table.shape[0]
-    for n in range(theta.shape[0]):
-        cell, x = find_cell(theta[n], cells)
-        look_up(address(table), int(cell) & (cells - 1), x, out)
-        value[n], slope[n] = row[:WIDTH], row[WIDTH:]
+find_cell = inlined(_find_cell)

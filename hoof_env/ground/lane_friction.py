@@ -1,12 +1,9 @@
-"""The laws of `friction` for loops over many legs.
-
-Without library functions or branches on the data, so that a loop over lanes vectorises and rounds as one lane
-does (see `exact_math`). What is not a number stays so.
-"""
+"""The laws of `friction` for lanes: without library functions or branches on the data (see `exact_math`)."""
 
 from __future__ import annotations
 
 from hoof_env._jit import inlined
+from hoof_env._lanes import larger, smaller
 from hoof_env.ground.exact_math import exp_of_negative
 
 AMBROSIO, THRELFALL, TANH = range(3)  # positions in friction.FRICTION_LAWS
@@ -18,14 +15,14 @@ def friction_part(speed, law, slow, fast):  # type: ignore[no-untyped-def]
 
     Args:
         speed: sliding speed |v| [m/s].
-        law: index into `friction.FRICTION_LAWS`, the same for all lanes.
+        law: index into `friction.FRICTION_LAWS`, the same in all lanes.
         slow, fast: threshold speeds [m/s].
     """
     if law == AMBROSIO:
         part = (speed - slow) / (fast - slow)
     elif law == THRELFALL:
-        part = 1.0 - exp_of_negative(-3.0 * min(speed / fast, 1.0))
+        part = 1.0 - exp_of_negative(-3.0 * smaller(speed / fast, 1.0))
     else:
         e = exp_of_negative(-2.0 * (speed / fast))
         part = (1.0 - e) / (1.0 + e)
-    return min(max(part, 0.0), 1.0)
+    return smaller(larger(part, 0.0), 1.0)

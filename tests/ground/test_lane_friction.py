@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numba import njit
 
 from hoof_env.ground import friction
-from hoof_env.ground.lane_contact import AMBROSIO, TANH, THRELFALL, friction_part
+from hoof_env.ground.lane_friction import AMBROSIO, TANH, THRELFALL, friction_part
 
 LAWS = (AMBROSIO, THRELFALL, TANH)
 
