@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 from numba import njit
 
+from hoof_env._lanes import fill, rows, write
+from hoof_env._memory import address, doubles
 from hoof_env.dynamics.constrained import ConstrainedLeg
 from hoof_env.dynamics.constraints import closed_form
 from hoof_env.dynamics.engine import GRAVITY
 from hoof_env.dynamics.reactions import (
+    CONSTANTS,
     DRIVER,
     HIP,
     LOCK,
@@ -18,6 +21,7 @@ from hoof_env.dynamics.reactions import (
     leg_constants,
     leg_reactions,
 )
+from hoof_env.dynamics.vectors import vector
 from hoof_env.gait.motion_law import evaluate_motion
 from hoof_env.gait.parameters import load_gait
 from hoof_env.ground.contact import Ground
@@ -62,20 +66,26 @@ def cross(arms, forces):
 
 @njit(error_model="numpy")
 def solve(state, constants, out):
-    """A leg a row: turn, rate and acceleration of crank and of frame, lift, forces on toe and heel."""
-    z = state[:, 0::2] + 1j * state[:, 1::2]
-    for k in range(len(z)):
+    """A leg a column: turn, rate and acceleration of crank and of frame, lift, forces on toe and heel."""
+    count = state.shape[1]
+    g, found = rows(doubles(CONSTANTS), 1), rows(doubles(OUTPUTS), 1)
+    fill(g, 0, CONSTANTS, address(constants), 0, 1, 1)
+    now = rows(doubles(14), 1)
+    for k in range(count):
+        fill(now, 0, 14, address(state), k, count, 1)
         joints, lock, driver, hip = leg_reactions(
-            constants, 0, z[k, 0], z[k, 1].real, z[k, 1].imag, z[k, 2], z[k, 3].real, z[k, 3].imag,
-            z[k, 4], z[k, 5], z[k, 6],
+            g, vector(now, 0), now[2], now[3], vector(now, 4), now[6], now[7], vector(now, 8),
+            vector(now, 10), vector(now, 12),
         )  # fmt: skip
-        keep_reactions(out, k, joints, lock, driver, hip)
+        keep_reactions(found, joints, lock, driver, hip)
+        for j in range(OUTPUTS):
+            write(found[j], address(out), j * count + k, 1)
 
 
 def solved(geometry, state):
     """Outputs of legs alike, shape (OUTPUTS, count)."""
     out = np.full((OUTPUTS, state.shape[1]), np.nan)
-    solve(np.ascontiguousarray(state.T), leg_constants(geometry), out)
+    solve(np.ascontiguousarray(state), leg_constants(geometry), out)
     return out
 
 
