@@ -63,7 +63,8 @@ def inlined(function: F) -> F:
     are known there and its loops over lanes become vector code."""
     import numba
 
-    return cast(F, numba.njit(error_model="numpy", forceinline=True)(function))
+    options = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # a third of the time to compile
+    return cast(F, numba.njit(error_model="numpy", forceinline=True, **options)(function))
 
 
 def pasted(function: F) -> F:
@@ -124,6 +125,7 @@ def _sources() -> str:
     """Digest of everything that kernels are made from."""
     here = Path(__file__).parent
     digest = hashlib.sha256()
-    for path in sorted(path for room in MECHANICS for path in (here / room).glob("*.py")):
+    rooms = (path for room in MECHANICS for path in (here / room).glob("*.py"))
+    for path in sorted((*rooms, *here.glob("_*.py"))):
         digest.update(path.read_bytes())
     return digest.hexdigest()

@@ -427,6 +427,20 @@ def lane_sum(context: Any, start: Any, x: Any) -> Any:
 
 
 @intrinsic
+def anywhere(context: Any, condition: Any) -> Any:
+    """Whether a condition holds in any lane."""
+
+    def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        count = signature.args[0].count
+        if count == 1:
+            return values[0]
+        bits = ir.IntType(count)
+        return builder.icmp_unsigned("!=", builder.bitcast(values[0], bits), bits(0))
+
+    return types.boolean(condition), emit
+
+
+@intrinsic
 def gather(context: Any, pointer: Any, index: Any) -> Any:
     """pointer[index] in every lane; the index is a double that holds a whole number."""
 

@@ -25,9 +25,9 @@ from hoof_env.dynamics.lanes_ground import meet_ground
 from hoof_env.dynamics.trunk import FIXED, FREE, RAIL, SUSPENDED
 from hoof_env.dynamics.vectors import add, add_vector, put, vector
 from hoof_env.gait.motion_law import COS, OFFSET, SIN, SPEED
-from hoof_env.ground.exact_math import ROUNDER, clip, cos_sin
+from hoof_env.ground.exact_math import clip, cos_sin
 from hoof_env.leg import profile as f
-from hoof_env.leg.profile import find_cell, look_up
+from hoof_env.leg.profile import look_up
 
 
 @pasted
@@ -58,11 +58,8 @@ def evaluate(trunk, limbs, legs, model, elapsed):  # type: ignore[no-untyped-def
 @inlined
 def look_up_functions(trunk, limb, model):  # type: ignore[no-untyped-def]
     """The functions of the crank angle and their derivatives."""
-    angle, cells = limb[b.ANGLE], model.cells
-    cell, rest = find_cell(angle, cells)
-    row = cell - ((cell * (1.0 / cells) - 0.5 + ROUNDER) - ROUNDER) * cells  # less whole turns
-    row = choose((row >= 0.0) & (row < cells), row, 0.0)  # what is not a number has the first row
-    look_up(below(limb, b.VALUES), model.tables, limb[b.FIRST] + row, rest)
+    angle = limb[b.ANGLE]
+    look_up(below(limb, b.VALUES), model.tables, limb[b.FIRST], model.cells, angle)
     value = limb[b.VALUES]
     trunk[t.STUCK] = choose((angle == angle) & (value != value), 1.0, trunk[t.STUCK])
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from hoof_env._jit import inlined
-from hoof_env._lanes import across, choose, cross, dot, larger, level, plane, size
+from hoof_env._lanes import across, anywhere, choose, cross, dot, larger, level, plane, size
 from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
 from hoof_env.dynamics.vectors import put, vector
@@ -67,15 +67,18 @@ def meet_point(trunk, limb, hip, hip_velocity, model, c, memory, name):  # type:
     normal = vector(limb, c + b.NORMAL_X)
     depth, rate, slide = (height - spot.imag) * normal.imag, -dot(normal, velocity), -cross(normal, velocity)
 
-    slowness = entry_slowness(trunk, limb, depth, rate, memory, model)
-    push, spring = push_back(trunk, limb[c + b.FIRMNESS], depth, rate, slowness, model)
-    part = friction_part(size(slide), model.friction_law, trunk[t.SLOW], trunk[t.FAST])
-    grip = trunk[t.FRICTION] * limb[c + b.ROUGHNESS] * part * push
-    rub = choose(slide > 0.0, -grip, grip)
-    force = push * normal - rub * across(normal)
-
     put(limb, c + b.SPOT, spot)
     limb[c + b.DEPTH], limb[c + b.DEPTH_RATE], limb[c + b.SLIDE] = depth, rate, slide
+    push = 0.0 * size(depth)  # what is not a number stays so
+    spring, slowness, rub = push, limb[memory + 2], push
+    if anywhere(depth > 0.0):
+        if anywhere((depth > 0.0) & (slowness == 0.0)):
+            slowness = choose(slowness > 0.0, slowness, entry_slowness(trunk, limb, depth, rate, memory, model))
+        push, spring = push_back(trunk, limb[c + b.FIRMNESS], depth, rate, slowness, model)
+        part = friction_part(size(slide), model.friction_law, trunk[t.SLOW], trunk[t.FAST])
+        grip = trunk[t.FRICTION] * limb[c + b.ROUGHNESS] * part * push
+        rub = choose(depth > 0.0, choose(slide > 0.0, -grip, grip), push)
+    force = push * normal - rub * across(normal)
     limb[c + b.SPRING], limb[c + b.SLOWNESS] = spring, slowness
     limb[c + b.NORMAL], limb[c + b.RUB] = push, rub
     put(limb, c + b.FORCE, force)
@@ -85,14 +88,14 @@ def meet_point(trunk, limb, hip, hip_velocity, model, c, memory, name):  # type:
 @inlined
 def entry_slowness(trunk, limb, depth, rate, memory, model):  # type: ignore[no-untyped-def]
     """1 / v0 with v0 the approach speed at the crossing of the surface, interpolated between the last whole
-    step and now; or what is kept from there."""
-    before, rate_before, kept, floor = limb[memory], limb[memory + 1], limb[memory + 2], trunk[t.FLOOR]
+    step and now."""
+    before, rate_before, floor = limb[memory], limb[memory + 1], trunk[t.FLOOR]
     span, entry = level(limb, 1.0), rate
     if model.interpolated:
         crossed = before < 0.0
         span = choose(crossed, depth - before, span)
         entry = choose(crossed, rate_before * span - before * (rate - rate_before), rate)
-    return choose(kept > 0.0, kept, span / larger(entry, floor * span))
+    return span / larger(entry, floor * span)
 
 
 @inlined
@@ -104,7 +107,7 @@ def push_back(trunk, firmness, depth, rate, slowness, model):  # type: ignore[no
         power = root_power(depth, model.eighths)
     spring, inside = trunk[t.STIFFNESS] * firmness * power, depth > 0.0
     push = spring * (1.0 + trunk[t.CHI] * rate * slowness) + trunk[t.DASHPOT] * rate
-    outside = 0.0 * size(depth)  # what is not a number stays so
+    outside = 0.0 * size(depth)
     return choose(inside, larger(push, 0.0), outside), choose(inside, spring, 0.0)
 
 

@@ -6,7 +6,7 @@ has the bits that it would have alone. What is not a number stays so.
 
 Sources: Cody & Waite 1980 (Software Manual for the Elementary Functions) for the reduction in two parts;
 the coefficients of sine and cosine are fdlibm's (Sun Microsystems, k_sin.c and k_cos.c, minimax on
-[-pi/4, pi/4]).
+[-pi/4, pi/4]); Estrin's scheme, whose chains of operations are short.
 """
 
 from __future__ import annotations
@@ -90,19 +90,14 @@ def cos_sin(angle):  # type: ignore[no-untyped-def]
     turns = (angle * TWO_OVER_PI + ROUNDER) - ROUNDER  # quarter turns to the nearest multiple of pi / 2
     r = (angle - turns * HALF_PI_HIGH) - turns * HALF_PI_LOW
     z = r * r
-    s = 1.58969099521155010221e-10
-    s = s * z + -2.50507602534068634195e-08
-    s = s * z + 2.75573137070700676789e-06
-    s = s * z + -1.98412698298579493134e-04
-    s = s * z + 8.33333333332248946124e-03
-    s = s * z + -1.66666666666666324348e-01
+    z2 = z * z
+    s = -1.66666666666666324348e-01 + 8.33333333332248946124e-03 * z
+    s = s + z2 * (-1.98412698298579493134e-04 + 2.75573137070700676789e-06 * z)
+    s = s + z2 * z2 * (-2.50507602534068634195e-08 + 1.58969099521155010221e-10 * z)
     sine = r + r * (z * s)
-    c = -1.13596475577881948265e-11
-    c = c * z + 2.08757232129817482790e-09
-    c = c * z + -2.75573143513906633035e-07
-    c = c * z + 2.48015872894767294178e-05
-    c = c * z + -1.38888888888741095749e-03
-    c = c * z + 4.16666666666666019037e-02
+    c = 4.16666666666666019037e-02 + -1.38888888888741095749e-03 * z
+    c = c + z2 * (2.48015872894767294178e-05 + -2.75573143513906633035e-07 * z)
+    c = c + z2 * z2 * (2.08757232129817482790e-09 + -1.13596475577881948265e-11 * z)
     half = 0.5 * z
     main = 1.0 - half
     cosine = main + (((1.0 - main) - half) + z * (z * c))  # what `main` lost in rounding is put back

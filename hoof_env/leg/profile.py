@@ -21,8 +21,8 @@ from numba.core import types
 from numba.core.extending import intrinsic
 from numpy.typing import NDArray
 
-from hoof_env._jit import inlined, kernel
-from hoof_env._lanes import DOUBLE, INDEX, pick, spread, store_row
+from hoof_env._jit import kernel
+from hoof_env._lanes import DOUBLE, INDEX, pick, spread, store_row, wide
 from hoof_env.errors import GeometryError
 from hoof_env.ground.exact_math import ROUNDER
 from hoof_env.leg.geometry import Geometry, tables
@@ -144,11 +144,11 @@ class LegProfile:
     def __call__(self, theta: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """As `functions`, from the table."""
         theta = np.asarray(theta, dtype=np.float64)
-        cell, x = _find_cell(theta[:, None], self.cells)
-        rows = self.table[cell[:, 0].astype(np.int64) % self.cells].reshape(-1, DEGREE + 1, WIDTH)
-        slope = rows[:, 0]
-        value = slope * x + rows[:, 1]
-        for p in range(2, DEGREE + 1):
+        cell = np.rint(theta * (self.cells / (2 * np.pi)))
+        x = (theta - cell * (2 * np.pi / self.cells))[:, None]
+        rows = self.table[cell.astype(np.int64) % self.cells].reshape(-1, DEGREE + 1, WIDTH)
+        slope, value = np.zeros((2, len(theta), WIDTH))
+        for p in range(DEGREE + 1):
             slope = slope * x + value
             value = value * x + rows[:, p]
         return value[:, : len(FUNCTIONS)], slope[:, :SLOPED]
@@ -193,35 +193,36 @@ def _fit(geometry: Geometry, cells: int) -> NDArray[np.float64]:
     return np.ascontiguousarray(table.reshape(cells, -1))
 
 
-def _find_cell(theta, cells):  # type: ignore[no-untyped-def]
-    """Number of the cell, as a float that counts turns too, and the angle from its middle [rad]."""
-    cell = (theta * (cells * 0.15915494309189535) + ROUNDER) - ROUNDER
-    return cell, theta - cell * (6.283185307179586 / cells)
-
-
-# The look-up: Horner's scheme runs through eight functions at once,
+# The look-up: eight functions at once, for each lane by itself, since each has a row of its own; then rows and
+# columns are swapped. Estrin's scheme has the operations of Horner's in a chain of half the length:
 #
-#     for p in 1 ... DEGREE:  slope = slope x + value;  value = value x + coefficient[p]
+#     p = c0 + c1 x, ... in pairs;  q = p + x^2 p, ...;  value = q + x^4 q,
 #
-# for each lane by itself, since each has a row of its own; then rows and columns are swapped.
+# and likewise its derivative by the product rule.
 
 _HALF = WIDTH // 2
 
 
-def _horner(builder: Any, first: Any, x: Any, sloped: bool) -> tuple[Any, Any]:
+def _polynomials(builder: Any, first: Any, x: Any, sloped: bool) -> tuple[Any, Any]:
     """Values of `_HALF` functions whose coefficients begin at `first`; derivatives if `sloped`."""
-    vector = ir.VectorType(DOUBLE, _HALF)
-    x = spread(builder, x, _HALF)
-    coefficients = []
-    for p in range(DEGREE + 1):
-        place = builder.bitcast(builder.gep(first, [ir.Constant(INDEX, p * WIDTH)]), vector.as_pointer())
-        coefficients.append(builder.load(place, align=8))
-    slope, value = coefficients[0], builder.fadd(builder.fmul(coefficients[0], x), coefficients[1])
-    for coefficient in coefficients[2:]:
-        if sloped:
-            slope = builder.fadd(builder.fmul(slope, x), value)
-        value = builder.fadd(builder.fmul(value, x), coefficient)
-    return value, slope
+    times, plus, vector = builder.fmul, builder.fadd, ir.VectorType(DOUBLE, _HALF)
+    c = []
+    for p in range(DEGREE, -1, -1):
+        place = builder.bitcast(builder.gep(first, [INDEX(p * WIDTH)]), vector.as_pointer())
+        c.append(builder.load(place, align=8))
+    x2 = times(x, x)
+    double, x4, x3 = plus(x, x), times(x2, x2), times(x2, x)
+    x, x2, x4, double, cubed = (
+        spread(builder, y, _HALF) for y in (x, x2, x4, double, times(x3, DOUBLE(4.0)))
+    )
+    p = [plus(c[k], times(c[k + 1], x)) for k in (0, 2, 4, 6)]
+    low, high = plus(p[0], times(x2, p[1])), plus(p[2], times(x2, p[3]))
+    value = plus(low, times(x4, high))
+    if not sloped:
+        return value, None
+    low_slope = plus(plus(c[1], times(c[3], x2)), times(double, p[1]))
+    high_slope = plus(plus(c[5], times(c[7], x2)), times(double, p[3]))
+    return value, plus(plus(low_slope, times(cubed, high)), times(x4, high_slope))
 
 
 def _shuffle(builder: Any, one: Any, two: Any, mask: list[int]) -> Any:
@@ -253,34 +254,43 @@ def _columns(builder: Any, rows: list[Any]) -> list[Any]:
 
 
 @intrinsic
-def look_up(context: Any, out: Any, table: Any, row: Any, x: Any) -> Any:
+def look_up(context: Any, out: Any, table: Any, first: Any, cells: Any, theta: Any) -> Any:
     """Fill the first WIDTH + SLOPED rows of `out` with all functions and derivatives.
 
     Args:
         out: `Rows`.
         table: pointer to the coefficients.
-        row, x: `Lanes`: the row of the table, and the angle from its cell's middle [rad].
+        first: `Lanes`: number of the row where the leg's table begins.
+        cells: of a table.
+        theta: `Lanes`, crank angle; what is not a number gives values that are none [rad].
     """
 
     def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        out, table, row, x = values
+        out, table, first, cells, theta = values
         count = signature.args[0].count
+        whole = wide(INDEX, count)
+        # The sum's last bits are the number of the cell, turns included: those of one turn are its row.
+        per_cell = builder.uitofp(cells, DOUBLE)
+        scaled = builder.fmul(theta, spread(builder, builder.fmul(per_cell, DOUBLE(1 / (2 * np.pi))), count))
+        rounder = spread(builder, DOUBLE(ROUNDER), count)
+        shifted = builder.fadd(scaled, rounder)
+        mask = spread(builder, builder.sub(cells, INDEX(1)), count)
+        row = builder.and_(builder.bitcast(shifted, whole), mask)
+        row = builder.add(row, builder.fptosi(first, whole))
+        cell, width = builder.fsub(shifted, rounder), builder.fdiv(DOUBLE(2 * np.pi), per_cell)
+        x = builder.fsub(theta, builder.fmul(cell, spread(builder, width, count)))
         parts: dict[int, list[Any]] = {begin: [] for begin in (0, _HALF, WIDTH)}
         for lane in range(count):
-            number = builder.fptosi(pick(builder, row, lane, count), INDEX)
-            first = builder.gep(table, [builder.mul(number, ir.Constant(INDEX, WIDTH * (DEGREE + 1)))])
-            angle = pick(builder, x, lane, count)
-            value, slope = _horner(builder, first, angle, sloped=True)
+            at = builder.mul(pick(builder, row, lane, count), INDEX(WIDTH * (DEGREE + 1)))
+            angle, place = pick(builder, x, lane, count), builder.gep(table, [at])
+            value, slope = _polynomials(builder, place, angle, sloped=True)
             parts[0].append(value)
             parts[WIDTH].append(slope)
-            other = builder.gep(first, [ir.Constant(INDEX, _HALF)])
-            parts[_HALF].append(_horner(builder, other, angle, sloped=False)[0])
+            other = builder.gep(place, [INDEX(_HALF)])
+            parts[_HALF].append(_polynomials(builder, other, angle, sloped=False)[0])
         for begin, lanes in parts.items():
             for k, column in enumerate(_columns(builder, lanes)):
-                store_row(builder, column, out, ir.Constant(INDEX, begin + k), count)
+                store_row(builder, column, out, INDEX(begin + k), count)
         return context.get_dummy_value()
 
-    return types.void(out, table, row, x), emit
-
-
-find_cell = inlined(_find_cell)
+    return types.void(out, table, first, types.int64, theta), emit
