@@ -413,6 +413,32 @@ floor = _of_llvm("llvm.floor", "The largest whole number that is not above it.")
 
 
 @intrinsic
+def quarter_turns(context: Any, cosine: Any, sine: Any, shifted: Any) -> Any:
+    """(cosine, sine) of an angle plus as many quarter turns as the last two bits of `shifted` say, a whole
+    number to which 3 2^51 was added. Bits are moved, nothing is rounded or compared."""
+
+    def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        count = getattr(signature.args[0], "count", 1)
+        whole = wide(INDEX, count)
+        cosine, sine, quarters = (builder.bitcast(value, whole) for value in values)
+
+        def constant(number: int) -> Any:
+            return spread(builder, INDEX(number), count)
+
+        odd = builder.sub(constant(0), builder.and_(quarters, constant(1)))  # all bits or none
+        swap = builder.and_(builder.xor(cosine, sine), odd)
+        top = constant(-(2**63))
+        sine_sign = builder.and_(builder.shl(quarters, constant(62)), top)
+        cosine_sign = builder.and_(builder.shl(builder.add(quarters, constant(1)), constant(62)), top)
+        x = builder.xor(builder.xor(cosine, swap), cosine_sign)
+        y = builder.xor(builder.xor(sine, swap), sine_sign)
+        both = [builder.bitcast(bits, values[0].type) for bits in (x, y)]
+        return context.make_tuple(builder, signature.return_type, both)
+
+    return types.UniTuple(cosine, 2)(cosine, sine, shifted), emit
+
+
+@intrinsic
 def lane_sum(context: Any, start: Any, x: Any) -> Any:
     """start + x_0 + x_1 + ..., added in this order, in every lane; `start` is the same in all."""
 

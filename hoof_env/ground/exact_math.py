@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 
 from hoof_env._jit import inlined
-from hoof_env._lanes import choose, larger, root, size, smaller
+from hoof_env._lanes import larger, quarter_turns, root, smaller
 
 EXPONENT_UNIT = 8
 """`root_power` knows the exponents that are whole multiples of 1 / EXPONENT_UNIT."""
@@ -87,7 +87,8 @@ def exp_of_negative(x):  # type: ignore[no-untyped-def]
 @inlined
 def cos_sin(angle):  # type: ignore[no-untyped-def]
     """Cosine and sine of `angle` [rad], error below 2e-16 for |angle| < 1e4."""
-    turns = (angle * TWO_OVER_PI + ROUNDER) - ROUNDER  # quarter turns to the nearest multiple of pi / 2
+    shifted = angle * TWO_OVER_PI + ROUNDER
+    turns = shifted - ROUNDER  # quarter turns to the nearest multiple of pi / 2
     r = (angle - turns * HALF_PI_HIGH) - turns * HALF_PI_LOW
     z = r * r
     z2 = z * z
@@ -101,10 +102,7 @@ def cos_sin(angle):  # type: ignore[no-untyped-def]
     half = 0.5 * z
     main = 1.0 - half
     cosine = main + (((1.0 - main) - half) + z * (z * c))  # what `main` lost in rounding is put back
-    quadrant = turns - 4.0 * ((turns * 0.25 + ROUNDER) - ROUNDER)  # -2 to 2
-    odd, back = size(quadrant) == 1.0, size(quadrant) == 2.0
-    x, y = choose(odd, sine, cosine), choose(odd, cosine, sine)
-    return choose((quadrant == 1.0) | back, -x, x), choose((quadrant == -1.0) | back, -y, y)
+    return quarter_turns(cosine, sine, shifted)
 
 
 @inlined
