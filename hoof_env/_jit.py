@@ -21,7 +21,7 @@ from hoof_env.errors import HoofEnvError, OutputError
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-MECHANICS = ("leg", "ground", "gait", "dynamics", "identify")
+MECHANICS = ("_lanes", "leg", "ground", "gait", "dynamics", "identify")
 """The rooms whose sources end up in kernels."""
 
 QUIET = "HOOF_ENV_QUIET"
@@ -63,8 +63,9 @@ def inlined(function: F) -> F:
     are known there and its loops over lanes become vector code."""
     import numba
 
-    options = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # a third of the time to compile
-    return cast(F, numba.njit(error_model="numpy", forceinline=True, **options)(function))
+    options: Any = {"error_model": "numpy", "forceinline": True}
+    options |= {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # a third of the time to compile
+    return cast(F, numba.njit(**options)(function))
 
 
 def pasted(function: F) -> F:

@@ -11,8 +11,10 @@ from __future__ import annotations
 from typing import Any
 
 from llvmlite import ir
-from numba.core import cgutils, types
-from numba.extending import intrinsic
+from numba.core import cgutils, extending, types
+
+intrinsic: Any = extending.intrinsic
+"""numba's decorator for functions that write their own instructions; it adds their first argument."""
 
 
 @intrinsic

@@ -15,7 +15,7 @@ from itertools import accumulate, pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import carray
+from numba import carray  # type: ignore[attr-defined]
 
 from hoof_env._jit import inlined, kernel, pasted
 from hoof_env._lanes import below, choose, fill, lane_sum, level, read, rows, write
@@ -35,7 +35,6 @@ from hoof_env.dynamics.lanes_report import (
 )
 from hoof_env.dynamics.lanes_time import begin_step, end_step, next_stage, weigh_stage
 from hoof_env.dynamics.reactions import CONSTANTS, OUTPUTS
-from hoof_env.dynamics.trunk import FIXED
 
 LANES = 8
 """Environments side by side in a batch: one vector of 512 bits."""

@@ -146,7 +146,11 @@ def move_trunk(trunk, kind):  # type: ignore[no-untyped-def]
 
     On a rail the place along y is given and the velocity along y 0.
     """
-    centre, moment, momentum = vector(trunk, t.NOW_CENTRE), vector(trunk, t.MOMENT), vector(trunk, t.NOW_MOMENTUM)
+    centre, moment, momentum = (
+        vector(trunk, t.NOW_CENTRE),
+        vector(trunk, t.MOMENT),
+        vector(trunk, t.NOW_MOMENTUM),
+    )
     drift, per_mass = vector(trunk, t.DRIFT), trunk[t.PER_MASS]
     place = centre - per_mass * moment
     velocity = per_mass * (momentum - drift)

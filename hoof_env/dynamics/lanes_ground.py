@@ -73,7 +73,9 @@ def meet_point(trunk, limb, hip, hip_velocity, model, c, memory, name):  # type:
     spring, slowness, rub = push, limb[memory + 2], push
     if anywhere(depth > 0.0):
         if anywhere((depth > 0.0) & (slowness == 0.0)):
-            slowness = choose(slowness > 0.0, slowness, entry_slowness(trunk, limb, depth, rate, memory, model))
+            slowness = choose(
+                slowness > 0.0, slowness, entry_slowness(trunk, limb, depth, rate, memory, model)
+            )
         push, spring = push_back(trunk, limb[c + b.FIRMNESS], depth, rate, slowness, model)
         part = friction_part(size(slide), model.friction_law, trunk[t.SLOW], trunk[t.FAST])
         grip = trunk[t.FRICTION] * limb[c + b.ROUGHNESS] * part * push

@@ -1,4 +1,4 @@
-"""Rows of memory that belong to one leg, in the kernels and, where they are state or settings, in the engine.
+"""Rows that belong to one leg, in the kernels and, where state or settings, in the engine's memory.
 
 Names are row numbers; a vector takes two rows, x at its name and y at the next. SI units and radians. The leg
 enters through its functions of the crank angle (`leg.profile`); beta = pitch + side phi is the world angle

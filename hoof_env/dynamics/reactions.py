@@ -5,10 +5,10 @@ that every law of moments reads 'this force turns the link like that one'. Two l
 dyad) then give the force in that point from two such laws, and the forces at their far ends from the balance
 of each. This starts at the hoof, which is loaded by inertia and ground alone, and ends at the crank.
 
-Planar vectors are in world axes (x forward, y up, counter-clockwise) from the crank centre O.
-Kernels use +, -, *, and one division and square root per dyad, without branches: so a lane has the bits that a
-leg has alone. Forces are named after the link that feels them and the one that exerts
-them: `gj_gf` is the force on link GJ by link GF.
+Planar vectors are in world axes (x forward, y up, counter-clockwise) from the crank centre O. Kernels use
++, -, *, and one division and square root per dyad, without branches: a lane has the bits that a leg has
+alone. Forces are named after the link that feels them and the one that exerts them: `gj_gf` is the force on
+link GJ by link GF.
 """
 
 from __future__ import annotations

@@ -351,7 +351,7 @@ class TrunkEngine:
         never = np.isnan(self._memory.trunk).all(0)
         return [
             "this environment was never reset" if new else Result(int(code)).message
-            for code, new in zip(self._memory.result, never, strict=True)
+            for code, new in zip(self._memory.result, np.atleast_1d(never), strict=True)
         ]
 
     def _which(self, envs: ArrayLike | None) -> NDArray[np.int64]:

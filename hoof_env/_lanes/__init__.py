@@ -1,0 +1,52 @@
+"""Numbers side by side: types for kernels that work on many environments, or many legs, in one instruction.
+
+A `Lanes(n)` is n doubles, one for each environment; arithmetic on it is one vector instruction, or for n = 1
+an ordinary one. The mechanics is written once, for a single leg, and compiled for one lane, four or eight:
+no loop to vectorise, and a number has the same bits in each. `Plane(n)` is a planar vector of lanes, which
+multiplies like a complex number; `Mask(n)` is truths, for `choose`; `Rows(n)` is memory, a row of lanes for
+each name. Floats mix with lanes and are the same in each.
+
+Lanes live inside kernels only: they come from `rows` and go back into them.
+"""
+
+import hoof_env._lanes.operators  # noqa: F401  teaches numba the operators
+from hoof_env._lanes.functions import (
+    across,
+    anywhere,
+    choose,
+    cross,
+    dot,
+    floor,
+    gather,
+    lane_sum,
+    larger,
+    plane,
+    quarter_turns,
+    root,
+    size,
+    smaller,
+)
+from hoof_env._lanes.rows import below, fill, level, read, rows, write
+
+__all__ = [
+    "across",
+    "anywhere",
+    "below",
+    "choose",
+    "cross",
+    "dot",
+    "fill",
+    "floor",
+    "gather",
+    "lane_sum",
+    "larger",
+    "level",
+    "plane",
+    "quarter_turns",
+    "read",
+    "root",
+    "rows",
+    "size",
+    "smaller",
+    "write",
+]

@@ -1,0 +1,171 @@
+"""Lanes are numbers side by side: each operation is NumPy's, with the same bits in one lane and in eight."""
+
+import numpy as np
+import pytest
+from numba import njit
+from numba.core.errors import TypingError
+
+from hoof_env._lanes import (
+    across,
+    anywhere,
+    below,
+    choose,
+    cross,
+    dot,
+    fill,
+    floor,
+    gather,
+    lane_sum,
+    larger,
+    level,
+    plane,
+    quarter_turns,
+    read,
+    root,
+    rows,
+    size,
+    smaller,
+    write,
+)
+from hoof_env._memory import address, doubles
+
+INPUTS, OUTPUTS = 6, 40
+
+
+def on_lanes(count, operations):
+    """A kernel that works on columns, `count` at a time."""
+
+    def kernel(given, found):
+        mine, out = rows(doubles(INPUTS * count), count), rows(doubles(OUTPUTS * count), count)
+        columns = given.shape[1]
+        for n in range(0, columns, count):
+            fill(mine, 0, INPUTS, address(given), n, columns, 1)
+            operations(mine, out)
+            for k in range(OUTPUTS):
+                write(out[k], address(found), k * columns + n, 1)
+
+    return njit(error_model="numpy")(kernel)
+
+
+@njit(error_model="numpy", forceinline=True)
+def arithmetic(x, out):
+    a, b, z, w = x[0], x[1], plane(x[2], x[3]), plane(x[4], x[5])
+    out[0], out[1], out[2], out[3], out[4] = a + b, a - 2.5, 3.0 * b, a / b, -a
+    out[5], out[6], out[7] = root(size(a)), floor(a), size(b)
+    out[8], out[9] = larger(a, b), smaller(a, 0.25)
+    out[10] = choose((a < b) & (b >= 0.1) | (a == 1.0), a, 7.0)
+    out[11] = choose((a > 0.5) | (a != a), b, choose(a <= -0.5, 1.0, a))
+    product, turned = z * w, across(z)
+    out[12], out[13] = product.real, product.imag
+    out[14], out[15] = turned.real, turned.imag
+    out[16], out[17] = dot(z, w), cross(z, w)
+    mixed = a * z - w * 2.0 + choose(a > b, z, -w)
+    out[18], out[19] = mixed.real, mixed.imag
+    below(out, 20)[1] = a
+    out[20] = level(out, 4.0) * a
+    out[22] = 1.0 if anywhere(a > 1e9) else 0.0
+    for k in range(23, 40):
+        out[k] = 0.0
+
+
+def expected(x):
+    a, b, z, w = x[0], x[1], x[2] + 1j * x[3], x[4] + 1j * x[5]
+    chosen = np.where((a < b) & (b >= 0.1) | (a == 1.0), a, 7.0)
+    nested = np.where((a > 0.5) | (a != a), b, np.where(a <= -0.5, 1.0, a))
+    mixed = a * z - w * 2.0 + np.where(a > b, z, -w)
+    return [
+        a + b, a - 2.5, 3.0 * b, a / b, -a, np.sqrt(np.abs(a)), np.floor(a), np.abs(b), np.maximum(a, b),
+        np.minimum(a, 0.25), chosen, nested, (z * w).real, (z * w).imag, -x[3], x[2],
+        (z.conj() * w).real, (z.conj() * w).imag, mixed.real, mixed.imag, 4.0 * a, a,
+    ]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def numbers():
+    x = np.random.default_rng(0).normal(size=(INPUTS, 64))
+    x[0, 3], x[0, 5] = 1.0, -0.0
+    return x
+
+
+@pytest.fixture(scope="module")
+def found(numbers):
+    results = {count: np.empty((OUTPUTS, 64)) for count in (1, 4, 8)}
+    for count, result in results.items():
+        on_lanes(count, arithmetic)(numbers, result)
+    return results
+
+
+def test_operations_are_those_of_numpy(numbers, found):
+    np.testing.assert_allclose(found[8][:22], expected(numbers), rtol=1e-15, atol=1e-15)
+
+
+@pytest.mark.parametrize("count", [4, 8])
+def test_a_lane_has_the_bits_that_it_has_alone(found, count):
+    np.testing.assert_array_equal(found[count].view(np.int64), found[1].view(np.int64))
+
+
+def test_what_is_not_a_number_stays_so_where_it_comes_first():
+    def operations(x, out):
+        out[0], out[1] = larger(x[0], x[1]), smaller(x[0], x[1])
+        out[2], out[3] = larger(x[1], x[0]), smaller(x[1], x[0])
+        out[4] = choose(x[0] == x[0], 1.0, 2.0)
+
+    given, result = np.ones((INPUTS, 8)), np.zeros((OUTPUTS, 8))
+    given[0] = np.nan
+    on_lanes(8, njit(error_model="numpy", forceinline=True)(operations))(given, result)
+    assert np.isnan(result[:2]).all()
+    assert (result[2:4] == 1).all()
+    assert (result[4] == 2).all()
+
+
+def test_quarter_turns():
+    def operations(x, out):
+        out[0], out[1] = quarter_turns(x[0], x[1], x[2] + 6755399441055744.0)
+
+    given, result = np.zeros((INPUTS, 16)), np.zeros((OUTPUTS, 16))
+    given[0], given[1], given[2] = np.cos(0.3), np.sin(0.3), np.arange(-8, 8)
+    on_lanes(8, njit(error_model="numpy", forceinline=True)(operations))(given, result)
+    angle = 0.3 + np.pi / 2 * np.arange(-8, 8)
+    np.testing.assert_allclose(result[:2], [np.cos(angle), np.sin(angle)], atol=1e-14)
+
+
+def test_the_sum_over_lanes_is_in_their_order():
+    def operations(x, out):
+        out[0] = lane_sum(level(x, 0.5), x[0])
+        out[1] = 1.0 if anywhere(x[0] > 0.9) else 0.0
+
+    given, result = np.zeros((INPUTS, 8)), np.zeros((OUTPUTS, 8))
+    given[0] = [0.1, 0.2, 0.3, 1e16, 0.7, -1e16, 0.5, 0.95]
+    on_lanes(4, njit(error_model="numpy", forceinline=True)(operations))(given, result)
+    assert (result[0, :4] == 0.5 + 0.1 + 0.2 + 0.3 + 1e16).all()
+    assert (result[0, 4:] == 0.5 + 0.7 - 1e16 + 0.5 + 0.95).all()
+    assert result[1, 0] == 1
+    given[0, 3] = 0.0
+    on_lanes(4, njit(error_model="numpy", forceinline=True)(operations))(given, result)
+    assert list(result[1, ::4]) == [0, 1]
+
+
+@pytest.mark.parametrize("stride", [1, 3])
+def test_memory_is_read_and_written_apart(stride):
+    @njit(error_model="numpy")
+    def copy(table, index, found):
+        row = rows(doubles(4), 4)
+        x = read(row, address(table), 2, stride)
+        write(x, address(found), 1, stride)
+        row[0] = gather(address(table), read(row, address(index), 0, 1))
+        write(row[0], address(found), 20, 1)
+
+    table, found = np.arange(20.0), np.full(24, -1.0)
+    copy(table, np.array([3.0, 0.0, 19.0, 7.0]), found)
+    np.testing.assert_array_equal(found[1 : 1 + 4 * stride : stride], table[2 : 2 + 4 * stride : stride])
+    np.testing.assert_array_equal(found[20:], [3, 0, 19, 7])
+
+
+def test_lanes_of_different_counts_do_not_mix():
+    @njit(error_model="numpy")
+    def mix():
+        one, two = rows(doubles(4), 4), rows(doubles(8), 8)
+        one[0] = one[0] + two[0]
+
+    with pytest.raises(TypingError):
+        mix()
