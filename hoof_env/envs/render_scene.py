@@ -59,6 +59,9 @@ PATH_STEP = 0.01
 ARROW_M = 1.3
 """Length in the scene of an arrow for the panel's full scale [m]."""
 
+LEAST_FORCE = 0.004
+"""Part of the full scale below which a force is not drawn [-]."""
+
 AROUND_M = np.linspace(-1.5, 1.5, 31)
 """Where the ground is looked at, from O, to find the camera's level [m]."""
 
@@ -178,7 +181,7 @@ class Scene:
 
     def _draw_forces(self, canvas: Any, now: Instant, full_scale: float) -> None:
         """Arrows of the forces on the hoof; where both points bear load, that of their sum behind them."""
-        if now.normal <= 0:
+        if now.grf < full_scale * LEAST_FORCE:
             return
         forces = [
             (TOE, 3.0, complex(now.toe_x, now.toe_y), complex(now.toe_force_x, now.toe_force_y)),

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from gymnasium.error import DependencyNotInstalled, ResetNeeded
@@ -19,6 +19,9 @@ from hoof_env.envs.render_stance import Stances
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
+
+if TYPE_CHECKING:
+    from hoof_env.records import Setting
 
 MODES = ("rgb_array", "human")
 """Render modes."""
@@ -73,7 +76,7 @@ class Renderer:
         self._canvas = pygame.Surface(self.size, 0, 32)
         # laid out in memory as a frame is, so that the copy is quick
         self._packed = pygame.Surface(self.size, 0, 24, (0xFF, 0xFF00, 0xFF0000, 0))
-        brush = Brush(self.size)
+        self.brush = brush = Brush(self.size)
         edge, column = round(16 * brush.unit), round(304 * brush.unit)
         ground = Terrain.flat() if terrain is None else terrain
         self._scene = Scene(
@@ -91,6 +94,11 @@ class Renderer:
         """Stances of the episode and their peaks."""
         stances: Stances = self._panel.stances
         return stances
+
+    @property
+    def latest(self) -> Instant:
+        """The instant that is drawn next; `ResetNeeded` if there is none."""
+        return self._check_seen()
 
     def reset(self) -> None:
         """A new episode: forget the force history and the paths of the hoof."""
@@ -168,6 +176,24 @@ class Renderer:
         display.get_surface().blit(self._canvas, (0, 0))
         display.flip()
         self._clock.tick(self.fps)
+
+
+def new_renderer(here: Setting, fps: float, size: tuple[int, int] = (960, 540)) -> Renderer:
+    """An off-screen renderer for an environment with this setting.
+
+    Raises:
+        ParameterError, DependencyNotInstalled: as `Renderer`.
+    """
+    weight = here.weight_n if here.suspended else None
+    return Renderer(
+        here.geometry,
+        "rgb_array",
+        fps,
+        size,
+        weight_n=weight,
+        lift_off_n=here.lift_off_n,
+        terrain=here.terrain,
+    )
 
 
 def _check_size(size: Any) -> tuple[int, int]:
