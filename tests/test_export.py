@@ -12,6 +12,7 @@ import pytest
 
 from hoof_env import __version__, cli
 from hoof_env.dynamics.engine import GRAVITY
+from hoof_env.dynamics.result import Result
 from hoof_env.envs.policies import make_policy
 from hoof_env.errors import HoofEnvError, OutputError, ParameterError
 from hoof_env.export.files import MOT_COLUMNS, export_episode, write
@@ -132,6 +133,25 @@ def test_an_episode_that_ends_early_ends_its_record(tmp_path):
     same = (tmp_path / "x.csv").read_bytes()
     export_episode(tmp_path / "x.csv", "run", LEG, ["episode_seconds=0.1"])
     assert (tmp_path / "x.csv").read_bytes() == same
+
+
+def test_a_step_that_failed_is_not_recorded():
+    """The environment keeps its last good state and shows it again; a record must not say it twice."""
+    with make_env(LEG) as env:
+        run = make_policy("run", env)
+
+        class Breaks:
+            steps = 0
+
+            def predict(self, observation, **options):
+                self.steps += 1
+                if self.steps == 4:
+                    env.unwrapped.engine.advance = lambda *_: Result.NOT_FINITE
+                return run.predict(observation, **options)
+
+        record = record_episode(env, Breaks(), 0)
+    assert len(record["time"]) == 61
+    assert (np.diff(record["time"]) > 0).all()
 
 
 @pytest.mark.parametrize(

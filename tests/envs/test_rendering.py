@@ -19,6 +19,7 @@ from hoof_env.dynamics.trunk import Trunk
 from hoof_env.envs.policies import make_policy
 from hoof_env.envs.render_ground import find_patches, footprint
 from hoof_env.envs.render_instant import columns_of_trace, instants
+from hoof_env.envs.render_stance import Stances
 from hoof_env.envs.rendering import Renderer
 from hoof_env.errors import ParameterError
 from hoof_env.gait.parameters import LIMITS, load_gait
@@ -210,9 +211,17 @@ def test_the_footprint_is_as_deep_as_the_sole_and_runs_out(run):
     (now,) = instants(columns_of_trace(trace))
     depth = footprint(now, np.array([0.0, 0.8, 0.9, 1.0, 1.5]))
     np.testing.assert_allclose(depth, [0.0, 0.02, 0.035, 0.05, 0.0], atol=1e-9)
-    pressed, flat = draw(trace), draw(run[0])
-    columns = slice(0, 640)
-    assert ((pressed[:, columns] == LINE).all(-1)).sum() != ((flat[:, columns] == LINE).all(-1)).sum()
+
+
+def test_the_ground_gives_way_under_the_hoof(run):
+    """Where the leg is not in front of it: both points 0.8 m ahead of the trunk, 10 cm deep."""
+    trace = loaded(run, 900.0)
+    for point in ("toe", "heel"):
+        trace[f"{point}_x"], trace[f"{point}_penetration"] = trace["trunk_x"] + 1.2, 0.1
+    column, metre = 312 + round(1.2 * 146), 146
+    beside = column + round(0.06 * metre)
+    deep = 0.1 * metre * np.exp(-((0.06 / 0.09) ** 2))
+    assert surface(draw(trace), beside) - surface(draw(run[0]), beside) == pytest.approx(deep, abs=2.5)
 
 
 def test_the_camera_follows_the_trunk_uphill(run):
@@ -276,6 +285,34 @@ def test_stances_and_peaks_are_those_of_the_reward(gait):
     assert sum(peak.force for peak in stances.peaks) == pytest.approx(summary["stance_peak_sum_n"])
     assert stances.highest == pytest.approx(summary["peak_grf_n"])
     env.close()
+
+
+def test_a_hoof_that_never_lifts_begins_a_stance_every_turn_of_the_crank(run):
+    (now,) = instants(columns_of_trace(loaded(run, 500.0)))
+    stances = Stances(40.0)
+    for k in range(301):
+        stances.add(now._replace(time=k / 100, crank_angle=2 * np.pi * k / 100, force_y=500.0 + k))
+    assert [peak.force for peak in stances.peaks] == [599.0, 699.0, 799.0, 800.0]
+    stances.add(now._replace(toe_normal=30.0, force_y=30.0))
+    assert (stances.opened, stances.running_peak, stances.highest) == (None, 0.0, 800.0)
+
+
+def test_a_trunk_that_pitches_turns_its_leg(run):
+    (now,) = instants(columns_of_trace(run[0]))
+    picture = renderer()
+    arms = []
+    for pitch in (0.0, 0.3):
+        z = picture._scene.look_at(now._replace(pitch=pitch))
+        arms.append(np.array([z[name] - z["O"] for name in ("C", "G", "J")]))
+    np.testing.assert_allclose(arms[1], arms[0] * np.exp(-0.3j))  # the picture's y points down
+    level, pitched = (draw_instant(now._replace(pitch=pitch)) for pitch in (0.0, 0.3))
+    assert (level != pitched)[100:220, 160:300].any()  # and the trunk with it
+
+
+def draw_instant(now) -> np.ndarray:
+    picture = renderer()
+    picture.add([now])
+    return picture.frame()
 
 
 def test_the_running_peak_is_of_the_open_stance(run):
