@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -32,6 +33,18 @@ PRESSED = ((0.5, 0.12), (0.33, 0.24), (0.17, 0.36))
 """How far below the footprint the soil is darker, in parts of its depth, and how much."""
 
 
+COLUMN = 6
+"""Distance of the places where the surface is drawn [pixels of the usual picture]."""
+
+MOST_EDGES = 60
+"""Up to so many changes of kind in the picture are drawn where they are; more are drawn to the next place."""
+
+LABEL = 90
+"""Least width of a patch that is labelled [pixels of the usual picture]."""
+
+Point = tuple[float, float]
+
+
 class Patch(NamedTuple):
     """A stretch of ground of one kind: from and to [m], factors of stiffness and friction [-]."""
 
@@ -57,10 +70,11 @@ class GroundPainter:
     ) -> None:
         self._brush, self._size, self._scale, self._clear = brush, size, scale, clear
         self._knots, self._heights = terrain.x, np.array(terrain.height)
+        self._stiffness, self._friction = np.array(terrain.stiffness), np.array(terrain.friction)
         self._level = bool(np.ptp(self._heights) == 0)
-        self.patches = find_patches(terrain)
-        self._starts = np.array([patch.start for patch in self.patches])
-        self._column = np.linspace(0, size[0], size[0] // 6 + 1)  # where the surface is drawn [pixels]
+        self._labelled = [p for p in find_patches(terrain) if p.end - p.start > LABEL * brush.unit / scale]
+        self._edges = edges(terrain)
+        self._grid = COLUMN * brush.unit / scale
 
     def height(self, x: Any) -> Any:
         """Height of the undisturbed ground [m]."""
@@ -68,16 +82,14 @@ class GroundPainter:
 
     def kinds(self) -> list[tuple[str, Colour]]:
         """Name and colour of every kind of ground in the terrain but the usual."""
-        found = []
-        for name, colour, there in (
-            ("stiffer ground", STIFFER, any(p.stiffness > 1 + ALIKE for p in self.patches)),
-            ("softer ground", SOFTER, any(p.stiffness < 1 - ALIKE for p in self.patches)),
-            ("more slippery", SLIPPERY, any(p.friction < 1 - ALIKE for p in self.patches)),
-            ("less slippery", ROUGHER, any(p.friction > 1 + ALIKE for p in self.patches)),
-        ):
-            if there:
-                found.append((name, colour))
-        return found
+        stiffness, friction = self._stiffness, self._friction
+        all_kinds = (
+            ("stiffer ground", STIFFER, stiffness.max() > 1 + ALIKE),
+            ("softer ground", SOFTER, stiffness.min() < 1 - ALIKE),
+            ("more slippery", SLIPPERY, friction.min() < 1 - ALIKE),
+            ("less slippery", ROUGHER, friction.max() > 1 + ALIKE),
+        )
+        return [(name, colour) for name, colour, there in all_kinds if there]
 
     def draw(self, canvas: Any, now: Instant, corner: complex) -> None:
         """Draw the ground.
@@ -87,44 +99,55 @@ class GroundPainter:
             now: where the hoof is and what it bears.
             corner: place in the world of the picture's left edge at pixel row 0 [m].
         """
-        columns = self._column
-        dent = None
-        if max(now.toe_depth, now.heel_depth) > 0:
-            at = (min(now.toe_x, now.heel_x) - corner.real) * self._scale
-            width = (abs(now.toe_x - now.heel_x) + 6 * FLANK_M) * self._scale
-            columns = np.unique(
-                np.concatenate([columns, np.arange(at - 3 * FLANK_M * self._scale, at + width, 2)])
-            )
-            columns = columns[(columns >= 0) & (columns <= self._size[0])]
-            dent = footprint(now, corner.real + columns / self._scale)
-        x = corner.real + columns / self._scale
-        y = self.height(x) if not self._level else np.full(len(x), self._heights[0])
-        free = (corner.imag - y) * self._scale
+        x = self._places(now, corner.real)
+        free = (corner.imag - self.height(x)) * self._scale
         if self._level:
             free = np.round(free)  # a sharp line
-        surface = free if dent is None else free + dent * self._scale
-        self._fill(canvas, columns, surface, SOIL)
-        for patch in self._visible(x[0], x[-1]):
-            inside = (x >= patch.start) & (x <= patch.end)
-            ends = np.clip([patch.start, patch.end], x[0], x[-1])
-            edge = (ends - corner.real) * self._scale
-            part = np.concatenate([edge[:1], columns[inside], edge[1:]])
-            self._fill(canvas, part, np.interp(part, columns, surface), body(patch.stiffness))
-        if dent is not None and now.normal > 0:
-            self._press(canvas, columns, free, surface)
-        self._draw_skin(canvas, columns, surface, x, corner)
-        self._draw_ticks(canvas, corner)
-
-    def _fill(self, canvas: Any, columns: Any, surface: Any, colour: Colour) -> None:
-        if len(columns) > 1:
+        surface = free
+        if max(now.toe_depth, now.heel_depth) > 0:
+            surface = free + footprint(now, x) * self._scale
+        columns = (x - corner.real) * self._scale
+        line = list(zip(columns.tolist(), surface.tolist(), strict=True))
+        middle = (x[1:] + x[:-1]) / 2
+        for part, colour in self._runs(line, middle, self._stiffness, BODY):
             bottom = self._size[1] + 1
-            line = list(zip(columns.tolist(), surface.tolist(), strict=True))
-            pygame.draw.polygon(canvas, colour, [(line[0][0], bottom), *line, (line[-1][0], bottom)])
+            pygame.draw.polygon(canvas, colour, [(part[0][0], bottom), *part, (part[-1][0], bottom)])
+        if surface is not free and now.normal > 0:
+            self._press(canvas, columns, free, surface)
+        deep = 8 * self._brush.unit
+        for part, colour in self._runs(line, middle, self._friction, SKIN):
+            pygame.draw.polygon(canvas, colour, [*part, *((a, b + deep) for a, b in reversed(part))])
+        for shift in range(max(1, round(2 * self._brush.unit))):
+            pygame.draw.aalines(canvas, SOIL_LINE, False, [(a, b + shift) for a, b in line])
+        self._draw_ticks(canvas, corner)
+        self._draw_labels(canvas, corner)
 
-    def _visible(self, left: float, right: float) -> list[Patch]:
-        first = max(int(np.searchsorted(self._starts, left)) - 1, 0)
-        last = int(np.searchsorted(self._starts, right))
-        return [p for p in self.patches[first:last] if p.end > left]
+    def _places(self, now: Instant, left: float) -> NDArray[np.float64]:
+        """Where the surface is drawn [m]: at places fixed to the ground, so that it does not shimmer."""
+        right = left + self._size[0] / self._scale
+        grid = self._grid
+        x = [np.arange(np.floor(left / grid), np.ceil(right / grid) + 1) * grid]
+        first, last = np.searchsorted(self._edges, (left, right))
+        if last - first <= MOST_EDGES:
+            x.append(self._edges[first:last])
+        if max(now.toe_depth, now.heel_depth) > 0:
+            near, far = sorted((now.toe_x, now.heel_x))
+            x.append(np.arange(near - 3 * FLANK_M, min(far, near + 1) + 3 * FLANK_M, 2 / self._scale))
+        return np.unique(np.concatenate(x))
+
+    def _runs(
+        self, line: list[Point], middle: Any, factors: Any, colours: tuple[Colour | None, ...]
+    ) -> Iterator[tuple[list[Point], Colour]]:
+        """Stretches of the surface line of one colour, by the factor in the middle of each piece of it."""
+        if len(factors) == 1:
+            shades = np.full(len(middle), shade(factors[0]))
+        else:
+            shades = shade(np.interp(middle, self._knots, factors))
+        changes = [0, *(np.flatnonzero(np.diff(shades)) + 1).tolist(), len(shades)]
+        for start, end in pairwise(changes):
+            colour = colours[int(shades[start])]
+            if colour is not None:
+                yield line[start : end + 1], colour
 
     def _press(self, canvas: Any, columns: Any, free: Any, surface: Any) -> None:
         """Darken the soil under the footprint, in bands that fade with depth."""
@@ -138,49 +161,33 @@ class GroundPainter:
                 below = list(zip(x, (top + reach * deep).tolist(), strict=True))
                 pygame.draw.polygon(canvas, mix(SOIL, SOIL_LINE, shade), [*above, *below[::-1]])
 
-    def _draw_skin(self, canvas: Any, columns: Any, surface: Any, x: Any, corner: complex) -> None:
-        thick = max(1, round(2 * self._brush.unit))
-        for patch in self._visible(x[0], x[-1]):
-            colour = skin(patch.friction)
-            if colour is None:
-                continue
-            ends = (np.clip([patch.start, patch.end], x[0], x[-1]) - corner.real) * self._scale
-            inside = columns[(columns > ends[0]) & (columns < ends[1])]
-            part = np.concatenate([ends[:1], inside, ends[1:]])
-            top = np.interp(part, columns, surface)
-            deep = top + 8 * self._brush.unit
-            band = [*zip(part.tolist(), top.tolist(), strict=True)]
-            band += [*zip(part[::-1].tolist(), deep[::-1].tolist(), strict=True)]
-            pygame.draw.polygon(canvas, colour, band)
-        line = list(zip(columns.tolist(), surface.tolist(), strict=True))
-        for shift in range(thick):
-            pygame.draw.aalines(canvas, SOIL_LINE, False, [(a, b + shift) for a, b in line])
-
     def _draw_ticks(self, canvas: Any, corner: complex) -> None:
         unit, scale = self._brush.unit, self._scale
         thick = max(1, round(2 * unit))
         first, last = corner.real, corner.real + self._size[0] / scale
-        for half in range(int(np.floor(2 * first)), int(np.ceil(2 * last)) + 1):
-            x, metre = half / 2, half % 2 == 0
-            at = (x - first) * scale
-            top = round((corner.imag - float(self.height(x))) * scale)
+        halves = np.arange(np.floor(2 * first), np.ceil(2 * last) + 1)
+        tops = (corner.imag - self.height(halves / 2)) * scale
+        for half, top in zip(halves.astype(int).tolist(), tops.tolist(), strict=True):
+            at, top = (half / 2 - first) * scale, round(top)
+            metre = half % 2 == 0
             length = round((10 if metre else 6) * unit)
             canvas.fill(SOIL_LINE, (round(at - thick / 2), top, thick if metre else 1, length))
             if metre:
                 self._brush.write(canvas, f"{half // 2} m", (at, top + 13 * unit), 17, SOIL_LINE, "midtop")
-        last = first + self._clear / scale
-        for patch in self._visible(first, last):
-            ends = np.clip([patch.start, patch.end], first, last)
-            words = [
-                f"{sign} × {factor:.2g}"
-                for sign, factor in (("stiffness", patch.stiffness), ("friction", patch.friction))
-                if abs(factor - 1) > ALIKE
-            ]
-            if (ends[1] - ends[0]) * scale < 90 * unit:
+
+    def _draw_labels(self, canvas: Any, corner: complex) -> None:
+        """Name the factors of every patch that is wide enough."""
+        unit, left = self._brush.unit, corner.real
+        right = left + self._clear / self._scale
+        for patch in self._labelled:
+            start, end = max(patch.start, left), min(patch.end, right)
+            if (end - start) * self._scale < LABEL * unit:
                 continue
-            middle = float(ends.mean())
-            x = (middle - first) * scale
-            y = (corner.imag - float(self.height(middle))) * scale + 36 * unit
+            middle = (start + end) / 2
+            x = (middle - left) * self._scale
+            y = (corner.imag - float(self.height(middle))) * self._scale + 36 * unit
+            factors = [("stiffness", patch.stiffness), ("friction", patch.friction)]
+            words = [f"{name} × {factor:.2g}" for name, factor in factors if abs(factor - 1) > ALIKE]
             for k, text in enumerate(words):
                 self._brush.write(canvas, text, (x, y + 15 * k * unit), 16, SOIL_LINE, "midtop")
 
@@ -200,12 +207,10 @@ def footprint(now: Instant, x: NDArray[np.float64]) -> NDArray[np.float64]:
 def find_patches(terrain: Terrain) -> list[Patch]:
     """Stretches of one kind, all but the usual; a change over one spacing counts half to either side."""
     factors = np.array([terrain.stiffness, terrain.friction])
-    kind = np.round(factors / ALIKE).astype(np.int64)
-    edges = np.flatnonzero((np.diff(kind, axis=1) != 0).any(axis=0)) + 1
-    bounds = [0, *edges.tolist(), factors.shape[1]]
+    changes = [0, *_changes(terrain).tolist(), factors.shape[1]]
     patches = []
-    for first, end in pairwise(bounds):
-        stiffness, friction = factors[:, first:end].mean(axis=1).tolist()
+    for first, end in pairwise(changes):
+        stiffness, friction = factors[:, (first + end) // 2].tolist()
         if max(abs(stiffness - 1), abs(friction - 1)) > ALIKE:
             left = -np.inf if first == 0 else terrain.start + (first - 0.5) * terrain.spacing
             right = np.inf if end == factors.shape[1] else terrain.start + (end - 0.5) * terrain.spacing
@@ -213,17 +218,33 @@ def find_patches(terrain: Terrain) -> list[Patch]:
     return patches
 
 
-def body(stiffness: float) -> Colour:
-    """Colour of soil by its factor of stiffness."""
-    return mix(SOIL, STIFFER if stiffness > 1 else SOFTER, _strength(stiffness))
+def edges(terrain: Terrain) -> NDArray[np.float64]:
+    """Where the kind of ground changes [m], in order."""
+    return (terrain.start + (_changes(terrain) - 0.5) * terrain.spacing).astype(np.float64)
 
 
-def skin(friction: float) -> Colour | None:
-    """Colour of the surface by its factor of friction; None where it is usual."""
-    if abs(friction - 1) <= ALIKE:
-        return None
-    return mix(PAPER, SLIPPERY if friction < 1 else ROUGHER, 0.35 + 0.65 * _strength(friction))
+def _changes(terrain: Terrain) -> NDArray[np.int64]:
+    """Knots that differ in kind from the one before."""
+    kinds = np.round(np.array([terrain.stiffness, terrain.friction]) / ALIKE)
+    return np.flatnonzero((np.diff(kinds, axis=1) != 0).any(axis=0)) + 1
 
 
-def _strength(factor: float) -> float:
-    return min(abs(float(np.log(max(factor, 1e-3)))) / float(np.log(STRONG)), 1.0)
+def shade(factor: Any) -> Any:
+    """Index of the colour for a factor of stiffness or friction: `SHADES` where it is 1."""
+    strength = np.log(np.maximum(factor, 1e-3)) / np.log(STRONG)
+    usual = np.abs(np.asarray(factor) - 1) <= ALIKE
+    steps = np.sign(strength) * np.maximum(np.ceil(np.minimum(np.abs(strength), 1) * SHADES - 1e-9), 1)
+    return np.where(usual, 0, steps).astype(int) + SHADES
+
+
+SHADES = 5
+"""Shades of a colour between the usual and the full one."""
+
+BODY: tuple[Colour | None, ...] = tuple(
+    mix(SOIL, SOFTER if k < 0 else STIFFER, abs(k) / SHADES) for k in range(-SHADES, SHADES + 1)
+)
+SKIN: tuple[Colour | None, ...] = tuple(
+    mix(PAPER, SLIPPERY if k < 0 else ROUGHER, 0.35 + 0.65 * abs(k) / SHADES) if k else None
+    for k in range(-SHADES, SHADES + 1)
+)
+"""Colours by `shade`: of the soil for stiffness, of its surface for friction."""

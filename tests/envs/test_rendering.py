@@ -162,7 +162,7 @@ def test_the_ground_scrolls_under_the_trunk_by_its_ticks(run):
         trace = run[0].copy()
         trace["trunk_x"] += x
         frame = draw(trace)
-        line = np.nonzero((frame[:, 0] == LINE).all(axis=-1))[0].max()  # the ground at the left edge
+        line = np.nonzero((frame[:, 5] == LINE).all(axis=-1))[0].max()  # the ground at the left edge
         return frame[line + 4, :640]
 
     np.testing.assert_array_equal(ticks(60.0), ticks(0.0))
