@@ -4,7 +4,7 @@
 #   TORCH_INDEX=URL     where Linux takes PyTorch from; empty for pip's own index, which has the CUDA build
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-peers bench lint clean
+.PHONY: help setup demo test test-peers test-ecosystem bench lint clean
 
 PY := .venv/bin/python
 PYTHONS := $(or $(PYTHON),$(PY) python3 python3.13 python3.12 python3.11)
@@ -14,6 +14,7 @@ help:
 	@echo 'make demo        reproduce the paper, train an agent, write runs/demo/report.html'
 	@echo 'make test        lint, types and tests'
 	@echo 'make test-peers  the engine against MuJoCo and Exudyn, which it installs'
+	@echo 'make test-ecosystem  every RL library on every id, in environments under .ecosystem/: 6 GB, some minutes'
 	@echo 'make bench       how fast the engine is beside MuJoCo and Exudyn, which it installs'
 	@echo 'make lint        lint and types alone'
 	@echo 'make setup       make .venv and nothing more'
@@ -35,6 +36,9 @@ test: lint
 test-peers: setup
 	@echo 'pip install mujoco exudyn' && $(PY) -m pip install -q -c constraints.txt -e '.[peers]'
 	@echo 'pytest tests/peers' && $(PY) -m pytest -q -m '' tests/peers
+
+test-ecosystem: setup
+	@$(PY) -m tests.ecosystem.run $(ARGS)
 
 bench: setup
 	@echo 'pip install mujoco exudyn' && $(PY) -m pip install -q -c constraints.txt -e '.[peers]' || \

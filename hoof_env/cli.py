@@ -158,6 +158,82 @@ def ensemble(
     _say(f"{paths[0]} written")
 
 
+def render(
+    out: Path,
+    policy: str = "run",
+    id: str = "hoof_env/HorseLeg-v0",
+    args: tuple[str, ...] = (),
+    seed: int = 0,
+    seconds: float = 8.0,
+    slow: float = 1.0,
+    fps: float = 50.0,
+    size: tuple[int, int] = (960, 540),
+) -> None:
+    """Film an episode of a policy (needs 'render' and 'video').
+
+    Args:
+        out: the film; ends in .mp4 or .gif.
+        policy: a gait of the preset, idle, random, bang-bang, drag or airborne; four gait parameters as
+            6.28,0.7,-0.2,-0.3; or a trained model (a trusted one only: a model is code).
+        id: the environment.
+        args: its arguments: key=value ..., or one JSON object.
+        seed: of the episode and of "random".
+        seconds: of the episode at most.
+        slow: how many times slower than life the film plays.
+        fps: frames a second.
+        size: width and height [pixels].
+    """
+    from hoof_env.envs.render_clip import render_episode
+
+    count = render_episode(out, policy, id, args, seed, seconds, slow, fps, size)
+    _say(f"{out}: {count} frames, {count / fps:.1f} s")
+
+
+def play(
+    id: str = "hoof_env/HorseLeg-v0",
+    args: tuple[str, ...] = (),
+    seed: int = 0,
+    slow: float = 1.0,
+    size: tuple[int, int] = (960, 540),
+) -> None:
+    """Drive the crank and the swing by keyboard in a window (needs 'render').
+
+    Args:
+        id: the environment.
+        args: its arguments: key=value ..., or one JSON object.
+        seed: of the first episode; the next ones follow it.
+        slow: how many times slower than life it runs.
+        size: width and height of the picture above the keys [pixels].
+    """
+    from hoof_env.play import play
+
+    play(id, args, seed, slow, size)
+
+
+def export(
+    out: Path,
+    policy: str = "run",
+    id: str = "hoof_env/HorseLeg-v0",
+    args: tuple[str, ...] = (),
+    seed: int = 0,
+    seconds: float | None = None,
+) -> None:
+    """Write the ground reaction force of an episode at every substep, with its point of application.
+
+    Args:
+        out: the file; ends in .csv, .parquet (needs 'export') or .mot, OpenSim's.
+        policy: as in `hoof-env render`.
+        id: the environment.
+        args: its arguments: key=value ..., or one JSON object.
+        seed: of the episode and of "random".
+        seconds: of the episode at most; its own end otherwise.
+    """
+    from hoof_env.export.files import export_episode
+
+    rows = export_episode(out, policy, id, args, seed, seconds)
+    _say(f"{out}: {rows} rows")
+
+
 def trunks() -> None:
     """Measure how the scripted walk and run move a rail and differently suspended trunks; prints a table."""
     from hoof_env.envs.trunk_study import study
@@ -171,6 +247,9 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "ensemble": ensemble,
     "carry": carry,
     "trunks": trunks,
+    "render": render,
+    "play": play,
+    "export": export,
 }
 
 

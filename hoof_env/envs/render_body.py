@@ -60,10 +60,9 @@ class Body:
         self._brush.smooth(image, [0j, complex(*image.get_size())], 0, paint)
         return image
 
-    def draw_trunk(self, canvas: Any, hip: complex) -> None:
-        """Draw the trunk around O at pixel `hip`, and the spring or rail that holds it."""
-        half, above, _ = (self._scale * length for length in TRUNK_M)
-        top = hip - 1j * above
+    def draw_support(self, canvas: Any, hip: complex) -> None:
+        """Draw the spring or the rail that holds a trunk around O at pixel `hip`."""
+        top = hip - 1j * self._scale * TRUNK_M[1]
         if self._suspended:
             coil = np.linspace(complex(hip.real, 0), top, 17)
             coil[2:-2] += 0.06 * self._scale * np.resize([1, -1], 13)
@@ -74,12 +73,22 @@ class Body:
 
             self._brush.smooth(canvas, coil, 3, paint)
         else:
-            top -= 2j * self._scale * WHEEL_M
+            rail = top.imag - 2 * self._scale * WHEEL_M
             thick = max(2, round(4 * self._brush.unit))
-            canvas.fill(GREY, (0, round(top.imag) - thick, canvas.get_width(), thick))
-        corner = top - half
+            canvas.fill(GREY, (0, round(rail) - thick, canvas.get_width(), thick))
+
+    def draw_trunk(self, canvas: Any, hip: complex, pitch: float = 0.0) -> None:
+        """Draw the trunk around O at pixel `hip`, turned by `pitch` [rad]."""
+        half, above, below = (self._scale * length for length in TRUNK_M)
+        high = above + (0.0 if self._suspended else 2 * self._scale * WHEEL_M)
+        image = self._trunk
+        corner = hip - complex(half, high)
+        if pitch:
+            image = pygame.transform.rotozoom(image, float(np.degrees(pitch)), 1.0)
+            middle = hip + 0.5j * (below - high) * np.exp(-1j * pitch)
+            corner = middle - complex(*image.get_size()) / 2
         at = round(corner.real), round(corner.imag)
-        canvas.blit(self._trunk, at, special_flags=pygame.BLEND_PREMULTIPLIED)
+        canvas.blit(image, at, special_flags=pygame.BLEND_PREMULTIPLIED)
 
     def draw_leg(self, canvas: Any, pixels: dict[str, complex]) -> None:
         """Draw the leg; `pixels` holds every named point."""

@@ -10,8 +10,9 @@ import numpy as np
 import pygame
 
 INK, GREY, FAINT, PAPER = (34, 43, 53), (88, 99, 111), (216, 222, 228), (255, 255, 255)
-FORCE, TOE, CRANK = (213, 94, 0), (0, 114, 178), (0, 158, 115)
-"""Vermilion, blue and bluish green of Okabe and Ito's palette, which any colour vision tells apart."""
+FORCE, TOE, HEEL, CRANK = (213, 94, 0), (0, 114, 178), (204, 121, 167), (0, 158, 115)
+"""Vermilion, blue, reddish purple and bluish green of Okabe and Ito's palette, which any colour vision tells
+apart."""
 
 FINE = 2
 """Resolution of smooth painting over that of the picture."""
@@ -78,6 +79,12 @@ class Brush:
         # opaque paint on transparent black is premultiplied by its alpha, and so is an average of it
         small = pygame.transform.smoothscale(fine, box.size)
         canvas.blit(small, box, special_flags=pygame.BLEND_PREMULTIPLIED)
+
+
+def mix(one: Colour, two: Colour, part: float) -> Colour:
+    """The colour `part` of the way from `one` to `two`."""
+    red, green, blue = (round(a + part * (b - a)) for a, b in zip(one, two, strict=True))
+    return red, green, blue
 
 
 def bar(surface: Any, colour: Colour, a: Position, b: Position, radius_a: float, radius_b: float) -> None:

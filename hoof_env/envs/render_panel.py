@@ -1,17 +1,20 @@
-"""The panel: numbers of the present row, and the ground reaction force over the last seconds."""
+"""The panel: numbers of the instant, the gait commanded and made, and the force of the last seconds."""
 
 from __future__ import annotations
 
+import math
 from collections import deque
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 import pygame
-from numpy.typing import NDArray
 
-from hoof_env.envs.render_paint import FAINT, FINE, FORCE, GREY, INK, PAPER, Brush
-from hoof_env.envs.stance import new_account, take_account
+from hoof_env.envs.render_instant import Instant
+from hoof_env.envs.render_paint import CRANK, FAINT, FINE, FORCE, GREY, INK, PAPER, Brush
+from hoof_env.envs.render_stance import Stances
+from hoof_env.gait.parameters import LIMITS
 
 SECONDS = 3
 """Time shown [s]."""
@@ -27,15 +30,22 @@ UNDER_CURVE = (252, 230, 214)
 NUMBERS = (
     ("time", "s", INK),
     ("forward speed", "m/s", INK),
-    ("crank speed", "rad/s", INK),
-    ("swing angle", "deg", INK),
     ("ground force", "kN", FORCE),
-    ("peak so far", "kN", FORCE),
+    ("peak of this stance", "kN", FORCE),
+    ("highest so far", "kN", FORCE),
 )
+
+GAIT = (
+    ("crank speed", "crank_speed", "rad/s"),
+    ("swing offset", "swing_offset", "rad"),
+    ("swing sine", "swing_sin", "rad"),
+    ("swing cosine", "swing_cos", "rad"),
+)
+"""Title, field of `Instant` and unit of each gait parameter."""
 
 
 class Panel:
-    """Numbers and force curve in one box of the picture.
+    """Numbers, gait and force curve in one box of the picture.
 
     Args:
         brush: the paint box.
@@ -44,7 +54,7 @@ class Panel:
         lift_off_n: normal force that tells stance from swing [N].
 
     Attributes:
-        peaks: time [s] and force [N] of the peak of each stance in view.
+        stances: stances and peaks so far.
         full_scale: force at the top of the curve's axis [N]; during an episode it only grows.
     """
 
@@ -55,58 +65,49 @@ class Panel:
         self._brush, self._box, self._weight = brush, pygame.Rect(box), weight_n
         self._lift_off = lift_off_n
         self._inside = self._box.inflate(-36 * unit, -32 * unit)
-        self._plot = pygame.Rect(0, 0, self._inside.width - 40 * unit, 156 * unit)
-        self._plot.bottomright = self._inside.right - round(6 * unit), self._inside.bottom - round(38 * unit)
+        self._plot = pygame.Rect(0, 0, self._inside.width - 40 * unit, 150 * unit)
+        self._plot.bottomright = self._inside.right - round(6 * unit), self._inside.bottom - round(36 * unit)
+        self._track = self._inside.left + 112 * unit, self._inside.right - 54 * unit
         self._card = lru_cache(maxsize=8)(self._paint_card)
         self.reset()
 
     def reset(self) -> None:
         """Forget the forces."""
-        self._account = new_account(self._lift_off)
+        self.stances = Stances(self._lift_off)
         self._curve: deque[tuple[float, float]] = deque()  # time [s], force [N]
-        self.peaks: deque[tuple[float, float]] = deque()
         self.full_scale = _nice(max(4 * (self._weight or 0.0), SMALLEST_SCALE))
 
-    def add(self, trace: NDArray[np.void]) -> None:
-        """Take the rows of a trace."""
-        now = float(trace["t"][-1])
-        rows = max(1, round(RESOLUTION * (len(trace) - 1) / max(now - trace["t"][0], RESOLUTION)))
-        for first in range(0, len(trace), rows):
-            part = trace[first : first + rows]
-            top = part[np.argmax(part["grf"])]
-            sample = float(top["t"]), float(top["grf"])
-            self._curve.append(sample)
-            stances = self._account["stances"]
-            take_account(self._account, part, 0.0, 0.0, True)  # only its stances and peaks are read
-            if self._account["stances"] > stances:
-                self.peaks.append(sample)
-            elif self.peaks and self._account["open"] and sample[1] > self.peaks[-1][1]:
-                self.peaks[-1] = sample
-        self.full_scale = max(self.full_scale, _nice(max(float(self._account["highest"]), SMALLEST_SCALE)))
-        for samples in (self._curve, self.peaks):
-            while samples and samples[0][0] < now - SECONDS:
-                samples.popleft()
+    def add(self, instants: Sequence[Instant]) -> None:
+        """Take instants in the order of time."""
+        curve = self._curve
+        for now in instants:
+            self.stances.add(now)
+            force = now.grf
+            if curve and math.floor(curve[-1][0] / RESOLUTION + 1e-6) == math.floor(
+                now.time / RESOLUTION + 1e-6
+            ):
+                if force > curve[-1][1]:
+                    curve[-1] = now.time, force
+            else:
+                curve.append((now.time, force))
+        self.full_scale = max(self.full_scale, _nice(max(self.stances.highest, SMALLEST_SCALE)))
+        while curve[0][0] < instants[-1].time - SECONDS:
+            curve.popleft()
 
-    def draw(self, canvas: Any, row: Any) -> None:
-        """Draw the panel for a row of dtype `TRACE`."""
+    def draw(self, canvas: Any, now: Instant) -> None:
+        """Draw the panel for an instant."""
         canvas.blit(self._card(self.full_scale), self._box, special_flags=pygame.BLEND_PREMULTIPLIED)
-        values = (
-            row["t"],
-            row["trunk_vx"],
-            row["theta_rate"],
-            np.degrees(row["phi"]),
-            row["grf"] / 1000,
-            self._account["highest"] / 1000,
-        )
-        for k, (value, (_, unit_name, colour)) in enumerate(zip(values, NUMBERS, strict=True)):
-            digits = 1 if unit_name == "deg" else 2
-            text = f"{round(float(value), digits) + 0.0:.{digits}f}"  # + 0.0 takes the sign off a zero
-            self._brush.write(canvas, text, self._line(k, 204), 25, colour, "midright")
-        self._draw_curve(canvas, float(row["t"]))
+        stances = self.stances
+        values = now.time, now.trunk_vx, now.grf / 1000, stances.running_peak / 1000, stances.highest / 1000
+        for k, (value, (_, _, colour)) in enumerate(zip(values, NUMBERS, strict=True)):
+            text = f"{round(value, 2) + 0.0:.2f}"  # + 0.0 takes the sign off a zero
+            self._brush.write(canvas, text, self._line(k, 210), 24, colour, "midright")
+        self._draw_gait(canvas, now)
+        self._draw_curve(canvas, now.time)
 
-    def _line(self, k: int, x: float) -> tuple[float, float]:
-        """Middle of line `k` of the numbers, `x` from the left."""
-        return self._inside.left + x * self._brush.unit, self._inside.top + (10 + 26 * k) * self._brush.unit
+    def _line(self, k: float, x: float) -> tuple[float, float]:
+        """Middle of line `k` of the numbers and the gait, `x` from the left."""
+        return self._inside.left + x * self._brush.unit, self._inside.top + (8 + 24 * k) * self._brush.unit
 
     def _paint_card(self, full_scale: float) -> Any:
         unit = self._brush.unit
@@ -123,49 +124,96 @@ class Panel:
 
         self._brush.smooth(whole, [complex(*self._box.topleft), complex(*self._box.bottomright)], 0, paint)
         for k, (name, unit_name, _) in enumerate(NUMBERS):
-            write(name, *self._line(k, 0), 21)
-            write(unit_name, *self._line(k, 212), 21)
-        title = plot.top - 23 * unit
-        write("ground reaction force, kN", inside.left, title, 21)
+            write(name, *self._line(k, 0), 20)
+            write(unit_name, *self._line(k, 217), 20)
+        first = len(NUMBERS) + 0.4
+        write("gait", *self._line(first, 0), 20)
+        _, y = self._line(first, 0)
+        self._mark_actual(whole, inside.left + 112 * unit, y)
+        write("now", inside.left + 122 * unit, y, 18)
+        self._mark_command(whole, inside.left + 172 * unit, y + 8 * unit)
+        write("commanded", inside.left + 182 * unit, y, 18)
+        for k, (title, name, _) in enumerate(GAIT):
+            x, y = self._line(first + 1 + k, 0)
+            write(title, x, y, 20)
+            left, right = self._track
+            whole.fill(FAINT, (round(left), round(y - unit), round(right - left), max(2, round(3 * unit))))
+            low, high = LIMITS[name]
+            if low < 0 < high:
+                whole.fill(GREY, (round(left + (right - left) * -low / (high - low)), round(y - 4 * unit), 1,
+                                  round(9 * unit)))  # fmt: skip
+        head = plot.top - 20 * unit
+        write("ground reaction force, kN", inside.left, head, 20)
         for part in (0.0, 0.5, 1.0):
             y = plot.bottom - part * plot.height
             whole.fill(FAINT, (plot.left, round(y), plot.width, 1))
-            write(f"{part * full_scale / 1000:g}", plot.left - 7 * unit, y, 19, "midright")
+            write(f"{part * full_scale / 1000:g}", plot.left - 7 * unit, y, 18, "midright")
         for second in range(SECONDS + 1):
             x = plot.right - second / SECONDS * plot.width
             whole.fill(FAINT, (round(x), plot.bottom, 1, round(5 * unit)))
-            write(f"{-second}", x, plot.bottom + 8 * unit, 19, "midtop")
-        write("time before now, s", plot.centerx, inside.bottom + 5 * unit, 19, "midbottom")
+            write(f"{-second}", x, plot.bottom + 7 * unit, 18, "midtop")
+        write("time before now, s", plot.centerx, inside.bottom + 7 * unit, 18, "midbottom")
         if self._weight:
             y = plot.bottom - self._weight / full_scale * plot.height
             key = inside.right - 74 * unit
-            for left, right, line in ((plot.left, plot.right, y), (key, key + 22 * unit, title)):
+            for left, right, line in ((plot.left, plot.right, y), (key, key + 22 * unit, head)):
                 for x in np.arange(left, right, 8 * unit):
                     whole.fill(GREY, (round(x), round(line), round(5 * unit), 1))
-            write("weight", key + 28 * unit, title, 19)
+            write("weight", key + 28 * unit, head, 18)
         return whole.subsurface(self._box)
+
+    def _draw_gait(self, canvas: Any, now: Instant) -> None:
+        """Where each gait parameter is within its limits, and where it was commanded to be."""
+        left, right = self._track
+        for k, (_, name, unit_name) in enumerate(GAIT):
+            _, y = self._line(len(NUMBERS) + 1.4 + k, 0)
+            low, high = LIMITS[name]
+            actual, wanted = getattr(now, name), getattr(now, f"command_{name}")
+            for value, mark in ((wanted, self._mark_command), (actual, self._mark_actual)):
+                if math.isfinite(value):
+                    part = min(max((value - low) / (high - low), 0.0), 1.0)
+                    mark(canvas, left + part * (right - left), y)
+            digits = 1 if unit_name == "rad/s" else 2
+            text = f"{round(actual, digits) + 0.0:.{digits}f}" if math.isfinite(actual) else "-"
+            self._brush.write(canvas, text, (self._inside.right, y), 20, INK, "midright")
+
+    def _mark_actual(self, canvas: Any, x: float, y: float) -> None:
+        pygame.draw.aacircle(canvas, CRANK, (x, y), 5 * self._brush.unit)
+
+    def _mark_command(self, canvas: Any, x: float, y: float) -> None:
+        unit = self._brush.unit
+        tip, half, top = y - 4 * unit, 5 * unit, y - 12 * unit
+        shape = [(x, tip), (x - half, top), (x + half, top)]
+        pygame.draw.polygon(canvas, INK, shape)
+        pygame.draw.aalines(canvas, INK, True, shape)
 
     def _draw_curve(self, canvas: Any, now: float) -> None:
         plot, unit = self._plot, self._brush.unit
+        per_second, per_newton = plot.width / SECONDS, plot.height / self.full_scale
 
-        def pixels(samples: Any) -> Any:
-            t, force = np.array(samples).T
-            x = plot.right - (now - t) / SECONDS * plot.width
-            return x + 1j * (plot.bottom - force / self.full_scale * plot.height)
+        def place(t: float, force: float) -> tuple[float, float]:
+            return plot.right - (now - t) * per_second, plot.bottom - force * per_newton
 
-        curve = pixels(self._curve)
-        peaks = pixels(self.peaks) if self.peaks else curve[:0]
-        line = [(z.real, z.imag) for z in curve.tolist()]
+        line = [place(*sample) for sample in self._curve]
         if len(line) > 1:
-            ends = (line[0][0], plot.bottom), (line[-1][0], plot.bottom)
-            pygame.draw.polygon(canvas, UNDER_CURVE, [ends[0], *line, ends[1]])
+            pygame.draw.polygon(
+                canvas, UNDER_CURVE, [(line[0][0], plot.bottom), *line, (line[-1][0], plot.bottom)]
+            )
             for shift in (0.0, 0.7 * unit):  # an anti-aliased line is one pixel wide
                 pygame.draw.aalines(canvas, FORCE, False, [(x, y - shift) for x, y in line])
-        for z in peaks.tolist():
-            self._brush.write(canvas, "•", (z.real, z.imag), 40, FORCE, "center")
-        if self.peaks:
-            above = min(peaks[-1].real, plot.right - 10 * unit), peaks[-1].imag - 6 * unit
-            self._brush.write(canvas, f"{self.peaks[-1][1] / 1000:.2f}", above, 21, FORCE, "midbottom")
+        seen = [peak for peak in self.stances.peaks[-20:] if peak.time >= now - SECONDS]
+        if not seen:
+            return
+        for peak in seen:
+            pygame.draw.aacircle(canvas, FORCE, place(*peak), 4 * unit)
+        x, y = place(*seen[-1])
+        if self.stances.opened is not None:  # the running peak, from touch-down on
+            start, _ = place(max(self.stances.opened, now - SECONDS), 0.0)
+            canvas.fill(
+                FORCE, (round(start), round(y), max(round(plot.right - start), 1), max(1, round(unit)))
+            )
+        above = min(x, plot.right - 10 * unit), y - 6 * unit
+        self._brush.write(canvas, f"{seen[-1].force / 1000:.2f}", above, 20, FORCE, "midbottom")
 
 
 def _nice(force: float) -> float:

@@ -1,29 +1,45 @@
-"""The scene: trunk, linkage, hoof, ground, the path of the toe and the force on the hoof.
+"""The scene: sky, ground, trunk and leg, the paths of toe and heel, the forces on the hoof.
 
-The camera follows the crank centre O along x. It keeps its height, and there is room for every angle that the
-leg can reach; only when O leaves its usual heights does the camera follow it up or down.
+The camera follows the crank centre O along x. It keeps its height over the ground around O, and there is room
+for every angle that the leg can reach; only when O leaves its usual heights does the camera follow it up or
+down.
 """
 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from functools import lru_cache
 from itertools import product
 from typing import Any
 
 import numpy as np
 import pygame
-from numpy.typing import NDArray
 
 from hoof_env.envs.render_body import Body
-from hoof_env.envs.render_paint import CRANK, FINE, FORCE, GREY, PAPER, TOE, Brush, arrow, bar
+from hoof_env.envs.render_ground import SOIL_LINE, GroundPainter
+from hoof_env.envs.render_instant import Instant
+from hoof_env.envs.render_paint import (
+    CRANK,
+    FINE,
+    FORCE,
+    GREY,
+    HEEL,
+    PAPER,
+    TOE,
+    Brush,
+    Colour,
+    arrow,
+    bar,
+    mix,
+)
 from hoof_env.gait.parameters import LIMITS
-from hoof_env.leg.geometry import Geometry
-from hoof_env.leg.kinematics import FrameMotion, pose
+from hoof_env.ground.terrain import Terrain
+from hoof_env.leg.geometry import Geometry, tables
+from hoof_env.leg.kinematics import pose, solve_points
 from hoof_env.leg.linkage import POINTS
 
 SKY_TOP, SKY_BOTTOM = (219, 231, 242), (249, 250, 252)
-SOIL, SOIL_LINE, SOIL_VEIL = (214, 200, 174), (112, 95, 66), 110
 
 HEIGHT_SLACK_M = 0.2
 """How far O may rise or sink from the paper's hip height before the camera follows [m]."""
@@ -35,25 +51,41 @@ MARGIN_M = 0.1
 """Room around the leg at its furthest reach [m]."""
 
 PATH_SECONDS = 1.0
-"""Length of the toe's path [s]."""
+"""Length of the paths of toe and heel [s]."""
+
+PATH_STEP = 0.01
+"""Time between two places of a path [s]."""
 
 ARROW_M = 1.3
 """Length in the scene of an arrow for the panel's full scale [m]."""
 
+LEAST_FORCE = 0.004
+"""Part of the full scale below which a force is not drawn [-]."""
+
+AROUND_M = np.linspace(-1.5, 1.5, 31)
+"""Where the ground is looked at, from O, to find the camera's level [m]."""
+
 
 class Scene:
-    """Draws one row of a trace; see the module docstring.
+    """Draws one instant; see the module docstring.
 
     Args:
         brush: the paint box.
         geometry: the leg.
+        terrain: the ground.
         size: of the picture [pixels].
         right: width on the right that the leg leaves free [pixels].
         suspended: the trunk hangs from a spring; else a rail holds it.
     """
 
     def __init__(
-        self, brush: Brush, geometry: Geometry, size: tuple[int, int], right: int, suspended: bool
+        self,
+        brush: Brush,
+        geometry: Geometry,
+        terrain: Terrain,
+        size: tuple[int, int],
+        right: int,
+        suspended: bool,
     ) -> None:
         self._brush, self._geometry, self._size = brush, geometry, size
         out, up = _reach(geometry)
@@ -64,48 +96,64 @@ class Scene:
         self._scale = min(size[1] / (soil + sky), self._centre / (out + MARGIN_M))
         self._level = size[1] - soil * self._scale  # of the ground [pixels] while the camera keeps its height
         self._camera = 0j
-        self._path: deque[tuple[float, complex]] = deque()
+        self._paths: tuple[tuple[Colour, deque[tuple[float, complex]]], ...] = (
+            (HEEL, deque()),
+            (TOE, deque()),
+        )
+        self._leg = tables(geometry)
+        self._ground = GroundPainter(brush, terrain, size, self._scale, 2 * self._centre)
         self._body = Body(brush, geometry, self._scale, suspended)
         self._sky = self._paint_sky()
-        self._veil = pygame.Surface(size, 0, 32)  # over what is inside the ground
-        self._veil.fill(SOIL)
-        self._veil.set_alpha(SOIL_VEIL)
         self._key = lru_cache(maxsize=8)(self._paint_key)
 
     def reset(self) -> None:
-        """Forget the path of the toe."""
-        self._path.clear()
+        """Forget the paths."""
+        for _, path in self._paths:
+            path.clear()
 
-    def add(self, trace: NDArray[np.void]) -> None:
-        """Lengthen the path of the toe by the rows of a trace, about one point every 10 ms."""
-        now = trace["t"][-1]
-        step = max(1, round(0.01 * (len(trace) - 1) / max(now - trace["t"][0], 0.01)))
-        rows = trace[::-step][::-1]
-        toe = rows["toe_x"] - 1j * rows["toe_penetration"]
-        self._path.extend(zip(rows["t"].tolist(), toe.tolist(), strict=True))
-        while self._path[0][0] < now - PATH_SECONDS:
-            self._path.popleft()
+    def add(self, instants: Sequence[Instant]) -> None:
+        """Lengthen the paths of toe and heel by instants in the order of time."""
+        now = instants[-1].time
+        toe, heel = self._paths[1][1], self._paths[0][1]
+        for instant in instants:
+            if not toe or instant.time >= toe[-1][0] + PATH_STEP * (1 - 1e-6):
+                toe.append((instant.time, complex(instant.toe_x, instant.toe_y)))
+                heel.append((instant.time, complex(instant.heel_x, instant.heel_y)))
+        while toe[0][0] < now - PATH_SECONDS:
+            toe.popleft(), heel.popleft()
 
-    def draw(self, canvas: Any, row: Any, full_scale: float) -> None:
-        """Draw a row of dtype `TRACE`; the arrow of a force `full_scale` [N] is `ARROW_M` long."""
-        pixels = self.look_at(row)
+    def draw(self, canvas: Any, now: Instant, full_scale: float) -> None:
+        """Draw an instant; the arrow of a force `full_scale` [N] is `ARROW_M` long."""
+        pixels = self.look_at(now)
         canvas.blit(self._sky, (0, 0))
-        ground = round(self._pixels(0j).imag)
-        canvas.fill(SOIL, (0, ground, *self._size))
-        self._body.draw_trunk(canvas, pixels["O"])
-        self._draw_path(canvas)
+        self._body.draw_support(canvas, pixels["O"])
+        self._ground.draw(canvas, now, self.corner)
+        self._body.draw_trunk(canvas, pixels["O"], now.pitch)
+        self._draw_paths(canvas, pixels)
         self._body.draw_leg(canvas, pixels)
-        self._draw_ground(canvas, ground)
-        self._draw_force(canvas, row, full_scale)
+        self._draw_forces(canvas, now, full_scale)
         canvas.blit(self._key(full_scale), (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
 
-    def look_at(self, row: Any) -> dict[str, complex]:
-        """Point the camera at a row; returns where each named point of the leg lies [pixels]."""
+    @property
+    def corner(self) -> complex:
+        """Place in the world of the picture's upper left corner [m]."""
+        return self._camera + complex(-self._centre, self._level) / self._scale
+
+    def look_at(self, now: Instant) -> dict[str, complex]:
+        """Point the camera at an instant; returns where each named point of the leg lies [pixels]."""
         usual = self._geometry.hip_height
-        x, y = float(row["trunk_x"]), float(row["trunk_y"])
-        self._camera = complex(x, y - min(max(y, usual - HEIGHT_SLACK_M), usual + HEIGHT_SLACK_M))
-        points = pose(self._geometry, row["theta"], frame=FrameMotion(phi=row["phi"], position=(x, y))).points
-        return dict(zip(POINTS, self._pixels(points[:, 0] + 1j * points[:, 1]).tolist(), strict=True))
+        hip = complex(now.trunk_x, now.trunk_y)
+        level = float(self._ground.height(hip.real + AROUND_M).mean())
+        high = hip.imag - level
+        rise = high - min(max(high, usual - HEIGHT_SLACK_M), usual + HEIGHT_SLACK_M)
+        self._camera = complex(hip.real, level + rise)
+        z, dz, ddz = np.empty((3, len(POINTS)), np.complex128)
+        crank, pivot = self._geometry.lengths["OP"], complex(*self._geometry.pivot)
+        solve_points(now.crank_angle, crank, pivot, *self._leg, z, dz, ddz)
+        z *= np.exp(1j * now.swing_angle)
+        z.real *= self._geometry.travel
+        points = hip + z * np.exp(1j * now.pitch)
+        return dict(zip(POINTS, self._pixels(points).tolist(), strict=True))
 
     def _pixels(self, z: Any) -> Any:
         """World position, complex [m], to position in the picture, complex with y down [pixels]."""
@@ -117,70 +165,73 @@ class Scene:
         ramp.set_at((0, 1), SKY_BOTTOM)
         return pygame.transform.smoothscale(ramp, self._size)
 
-    def _draw_path(self, canvas: Any) -> None:
-        if len(self._path) < 2:
-            return
-        times, places = zip(*self._path, strict=True)
-        path = self._pixels(np.array(places))
-        for first in range(0, len(path) - 1, 10):  # older parts fade into the sky
-            fade = 0.75 * (times[-1] - times[first]) / PATH_SECONDS
-            self._draw_line(canvas, path[first : first + 11], fade)
+    def _draw_paths(self, canvas: Any, pixels: dict[str, complex]) -> None:
+        ends = pixels[self._geometry.heel], pixels[self._geometry.toe]
+        for (colour, path), end in zip(self._paths, ends, strict=True):
+            if len(path) < 2:
+                continue
+            times, places = zip(*path, strict=True)
+            line = np.append(self._pixels(np.array(places)), end)
+            points = list(zip(line.real.tolist(), line.imag.tolist(), strict=True))
+            for first in range(0, len(points) - 1, 10):  # older parts fade into the sky
+                part = points[first : first + 11]
+                faded = mix(colour, SKY_BOTTOM, 0.75 * (times[-1] - times[first]) / PATH_SECONDS)
+                for shift in (0.0, 0.8 * self._brush.unit):  # an anti-aliased line is one pixel wide
+                    pygame.draw.aalines(canvas, faded, False, [(x, y + shift) for x, y in part])
 
-    def _draw_line(self, canvas: Any, line: NDArray[np.complex128], fade: float) -> None:
-        colour = [round(c + fade * (sky - c)) for c, sky in zip(TOE, SKY_BOTTOM, strict=True)]
-        width = round(2.8 * self._brush.unit * FINE)
+    def _draw_forces(self, canvas: Any, now: Instant, full_scale: float) -> None:
+        """Arrows of the forces on the hoof; where both points bear load, that of their sum behind them."""
+        if now.grf < full_scale * LEAST_FORCE:
+            return
+        forces = [
+            (TOE, 3.0, complex(now.toe_x, now.toe_y), complex(now.toe_force_x, now.toe_force_y)),
+            (HEEL, 3.0, complex(now.heel_x, now.heel_y), complex(now.heel_force_x, now.heel_force_y)),
+            (FORCE, 7.0, complex(now.cop_x, now.cop_y), complex(now.force_x, now.force_y)),
+        ]
+        ends = [
+            (colour, width * self._brush.unit * FINE, self._pixels(foot),
+             self._pixels(foot + force * ARROW_M / full_scale))
+            for colour, width, foot, force in reversed(forces) if force
+        ]  # fmt: skip
 
         def paint(fine: Any, place: Any) -> None:
-            pygame.draw.lines(fine, colour, False, [place(z) for z in line.tolist()], width)
+            for colour, width, tail, tip in ends:
+                for shade, grow in ((PAPER, 1.2 * FINE), (colour, 0.0)):
+                    pygame.draw.circle(fine, shade, place(tail), 0.75 * width + grow)
+                    arrow(fine, shade, place(tail), place(tip), width, grow)
 
-        self._brush.smooth(canvas, line, 3, paint)
-
-    def _draw_ground(self, canvas: Any, ground: int) -> None:
-        (width, height), unit = self._size, self._brush.unit
-        left = self._camera.real - self._centre / self._scale
-        label = ground + height - self._level - 8 * unit
-        thick = max(1, round(2 * unit))
-        canvas.blit(self._veil, (0, ground))
-        canvas.fill(SOIL_LINE, (0, ground, width, thick))
-        for metre in range(int(np.floor(left)), int(np.ceil(left + width / self._scale)) + 1):
-            x = self._pixels(complex(metre, 0)).real
-            canvas.fill(SOIL_LINE, (round(x - thick / 2), ground, thick, round(10 * unit)))
-            canvas.fill(SOIL_LINE, (round(x + self._scale / 2), ground, 1, round(6 * unit)))
-            self._brush.write(canvas, f"{metre} m", (x, label), 18, SOIL_LINE, "midbottom")
-
-    def _draw_force(self, canvas: Any, row: Any, full_scale: float) -> None:
-        if row["normal"] <= 0:
-            return
-        moment = row["toe_normal"] * row["toe_penetration"] + row["heel_normal"] * row["heel_penetration"]
-        foot = complex(row["cop_x"], -moment / row["normal"])
-        force = complex(row["friction"], row["normal"])
-        tail, tip = self._pixels(foot), self._pixels(foot + force * ARROW_M / full_scale)
-        width = 6 * self._brush.unit * FINE
-
-        def paint(fine: Any, place: Any) -> None:
-            for colour, grow in ((PAPER, 1.2 * FINE), (FORCE, 0.0)):
-                pygame.draw.circle(fine, colour, place(tail), 0.75 * width + grow)
-                arrow(fine, colour, place(tail), place(tip), width, grow)
-
-        self._brush.smooth(canvas, [tail, tip], 14 * self._brush.unit, paint)
+        box = [z for end in ends for z in end[2:]]
+        self._brush.smooth(canvas, box, 14 * self._brush.unit, paint)
+        tip = ends[0][3]
+        text = f"{now.grf / 1000:.2f} kN"
+        self._brush.write(canvas, text, (tip.real + 12 * self._brush.unit, tip.imag), 21, FORCE)
 
     def _paint_key(self, full_scale: float) -> Any:
         unit = self._brush.unit
         force = full_scale / 5
-        start, step = 20 * (1 + 1j) * unit, 22j * unit
-        end = start + force / full_scale * ARROW_M * self._scale
-        image = pygame.Surface((round(self._centre), round(90 * unit)), pygame.SRCALPHA, 32)
+        length = force / full_scale * ARROW_M * self._scale
+        kinds = self._ground.kinds()
+        words = f"{force / 1000:g} kN on the hoof", "toe: force and path", "heel: force and path", "crank"
+        rows = [20 + (20 + 20 * k) * 1j for k in range(4)]
+        places = [row * unit for row in rows] + [row * unit + self._centre for row in rows[: len(kinds)]]
+        image = pygame.Surface((round(2 * self._centre), round(100 * unit)), pygame.SRCALPHA, 32)
 
         def paint(fine: Any, place: Any) -> None:
-            arrow(fine, FORCE, place(start), place(end), 6 * unit * FINE)
-            for k, colour, radius in ((1, TOE, 1.1 * unit * FINE), (2, CRANK, 3.3 * unit * FINE)):
-                bar(fine, colour, place(start + k * step), place(end + k * step), radius, radius)
+            arrow(fine, FORCE, place(places[0]), place(places[0] + length), 7 * unit * FINE)
+            for at, (colour, radius) in zip(
+                places[1:4], ((TOE, 1.2), (HEEL, 1.2), (CRANK, 3.3)), strict=True
+            ):
+                bar(fine, colour, place(at), place(at + length), radius * unit * FINE, radius * unit * FINE)
+            for at, (_, colour) in zip(places[4:], kinds, strict=True):
+                x, y = place(at - 6j * unit)
+                swatch = pygame.Rect(x, y, length * FINE, 12 * unit * FINE)
+                pygame.draw.rect(fine, SOIL_LINE, swatch)
+                pygame.draw.rect(fine, colour, swatch.inflate(-2 * FINE, -2 * FINE))
 
-        self._brush.smooth(image, [start, end + 2 * step], 10 * unit, paint)
-        words = f"{force / 1000:g} kN on the hoof", f"toe, last {PATH_SECONDS:g} s", "crank"
-        for k, text in enumerate(words):
-            at = end + k * step + 12 * unit
-            self._brush.write(image, text, (at.real, at.imag), 19, GREY)
+        self._brush.smooth(image, [*places, places[-1] + length], 10 * unit, paint)
+        for at, text in zip(places, (*words, *(name for name, _ in kinds)), strict=True):
+            write_at = at + length + 12 * unit
+            self._brush.write(image, text, (write_at.real, write_at.imag), 19, GREY)
         return image
 
 

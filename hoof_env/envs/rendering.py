@@ -1,19 +1,27 @@
 """Pictures of the leg at work: an off-screen RGB array, or a window for people.
 
 Drawing is done in software on an off-screen surface; only render mode "human" opens a display. Every
-number in the picture is read from rows of dtype `dynamics.trace.TRACE`; it computes no mechanics of its own.
+number in the picture is read from `render_instant.Instant`s; it computes no mechanics of its own.
 """
 
 from __future__ import annotations
 
-from typing import Any
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from gymnasium.error import DependencyNotInstalled, ResetNeeded
 from numpy.typing import NDArray
 
+from hoof_env.envs.render_instant import Instant, columns_of_trace, instants
+from hoof_env.envs.render_stance import Stances
 from hoof_env.errors import ParameterError, check_choice, check_number
+from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
+
+if TYPE_CHECKING:
+    from hoof_env.records import Setting
 
 MODES = ("rgb_array", "human")
 """Render modes."""
@@ -23,7 +31,7 @@ SMALLEST_SIZE = (480, 270)
 
 
 class Renderer:
-    """Draws the leg, the ground, the force on the hoof and a panel with numbers and the force trace.
+    """Draws the leg, the ground, the forces on the hoof and a panel with numbers, gait and force curve.
 
     Args:
         geometry: the leg.
@@ -32,6 +40,8 @@ class Renderer:
         size: width and height of the picture [pixels].
         weight_n: weight of trunk and leg [N] if the trunk is suspended: it is drawn on a spring, and the
             weight as a line beside the force. None if it is fixed or on a rail: it is drawn under a rail.
+        lift_off_n: normal force that tells stance from swing [N].
+        terrain: what it stands on; level if None.
 
     Raises:
         ParameterError: an unknown mode, or a value out of range.
@@ -46,6 +56,7 @@ class Renderer:
         size: tuple[int, int] = (960, 540),
         weight_n: float | None = None,
         lift_off_n: float = 0.0,
+        terrain: Terrain | None = None,
     ) -> None:
         self.mode = check_choice("render_mode", mode, MODES)
         self.fps = check_number("fps", fps, low=0, exclusive_low=True)
@@ -65,47 +76,63 @@ class Renderer:
         self._canvas = pygame.Surface(self.size, 0, 32)
         # laid out in memory as a frame is, so that the copy is quick
         self._packed = pygame.Surface(self.size, 0, 24, (0xFF, 0xFF00, 0xFF0000, 0))
-        brush = Brush(self.size)
+        self.brush = brush = Brush(self.size)
         edge, column = round(16 * brush.unit), round(304 * brush.unit)
-        self._scene = Scene(brush, geometry, self.size, column + 2 * edge, suspended=weight_n is not None)
-        box = (self.size[0] - edge - column, edge, column, round(424 * brush.unit))
+        ground = Terrain.flat() if terrain is None else terrain
+        self._scene = Scene(
+            brush, geometry, ground, self.size, column + 2 * edge, suspended=weight_n is not None
+        )
+        box = (self.size[0] - edge - column, edge, column, round(508 * brush.unit))
         self._panel = Panel(brush, box, weight_n, lift_off_n)
         self._window_open = False
         self._clock = pygame.time.Clock()
         self._closed = False
-        self._row: Any = None
+        self._now: Instant | None = None
+
+    @property
+    def stances(self) -> Stances:
+        """Stances of the episode and their peaks."""
+        stances: Stances = self._panel.stances
+        return stances
+
+    @property
+    def latest(self) -> Instant:
+        """The instant that is drawn next; `ResetNeeded` if there is none."""
+        return self._check_seen()
 
     def reset(self) -> None:
-        """A new episode: forget the force history and the path of the toe."""
-        self._row = None
+        """A new episode: forget the force history and the paths of the hoof."""
+        self._now = None
         self._scene.reset()
         self._panel.reset()
 
-    def add(self, trace: NDArray[np.void]) -> None:
-        """Take the rows (dtype `TRACE`) of one control step; rows that are not finite are left out."""
-        drawn = ("theta", "phi", "trunk_x", "trunk_y", "grf")
-        trace = trace[np.isfinite(sum(trace[name] for name in drawn))]
-        if len(trace):
-            self._row = trace[-1].copy()
-            self._scene.add(trace)
-            self._panel.add(trace)
+    def add(self, news: Sequence[Instant] | NDArray[np.void]) -> None:
+        """Take what happened since the last call, in the order of time: instants, or rows of dtype `TRACE`.
+
+        What is not finite is left out.
+        """
+        rows = instants(columns_of_trace(news)) if isinstance(news, np.ndarray) else news
+        seen = [now for now in rows if math.isfinite(sum(now[:9]) + now.force_x + now.force_y)]
+        if seen:
+            self._now = seen[-1]
+            self._scene.add(seen)
+            self._panel.add(seen)
 
     def frame(self) -> NDArray[np.uint8] | None:
-        """Draw the latest row.
+        """Draw the latest instant.
 
         Returns:
             "rgb_array": a fresh array of shape (height, width, 3). "human": None; the window shows the
             picture and the call waits so that frames come at `fps`. A window that was closed stays closed.
 
         Raises:
-            ResetNeeded: there is no row yet.
+            ResetNeeded: there is none yet.
         """
-        if self._row is None:
-            raise ResetNeeded("nothing to draw yet: reset the environment first")
+        self._check_seen()
         if self.mode == "human":
             self._show()
             return None
-        self._draw()
+        self.draw()
         self._packed.blit(self._canvas, (0, 0))
         return self._pygame.surfarray.pixels3d(self._packed).transpose(1, 0, 2).copy()
 
@@ -116,9 +143,21 @@ class Renderer:
             self._window_open = False
             self._pygame.display.quit()
 
-    def _draw(self) -> None:
-        self._scene.draw(self._canvas, self._row, self._panel.full_scale)
-        self._panel.draw(self._canvas, self._row)
+    def draw(self) -> Any:
+        """Draw the latest instant; returns the surface, which the next call paints over.
+
+        Raises:
+            ResetNeeded: as `frame`.
+        """
+        now = self._check_seen()
+        self._scene.draw(self._canvas, now, self._panel.full_scale)
+        self._panel.draw(self._canvas, now)
+        return self._canvas
+
+    def _check_seen(self) -> Instant:
+        if self._now is None:
+            raise ResetNeeded("nothing to draw yet: reset the environment first")
+        return self._now
 
     def _show(self) -> None:
         if self._closed:
@@ -133,10 +172,28 @@ class Renderer:
         if any(event.type == self._pygame.QUIT for event in self._pygame.event.get()):
             self.close()
             return
-        self._draw()
+        self.draw()
         display.get_surface().blit(self._canvas, (0, 0))
         display.flip()
         self._clock.tick(self.fps)
+
+
+def new_renderer(here: Setting, fps: float, size: tuple[int, int] = (960, 540)) -> Renderer:
+    """An off-screen renderer for an environment with this setting.
+
+    Raises:
+        ParameterError, DependencyNotInstalled: as `Renderer`.
+    """
+    weight = here.weight_n if here.suspended else None
+    return Renderer(
+        here.geometry,
+        "rgb_array",
+        fps,
+        size,
+        weight_n=weight,
+        lift_off_n=here.lift_off_n,
+        terrain=here.terrain,
+    )
 
 
 def _check_size(size: Any) -> tuple[int, int]:

@@ -8,6 +8,7 @@ import sys
 import time
 from itertools import product
 
+import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.error import DependencyNotInstalled, ResetNeeded
@@ -15,10 +16,15 @@ from gymnasium.error import DependencyNotInstalled, ResetNeeded
 from hoof_env.dynamics.engine import LegEngine
 from hoof_env.dynamics.trace import new_trace
 from hoof_env.dynamics.trunk import Trunk
+from hoof_env.envs.policies import make_policy
+from hoof_env.envs.render_ground import find_patches, footprint
+from hoof_env.envs.render_instant import columns_of_trace, instants
+from hoof_env.envs.render_stance import Stances
 from hoof_env.envs.rendering import Renderer
 from hoof_env.errors import ParameterError
 from hoof_env.gait.parameters import LIMITS, load_gait
 from hoof_env.ground.contact import Ground
+from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import load_geometry
 
 pygame = pytest.importorskip("pygame")
@@ -26,7 +32,7 @@ pygame = pytest.importorskip("pygame")
 GEOMETRY = load_geometry("first_fit")
 SCENE = (slice(90, None), slice(0, 640))  # rows and columns of the scene, below its key and left of the panel
 KEY = (slice(10, 31), slice(0, 64))  # of the key's arrow
-VERMILION = (213, 94, 0)
+VERMILION, BLUE, PURPLE, LINE = (213, 94, 0), (0, 114, 178), (204, 121, 167), (112, 95, 66)
 
 
 def simulate(seconds: float, gait: str = "run", trunk: str = "suspended") -> list[np.ndarray]:
@@ -67,9 +73,11 @@ def loaded(run, normal: float, friction: float = 0.0) -> np.ndarray:
     return trace
 
 
-def vermilion(frame: np.ndarray, where: tuple[slice, slice] = SCENE) -> tuple[np.ndarray, np.ndarray]:
-    """Rows and columns of the pixels in the force's colour."""
-    rows, columns = np.nonzero((frame[where] == VERMILION).all(axis=-1))
+def pixels(
+    frame: np.ndarray, colour: tuple[int, int, int], where: tuple[slice, slice] = SCENE
+) -> tuple[np.ndarray, np.ndarray]:
+    """Rows and columns of the pixels of a colour."""
+    rows, columns = np.nonzero((frame[where] == colour).all(axis=-1))
     return rows + (where[0].start or 0), columns + (where[1].start or 0)
 
 
@@ -115,21 +123,23 @@ def test_off_screen_frames_need_no_display(run):
 
 
 def test_no_arrow_without_load(run):
-    assert vermilion(draw(loaded(run, 0.0)))[0].size == 0
+    for colour in (VERMILION, BLUE, PURPLE):
+        assert pixels(draw(loaded(run, 0.0)), colour)[0].size == 0
 
 
 @pytest.mark.parametrize("normal", [600.0, 1500.0, 4000.0])
 def test_the_arrow_is_as_long_as_its_key_says(run, normal):
     frame = draw(loaded(run, normal), weight_n=1000.0)  # full scale 5 kN, so the key's arrow is 1 kN
-    key = np.ptp(vermilion(frame, KEY)[1]) + 1
-    rows, columns = vermilion(frame)
-    dot = 4.5  # radius of the point of application, below the tail
+    key = np.ptp(pixels(frame, VERMILION, KEY)[1]) + 1
+    rows, columns = pixels(frame, BLUE)
+    dot = 2.25  # radius of the point of application, below the tail
     assert np.ptp(rows) + 1 - dot == pytest.approx(key * normal / 1000, abs=3)
-    assert np.ptp(columns) < 20  # upright
+    assert np.ptp(columns) < 12  # upright
+    assert pixels(frame, VERMILION)[0].size > rows.size / 2  # that of the whole hoof is behind it, wider
 
 
 def test_the_arrow_leans_the_way_friction_acts(run):
-    backward, forward = (vermilion(draw(loaded(run, 1000.0, f), weight_n=1000.0)) for f in (-400.0, 400.0))
+    backward, forward = (pixels(draw(loaded(run, 1000.0, f), weight_n=1000.0), BLUE) for f in (-400.0, 400.0))
     tip_of = [columns[np.argmin(rows)] for rows, columns in (backward, forward)]
     tail_of = [columns[np.argmax(rows)] for rows, columns in (backward, forward)]
     assert abs(tail_of[0] - tail_of[1]) <= 4
@@ -137,18 +147,111 @@ def test_the_arrow_leans_the_way_friction_acts(run):
     assert tip_of[1] > tail_of[1] + 8
 
 
+def test_each_point_has_its_arrow_where_it_is(run):
+    trace = loaded(run, 900.0)
+    trace["toe_normal"], trace["heel_normal"], trace["heel_penetration"] = 300.0, 600.0, 0.04
+    frame = draw(trace, weight_n=1000.0)
+    (toe_rows, toe_columns), (heel_rows, heel_columns) = pixels(frame, BLUE), pixels(frame, PURPLE)
+    assert np.ptp(heel_rows) > 1.6 * np.ptp(toe_rows)
+    ahead = np.sign(trace["toe_x"][0] - trace["heel_x"][0])
+    assert ahead * (np.median(toe_columns) - np.median(heel_columns)) > 5
+
+
 def test_the_ground_scrolls_under_the_trunk_by_its_ticks(run):
     def ticks(x: float) -> np.ndarray:
         trace = run[0].copy()
         trace["trunk_x"] += x
         frame = draw(trace)
-        line = np.nonzero((frame[:, 0] == (112, 95, 66)).all(axis=-1))[
-            0
-        ].max()  # the ground line at the left edge
-        return frame[line + 2]
+        line = np.nonzero((frame[:, 5] == LINE).all(axis=-1))[0].max()  # the ground at the left edge
+        return frame[line + 4, :640]
 
     np.testing.assert_array_equal(ticks(60.0), ticks(0.0))
     assert (ticks(60.25) != ticks(0.0)).any()
+
+
+def surface(frame: np.ndarray, column: int) -> int:
+    """Row of the ground's line in a column."""
+    far = np.abs(frame[300:, column] - np.array(LINE)).sum(axis=-1)
+    return 300 + int(np.nonzero(far < 90)[0][0])
+
+
+def test_the_ground_is_as_high_as_the_terrain(run):
+    """A rise of 0.2 m a metre ahead; the metre marks of level ground say how long a metre is."""
+    level, (trace, *_) = draw(run[0]), run
+    metre = 146  # pixels between two ticks at this size and leg, seen below
+    row = surface(level, 5) + 8
+    ticks = np.flatnonzero((level[row, :640] == LINE).all(axis=-1))
+    assert np.diff(ticks)[np.diff(ticks) > 2] == pytest.approx(metre, abs=2)
+    terrain = Terrain.through([-50.0, 1.0, 1.1, 50.0], [0.0, 0.0, 0.2, 0.2])
+    frame = draw(trace, terrain=terrain)
+    assert surface(frame, 10) - surface(frame, 600) == pytest.approx(0.2 * metre, abs=2)
+    assert surface(level, 10) == surface(level, 600)
+
+
+def test_kinds_of_ground_differ_by_colour_and_are_named_in_the_key(run):
+    plain = draw(run[0])
+    for patch in ((-9, 9, 0.2, 1), (-9, 9, 5, 1), (-9, 9, 1, 0.2), (-9, 9, 1, 2)):
+        frame = draw(run[0], terrain=Terrain.patches([patch]))
+        assert (frame[:90, 320:500] != plain[:90, 320:500]).any()
+        ground = surface(plain, 100)
+        assert (frame[ground + 4, 80:120] != plain[ground + 4, 80:120]).any(axis=-1).mean() > 0.9
+
+
+def test_patches_are_found_where_they_are():
+    patches = find_patches(Terrain.patches([(0.5, 1.0, 0.25, 1.0), (1.0, 2.0, 1.0, 3.0)], spacing=0.01))
+    assert [patch[2:] for patch in patches] == [(0.25, 1.0), (1.0, 3.0)]
+    np.testing.assert_allclose([patch[:2] for patch in patches], [(0.5, 1.0), (1.0, 2.0)], atol=0.011)
+    assert find_patches(Terrain.slope(0.1)) == []
+    assert find_patches(Terrain((0.0,), 2.0))[0][:3] == (-np.inf, np.inf, 2.0)
+
+
+def test_the_footprint_is_as_deep_as_the_sole_and_runs_out(run):
+    trace = loaded(run, 900.0)
+    trace["toe_x"], trace["heel_x"], trace["heel_penetration"] = 1.0, 0.8, 0.02
+    (now,) = instants(columns_of_trace(trace))
+    depth = footprint(now, np.array([0.0, 0.8, 0.9, 1.0, 1.5]))
+    np.testing.assert_allclose(depth, [0.0, 0.02, 0.035, 0.05, 0.0], atol=1e-9)
+
+
+def test_the_ground_gives_way_under_the_hoof(run):
+    """Where the leg is not in front of it: both points 0.8 m ahead of the trunk, 10 cm deep."""
+    trace = loaded(run, 900.0)
+    for point in ("toe", "heel"):
+        trace[f"{point}_x"], trace[f"{point}_penetration"] = trace["trunk_x"] + 1.2, 0.1
+    column, metre = 312 + round(1.2 * 146), 146
+    beside = column + round(0.06 * metre)
+    deep = 0.1 * metre * np.exp(-((0.06 / 0.09) ** 2))
+    assert surface(draw(trace), beside) - surface(draw(run[0]), beside) == pytest.approx(deep, abs=2.5)
+
+
+def test_the_camera_follows_the_trunk_uphill(run):
+    """Over ground that rises with the trunk, the leg stays where it is in the picture."""
+    picture = renderer(terrain=Terrain.slope(0.2))
+    (now,) = instants(columns_of_trace(run[0]))
+    places = [
+        picture._scene.look_at(now._replace(trunk_x=x, trunk_y=now.trunk_y + x * np.tan(0.2)))["O"]
+        for x in (0.0, 3.0, 40.0)
+    ]
+    np.testing.assert_allclose(places, places[0])
+
+
+def test_the_gait_shows_what_is_commanded_and_what_is_made(run):
+    dark = (34, 43, 53)
+    command, gait = np.array([9.0, 0.3, 0.2, 0.0]), np.array([6.0, 1.0, -0.4, -0.5])
+
+    def marks(*given) -> np.ndarray:
+        """Columns of the commands' marks beside crank speed and swing offset."""
+        picture = renderer()
+        picture.add(instants(columns_of_trace(run[0], *given)))
+        frame = picture.frame()
+        return np.array([np.nonzero((frame[y, 760:880] == dark).all(-1))[0].mean() for y in (184, 208)])
+
+    low, high = np.array(list(LIMITS.values()))[:2].T
+    part = (command[:2] - low) / (high - low)
+    track = 760 + marks(command, gait)
+    left, right = 770.0, 872.0
+    np.testing.assert_allclose(track, left + part * (right - left), atol=1.5)
+    assert (marks(gait, gait) != marks(command, gait)).all()
 
 
 PICTURES = [renderer(size=size) for size in ((600, 540), (960, 540), (1400, 540))]
@@ -156,38 +259,77 @@ PICTURES = [renderer(size=size) for size in ((600, 540), (960, 540), (1400, 540)
 
 @pytest.mark.parametrize("height", [0.5, 0.88, 1.0, 1.12, 2.1])
 def test_the_leg_is_always_in_the_picture(height):
-    row = new_trace(1)[0]
+    row = new_trace(1)
     row["trunk_x"], row["trunk_y"] = -37.3, height * GEOMETRY.hip_height
+    (start,) = instants(columns_of_trace(row))
     for theta in np.linspace(0, 2 * np.pi, 36, endpoint=False):
         for offset, a, b in product(*list(LIMITS.values())[1:]):
-            row["theta"], row["phi"] = theta, offset + a * np.sin(theta) + b * np.cos(theta)
+            phi = offset + a * np.sin(theta) + b * np.cos(theta)
+            now = start._replace(crank_angle=theta, swing_angle=phi)
             for picture in PICTURES:
-                z = np.array(list(picture._scene.look_at(row).values()))
+                z = np.array(list(picture._scene.look_at(now).values()))
                 assert ((z.real > 0) & (z.real < picture._panel._box.left)).all()
                 assert ((z.imag > 0) & (z.imag < picture.size[1])).all()
 
 
-def test_stance_peaks_are_the_highest_force_of_each_contact(run):
+@pytest.mark.parametrize("gait", ["run", "walk"])
+def test_stances_and_peaks_are_those_of_the_reward(gait):
+    env = gym.make("hoof_env/HorseLeg-v0", render_mode="rgb_array", episode_seconds=4.0).unwrapped
+    observation, _ = env.reset(seed=0, options={"gait": gait})
+    policy, ended = make_policy(gait, env), False
+    while not ended:
+        observation, _, failed, truncated, info = env.step(policy.predict(observation)[0])
+        ended = failed or truncated
+    summary, stances = info["episode_summary"], env._renderer.stances
+    assert len(stances.peaks) == summary["stances"] > 2
+    assert sum(peak.force for peak in stances.peaks) == pytest.approx(summary["stance_peak_sum_n"])
+    assert stances.highest == pytest.approx(summary["peak_grf_n"])
+    env.close()
+
+
+def test_a_hoof_that_never_lifts_begins_a_stance_every_turn_of_the_crank(run):
+    (now,) = instants(columns_of_trace(loaded(run, 500.0)))
+    stances = Stances(40.0)
+    for k in range(301):
+        stances.add(now._replace(time=k / 100, crank_angle=2 * np.pi * k / 100, force_y=500.0 + k))
+    assert [peak.force for peak in stances.peaks] == [599.0, 699.0, 799.0, 800.0]
+    stances.add(now._replace(toe_normal=30.0, force_y=30.0))
+    assert (stances.opened, stances.running_peak, stances.highest) == (None, 0.0, 800.0)
+
+
+def test_a_trunk_that_pitches_turns_its_leg(run):
+    (now,) = instants(columns_of_trace(run[0]))
     picture = renderer()
+    arms = []
+    for pitch in (0.0, 0.3):
+        z = picture._scene.look_at(now._replace(pitch=pitch))
+        arms.append(np.array([z[name] - z["O"] for name in ("C", "G", "J")]))
+    np.testing.assert_allclose(arms[1], arms[0] * np.exp(-0.3j))  # the picture's y points down
+    level, pitched = (draw_instant(now._replace(pitch=pitch)) for pitch in (0.0, 0.3))
+    assert (level != pitched)[100:220, 160:300].any()  # and the trunk with it
+
+
+def draw_instant(now) -> np.ndarray:
+    picture = renderer()
+    picture.add([now])
+    return picture.frame()
+
+
+def test_the_running_peak_is_of_the_open_stance(run):
+    picture = renderer(lift_off_n=40.0)
     for trace in run:
         picture.add(trace)
-    rows = np.concatenate(run)
-    inside = (rows["toe_penetration"] > 0) | (rows["heel_penetration"] > 0)
-    edges = np.flatnonzero(np.diff(inside.astype(int), prepend=0, append=0))
-    peaks = []
-    for first, end in edges.reshape(-1, 2):
-        top = rows[first:end][np.argmax(rows["grf"][first:end])]
-        if top["t"] >= rows["t"][-1] - 3:
-            peaks.append((top["t"], top["grf"]))
-    assert len(peaks) >= 3
-    np.testing.assert_allclose(list(picture._panel.peaks), peaks)
+        stances = picture.stances
+        (*_, now) = instants(columns_of_trace(trace))
+        assert (stances.opened is None) == (now.normal <= 40.0)
+        assert stances.running_peak >= now.grf * (now.normal > 40.0)
     assert picture._panel.full_scale == 5000  # of 1, 2, 5 the first above 4.4 kN
 
 
 def test_rows_that_are_not_finite_are_left_out(run):
     broken = run[1].copy()
     broken["theta"][-1] = np.nan
-    broken["grf"][-2] = np.inf
+    broken["toe_normal"][-2] = np.inf
     np.testing.assert_array_equal(draw(run[0], broken), draw(run[0], run[1][:-2]))
 
 

@@ -1,0 +1,295 @@
+"""Proximal policy optimisation (PPO) in one file, with torch and Gymnasium alone, to read and to change.
+
+    python -m agents.ppo_flat                          a million steps of hoof_env/HorseLeg-v0
+    python -m agents.ppo_flat --steps 100000 --env-id hoof_env/HorseLegFixed-v0 --out runs/flat
+
+In the form of CleanRL's scripts: arguments, seeds, environments, storage, then the loop from top to bottom.
+
+Vector environments restart in Gymnasium's default way, on the next step: the step that ends an episode
+returns its last observation, and the step after it ignores its action and returns the next one's first. So
+the value of a last observation is at hand where a time limit truncates an episode, which is not the end of
+the task; only a termination has no future. The steps that restart are no experience and are left out.
+"""
+
+from __future__ import annotations
+
+import csv
+import time
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, Literal
+
+import gymnasium as gym
+import numpy as np
+import torch
+from torch import Tensor, nn
+from torch.distributions import Normal
+
+import hoof_env  # noqa: F401  (registers the environments)
+from agents.command import parse_pairs, run
+from hoof_env._output import check_folder
+from hoof_env.errors import ParameterError, check_number
+
+
+@dataclass(frozen=True)
+class Args:
+    env_id: str = "hoof_env/HorseLeg-v0"
+    """registered environment; module:id imports the module first"""
+    seed: int = 0
+    """of the environments, the network and the sampling"""
+    steps: int = 1_000_000
+    """environment steps in all, rounded up to whole rollouts"""
+    n_envs: int = 32
+    """environments stepped side by side"""
+    vectorization: Literal["sync", "async", "vector_entry_point"] | None = None
+    """of gymnasium.make_vec; otherwise the id's own vector environment where it has one, else sync"""
+    env_kwargs: tuple[str, ...] = ()
+    """arguments of the environment: key=value ..., or one JSON object"""
+    n_steps: int = 256
+    """steps of each environment in a rollout"""
+    batch_size: int = 2048
+    """steps in one gradient step"""
+    n_epochs: int = 8
+    """passes over a rollout"""
+    learning_rate: float = 1e-3
+    """of Adam, falling linearly to zero"""
+    gamma: float = 0.99
+    """discount per step"""
+    gae_lambda: float = 0.95
+    """of generalised advantage estimation"""
+    clip_range: float = 0.2
+    """of the ratio of probabilities"""
+    ent_coef: float = 0.0
+    """weight of the entropy"""
+    vf_coef: float = 0.5
+    """weight of the value loss"""
+    max_grad_norm: float = 0.5
+    """gradients are scaled down to this norm"""
+    log_std_init: float = -1.5
+    """logarithm of the action noise at the start"""
+    net_arch: tuple[int, ...] = (64, 64)
+    """units of the hidden layers, policy and value each"""
+    out: Path | None = None
+    """folder for model.pt and progress.csv; otherwise nothing is kept"""
+    device: str = "cpu"
+    """torch device; small networks are fastest on the CPU"""
+    torch_threads: int = 1
+    """threads of torch"""
+
+
+@dataclass
+class Learned:
+    """What a training leaves: the agent, and a row per rollout as in progress.csv."""
+
+    agent: Agent
+    progress: list[dict[str, float]] = field(default_factory=list)
+
+
+class Agent(nn.Module):
+    """A policy (normal, its deviation independent of the observation) and a value, two networks."""
+
+    def __init__(self, n_obs: int, n_actions: int, net_arch: tuple[int, ...], log_std_init: float) -> None:
+        super().__init__()
+        self.actor = _network([n_obs, *net_arch, n_actions], last_gain=0.01)
+        self.critic = _network([n_obs, *net_arch, 1], last_gain=1.0)
+        self.log_std = nn.Parameter(torch.full((n_actions,), log_std_init))
+
+    def policy(self, observation: Tensor) -> Normal:
+        """The distribution of actions, shape (..., n_actions)."""
+        return Normal(self.actor(observation), self.log_std.exp())
+
+    def value(self, observation: Tensor) -> Tensor:
+        """Expected discounted return, shape (...)."""
+        value: Tensor = self.critic(observation).squeeze(-1)
+        return value
+
+
+def _network(sizes: list[int], last_gain: float) -> nn.Sequential:
+    layers: list[nn.Module] = []
+    for index, (inputs, outputs) in enumerate(pairwise(sizes)):
+        last = index == len(sizes) - 2
+        layer = nn.Linear(inputs, outputs)
+        nn.init.orthogonal_(layer.weight, last_gain if last else float(np.sqrt(2)))
+        nn.init.zeros_(layer.bias)
+        layers += [layer] if last else [layer, nn.Tanh()]
+    return nn.Sequential(*layers)
+
+
+def estimate_advantages(
+    rewards: Tensor, values: Tensor, terminated: Tensor, truncated: Tensor, gamma: float, gae_lambda: float
+) -> Tensor:
+    """Generalised advantage estimation (Schulman et al. 2016) over time limits, shape (T, n).
+
+    Args:
+        rewards, terminated, truncated: of T steps of n environments, shape (T, n).
+        values: of the observations before each step and after the last, shape (T + 1, n). The
+            observation after a step that ends an episode is that episode's last one.
+        gamma, gae_lambda: discount, and weight of longer estimates.
+    """
+    surprise = rewards + gamma * values[1:] * ~terminated - values[:-1]
+    goes_on = ~(terminated | truncated)
+    advantages = torch.zeros_like(rewards)
+    later = torch.zeros_like(rewards[0])
+    for t in reversed(range(len(rewards))):
+        advantages[t] = later = surprise[t] + gamma * gae_lambda * goes_on[t] * later
+    return advantages
+
+
+def make_envs(args: Args) -> gym.wrappers.vector.RecordEpisodeStatistics:
+    """The vector environment, with episode returns.
+
+    Raises:
+        ParameterError: unknown id or argument, spaces that are not boxes of one dimension, or an environment
+            that restarts in another way than on the next step.
+    """
+    kwargs: dict[str, Any] = parse_pairs("--env-kwargs", args.env_kwargs)
+    try:
+        envs = gym.make_vec(args.env_id, args.n_envs, args.vectorization, **kwargs)
+    except (gym.error.Error, ModuleNotFoundError, TypeError) as error:
+        raise ParameterError(
+            f"environment {args.env_id!r} with {kwargs or 'no arguments'}: {error}"
+        ) from None
+    for space in (envs.single_observation_space, envs.single_action_space):
+        if not isinstance(space, gym.spaces.Box) or len(space.shape) != 1:
+            raise ParameterError(f"environment {args.env_id!r}: expected boxes of one dimension, got {space}")
+    mode = envs.metadata.get("autoreset_mode")
+    if mode is not gym.vector.AutoresetMode.NEXT_STEP:
+        raise ParameterError(f"environment {args.env_id!r}: expected autoreset on the next step, got {mode}")
+    return gym.wrappers.vector.RecordEpisodeStatistics(envs)
+
+
+def learn(args: Args) -> Learned:
+    """Train as `args` say, with a printed line per rollout. The same arguments give the same agent.
+
+    Raises:
+        ParameterError: the arguments or the environment do not fit.
+        OutputError: the folder cannot be written.
+    """
+    for name in ("steps", "n_envs", "n_steps", "n_epochs", "torch_threads"):
+        check_number(name, getattr(args, name), low=1)
+    check_number("batch_size", args.batch_size, low=2)  # advantages are normalised over a batch
+    check_number("seed", args.seed, low=0)
+    if args.out:
+        check_folder(args.out)
+
+    torch.set_num_threads(args.torch_threads)
+    torch.manual_seed(args.seed)
+    shuffle = np.random.default_rng(args.seed)
+    device = torch.device(args.device)
+
+    envs = make_envs(args)
+    box: Any = envs.single_action_space
+    n_obs, n_actions = gym.spaces.flatdim(envs.single_observation_space), gym.spaces.flatdim(box)
+    agent = Agent(n_obs, n_actions, args.net_arch, args.log_std_init).to(device)
+    optimizer = torch.optim.Adam(agent.parameters(), lr=args.learning_rate, eps=1e-5)
+    learned = Learned(agent)
+
+    # One rollout; observations have one row more, for the value after the last step
+    shape = (args.n_steps, args.n_envs)
+    observations = torch.zeros((args.n_steps + 1, args.n_envs, n_obs), device=device)
+    actions = torch.zeros((*shape, n_actions), device=device)
+    log_probs, rewards = torch.zeros(shape, device=device), torch.zeros(shape, device=device)
+    terminated = torch.zeros(shape, dtype=torch.bool, device=device)
+    truncated, restarts = torch.zeros_like(terminated), torch.zeros_like(terminated)
+
+    n_rollouts = -(-args.steps // (args.n_steps * args.n_envs))
+    started = time.monotonic()
+    first, _ = envs.reset(seed=args.seed)
+    observations[-1] = torch.as_tensor(first, device=device)
+    ended = torch.zeros(args.n_envs, dtype=torch.bool, device=device)
+    try:
+        for rollout in range(n_rollouts):
+            optimizer.param_groups[0]["lr"] = args.learning_rate * (1 - rollout / n_rollouts)
+
+            # Play
+            observations[0] = observations[-1]
+            for t in range(args.n_steps):
+                with torch.no_grad():
+                    policy = agent.policy(observations[t])
+                    actions[t] = policy.sample()
+                    log_probs[t] = policy.log_prob(actions[t]).sum(-1)
+                # A sample outside the box is played at its edge, but learnt from as it was drawn
+                played = np.clip(actions[t].cpu().numpy(), box.low, box.high)
+                observation, reward, terminations, truncations, _ = envs.step(played)
+                restarts[t] = ended
+                observations[t + 1] = torch.as_tensor(observation, device=device)
+                rewards[t] = torch.as_tensor(reward, device=device)
+                terminated[t] = torch.as_tensor(terminations, device=device)
+                truncated[t] = torch.as_tensor(truncations, device=device)
+                ended = terminated[t] | truncated[t]
+
+            # Judge
+            with torch.no_grad():
+                values = agent.value(observations)
+                advantages = estimate_advantages(
+                    rewards, values, terminated, truncated, args.gamma, args.gae_lambda
+                )
+            lived = ~restarts
+            batch = {
+                "observation": observations[:-1][lived],
+                "action": actions[lived],
+                "log_prob": log_probs[lived],
+                "advantage": advantages[lived],
+                "target": (advantages + values[:-1])[lived],
+            }
+
+            # Improve
+            for _ in range(args.n_epochs):
+                order = shuffle.permutation(len(batch["target"]))
+                for start in range(0, len(order), args.batch_size):
+                    chosen = torch.as_tensor(order[start : start + args.batch_size], device=device)
+                    if len(chosen) > 1:
+                        loss = _loss(agent, {key: values[chosen] for key, values in batch.items()}, args)
+                        optimizer.zero_grad()
+                        loss.backward()
+                        nn.utils.clip_grad_norm_(agent.parameters(), args.max_grad_norm)
+                        optimizer.step()
+
+            # Report
+            steps, seconds = (rollout + 1) * args.n_steps * args.n_envs, time.monotonic() - started
+            row = {
+                "steps": steps,
+                "seconds": round(seconds, 3),
+                "sps": round(steps / seconds),
+                "episodes": int(envs.episode_count),
+                "episodic_return": float(np.mean(envs.return_queue)) if envs.return_queue else float("nan"),
+            }
+            learned.progress.append(row)
+            print(
+                f"steps {steps:>10,}   SPS {row['sps']:>7,}   episodes {row['episodes']:>6,}   "
+                f"episodic return {row['episodic_return']:.2f}",
+                flush=True,
+            )
+    finally:
+        envs.close()
+    if args.out:
+        torch.save(agent.state_dict(), args.out / "model.pt")
+        with (args.out / "progress.csv").open("w", newline="") as file:
+            writer = csv.DictWriter(file, list(learned.progress[0]))
+            writer.writeheader()
+            writer.writerows(learned.progress)
+    return learned
+
+
+def _loss(agent: Agent, batch: dict[str, Tensor], args: Args) -> Tensor:
+    """Eq. 9 of Schulman et al. 2017, with advantages normalised over the batch."""
+    policy = agent.policy(batch["observation"])
+    ratio = (policy.log_prob(batch["action"]).sum(-1) - batch["log_prob"]).exp()
+    advantage = (batch["advantage"] - batch["advantage"].mean()) / (batch["advantage"].std() + 1e-8)
+    clipped = ratio.clamp(1 - args.clip_range, 1 + args.clip_range)
+    policy_loss = -torch.min(advantage * ratio, advantage * clipped).mean()
+    value_loss = (agent.value(batch["observation"]) - batch["target"]).square().mean()
+    entropy = policy.entropy().sum(-1).mean()
+    loss: Tensor = policy_loss + args.vf_coef * value_loss - args.ent_coef * entropy
+    return loss
+
+
+def main(argv: list[str] | None = None) -> None:
+    import tyro
+
+    learn(tyro.cli(Args, args=argv, prog="python -m agents.ppo_flat", description=__doc__))
+
+
+if __name__ == "__main__":
+    run(main)

@@ -1,0 +1,168 @@
+"""An episode as a film: MP4 (H.264, which every browser plays) or GIF."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoof_env._output import staged
+from hoof_env.envs.render_instant import Columns, Instant, instants
+from hoof_env.errors import HoofEnvError, ParameterError, check_number
+
+if TYPE_CHECKING:
+    from hoof_env.envs.rendering import Renderer
+
+FFMPEG: dict[str, dict[str, Any]] = {
+    ".mp4": {
+        "codec": "libx264",
+        "pix_fmt_out": "yuv420p",
+        "output_params": [
+            "-vf", "crop=trunc(iw/2)*2:trunc(ih/2)*2",  # what H.264 can have
+            "-crf", "22", "-preset", "medium", "-movflags", "+faststart",
+        ],
+    },
+    ".gif": {  # one palette for the whole film, so that colours do not flicker; it takes all frames at once
+        "codec": "gif",
+        "pix_fmt_out": "pal8",
+        "output_params": [
+            "-vf", "split[a][b];[a]palettegen[p];[b][p]paletteuse=dither=none:diff_mode=rectangle",
+            "-loop", "0",
+        ],
+    },
+}  # fmt: skip
+"""How ffmpeg writes each kind of film."""
+
+
+def check_film(path: Path, fps: float) -> None:
+    """Raise unless a film of this kind and pace can be written here.
+
+    Raises:
+        ParameterError: a GIF whose frames are not whole hundredths of a second apart.
+        HoofEnvError: a package is missing.
+    """
+    from importlib.util import find_spec
+
+    for name, package, extra in (
+        ("pygame", "pygame-ce", "render"),
+        ("imageio_ffmpeg", "imageio-ffmpeg", "video"),
+    ):
+        if find_spec(name) is None:
+            raise HoofEnvError(f'films need {package}: pip install "hoof-env[{extra}]"')
+    hundredths = 100 / fps  # in which a GIF counts; browsers slow down what has less than two
+    if path.suffix.lower() == ".gif" and (hundredths < 2 or abs(hundredths - round(hundredths)) > 1e-6):
+        raise ParameterError(f"fps: expected 50, 25, 20, 10 ... of a GIF, got {fps:g}")
+
+
+def frames(
+    renderer: Renderer, episode: Iterable[Columns], fps: float, slow: float = 1.0
+) -> Iterator[NDArray[np.uint8]]:
+    """Pictures of an episode, 1 / (fps slow) of its seconds apart, each at the last substep before its time.
+
+    Args:
+        renderer: in mode "rgb_array"; it is reset.
+        episode: columns in the order of time, as `records.episode` yields them.
+        fps: frames a second of the film.
+        slow: how many times slower than life it plays.
+    """
+    renderer.reset()
+    step = 1 / (fps * slow)
+    shown = 0
+    news: list[Instant] = []
+    for columns in episode:
+        for now in instants(columns):
+            news.append(now)
+            if now.time >= shown * step - 1e-9:
+                renderer.add(news)
+                news = []
+                frame = renderer.frame()
+                assert frame is not None
+                while now.time >= shown * step - 1e-9:  # substeps longer than a frame repeat it
+                    shown += 1
+                    yield frame
+
+
+def write_film(pictures: Iterable[NDArray[np.uint8]], path: Path, fps: float) -> int:
+    """Write pictures of one size to `path` and return how many; an older file is replaced when this is whole.
+
+    Args:
+        pictures: arrays of shape (height, width, 3).
+        path: ends in .mp4 or .gif.
+        fps: frames a second.
+
+    Raises:
+        ParameterError, HoofEnvError: as `check_film`. OutputError: the folder cannot be written.
+    """
+    check_film(path, check_number("fps", fps, low=0, high=1000, exclusive_low=True))
+    with staged(path.parent) as stage:
+        writer: Any = None
+        count = 0
+        try:
+            for picture in pictures:
+                if writer is None:
+                    writer = _writer(stage / path.name, picture.shape, fps)
+                writer.send(np.ascontiguousarray(picture))
+                count += 1
+        finally:
+            if writer is not None:
+                writer.close()
+    return count
+
+
+def _writer(path: Path, shape: tuple[int, ...], fps: float) -> Any:
+    """A generator that takes frames."""
+    import imageio_ffmpeg
+
+    options: dict[str, Any] = FFMPEG[path.suffix.lower()]
+    writer = imageio_ffmpeg.write_frames(
+        str(path), shape[1::-1], fps=fps, macro_block_size=1, ffmpeg_log_level="error", **options
+    )
+    writer.send(None)
+    return writer
+
+
+def render_episode(
+    path: Path,
+    policy: str,
+    env_id: str,
+    arguments: Sequence[str] = (),
+    seed: int = 0,
+    seconds: float = 8.0,
+    slow: float = 1.0,
+    fps: float = 50.0,
+    size: tuple[int, int] = (960, 540),
+) -> int:
+    """Film an episode; returns the number of frames. What `hoof-env render` does.
+
+    Raises:
+        ParameterError, DataFileError: as `records.make_env` and `records.find_policy`, or a value is out of
+            range. OutputError, HoofEnvError: as `write_film`, and before the episode is played.
+    """
+    from hoof_env import records
+    from hoof_env.envs.rendering import new_renderer
+
+    records.check_place(path, FFMPEG)
+    check_film(path, check_number("fps", fps, low=0, high=1000, exclusive_low=True))
+    check_number("slow", slow, low=1e-3, high=1e3)
+    check_number("seed", seed, low=0)
+    with records.make_env(env_id, records.parse_arguments("--args", arguments)) as env:
+        found = records.find_policy(policy, env, env_id, seed)
+        renderer = new_renderer(records.setting(env), fps, size)
+        pictures = frames(renderer, records.episode(env, found, seed, seconds), fps, slow)
+        count = write_film(_with_progress(pictures, seconds * slow * fps + 1), path, fps)
+    return count
+
+
+def _with_progress(pictures: Iterable[NDArray[np.uint8]], expected: float) -> Iterable[NDArray[np.uint8]]:
+    """The same, with a bar where there is a terminal and tqdm."""
+    try:
+        from tqdm import tqdm
+    except ImportError:
+        return pictures
+    bar: Iterable[NDArray[np.uint8]] = tqdm(
+        pictures, total=round(expected), unit=" frames", leave=False, disable=None
+    )
+    return bar

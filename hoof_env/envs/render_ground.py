@@ -1,0 +1,250 @@
+"""The ground: its heights, its kinds by colour, and the footprint of the hoof."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+import pygame
+from numpy.typing import NDArray
+
+from hoof_env.envs.render_instant import Instant
+from hoof_env.envs.render_paint import PAPER, Brush, Colour, mix
+from hoof_env.ground.terrain import Terrain
+
+SOIL, SOIL_LINE = (214, 200, 174), (112, 95, 66)
+STIFFER, SOFTER = (150, 152, 158), (238, 226, 170)
+SLIPPERY, ROUGHER = (86, 180, 233), (90, 50, 20)
+"""Body of the soil where it is stiffer or softer; its skin where it is more slippery or rougher."""
+
+STRONG = 4.0
+"""A factor of stiffness or friction of this, or its inverse, has the full colour [-]."""
+
+ALIKE = 0.02
+"""Relative difference of a factor from 1 below which the ground counts as usual [-]."""
+
+FLANK_M = 0.09
+"""How far from the hoof the ground is drawn down by the footprint; the model has no width [m]."""
+
+
+PRESSED = ((0.5, 0.12), (0.33, 0.24), (0.17, 0.36))
+"""How far below the footprint the soil is darker, in parts of its depth, and how much."""
+
+
+COLUMN = 6
+"""Distance of the places where the surface is drawn [pixels of the usual picture]."""
+
+MOST_EDGES = 60
+"""Up to so many changes of kind in the picture are drawn where they are; more are drawn to the next place."""
+
+LABEL = 90
+"""Least width of a patch that is labelled [pixels of the usual picture]."""
+
+Point = tuple[float, float]
+
+
+class Patch(NamedTuple):
+    """A stretch of ground of one kind: from and to [m], factors of stiffness and friction [-]."""
+
+    start: float
+    end: float
+    stiffness: float
+    friction: float
+
+
+class GroundPainter:
+    """Draws a terrain.
+
+    Args:
+        brush: the paint box.
+        terrain: what to draw.
+        size: of the picture [pixels].
+        scale: pixels per metre.
+        clear: width on the left where labels go [pixels].
+    """
+
+    def __init__(
+        self, brush: Brush, terrain: Terrain, size: tuple[int, int], scale: float, clear: float
+    ) -> None:
+        self._brush, self._size, self._scale, self._clear = brush, size, scale, clear
+        self._knots, self._heights = terrain.x, np.array(terrain.height)
+        self._stiffness, self._friction = np.array(terrain.stiffness), np.array(terrain.friction)
+        self._level = bool(np.ptp(self._heights) == 0)
+        self._labelled = [p for p in find_patches(terrain) if p.end - p.start > LABEL * brush.unit / scale]
+        self._edges = edges(terrain)
+        self._grid = COLUMN * brush.unit / scale
+
+    def height(self, x: Any) -> Any:
+        """Height of the undisturbed ground [m]."""
+        return np.interp(x, self._knots, self._heights)
+
+    def kinds(self) -> list[tuple[str, Colour]]:
+        """Name and colour of every kind of ground in the terrain but the usual."""
+        stiffness, friction = self._stiffness, self._friction
+        all_kinds = (
+            ("stiffer ground", STIFFER, stiffness.max() > 1 + ALIKE),
+            ("softer ground", SOFTER, stiffness.min() < 1 - ALIKE),
+            ("more slippery", SLIPPERY, friction.min() < 1 - ALIKE),
+            ("less slippery", ROUGHER, friction.max() > 1 + ALIKE),
+        )
+        return [(name, colour) for name, colour, there in all_kinds if there]
+
+    def draw(self, canvas: Any, now: Instant, corner: complex) -> None:
+        """Draw the ground.
+
+        Args:
+            canvas: the picture.
+            now: where the hoof is and what it bears.
+            corner: place in the world of the picture's left edge at pixel row 0 [m].
+        """
+        x = self._places(now, corner.real)
+        free = (corner.imag - self.height(x)) * self._scale
+        if self._level:
+            free = np.round(free)  # a sharp line
+        surface = free
+        if max(now.toe_depth, now.heel_depth) > 0:
+            surface = free + footprint(now, x) * self._scale
+        columns = (x - corner.real) * self._scale
+        line = list(zip(columns.tolist(), surface.tolist(), strict=True))
+        middle = (x[1:] + x[:-1]) / 2
+        for part, colour in self._runs(line, middle, self._stiffness, BODY):
+            bottom = self._size[1] + 1
+            pygame.draw.polygon(canvas, colour, [(part[0][0], bottom), *part, (part[-1][0], bottom)])
+        if surface is not free and now.normal > 0:
+            self._press(canvas, columns, free, surface)
+        deep = 8 * self._brush.unit
+        for part, colour in self._runs(line, middle, self._friction, SKIN):
+            pygame.draw.polygon(canvas, colour, [*part, *((a, b + deep) for a, b in reversed(part))])
+        for shift in range(max(1, round(2 * self._brush.unit))):
+            pygame.draw.aalines(canvas, SOIL_LINE, False, [(a, b + shift) for a, b in line])
+        self._draw_ticks(canvas, corner)
+        self._draw_labels(canvas, corner)
+
+    def _places(self, now: Instant, left: float) -> NDArray[np.float64]:
+        """Where the surface is drawn [m]: at places fixed to the ground, so that it does not shimmer."""
+        right = left + self._size[0] / self._scale
+        grid = self._grid
+        x = [np.arange(np.floor(left / grid), np.ceil(right / grid) + 1) * grid]
+        first, last = np.searchsorted(self._edges, (left, right))
+        if last - first <= MOST_EDGES:
+            x.append(self._edges[first:last])
+        if max(now.toe_depth, now.heel_depth) > 0:
+            near, far = sorted((now.toe_x, now.heel_x))
+            x.append(np.arange(near - 3 * FLANK_M, min(far, near + 1) + 3 * FLANK_M, 2 / self._scale))
+        return np.unique(np.concatenate(x))
+
+    def _runs(
+        self, line: list[Point], middle: Any, factors: Any, colours: tuple[Colour | None, ...]
+    ) -> Iterator[tuple[list[Point], Colour]]:
+        """Stretches of the surface line of one colour, by the factor in the middle of each piece of it."""
+        if len(factors) == 1:
+            shades = np.full(len(middle), shade(factors[0]))
+        else:
+            shades = shade(np.interp(middle, self._knots, factors))
+        changes = [0, *(np.flatnonzero(np.diff(shades)) + 1).tolist(), len(shades)]
+        for start, end in pairwise(changes):
+            colour = colours[int(shades[start])]
+            if colour is not None:
+                yield line[start : end + 1], colour
+
+    def _press(self, canvas: Any, columns: Any, free: Any, surface: Any) -> None:
+        """Darken the soil under the footprint, in bands that fade with depth."""
+        dent = surface - free
+        pressed = np.flatnonzero(dent > 0.5)
+        if len(pressed):
+            part = slice(max(pressed[0] - 1, 0), pressed[-1] + 2)
+            x, top, deep = columns[part].tolist(), surface[part], dent[part]
+            above = list(zip(x, top.tolist(), strict=True))
+            for reach, shade in PRESSED:
+                below = list(zip(x, (top + reach * deep).tolist(), strict=True))
+                pygame.draw.polygon(canvas, mix(SOIL, SOIL_LINE, shade), [*above, *below[::-1]])
+
+    def _draw_ticks(self, canvas: Any, corner: complex) -> None:
+        unit, scale = self._brush.unit, self._scale
+        thick = max(1, round(2 * unit))
+        first, last = corner.real, corner.real + self._size[0] / scale
+        halves = np.arange(np.floor(2 * first), np.ceil(2 * last) + 1)
+        tops = (corner.imag - self.height(halves / 2)) * scale
+        for half, top in zip(halves.astype(int).tolist(), tops.tolist(), strict=True):
+            at, top = (half / 2 - first) * scale, round(top)
+            metre = half % 2 == 0
+            length = round((10 if metre else 6) * unit)
+            canvas.fill(SOIL_LINE, (round(at - thick / 2), top, thick if metre else 1, length))
+            if metre:
+                self._brush.write(canvas, f"{half // 2} m", (at, top + 13 * unit), 17, SOIL_LINE, "midtop")
+
+    def _draw_labels(self, canvas: Any, corner: complex) -> None:
+        """Name the factors of every patch that is wide enough."""
+        unit, left = self._brush.unit, corner.real
+        right = left + self._clear / self._scale
+        for patch in self._labelled:
+            start, end = max(patch.start, left), min(patch.end, right)
+            if (end - start) * self._scale < LABEL * unit:
+                continue
+            middle = (start + end) / 2
+            x = (middle - left) * self._scale
+            y = (corner.imag - float(self.height(middle))) * self._scale + 36 * unit
+            factors = [("stiffness", patch.stiffness), ("friction", patch.friction)]
+            words = [f"{name} × {factor:.2g}" for name, factor in factors if abs(factor - 1) > ALIKE]
+            for k, text in enumerate(words):
+                self._brush.write(canvas, text, (x, y + 15 * k * unit), 16, SOIL_LINE, "midtop")
+
+
+def footprint(now: Instant, x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How far the ground at `x` is pressed down [m]: as deep as the sole, running out on both sides.
+
+    The contact knows two points without width; the flanks are there for the eye alone.
+    """
+    (a, deep_a), (b, deep_b) = sorted(((now.toe_x, now.toe_depth), (now.heel_x, now.heel_depth)))
+    inside = np.interp(x, [a, max(b, a + 1e-9)], [deep_a, deep_b])
+    outside = np.maximum(a - x, x - b)
+    fall = np.exp(-np.square(np.maximum(outside, 0.0) / FLANK_M))
+    return np.maximum(inside, 0.0) * np.where(outside > 0, fall, 1.0)
+
+
+def find_patches(terrain: Terrain) -> list[Patch]:
+    """Stretches of one kind, all but the usual; a change over one spacing counts half to either side."""
+    factors = np.array([terrain.stiffness, terrain.friction])
+    changes = [0, *_changes(terrain).tolist(), factors.shape[1]]
+    patches = []
+    for first, end in pairwise(changes):
+        stiffness, friction = factors[:, (first + end) // 2].tolist()
+        if max(abs(stiffness - 1), abs(friction - 1)) > ALIKE:
+            left = -np.inf if first == 0 else terrain.start + (first - 0.5) * terrain.spacing
+            right = np.inf if end == factors.shape[1] else terrain.start + (end - 0.5) * terrain.spacing
+            patches.append(Patch(left, right, stiffness, friction))
+    return patches
+
+
+def edges(terrain: Terrain) -> NDArray[np.float64]:
+    """Where the kind of ground changes [m], in order."""
+    return (terrain.start + (_changes(terrain) - 0.5) * terrain.spacing).astype(np.float64)
+
+
+def _changes(terrain: Terrain) -> NDArray[np.int64]:
+    """Knots that differ in kind from the one before."""
+    kinds = np.round(np.array([terrain.stiffness, terrain.friction]) / ALIKE)
+    return np.flatnonzero((np.diff(kinds, axis=1) != 0).any(axis=0)) + 1
+
+
+def shade(factor: Any) -> Any:
+    """Index of the colour for a factor of stiffness or friction: `SHADES` where it is 1."""
+    strength = np.log(np.maximum(factor, 1e-3)) / np.log(STRONG)
+    usual = np.abs(np.asarray(factor) - 1) <= ALIKE
+    steps = np.sign(strength) * np.maximum(np.ceil(np.minimum(np.abs(strength), 1) * SHADES - 1e-9), 1)
+    return np.where(usual, 0, steps).astype(int) + SHADES
+
+
+SHADES = 5
+"""Shades of a colour between the usual and the full one."""
+
+BODY: tuple[Colour | None, ...] = tuple(
+    mix(SOIL, SOFTER if k < 0 else STIFFER, abs(k) / SHADES) for k in range(-SHADES, SHADES + 1)
+)
+SKIN: tuple[Colour | None, ...] = tuple(
+    mix(PAPER, SLIPPERY if k < 0 else ROUGHER, 0.35 + 0.65 * abs(k) / SHADES) if k else None
+    for k in range(-SHADES, SHADES + 1)
+)
+"""Colours by `shade`: of the soil for stiffness, of its surface for friction."""

@@ -1,0 +1,218 @@
+"""What a picture, or a record of forces, needs of one instant, whichever engine simulated it.
+
+Two functions give columns by name, one from rows of `dynamics.trace.TRACE` and one from what `TrunkEngine`
+says; `instants` turns columns into records for the renderer. Nothing behind this boundary knows an engine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hoof_env.gait.parameters import PARAMETERS
+from hoof_env.ground.terrain import Terrain
+
+Columns = dict[str, NDArray[np.float64]]
+"""Arrays of shape (n,) by the names of `Instant`'s fields, for n instants in the order of time."""
+
+
+class Instant(NamedTuple):
+    """One instant of one leg, in the world: x forward, y up, angles counter-clockwise; SI units and radians.
+
+    `trunk_x`, `trunk_y` are the place of the crank centre O and `trunk_vx`, `trunk_vy` its velocity; `pitch`
+    turns the trunk. `crank_angle` and `swing_angle` are the leg's theta and phi, in its own sense. A normal
+    and a friction force act along the ground's normal and tangent on a hoof point, and together they are
+    (force_x, force_y); depth is penetration, negative in the air. The hoof's own (force_x, force_y) is the
+    sum; its point of application, the centre of pressure (cop_x, cop_y), is where the moment of both forces
+    is zero, and it is 0, 0 without load, as force plates report it. What an engine does not say is NaN.
+    """
+
+    time: float
+    trunk_x: float
+    trunk_y: float
+    trunk_vx: float
+    trunk_vy: float
+    pitch: float
+    crank_angle: float
+    crank_speed: float
+    swing_angle: float
+    swing_offset: float
+    swing_sin: float
+    swing_cos: float
+    command_crank_speed: float
+    command_swing_offset: float
+    command_swing_sin: float
+    command_swing_cos: float
+    toe_x: float
+    toe_y: float
+    toe_depth: float
+    toe_normal: float
+    toe_friction: float
+    toe_force_x: float
+    toe_force_y: float
+    heel_x: float
+    heel_y: float
+    heel_depth: float
+    heel_normal: float
+    heel_friction: float
+    heel_force_x: float
+    heel_force_y: float
+    force_x: float
+    force_y: float
+    cop_x: float
+    cop_y: float
+
+    @property
+    def normal(self) -> float:
+        """Normal force on the hoof [N]."""
+        return self.toe_normal + self.heel_normal
+
+    @property
+    def grf(self) -> float:
+        """Size of the ground reaction force [N]."""
+        return float((self.force_x**2 + self.force_y**2) ** 0.5)
+
+
+POINTS = ("toe", "heel")
+
+UNITS = {
+    "time": "s", "trunk_x": "m", "trunk_y": "m", "trunk_vx": "m/s", "trunk_vy": "m/s", "pitch": "rad",
+    "crank_angle": "rad", "crank_speed": "rad/s", "swing_angle": "rad",
+    **{f"{part}{name}": "rad/s" if name == "crank_speed" else "rad"
+       for part in ("", "command_") for name in PARAMETERS},
+    **{f"{point}_{name}": unit for point in POINTS for name, unit in (
+        ("x", "m"), ("y", "m"), ("depth", "m"), ("normal", "N"), ("friction", "N"),
+        ("force_x", "N"), ("force_y", "N"))},
+    "force_x": "N", "force_y": "N", "cop_x": "m", "cop_y": "m",
+}  # fmt: skip
+"""Unit of each field of `Instant`."""
+
+
+def instants(columns: Mapping[str, NDArray[np.float64]]) -> list[Instant]:
+    """Records of the rows of `columns`."""
+    return list(map(Instant._make, zip(*(columns[name].tolist() for name in Instant._fields), strict=True)))
+
+
+def columns_of_trace(
+    trace: NDArray[np.void], command: ArrayLike | None = None, gait: ArrayLike | None = None
+) -> Columns:
+    """Columns from rows of dtype `TRACE`: level ground at height 0 and a trunk that does not pitch.
+
+    Args:
+        trace: shape (n,).
+        command: gait parameters commanded during these rows, shape (4,); None if not known.
+        gait: the filters' values at the last row, shape (4,); None if not known.
+    """
+    n = len(trace)
+    unknown = np.full(4, np.nan)
+    wanted, now = (unknown if given is None else np.asarray(given, float) for given in (command, gait))
+    columns = {
+        "time": trace["t"].copy(),
+        **{name: trace[name].copy() for name in ("trunk_x", "trunk_y", "trunk_vx", "trunk_vy")},
+        "pitch": np.zeros(n),
+        **dict(zip(PARAMETERS, np.repeat(now, n).reshape(4, n), strict=True)),
+        **{
+            f"command_{name}": row
+            for name, row in zip(PARAMETERS, np.repeat(wanted, n).reshape(4, n), strict=True)
+        },
+        "crank_angle": trace["theta"].copy(),
+        "crank_speed": trace["theta_rate"].copy(),
+        "swing_angle": trace["phi"].copy(),
+    }
+    for point in POINTS:
+        depth, normal, friction = (
+            trace[f"{point}_{name}"].copy() for name in ("penetration", "normal", "friction")
+        )
+        columns |= {
+            f"{point}_x": trace[f"{point}_x"].copy(), f"{point}_y": -depth, f"{point}_depth": depth,
+            f"{point}_normal": normal, f"{point}_friction": friction,
+            f"{point}_force_x": friction, f"{point}_force_y": normal,
+        }  # fmt: skip
+    return columns | _together(columns)
+
+
+def columns_of_engine(
+    record: Mapping[str, NDArray[Any]],
+    terrain: Terrain | None = None,
+    *,
+    hip: Sequence[float] = (0.0, 0.0),
+    command: ArrayLike | None = None,
+    leg: int = 0,
+    env: int = 0,
+) -> Columns:
+    """Columns from what `TrunkEngine` says of one leg of one environment.
+
+    Args:
+        record: `engine.state | engine.report`, for one instant, or what `engine.run` returns.
+        terrain: what the engine stands on; level if None.
+        hip: where O sits on the trunk, `Limb.hip` [m].
+        command: gait parameters commanded, shape (4,); None if not known.
+        leg, env: which.
+    """
+    ground = Terrain.flat() if terrain is None else terrain
+    of_trunk = {name: np.atleast_1d(record[name][..., env]).astype(float) for name in _TRUNK}
+    of_leg = {name: np.atleast_1d(record[name][..., leg, env]).astype(float) for name in _LEG}
+    n = len(of_trunk["time"])
+    arm = complex(*hip) * np.exp(1j * of_trunk["pitch"])
+    place = of_trunk["x"] + 1j * of_trunk["y"] + arm
+    velocity = of_trunk["vx"] + 1j * of_trunk["vy"] + 1j * of_trunk["pitch_rate"] * arm
+    wanted = np.full(4, np.nan) if command is None else np.asarray(command, float)
+    columns = {
+        "time": of_trunk["time"],
+        "trunk_x": place.real, "trunk_y": place.imag, "trunk_vx": velocity.real, "trunk_vy": velocity.imag,
+        "pitch": of_trunk["pitch"],
+        "crank_angle": of_leg["theta"], "crank_speed": of_leg["theta_rate"], "swing_angle": of_leg["phi"],
+        **{name: of_leg[name] for name in PARAMETERS[1:]},
+        **{f"command_{name}": np.full(n, value)
+           for name, value in zip(PARAMETERS, wanted.tolist(), strict=True)},
+    }  # fmt: skip
+    for point in POINTS:
+        x, y, normal, friction = (of_leg[f"{point}_{name}"] for name in ("x", "y", "normal", "friction"))
+        height, across = ground_at(ground, x)
+        force = (normal - 1j * friction) * across  # the tangent is the normal turned clockwise
+        columns |= {
+            f"{point}_x": x, f"{point}_y": y, f"{point}_depth": (height - y) * across.imag,
+            f"{point}_normal": normal, f"{point}_friction": friction,
+            f"{point}_force_x": force.real, f"{point}_force_y": force.imag,
+        }  # fmt: skip
+    return columns | _together(columns)
+
+
+_TRUNK = ("time", "x", "y", "vx", "vy", "pitch", "pitch_rate")
+_LEG = (
+    "theta", "theta_rate", "phi", *PARAMETERS[1:],
+    *(f"{point}_{name}" for point in POINTS for name in ("x", "y", "normal", "friction")),
+)  # fmt: skip
+
+
+def ground_at(terrain: Terrain, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
+    """Height [m] of the ground at `x` [m] and its unit normal as a complex number, of the piece that a point
+    there meets."""
+    place = (x - terrain.start) / terrain.spacing
+    last, heights = len(terrain.height) - 1, terrain.height
+    before = np.clip(np.floor(place), -1, last)  # the knot before x; -1 and the last lead to level ground
+    knots = [(max(k, 0), min(k + 1, last)) for k in before.astype(int).tolist()]
+    ends = np.array([(heights[i], heights[j]) for i, j in knots]).reshape(-1, 2)
+    rise = ends[:, 1] - ends[:, 0]
+    normal = (terrain.spacing * 1j - rise) / np.hypot(terrain.spacing, rise)
+    return ends[:, 0] + np.where(rise != 0, (place - before) * rise, 0.0), normal
+
+
+@np.errstate(invalid="ignore", over="ignore")  # what is not finite is left out later
+def _together(columns: Columns) -> Columns:
+    """Force on the hoof and its centre of pressure: the point nearest to the mean of both hoof points,
+    weighted by their normal forces, about which the two forces have no moment."""
+    at = [columns[f"{point}_x"] + 1j * columns[f"{point}_y"] for point in POINTS]
+    forces = [columns[f"{point}_force_x"] + 1j * columns[f"{point}_force_y"] for point in POINTS]
+    normals = [columns[f"{point}_normal"] for point in POINTS]
+    force, normal = forces[0] + forces[1], normals[0] + normals[1]
+    loaded = (normal > 0) & (np.abs(force) > 0)
+    load, size = np.where(loaded, normal, 1.0), np.where(loaded, np.abs(force), 1.0)
+    mean = (normals[0] * at[0] + normals[1] * at[1]) / load
+    moment = sum((np.conj(z - mean) * f).imag for z, f in zip(at, forces, strict=True))
+    # a force F moved by d turns with Im(conj(d) F); d = -i moment F / |F|^2 has exactly `moment`
+    cop = np.where(loaded, mean - 1j * moment * force / size**2, 0.0)
+    return {"force_x": force.real, "force_y": force.imag, "cop_x": cop.real, "cop_y": cop.imag}

@@ -1,0 +1,226 @@
+"""Drive a leg by keyboard: `hoof-env play`.
+
+`Game` is the whole of it without a window: it takes names of keys and advances an environment. `play` feeds
+it from pygame's event loop and shows what the renderer draws, with the keys and the score below.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Collection, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoof_env import records
+from hoof_env.envs.render_instant import Instant, instants
+from hoof_env.errors import HoofEnvError, check_number
+from hoof_env.gait.parameters import GaitParameters
+
+HELD = {
+    "up": (0, 1), "down": (0, -1), "right": (1, 1), "left": (1, -1),
+    "w": (2, 1), "s": (2, -1), "d": (3, 1), "a": (3, -1),
+}  # fmt: skip
+"""What a key does while it is held: which entry of the action it moves, and which way."""
+
+RATE = 0.8
+"""How fast a held key moves its entry of the action [1/s]; the whole range is 2."""
+
+HELP = (
+    (("up, down", "crank faster, slower"), ("left, right", "swing offset"), ("w, s", "swing sine")),
+    (("a, d", "swing cosine"), ("1, 2 ...", "{gaits}"), ("0", "stop the crank")),
+    (("space", "pause"), ("r", "start again"), ("q, esc", "quit")),
+)
+"""Three columns of keys and what they do, as the window says."""
+
+
+class Game:
+    """An environment driven by keys.
+
+    Args:
+        env: an environment of this package.
+        seed: of the first episode; each further one takes the next.
+
+    Attributes:
+        action: what is commanded, shape (4,), in [-1, 1].
+        news: what happened since the last tick or restart.
+        score: sum of the rewards of the episode.
+        paused, ended, quit: whether it waits, the episode is over, or the player has left.
+        why: how the episode ended, for people.
+    """
+
+    def __init__(self, env: Any, seed: int = 0) -> None:
+        self._env, self._seed = env, seed
+        self._leg: Any = env.unwrapped
+        self.dt = records.setting(env).dt
+        self.gaits: list[str] = sorted(self._leg.gaits)
+        self.paused = self.quit = False
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin a new episode with the gait that it starts in."""
+        _, info = self._env.reset(seed=self._seed)
+        self._seed += 1
+        gait = info.get("gait")
+        self.action: NDArray[np.float32] = np.zeros(4, np.float32)
+        if gait:
+            self.action = self._leg.action_for(GaitParameters(**gait))
+        self.news: list[Instant] = instants(records.substeps(self._env, self._command()))
+        self.score = 0.0
+        self.distance_from = self.news[0].trunk_x
+        self.ended, self.why = False, ""
+        self.begun = True
+
+    def press(self, key: str) -> None:
+        """A key went down; one that means nothing is ignored."""
+        if key in ("q", "escape"):
+            self.quit = True
+        elif key == "r":
+            self.restart()
+        elif key == "space":
+            self.paused = not self.paused
+        elif key == "0":
+            self.action[0] = -1.0
+        elif key.isdecimal() and 0 < int(key) <= len(self.gaits):
+            self.action = self._leg.action_for(self._leg.gaits[self.gaits[int(key) - 1]])
+
+    def tick(self, held: Collection[str] = ()) -> None:
+        """One control step with these keys held down; nothing moves while the game is paused or over."""
+        self.news = []
+        if self.paused or self.ended:
+            return
+        for key in held:
+            if key in HELD:
+                entry, way = HELD[key]
+                self.action[entry] = np.clip(self.action[entry] + way * RATE * self.dt, -1.0, 1.0)
+        _, reward, failed, truncated, info = self._env.step(self.action.copy())
+        self.score += float(reward)
+        self.news = instants(records.substeps(self._env, self._command()))
+        self.ended = failed or truncated
+        if self.ended:
+            self.why = str(info.get("failure", "time is up"))
+
+    @property
+    def status(self) -> str:
+        """What the game is doing, for people; empty while it runs."""
+        if self.ended:
+            return f"over: {self.why}; r starts again"
+        return "paused; space goes on" if self.paused else ""
+
+    def _command(self) -> NDArray[np.float64]:
+        command: NDArray[np.float64] = self._leg.command_of(self.action)
+        return command
+
+
+STRIP = 96
+"""Height of the strip with keys and score below a picture of 540 pixels [pixels]."""
+
+
+def play(
+    env_id: str,
+    arguments: Sequence[str] = (),
+    seed: int = 0,
+    slow: float = 1.0,
+    size: tuple[int, int] = (960, 540),
+    most_ticks: int | None = None,
+) -> Game:
+    """Open a window and let a person play; returns the game when it is left.
+
+    Args:
+        env_id, arguments: the environment, its arguments as `records.parse_arguments` reads them.
+        seed: of the first episode.
+        slow: how many times slower than life it runs.
+        size: of the picture [pixels].
+        most_ticks: leave after so many control steps; None lets the person decide.
+
+    Raises:
+        ParameterError: as `records.make_env`, or a value out of range.
+        HoofEnvError: no pygame, or no display.
+    """
+    check_number("slow", slow, low=0.1, high=100)
+    check_number("seed", seed, low=0)
+    try:
+        import pygame
+    except ImportError:
+        raise HoofEnvError('playing needs pygame-ce: pip install "hoof-env[render]"') from None
+    from hoof_env.envs.rendering import new_renderer
+
+    with records.make_env(env_id, records.parse_arguments("--args", arguments)) as env:
+        game = Game(env, seed)
+        renderer = new_renderer(records.setting(env), 1 / game.dt, size)
+        window = _open_window(pygame, (size[0], size[1] + _strip(size)), env_id)
+        try:
+            clock = pygame.time.Clock()
+            ticks = 0
+            while not game.quit and (most_ticks is None or ticks < most_ticks):
+                for event in pygame.event.get():
+                    if event.type == pygame.QUIT:
+                        game.quit = True
+                    elif event.type == pygame.KEYDOWN:
+                        game.press(pygame.key.name(event.key))
+                if game.begun:  # an episode began
+                    renderer.reset()
+                    game.begun = False
+                    renderer.add(game.news)
+                down = pygame.key.get_pressed()
+                game.tick([name for name in HELD if down[pygame.key.key_code(name)]])
+                renderer.add(game.news)
+                window.blit(renderer.draw(), (0, 0))
+                _draw_strip(window, renderer, game, size)
+                pygame.display.flip()
+                clock.tick(1 / (game.dt * slow))
+                ticks += 1
+        finally:
+            renderer.close()
+            pygame.display.quit()
+    return game
+
+
+def _strip(size: tuple[int, int]) -> int:
+    return round(STRIP * min(size[0] / 960, size[1] / 540))
+
+
+def _open_window(pygame: Any, size: tuple[int, int], title: str) -> Any:
+    """A window, or one error: SDL falls back to a driver that shows nothing where there is no display."""
+    try:
+        pygame.display.init()
+        driver = pygame.display.get_driver()
+        if driver in ("dummy", "offscreen") and os.environ.get("SDL_VIDEODRIVER") != driver:
+            pygame.display.quit()
+            raise pygame.error("there is no display")
+        window = pygame.display.set_mode(size)
+    except pygame.error as error:
+        raise HoofEnvError(
+            f"playing needs a display, and none can be opened ({error}); `hoof-env render` films without one"
+        ) from None
+    pygame.display.set_caption(f"hoof-env play: {title}")
+    return window
+
+
+def _draw_strip(window: Any, renderer: Any, game: Game, size: tuple[int, int]) -> None:
+    """Score, state and keys, below the picture."""
+    from hoof_env.envs.render_paint import CRANK, FORCE, GREY, INK, PAPER
+
+    brush = renderer.brush
+    unit, top = brush.unit, size[1]
+    window.fill(PAPER, (0, top, size[0], _strip(size)))
+    rows = [top + y * unit for y in (20, 48, 76)]
+    ahead = renderer.latest.trunk_x - game.distance_from
+    for y, (text, colour) in zip(
+        rows,
+        (
+            (f"score {game.score + 0.0:.2f}", INK),
+            (f"way {ahead + 0.0:.2f} m", CRANK),
+            (f"peak {renderer.stances.running_peak / 1000:.2f} kN", FORCE),
+        ),
+        strict=True,
+    ):
+        brush.write(window, text, (16 * unit, y), 25, colour)
+    for column, left, width in zip(HELP, (190, 460, 760), (90, 66, 60), strict=True):
+        for y, (keys, what) in zip(rows, column, strict=True):
+            words = what.format(gaits=", ".join(game.gaits))
+            brush.write(window, keys, (left * unit, y), 20, INK)
+            brush.write(window, words, ((left + width) * unit, y), 20, GREY)
+    if game.status:
+        brush.write(window, game.status, (size[0] / 2, top - 20 * unit), 26, FORCE, "center")

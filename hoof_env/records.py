@@ -1,0 +1,279 @@
+"""Episodes of any policy on any environment of the package, substep by substep: for files and for pictures.
+
+`setting` and `substeps` are all that is read from behind an environment; the rest is written against them.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+import hoof_env
+from hoof_env._output import check_folder
+from hoof_env.envs.policies import Scripted, make_policy, policy_names
+from hoof_env.envs.render_instant import UNITS, Columns, columns_of_trace
+from hoof_env.errors import DataFileError, OutputError, ParameterError, check_number
+from hoof_env.gait.parameters import PARAMETERS, GaitParameters
+from hoof_env.ground.terrain import Terrain
+from hoof_env.leg.geometry import Geometry
+
+NOT_RECORDED = ("swing_offset", "swing_sin", "swing_cos")
+"""Fields of `Instant` that a record lacks: they are known at the end of a control step only."""
+
+RECORD = {name: unit for name, unit in UNITS.items() if name not in NOT_RECORDED} | {"free_moment": "N m"}
+"""Columns of a record and their units. They mean what `Instant` says; the free moment is 0, for the centre of
+pressure is where the ground's forces have no moment."""
+
+
+class Setting(NamedTuple):
+    """What pictures and files say of an environment beside its motion.
+
+    Attributes:
+        geometry, terrain: the leg and what it stands on.
+        weight_n: weight of trunk and leg [N].
+        suspended: whether the trunk hangs from a spring.
+        lift_off_n: normal force that tells stance from swing [N].
+        dt, sim_dt: control step and substep [s].
+    """
+
+    geometry: Geometry
+    terrain: Terrain
+    weight_n: float
+    suspended: bool
+    lift_off_n: float
+    dt: float
+    sim_dt: float
+
+
+def setting(env: Any) -> Setting:
+    """The setting of an environment of this package, wrapped or not.
+
+    Raises:
+        ParameterError: an environment of somebody else.
+    """
+    from hoof_env.envs.stance import LIFT_OFF
+
+    leg = env.unwrapped
+    try:
+        return Setting(
+            leg.geometry,
+            getattr(leg, "terrain", None) or Terrain.flat(),
+            leg.weight,
+            leg.engine.trunk.kind == "suspended",
+            LIFT_OFF * leg.weight,
+            leg.dt,
+            leg.sim_dt,
+        )
+    except AttributeError:
+        raise ParameterError(
+            f"environment: expected one leg of this package behind it, got {type(leg).__name__}"
+        ) from None
+
+
+def substeps(env: Any, command: NDArray[np.float64] | None = None) -> Columns:
+    """What happened in the last control step, one row a substep, or the start after a reset.
+
+    Args:
+        env: an environment of this package.
+        command: gait parameters that were commanded, shape (4,); None if nobody knows.
+
+    Returns:
+        Arrays by the fields of `Instant`.
+    """
+    leg = env.unwrapped
+    return columns_of_trace(leg.trace, command, leg.engine.state.filters["value"])
+
+
+def parse_arguments(option: str, items: Sequence[str]) -> dict[str, Any]:
+    """Read `key=value` items, or JSON objects, into one mapping; a value that is not JSON is kept as text.
+
+    >>> parse_arguments("--args", ["trunk=rail", "restitution=0.5"])
+    {'trunk': 'rail', 'restitution': 0.5}
+
+    Raises:
+        ParameterError: an item is neither.
+    """
+    pairs: dict[str, Any] = {}
+    for item in items:
+        key, equals, text = item.partition("=")
+        try:
+            if item.lstrip().startswith("{"):
+                pairs.update(json.loads(item))
+            elif equals and key.isidentifier():
+                pairs[key] = _value(text)
+            else:
+                raise ValueError(item)
+        except ValueError:
+            raise ParameterError(f"{option}: expected a JSON object or key=value, got {item!r}") from None
+    return pairs
+
+
+def _value(text: str) -> Any:
+    try:
+        return json.loads(text)
+    except ValueError:
+        return text
+
+
+def make_env(env_id: str, arguments: Mapping[str, Any] | None = None) -> gym.Env[Any, Any]:
+    """`gymnasium.make`, refusals in our words.
+
+    Raises:
+        ParameterError: unknown id, an argument that the environment does not take, or an environment of
+            somebody else.
+    """
+    arguments = dict(arguments or {})
+    if "render_mode" in arguments:
+        raise ParameterError("render_mode: expected none here, where the environment need not draw itself")
+    try:
+        env = gym.make(env_id, **arguments)
+    except ParameterError:
+        raise
+    except (gym.error.Error, ModuleNotFoundError, TypeError) as error:
+        raise ParameterError(f"environment {env_id!r} with {arguments or 'no arguments'}: {error}") from None
+    setting(env)
+    return env
+
+
+def find_policy(name: str, env: gym.Env[Any, Any], env_id: str, seed: int = 0) -> Any:
+    """A policy by its name: a gait or another scripted one, four gait parameters, or a trained model's path.
+
+    Args:
+        name: as "run", as "6.28,0.7,-0.2,-0.3" (crank speed [rad/s], swing offset, sine and cosine
+            coefficient [rad]), or the .zip or run folder of a model. A model is a pickle: it can run code.
+        env, env_id: what it is for.
+        seed: of "random".
+
+    Raises:
+        ParameterError: unknown name, or gait parameters out of range.
+        DataFileError: a model that cannot be read or does not fit, or nothing here that reads it.
+    """
+    names = policy_names(env)
+    if name in names:
+        return make_policy(name, env, seed)
+    if name.endswith(".zip") or Path(name, "model.zip").is_file():
+        return _trained(Path(name), env, env_id)
+    if len(numbers := name.split(",")) == len(PARAMETERS):
+        try:
+            gait = GaitParameters(*(float(number) for number in numbers))
+        except ParameterError:
+            raise
+        except ValueError:
+            pass
+        else:
+            action = env.unwrapped.action_for(gait)  # type: ignore[attr-defined]
+            return Scripted(lambda observation, time: action, setting(env).dt)
+    raise ParameterError(
+        f"policy: expected a name ({', '.join(names)}), four gait parameters as 6.28,0.7,-0.2,-0.3, or the "
+        f"path of a trained model, got {name!r}"
+    )
+
+
+def _trained(path: Path, env: Any, env_id: str) -> Any:
+    try:
+        from agents.runs import SavedModel
+
+        return SavedModel.find(path).load(env, env_id)
+    except ImportError as error:
+        raise DataFileError(
+            f"model {path}: reading it needs the agents of this project's repository and "
+            f'pip install "hoof-env[train]" ({error})'
+        ) from None
+
+
+def episode(
+    env: gym.Env[Any, Any],
+    policy: Any,
+    seed: int = 0,
+    seconds: float | None = None,
+    options: Mapping[str, Any] | None = None,
+) -> Iterator[Columns]:
+    """Play an episode; yields the columns of its start (one row) and of every control step.
+
+    Args:
+        env: an environment of this package, wrapped or not.
+        policy: anything with Stable-Baselines3's `predict`.
+        seed: of the episode.
+        seconds: when to stop; None for its own end.
+        options: of `reset`.
+
+    Raises:
+        ParameterError: as `reset` and `step` do, or `seconds` is not positive.
+    """
+    if seconds is not None:
+        check_number("seconds", seconds, low=0, exclusive_low=True)
+    leg: Any = env.unwrapped
+    observation, info = env.reset(seed=seed, options=dict(options or {}))
+    here = substeps(env, _start_gait(info))
+    yield here
+    start, ended = np.ones(1, bool), False
+    while not ended and (seconds is None or here["time"][-1] < seconds - 1e-9):
+        action, _ = policy.predict(observation, episode_start=start, deterministic=True)
+        observation, _, failed, truncated, _ = env.step(action)
+        start, ended = np.zeros(1, bool), failed or truncated
+        before = here["time"][-1]
+        here = substeps(env, leg.command_of(np.asarray(action, np.float32)))
+        if here["time"][-1] > before:  # else the simulation failed and nothing happened
+            yield here
+
+
+def _start_gait(info: Mapping[str, Any]) -> NDArray[np.float64] | None:
+    gait = info.get("gait")
+    return np.array([gait[name] for name in PARAMETERS]) if gait else None
+
+
+def record_episode(
+    env: gym.Env[Any, Any],
+    policy: Any,
+    seed: int = 0,
+    seconds: float | None = None,
+    options: Mapping[str, Any] | None = None,
+) -> Columns:
+    """The record of an episode at every substep: arrays of shape (n,), names and units as in `RECORD`.
+
+    Arguments and errors are those of `episode`.
+    """
+    parts = list(episode(env, policy, seed, seconds, options))
+    record = {name: np.concatenate([part[name] for part in parts]) for name in RECORD if name in parts[0]}
+    return record | {"free_moment": np.zeros(len(record["time"]))}
+
+
+def describe(env: gym.Env[Any, Any], **about: Any) -> dict[str, Any]:
+    """What a file says about its record, JSON-serialisable: version, units, leg, ground and `about`."""
+    here = setting(env)
+    return {
+        "hoof_env": hoof_env.__version__,
+        **about,
+        "sim_dt_s": here.sim_dt,
+        "weight_n": here.weight_n,
+        "axes": "x forward, y up, z to the right; angles counter-clockwise",
+        "units": RECORD,
+        "geometry": here.geometry.to_dict(),
+        "ground": _plain(asdict(env.unwrapped.engine.ground)),  # type: ignore[attr-defined]
+        "terrain": here.terrain.to_dict(),
+    }
+
+
+def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: value.item() if isinstance(value, np.generic) else value for name, value in values.items()}
+
+
+def check_place(path: Path, suffixes: Iterable[str]) -> None:
+    """Raise unless a file can be written at `path` and its suffix is one of `suffixes`.
+
+    Raises:
+        ParameterError: another suffix. OutputError: a folder is in its place, or its folder is not writable.
+    """
+    known = sorted(suffixes)
+    if path.suffix.lower() not in known:
+        raise ParameterError(f"out: expected a file that ends in {', '.join(known)}, got {str(path)!r}")
+    if path.is_dir():
+        raise OutputError(f"cannot write to {str(path)!r}: expected a file, got a folder")
+    check_folder(path.parent)

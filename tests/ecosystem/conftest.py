@@ -1,0 +1,26 @@
+"""A test with the argument `env_id` runs on every id of hoof-env in Gymnasium's registry but those with a
+vector reward, which libraries for one objective cannot take; one with `mo_id` runs on these."""
+
+from __future__ import annotations
+
+import gymnasium as gym
+import pytest
+
+import hoof_env  # noqa: F401  (registers the environments)
+
+collect_ignore = ["third_party"]  # somebody else's project
+
+MULTI_OBJECTIVE = "hoof_env.envs.multi_objective:"
+if not any(str(spec.entry_point).startswith(MULTI_OBJECTIVE) for spec in gym.registry.values()):
+    gym.register("hoof_env/HorseLegMO-v0", f"{MULTI_OBJECTIVE}HorseLegMOEnv", disable_env_checker=True)
+
+OURS = sorted(
+    (spec for spec in gym.registry.values() if spec.namespace == "hoof_env"), key=lambda spec: spec.id
+)
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    for name, vector_reward in ("env_id", False), ("mo_id", True):
+        if name in metafunc.fixturenames:
+            chosen = [s.id for s in OURS if str(s.entry_point).startswith(MULTI_OBJECTIVE) is vector_reward]
+            metafunc.parametrize(name, chosen)

@@ -1,0 +1,130 @@
+"""Every RL library takes hoof-env unchanged: `python -m tests.ecosystem.run`, or `make test-ecosystem`.
+
+Each check of suite.toml runs in the virtual environment that it names, one after the other, whatever becomes
+of those before it. docs/ecosystem.md is written when every check has a result, old ones included.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import tyro
+
+from tests.ecosystem.table import markdown, verdict
+from tests.ecosystem.venvs import CACHE, ROOT, Failed, Venv
+
+HERE = Path(__file__).parent
+SUITE = tomllib.loads((HERE / "suite.toml").read_text())
+VENVS = {
+    name: Venv(name, **{k: tuple(v) if isinstance(v, list) else v for k, v in table.items()})
+    for name, table in SUITE["venv"].items()
+}
+RESULTS = CACHE / "results"
+CHECKOUT_FOLDER = HERE
+PAGE = ROOT / "docs" / "ecosystem.md"
+VERSIONS = (
+    "import sys, importlib.metadata as m; print(*(f'{n} {m.version(n)}' for n in sys.argv[1:]), sep='\\n')"
+)
+
+
+@dataclass(frozen=True)
+class Args:
+    only: tuple[str, ...] = ()
+    """these checks alone: names of suite.toml"""
+    quick: bool = False
+    """the checks that need no environment but .venv"""
+
+
+def main() -> int:
+    args = tyro.cli(Args, prog="python -m tests.ecosystem.run", description=__doc__)
+    checks: dict[str, dict[str, Any]] = SUITE["check"]
+    if unknown := set(args.only) - set(checks):
+        print(f"error: no check {', '.join(sorted(unknown))}; there are {', '.join(checks)}", file=sys.stderr)
+        return 2
+    chosen = [
+        name
+        for name, check in checks.items()
+        if name in (args.only or checks) and not (args.quick and "venv" in check)
+    ]
+    failed = []
+    RESULTS.mkdir(parents=True, exist_ok=True)
+    for name in chosen:
+        print(f"{name:18}", end=" ", flush=True)
+        result = check(name, **checks[name])
+        (RESULTS / f"{name}.json").write_text(json.dumps(result, indent=1))
+        good, told = verdict(result)
+        failed += [] if good else [name]
+        print(told if good else f"{told}; more in .ecosystem/results/{name}.log", flush=True)
+    stored = [RESULTS / f"{name}.json" for name in checks]
+    missing = [path.stem for path in stored if not path.exists()]
+    results = [json.loads(path.read_text()) for path in stored if path.exists()]
+    if missing:
+        print(f"docs/ecosystem.md stays as it is: no result yet of {', '.join(missing)}")
+    else:
+        PAGE.write_text(markdown(results))
+        print("written: docs/ecosystem.md")
+    print(f"failed: {', '.join(failed)}" if failed else f"all {len(chosen)} accept hoof-env")
+    return 1 if failed else 0
+
+
+def check(name: str, libraries: list[str], seconds: float, venv: str | None = None) -> dict[str, Any]:
+    """Run one check and return its versions, the rows of its tests, and what ended it early, if anything."""
+    result: dict[str, Any] = {"name": name, "libraries": libraries, "commit": _commit(), "rows": []}
+    place = VENVS[venv] if venv else None
+    try:
+        if place:
+            place.prepare()
+        python = str(place.python if place else sys.executable)
+        asked = [python, "-c", VERSIONS, *libraries]
+        told = subprocess.run(asked, capture_output=True, text=True, check=True).stdout
+        result["versions"] = told.splitlines()
+    except (Failed, subprocess.CalledProcessError) as error:
+        return {**result, "ended": f"not installed: {error}"}
+    folder = ROOT / place.folder if place else CHECKOUT_FOLDER
+    rows = RESULTS / f"{name}.jsonl"
+    rows.unlink(missing_ok=True)
+    started = time.monotonic()
+    options = ("-p", "no:cacheprovider", "-p", "record", "--record", str(rows))
+    command = [python, "-m", "pytest", *options, f"{name}.py"]
+    ended = _run(command, folder, seconds, RESULTS / f"{name}.log")
+    lines = rows.read_text().splitlines() if rows.exists() else []
+    result |= {"rows": [json.loads(line) for line in lines], "seconds": time.monotonic() - started}
+    return {**result, "ended": ended or ("" if lines else "no test ran")}
+
+
+def _run(command: list[str], folder: Path, seconds: float, log: Path) -> str:
+    """What ended the command, where that was not its tests; all of its processes are ended with it."""
+    paths = os.pathsep.join([str(HERE), *filter(None, [os.environ.get("PYTHONPATH")])])
+    environment = {**os.environ, "PYTHONPATH": paths, "HOOF_ENV_QUIET": "1", "OMP_NUM_THREADS": "1"}
+    with log.open("w") as file:
+        process = subprocess.Popen(
+            command, cwd=folder, env=environment, start_new_session=True,
+            stdin=subprocess.DEVNULL, stdout=file, stderr=subprocess.STDOUT,
+        )  # fmt: skip
+        try:
+            code = process.wait(seconds)
+        except subprocess.TimeoutExpired:
+            return f"stopped after {seconds:.0f} s"
+        finally:
+            if process.poll() is None:
+                os.killpg(process.pid, signal.SIGKILL)
+                process.wait()
+    return "" if code in (0, 1) else f"pytest ended with code {code}"
+
+
+def _commit() -> str:
+    command = ["git", "describe", "--always", "--dirty", "--exclude=*"]
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True).stdout.strip() or "unknown"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,90 @@
+"""The suite itself: its files; a failure is told and stops nothing; what never ends is ended."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.ecosystem import run
+from tests.ecosystem.table import markdown, verdict
+
+PROGRAM = '''
+import time
+import pytest
+
+@pytest.mark.parametrize("case", ["a", "b"])
+def test_good(case):
+    """Passes."""
+
+def test_bad():
+    """Fails."""
+    raise ValueError("no | such leg")
+
+def test_skipped():
+    """Skips."""
+    pytest.skip("not yet")
+
+def test_endless():
+    """Never ends."""
+    time.sleep(WAIT)
+'''
+
+
+@pytest.fixture
+def result(tmp_path, monkeypatch, request):
+    """What a check comes to whose last test sleeps as long as the parameter says [s]."""
+    monkeypatch.setattr(run, "RESULTS", tmp_path)
+    (tmp_path / "check_sample.py").write_text(PROGRAM.replace("WAIT", str(request.param)))
+    (tmp_path / "pytest.ini").touch()
+    monkeypatch.setattr(run, "CHECKOUT_FOLDER", tmp_path)
+    return run.check("check_sample", libraries=["gymnasium"], seconds=5)
+
+
+@pytest.mark.parametrize("result", [0], indirect=True)
+def test_a_failure_is_told_and_does_not_stop_the_rest(result):
+    good, told = verdict(result)
+    assert not good
+    assert told.startswith("3 passed, 1 skipped, 1 failed in ")
+    page = markdown([result]).splitlines()
+    version = subprocess.check_output([sys.executable, "-c", run.VERSIONS, "gymnasium"], text=True).split()[1]
+    rows = [row.rpartition(" | ")[0] for row in page if row.startswith("| gymnasium")]
+    assert rows == [
+        f"| gymnasium | {version} | Passes | 2 passed",
+        f"| gymnasium | {version} | Fails | **1 failed (ValueError: no / such leg)**",
+        f"| gymnasium | {version} | Skips | 1 skipped (not yet)",
+        f"| gymnasium | {version} | Never ends | 1 passed",
+    ]
+
+
+@pytest.mark.parametrize("result", [600], indirect=True)
+def test_an_endless_test_is_ended_and_what_ran_before_it_is_kept(result):
+    good, told = verdict(result)
+    assert not good
+    assert told.endswith("stopped after 5 s")
+    assert len(result["rows"]) == 4
+    assert "**stopped after 5 s**" in markdown([result])
+
+
+def test_a_check_whose_library_is_missing_fails():
+    result = run.check("test_gymnasium", libraries=["no-such-library"], seconds=1)
+    assert not verdict(result)[0]
+    assert "no-such-library" in markdown([json.loads(json.dumps(result))])
+
+
+def test_a_check_in_which_no_test_runs_fails():
+    skipped = {"what": "", "case": "", "outcome": "skipped", "reason": "", "seconds": 0.0}
+    assert not verdict({"rows": [skipped], "ended": "", "seconds": 1.0})[0]
+
+
+def test_every_check_has_its_file_and_every_file_its_check():
+    files = {
+        path.stem
+        for path in Path(__file__).parent.rglob("*_*.py")
+        if path.stem.split("_")[0] in ("check", "test")
+    }
+    assert files - {"test_suite"} == set(run.SUITE["check"])
+    assert {check["venv"] for check in run.SUITE["check"].values() if "venv" in check} == set(run.VENVS)

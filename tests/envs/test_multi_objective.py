@@ -1,0 +1,43 @@
+"""The vector reward: its parts, that they add up to the scalar one, and what a fall costs."""
+
+import numpy as np
+import pytest
+
+from hoof_env.envs.horse_leg import HorseLegEnv
+from hoof_env.envs.multi_objective import OBJECTIVES, HorseLegMOEnv, vector_reward
+
+TERMS = {"reward_progress": 0.5, "reward_peak": -0.2, "reward_energy": -0.1, "reward_action": -0.02}
+
+
+def test_each_objective_has_its_terms():
+    np.testing.assert_allclose(vector_reward({**TERMS, "reward_failure": 0.0}), [0.5, -0.2, -0.12], rtol=1e-6)
+
+
+@pytest.mark.parametrize("weights", [(1, 0, 0), (0, 1, 0), (0, 0, 1), (0.2, 0.3, 0.5)])
+def test_a_fall_costs_every_preference_the_same(weights):
+    fell, stood = (vector_reward({**TERMS, "reward_failure": failure}) for failure in (-300.0, 0.0))
+    assert np.dot(weights, fell - stood) == pytest.approx(-100.0, rel=1e-6)
+
+
+FALLS = {"trunk_share": 1.0, "trunk_stiffness": 0.0, "trunk_damping": 0.0}
+
+
+@pytest.mark.parametrize("kwargs", [{}, {"reward_weights": {"peak": 2.0}}, FALLS])
+def test_objectives_add_up_to_the_scalar_reward_and_all_else_is_the_same(kwargs):
+    one, many = HorseLegEnv(**kwargs), HorseLegMOEnv(**kwargs)
+    generator = np.random.default_rng(0)
+    one.reset(seed=1), many.reset(seed=1)
+    assert many.reward_space.shape == (many.reward_dim,) == (len(OBJECTIVES),)
+    for _ in range(150):
+        action = generator.uniform(-1, 1, 4).astype(np.float32)
+        (seen, reward, *flags, info), (seen_too, rewards, *flags_too, info_too) = (
+            one.step(action),
+            many.step(action),
+        )
+        np.testing.assert_array_equal(seen, seen_too)
+        assert (flags, info) == (flags_too, info_too)
+        assert rewards in many.reward_space
+        assert rewards.sum() == pytest.approx(reward, rel=1e-5, abs=1e-6)
+        if any(flags):
+            break
+    assert ("failure" in info) == (kwargs is FALLS)

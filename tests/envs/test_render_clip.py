@@ -1,0 +1,114 @@
+"""Films: as many frames as asked for, of the right moments, and never half a file."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from hoof_env import cli
+from hoof_env.envs.render_clip import frames, write_film
+from hoof_env.envs.rendering import new_renderer
+from hoof_env.records import episode, find_policy, make_env, setting
+
+pytest.importorskip("pygame")
+iio = pytest.importorskip("imageio.v3")
+pytest.importorskip("imageio_ffmpeg")
+
+LEG = "hoof_env/HorseLeg-v0"
+SMALL = ["--size", "480", "270"]
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "count"),
+    [
+        ("run.mp4", ["--seconds", "0.2"], 11),
+        ("run.MP4", ["--seconds", "0.1", "--slow", "4", "--fps", "25"], 11),
+        ("walk.gif", ["--seconds", "0.2", "--fps", "25", "--policy", "walk"], 6),
+        ("fast.gif", ["--seconds", "0.2", "--slow", "0.5", "--policy", "random"], 6),
+        ("fixed.mp4", ["--seconds", "0.1", "--id", "hoof_env/HorseLegFixed-v0", "--args", "gait=run"], 6),
+        ("short.mp4", ["--seconds", "9", "--args", "episode_seconds=0.1", "--policy", "6,0.7,-0.2,-0.3"], 6),
+    ],
+)
+def test_a_film_has_its_frames(name, options, count, tmp_path, capsys):
+    out = tmp_path / "new" / name
+    assert cli.main(["render", "--out", str(out), *SMALL, *options]) == 0
+    film = iio.imread(out)
+    assert film.shape == (count, 270, 480, 3)
+    assert (film[0] != film[-1]).any()
+    assert f"{count} frames" in capsys.readouterr().out
+    assert [file.name for file in out.parent.iterdir()] == [name]
+
+
+def test_slow_motion_shows_the_substeps_between():
+    with make_env(LEG) as env:
+        renderer = new_renderer(setting(env), 50, (480, 270))
+
+        def play(fps, slow):
+            pictures = frames(renderer, episode(env, find_policy("run", env, LEG), 0, 0.1), fps, slow)
+            return np.array([renderer.latest.time for _ in pictures])
+
+        np.testing.assert_allclose(play(50, 1), np.arange(6) * 0.02, atol=1e-9)
+        np.testing.assert_allclose(play(50, 4), np.arange(21) * 0.005, atol=1e-9)
+        np.testing.assert_allclose(play(25, 1), np.arange(3) * 0.04, atol=1e-9)
+        assert len(play(50, 40)) == pytest.approx(201, abs=1)  # finer than the substeps: repeated
+
+
+def test_a_failure_leaves_the_old_film_as_it_was(tmp_path):
+    out = tmp_path / "run.mp4"
+    out.write_bytes(b"old")
+
+    def broken():
+        yield np.zeros((64, 64, 3), np.uint8)
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_film(broken(), out, 50)
+    assert out.read_bytes() == b"old"
+    assert [file.name for file in tmp_path.iterdir()] == ["run.mp4"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT to another process")
+def test_an_interrupt_is_one_line_and_leaves_nothing_behind(tmp_path):
+    command = [sys.executable, "-m", "hoof_env.cli", "render", "--out", str(tmp_path / "x.mp4")]
+    options = ["--seconds", "1000", "--args", "episode_seconds=1000"]
+    with subprocess.Popen([*command, *options], stderr=subprocess.PIPE, text=True) as process:
+        while not any(file.stat().st_size for file in tmp_path.glob(".unfinished-*/*")):
+            assert process.poll() is None
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert errors.splitlines()[-1].endswith("interrupted")
+    assert "Traceback" not in errors
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--out", "{}/x.avi"], "expected a file that ends in .gif, .mp4"),
+        (["--out", "{}/x.gif", "--fps", "60"], "fps: expected 50, 25"),
+        (["--out", "{}/x.mp4", "--fps", "0"], "fps: expected"),
+        (["--out", "{}/x.mp4", "--slow", "0"], "slow: expected"),
+        (["--out", "{}/x.mp4", "--seconds", "-1"], "seconds: expected"),
+        (["--out", "{}/x.mp4", "--size", "10", "10"], "size: expected"),
+        (["--out", "{}/x.mp4", "--policy", "gallop"], "policy: expected"),
+        (["--out", "{}/x.mp4", "--args", "render_mode=human"], "render_mode: expected"),
+    ],
+)
+def test_a_bad_request_is_one_line_and_leaves_nothing(options, words, tmp_path, capsys):
+    assert cli.main(["render", *(text.format(tmp_path) for text in options)]) == 2
+    said = capsys.readouterr().err
+    assert words in said
+    assert said.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("module", "extra"), [("pygame", "render"), ("imageio_ffmpeg", "video")])
+def test_a_missing_package_is_named(module, extra, tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, module, None)
+    assert cli.main(["render", "--out", str(tmp_path / "x.mp4")]) == 2
+    assert f'pip install "hoof-env[{extra}]"' in capsys.readouterr().err

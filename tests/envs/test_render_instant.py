@@ -1,0 +1,160 @@
+"""What both engines say of an instant means the same, and a force acts where its moment says."""
+
+import numpy as np
+import pytest
+
+from hoof_env.dynamics.drive import Prescribed
+from hoof_env.dynamics.engine import LegEngine
+from hoof_env.dynamics.limb import Limb
+from hoof_env.dynamics.trace import new_trace
+from hoof_env.dynamics.trunk import Trunk
+from hoof_env.dynamics.trunk_engine import TrunkEngine
+from hoof_env.envs.render_instant import (
+    POINTS,
+    UNITS,
+    Instant,
+    columns_of_engine,
+    columns_of_trace,
+    ground_at,
+    instants,
+)
+from hoof_env.gait.parameters import load_gait
+from hoof_env.ground.contact import Ground
+from hoof_env.ground.terrain import Terrain
+from hoof_env.leg.geometry import load_geometry
+from hoof_env.leg.kinematics import FrameMotion, pose
+
+LEG, RUN = load_geometry("first_fit"), load_gait("run", "first_fit")
+HILLS = Terrain.through([-1.0, 0.4, 1.0, 2.0], [0.0, 0.0, 0.1, -0.05], friction=[1.0, 1.0, 0.5, 2.0])
+
+
+@pytest.fixture(scope="module")
+def trace():
+    engine = LegEngine(LEG, Trunk(height=LEG.hip_height), Ground(), sim_dt=1e-3)
+    engine.reset(RUN)
+    rows = new_trace(1500)
+    engine.advance(RUN.to_array(), rows)
+    return rows
+
+
+def roll(
+    terrain: Terrain, trunk: str = "suspended", hip=(0.0, 0.0), drive=None, seconds: float = 1.0, **start
+):
+    engine = TrunkEngine(
+        Limb(LEG, hip=hip, drive=drive or Prescribed()),
+        Trunk(trunk, height=LEG.hip_height, pitch_inertia=30.0),
+        Ground(),
+        terrain,
+    )
+    engine.reset(RUN, **start)
+    return engine, engine.run(RUN.to_array(), round(seconds * 1000))
+
+
+def test_every_field_has_a_unit_and_every_column_is_a_field(trace):
+    assert set(UNITS) == set(Instant._fields)
+    assert set(columns_of_trace(trace)) == set(Instant._fields)
+    assert set(columns_of_engine(roll(HILLS, seconds=0.01)[1], HILLS)) == set(Instant._fields)
+
+
+def test_a_trace_becomes_instants(trace):
+    command, gait = np.arange(4.0), np.arange(4.0) / 2
+    rows = instants(columns_of_trace(trace, command, gait))
+    assert len(rows) == len(trace)
+    for row, now in zip(trace[::100], rows[::100], strict=True):
+        assert (now.time, now.crank_angle, now.crank_speed, now.swing_angle) == tuple(
+            row[["t", "theta", "theta_rate", "phi"]].item()
+        )
+        assert (now.command_crank_speed, now.command_swing_cos) == (0.0, 3.0)
+        assert (now.swing_offset, now.swing_cos) == (0.5, 1.5)
+        assert (now.grf, now.normal) == pytest.approx((row["grf"], row["normal"]))
+        assert (now.toe_depth, now.toe_y) == (row["toe_penetration"], -row["toe_penetration"])
+    assert np.isnan(instants(columns_of_trace(trace))[0].command_swing_sin)
+
+
+def test_the_hoof_has_no_moment_about_its_centre_of_pressure(trace):
+    for found in (columns_of_trace(trace), columns_of_engine(roll(HILLS)[1], HILLS)):
+        loaded = found["toe_normal"] + found["heel_normal"] > 0
+        assert 50 < loaded.sum() < len(loaded)
+        moment = sum(
+            (found[f"{p}_x"] - found["cop_x"]) * found[f"{p}_force_y"]
+            - (found[f"{p}_y"] - found["cop_y"]) * found[f"{p}_force_x"]
+            for p in POINTS
+        )
+        np.testing.assert_allclose(moment, 0, atol=1e-8)
+        for name in ("cop_x", "cop_y", "force_x", "force_y"):
+            assert not found[name][~loaded].any()
+
+
+def test_with_equal_friction_the_centre_is_the_mean_weighted_by_load(trace):
+    found = columns_of_trace(trace)
+    both = (found["toe_normal"] > 0) & (found["heel_normal"] > 0)
+    ratio = [
+        np.where(both, found[f"{p}_friction"] / np.where(both, found[f"{p}_normal"], 1), 0) for p in POINTS
+    ]
+    equal = both & (np.abs(ratio[0] - ratio[1]) < 1e-12)
+    assert equal.sum() > 10
+    np.testing.assert_allclose(found["cop_x"][equal], trace["cop_x"][equal])
+    alone = (found["toe_normal"] > 0) & (found["heel_normal"] == 0)
+    assert alone.sum() > 10
+    np.testing.assert_allclose(found["cop_y"][alone], found["toe_y"][alone])
+
+
+def test_both_engines_say_the_same_of_the_same_motion(trace):
+    """One gait on level ground; they integrate differently, so nearly the same."""
+    _, record = roll(Terrain.flat(), seconds=1.5)
+    one, two = columns_of_trace(trace), columns_of_engine(record, command=RUN.to_array())
+    for name in Instant._fields:
+        if np.isnan(one[name]).all() or name.startswith("command"):
+            continue
+        difference = np.abs(one[name] - two[name][1:])
+        scale = np.abs(one[name]).max() + 1e-3
+        assert np.median(difference) < 0.02 * scale, name
+
+
+def test_a_pitching_trunk_carries_its_leg_where_the_engine_has_it():
+    hip = (0.3, -0.1)
+    _, record = roll(
+        HILLS, "free", hip, seconds=0.2, pitch=0.2, pitch_rate=-0.5, y=LEG.hip_height + 0.15, vx=1.0
+    )
+    found = columns_of_engine(record, HILLS, hip=hip)
+    for now in instants(found)[::20]:
+        points = pose(LEG, now.crank_angle, frame=FrameMotion(phi=now.swing_angle))
+        for point, corner in (("toe", LEG.toe), ("heel", LEG.heel)):
+            z = complex(*points.point(corner)) * np.exp(1j * now.pitch) + complex(now.trunk_x, now.trunk_y)
+            at = complex(getattr(now, f"{point}_x"), getattr(now, f"{point}_y"))
+            assert abs(z - at) < 1e-9
+    speed = np.gradient(found["trunk_x"], found["time"])
+    np.testing.assert_allclose(found["trunk_vx"][1:-1], speed[1:-1], atol=2e-3)
+
+
+def test_forces_in_the_world_add_up_to_the_engine_s_impulse_on_hills():
+    engine, record = roll(HILLS, vx=1.0)
+    found = columns_of_engine(record, HILLS)
+    assert (
+        np.abs(found["force_x"] - found["toe_friction"] - found["heel_friction"]).max() > 10
+    )  # hills matter
+    for axis in "xy":
+        force = found[f"force_{axis}"]
+        impulse = 0.5e-3 * (force[1:] + force[:-1]).sum()
+        assert impulse == pytest.approx(engine.account[f"impulse_{axis}"][0], abs=0.5)
+    assert abs(engine.account["impulse_y"][0]) > 100
+    inside = found["toe_depth"] > 0
+    np.testing.assert_allclose(
+        found["toe_depth"][inside], record["toe_penetration"][inside, 0, 0], atol=1e-12
+    )
+
+
+def test_one_instant_and_a_run_are_read_alike():
+    engine, record = roll(HILLS, seconds=0.05)
+    last = instants(columns_of_engine(record, HILLS))[-1]
+    (now,) = instants(columns_of_engine(engine.state | engine.report, HILLS))
+    np.testing.assert_array_equal(last, now)
+
+
+def test_the_ground_at_a_point_is_the_terrain_s():
+    x = np.array([-5.0, -1.0, 0.2, 0.7, 1.5, 9.0])
+    height, normal = ground_at(HILLS, x)
+    np.testing.assert_allclose(height, HILLS.height_at(x), atol=1e-12)
+    slope = np.array([0.0, 0.0, 0.0, 1 / 6, -0.15, 0.0])
+    np.testing.assert_allclose(normal, (1j - slope) / np.hypot(1, slope), atol=1e-9)
+    assert ground_at(Terrain.flat(), np.zeros(0))[0].shape == (0,)

@@ -1,0 +1,220 @@
+"""Force records: what a file says is what happened, and every bad request is one clear error."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from hoof_env import __version__, cli
+from hoof_env.dynamics.engine import GRAVITY
+from hoof_env.dynamics.result import Result
+from hoof_env.envs.policies import make_policy
+from hoof_env.errors import HoofEnvError, OutputError, ParameterError
+from hoof_env.export.files import MOT_COLUMNS, export_episode, write
+from hoof_env.leg.geometry import load_geometry
+from hoof_env.records import RECORD, describe, find_policy, make_env, parse_arguments, record_episode
+
+LEG = "hoof_env/HorseLeg-v0"
+
+
+@pytest.fixture(scope="module")
+def episode():
+    with make_env(LEG, {"trunk_drag": 0.0, "trunk_stiffness": 0.0, "trunk_damping": 0.0}) as env:
+        record = record_episode(env, make_policy("run", env), seed=3, seconds=2.0, options={"gait": "run"})
+        return record, describe(env, environment=LEG, policy="run", seed=3)
+
+
+def read_mot(path) -> tuple[dict[str, str], dict[str, np.ndarray]]:
+    """Header and columns, as the format is described: key=value lines, endheader, names, rows."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    end = lines.index("endheader")
+    header = dict(line.split("=") for line in lines[1:end])
+    table = np.array([[float(cell) for cell in line.split("\t")] for line in lines[end + 2 :]])
+    return header, dict(zip(lines[end + 1].split("\t"), table.T, strict=True))
+
+
+def test_a_record_has_every_substep_and_every_column(episode):
+    record, about = episode
+    assert set(record) == set(RECORD) == set(about["units"])
+    np.testing.assert_allclose(record["time"], np.arange(2001) / 1000, atol=1e-9)
+    assert all(column.shape == (2001,) and np.isfinite(column).all() for column in record.values())
+    json.dumps(about, allow_nan=False)
+
+
+def test_csv_has_units_in_its_header_and_keeps_every_bit(episode, tmp_path):
+    record, about = episode
+    path = write(record, about, tmp_path / "new" / "run.csv")
+    header = path.read_text(encoding="utf-8").splitlines()[0].split(",")
+    assert header == [f"{name} [{RECORD[name]}]" for name in record]
+    assert "force_y [N]" in header
+    table = np.loadtxt(path, delimiter=",", skiprows=1)
+    for name, column in zip(record, table.T, strict=True):
+        np.testing.assert_array_equal(column, record[name], err_msg=name)
+
+
+def test_parquet_has_units_version_and_geometry(episode, tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    record, about = episode
+    table = parquet.read_table(write(record, about, tmp_path / "run.parquet"))
+    assert table.column_names == list(record)
+    for name in record:
+        np.testing.assert_array_equal(table[name].to_numpy(), record[name])
+        assert table.schema.field(name).metadata == {b"unit": RECORD[name].encode()}
+    said = json.loads(table.schema.metadata[b"hoof_env"])
+    assert said["hoof_env"] == __version__
+    assert said["geometry"] == load_geometry("first_fit").to_dict()
+    assert (said["environment"], said["policy"], said["seed"]) == (LEG, "run", 3)
+
+
+def test_mot_is_what_opensim_reads(episode, tmp_path):
+    record, about = episode
+    header, columns = read_mot(write(record, about, tmp_path / "run.mot"))
+    assert header == {"version": "1", "nRows": "2001", "nColumns": "10", "inDegrees": "yes"}
+    assert tuple(columns) == MOT_COLUMNS
+    for name, source in (("vx", "force_x"), ("vy", "force_y"), ("px", "cop_x"), ("py", "cop_y")):
+        np.testing.assert_allclose(columns[f"ground_force_{name}"], record[source], rtol=1e-9)
+    np.testing.assert_allclose(columns["time"], record["time"], rtol=1e-9)
+    for name in (
+        "ground_force_vz",
+        "ground_force_pz",
+        "ground_torque_x",
+        "ground_torque_y",
+        "ground_torque_z",
+    ):
+        assert not columns[name].any()
+
+
+def test_in_swing_force_and_its_place_are_zero(episode):
+    record, _ = episode
+    swing = record["toe_normal"] + record["heel_normal"] == 0
+    assert 0.2 < swing.mean() < 0.9
+    for name in ("force_x", "force_y", "cop_x", "cop_y"):
+        assert not record[name][swing].any()
+        assert record[name][~swing].any()
+    under = np.abs(record["cop_x"] - record["trunk_x"])[~swing]
+    assert under.max() < 2.0  # the foot is where the animal is
+
+
+def test_the_impulse_in_the_file_is_the_change_of_momentum(episode, tmp_path):
+    """Over one turn of the crank the leg comes back to where it was, so all of it has sped up by as much."""
+    record, about = episode
+    _, columns = read_mot(write(record, about, tmp_path / "run.mot"))
+    mass = 80.0 + load_geometry("first_fit").mass
+    first, last = 700, 1700  # the run's crank turns once a second
+    turn = record["crank_angle"][last] - record["crank_angle"][first]
+    assert turn == pytest.approx(2 * math.pi, abs=1e-6)
+    step = np.diff(columns["time"][first : last + 1])
+    for name, speed, other in (("vx", "trunk_vx", 0.0), ("vy", "trunk_vy", -0.8 * mass * GRAVITY)):
+        impulse = (step * columns[f"ground_force_{name}"][first:last]).sum() + other
+        change = mass * (record[speed][last] - record[speed][first])
+        assert abs(change) > 5
+        assert impulse == pytest.approx(change, abs=0.02 * abs(change) + 0.5)
+
+
+@pytest.mark.parametrize("solver", ["exact", "paper"])
+def test_the_fixed_leg_is_recorded_too(solver, tmp_path):
+    out = tmp_path / "walk.csv"
+    assert cli.main(
+        ["export", "--out", str(out), "--id", "hoof_env/HorseLegFixed-v0", "--args", f"solver={solver}",
+         "--policy", "walk", "--seconds", "0.1"]
+    ) == 0  # fmt: skip
+    table = np.genfromtxt(out, delimiter=",", names=True, deletechars="")
+    assert len(table) == (101 if solver == "paper" else 1001)
+
+
+def test_an_episode_that_ends_early_ends_its_record(tmp_path):
+    rows = export_episode(tmp_path / "x.csv", "run", LEG, ["episode_seconds=0.1"])
+    assert rows == 101
+    same = (tmp_path / "x.csv").read_bytes()
+    export_episode(tmp_path / "x.csv", "run", LEG, ["episode_seconds=0.1"])
+    assert (tmp_path / "x.csv").read_bytes() == same
+
+
+def test_a_step_that_failed_is_not_recorded():
+    """The environment keeps its last good state and shows it again; a record must not say it twice."""
+    with make_env(LEG) as env:
+        run = make_policy("run", env)
+
+        class Breaks:
+            steps = 0
+
+            def predict(self, observation, **options):
+                self.steps += 1
+                if self.steps == 4:
+                    env.unwrapped.engine.advance = lambda *_: Result.NOT_FINITE
+                return run.predict(observation, **options)
+
+        record = record_episode(env, Breaks(), 0)
+    assert len(record["time"]) == 61
+    assert (np.diff(record["time"]) > 0).all()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--out", "{}/x.txt"], "expected a file that ends in .csv, .mot, .parquet"),
+        (["--out", "{}/x.csv", "--policy", "gallop"], "policy: expected a name"),
+        (["--out", "{}/x.csv", "--policy", "1,0.2,0.3,nan"], "swing_cos: expected"),
+        (["--out", "{}/x.csv", "--policy", "99,0,0,0"], "crank_speed: expected"),
+        (["--out", "{}/x.csv", "--policy", "no.zip"], "model no.zip"),
+        (["--out", "{}/x.csv", "--id", "hoof_env/Nobody-v0"], "environment 'hoof_env/Nobody-v0'"),
+        (["--out", "{}/x.csv", "--id", "CartPole-v1"], "expected one leg of this package"),
+        (["--out", "{}/x.csv", "--args", "wings=2"], "wings"),
+        (["--out", "{}/x.csv", "--args", "trunk"], "--args: expected a JSON object or key=value"),
+        (["--out", "{}/x.csv", "--args", "trunk=cloud"], "trunk: expected one of"),
+        (["--out", "{}/x.csv", "--seconds", "0"], "seconds: expected"),
+        (["--out", "{}/x.csv", "--seed", "-1"], "seed: expected"),
+        (["--out", "{}"], "expected a file that ends in"),
+        (["--out", "{}/taken/x.csv"], "cannot write to"),
+    ],
+)
+def test_a_bad_request_is_one_line_and_leaves_nothing(arguments, words, tmp_path, capsys):
+    (tmp_path / "taken").write_text("mine", encoding="utf-8")
+    assert cli.main(["export", *(text.format(tmp_path) for text in arguments)]) == 2
+    said = capsys.readouterr().err
+    assert words in said
+    assert said.count("\n") == 1
+    assert [file.name for file in tmp_path.iterdir()] == ["taken"]
+
+
+def test_a_folder_in_the_file_s_place_is_refused(tmp_path, episode):
+    (tmp_path / "x.csv").mkdir()
+    with pytest.raises(OutputError, match="got a folder"):
+        write(*episode, tmp_path / "x.csv")
+
+
+def test_parquet_without_pyarrow_says_what_to_install_before_anything_runs(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
+    with pytest.raises(HoofEnvError, match=r'pip install "hoof-env\[export\]"'):
+        export_episode(tmp_path / "x.parquet", "run", "nobody asks for this")
+
+
+def test_policies_by_name_and_by_four_numbers():
+    with make_env(LEG) as env:
+        constant = find_policy("6.0,0.7,-0.2,-0.3", env, LEG)
+        action, _ = constant.predict(None)
+        np.testing.assert_allclose(env.unwrapped.command_of(action), [6.0, 0.7, -0.2, -0.3], atol=1e-6)
+        assert find_policy("idle", env, LEG).predict(None)[0].shape == (4,)
+
+
+def test_arguments_are_pairs_or_objects():
+    assert parse_arguments("--args", ["trunk=rail", "dt=0.01", '{"preset": null}']) == {
+        "trunk": "rail", "dt": 0.01, "preset": None,
+    }  # fmt: skip
+    for bad in ("trunk", "=3", "{trunk: 1}"):
+        with pytest.raises(ParameterError, match="--args"):
+            parse_arguments("--args", [bad])
+
+
+def test_a_wrapped_environment_is_recorded_alike(episode):
+    with gym.make(LEG, trunk_drag=0.0, trunk_stiffness=0.0, trunk_damping=0.0) as env:
+        wrapped = gym.wrappers.RecordEpisodeStatistics(env)
+        again = record_episode(wrapped, make_policy("run", wrapped), 3, 0.5, {"gait": "run"})
+    for name, column in again.items():
+        np.testing.assert_array_equal(column, episode[0][name][: len(column)], err_msg=name)

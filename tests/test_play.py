@@ -1,0 +1,180 @@
+"""The game without a window, driven by names of keys; then with a window that nobody sees."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from hoof_env import cli
+from hoof_env.errors import HoofEnvError, ParameterError
+from hoof_env.play import HELD, HELP, RATE, Game, play
+from hoof_env.records import make_env
+
+pygame = pytest.importorskip("pygame")
+
+LEG = "hoof_env/HorseLeg-v0"
+
+
+@pytest.fixture
+def env():
+    with make_env(LEG, {"episode_seconds": 0.4}) as env:
+        yield env
+
+
+@pytest.mark.parametrize("key", HELD)
+def test_a_held_key_moves_its_command_and_no_other(env, key):
+    game = Game(env)
+    game.action[:] = 0
+    for _ in range(5):
+        game.tick({key})
+    entry, way = HELD[key]
+    expected = np.zeros(4)
+    expected[entry] = 5 * way * RATE * game.dt
+    np.testing.assert_allclose(game.action, expected, atol=1e-6)
+    last = game.news[-1]
+    commanded = (
+        last.command_crank_speed, last.command_swing_offset, last.command_swing_sin, last.command_swing_cos,
+    )  # fmt: skip
+    np.testing.assert_allclose(commanded, env.unwrapped.command_of(game.action))
+
+
+def test_commands_stop_at_their_limits_and_keys_held_against_each_other_cancel(env):
+    game = Game(env)
+    game.action[:] = 0.999
+    game.tick(["up", "w", "d", "right"])
+    np.testing.assert_array_equal(game.action, 1.0)
+    game.tick({"left", "right", "a", "d"})
+    np.testing.assert_allclose(game.action, 1.0, atol=RATE * game.dt + 1e-6)
+    game.tick(["nothing"])
+
+
+def test_the_leg_starts_in_its_gait_and_a_digit_commands_another(env):
+    game = Game(env, seed=4)
+    first = game.news[0]
+    assert first.time == 0
+    assert first.command_crank_speed == pytest.approx(first.crank_speed, abs=1e-5)
+    for number, name in enumerate(game.gaits, 1):
+        game.press(str(number))
+        np.testing.assert_array_equal(game.action, env.unwrapped.action_for(env.unwrapped.gaits[name]))
+    game.press("0")
+    assert env.unwrapped.command_of(game.action)[0] == 0
+    before = game.action.copy()
+    for key in ("9", "x", "f1", "²"):
+        game.press(key)
+    np.testing.assert_array_equal(game.action, before)
+
+
+def test_the_score_is_the_return_and_the_end_is_told(env):
+    game = Game(env, seed=1)
+    rewards = []
+    step = env.unwrapped.step
+
+    def spy(action):
+        result = step(action)
+        rewards.append(result[1])
+        return result
+
+    env.unwrapped.step = spy
+    for _ in range(30):
+        game.tick(["up"])
+    assert len(rewards) == 20  # 0.4 s
+    assert game.score == pytest.approx(sum(rewards))
+    assert game.ended
+    assert game.status == "over: time is up; r starts again"
+    assert game.news == []
+    game.press("r")
+    assert (game.ended, game.score, game.status) == (False, 0.0, "")
+    game.tick()
+    assert game.news[-1].time == pytest.approx(game.dt)
+
+
+def test_a_pause_stops_the_clock(env):
+    game = Game(env)
+    game.tick()
+    game.press("space")
+    game.tick(["up"])
+    assert (game.paused, game.news, game.status) == (True, [], "paused; space goes on")
+    game.press("space")
+    game.tick()
+    assert game.news[-1].time == pytest.approx(2 * game.dt)
+    game.press("q")
+    assert game.quit
+
+
+def test_the_fixed_leg_is_played_by_offsets():
+    with make_env("hoof_env/HorseLegFixed-v0") as env:
+        game = Game(env)
+        np.testing.assert_array_equal(game.action, 0)
+        game.tick(["up"])
+        assert game.news[-1].command_crank_speed > game.news[0].crank_speed
+
+
+def test_every_key_is_explained():
+    words = ", ".join(keys for column in HELP for keys, _ in column)
+    assert all(key in words.split(", ") for key in HELD)
+
+
+def shown(monkeypatch, keys_at: dict[int, int]):
+    """Key events that arrive before the given frame, and a picture of every frame."""
+    pictures = []
+    flip = pygame.display.flip
+
+    def watch():
+        flip()
+        pictures.append(pygame.surfarray.array3d(pygame.display.get_surface()).transpose(1, 0, 2))
+        if len(pictures) in keys_at:
+            pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=keys_at[len(pictures)]))
+
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    monkeypatch.setattr(pygame.display, "flip", watch)
+    return pictures
+
+
+def test_a_window_shows_leg_score_and_keys_until_it_is_left(monkeypatch):
+    pictures = shown(monkeypatch, {3: pygame.K_SPACE, 6: pygame.K_SPACE, 8: pygame.K_r, 12: pygame.K_ESCAPE})
+    game = play(LEG, slow=0.2, size=(640, 360), most_ticks=100)
+    assert game.quit
+    assert len(pictures) == 13
+    assert pictures[0].shape == (360 + 64, 640, 3)
+    strip = pictures[0][362:]
+    assert (strip != 255).any(axis=-1).mean() > 0.02  # words
+    assert (pictures[4] != pictures[2]).any()  # it says that it is paused,
+    np.testing.assert_array_equal(pictures[4], pictures[5])  # and is
+    assert not pygame.display.get_init()
+
+
+def test_closing_the_window_leaves_the_game(monkeypatch):
+    pictures = shown(monkeypatch, {})
+    monkeypatch.setattr(pygame.event, "get", lambda: [pygame.event.Event(pygame.QUIT)])
+    assert play(LEG, size=(640, 360), most_ticks=100).quit
+    assert len(pictures) <= 1
+
+
+def test_a_machine_without_a_display_gets_one_line():
+    hidden = ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER")
+    code = f"import os\nfor name in {hidden}: os.environ.pop(name, None)\n"
+    code += "import sys; from hoof_env import cli; sys.exit(cli.main(['play']))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    if done.returncode == 0:  # macOS and Windows always have one
+        pytest.skip("this system has a display")
+    assert done.returncode == 2
+    errors = [line for line in done.stderr.splitlines() if line.startswith("hoof-env: error")]
+    assert len(errors) == 1
+    assert "playing needs a display" in errors[0]
+    assert "Traceback" not in done.stderr
+
+
+def test_bad_requests_are_refused(monkeypatch, capsys):
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    with pytest.raises(ParameterError, match="slow: expected"):
+        play(LEG, slow=0.0)
+    assert cli.main(["play", "--size", "10", "10"]) == 2
+    assert "size: expected" in capsys.readouterr().err
+    assert cli.main(["play", "--id", "CartPole-v1"]) == 2
+    assert not pygame.display.get_init()
+    monkeypatch.setitem(sys.modules, "pygame", None)
+    with pytest.raises(HoofEnvError, match=r'pip install "hoof-env\[render\]"'):
+        play(LEG)
