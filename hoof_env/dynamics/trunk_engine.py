@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
 from hoof_env.dynamics.advance import LANES, advance_batch, advance_four, advance_leg, advance_one
-from hoof_env.dynamics.arguments import Floats, all_of, count, finite, one_of
+from hoof_env.dynamics.arguments import Floats, all_of, count, finite, flag, one_of
 from hoof_env.dynamics.engine import GRAVITY
 from hoof_env.dynamics.lanes_report import ACCOUNT, LIMB_REPORT, TRUNK_REPORT
 from hoof_env.dynamics.limb import Limb
@@ -45,7 +45,7 @@ MOST_LEGS = 32
 MOST_STEPS = 10**12
 """Substeps of a call, which are counted in 64 bits."""
 
-STATE = ("trunk", "limbs", "command", "account")
+STATE = ("trunk", "limbs", "strides", "command", "account")
 """Arrays that hold what changes."""
 
 
@@ -80,6 +80,7 @@ class TrunkEngine:
         num_envs: environments side by side, which share all of the above.
         filters: bounds of the command filters.
         reactions: compute the joint reactions of every step; `reactions()` has those of the last.
+        strides: count stances, peak forces and work; `strides` has them.
 
     Attributes:
         step_limits: longest step [s] for each cause, see `step_length`. Friction is not heeded, for nothing
@@ -109,6 +110,7 @@ class TrunkEngine:
         num_envs: int = 1,
         filters: FilterSettings | None = None,
         reactions: bool = False,
+        strides: bool = False,
     ) -> None:
         self.limbs = all_of("limbs", limbs, Limb)
         if len(self.limbs) > MOST_LEGS:
@@ -125,7 +127,7 @@ class TrunkEngine:
         self.step_limits = length.limits
         asked = None if substeps is None else count("substeps", substeps, most=MOST_STEPS)
         self.substeps = length.choose(self.sim_dt, asked)
-        self.reacts = bool(reactions)
+        self.reacts, self.counts_strides = flag("reactions", reactions), flag("strides", strides)
         is_few = self.num_envs <= FEW
         alone = {1: advance_leg, 4: advance_four}.get(len(self.limbs), advance_one)
         self._run = alone if is_few else advance_batch
@@ -186,7 +188,7 @@ class TrunkEngine:
         at = {"x": x, "y": height, "pitch": pitch, "vx": vx, "vy": vy, "pitch_rate": pitch_rate}
         a.trunk[:, where], a.limbs[:, :, where] = start(self, values, theta, theta_rate, at, where.size)
         a.command[:, :, where] = values[:, :, None]
-        a.account[:, where] = 0.0
+        a.account[:, where], a.strides[:, :, where] = 0.0, 0.0
         self._go(0)
 
     def get_state(self) -> dict[str, Any]:
@@ -326,6 +328,14 @@ class TrunkEngine:
     def account(self) -> dict[str, Floats]:
         """Integrals since the reset by name, `lanes_report.ACCOUNT`, shape (num_envs,)."""
         return {name: self._memory.account[k].copy() for k, name in enumerate(ACCOUNT)}
+
+    @property
+    def strides(self) -> dict[str, Floats]:
+        """The open stance and the sums of the last call by name, `limb_rows.STRIDES` and `STRIDE_SUMS`, shape
+        (legs, num_envs); see `lanes_strides`. Zeros unless the engine was made with `strides=True`."""
+        names, m = (*b.STRIDES, *b.STRIDE_SUMS), self._memory
+        whole = np.concatenate([m.strides, m.stride_sums], axis=1)
+        return {name: whole[:, k] for k, name in enumerate(names)}
 
     def reactions(self) -> Reactions:
         """Joint reactions at the present instant.

@@ -28,6 +28,11 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
+LIFT_OFF = 0.05
+"""Normal force that tells stance from swing, in a leg's part of the weight. A hoof that merely grazes the
+ground between two pushes has lifted off: were any contact stance, a policy could hold one peak for ever and
+push under it."""
+
 
 class Memory(NamedTuple):
     """An engine's memory: `data` as the kernels take it, and views of its parts; the last axis is the
@@ -36,7 +41,8 @@ class Memory(NamedTuple):
     Attributes:
         data: all of it, shape (rows, columns): whole vectors of environments, so some columns may be idle.
         trunk, limbs: the state, shapes (7, n) and (legs, 16, n).
-        trunk_settings, limb_settings: parameters, shapes (17, n) and (legs, 11, n).
+        trunk_settings, limb_settings: parameters, shapes (17, n) and (legs, 12, n).
+        strides, stride_sums: of `limb_rows`, shapes (legs, 3, n) and (legs, 7, n).
         command: shape (legs, 4, n).
         account: shape (9, n), added to.
         trunk_report, limb_report: at the end, shapes (8, n) and (legs, 18, n).
@@ -50,6 +56,8 @@ class Memory(NamedTuple):
     limbs: Floats
     trunk_settings: Floats
     limb_settings: Floats
+    strides: Floats
+    stride_sums: Floats
     command: Floats
     account: Floats
     trunk_report: Floats
@@ -66,12 +74,15 @@ def new_memory(engine: TrunkEngine, columns: int) -> Memory:
     trunk, limbs = data[:TRUNK_ROWS], data[TRUNK_ROWS:].reshape(legs, LIMB_ROWS, columns)
     trunk[TRUNK["state"]], limbs[:, LIMB["state"]] = np.nan, np.nan
     trunk[TRUNK["settings"]] = _trunk_settings(engine)[:, None]
-    settings = [_limb_settings(*pair) for pair in zip(engine.limbs, _first_rows(engine), strict=True)]
+    lift_off = LIFT_OFF * engine.weight / legs
+    firsts = zip(engine.limbs, _first_rows(engine), strict=True)
+    settings = [_limb_settings(limb, first, lift_off) for limb, first in firsts]
     limbs[:, LIMB["settings"]] = np.array(settings)[:, :, None]
     ours, theirs = trunk[:, :n], limbs[:, :, :n]
     return Memory(
         data, ours[TRUNK["state"]], theirs[:, LIMB["state"]],
-        ours[TRUNK["settings"]], theirs[:, LIMB["settings"]], theirs[:, LIMB["command"]],
+        ours[TRUNK["settings"]], theirs[:, LIMB["settings"]],
+        theirs[:, LIMB["strides"]], theirs[:, LIMB["stride_sums"]], theirs[:, LIMB["command"]],
         ours[TRUNK["account"]], ours[TRUNK["report"]], theirs[:, LIMB["report"]], ours[TRUNK["result"]][0],
         np.array([leg_constants(limb.geometry)[:, 0] for limb in engine.limbs]),
         np.zeros((legs, OUTPUTS, columns if engine.reacts else 0)),
@@ -100,6 +111,7 @@ def new_model(engine: TrunkEngine) -> tuple[NDArray[Any], Floats, Floats]:
     record["friction_law"] = FRICTION_LAWS.index(ground.friction_law)
     record["interpolated"] = ground.approach == "interpolated"
     record["is_terrain"], record["new_rates"] = terrain != Terrain.flat(), scheme.new_rates
+    record["strides"] = engine.counts_strides
     record["stages"] = len(scheme.weights)
     record["fractions"][: len(scheme.fractions)] = scheme.fractions
     record["weights"][: len(scheme.weights)] = scheme.weights
@@ -156,12 +168,12 @@ def _first_rows(engine: TrunkEngine) -> list[int]:
     return [unique.index(profile) * cells for profile in engine.profiles]
 
 
-def _limb_settings(limb: Limb, first_row: int) -> Floats:
+def _limb_settings(limb: Limb, first_row: int, lift_off: float) -> Floats:
     motor = limb.drive if isinstance(limb.drive, Motor) else Motor(0.0, 0.0, 0.0, 0.0)
     side, rotor = float(limb.geometry.travel), motor.rotor_inertia
     values = (
         *limb.hip, limb.geometry.mass, side, first_row, float(isinstance(limb.drive, Motor)),
         motor.speed_gain, motor.torque_limit,
-        motor.reflected_inertia, -side * motor.gear_ratio * rotor, rotor,
+        motor.reflected_inertia, -side * motor.gear_ratio * rotor, rotor, lift_off,
     )  # fmt: skip
     return np.array(values)
