@@ -75,7 +75,8 @@ MODEL = np.dtype(
         ("stages", "i8"), ("fractions", "f8", (4,)), ("weights", "f8", (4,)),  # of the scheme
         ("settings", "f8", (12,)),  # of the filters
         ("ground_origin", "f8"), ("ground_per_metre", "f8"),  # of the terrain's grid
-    ]
+    ],
+    align=True,
 )  # fmt: skip
 """What does not change while the engine runs, but for large arrays."""
 
