@@ -18,11 +18,11 @@ import numpy as np
 from numba import carray  # type: ignore[attr-defined]
 
 from hoof_env._jit import inlined, kernel, pasted
-from hoof_env._lanes import below, choose, fill, lane_sum, level, read, rows, write
+from hoof_env._lanes import anywhere, below, choose, fill, lane_sum, level, read, rows, write
 from hoof_env._memory import address, doubles, offset
 from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
-from hoof_env.dynamics.lanes import evaluate, keep_still
+from hoof_env.dynamics.lanes import evaluate, keep_still, settle
 from hoof_env.dynamics.lanes_ground import level_ground, remember_contacts
 from hoof_env.dynamics.lanes_reactions import react
 from hoof_env.dynamics.lanes_report import (
@@ -36,12 +36,16 @@ from hoof_env.dynamics.lanes_report import (
 from hoof_env.dynamics.lanes_strides import count_stride, forget_sums
 from hoof_env.dynamics.lanes_time import begin_step, end_step, next_stage, weigh_stage
 from hoof_env.dynamics.reactions import CONSTANTS, OUTPUTS
+from hoof_env.dynamics.trunk import FIXED
 
 LANES = 8
 """Environments side by side in a batch: one vector of 512 bits."""
 
 OK, NOT_FINITE, DEAD_POINT, FALLEN = 0, 1, 3, 4
 """As in `result.Result`."""
+
+STARTS = -1.0
+"""Stands in the place of a result where an environment is to start."""
 
 
 def _blocks(**sizes: int) -> dict[str, slice]:
@@ -203,7 +207,8 @@ def run_steps(trunk, limbs, legs, model, account, constants, found, h, steps, ke
 
 @pasted
 def run(data, model, tables, ground, constants, reactions, h, steps, keeps_account, legs, lanes, together):  # type: ignore[no-untyped-def]
-    """Advance all environments: `lanes` at a time, or one whose legs the lanes are."""
+    """Advance all environments: `lanes` at a time, or one whose legs the lanes are. With `steps` below 0
+    those start whose result is `STARTS`."""
     trunk = rows(doubles(t.ROWS * lanes), lanes)
     limbs = rows(doubles(legs * b.ROWS * lanes), lanes)
     account = rows(doubles(ACCOUNTS * lanes), lanes)
@@ -227,7 +232,14 @@ def run(data, model, tables, ground, constants, reactions, h, steps, keeps_accou
         for i in range(legs):
             first = (TRUNK_ROWS + i * LIMB_ROWS) * row + n
             load_limb_rows(below(limbs, i * b.ROWS), at, first, row, far)
-        run_steps(trunk, limbs, legs, inside, account, shape, found, h, steps, keeps_account, reacts)
+        if steps < 0:
+            starts = read(trunk, at, AT_RESULT * row + n, near) == STARTS
+            if not anywhere(starts):
+                continue
+            begin_step(trunk, limbs, legs, inside)
+            if inside.kind != FIXED:
+                settle(trunk, limbs, legs, inside, starts)
+        run_steps(trunk, limbs, legs, inside, account, shape, found, h, max(steps, 0), keeps_account, reacts)
         report_trunk(trunk, at, AT_REPORT * row + n, row, near)
         result = judge(trunk, limbs, legs, together)
         write(result, at, AT_RESULT * row + n, near)

@@ -8,7 +8,6 @@ from hoof_env.dynamics.drive import Drive, Motor, Prescribed
 from hoof_env.errors import ParameterError, check_number
 from hoof_env.leg.geometry import Geometry
 
-
 FARTHEST = 1e3
 """Of O from the trunk's centre of mass [m]."""
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -17,8 +18,9 @@ from hoof_env.dynamics.engine import GRAVITY
 from hoof_env.dynamics.limb import Limb
 from hoof_env.dynamics.reactions import OUTPUTS, leg_constants
 from hoof_env.dynamics.schemes import SCHEMES
-from hoof_env.dynamics.trunk import TRUNKS
+from hoof_env.dynamics.trunk import TRUNKS, Trunk
 from hoof_env.errors import ParameterError
+from hoof_env.ground.contact import Ground
 from hoof_env.ground.exact_math import EXPONENT_UNIT
 from hoof_env.ground.friction import FRICTION_LAWS
 from hoof_env.ground.terrain import Terrain
@@ -67,26 +69,32 @@ class Memory(NamedTuple):
     reactions: Floats
 
 
+def memory_of(data: Floats, num_envs: int, constants: Floats, reactions: Floats) -> Memory:
+    """`Memory` with the parts of `data`, whose last columns may be idle."""
+    legs = len(constants)
+    trunk, limbs = (
+        data[:TRUNK_ROWS, :num_envs],
+        data[TRUNK_ROWS:].reshape(legs, LIMB_ROWS, -1)[:, :, :num_envs],
+    )
+    t_parts = {name: trunk[rows] for name, rows in TRUNK.items()}
+    l_parts = {name: limbs[:, rows] for name, rows in LIMB.items()}
+    return Memory(
+        data, t_parts["state"], l_parts["state"], t_parts["settings"], l_parts["settings"],
+        l_parts["strides"], l_parts["stride_sums"], l_parts["command"], t_parts["account"],
+        t_parts["report"], l_parts["report"], t_parts["result"][0], constants, reactions,
+    )  # fmt: skip
+
+
 def new_memory(engine: TrunkEngine, columns: int) -> Memory:
     """Memory of an engine whose environments are nowhere, that is not a number, until they are reset."""
-    n, legs = engine.num_envs, len(engine.limbs)
-    data = np.zeros((TRUNK_ROWS + legs * LIMB_ROWS, columns))
-    trunk, limbs = data[:TRUNK_ROWS], data[TRUNK_ROWS:].reshape(legs, LIMB_ROWS, columns)
-    trunk[TRUNK["state"]], limbs[:, LIMB["state"]] = np.nan, np.nan
-    trunk[TRUNK["settings"]] = _trunk_settings(engine)[:, None]
-    lift_off = LIFT_OFF * engine.weight / legs
-    firsts = zip(engine.limbs, _first_rows(engine), strict=True)
-    settings = [_limb_settings(limb, first, lift_off) for limb, first in firsts]
-    limbs[:, LIMB["settings"]] = np.array(settings)[:, :, None]
-    ours, theirs = trunk[:, :n], limbs[:, :, :n]
-    return Memory(
-        data, ours[TRUNK["state"]], theirs[:, LIMB["state"]],
-        ours[TRUNK["settings"]], theirs[:, LIMB["settings"]],
-        theirs[:, LIMB["strides"]], theirs[:, LIMB["stride_sums"]], theirs[:, LIMB["command"]],
-        ours[TRUNK["account"]], ours[TRUNK["report"]], theirs[:, LIMB["report"]], ours[TRUNK["result"]][0],
-        np.array([leg_constants(limb.geometry)[:, 0] for limb in engine.limbs]),
-        np.zeros((legs, OUTPUTS, columns if engine.reacts else 0)),
-    )  # fmt: skip
+    legs = len(engine.limbs)
+    constants = np.array([leg_constants(limb.geometry)[:, 0] for limb in engine.limbs])
+    reactions = np.zeros((legs, OUTPUTS, columns if engine.reacts else 0))
+    whole = memory_of(np.zeros((TRUNK_ROWS + legs * LIMB_ROWS, columns)), columns, constants, reactions)
+    whole.trunk[:], whole.limbs[:] = np.nan, np.nan
+    trunk, limbs = settings_of(engine, engine.trunk, engine.ground, engine.limbs)
+    whole.trunk_settings[:], whole.limb_settings[:] = trunk[:, None], limbs[:, :, None]
+    return memory_of(whole.data, engine.num_envs, constants, reactions)
 
 
 def new_model(engine: TrunkEngine) -> tuple[NDArray[Any], Floats, Floats]:
@@ -147,19 +155,26 @@ def _digest(value: Any) -> str:
     return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()[:16]
 
 
-def _trunk_settings(engine: TrunkEngine) -> Floats:
-    trunk, ground, mass = engine.trunk, engine.ground.to_record(), engine.total_mass
-    hangs = trunk.kind == "suspended"
+def settings_of(
+    engine: TrunkEngine, trunk: Trunk, ground: Ground, limbs: Sequence[Limb]
+) -> tuple[Floats, Floats]:
+    """Rows `trunk_rows.PARAMETERS`, shape (17,), and `limb_rows.PARAMETERS`, shape (legs, 12), of an
+    environment of this engine under a trunk of the same kind, on a ground with the same laws."""
+    mass = trunk.mass + sum(limb.geometry.mass for limb in limbs)
+    record, hangs = ground.to_record(), trunk.kind == "suspended"
     values = {
         "total_mass": mass, "per_mass": 1 / mass, "pitch_inertia": trunk.pitch_inertia,
         "support": (1 - trunk.share) * mass * GRAVITY if hangs else 0.0,
         "spring": trunk.stiffness if hangs else 0.0, "damper": trunk.damping if hangs else 0.0,
         "height": trunk.height, "drag": trunk.drag, "gravity": GRAVITY,
         "bottom": float(np.min(engine.terrain.height)),
-    } | {name: ground[name] for name in (
+    } | {name: record[name] for name in (
         "stiffness", "chi", "dashpot", "approach_floor", "friction", "friction_slow", "friction_fast"
     )}  # fmt: skip
-    return np.array([values[name] for name in t.PARAMETERS])
+    lift_off = LIFT_OFF * mass * GRAVITY / len(limbs)
+    firsts = zip(limbs, _first_rows(engine), strict=True)
+    each = [_limb_settings(limb, first, lift_off) for limb, first in firsts]
+    return np.array([values[name] for name in t.PARAMETERS]), np.array(each)
 
 
 def _first_rows(engine: TrunkEngine) -> list[int]:
