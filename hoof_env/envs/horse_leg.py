@@ -22,6 +22,7 @@ from hoof_env.errors import ParameterError, check_choice
 from hoof_env.gait.parameters import PARAMETERS, GaitParameters
 
 RENDER_MODES = ("human", "rgb_array")
+_SHAPE, _NUMBERS = (e.ACTIONS,), (np.dtype(np.float32), np.dtype(np.float64))
 
 
 class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
@@ -56,7 +57,12 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._recording: Recording | None = Recording(self.batch) if render_mode else None
         self._renderer: Any = None
         self._state = "new"
+        self._attach()
+
+    def _attach(self) -> None:
+        """Views of the batch that every step reads or writes."""
         self._terms = self.batch.episode[e.TERM : e.TERM + len(e.TERMS), 0]
+        self._action, self._seen = self.batch.actions[0], self.batch.seen[0]
 
     # What pictures, records and policies read
 
@@ -126,7 +132,7 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self._recording is not None:
             self._show(restart=True)
         info = {name: float(start[name][0]) for name in ("crank_angle", "speed", "height", "x")}
-        return self.batch.seen[0].copy(), {
+        return self._seen.copy(), {
             **info,
             "gait": dict(zip(PARAMETERS, start["gaits"][0].tolist(), strict=True)),
         }
@@ -142,9 +148,15 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._take(action)
         if self._recording is not None:
             self._recording.start()
-        ended = batch.step((self.np_random,)) if self._generator_is_needed else batch.step(())
-        terms = self._terms.tolist()
-        info: dict[str, Any] = dict(zip(e.TERMS, terms, strict=True))
+        ended = batch.step((self._np_random,))
+        progress, peak, energy, change, failure = self._terms.tolist()
+        info: dict[str, Any] = {
+            "reward_progress": progress,
+            "reward_peak": peak,
+            "reward_energy": energy,
+            "reward_action": change,
+            "reward_failure": failure,
+        }
         failed = truncated = False
         if ended:
             failed = bool(batch.episode[e.ENDED, 0] == e.FAILED)
@@ -154,28 +166,19 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
                 info["failure"] = batch.failure(0)
         if self._recording is not None:
             self._show()
-        return batch.seen[0].copy(), sum(terms), failed, truncated, info
-
-    @property
-    def _generator_is_needed(self) -> bool:
-        return self.batch.target_speed is not None
+        return self._seen.copy(), progress + peak + energy + change + failure, failed, truncated, info
 
     def _take(self, action: Any) -> None:
         """Put an action where the kernel finds it."""
-        try:
-            if action.shape == (e.ACTIONS,) and action.dtype.kind in "fiu":
-                self.batch.actions[0] = action
-                return
-        except AttributeError:
-            pass
-        try:
-            given = np.asarray(action)
-            good = given.shape == (e.ACTIONS,) and given.dtype.kind in "fiu"
-        except ValueError:
-            good = False
-        if not good:
-            raise ParameterError(f"action: expected 4 finite numbers in [-1, 1], got {action!r}")
-        self.batch.actions[0] = given
+        if type(action) is not np.ndarray or action.shape != _SHAPE or action.dtype not in _NUMBERS:
+            try:
+                given = np.asarray(action)
+            except ValueError:
+                given = np.empty(0)
+            if given.shape != _SHAPE or given.dtype.kind not in "fiu":
+                raise ParameterError(f"action: expected 4 finite numbers in [-1, 1], got {action!r}")
+            action = given
+        self._action[:] = action
 
     def _refuse_closed(self, name: str) -> None:
         if self._state == "closed":
@@ -256,12 +259,13 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.batch.set_state(state)
         self.np_random.bit_generator.state = copy.deepcopy(state["generator"])
         self._state = "running"
-        return self.batch.seen[0].copy()
+        return self._seen.copy()
 
     def __getstate__(self) -> dict[str, Any]:
         """Copies and pickles leave the window behind; it belongs to this process and this environment."""
-        return {**self.__dict__, "_renderer": None, "_terms": None}
+        views = ("_terms", "_action", "_seen")
+        return {**{k: v for k, v in vars(self).items() if k not in views}, "_renderer": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
-        self._terms = self.batch.episode[e.TERM : e.TERM + len(e.TERMS), 0]
+        vars(self).update(state)
+        self._attach()
