@@ -70,27 +70,22 @@ def meet_point(trunk, limb, hip, hip_velocity, model, c, memory, name):  # type:
     put(limb, c + b.SPOT, spot)
     limb[c + b.DEPTH], limb[c + b.DEPTH_RATE], limb[c + b.SLIDE] = depth, rate, slide
 
-    nothing = 0.0 * size(depth)  # what is not a number stays so
-    push, spring, rub, slowness = nothing, nothing, nothing, limb[memory + 2]
-    force, along_theta, along_beta = plane(nothing, nothing), nothing, nothing
-    inside = depth > 0.0
+    push = 0.0 * size(depth)  # what is not a number stays so
+    spring, slowness, rub, inside = push, limb[memory + 2], push, depth > 0.0
     if anywhere(inside):
         if anywhere(inside & (slowness == 0.0)):
             slowness = choose(slowness > 0.0, slowness, entry_slowness(trunk, limb, depth, rate, memory, model))
-        push, spring = push_back(trunk, limb[c + b.FIRMNESS], depth, rate, slowness, model)
+        pushed, spring = push_back(trunk, limb[c + b.FIRMNESS], depth, rate, slowness, model)
         part = friction_part(size(slide), model.friction_law, trunk[t.SLOW], trunk[t.FAST])
-        grip = trunk[t.FRICTION] * limb[c + b.ROUGHNESS] * part * push
-        normal = vector(limb, c + b.NORMAL_X)
-        rub = choose(slide > 0.0, -grip, grip)
-        force = push * normal - rub * across(normal)
-        push, spring, rub = choose(inside, push, nothing), choose(inside, spring, nothing), choose(inside, rub, nothing)
-        along_theta, along_beta = dot(force, by_theta), cross(arm, force)
-        along_theta, along_beta = choose(inside, along_theta, nothing), choose(inside, along_beta, nothing)
-        force = choose(inside, force, plane(nothing, nothing))
+        grip = trunk[t.FRICTION] * limb[c + b.ROUGHNESS] * part * pushed
+        rub = choose(inside, choose(slide > 0.0, -grip, grip), push)
+        push, spring = choose(inside, pushed, push), choose(inside, spring, push)
+    normal = vector(limb, c + b.NORMAL_X)
+    force = push * normal - rub * across(normal)
     limb[c + b.SPRING], limb[c + b.SLOWNESS] = spring, slowness
     limb[c + b.NORMAL], limb[c + b.RUB] = push, rub
     put(limb, c + b.FORCE, force)
-    return force, along_theta, along_beta
+    return force, dot(force, by_theta), cross(arm, force)
 
 
 @inlined
