@@ -74,7 +74,9 @@ def meet_point(trunk, limb, hip, hip_velocity, model, c, memory, name):  # type:
     spring, slowness, rub, inside = push, limb[memory + 2], push, depth > 0.0
     if anywhere(inside):
         if anywhere(inside & (slowness == 0.0)):
-            slowness = choose(slowness > 0.0, slowness, entry_slowness(trunk, limb, depth, rate, memory, model))
+            slowness = choose(
+                slowness > 0.0, slowness, entry_slowness(trunk, limb, depth, rate, memory, model)
+            )
         pushed, spring = push_back(trunk, limb[c + b.FIRMNESS], depth, rate, slowness, model)
         part = friction_part(size(slide), model.friction_law, trunk[t.SLOW], trunk[t.FAST])
         grip = trunk[t.FRICTION] * limb[c + b.ROUGHNESS] * part * pushed
@@ -103,7 +105,7 @@ def entry_slowness(trunk, limb, depth, rate, memory, model):  # type: ignore[no-
 
 @inlined
 def push_back(trunk, firmness, depth, rate, slowness, model):  # type: ignore[no-untyped-def]
-    """Normal force of the ground (Eq. 14), which never pulls, and the part of its spring [N]; for points inside."""
+    """Normal force on a point inside the ground (Eq. 14), which never pulls, and its spring's part [N]."""
     if model.eighths == 12:  # the usual exponent, 3/2
         power = root_power(depth, 12)
     else:

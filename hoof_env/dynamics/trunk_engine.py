@@ -17,7 +17,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
-from hoof_env.dynamics.advance import LANES, LIMB, LIMB_ROWS, STARTS, TRUNK_ROWS, advance_batch, advance_four, advance_leg, advance_one
+from hoof_env.dynamics.advance import (
+    LANES,
+    LIMB,
+    LIMB_ROWS,
+    STARTS,
+    TRUNK_ROWS,
+    advance_batch,
+    advance_four,
+    advance_leg,
+    advance_one,
+)
 from hoof_env.dynamics.arguments import Floats, all_of, count, finite, flag, one_of
 from hoof_env.dynamics.drive import Drive
 from hoof_env.dynamics.engine import GRAVITY
@@ -365,7 +375,8 @@ class TrunkEngine:
         whole[:] = given
 
     def _go(self, steps: int, account: bool = False) -> None:
-        self._run(*self.arrays, self.substep, steps * self.substeps, account)
+        run: Any = self._run
+        run(*self.arrays, self.substep, steps * self.substeps, account)
 
     def _look(self) -> None:
         """Evaluate where the state is, and change nothing but the report."""

@@ -90,7 +90,7 @@ class EpisodeBatch:
 
     def _physics(self, changes: Mapping[str, float]) -> tuple[Trunk, Ground, Drive]:
         """Trunk, ground and drive with some settings changed."""
-        s = replace(self.settings, **changes)
+        s = replace(self.settings, **dict(changes))  # type: ignore[arg-type]
         trunk = Trunk(
             s.trunk,
             s.trunk_mass,
@@ -136,7 +136,10 @@ class EpisodeBatch:
     # Episodes
 
     def reset(
-        self, envs: Sequence[int], generators: Sequence[np.random.Generator], options: Mapping[str, Any]
+        self,
+        envs: Sequence[int] | NDArray[np.int64],
+        generators: Sequence[np.random.Generator],
+        options: Mapping[str, Any],
     ) -> dict[str, Floats]:
         """Start episodes in some environments.
 
@@ -148,10 +151,9 @@ class EpisodeBatch:
         Returns:
             What was drawn, by name, one row an environment: gaits, crank_angle, speed, height, x.
         """
-        envs = np.asarray(envs, np.int64)
-        columns = self.episode
+        which, columns = np.asarray(envs, np.int64), self.episode
         if parameters := {**self.randomize, **options.get("parameters", {})}:
-            for env, generator in zip(envs, generators, strict=True):
+            for env, generator in zip(which, generators, strict=True):
                 trunk, ground, drive = self._physics(draw_parameters(parameters, generator))
                 self.engine.vary(int(env), trunk, ground, drive)
                 columns[e.WEIGHT, env] = (trunk.mass + self.geometry.mass) * GRAVITY
@@ -159,15 +161,20 @@ class EpisodeBatch:
             options, generators, self.engine.profiles[0], self.engine.trunk, self.gaits, self.engine.terrain
         )
         self.engine.reset(
-            start.gaits.T[None], start.crank_angle[None], x=start.x, y=start.height, vx=start.speed, envs=envs
+            start.gaits.T[None],
+            start.crank_angle[None],
+            x=start.x,
+            y=start.height,
+            vx=start.speed,
+            envs=which,
         )
-        columns[e.ACTION : e.ACTION + 4, envs] = self.action_for(start.gaits).T
-        columns[e.STEPS, envs], columns[e.BEFORE, envs], columns[e.ENDED, envs] = 0.0, start.x, 0.0
-        columns[e.TIME : e.HIGHEST + 1, envs] = 0.0
-        columns[e.TERM : e.TERM + len(e.TERMS), envs] = 0.0
-        columns[e.TARGET, envs], columns[e.SWITCH, envs] = np.inf, np.inf
+        columns[e.ACTION : e.ACTION + 4, which] = self.action_for(start.gaits).T
+        columns[e.STEPS, which], columns[e.BEFORE, which], columns[e.ENDED, which] = 0.0, start.x, 0.0
+        columns[e.TIME : e.HIGHEST + 1, which] = 0.0
+        columns[e.TERM : e.TERM + len(e.TERMS), which] = 0.0
+        columns[e.TARGET, which], columns[e.SWITCH, which] = np.inf, np.inf
         if self.target_speed:
-            for env, generator in zip(envs, generators, strict=True):
+            for env, generator in zip(which, generators, strict=True):
                 columns[e.TARGET, env] = generator.uniform(*self.target_speed)
                 self._draw_target(int(env), generator)
         self._look(self._desk)
@@ -192,7 +199,7 @@ class EpisodeBatch:
         if self.target_speed:
             n = self.num_envs
             for env in np.flatnonzero(self.episode[e.STEPS, :n] >= self.episode[e.SWITCH, :n]):
-                self._draw_target(int(env), generators[env])
+                self._draw_target(int(env), generators[int(env)])
         return ended > 0
 
     def summary(self, env: int) -> dict[str, float]:
@@ -287,3 +294,21 @@ def _substeps(dt: float, sim_dt: float) -> int:
             f"(ratio {ratio:g}; at most {MOST_SUBSTEPS})"
         )
     return round(ratio)
+
+
+def check_state(state: Any, env_id: str, settings: Mapping[str, Any], parts: Sequence[str] = ()) -> None:
+    """Raise unless `state` is one that `get_state` of such an environment gave.
+
+    Raises:
+        ParameterError: it lacks a part, or is of another id or of other settings.
+    """
+    names = ("id", "settings", "engine", "episode", "generator", *parts)
+    missing = [name for name in names if not isinstance(state, Mapping) or name not in state]
+    if missing:
+        raise ParameterError(f"state: expected what get_state gives, but {', '.join(missing)} is missing")
+    if state["id"] != env_id:
+        raise ParameterError(f"state: expected one of {env_id}, got one of {state['id']}")
+    there = state["settings"]
+    unlike = [f"{k}: {v!r} here, {there.get(k)!r} there" for k, v in settings.items() if there.get(k) != v]
+    if unlike:
+        raise ParameterError(f"state: of other settings; {'; '.join(unlike)}")

@@ -1,4 +1,4 @@
-"""The kernels of an environment's step: from actions to commands, through the engine, to observation and reward.
+"""The kernels of an environment's step: from actions through the engine to observation and reward.
 
 One source for one environment and for `LANES` side by side, so that a row of a batch has the bits of the
 environment alone. All arrays are reached from one array of addresses (`DESK`), for a call from Python costs

@@ -1,4 +1,4 @@
-"""The environments of the family, one class for all; `tasks` has what they differ in, `manual` their pages."""
+"""The environments of the family, one class for all; `tasks` has what they differ in."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.trunk_model import LIFT_OFF
 from hoof_env.envs import episode as e
-from hoof_env.envs.batch import EpisodeBatch
+from hoof_env.envs.batch import EpisodeBatch, check_state
 from hoof_env.envs.recording import Recording
 from hoof_env.envs.start import check_options
 from hoof_env.envs.tasks import TASKS, to_json
@@ -148,7 +148,7 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._take(action)
         if self._recording is not None:
             self._recording.start()
-        ended = batch.step((self._np_random,))
+        ended = batch.step((self.np_random,))
         progress, peak, energy, change, failure = self._terms.tolist()
         info: dict[str, Any] = {
             "reward_progress": progress,
@@ -246,16 +246,7 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         Raises:
             ParameterError: a state of another id, version, geometry or setting, or one that lacks a part.
         """
-        parts = ("id", "settings", "engine", "episode", "generator")
-        missing = [name for name in parts if not isinstance(state, Mapping) or name not in state]
-        if missing:
-            raise ParameterError(f"state: expected what get_state gives, but {', '.join(missing)} is missing")
-        if state["id"] != self.task.id:
-            raise ParameterError(f"state: expected one of {self.task.id}, got one of {state['id']}")
-        own = to_json(self.settings)
-        unlike = [f"{k}: {own[k]!r} here, {v!r} there" for k, v in state["settings"].items() if own.get(k) != v]
-        if unlike:
-            raise ParameterError(f"state: of other settings; {'; '.join(unlike)}")
+        check_state(state, self.task.id, to_json(self.settings))
         self.batch.set_state(state)
         self.np_random.bit_generator.state = copy.deepcopy(state["generator"])
         self._state = "running"

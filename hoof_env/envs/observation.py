@@ -49,8 +49,8 @@ GROUPS: dict[str, tuple[tuple[str, str, str], ...]] = {
     "target": (("commanded speed", "tanh(x / 5)", "m/s"),),
     "ground": tuple((f"height of the ground {x:g} m ahead", "tanh(x / 0.5)", "m") for x in AHEAD),
 }
-"""Names, scaling and unit before scaling of all entries, by group, in the order in which kernels know them; the
-height of the ground is that above the ground under O."""
+"""Names, scaling and unit before scaling of all entries, by group, in the order in which kernels know them;
+the height of the ground is that above the ground under O."""
 
 _KNOWN = [entry[0] for group in GROUPS.values() for entry in group]
 _NUMBERS = {name: k for k, name in enumerate(_KNOWN)}

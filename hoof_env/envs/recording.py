@@ -39,7 +39,9 @@ class Recording:
         time = self.batch.engine.state["time"][self.env]
         if time == 0.0 or self._before is None:
             return self._run(now, 0)
-        return {name: values[1:] for name, values in self._run(self._before, self.batch.substeps, now).items()}
+        return {
+            name: values[1:] for name, values in self._run(self._before, self.batch.substeps, now).items()
+        }
 
     def _run(
         self, column: NDArray[np.float64], steps: int, after: NDArray[np.float64] | None = None

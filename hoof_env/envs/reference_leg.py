@@ -21,8 +21,8 @@ from hoof_env.dynamics.trace import new_trace
 from hoof_env.dynamics.trunk import ONE_LEG, Trunk
 from hoof_env.envs import reward
 from hoof_env.envs.reference_observation import HALF_RANGE, MIDDLE, layout, observe
-from hoof_env.envs.stance import LIFT_OFF, new_account, summarize, take_account
 from hoof_env.envs.reference_start import HIGHEST, LOWEST, Start, check_options, draw_start
+from hoof_env.envs.stance import LIFT_OFF, new_account, summarize, take_account
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait.motion_law import FilterSettings
 from hoof_env.gait.parameters import GaitParameters, gait_names, load_gait

@@ -35,8 +35,8 @@ HANDED_ON = ("minari_autoseed",)
 """Options that others put there for themselves: Minari hands its own on to the environment."""
 
 FLAT, MARGIN, REACH = Terrain.flat(), 50.0, np.linspace(-1.0, 1.0, 21)
-"""Level ground; how far from its ends an episode on a terrain begins [m], for it goes somewhere; where a hoof may
-come down, from O [m]."""
+"""Level ground; how far from its ends an episode on a terrain begins [m], for it goes somewhere; where a hoof
+may come down, from O [m]."""
 
 MOST_TRIES = 100
 """Draws of a crank angle at which the hoof is above the ground."""
@@ -115,7 +115,7 @@ def draw_starts(
             below = np.flatnonzero(height + hoof_height(profile, chosen, theta) < ground)
             if not below.size:
                 break
-            theta[below] = [2 * np.pi * generators[k].random() for k in below]
+            theta[below] = [2 * np.pi * generators[int(k)].random() for k in below]
     return Starts(chosen, theta, speed, height, x)
 
 

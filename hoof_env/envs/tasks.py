@@ -98,8 +98,10 @@ class Task:
         return replace(Settings(), **{**self.defaults, **changes})
 
 
-_SUSPENDED = """The trunk moves along x and y. The leg must bear `trunk_share` of the weight of trunk and leg; a
-constant force carries the rest, a vertical spring and damper stands for the animal's other legs."""
+_SUSPENDED = (
+    "The trunk moves along x and y. The leg must bear `trunk_share` of the weight of trunk and leg; a"
+    " constant force carries the rest, a vertical spring and damper stands for the animal's other legs."
+)
 
 TASKS: Mapping[str, Task] = MappingProxyType(
     {
@@ -114,7 +116,8 @@ TASKS: Mapping[str, Task] = MappingProxyType(
             "HorseLegSpeed",
             "A horse's leg that keeps a commanded speed, which changes.",
             _SUSPENDED
-            + " Every 2 to 4 s a new speed is commanded. Progress is paid up to it; what goes beyond costs as much.",
+            + " Every 2 to 4 s a new speed is commanded. Progress is paid up to it; what goes beyond costs"
+            " as much.",
             {
                 "target_speed": (0.5, 3.5),
                 "observation": ("crank", "gait", "trunk", "hoof", "action", "target"),
@@ -124,8 +127,8 @@ TASKS: Mapping[str, Task] = MappingProxyType(
             "HorseLegTerrain",
             "A horse's leg on slopes and on patches of stiff, soft and slippery ground.",
             _SUSPENDED
-            + " The ground rises and falls, and is harder, softer or more slippery in places; an episode begins"
-            " anywhere on it. The heights ahead are observed, what the ground is made of is not.",
+            + " The ground rises and falls, and is harder, softer or more slippery in places; an episode"
+            " begins anywhere on it. The heights ahead are observed, what the ground is made of is not.",
             {
                 "terrain": {"kind": "hills", "seed": 0},
                 "observation": ("crank", "gait", "trunk", "hoof", "action", "ground"),

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from hoof_env.dynamics.result import Result
 from hoof_env.dynamics.trace import new_trace
 from hoof_env.envs.reference_leg import ReferenceLegEnv
-from hoof_env.envs.stance import LIFT_OFF
 from hoof_env.envs.reference_start import HIGHEST, LOWEST
+from hoof_env.envs.stance import LIFT_OFF
 from hoof_env.errors import ParameterError
 from hoof_env.gait.parameters import GaitParameters
 

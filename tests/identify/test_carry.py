@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from hoof_env import cli
-from hoof_env.envs.reference_leg import ReferenceLegEnv
 from hoof_env.envs.policies import make_policy, policy_names
+from hoof_env.envs.reference_leg import ReferenceLegEnv
 from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.gait.parameters import LIMITS, PARAMETERS, GaitParameters, gait_names, load_gait
 from hoof_env.identify import carry_report
