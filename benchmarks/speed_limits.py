@@ -19,7 +19,7 @@ from benchmarks.speed_cases import BATCH, DT, STEPS, Scene, engine, scenes, work
 from benchmarks.speed_ceilings import ceilings, clock
 from benchmarks.speed_code import KINDS, WIDTHS, assembly, by_kind, instructions
 from benchmarks.speed_rounds import Floats, interleave, spread
-from benchmarks.speed_stages import AROUND, EVALUATE, WHOLE, Pass, jit
+from benchmarks.speed_stages import STAGES, STEP, Pass, jit
 from hoof_env.dynamics.advance import LANES, advance_batch, advance_one, run
 from hoof_env.dynamics.trunk_engine import TrunkEngine
 
@@ -34,9 +34,7 @@ PASSES = {
 }
 """By name: scene, lanes, environments."""
 
-STAGES = {**EVALUATE, "all of these in one piece": WHOLE, **AROUND}
-WHOLE_STEP = ("all of these in one piece", *AROUND)
-"""What a whole step is."""
+PIECE = "a step in one piece"
 
 BOUNDS = {"divisions": KINDS[:2], "arithmetic": KINDS[2:3], "loads": KINDS[3:4], "stores": KINDS[4:]}
 """Square roots go through the divider."""
@@ -57,7 +55,7 @@ def limits(preset: str, quick: bool, rounds: int) -> dict[str, Any]:
         made = engine(at[scene], preset, number)
         one, counts[name] = Pass(made, lanes, together=number == 1 < lanes), {}
         runs[name, "step"] = _advance(made, number // lanes if number > 1 else 1, STEPS[scene, number])
-        for title, stage in STAGES.items():
+        for title, stage in {**STAGES, PIECE: STEP}.items():
             if not stage.moves or made.trunk.kind != "fixed":
                 found, work = one.count(stage), partial(one.loop(stage, one.legs), *one.given, DT, TURNS)
                 counts[name][title] = Counter({k: stage.calls * n for k, n in found.items()})
@@ -85,9 +83,8 @@ def _pass(name: str, counts: dict[str, Counts], seconds: dict[Any, Floats]) -> d
             "of_ceiling": {bound: spread(needed(count, bound) / spent) for bound in BOUNDS},
         }
 
-    whole = sum((counts[title] for title in WHOLE_STEP), Counter())
     rows = {title: row(count, seconds[name, title]) for title, count in counts.items()}
-    return {"rows": rows, "step": row(whole, seconds[name, "step"])}
+    return {"rows": rows, "step": row(counts[PIECE], seconds[name, "step"])}
 
 
 def _widths(made: TrunkEngine) -> dict[str, dict[int, int]]:

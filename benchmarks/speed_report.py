@@ -150,12 +150,9 @@ def _limits(limits: dict[str, Any]) -> list[str]:
     if limits["passes"]:
         parts += ["### Stages of a step", PASSES]
     for name, found in limits["passes"].items():
-        step = found["step"]
         parts += [f"#### {name}", _pass(found)]
-        parts.append(
-            f"The whole step: {told(step['ns'])} ns, {told(step['per_cycle'])} instructions a cycle."
-        )
-    parts += ["### Experiments", EXPERIMENTS] if limits["experiments"] else []
+        parts.append(f"A step in the kernel: {told(found['step']['ns'], 4)} ns.")
+    parts += [EXPERIMENTS] if limits["experiments"] else []
     for group, found in limits["experiments"].items():
         parts.append(table([group, "time"], [[name, told(s)] for name, s in found.items()]))
     return parts
@@ -167,13 +164,13 @@ def _pass(found: dict[str, Any]) -> str:
     rows = [
         [
             name,
-            f"{row['ns']['median']:.3g}",
+            f"{row['ns']['median']:.1f}",
             str(row["instructions"]),
             f"{row['per_cycle']['median']:.1f}",
             *(str(row[kind]) for kind in KINDS),
             *(f"{share['median']:.2f}" for share in row["of_ceiling"].values()),
         ]
-        for name, row in (*found["rows"].items(), ("the whole step", found["step"]))
+        for name, row in (*found["rows"].items(), ("a step in the kernel", found["step"]))
     ]
     return table(head, rows)
 

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numba
 import numpy as np
 from llvmlite import ir
+from numba import carray  # type: ignore[attr-defined]
 from numba.core import types
 from numpy.typing import NDArray
 
@@ -60,7 +61,7 @@ def _all(stage: Callable[..., None]) -> Stage:
     return Stage(inlined(stage), 1)
 
 
-EVALUATE: dict[str, Stage] = {
+STAGES: dict[str, Stage] = {
     "clear the trunk": _trunk(lambda trunk, kind: m.clear_trunk(trunk, kind)),
     "look up the leg's functions": _each(
         lambda trunk, limb, model, h: m.look_up_functions(trunk, limb, model)
@@ -77,24 +78,29 @@ EVALUATE: dict[str, Stage] = {
     ),
     "accelerate the trunk": _trunk(lambda trunk, kind: m.accelerate_trunk(trunk, kind)),
     "accelerate the crank": _each(lambda trunk, limb, model, h: m.accelerate_crank(trunk, limb)),
-}
-AROUND: dict[str, Stage] = {
     "remember contacts": _each(lambda trunk, limb, model, h: remember_contacts(limb), calls=1),
     "begin the step": _all(lambda trunk, limbs, legs, model, h: begin_step(trunk, limbs, legs, model)),
     "weigh the stage": _all(lambda trunk, limbs, legs, model, h: weigh_stage(trunk, limbs, legs, model, h)),
     "next stage": _all(lambda trunk, limbs, legs, model, h: next_stage(trunk, limbs, legs, model, h)),
     "end the step": _all(lambda trunk, limbs, legs, model, h: end_step(trunk, limbs, legs, model, h)),
 }
-"""Both together are what a step does. Of two stages of midpoint one has no weight."""
+"""By name. Of the two stages of midpoint one has no weight."""
 
 
 @pasted
-def _evaluate(trunk, limbs, legs, model, h):  # type: ignore[no-untyped-def]
-    m.evaluate(trunk, limbs, legs, model, h)
+def _step(trunk, limbs, legs, model, h):  # type: ignore[no-untyped-def]
+    m.evaluate(trunk, limbs, legs, model, 0.0)
+    for i in range(legs):
+        remember_contacts(below(limbs, i * b.ROWS))
+    next_stage(trunk, limbs, legs, model, 0.5 * h)
+    m.evaluate(trunk, limbs, legs, model, 0.5 * h)
+    weigh_stage(trunk, limbs, legs, model, 1.0)
+    end_step(trunk, limbs, legs, model, h)
+    begin_step(trunk, limbs, legs, model)
 
 
-WHOLE = Stage(_evaluate, 2)
-"""All of `EVALUATE` in one piece, as in the kernels."""
+STEP = Stage(_step, 1)
+"""A step of midpoint in one piece, without the kernels' loop over the stages of any scheme."""
 
 
 @intrinsic
@@ -126,7 +132,8 @@ class Pass:
     def __init__(self, made: TrunkEngine, lanes: int, together: bool = False) -> None:
         self.made, self.lanes, self.together = made, lanes, together
         self.legs = 1 if together else len(made.limbs)
-        self.given = self._filled(), *made._model
+        model, tables, _ = made._model
+        self.given = self._filled(), tables, model[0]["settings"].copy()
 
     def _filled(self) -> NDArray[np.float64]:
         """Rows of trunk and legs, evaluated."""
@@ -157,16 +164,16 @@ class Pass:
         kind, eighths, law, cells = (int(record[k]) for k in ("kind", "eighths", "friction_law", "cells"))
         interpolated = bool(record["interpolated"])
 
-        def loop(filled, model, tables, ground, h, n):  # type: ignore[no-untyped-def]
+        def loop(filled, tables, settings, h, n):  # type: ignore[no-untyped-def]
             memory = doubles(filled.size)
             trunk = rows(memory, lanes)
             limbs = below(trunk, t.ROWS)
             for k in range(filled.size):
                 memory[k] = filled[k]
-            given = inner(model, tables, ground, doubles(20), together)
+            filters = address(settings)
             fixed = Model(
-                kind, eighths, law, interpolated, False, False, together, cells, given.tables,
-                given.settings, given.stages, given.fractions, given.weights, given.ground_cells, 0.0, 1.0,
+                kind, eighths, law, interpolated, False, False, together, cells, address(tables),
+                filters, 2, filters, filters, carray(address(tables), tables.shape), 0.0, 1.0,
             )  # fmt: skip
             for _ in range(n if again else 1):
                 fence(memory)

@@ -15,7 +15,7 @@ from benchmarks.speed_code import by_kind, instructions
 from benchmarks.speed_report import speed_table
 from benchmarks.speed_rounds import interleave, spread
 from benchmarks.speed_scaling import line_error
-from benchmarks.speed_stages import EVALUATE, Pass
+from benchmarks.speed_stages import STAGES, Pass
 
 
 def test_quick_mode_runs_without_peers_and_writes_its_files(tmp_path, monkeypatch, capsys):
@@ -93,7 +93,7 @@ def test_machine_code_is_counted_by_width():
 def test_a_stage_is_counted_for_all_legs():
     """One division for a crank, whatever the loop around it; the trunk's 3 x 3 system has one of its own."""
     horse = Pass(engine(scenes("identified")["horse"], "identified", 8), lanes=8)
-    legs, trunk = (horse.count(EVALUATE[name]) for name in ("feel the leg", "accelerate the trunk"))
+    legs, trunk = (horse.count(STAGES[name]) for name in ("feel the leg", "accelerate the trunk"))
     bits = {
         kind: sum(n * w for (k, w), n in legs.items() if k == kind) for kind in ("divisions", "square roots")
     }
