@@ -30,6 +30,9 @@ _PUBLIC = {
     "ConstrainedLeg": "hoof_env.dynamics.constrained",
     "HorseLegEnv": "hoof_env.envs.horse_leg",
     "HorseLegFixedEnv": "hoof_env.envs.horse_leg_fixed",
+    "HorseLegMOEnv": "hoof_env.envs.multi_objective",
+    "HorseLegVectorEnv": "hoof_env.envs.vector",
+    "Sb3VecEnv": "hoof_env.envs.sb3",
     "make_policy": "hoof_env.envs.policies",
     "HoofEnvError": "hoof_env.errors",
     "ParameterError": "hoof_env.errors",
@@ -40,10 +43,7 @@ _PUBLIC = {
 
 __all__ = ["__version__", *_PUBLIC]
 
-_ENTRY_POINTS = {
-    "hoof_env/HorseLeg-v0": "hoof_env.envs.horse_leg:HorseLegEnv",
-    "hoof_env/HorseLegFixed-v0": "hoof_env.envs.horse_leg_fixed:HorseLegFixedEnv",
-}
+_TASKS = {"HorseLeg": "leg", "HorseLegRail": "rail", "HorseLegSpeed": "speed", "HorseLegTerrain": "terrain"}
 
 
 def __getattr__(name: str) -> Any:
@@ -58,6 +58,21 @@ def __dir__() -> list[str]:
     return sorted(__all__)
 
 
-for _id, _entry in _ENTRY_POINTS.items():
-    if _id not in _gym.registry:
-        _gym.register(id=_id, entry_point=_entry)
+def _register(name: str, **spec: Any) -> None:
+    if f"hoof_env/{name}" not in _gym.registry:
+        _gym.register(id=f"hoof_env/{name}", **spec)
+
+
+for _name, _task in _TASKS.items():
+    _register(
+        f"{_name}-v0",
+        entry_point="hoof_env.envs.horse_leg:HorseLegEnv",
+        vector_entry_point="hoof_env.envs.vector:HorseLegVectorEnv",
+        kwargs={"task": _task},
+    )
+_register("HorseLegFixed-v0", entry_point="hoof_env.envs.horse_leg_fixed:HorseLegFixedEnv")
+_register(
+    "HorseLegMO-v0",
+    entry_point="hoof_env.envs.multi_objective:HorseLegMOEnv",
+    disable_env_checker=True,  # it expects a number for a reward
+)

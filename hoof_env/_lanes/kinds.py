@@ -9,7 +9,7 @@ from numba.core import types
 from numba.core.datamodel import models
 from numba.core.extending import register_model
 
-INDEX, DOUBLE, TRUTH = ir.IntType(64), ir.DoubleType(), ir.IntType(1)
+INDEX, DOUBLE, SINGLE, TRUTH = ir.IntType(64), ir.DoubleType(), ir.FloatType(), ir.IntType(1)
 _POSITION = ir.IntType(32)
 
 

@@ -9,7 +9,7 @@ from numba.core import types
 from numba.core.extending import lower_builtin
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 
-from hoof_env._lanes.kinds import DOUBLE, INDEX, Lanes, Rows, gathered, is_real, number, pick, wide
+from hoof_env._lanes.kinds import DOUBLE, INDEX, SINGLE, Lanes, Rows, gathered, is_real, number, pick, wide
 from hoof_env._memory import intrinsic
 
 
@@ -48,10 +48,12 @@ def _read(builder: Any, pointer: Any, at: Any, stride: Any, count: int) -> Any:
     """`count` doubles from pointer[at] on, `stride` apart: one load if they are neighbours."""
     first = builder.gep(pointer, [at])
     if count == 1:
-        return builder.load(first)
+        return as_double(builder, builder.load(first))
     with builder.if_else(builder.icmp_signed("==", stride, INDEX(1))) as (near, far):
         with near:
-            one = builder.load(builder.bitcast(first, wide(DOUBLE, count).as_pointer()), align=8)
+            one = builder.load(
+                builder.bitcast(first, wide(pointer.type.pointee, count).as_pointer()), align=4
+            )
             after_near = builder.block
         with far:
             places = [builder.add(at, builder.mul(stride, INDEX(lane))) for lane in range(count)]
@@ -60,17 +62,25 @@ def _read(builder: Any, pointer: Any, at: Any, stride: Any, count: int) -> Any:
     found = builder.phi(one.type)
     found.add_incoming(one, after_near)
     found.add_incoming(many, after_far)
-    return found
+    return as_double(builder, found)
+
+
+def as_double(builder: Any, x: Any) -> Any:
+    """Doubles of floats that may be single."""
+    element = getattr(x.type, "element", x.type)
+    return builder.fpext(x, wide(DOUBLE, getattr(x.type, "count", 1))) if element == SINGLE else x
 
 
 def _write(builder: Any, x: Any, pointer: Any, at: Any, stride: Any, count: int) -> None:
     first = builder.gep(pointer, [at])
+    if pointer.type.pointee == SINGLE:
+        x = builder.fptrunc(x, wide(SINGLE, count))
     if count == 1:
         builder.store(x, first)
         return
     with builder.if_else(builder.icmp_signed("==", stride, INDEX(1))) as (near, far):
         with near:
-            builder.store(x, builder.bitcast(first, x.type.as_pointer()), align=8)
+            builder.store(x, builder.bitcast(first, x.type.as_pointer()), align=4)
         with far:
             for lane in range(count):
                 place = builder.add(at, builder.mul(stride, INDEX(lane)))
@@ -79,7 +89,7 @@ def _write(builder: Any, x: Any, pointer: Any, at: Any, stride: Any, count: int)
 
 @intrinsic
 def read(context: Any, rows: Any, pointer: Any, start: Any, stride: Any) -> Any:
-    """pointer[start], pointer[start + stride], ...: as many as the rows have lanes."""
+    """pointer[start], pointer[start + stride], ...: as many as the rows have lanes. Singles are widened."""
 
     def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         _, pointer, start, stride = values
@@ -90,7 +100,7 @@ def read(context: Any, rows: Any, pointer: Any, start: Any, stride: Any) -> Any:
 
 @intrinsic
 def write(context: Any, x: Any, pointer: Any, start: Any, stride: Any) -> Any:
-    """Put lanes at pointer[start], pointer[start + stride], ..."""
+    """Put lanes at pointer[start], pointer[start + stride], ...; rounded if singles are there."""
 
     def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         x, pointer, start, stride = values

@@ -18,11 +18,11 @@ import numpy as np
 from numba import carray  # type: ignore[attr-defined]
 
 from hoof_env._jit import inlined, kernel, pasted
-from hoof_env._lanes import below, choose, fill, lane_sum, level, read, rows, write
+from hoof_env._lanes import anywhere, below, choose, fill, lane_sum, level, read, rows, write
 from hoof_env._memory import address, doubles, offset
 from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
-from hoof_env.dynamics.lanes import evaluate, keep_still
+from hoof_env.dynamics.lanes import evaluate, keep_still, settle
 from hoof_env.dynamics.lanes_ground import level_ground, remember_contacts
 from hoof_env.dynamics.lanes_reactions import react
 from hoof_env.dynamics.lanes_report import (
@@ -33,14 +33,19 @@ from hoof_env.dynamics.lanes_report import (
     report_leg,
     report_trunk,
 )
+from hoof_env.dynamics.lanes_strides import count_stride, forget_sums
 from hoof_env.dynamics.lanes_time import begin_step, end_step, next_stage, weigh_stage
 from hoof_env.dynamics.reactions import CONSTANTS, OUTPUTS
+from hoof_env.dynamics.trunk import FIXED
 
 LANES = 8
 """Environments side by side in a batch: one vector of 512 bits."""
 
 OK, NOT_FINITE, DEAD_POINT, FALLEN = 0, 1, 3, 4
 """As in `result.Result`."""
+
+STARTS = -1.0
+"""Stands in the place of a result where an environment is to start."""
 
 
 def _blocks(**sizes: int) -> dict[str, slice]:
@@ -52,24 +57,30 @@ def _blocks(**sizes: int) -> dict[str, slice]:
 TRUNK = _blocks(
     state=len(t.STATE), settings=len(t.PARAMETERS), account=len(ACCOUNT), report=len(TRUNK_REPORT), result=1
 )
-LIMB = _blocks(state=len(b.STATE), command=4, settings=len(b.PARAMETERS), report=len(LIMB_REPORT))
+LIMB = _blocks(
+    state=len(b.STATE), strides=len(b.STRIDES), stride_sums=len(b.STRIDE_SUMS), command=4,
+    settings=len(b.PARAMETERS), report=len(LIMB_REPORT),
+)  # fmt: skip
 """Rows of `data`: the engine's state and settings, what it was told, and what it tells."""
 
 TRUNK_ROWS, LIMB_ROWS = TRUNK["result"].stop, LIMB["report"].stop
 TRUNK_STATES, TRUNK_SETTINGS, ACCOUNTS = len(t.STATE), len(t.PARAMETERS), len(ACCOUNT)
-LIMB_STATES, LIMB_SETTINGS = len(b.STATE), len(b.PARAMETERS)
+LIMB_STATES, LIMB_KEPT, LIMB_SETTINGS = len(b.STATE), len(b.STATE + b.STRIDES), len(b.PARAMETERS)
+LIMB_STORED = LIMB_KEPT + len(b.STRIDE_SUMS)
 AT_SETTINGS, AT_ACCOUNT, AT_REPORT, AT_RESULT = (block.start for block in list(TRUNK.values())[1:])
-AT_COMMAND, AT_LIMB_SETTINGS, AT_LIMB_REPORT = (block.start for block in list(LIMB.values())[1:])
+AT_COMMAND, AT_LIMB_SETTINGS, AT_LIMB_REPORT = (block.start for block in list(LIMB.values())[3:])
 
 MODEL = np.dtype(
     [
         ("legs", "i8"), ("cells", "i8"),  # how many; cells of a leg's table
         ("kind", "i8"), ("eighths", "i8"), ("friction_law", "i8"),  # of trunk, contact exponent, friction
         ("interpolated", "?"), ("is_terrain", "?"), ("new_rates", "?"),  # see `Ground`, `Terrain`, `schemes`
+        ("strides", "?"),  # whether to count them
         ("stages", "i8"), ("fractions", "f8", (4,)), ("weights", "f8", (4,)),  # of the scheme
         ("settings", "f8", (12,)),  # of the filters
         ("ground_origin", "f8"), ("ground_per_metre", "f8"),  # of the terrain's grid
-    ]
+    ],
+    align=True,
 )  # fmt: skip
 """What does not change while the engine runs, but for large arrays."""
 
@@ -90,6 +101,7 @@ class Model(NamedTuple):
     interpolated: bool
     is_terrain: bool
     new_rates: bool
+    strides: bool
     together: bool
     cells: int
     tables: Any
@@ -112,7 +124,8 @@ def inner(model, tables, ground, small, together):  # type: ignore[no-untyped-de
         small[12 + k], small[16 + k] = given.fractions[k], given.weights[k]
     return Model(
         given.kind, given.eighths, given.friction_law, given.interpolated, given.is_terrain, given.new_rates,
-        together, given.cells, address(tables), small, given.stages, offset(small, 12), offset(small, 16),
+        given.strides, together, given.cells, address(tables),
+        small, given.stages, offset(small, 12), offset(small, 16),
         carray(address(ground), ground.shape), given.ground_origin, given.ground_per_metre,
     )  # fmt: skip
 
@@ -128,7 +141,8 @@ def load_trunk_rows(trunk, data, n, row, stride):  # type: ignore[no-untyped-def
 @inlined
 def load_limb_rows(limb, data, start, row, stride):  # type: ignore[no-untyped-def]
     """State, command and settings of a leg, whose rows begin at `start`."""
-    fill(limb, 0, LIMB_STATES, data, start, row, stride)
+    fill(limb, 0, LIMB_KEPT, data, start, row, stride)
+    forget_sums(limb)
     fill(limb, b.COMMAND, 4, data, start + AT_COMMAND * row, row, stride)
     fill(limb, b.HIP_ON_TRUNK, LIMB_SETTINGS, data, start + AT_LIMB_SETTINGS * row, row, stride)
     level_ground(limb)
@@ -172,6 +186,8 @@ def run_steps(trunk, limbs, legs, model, account, constants, found, h, steps, ke
             for i in range(legs):
                 limb = below(limbs, i * b.ROWS)
                 remember_contacts(limb)
+                if model.strides and turn > 0:
+                    count_stride(trunk, limb, h)
                 if reacts and (turn > 0 or steps == 0):
                     react(trunk, limb, below(constants, i * CONSTANTS), below(found, i * OUTPUTS))
         if turn < steps * model.stages:
@@ -191,7 +207,8 @@ def run_steps(trunk, limbs, legs, model, account, constants, found, h, steps, ke
 
 @pasted
 def run(data, model, tables, ground, constants, reactions, h, steps, keeps_account, legs, lanes, together):  # type: ignore[no-untyped-def]
-    """Advance all environments: `lanes` at a time, or one whose legs the lanes are."""
+    """Advance all environments: `lanes` at a time, or one whose legs the lanes are. With `steps` below 0
+    those start whose result is `STARTS`."""
     trunk = rows(doubles(t.ROWS * lanes), lanes)
     limbs = rows(doubles(legs * b.ROWS * lanes), lanes)
     account = rows(doubles(ACCOUNTS * lanes), lanes)
@@ -215,7 +232,14 @@ def run(data, model, tables, ground, constants, reactions, h, steps, keeps_accou
         for i in range(legs):
             first = (TRUNK_ROWS + i * LIMB_ROWS) * row + n
             load_limb_rows(below(limbs, i * b.ROWS), at, first, row, far)
-        run_steps(trunk, limbs, legs, inside, account, shape, found, h, steps, keeps_account, reacts)
+        if steps < 0:
+            starts = read(trunk, at, AT_RESULT * row + n, near) == STARTS
+            if not anywhere(starts):
+                continue
+            begin_step(trunk, limbs, legs, inside)
+            if inside.kind != FIXED:
+                settle(trunk, limbs, legs, inside, starts)
+        run_steps(trunk, limbs, legs, inside, account, shape, found, h, max(steps, 0), keeps_account, reacts)
         report_trunk(trunk, at, AT_REPORT * row + n, row, near)
         result = judge(trunk, limbs, legs, together)
         write(result, at, AT_RESULT * row + n, near)
@@ -227,7 +251,7 @@ def run(data, model, tables, ground, constants, reactions, h, steps, keeps_accou
         for i in range(legs):
             limb, first = below(limbs, i * b.ROWS), (TRUNK_ROWS + i * LIMB_ROWS) * row + n
             report_leg(trunk, limb, at, first + AT_LIMB_REPORT * row, row, far)
-            replace(trunk, limb, LIMB_STATES, at, first, row, far, result)
+            replace(trunk, limb, LIMB_STORED, at, first, row, far, result)
             if reacts:
                 for k in range(OUTPUTS):
                     place = (i * OUTPUTS + k) * row + n

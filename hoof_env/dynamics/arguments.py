@@ -62,3 +62,10 @@ def all_of(name: str, values: Any, kind: type[Kind]) -> tuple[Kind, ...]:
     if not several or not all(isinstance(value, kind) for value in several):
         raise ParameterError(f"{name}: expected {kind.__name__}, one or more, got {values!r}")
     return several
+
+
+def flag(name: str, value: Any) -> bool:
+    """`value`, if it is True or False."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise ParameterError(f"{name}: expected True or False, got {value!r}")
+    return bool(value)

@@ -18,6 +18,10 @@ class Prescribed:
     """The crank follows the filtered command exactly (the paper's driver, row 42 of Eq. 2)."""
 
 
+LARGEST = 1e9
+"""Of each number of a motor, whose squares are then numbers still."""
+
+
 @dataclass(frozen=True)
 class Motor:
     """A speed servo: torque = speed_gain (commanded - actual crank speed), limited to +-torque_limit.
@@ -32,7 +36,7 @@ class Motor:
         gear_ratio: turns of the rotor for one of the crank [-].
 
     Raises:
-        ParameterError: a value is not finite or negative.
+        ParameterError: a value is not finite, negative or beyond `LARGEST`.
     """
 
     speed_gain: float = 100.0
@@ -42,7 +46,7 @@ class Motor:
 
     def __post_init__(self) -> None:
         for name in ("speed_gain", "torque_limit", "rotor_inertia", "gear_ratio"):
-            check_number(f"motor.{name}", getattr(self, name), low=0)
+            check_number(f"motor.{name}", getattr(self, name), low=0, high=LARGEST)
 
     @property
     def reflected_inertia(self) -> float:

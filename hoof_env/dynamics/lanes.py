@@ -181,6 +181,32 @@ def move_trunk(trunk, kind):  # type: ignore[no-untyped-def]
     trunk[t.FELL] = choose(place.imag < trunk[t.BOTTOM], 1.0, trunk[t.FELL])
 
 
+@pasted
+def settle(trunk, limbs, legs, model, starts):  # type: ignore[no-untyped-def]
+    """Centre of mass, momentum and spin of all where an environment starts, from what stands in their place
+    then: place and velocity of the trunk and rate of its pitch. The inverse of `move_trunk`."""
+    clear_trunk(trunk, model.kind)
+    for i in range(legs):
+        limb = below(limbs, i * b.ROWS)
+        look_up_functions(trunk, limb, model)
+        place_frame(trunk, limb, 0.0)
+        gather_leg(trunk, limb, model.together)
+    place, velocity, rate = vector(trunk, t.CENTRE), vector(trunk, t.MOMENTUM), trunk[t.SPIN]
+    moment, drift, per_mass = vector(trunk, t.MOMENT), vector(trunk, t.DRIFT), trunk[t.PER_MASS]
+    centre = place + per_mass * moment
+    momentum = trunk[t.TOTAL_MASS] * velocity + drift
+    spin = level(trunk, 0.0)
+    if model.kind == RAIL:
+        centre, momentum = plane(centre.real, place.imag), plane(momentum.real, 0.0)
+    if model.kind == FREE:
+        momentum = momentum + rate * across(moment)
+        about = trunk[t.ROUND] - dot(moment, moment) * per_mass
+        spin = rate * about + trunk[t.SWIRL] - cross(moment, drift) * per_mass
+    put(trunk, t.CENTRE, choose(starts, centre, place))
+    put(trunk, t.MOMENTUM, choose(starts, momentum, velocity))
+    trunk[t.SPIN] = choose(starts, spin, rate)
+
+
 @inlined
 def feel_leg(trunk, limb, elapsed):  # type: ignore[no-untyped-def]
     """A crank's equation of motion: INERTIA theta_tt + U . a + LEVER pitch_tt = torque + ground - rest.

@@ -57,29 +57,32 @@ def meet_point(trunk, limb, hip, hip_velocity, model, c, memory, name):  # type:
     arm = turn * vector(limb, b.VALUES + name)
     by_theta = turn * vector(limb, b.SLOPES + name)
     spot, velocity = hip + arm, hip_velocity + (w * by_theta + frame_rate * across(arm))
-    height = level(limb, 0.0)
+    depth, rate, slide = -spot.imag, -velocity.imag, velocity.real
     if model.is_terrain:
         height, normal_x, normal_y, firmness, roughness = surface(
             spot.real, model.ground_cells, model.ground_origin, model.ground_per_metre
         )
-        put(limb, c + b.NORMAL_X, plane(normal_x, normal_y))
+        normal = plane(normal_x, normal_y)
+        depth, rate = (height - spot.imag) * normal_y, -dot(normal, velocity)
+        slide = -cross(normal, velocity)
+        put(limb, c + b.NORMAL_X, normal)
         limb[c + b.FIRMNESS], limb[c + b.ROUGHNESS] = firmness, roughness
-    normal = vector(limb, c + b.NORMAL_X)
-    depth, rate, slide = (height - spot.imag) * normal.imag, -dot(normal, velocity), -cross(normal, velocity)
-
     put(limb, c + b.SPOT, spot)
     limb[c + b.DEPTH], limb[c + b.DEPTH_RATE], limb[c + b.SLIDE] = depth, rate, slide
+
     push = 0.0 * size(depth)  # what is not a number stays so
-    spring, slowness, rub = push, limb[memory + 2], push
-    if anywhere(depth > 0.0):
-        if anywhere((depth > 0.0) & (slowness == 0.0)):
+    spring, slowness, rub, inside = push, limb[memory + 2], push, depth > 0.0
+    if anywhere(inside):
+        if anywhere(inside & (slowness == 0.0)):
             slowness = choose(
                 slowness > 0.0, slowness, entry_slowness(trunk, limb, depth, rate, memory, model)
             )
-        push, spring = push_back(trunk, limb[c + b.FIRMNESS], depth, rate, slowness, model)
+        pushed, spring = push_back(trunk, limb[c + b.FIRMNESS], depth, rate, slowness, model)
         part = friction_part(size(slide), model.friction_law, trunk[t.SLOW], trunk[t.FAST])
-        grip = trunk[t.FRICTION] * limb[c + b.ROUGHNESS] * part * push
-        rub = choose(depth > 0.0, choose(slide > 0.0, -grip, grip), push)
+        grip = trunk[t.FRICTION] * limb[c + b.ROUGHNESS] * part * pushed
+        rub = choose(inside, choose(slide > 0.0, -grip, grip), push)
+        push, spring = choose(inside, pushed, push), choose(inside, spring, push)
+    normal = vector(limb, c + b.NORMAL_X)
     force = push * normal - rub * across(normal)
     limb[c + b.SPRING], limb[c + b.SLOWNESS] = spring, slowness
     limb[c + b.NORMAL], limb[c + b.RUB] = push, rub
@@ -102,15 +105,14 @@ def entry_slowness(trunk, limb, depth, rate, memory, model):  # type: ignore[no-
 
 @inlined
 def push_back(trunk, firmness, depth, rate, slowness, model):  # type: ignore[no-untyped-def]
-    """Normal force of the ground (Eq. 14), which never pulls, and the part of its spring [N]."""
+    """Normal force on a point inside the ground (Eq. 14), which never pulls, and its spring's part [N]."""
     if model.eighths == 12:  # the usual exponent, 3/2
         power = root_power(depth, 12)
     else:
         power = root_power(depth, model.eighths)
-    spring, inside = trunk[t.STIFFNESS] * firmness * power, depth > 0.0
+    spring = trunk[t.STIFFNESS] * firmness * power
     push = spring * (1.0 + trunk[t.CHI] * rate * slowness) + trunk[t.DASHPOT] * rate
-    outside = 0.0 * size(depth)
-    return choose(inside, larger(push, 0.0), outside), choose(inside, spring, 0.0)
+    return larger(push, 0.0), spring
 
 
 @inlined

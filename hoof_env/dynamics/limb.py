@@ -8,6 +8,9 @@ from hoof_env.dynamics.drive import Drive, Motor, Prescribed
 from hoof_env.errors import ParameterError, check_number
 from hoof_env.leg.geometry import Geometry
 
+FARTHEST = 1e3
+"""Of O from the trunk's centre of mass [m]."""
+
 
 @dataclass(frozen=True)
 class Limb:
@@ -19,7 +22,7 @@ class Limb:
         drive: what turns its crank.
 
     Raises:
-        ParameterError: a part is of the wrong type or not finite.
+        ParameterError: a part is of the wrong type, not finite, or the hip beyond `FARTHEST`.
     """
 
     geometry: Geometry
@@ -37,4 +40,7 @@ class Limb:
             raise ParameterError(
                 f"limb.hip: expected two numbers (x, y) in metres, got {self.hip!r}"
             ) from None
-        object.__setattr__(self, "hip", (check_number("limb.hip[0]", x), check_number("limb.hip[1]", y)))
+        hip = tuple(
+            check_number(f"limb.hip[{k}]", v, low=-FARTHEST, high=FARTHEST) for k, v in enumerate((x, y))
+        )
+        object.__setattr__(self, "hip", hip)

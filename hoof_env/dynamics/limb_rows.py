@@ -20,7 +20,21 @@ STATE = (
 """Crank angle and rate; command filters; what each hoof point remembers of the last whole step: penetration,
 its rate, and while it is in the ground its slowness at entry, 1 / approach speed [s/m], else 0."""
 
-VALUES = 16  # the leg's functions at the present stage, in the profile's order
+STANCE_OPEN, STANCE_BEGAN, STANCE_PEAK = range(16, 19)
+STRIDES = ("stance_open", "stance_began", "stance_peak")
+"""Whether there is a stance (1 or 0), the crank angle where it opened [rad], and its highest force [N]; see
+`lanes_strides`."""
+
+STRIDE_SUM = 19
+PEAK_INCREASE, HIGHEST, POSITIVE_WORK, LOAD_IMPULSE, LOADED_TIME, STANCES, TRAVEL = range(19, 26)
+STRIDE_SUMS = (
+    "peak_increase", "highest", "positive_work", "load_impulse", "loaded_time", "stances", "travel",
+)  # fmt: skip
+"""Of one call of the engine: increases of running peaks and highest force [N], positive work of both drives
+[J], impulse of the normal force [N s], time under load [s], stances that began, and load-weighted backward
+travel of the hoof along the ground [m]."""
+
+VALUES = 26  # the leg's functions at the present stage, in the profile's order
 SLOPES = VALUES + WIDTH  # derivatives of the first of them by the crank angle
 (
     COMMAND, _, _, _,  # what is commanded of the filters
@@ -53,12 +67,15 @@ CONTACT_ROWS = 15
 ) = range(15)  # fmt: skip
 
 _P = CONTACT + 2 * CONTACT_ROWS
-HIP_ON_TRUNK, _, MASS, SIDE, FIRST, MOTOR, GAIN, LIMIT, ROTOR_A, ROTOR_B, ROTOR_C = range(_P, _P + 11)
+HIP_ON_TRUNK, _, MASS, SIDE, FIRST, MOTOR, GAIN, LIMIT, ROTOR_A, ROTOR_B, ROTOR_C, LIFT_OFF = range(
+    _P, _P + 12
+)
 PARAMETERS = (
     "hip_x", "hip_y", "mass", "side", "first_row", "is_motor", "speed_gain", "torque_limit",
-    "rotor_a", "rotor_b", "rotor_c",
+    "rotor_a", "rotor_b", "rotor_c", "lift_off",
 )  # fmt: skip
 """Settings of a leg: its place on the trunk, mass, which way it travels, the row where its table begins, its
-motor, and what the rotor adds to the inertias a, b, c."""
+motor, what the rotor adds to the inertias a, b, c, and the
+normal force that tells stance from swing [N]."""
 
-ROWS = _P + 11
+ROWS = _P + 12

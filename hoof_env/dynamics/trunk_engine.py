@@ -9,6 +9,7 @@ module is the border: checks and state. A number has the same bits alone and in 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,8 +17,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
-from hoof_env.dynamics.advance import LANES, advance_batch, advance_four, advance_leg, advance_one
-from hoof_env.dynamics.arguments import Floats, all_of, count, finite, one_of
+from hoof_env.dynamics.advance import (
+    LANES,
+    LIMB,
+    LIMB_ROWS,
+    STARTS,
+    TRUNK_ROWS,
+    advance_batch,
+    advance_four,
+    advance_leg,
+    advance_one,
+)
+from hoof_env.dynamics.arguments import Floats, all_of, count, finite, flag, one_of
+from hoof_env.dynamics.drive import Drive
 from hoof_env.dynamics.engine import GRAVITY
 from hoof_env.dynamics.lanes_report import ACCOUNT, LIMB_REPORT, TRUNK_REPORT
 from hoof_env.dynamics.limb import Limb
@@ -27,7 +39,7 @@ from hoof_env.dynamics.schemes import SCHEMES
 from hoof_env.dynamics.step_length import StepLength
 from hoof_env.dynamics.tally import Tally, tally
 from hoof_env.dynamics.trunk import Trunk
-from hoof_env.dynamics.trunk_model import differences, layout, new_memory, new_model
+from hoof_env.dynamics.trunk_model import differences, layout, memory_of, new_memory, new_model, settings_of
 from hoof_env.dynamics.trunk_start import FARTHEST, start
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait.motion_law import FilterSettings
@@ -45,7 +57,7 @@ MOST_LEGS = 32
 MOST_STEPS = 10**12
 """Substeps of a call, which are counted in 64 bits."""
 
-STATE = ("trunk", "limbs", "command", "account")
+STATE = ("trunk", "limbs", "strides", "command", "account", "trunk_settings", "limb_settings")
 """Arrays that hold what changes."""
 
 
@@ -80,8 +92,10 @@ class TrunkEngine:
         num_envs: environments side by side, which share all of the above.
         filters: bounds of the command filters.
         reactions: compute the joint reactions of every step; `reactions()` has those of the last.
+        strides: count stances, peak forces and work; `strides` has them.
 
     Attributes:
+        is_few: environments are run one by one, not side by side.
         step_limits: longest step [s] for each cause, see `step_length`. Friction is not heeded, for nothing
             blows up: on the ground of `HorseLeg-v0` it asks a horse of 349 kg for 0.14 ms. There forces at
             1 ms agree with those at 16 us to 1 % under hoofs that slide; under hoofs that stand friction is
@@ -109,6 +123,7 @@ class TrunkEngine:
         num_envs: int = 1,
         filters: FilterSettings | None = None,
         reactions: bool = False,
+        strides: bool = False,
     ) -> None:
         self.limbs = all_of("limbs", limbs, Limb)
         if len(self.limbs) > MOST_LEGS:
@@ -125,12 +140,20 @@ class TrunkEngine:
         self.step_limits = length.limits
         asked = None if substeps is None else count("substeps", substeps, most=MOST_STEPS)
         self.substeps = length.choose(self.sim_dt, asked)
-        self.reacts = bool(reactions)
-        is_few = self.num_envs <= FEW
+        self.reacts, self.counts_strides = flag("reactions", reactions), flag("strides", strides)
+        self.is_few = self.num_envs <= FEW
         alone = {1: advance_leg, 4: advance_four}.get(len(self.limbs), advance_one)
-        self._run = alone if is_few else advance_batch
-        self._memory = new_memory(self, self.num_envs if is_few else -(-self.num_envs // LANES) * LANES)
+        self._run = alone if self.is_few else advance_batch
+        self._memory = new_memory(self, self.num_envs if self.is_few else -(-self.num_envs // LANES) * LANES)
         self._model = new_model(self)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """A copy has memory of its own, also a shallow one."""
+        m = self._memory
+        return {**vars(self), "_memory": (m.data.copy(), self.num_envs, m.constants, m.reactions.copy())}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state, _memory=memory_of(*state["_memory"]))
 
     # What it is like
 
@@ -144,11 +167,53 @@ class TrunkEngine:
         """Weight of trunk and legs [N]."""
         return self.total_mass * GRAVITY
 
+    # What the kernels take, for those that call them from kernels of their own
+
+    @property
+    def arrays(self) -> tuple[NDArray[Any], ...]:
+        """The first arguments of the kernels of `advance`; they stay where they are, but not in a copy."""
+        m = self._memory
+        return (m.data, *self._model, m.constants, m.reactions)
+
+    @property
+    def columns(self) -> int:
+        """Of the memory: environments, idle ones included."""
+        return int(self._memory.data.shape[1])
+
+    @property
+    def substep(self) -> float:
+        """What is integrated at once [s]."""
+        return self.sim_dt / self.substeps
+
+    @property
+    def results(self) -> NDArray[np.int64]:
+        """How the last call ended in each environment, values of `result.Result`, shape (num_envs,)."""
+        return self._memory.result.astype(np.int64)
+
+    def column(self, env: int) -> Floats:
+        """All memory of one environment: state, settings, command, report; shape (rows,)."""
+        return self._memory.data[:, env].copy()
+
+    def set_column(self, env: int, column: Floats) -> None:
+        """Put back what `column` gave, of an engine like this one."""
+        self._memory.data[:, env] = column
+
+    def command_in(self, column: Floats) -> Floats:
+        """The command in such a column, shape (legs, 4)."""
+        return column[TRUNK_ROWS:].reshape(len(self.limbs), LIMB_ROWS)[:, LIMB["command"]].copy()
+
+    def alone(self) -> TrunkEngine:
+        """An engine like this one, for one environment."""
+        return TrunkEngine(
+            self.limbs, self.trunk, self.ground, self.terrain, sim_dt=self.sim_dt, integrator=self.integrator,
+            substeps=self.substeps, filters=self.filters, reactions=self.reacts, strides=self.counts_strides,
+        )  # fmt: skip
+
     # State
 
     def reset(
         self,
-        gaits: GaitParameters | Sequence[GaitParameters],
+        gaits: GaitParameters | Sequence[GaitParameters] | Floats,
         theta: ArrayLike = 0.0,
         *,
         x: ArrayLike = 0.0,
@@ -165,7 +230,7 @@ class TrunkEngine:
         A hoof point that starts inside the ground has entered it at its present rate.
 
         Args:
-            gaits: gait parameters of each leg.
+            gaits: gait parameters, one for all legs or one each; or as numbers, shape (legs, 4, n).
             theta: crank angles [rad], of shape (), (legs,) or (legs, n) with n the environments that start.
             x, y, pitch, vx, vy, pitch_rate: of the trunk's centre of mass [m, rad, s], shape () or (n,); a
                 `y` of None is the trunk's height.
@@ -176,18 +241,42 @@ class TrunkEngine:
             ParameterError: a value is not finite, of the wrong shape or forbidden by the trunk's kind, an
                 angle, place or rate is beyond `trunk_start.FARTHEST`, or a leg's links have no place there.
         """
-        where, legs, a = self._which(envs), len(self.limbs), self._memory
-        one = isinstance(gaits, GaitParameters)
-        each = all_of("gaits", [gaits] * legs if one else gaits, GaitParameters)
-        if len(each) != legs:
-            raise ParameterError(f"gaits: expected one or {legs}, got {len(each)}")
-        values = np.array([gait.to_array() for gait in each])
+        where, a = self._which(envs), self._memory
+        values = self._gaits(gaits, where.size)
         height = self.trunk.height if y is None else y
         at = {"x": x, "y": height, "pitch": pitch, "vx": vx, "vy": vy, "pitch_rate": pitch_rate}
         a.trunk[:, where], a.limbs[:, :, where] = start(self, values, theta, theta_rate, at, where.size)
-        a.command[:, :, where] = values[:, :, None]
-        a.account[:, where] = 0.0
-        self._go(0)
+        a.command[:, :, where] = values
+        a.account[:, where], a.strides[:, :, where] = 0.0, 0.0
+        a.result[where] = STARTS
+        self._go(-1)
+
+    def vary(
+        self, env: int, trunk: Trunk | None = None, ground: Ground | None = None, drive: Drive | None = None
+    ) -> None:
+        """Give one environment its own masses, springs, ground or motors; it must be reset afterwards.
+
+        Args:
+            env: which.
+            trunk, ground, drive: instead of the engine's, whose kind, exponent and laws they share; None is
+                the engine's own.
+
+        Raises:
+            ParameterError: what environments share differs.
+        """
+        trunk, ground = trunk or self.trunk, ground or self.ground
+        shared = {
+            "trunk.kind": (trunk.kind, self.trunk.kind),
+            "exponent": (ground.exponent, self.ground.exponent),
+        }
+        shared["friction_law"] = (ground.friction_law, self.ground.friction_law)
+        shared["approach"] = (ground.approach, self.ground.approach)
+        for name, (given, own) in shared.items():
+            if given != own:
+                raise ParameterError(f"{name}: expected {own!r}, which all environments share, got {given!r}")
+        limbs = [limb if drive is None else replace(limb, drive=drive) for limb in self.limbs]
+        m = self._memory
+        m.trunk_settings[:, env], m.limb_settings[:, :, env] = settings_of(self, trunk, ground, limbs)
 
     def get_state(self) -> dict[str, Any]:
         """Everything that changes, as arrays of their own: continuing from it is bit-identical."""
@@ -286,9 +375,8 @@ class TrunkEngine:
         whole[:] = given
 
     def _go(self, steps: int, account: bool = False) -> None:
-        memory, h = self._memory, self.sim_dt / self.substeps
-        arrays = (memory.data, *self._model, memory.constants, memory.reactions)
-        self._run(*arrays, h, steps * self.substeps, account)
+        run: Any = self._run
+        run(*self.arrays, self.substep, steps * self.substeps, account)
 
     def _look(self) -> None:
         """Evaluate where the state is, and change nothing but the report."""
@@ -327,6 +415,14 @@ class TrunkEngine:
         """Integrals since the reset by name, `lanes_report.ACCOUNT`, shape (num_envs,)."""
         return {name: self._memory.account[k].copy() for k, name in enumerate(ACCOUNT)}
 
+    @property
+    def strides(self) -> dict[str, Floats]:
+        """The open stance and the sums of the last call by name, `limb_rows.STRIDES` and `STRIDE_SUMS`, shape
+        (legs, num_envs); see `lanes_strides`. Zeros unless the engine was made with `strides=True`."""
+        names, m = (*b.STRIDES, *b.STRIDE_SUMS), self._memory
+        whole = np.concatenate([m.strides, m.stride_sums], axis=1)
+        return {name: whole[:, k] for k, name in enumerate(names)}
+
     def reactions(self) -> Reactions:
         """Joint reactions at the present instant.
 
@@ -353,6 +449,19 @@ class TrunkEngine:
             "this environment was never reset" if new else Result(int(code)).message
             for code, new in zip(self._memory.result, np.atleast_1d(never), strict=True)
         ]
+
+    def _gaits(self, gaits: Any, n: int) -> Floats:
+        """Gait parameters as numbers, shape (legs, 4, n)."""
+        legs = len(self.limbs)
+        if isinstance(gaits, np.ndarray):
+            given = finite("gaits", gaits, FARTHEST)
+            if given.shape != (legs, 4, n):
+                raise ParameterError(f"gaits: expected shape {(legs, 4, n)}, got {given.shape}")
+            return given
+        each = all_of("gaits", [gaits] * legs if isinstance(gaits, GaitParameters) else gaits, GaitParameters)
+        if len(each) != legs:
+            raise ParameterError(f"gaits: expected one or {legs}, got {len(each)}")
+        return np.repeat(np.array([gait.to_array() for gait in each])[:, :, None], n, 2)
 
     def _which(self, envs: ArrayLike | None) -> NDArray[np.int64]:
         if envs is None:

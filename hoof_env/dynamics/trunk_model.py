@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -17,8 +18,9 @@ from hoof_env.dynamics.engine import GRAVITY
 from hoof_env.dynamics.limb import Limb
 from hoof_env.dynamics.reactions import OUTPUTS, leg_constants
 from hoof_env.dynamics.schemes import SCHEMES
-from hoof_env.dynamics.trunk import TRUNKS
+from hoof_env.dynamics.trunk import TRUNKS, Trunk
 from hoof_env.errors import ParameterError
+from hoof_env.ground.contact import Ground
 from hoof_env.ground.exact_math import EXPONENT_UNIT
 from hoof_env.ground.friction import FRICTION_LAWS
 from hoof_env.ground.terrain import Terrain
@@ -28,6 +30,11 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
+LIFT_OFF = 0.05
+"""Normal force that tells stance from swing, in a leg's part of the weight. A hoof that merely grazes the
+ground between two pushes has lifted off: were any contact stance, a policy could hold one peak for ever and
+push under it."""
+
 
 class Memory(NamedTuple):
     """An engine's memory: `data` as the kernels take it, and views of its parts; the last axis is the
@@ -36,7 +43,8 @@ class Memory(NamedTuple):
     Attributes:
         data: all of it, shape (rows, columns): whole vectors of environments, so some columns may be idle.
         trunk, limbs: the state, shapes (7, n) and (legs, 16, n).
-        trunk_settings, limb_settings: parameters, shapes (17, n) and (legs, 11, n).
+        trunk_settings, limb_settings: parameters, shapes (17, n) and (legs, 12, n).
+        strides, stride_sums: of `limb_rows`, shapes (legs, 3, n) and (legs, 7, n).
         command: shape (legs, 4, n).
         account: shape (9, n), added to.
         trunk_report, limb_report: at the end, shapes (8, n) and (legs, 18, n).
@@ -50,6 +58,8 @@ class Memory(NamedTuple):
     limbs: Floats
     trunk_settings: Floats
     limb_settings: Floats
+    strides: Floats
+    stride_sums: Floats
     command: Floats
     account: Floats
     trunk_report: Floats
@@ -59,23 +69,32 @@ class Memory(NamedTuple):
     reactions: Floats
 
 
+def memory_of(data: Floats, num_envs: int, constants: Floats, reactions: Floats) -> Memory:
+    """`Memory` with the parts of `data`, whose last columns may be idle."""
+    legs = len(constants)
+    trunk, limbs = (
+        data[:TRUNK_ROWS, :num_envs],
+        data[TRUNK_ROWS:].reshape(legs, LIMB_ROWS, -1)[:, :, :num_envs],
+    )
+    t_parts = {name: trunk[rows] for name, rows in TRUNK.items()}
+    l_parts = {name: limbs[:, rows] for name, rows in LIMB.items()}
+    return Memory(
+        data, t_parts["state"], l_parts["state"], t_parts["settings"], l_parts["settings"],
+        l_parts["strides"], l_parts["stride_sums"], l_parts["command"], t_parts["account"],
+        t_parts["report"], l_parts["report"], t_parts["result"][0], constants, reactions,
+    )  # fmt: skip
+
+
 def new_memory(engine: TrunkEngine, columns: int) -> Memory:
     """Memory of an engine whose environments are nowhere, that is not a number, until they are reset."""
-    n, legs = engine.num_envs, len(engine.limbs)
-    data = np.zeros((TRUNK_ROWS + legs * LIMB_ROWS, columns))
-    trunk, limbs = data[:TRUNK_ROWS], data[TRUNK_ROWS:].reshape(legs, LIMB_ROWS, columns)
-    trunk[TRUNK["state"]], limbs[:, LIMB["state"]] = np.nan, np.nan
-    trunk[TRUNK["settings"]] = _trunk_settings(engine)[:, None]
-    settings = [_limb_settings(*pair) for pair in zip(engine.limbs, _first_rows(engine), strict=True)]
-    limbs[:, LIMB["settings"]] = np.array(settings)[:, :, None]
-    ours, theirs = trunk[:, :n], limbs[:, :, :n]
-    return Memory(
-        data, ours[TRUNK["state"]], theirs[:, LIMB["state"]],
-        ours[TRUNK["settings"]], theirs[:, LIMB["settings"]], theirs[:, LIMB["command"]],
-        ours[TRUNK["account"]], ours[TRUNK["report"]], theirs[:, LIMB["report"]], ours[TRUNK["result"]][0],
-        np.array([leg_constants(limb.geometry)[:, 0] for limb in engine.limbs]),
-        np.zeros((legs, OUTPUTS, columns if engine.reacts else 0)),
-    )  # fmt: skip
+    legs = len(engine.limbs)
+    constants = np.array([leg_constants(limb.geometry)[:, 0] for limb in engine.limbs])
+    reactions = np.zeros((legs, OUTPUTS, columns if engine.reacts else 0))
+    whole = memory_of(np.zeros((TRUNK_ROWS + legs * LIMB_ROWS, columns)), columns, constants, reactions)
+    whole.trunk[:], whole.limbs[:] = np.nan, np.nan
+    trunk, limbs = settings_of(engine, engine.trunk, engine.ground, engine.limbs)
+    whole.trunk_settings[:], whole.limb_settings[:] = trunk[:, None], limbs[:, :, None]
+    return memory_of(whole.data, engine.num_envs, constants, reactions)
 
 
 def new_model(engine: TrunkEngine) -> tuple[NDArray[Any], Floats, Floats]:
@@ -100,6 +119,7 @@ def new_model(engine: TrunkEngine) -> tuple[NDArray[Any], Floats, Floats]:
     record["friction_law"] = FRICTION_LAWS.index(ground.friction_law)
     record["interpolated"] = ground.approach == "interpolated"
     record["is_terrain"], record["new_rates"] = terrain != Terrain.flat(), scheme.new_rates
+    record["strides"] = engine.counts_strides
     record["stages"] = len(scheme.weights)
     record["fractions"][: len(scheme.fractions)] = scheme.fractions
     record["weights"][: len(scheme.weights)] = scheme.weights
@@ -135,19 +155,26 @@ def _digest(value: Any) -> str:
     return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()[:16]
 
 
-def _trunk_settings(engine: TrunkEngine) -> Floats:
-    trunk, ground, mass = engine.trunk, engine.ground.to_record(), engine.total_mass
-    hangs = trunk.kind == "suspended"
+def settings_of(
+    engine: TrunkEngine, trunk: Trunk, ground: Ground, limbs: Sequence[Limb]
+) -> tuple[Floats, Floats]:
+    """Rows `trunk_rows.PARAMETERS`, shape (17,), and `limb_rows.PARAMETERS`, shape (legs, 12), of an
+    environment of this engine under a trunk of the same kind, on a ground with the same laws."""
+    mass = trunk.mass + sum(limb.geometry.mass for limb in limbs)
+    record, hangs = ground.to_record(), trunk.kind == "suspended"
     values = {
         "total_mass": mass, "per_mass": 1 / mass, "pitch_inertia": trunk.pitch_inertia,
         "support": (1 - trunk.share) * mass * GRAVITY if hangs else 0.0,
         "spring": trunk.stiffness if hangs else 0.0, "damper": trunk.damping if hangs else 0.0,
         "height": trunk.height, "drag": trunk.drag, "gravity": GRAVITY,
         "bottom": float(np.min(engine.terrain.height)),
-    } | {name: ground[name] for name in (
+    } | {name: record[name] for name in (
         "stiffness", "chi", "dashpot", "approach_floor", "friction", "friction_slow", "friction_fast"
     )}  # fmt: skip
-    return np.array([values[name] for name in t.PARAMETERS])
+    lift_off = LIFT_OFF * mass * GRAVITY / len(limbs)
+    firsts = zip(limbs, _first_rows(engine), strict=True)
+    each = [_limb_settings(limb, first, lift_off) for limb, first in firsts]
+    return np.array([values[name] for name in t.PARAMETERS]), np.array(each)
 
 
 def _first_rows(engine: TrunkEngine) -> list[int]:
@@ -156,12 +183,12 @@ def _first_rows(engine: TrunkEngine) -> list[int]:
     return [unique.index(profile) * cells for profile in engine.profiles]
 
 
-def _limb_settings(limb: Limb, first_row: int) -> Floats:
+def _limb_settings(limb: Limb, first_row: int, lift_off: float) -> Floats:
     motor = limb.drive if isinstance(limb.drive, Motor) else Motor(0.0, 0.0, 0.0, 0.0)
     side, rotor = float(limb.geometry.travel), motor.rotor_inertia
     values = (
         *limb.hip, limb.geometry.mass, side, first_row, float(isinstance(limb.drive, Motor)),
         motor.speed_gain, motor.torque_limit,
-        motor.reflected_inertia, -side * motor.gear_ratio * rotor, rotor,
+        motor.reflected_inertia, -side * motor.gear_ratio * rotor, rotor, lift_off,
     )  # fmt: skip
     return np.array(values)

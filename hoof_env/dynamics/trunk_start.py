@@ -1,4 +1,4 @@
-"""Where `TrunkEngine` starts: its state from gaits, crank angles and the place and speed of the trunk."""
+"""Where `TrunkEngine` starts: checks of gaits, crank angles and the place and speed of the trunk."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
 from hoof_env.dynamics.arguments import Floats, spread
 from hoof_env.dynamics.drive import Motor
-from hoof_env.dynamics.tally import tally
 from hoof_env.dynamics.trunk import FREE, RAIL, SUSPENDED, TRUNKS
 from hoof_env.errors import ParameterError
 
@@ -34,9 +33,12 @@ def start(
 ) -> tuple[Floats, Floats]:
     """State of `n` environments with filters at rest: of the trunk, shape (7, n), and legs, (legs, 16, n).
 
+    In the place of centre of mass, momentum and spin of all are the trunk's place, velocity and rate of
+    pitch: the kernels make the one of the other (`lanes.settle`).
+
     Args:
         engine: that is to start.
-        gaits: gait parameters of each leg, shape (legs, 4).
+        gaits: gait parameters of each leg, shape (legs, 4, n).
         theta, theta_rate: as in `TrunkEngine.reset`.
         trunk: x, y, pitch, vx, vy, pitch_rate there.
 
@@ -45,11 +47,11 @@ def start(
     """
     legs = len(engine.limbs)
     angle = spread("theta", theta, (legs, n), FARTHEST)
-    spin = spread("theta_rate", gaits[:, :1] if theta_rate is None else theta_rate, (legs, n), FARTHEST)
+    spin = spread("theta_rate", gaits[:, 0] if theta_rate is None else theta_rate, (legs, n), FARTHEST)
     for i, limb in enumerate(engine.limbs):
         if not isinstance(limb.drive, Motor) and np.any(spin[i] != gaits[i, 0]):
             raise ParameterError(
-                f"theta_rate: leg {i} is prescribed to turn at {gaits[i, 0]:g} rad/s, got {spin[i]}"
+                f"theta_rate: leg {i} is prescribed to turn at {gaits[i, 0]} rad/s, got {spin[i]}"
             )
         if not np.isfinite(engine.profiles[i](angle[i])[0]).all():
             raise ParameterError(f"theta: the links of leg {i} have no place at some of {angle[i]} rad")
@@ -63,16 +65,11 @@ def start(
             raise ParameterError(f"{name}: expected 0 of a {engine.trunk.kind} trunk, got {at[name]}")
     if kind <= RAIL and np.any(at["y"] != engine.trunk.height):
         raise ParameterError(f"y: a {engine.trunk.kind} trunk is at {engine.trunk.height:g} m, got {at['y']}")
-    swing = gaits[:, 1:2] + gaits[:, 2:3] * np.sin(angle) + gaits[:, 3:] * np.cos(angle)
-    slope = gaits[:, 2:3] * np.cos(angle) - gaits[:, 3:] * np.sin(angle)
-    whole = tally(engine, angle, spin, swing, slope * spin, at)
-    moves = np.array([kind != 0, kind in (SUSPENDED, FREE), kind == FREE], dtype=float)
     state = np.zeros((len(t.STATE), n))
-    state[t.CENTRE] = np.where(moves[0], whole.centre.real, at["x"])
-    state[t.CENTRE + 1] = np.where(moves[1], whole.centre.imag, at["y"])
-    state[t.MOMENTUM], state[t.MOMENTUM + 1] = moves[0] * whole.momentum.real, moves[1] * whole.momentum.imag
-    state[t.PITCH], state[t.SPIN] = at["pitch"], moves[2] * whole.spin
+    rows = (t.CENTRE, t.CENTRE + 1, t.MOMENTUM, t.MOMENTUM + 1, t.PITCH, t.SPIN)
+    for row, name in zip(rows, ("x", "y", "vx", "vy", "pitch", "pitch_rate"), strict=True):
+        state[row] = at[name]
     leg = np.zeros((legs, len(b.STATE), n))
     leg[:, b.THETA], leg[:, b.OMEGA] = angle, spin
-    leg[:, b.VALUE : b.VALUE + 4] = gaits[:, :, None]
+    leg[:, b.VALUE : b.VALUE + 4] = gaits
     return state, leg

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from hoof_env.dynamics.constrained import ConstrainedLeg
 from hoof_env.dynamics.integrators import INTEGRATORS
 from hoof_env.dynamics.trunk import Trunk
-from hoof_env.envs.horse_leg import HorseLegEnv
-from hoof_env.envs.observation import HALF_RANGE
-from hoof_env.envs.start import Start
+from hoof_env.envs.reference_leg import ReferenceLegEnv
+from hoof_env.envs.reference_observation import HALF_RANGE
+from hoof_env.envs.reference_start import Start
 from hoof_env.errors import check_choice, check_number
 from hoof_env.gait.parameters import LIMITS, GaitParameters
 from hoof_env.ground.contact import Ground
@@ -26,7 +26,7 @@ PRINTED_BETA = math.sqrt(2 * 15.0)
 """Baumgarte's beta as the paper's Table 1 prints it, sqrt(2 alpha) [1/s]; sqrt(2) alpha = 21.2 is probably meant."""
 
 
-class HorseLegFixedEnv(HorseLegEnv):
+class HorseLegFixedEnv(ReferenceLegEnv):
     """The paper's set-up: one gait on a fixed trunk, one crank revolution.
 
     ## Description

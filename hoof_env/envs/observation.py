@@ -1,97 +1,83 @@
-"""What a policy sees: 24 numbers in [-1, 1] on a suspended trunk, fewer where the trunk cannot move."""
+"""What a policy sees: numbers in [-1, 1], in groups that can be chosen. `episode.look` computes them."""
 
 from __future__ import annotations
 
-import math
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hoof_env.envs.episode import AHEAD
+from hoof_env.errors import ParameterError
 from hoof_env.gait.parameters import LIMITS
-
-SPEED_SCALE, RISE_SCALE, HEIGHT_SCALE, APPROACH_SCALE, LOAD_SCALE = 5.0, 2.0, 0.3, 2.0, 3.0
-"""Scales of tanh: forward speed [m/s], vertical speed [m/s], height [m], approach
-speed [m/s], force [weights]."""
 
 _LOW, _HIGH = (np.array([limit[i] for limit in LIMITS.values()]) for i in (0, 1))
 MIDDLE, HALF_RANGE = (_LOW + _HIGH) / 2, (_HIGH - _LOW) / 2
 """Middle and half range of the gait parameters, shape (4,)."""
 
-_BEFORE = (
-    "sin(crank angle)",
-    "cos(crank angle)",
-    "crank speed",
-    "swing offset",
-    "swing sine coefficient",
-    "swing cosine coefficient",
-    "rate of crank speed",
-    "rate of swing offset",
-    "rate of swing sine coefficient",
-    "rate of swing cosine coefficient",
-)
-_TRUNK = {
-    "fixed": (),
-    "rail": ("forward speed",),
-    "suspended": ("forward speed", "vertical speed", "height"),
+GROUPS: dict[str, tuple[tuple[str, str, str], ...]] = {
+    "crank": (("sin(crank angle)", "none", "-"), ("cos(crank angle)", "none", "-")),
+    "gait": (
+        ("crank speed", "as action 0", "rad/s"),
+        ("swing offset", "as action 1", "rad"),
+        ("swing sine coefficient", "as action 2", "rad"),
+        ("swing cosine coefficient", "as action 3", "rad"),
+        ("rate of crank speed", "/ 20", "rad/s^2"),
+        ("rate of swing offset", "/ 6", "rad/s"),
+        ("rate of swing sine coefficient", "/ 6", "rad/s"),
+        ("rate of swing cosine coefficient", "/ 6", "rad/s"),
+    ),
+    "trunk": (
+        ("forward speed", "tanh(x / 5)", "m/s"),
+        ("vertical speed", "tanh(x / 2)", "m/s"),
+        ("height", "tanh((x - hip height) / 0.3)", "m"),
+    ),
+    "hoof": (
+        ("toe contact", "0 or 1", "-"),
+        ("heel contact", "0 or 1", "-"),
+        ("toe load", "tanh(x / 3 weights)", "N"),
+        ("heel load", "tanh(x / 3 weights)", "N"),
+        ("toe approach speed", "tanh(x / 2)", "m/s"),
+        ("heel approach speed", "tanh(x / 2)", "m/s"),
+        ("running peak force", "tanh(x / 3 weights)", "N"),
+    ),
+    "action": tuple(
+        (f"previous action: {name}", "none", "-")
+        for name in ("crank speed", "swing offset", "swing sine coefficient", "swing cosine coefficient")
+    ),
+    "target": (("commanded speed", "tanh(x / 5)", "m/s"),),
+    "ground": tuple((f"height of the ground {x:g} m ahead", "tanh(x / 0.5)", "m") for x in AHEAD),
 }
-_AFTER = (
-    "toe contact",
-    "heel contact",
-    "toe load",
-    "heel load",
-    "toe approach speed",
-    "heel approach speed",
-    "running peak force",
-    "previous action: crank speed",
-    "previous action: swing offset",
-    "previous action: swing sine coefficient",
-    "previous action: swing cosine coefficient",
-)
+"""Names, scaling and unit before scaling of all entries, by group, in the order in which kernels know them;
+the height of the ground is that above the ground under O."""
+
+_KNOWN = [entry[0] for group in GROUPS.values() for entry in group]
+_NUMBERS = {name: k for k, name in enumerate(_KNOWN)}
 
 
-def layout(trunk: str) -> tuple[str, ...]:
-    """Names of the entries for a kind of trunk, in order."""
-    return _BEFORE + _TRUNK[trunk] + _AFTER
+def entries(groups: Iterable[str], trunk: str) -> list[tuple[str, str, str]]:
+    """The entries of some groups on a kind of trunk: what cannot move is not observed."""
+    absent = {"fixed": ("forward speed", "vertical speed", "height"), "rail": ("vertical speed", "height")}
+    return [entry for group in groups for entry in GROUPS[group] if entry[0] not in absent.get(trunk, ())]
 
 
-def observe(
-    row: Any,
-    filters: NDArray[np.void],
-    rate_bounds: NDArray[np.float64],
-    trunk: str,
-    height: float,
-    weight: float,
-    peak: float,
-    action: NDArray[np.float32],
-) -> NDArray[np.float32]:
-    """The observation after a control step, float32, entries as in `layout`.
+def check_groups(groups: Any, known: Iterable[str]) -> tuple[str, ...]:
+    """The groups to observe, each once.
 
-    Unbounded quantities are squashed by tanh(value / scale); parameters and their rates are divided by
-    their bounds.
-
-    Args:
-        row: last row of the trace.
-        filters, rate_bounds: command filters and the bounds of their rates, shape (4,).
-        trunk, height: kind of trunk and its nominal height [m].
-        weight: of trunk and leg [N].
-        peak: running peak of the open stance [N].
-        action: the last one, shape (4,).
+    Raises:
+        ParameterError: not a row of known names, or none, or one twice.
     """
-    values = ((filters["value"] - MIDDLE) / HALF_RANGE).tolist()
-    rates = (filters["rate"] / rate_bounds).tolist()
-    body: tuple[float, ...] = ()
-    if trunk != "fixed":
-        body = (math.tanh(row["trunk_vx"] / SPEED_SCALE),)
-    if trunk == "suspended":
-        body += (math.tanh(row["trunk_vy"] / RISE_SCALE), math.tanh((row["trunk_y"] - height) / HEIGHT_SCALE))
-    load = LOAD_SCALE * weight
-    theta = row["theta"]
-    entries = (
-        math.sin(theta), math.cos(theta), *values, *rates, *body,
-        float(row["toe_penetration"] > 0), float(row["heel_penetration"] > 0),
-        math.tanh(row["toe_normal"] / load), math.tanh(row["heel_normal"] / load),
-        math.tanh(row["toe_approach"] / APPROACH_SCALE), math.tanh(row["heel_approach"] / APPROACH_SCALE),
-        math.tanh(peak / load), *action.tolist(),
-    )  # fmt: skip
-    return np.clip(np.array(entries, dtype=np.float32), -1.0, 1.0)
+    names = tuple(known)
+    given = tuple(groups) if isinstance(groups, (list, tuple)) else ()
+    if not given or len(set(given)) < len(given) or not set(given) <= set(names):
+        raise ParameterError(f"observation: expected a list of some of {', '.join(names)}, got {groups!r}")
+    return given
+
+
+def places(names: Iterable[str], count: int) -> NDArray[np.int64]:
+    """Where each entry that the kernels know goes in the observation, -1 for those not asked for."""
+    found = np.full(count, -1, np.int64)
+    for place, name in enumerate(names):
+        found[_NUMBERS[name]] = place
+    return found

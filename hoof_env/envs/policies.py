@@ -11,10 +11,10 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.envs.horse_leg import HorseLegEnv
-from hoof_env.envs.start import hoof_height
+from hoof_env.envs.start import extreme_posture
 from hoof_env.errors import check_choice
 from hoof_env.gait.parameters import GaitParameters, paper_gaits
+from hoof_env.leg.profile import leg_profile
 
 Action = NDArray[np.float32]
 
@@ -69,7 +69,7 @@ def make_policy(name: str, env: Any, seed: int = 0) -> Scripted:
     Raises:
         ParameterError: unknown name.
     """
-    leg: HorseLegEnv = env.unwrapped
+    leg = env.unwrapped
     check_choice("policy", name, policy_names(env))
     if name in leg.gaits:
         action = leg.action_for(leg.gaits[name])
@@ -84,9 +84,8 @@ def make_policy(name: str, env: Any, seed: int = 0) -> Scripted:
     rest = leg.action_for(GaitParameters(0.0, middle, 0.0, 0.0))
     if name == "idle":
         return Scripted(lambda observation, time: rest, leg.dt)
-    offset, target = _extreme_posture(
-        leg, [middle] if name == "drag" else np.linspace(0.0, 1.4, 15), name == "drag"
-    )
+    offsets = [middle] if name == "drag" else np.linspace(0.0, 1.4, 15).tolist()
+    offset, target = extreme_posture(leg_profile(leg.geometry), offsets, name == "drag")
 
     def hold(observation: Any, time: float) -> Action:
         """Turn the crank (it turns one way only) to `target` and stop; "drag" then swings to and fro."""
@@ -96,18 +95,3 @@ def make_policy(name: str, env: Any, seed: int = 0) -> Scripted:
         return leg.action_for(GaitParameters(min(speed, 2 * np.pi), offset + swing, 0.0, 0.0))
 
     return Scripted(hold, leg.dt)
-
-
-def _extreme_posture(leg: HorseLegEnv, offsets: Any, lowest: bool) -> tuple[float, float]:
-    """Swing offset and crank angle [rad] at which the lower hoof point is highest, or lowest."""
-    sign = -1.0 if lowest else 1.0
-    postures = [
-        (
-            sign * hoof_height(leg.geometry, GaitParameters(0.0, float(offset), 0.0, 0.0), float(theta)),
-            float(offset),
-            float(theta),
-        )
-        for offset in offsets
-        for theta in np.linspace(0, 2 * np.pi, 72, endpoint=False)
-    ]
-    return max(postures)[1:]

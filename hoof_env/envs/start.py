@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hoof_env.dynamics.trunk import Trunk
+from hoof_env.envs.tasks import PER_EPISODE
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait.parameters import GaitParameters, paper_gaits
-from hoof_env.leg.geometry import Geometry
-from hoof_env.leg.kinematics import FrameMotion, pose
+from hoof_env.ground.terrain import Terrain
+from hoof_env.leg import profile as f
+from hoof_env.leg.profile import LegProfile
+
+Floats = NDArray[np.float64]
 
 LOWEST, HIGHEST = 0.6, 2.0
 """Heights of the trunk at which an episode fails, as parts of its nominal height."""
@@ -20,59 +26,97 @@ LOWEST, HIGHEST = 0.6, 2.0
 START_SPEED = 1.0
 """Highest forward speed at reset [m/s]: a learner meets both a standing start and a rolling one."""
 
-OPTIONS = {"crank_angle": (-1e6, 1e6), "speed": (-20.0, 20.0), "height": (0.0, np.inf)}
-"""Numeric reset options and their ranges [rad, m/s, m]; "gait" is the other one."""
+OPTIONS = {
+    "crank_angle": (-1e6, 1e6), "speed": (-20.0, 20.0), "height": (0.0, np.inf), "x": (-1e5, 1e5),
+}  # fmt: skip
+"""Numeric reset options and their ranges [rad, m/s, m, m]; "gait" and "parameters" are the others."""
+
+HANDED_ON = ("minari_autoseed",)
+"""Options that others put there for themselves: Minari hands its own on to the environment."""
+
+FLAT, MARGIN, REACH = Terrain.flat(), 50.0, np.linspace(-1.0, 1.0, 21)
+"""Level ground; how far from its ends an episode on a terrain begins [m], for it goes somewhere; where a hoof
+may come down, from O [m]."""
+
+MOST_TRIES = 100
+"""Draws of a crank angle at which the hoof is above the ground."""
 
 
-class Start(NamedTuple):
-    """Gait, crank angle [rad], forward speed [m/s] and height of O [m] at the start of an episode."""
+@dataclass
+class Starts:
+    """Starts of n episodes.
 
-    gait: GaitParameters
-    crank_angle: float
-    speed: float
-    height: float
+    Attributes:
+        gaits: shape (n, 4).
+        crank_angle, speed, height, x: shape (n,) [rad, m/s, m, m].
+    """
+
+    gaits: Floats
+    crank_angle: Floats
+    speed: Floats
+    height: Floats
+    x: Floats
 
 
-def hoof_height(geometry: Geometry, gait: GaitParameters, theta: float) -> float:
-    """Height of the lower hoof point relative to O [m], at crank angle `theta` of a steady gait."""
-    phi = gait.swing_offset + gait.swing_sin * math.sin(theta) + gait.swing_cos * math.cos(theta)
-    points = pose(geometry, theta, frame=FrameMotion(phi=phi))
-    return min(float(points.point("I")[1]), float(points.point("J")[1]))
+def hoof_height(profile: LegProfile, gaits: Floats, theta: Floats) -> Floats:
+    """Height of the lower hoof point relative to O [m], at crank angles `theta`, shape (n,), of steady gaits,
+    shape (n, 4)."""
+    phi = gaits[:, 1] + gaits[:, 2] * np.sin(theta) + gaits[:, 3] * np.cos(theta)
+    sine, cosine = profile.geometry.travel * np.sin(phi), np.cos(phi)
+    value = profile(theta)[0]
+    toe = sine * value[:, f.TOE_X] + cosine * value[:, f.TOE_Y]
+    return np.minimum(toe, sine * value[:, f.HEEL_X] + cosine * value[:, f.HEEL_Y])
 
 
-def draw_start(
-    options: dict[str, Any],
-    generator: np.random.Generator,
-    geometry: Geometry,
+def draw_starts(
+    options: Mapping[str, Any],
+    generators: Sequence[np.random.Generator],
+    profile: LegProfile,
     trunk: Trunk,
     gaits: Mapping[str, GaitParameters],
-) -> Start:
-    """A random start, but for what the options fix (see `check_options`).
+    terrain: Terrain,
+    own_gait: GaitParameters | None = None,
+) -> Starts:
+    """Random starts, one for each generator, but for what the options fix (see `check_options`).
 
     No contact begins with a hoof inside the ground: a suspended trunk hangs higher where it would, on any
     other the crank angle is drawn again.
+
+    Args:
+        terrain: an episode begins anywhere on it but near its ends; at 0 if it is level.
+        own_gait: instead of one between walk and run.
     """
-    mix, turn, rolling = generator.random(3)
+    n = len(generators)
+    drawn = np.array([generator.random(3) for generator in generators])
     ends = [end.to_array() for end in paper_gaits(gaits).values()]
-    one, two = ends[0], ends[-1]
-    gait = options.get("gait") or GaitParameters.from_array(one + mix * (two - one))
-    theta = options.get("crank_angle", 2 * np.pi * turn)
-    speed = options.get("speed", START_SPEED * rolling if trunk.kind != "fixed" else 0.0)
-    height = options.get("height", trunk.height)
+    mixed = ends[0] + drawn[:, :1] * (ends[-1] - ends[0])
+    fixed = options.get("gait") or own_gait
+    chosen = np.repeat(fixed.to_array()[None], n, 0) if fixed else mixed
+    theta = np.full(n, options["crank_angle"]) if "crank_angle" in options else 2 * np.pi * drawn[:, 1]
+    rolling = np.zeros(n) if trunk.kind == "fixed" else START_SPEED * drawn[:, 2]
+    speed = np.full(n, options["speed"]) if "speed" in options else rolling
+    height, x = np.full(n, options.get("height", trunk.height)), np.full(n, options.get("x", 0.0))
+    ground = np.zeros(n)
+    if terrain != FLAT:
+        if "x" not in options:
+            low, high = terrain.x[0] + MARGIN, terrain.x[-1] - MARGIN
+            x = np.array([generator.uniform(low, max(low, high)) for generator in generators])
+        ground = terrain.height_at(x[:, None] + REACH).max(1)
     if trunk.kind == "suspended":
-        if not LOWEST * trunk.height < height < HIGHEST * trunk.height:
+        if not LOWEST * trunk.height < height[0] < HIGHEST * trunk.height:
             raise ParameterError(
                 f"options['height']: expected {LOWEST:g} to {HIGHEST:g} times {trunk.height:g} m, "
-                f"outside which an episode fails, got {height:g}"
+                f"outside which an episode fails, got {height[0]:g}"
             )
         if "height" not in options:
-            height = max(height, -hoof_height(geometry, gait, theta))
+            height = np.maximum(height, ground - hoof_height(profile, chosen, theta))
     elif "crank_angle" not in options:
-        for _ in range(100):
-            if height + hoof_height(geometry, gait, theta) >= 0:
+        for _ in range(MOST_TRIES):
+            below = np.flatnonzero(height + hoof_height(profile, chosen, theta) < ground)
+            if not below.size:
                 break
-            theta = 2 * np.pi * generator.random()
-    return Start(gait, float(theta), float(speed), float(height))
+            theta[below] = [2 * np.pi * generators[int(k)].random() for k in below]
+    return Starts(chosen, theta, speed, height, x)
 
 
 def check_options(options: Any, gaits: Mapping[str, GaitParameters]) -> dict[str, Any]:
@@ -81,9 +125,11 @@ def check_options(options: Any, gaits: Mapping[str, GaitParameters]) -> dict[str
     Raises:
         ParameterError: an unknown option, or a value out of range.
     """
-    known = ("gait", *OPTIONS)
+    known = ("gait", "parameters", *OPTIONS)
     if options is None:
         return {}
+    if isinstance(options, Mapping):
+        options = {key: value for key, value in options.items() if key not in HANDED_ON}
     if not isinstance(options, Mapping) or not set(options) <= set(known):
         raise ParameterError(f"options: expected a mapping with some of {', '.join(known)}, got {options!r}")
     checked = dict(options)
@@ -92,7 +138,43 @@ def check_options(options: Any, gaits: Mapping[str, GaitParameters]) -> dict[str
             checked[name] = check_number(f"options[{name!r}]", checked[name], low=low, high=high)
     if checked.get("gait") is not None:
         checked["gait"] = _gait(checked["gait"], gaits)
+    if "parameters" in checked:
+        checked["parameters"] = check_parameters("options['parameters']", checked["parameters"])
     return checked
+
+
+def check_parameters(name: str, given: Any) -> dict[str, float | tuple[float, float]]:
+    """Physical parameters of an episode: a number each, or two to draw between.
+
+    Raises:
+        ParameterError: not a mapping, a parameter that cannot change, or values that are none.
+    """
+    if not isinstance(given, Mapping) or not set(given) <= set(PER_EPISODE):
+        raise ParameterError(
+            f"{name}: expected a mapping with some of {', '.join(PER_EPISODE)}, got {given!r}"
+        )
+    found: dict[str, float | tuple[float, float]] = {}
+    for key, value in given.items():
+        if isinstance(value, (list, tuple)):
+            if len(value) != 2:
+                raise ParameterError(f"{name}[{key!r}]: expected a number or two, got {value!r}")
+            low, high = (check_number(f"{name}[{key!r}][{k}]", v) for k, v in enumerate(value))
+            if low > high:
+                raise ParameterError(f"{name}[{key!r}]: expected the lower one first, got {value!r}")
+            found[key] = low, high
+        else:
+            found[key] = check_number(f"{name}[{key!r}]", value)
+    return found
+
+
+def draw_parameters(
+    given: Mapping[str, float | tuple[float, float]], generator: np.random.Generator
+) -> dict[str, float]:
+    """A value for each parameter."""
+    return {
+        name: float(generator.uniform(*value)) if isinstance(value, tuple) else value
+        for name, value in given.items()
+    }
 
 
 def _gait(value: Any, gaits: Mapping[str, GaitParameters]) -> GaitParameters:
@@ -107,3 +189,16 @@ def _gait(value: Any, gaits: Mapping[str, GaitParameters]) -> GaitParameters:
             f"options['gait']: expected a gait name ({', '.join(sorted(gaits))}) or a mapping of the four "
             f"gait parameters, got {value!r}"
         ) from None
+
+
+def extreme_posture(profile: LegProfile, offsets: Sequence[float], lowest: bool) -> tuple[float, float]:
+    """Swing offset and crank angle [rad] at which the lower hoof point is highest, or lowest."""
+    sign = -1.0 if lowest else 1.0
+    postures = []
+    theta = np.linspace(0, 2 * math.pi, 72, endpoint=False)
+    for offset in offsets:
+        gaits = np.tile([0.0, offset, 0.0, 0.0], (len(theta), 1))
+        heights = sign * hoof_height(profile, gaits, theta)
+        best = int(np.argmax(heights))
+        postures.append((float(heights[best]), float(offset), float(theta[best])))
+    return max(postures)[1:]

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 
 from hoof_env._jit import inlined
-from hoof_env._lanes import larger, quarter_turns, root, smaller
+from hoof_env._lanes import choose, larger, quarter_turns, root, size, smaller
 
 EXPONENT_UNIT = 8
 """`root_power` knows the exponents that are whole multiples of 1 / EXPONENT_UNIT."""
@@ -82,6 +82,14 @@ def exp_of_negative(x):  # type: ignore[no-untyped-def]
     e = e * e
     e = e * e
     return e * e
+
+
+@inlined
+def tanh(x):  # type: ignore[no-untyped-def]
+    """Hyperbolic tangent, error below 1e-13."""
+    e = exp_of_negative(-2.0 * size(x))
+    part = (1.0 - e) / (1.0 + e)
+    return choose(x < 0.0, -part, part)
 
 
 @inlined

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.result import Result
 from hoof_env.dynamics.trace import new_trace
-from hoof_env.envs.horse_leg import HorseLegEnv
+from hoof_env.envs.reference_leg import ReferenceLegEnv
+from hoof_env.envs.reference_start import HIGHEST, LOWEST
 from hoof_env.envs.stance import LIFT_OFF
-from hoof_env.envs.start import HIGHEST, LOWEST
 from hoof_env.errors import ParameterError
 from hoof_env.gait.parameters import GaitParameters
 
@@ -115,7 +115,7 @@ class Course:
     """
 
     def __init__(self, preset: str | Path, starts: int) -> None:
-        self.env, self.starts = HorseLegEnv(preset=str(preset)), starts
+        self.env, self.starts = ReferenceLegEnv(preset=str(preset)), starts
         self.trunk = self.env.engine.trunk
         self.load = self.trunk.share * self.env.weight
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from hoof_env import cli
-from hoof_env.envs.horse_leg import HorseLegEnv
 from hoof_env.envs.policies import make_policy, policy_names
+from hoof_env.envs.reference_leg import ReferenceLegEnv
 from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.gait.parameters import LIMITS, PARAMETERS, GaitParameters, gait_names, load_gait
 from hoof_env.identify import carry_report
@@ -82,7 +82,7 @@ def test_a_gait_more_leaves_the_starts_and_the_other_policies_as_they_were(tmp_p
     preset["gaits"][NAME] = dict(zip(PARAMETERS, CARRIES.to_array().tolist(), strict=True))
     path = tmp_path / "more.json"
     path.write_text(json.dumps(preset))
-    one, more = HorseLegEnv(preset=LEG), HorseLegEnv(preset=str(path))
+    one, more = ReferenceLegEnv(preset=LEG), ReferenceLegEnv(preset=str(path))
     assert policy_names(more) == [NAME, *policy_names(one)]
     for seed in range(3):
         (seen, info), (seen_more, info_more) = one.reset(seed=seed), more.reset(seed=seed)

@@ -1,0 +1,314 @@
+"""Episodes of a task, one or many at once: what the single and the vector environment share.
+
+`EpisodeBatch` knows arrays and generators and nothing of Gymnasium. A row has the same bits whatever the
+number of its neighbours: starts are drawn from a generator of its own, and the kernels are those of
+`episode`, compiled for one environment or for several side by side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoof_env.dynamics.drive import Drive, Motor, Prescribed
+from hoof_env.dynamics.engine import GRAVITY
+from hoof_env.dynamics.limb import Limb
+from hoof_env.dynamics.result import Result
+from hoof_env.dynamics.trunk import ONE_LEG, Trunk
+from hoof_env.dynamics.trunk_engine import TrunkEngine
+from hoof_env.envs import episode as e
+from hoof_env.envs.grounds import make_terrain
+from hoof_env.envs.observation import GROUPS, HALF_RANGE, MIDDLE, check_groups, entries, places
+from hoof_env.envs.reward import RewardWeights
+from hoof_env.envs.start import HIGHEST, LOWEST, check_parameters, draw_parameters, draw_starts
+from hoof_env.envs.tasks import Settings, Task
+from hoof_env.errors import ParameterError, check_choice, check_number
+from hoof_env.gait.parameters import LIMITS, GaitParameters, gait_names, load_gait
+from hoof_env.ground.contact import Ground
+from hoof_env.leg.geometry import load_geometry
+
+Floats = NDArray[np.float64]
+
+LONGEST_EPISODE, MOST_SUBSTEPS = 1e6, 100_000
+"""Seconds of an episode and substeps of a control step at most."""
+
+
+class EpisodeBatch:
+    """`num_envs` episodes of a task.
+
+    Attributes:
+        task, settings: what it is.
+        engine: the mechanics of all.
+        names: of the observation's entries.
+        episode: memory of the episodes, rows as in `episode`, shape (EPISODE_ROWS, columns).
+
+    Raises:
+        ParameterError: a setting is out of range or of the wrong type.
+    """
+
+    def __init__(self, task: Task, settings: Settings, num_envs: int) -> None:
+        self.task, self.settings, self.num_envs = task, settings, num_envs
+        s = settings
+        check_choice("trunk", s.trunk, ONE_LEG)
+        check_choice("drive", s.drive, ("prescribed", "motor"))
+        self.geometry = load_geometry(s.preset)
+        self.gaits = {name: load_gait(name, s.preset) for name in gait_names(s.preset)}
+        self.weights = RewardWeights.of(s.reward_weights)
+        self.substeps = _substeps(s.dt, s.sim_dt)
+        self.dt = s.sim_dt * self.substeps
+        low = self.dt * (1 - 1e-9)
+        self.episode_seconds = check_number(
+            "episode_seconds", s.episode_seconds, low=low, high=LONGEST_EPISODE
+        )
+        self.steps_per_episode = round(s.episode_seconds / self.dt)
+        nominal = self.geometry.hip_height
+        height = nominal if s.hip_height is None else s.hip_height
+        self.height = check_number("hip_height", height, low=LOWEST * nominal, high=HIGHEST * nominal)
+        self.groups = check_groups(s.observation, GROUPS)
+        self.randomize = check_parameters("randomize", s.randomize or {})
+        self.target_speed = _two("target_speed", s.target_speed, -20.0) if s.target_speed else None
+        self.target_seconds = _two("target_seconds", s.target_seconds, self.dt)
+        terrain = make_terrain(s.terrain)
+        trunk, ground, drive = self._physics({})
+        self.engine = TrunkEngine(
+            Limb(self.geometry, drive=drive), trunk, ground, terrain,
+            sim_dt=s.sim_dt, integrator=s.integrator, num_envs=num_envs, strides=True,
+        )  # fmt: skip
+        self.names = [entry[0] for entry in entries(self.groups, s.trunk)]
+        columns = self.engine.columns
+        self.episode = np.zeros((e.EPISODE_ROWS, columns))
+        self.episode[e.ACTION : e.ACTION + e.ACTIONS] = 0.0
+        self.episode[e.WEIGHT] = self.engine.weight
+        self.actions = np.zeros((columns, e.ACTIONS), np.float32)
+        self.seen = np.zeros((columns, len(self.names)), np.float32)
+        self._task = self._task_record()
+        self._open()
+
+    def _physics(self, changes: Mapping[str, float]) -> tuple[Trunk, Ground, Drive]:
+        """Trunk, ground and drive with some settings changed."""
+        s = replace(self.settings, **dict(changes))  # type: ignore[arg-type]
+        trunk = Trunk(
+            s.trunk,
+            s.trunk_mass,
+            s.trunk_share,
+            s.trunk_stiffness,
+            s.trunk_damping,
+            s.trunk_drag,
+            self.height,
+        )
+        ground = Ground(
+            s.stiffness, s.exponent, s.normal_law, s.restitution, s.approach_floor, "interpolated",
+            s.friction_law, s.friction, s.friction_slow, s.friction_fast, s.trunk_mass,
+        )  # fmt: skip
+        if s.drive == "prescribed":
+            return trunk, ground, Prescribed()
+        return trunk, ground, Motor(s.motor_gain, s.motor_torque, s.motor_inertia, 1.0)
+
+    def _task_record(self) -> NDArray[Any]:
+        found = np.zeros(1, e.TASK)
+        task, low_high = found[0], np.array(list(LIMITS.values()))
+        task["base"] = task["middle"] = MIDDLE
+        task["half"], task["low"], task["high"] = HALF_RANGE, low_high[:, 0], low_high[:, 1]
+        task["rate_bound"] = self.engine.filters.to_array()[:, 1]
+        w = self.weights
+        task["weights"] = w.progress, w.peak, w.energy, w.action, w.failure
+        task["failure_seconds"] = self.episode_seconds
+        task["h"], task["substeps"] = self.engine.substep, self.substeps * self.engine.substeps
+        task["dt"], task["episode_steps"] = self.dt, self.steps_per_episode
+        task["height"] = self.height
+        task["lowest"], task["highest"] = LOWEST * self.height, HIGHEST * self.height
+        task["stays"], task["sees_ground"] = self.settings.trunk == "fixed", "ground" in self.groups
+        task["count"], task["places"] = len(self.names), places(self.names, e.ENTRIES)
+        return found
+
+    def _open(self) -> None:
+        """Make the desk: addresses of the arrays as they are now."""
+        one, many = (e.step_one, e.look_one), (e.step_batch, e.look_batch)
+        self._step, self._look = one if self.engine.is_few else many
+        arrays = (*self.engine.arrays, self.episode, self._task, self.actions, self.seen)
+        slots = [[a.ctypes.data, *a.shape, *[0] * (3 - a.ndim)] for a in arrays]
+        self._desk = np.array(slots, np.int64).ravel()
+
+    # Episodes
+
+    def reset(
+        self,
+        envs: Sequence[int] | NDArray[np.int64],
+        generators: Sequence[np.random.Generator],
+        options: Mapping[str, Any],
+    ) -> dict[str, Floats]:
+        """Start episodes in some environments.
+
+        Args:
+            envs: which.
+            generators: of each of them.
+            options: as `start.check_options` gives them.
+
+        Returns:
+            What was drawn, by name, one row an environment: gaits, crank_angle, speed, height, x.
+        """
+        which, columns = np.asarray(envs, np.int64), self.episode
+        if parameters := {**self.randomize, **options.get("parameters", {})}:
+            for env, generator in zip(which, generators, strict=True):
+                trunk, ground, drive = self._physics(draw_parameters(parameters, generator))
+                self.engine.vary(int(env), trunk, ground, drive)
+                columns[e.WEIGHT, env] = (trunk.mass + self.geometry.mass) * GRAVITY
+        start = draw_starts(
+            options, generators, self.engine.profiles[0], self.engine.trunk, self.gaits, self.engine.terrain
+        )
+        self.engine.reset(
+            start.gaits.T[None],
+            start.crank_angle[None],
+            x=start.x,
+            y=start.height,
+            vx=start.speed,
+            envs=which,
+        )
+        columns[e.ACTION : e.ACTION + 4, which] = self.action_for(start.gaits).T
+        columns[e.STEPS, which], columns[e.BEFORE, which], columns[e.ENDED, which] = 0.0, start.x, 0.0
+        columns[e.TIME : e.HIGHEST + 1, which] = 0.0
+        columns[e.TERM : e.TERM + len(e.TERMS), which] = 0.0
+        columns[e.TARGET, which], columns[e.SWITCH, which] = np.inf, np.inf
+        if self.target_speed:
+            for env, generator in zip(which, generators, strict=True):
+                columns[e.TARGET, env] = generator.uniform(*self.target_speed)
+                self._draw_target(int(env), generator)
+        self._look(self._desk)
+        return vars(start)
+
+    def _draw_target(self, env: int, generator: np.random.Generator) -> None:
+        """Draw the next commanded speed, and when."""
+        assert self.target_speed
+        now = self.episode[e.STEPS, env]
+        self.episode[e.SWITCH, env] = now + round(generator.uniform(*self.target_seconds) / self.dt)
+        self.episode[e.NEXT_TARGET, env] = generator.uniform(*self.target_speed)
+
+    def step(self, generators: Sequence[np.random.Generator]) -> bool:
+        """One control step under `actions`; returns whether any episode ended.
+
+        Raises:
+            ParameterError: an action is not a number; nothing has happened then.
+        """
+        ended: int = self._step(self._desk)
+        if ended < 0:
+            raise ParameterError("action: expected finite numbers, got some that are not")
+        if self.target_speed:
+            n = self.num_envs
+            for env in np.flatnonzero(self.episode[e.STEPS, :n] >= self.episode[e.SWITCH, :n]):
+                self._draw_target(int(env), generators[int(env)])
+        return ended > 0
+
+    def summary(self, env: int) -> dict[str, float]:
+        """Figures of an episode.
+
+        seconds, distance_m, speed_m_s, peak_grf_n (highest of the episode), mean_grf_n (normal force over
+        the whole time), stance_peak_sum_n, stances, duty_factor, drive_work_j (braking is not recovered),
+        cost_of_transport (work per weight and distance; infinite without forward progress), weight_share
+        (mean normal force over weight: what the leg bore), support_share (the rest: what the rail or the
+        suspension bore), failed (0 or 1).
+        """
+        column = self.episode[:, env].tolist()
+        seconds, distance, work, impulse, loaded, stances, peaks, highest = column[e.TIME : e.HIGHEST + 1]
+        weight, time = column[e.WEIGHT], max(seconds, 1e-12)
+        mean = impulse / time
+        return {
+            "seconds": seconds,
+            "distance_m": distance,
+            "speed_m_s": distance / time,
+            "peak_grf_n": highest,
+            "mean_grf_n": mean,
+            "stance_peak_sum_n": peaks,
+            "stances": stances,
+            "duty_factor": loaded / time,
+            "drive_work_j": work,
+            "cost_of_transport": work / (weight * distance) if distance > 0 else float("inf"),
+            "weight_share": mean / weight,
+            "support_share": 1 - mean / weight,
+            "failed": float(column[e.ENDED] == e.FAILED),
+        }
+
+    def failure(self, env: int) -> str:
+        """Why an episode failed, for people."""
+        result = Result(int(self.engine.results[env]))
+        return result.message if result is not Result.OK else "the trunk left its range of heights"
+
+    # Actions
+
+    def command_of(self, action: Any) -> Floats:
+        """Gait parameters that an action commands, shape (4,); the action is clipped to [-1, 1]."""
+        return MIDDLE + HALF_RANGE * np.clip(np.asarray(action, np.float64), -1.0, 1.0)
+
+    def action_for(self, gaits: GaitParameters | Floats) -> NDArray[np.float32]:
+        """The action that commands a gait, or gaits of shape (n, 4), to float32 precision."""
+        values = gaits.to_array() if isinstance(gaits, GaitParameters) else gaits
+        return np.clip((values - MIDDLE) / HALF_RANGE, -1, 1).astype(np.float32)
+
+    # State
+
+    def get_state(self) -> dict[str, Any]:
+        """Everything that changes, but for the generators."""
+        return {"engine": self.engine.get_state(), "episode": self.episode[:, : self.num_envs].copy()}
+
+    def set_state(self, state: Mapping[str, Any]) -> None:
+        """Put back what `get_state` gave.
+
+        Raises:
+            ParameterError: the state is of another task, geometry or setting.
+        """
+        episode = np.asarray(state["episode"], np.float64)
+        if episode.shape != (e.EPISODE_ROWS, self.num_envs):
+            expected = (e.EPISODE_ROWS, self.num_envs)
+            raise ParameterError(f"state['episode']: expected shape {expected}, got {episode.shape}")
+        self.engine.set_state(state["engine"])
+        self.episode[:, : self.num_envs] = episode
+        self._look(self._desk)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {key: value for key, value in vars(self).items() if key not in ("_desk", "_step", "_look")}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self._open()
+
+
+def _two(name: str, value: Any, low: float) -> tuple[float, float]:
+    """A range, or one number as one."""
+    pair = value if isinstance(value, (list, tuple)) else (value, value)
+    if len(pair) != 2:
+        raise ParameterError(f"{name}: expected two numbers, got {value!r}")
+    first = check_number(f"{name}[0]", pair[0], low=low, high=1e6)
+    return first, check_number(f"{name}[1]", pair[1], low=first, high=1e6)
+
+
+def _substeps(dt: float, sim_dt: float) -> int:
+    check_number("sim_dt", sim_dt, low=0, exclusive_low=True)
+    check_number("dt", dt, low=0, exclusive_low=True)
+    ratio = dt / sim_dt
+    if not 0.5 < ratio <= MOST_SUBSTEPS or abs(ratio - round(ratio)) > 1e-6:
+        raise ParameterError(
+            f"dt: expected a whole multiple of sim_dt = {sim_dt:g} s, got {dt:g} s "
+            f"(ratio {ratio:g}; at most {MOST_SUBSTEPS})"
+        )
+    return round(ratio)
+
+
+def check_state(state: Any, env_id: str, settings: Mapping[str, Any], parts: Sequence[str] = ()) -> None:
+    """Raise unless `state` is one that `get_state` of such an environment gave.
+
+    Raises:
+        ParameterError: it lacks a part, or is of another id or of other settings.
+    """
+    names = ("id", "settings", "engine", "episode", "generator", *parts)
+    missing = [name for name in names if not isinstance(state, Mapping) or name not in state]
+    if missing:
+        raise ParameterError(f"state: expected what get_state gives, but {', '.join(missing)} is missing")
+    if state["id"] != env_id:
+        raise ParameterError(f"state: expected one of {env_id}, got one of {state['id']}")
+    there = state["settings"]
+    unlike = [f"{k}: {v!r} here, {there.get(k)!r} there" for k, v in settings.items() if there.get(k) != v]
+    if unlike:
+        raise ParameterError(f"state: of other settings; {'; '.join(unlike)}")

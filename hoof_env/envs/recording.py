@@ -1,0 +1,67 @@
+"""What happened between two control steps: the substeps are run again, on an engine of their own.
+
+The kernels keep sums of a control step, not its substeps; who wants to see those pays for them. Running them
+again from the same state gives the same bits.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections import deque
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoof_env.envs.batch import EpisodeBatch
+from hoof_env.envs.render_instant import columns_of_engine, instants
+
+SHOWN = 4.0
+"""Seconds before a picture that it can show."""
+
+
+class Recording:
+    """Substeps of one environment of a batch."""
+
+    def __init__(self, batch: EpisodeBatch, env: int = 0) -> None:
+        self.batch, self.env = batch, env
+        self._engine = copy.copy(batch.engine) if batch.num_envs == 1 else batch.engine.alone()
+        self._before: NDArray[np.float64] | None = None
+        self._waiting: deque[tuple[bool, Any]] = deque(maxlen=round(SHOWN / batch.dt) + 1)
+
+    def start(self) -> None:
+        """Before a step or a reset: remember where it begins."""
+        self._before = self.batch.engine.column(self.env)
+
+    def last(self) -> dict[str, NDArray[np.float64]]:
+        """State and report by name at each substep of the last control step; at the start, after a reset."""
+        now = self.batch.engine.column(self.env)
+        time = self.batch.engine.state["time"][self.env]
+        if time == 0.0 or self._before is None:
+            return self._run(now, 0)
+        return {
+            name: values[1:] for name, values in self._run(self._before, self.batch.substeps, now).items()
+        }
+
+    def _run(
+        self, column: NDArray[np.float64], steps: int, after: NDArray[np.float64] | None = None
+    ) -> dict[str, NDArray[np.float64]]:
+        self._engine.set_column(0, column)
+        command = None if after is None else self._engine.command_in(after)
+        record = self._engine.run(command, steps)
+        record.pop("result")
+        return record
+
+    def keep(self, restart: bool) -> None:
+        """Keep the last control step for a picture."""
+        self._waiting.append((restart, self.last()))
+
+    def draw(self, renderer: Any) -> None:
+        """Give a renderer what was kept."""
+        engine = self.batch.engine
+        while self._waiting:
+            restart, record = self._waiting.popleft()
+            if restart:
+                renderer.reset()
+            command = engine.command_in(engine.column(self.env))[0]
+            renderer.add(instants(columns_of_engine(record, engine.terrain, command=command)))

@@ -1,0 +1,119 @@
+"""The native vector environment as Stable-Baselines3's `VecEnv`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.vector import AutoresetMode
+from numpy.typing import NDArray
+from stable_baselines3.common.vec_env import VecEnv
+
+from hoof_env.envs import episode as e
+from hoof_env.envs.vector import HorseLegVectorEnv
+from hoof_env.errors import ParameterError
+
+
+class Sb3VecEnv(VecEnv):
+    """`num_envs` environments of an id for Stable-Baselines3, all stepped in one call.
+
+    Wrap it in `VecMonitor` for episode returns. When an episode ends its info has "terminal_observation",
+    "TimeLimit.truncated" and "episode_summary"; the reward's terms are not in the infos, for a dictionary an
+    environment and step costs more than the simulation: `terms` has those of the last step.
+
+    Args:
+        env_id: registered id of the family.
+        num_envs: how many.
+        settings: arguments of the environment.
+
+    Raises:
+        ParameterError: an id without a native vector environment, or a bad argument.
+    """
+
+    def __init__(self, env_id: str = "hoof_env/HorseLeg-v0", num_envs: int = 64, **settings: Any) -> None:
+        settings.setdefault("autoreset_mode", AutoresetMode.SAME_STEP)
+        made = gym.make_vec(env_id, num_envs=num_envs, vectorization_mode="vector_entry_point", **settings)
+        envs = made.unwrapped
+        if not isinstance(envs, HorseLegVectorEnv):
+            raise ParameterError(f"env_id: expected an id of this package with many at once, got {env_id!r}")
+        self.envs, self.render_mode = envs, envs.render_mode
+        self._actions: NDArray[Any] | None = None
+        super().__init__(num_envs, envs.single_observation_space, envs.single_action_space)
+
+    @property
+    def terms(self) -> dict[str, NDArray[np.float64]]:
+        """Terms of the last rewards by name, shape (num_envs,) each."""
+        rows = self.envs.batch.episode[e.TERM : e.TERM + len(e.TERMS), : self.num_envs]
+        return dict(zip(e.TERMS, rows.copy(), strict=True))
+
+    def reset(self) -> NDArray[np.float32]:
+        """Observations at the start of all episodes."""
+        seeds = list(self._seeds)
+        options = self._options[0] if self._options and self._options[0] else None
+        observations, _ = self.envs.reset(seed=None if None in seeds else seeds, options=options)
+        self.reset_infos = [{} for _ in range(self.num_envs)]
+        self._reset_seeds()
+        self._reset_options()
+        return observations
+
+    def step_async(self, actions: NDArray[Any]) -> None:
+        """Keep the actions."""
+        self._actions = actions
+
+    def step_wait(self) -> Any:
+        """Take the step."""
+        observations, rewards, terminated, truncated, infos = self.envs.step(self._actions)  # type: ignore[arg-type]
+        dones = terminated | truncated
+        each: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        if dones.any():
+            figures = infos["final_info"]["episode_summary"]
+            names = [name for name in figures if not name.startswith("_")]
+            for env in np.flatnonzero(dones):
+                each[env] = {
+                    "terminal_observation": infos["final_obs"][env],
+                    "TimeLimit.truncated": bool(truncated[env]),
+                    "episode_summary": {name: float(figures[name][env]) for name in names},
+                }
+        return observations, rewards.astype(np.float32), dones, each
+
+    def close(self) -> None:
+        """Give everything back."""
+        self.envs.close()
+
+    def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
+        """Frames of the environments that are drawn."""
+        frames = self.envs.render() or ()
+        return [*frames, *[None] * (self.num_envs - len(frames))]
+
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+        """The attribute of the whole, once for each index."""
+        return [getattr(self.envs, attr_name) for _ in self._get_indices(indices)]
+
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        """Set an attribute of the whole.
+
+        Raises:
+            ParameterError: only some of the environments are meant.
+        """
+        self._whole("set_attr", indices)
+        setattr(self.envs, attr_name, value)
+
+    def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
+        """Call a method of the whole; its result once for each index.
+
+        Raises:
+            ParameterError: only some of the environments are meant.
+        """
+        self._whole("env_method", indices)
+        result = getattr(self.envs, method_name)(*args, **kwargs)
+        return [result] * self.num_envs
+
+    def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
+        """Nothing is wrapped."""
+        return [False for _ in self._get_indices(indices)]
+
+    def _whole(self, name: str, indices: Any) -> None:
+        if len(list(self._get_indices(indices))) != self.num_envs:
+            raise ParameterError(f"{name}: expected all environments, which are one, got {indices!r}")

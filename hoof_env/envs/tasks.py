@@ -1,0 +1,147 @@
+"""The family of tasks, as data: what each id asks of the leg, and every setting with its default.
+
+One environment class serves all (`horse_leg`), alone or many at once (`vector`): a task differs in its
+settings, its starts and what is observed, and in nothing else.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields, replace
+from types import MappingProxyType
+from typing import Any
+
+from hoof_env.errors import ParameterError
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Everything that can be set, plain values that JSON can hold; `HorseLegEnv` says what they mean."""
+
+    preset: str = "first_fit"
+    trunk: str = "suspended"
+    hip_height: float | None = None
+    trunk_mass: float = 80.0
+    trunk_share: float = 0.8
+    trunk_stiffness: float = 4000.0
+    trunk_damping: float = 1130.0
+    trunk_drag: float = 20.0
+    stiffness: float = 2e4
+    exponent: float = 1.5
+    normal_law: str = "lankarani-nikravesh"
+    restitution: float = 0.5
+    approach_floor: float = 0.1
+    friction_law: str = "ambrosio"
+    friction: float = 0.4
+    friction_slow: float = 1e-3
+    friction_fast: float = 5e-2
+    terrain: Mapping[str, Any] | None = None
+    drive: str = "prescribed"
+    motor_gain: float = 100.0
+    motor_torque: float = 600.0
+    motor_inertia: float = 0.5
+    integrator: str = "midpoint"
+    sim_dt: float = 1e-3
+    dt: float = 0.02
+    episode_seconds: float = 10.0
+    target_speed: tuple[float, float] | None = None
+    target_seconds: tuple[float, float] = (2.0, 4.0)
+    observation: tuple[str, ...] = ("crank", "gait", "trunk", "hoof", "action")
+    reward_weights: Mapping[str, float] | None = None
+    randomize: Mapping[str, Any] | None = None
+
+
+PER_EPISODE = (
+    "trunk_mass", "trunk_share", "trunk_stiffness", "trunk_damping", "trunk_drag",
+    "stiffness", "restitution", "approach_floor", "friction", "friction_slow", "friction_fast",
+    "motor_gain", "motor_torque",
+)  # fmt: skip
+"""Settings that `reset(options={"parameters": ...})` and `randomize` can change for an episode."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """A task: `defaults` are its settings where they differ from those of `Settings`.
+
+    Attributes:
+        name: of the id, without namespace and version.
+        summary: one line.
+        about: what is asked, for the manual page.
+        defaults: settings.
+        reference: the scripted gait that simple policies must stay below.
+    """
+
+    name: str
+    summary: str
+    about: str
+    defaults: Mapping[str, Any]
+    reference: str = "run"
+
+    @property
+    def id(self) -> str:
+        """The registered id."""
+        return f"hoof_env/{self.name}-v0"
+
+    def settings(self, changes: Mapping[str, Any]) -> Settings:
+        """Its settings with some changed.
+
+        Raises:
+            ParameterError: an unknown setting.
+        """
+        known = [item.name for item in fields(Settings)]
+        for name in changes:
+            if name not in known:
+                near = difflib.get_close_matches(name, known, 1)
+                hint = f"; did you mean {near[0]}?" if near else f" (known: {', '.join(known)})"
+                raise ParameterError(f"{self.id}: no such argument: {name}{hint}")
+        return replace(Settings(), **{**self.defaults, **changes})
+
+
+_SUSPENDED = (
+    "The trunk moves along x and y. The leg must bear `trunk_share` of the weight of trunk and leg; a"
+    " constant force carries the rest, a vertical spring and damper stands for the animal's other legs."
+)
+
+TASKS: Mapping[str, Task] = MappingProxyType(
+    {
+        "leg": Task("HorseLeg", "A horse's leg that must carry and move its trunk.", _SUSPENDED, {}),
+        "rail": Task(
+            "HorseLegRail",
+            "A horse's leg that pulls its trunk along a rail.",
+            "The trunk slides along x at fixed height: nobody has to be carried, only moved.",
+            {"trunk": "rail"},
+        ),
+        "speed": Task(
+            "HorseLegSpeed",
+            "A horse's leg that keeps a commanded speed, which changes.",
+            _SUSPENDED
+            + " Every 2 to 4 s a new speed is commanded. Progress is paid up to it; what goes beyond costs"
+            " as much.",
+            {
+                "target_speed": (0.5, 3.5),
+                "observation": ("crank", "gait", "trunk", "hoof", "action", "target"),
+            },
+        ),
+        "terrain": Task(
+            "HorseLegTerrain",
+            "A horse's leg on slopes and on patches of stiff, soft and slippery ground.",
+            _SUSPENDED
+            + " The ground rises and falls, and is harder, softer or more slippery in places; an episode"
+            " begins anywhere on it. The heights ahead are observed, what the ground is made of is not.",
+            {
+                "terrain": {"kind": "hills", "seed": 0},
+                "observation": ("crank", "gait", "trunk", "hoof", "action", "ground"),
+            },
+        ),
+    }
+)
+"""The tasks by name."""
+
+
+def to_json(settings: Settings) -> dict[str, Any]:
+    """The settings as values that JSON can hold."""
+    return {
+        key: list(value) if isinstance(value, tuple) else dict(value) if isinstance(value, Mapping) else value
+        for key, value in asdict(settings).items()
+    }

@@ -1,0 +1,346 @@
+"""The family as a native vector environment: all episodes in one call, time limit and autoreset its own.
+
+Row i has the bits of the single environment that was seeded alike: with `reset(seed=s)` row i draws from the
+generator that `gym.make(id).reset(seed=s + i)` would have.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
+from gymnasium.error import ClosedEnvironmentError, ResetNeeded
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from hoof_env.dynamics.arguments import count
+from hoof_env.dynamics.trunk_model import LIFT_OFF
+from hoof_env.envs import episode as e
+from hoof_env.envs.batch import EpisodeBatch, check_state
+from hoof_env.envs.recording import Recording
+from hoof_env.envs.start import check_options
+from hoof_env.envs.tasks import TASKS, to_json
+from hoof_env.errors import ParameterError, check_choice, check_number
+
+MOST_ENVS = 1_000_000
+
+
+class HorseLegVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]):
+    """`num_envs` environments of a task, stepped together.
+
+    Args:
+        num_envs: how many.
+        task, settings: as of `HorseLegEnv`.
+        autoreset_mode: an `AutoresetMode` or its value: NEXT_STEP (default), SAME_STEP or DISABLED.
+        max_episode_steps: control steps of an episode; None for `episode_seconds`.
+        render_mode: "rgb_array"; `render` gives a frame of each of the first `rendered` environments.
+        rendered: how many are drawn.
+
+    Rewards are float64, shape (num_envs,). Infos hold the five reward terms; when an episode ends its
+    figures, too, as "episode_summary", one array for each figure, with masks under "_episode_summary".
+
+    Raises:
+        ParameterError: a bad argument, option or action.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
+        "render_modes": ["rgb_array"], "render_fps": 50, "autoreset_mode": AutoresetMode.NEXT_STEP
+    }  # fmt: skip
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        task: str = "leg",
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        max_episode_steps: int | None = None,
+        render_mode: str | None = None,
+        rendered: int = 1,
+        **settings: Any,
+    ) -> None:
+        self.num_envs = count("num_envs", num_envs, most=MOST_ENVS)
+        self.autoreset_mode = _autoreset_mode(autoreset_mode)
+        if render_mode is not None:
+            check_choice("render_mode", render_mode, self.metadata["render_modes"])
+        self.task = TASKS[check_choice("task", task, TASKS)]
+        self.settings = self.task.settings(settings)
+        if max_episode_steps is not None:
+            steps = count("max_episode_steps", max_episode_steps)
+            self.settings = self.task.settings({**settings, "episode_seconds": steps * self.settings.dt})
+        self.batch = EpisodeBatch(self.task, self.settings, self.num_envs)
+        self.single_observation_space = spaces.Box(-1.0, 1.0, (len(self.batch.names),), np.float32)
+        self.single_action_space = spaces.Box(-1.0, 1.0, (e.ACTIONS,), np.float32)
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self.metadata = {  # type: ignore[misc]
+            **type(self).metadata,
+            "render_fps": round(1 / self.batch.dt),
+            "autoreset_mode": self.autoreset_mode,
+        }
+        self.render_mode, self.spec = render_mode, None
+        drawn = min(count("rendered", rendered), self.num_envs) if render_mode else 0
+        self._recordings = [Recording(self.batch, env) for env in range(drawn)]
+        self._renderers: list[Any] = []
+        self._generators: list[np.random.Generator] = []
+        self._ended = np.zeros(self.num_envs, bool)
+        self._started = np.zeros(self.num_envs, bool)
+
+    # Gymnasium
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Start episodes: in all environments, or in those of `options["reset_mask"]`.
+
+        Args:
+            seed: of the first; the i-th has `seed + i`. Or one each, None to go on with its generator.
+            options: as of the single environment, the same for all; "reset_mask", bool of shape (num_envs,).
+
+        Raises:
+            ParameterError: a bad seed, option or mask.
+        """
+        self._refuse_closed("reset")
+        options = dict(options or {})
+        mask = self._mask(options.pop("reset_mask", None))
+        checked = check_options(options or None, self.batch.gaits)
+        self._seed(seed, mask)
+        start = self._start(np.flatnonzero(mask), checked)
+        self._ended[mask] = False
+        return self._observed(), start
+
+    def step(
+        self, actions: NDArray[np.float32]
+    ) -> tuple[NDArray[np.float32], NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
+        """One control step of all.
+
+        Raises:
+            ParameterError: actions of a wrong shape or type, or not finite.
+            ResetNeeded: `reset` was not called, or with autoreset disabled an episode that ended.
+        """
+        self._refuse_closed("step")
+        if not self._started.all():
+            raise ResetNeeded("step() was called before reset(): expected reset() of all environments first")
+        batch, n, before = self.batch, self.num_envs, self._ended
+        again = before if before.any() else None
+        if again is not None and self.autoreset_mode == AutoresetMode.DISABLED:
+            raise ResetNeeded(
+                f"step() was called although episodes {np.flatnonzero(again).tolist()} ended: "
+                "expected reset(options={'reset_mask': ...})"
+            )
+        self._take(actions)
+        for recording in self._recordings:
+            recording.start()
+        batch.step(self._generators)
+        ended = batch.episode[e.ENDED, :n]
+        terminated, truncated = ended == e.FAILED, ended == e.TRUNCATED
+        terms = batch.episode[e.TERM : e.TERM + len(e.TERMS), :n].copy()
+        infos: dict[str, Any] = {}
+        if again is not None:  # NEXT_STEP: these were not stepped, they start
+            terms[:, again], terminated[again], truncated[again] = 0.0, False, False
+        done = terminated | truncated
+        if done.any():
+            self._sum_up(infos, np.flatnonzero(done))
+        rewards = terms[0] + terms[1] + terms[2] + terms[3] + terms[4]
+        infos |= dict(zip(e.TERMS, terms, strict=True))
+        if again is not None:
+            infos |= self._start(np.flatnonzero(again), {})
+        if done.any() and self.autoreset_mode == AutoresetMode.SAME_STEP:
+            self._same_step(infos, done)
+            done = np.zeros(n, bool)
+        else:
+            self._show()
+        self._ended = done
+        return self._observed(), rewards, terminated, truncated, infos
+
+    def _same_step(self, infos: dict[str, Any], done: NDArray[np.bool_]) -> None:
+        """Start again at once what ended; what it ended with goes into the infos."""
+        last = np.full(self.num_envs, None, dtype=object)
+        for env in np.flatnonzero(done):
+            last[env] = self.batch.seen[env].copy()
+        final = {key: value for key, value in infos.items() if not key.startswith("_")}
+        masks = {f"_{key}": infos.get(f"_{key}", done.copy()) for key in final}
+        self._show()
+        start = self._start(np.flatnonzero(done), {})
+        infos |= {"final_obs": last, "_final_obs": done.copy()}
+        infos |= {"final_info": final | masks, "_final_info": done.copy()}
+        infos |= start
+
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
+        """Frames of the first environments, (H, W, 3) uint8 each."""
+        if self.render_mode is None:
+            gym.logger.warn("render() was called without a render_mode: pass render_mode='rgb_array'")
+            return None
+        if not self._started.all():
+            raise ResetNeeded("render() was called before reset(): expected reset() first")
+        from hoof_env.envs.rendering import Renderer
+
+        engine, weight = self.batch.engine, self.batch.engine.weight
+        while len(self._renderers) < len(self._recordings):
+            self._renderers.append(
+                Renderer(
+                    self.batch.geometry, "rgb_array", self.metadata["render_fps"],
+                    weight_n=weight if self.settings.trunk == "suspended" else None,
+                    lift_off_n=LIFT_OFF * weight, terrain=engine.terrain,
+                )
+            )  # fmt: skip
+        for recording, renderer in zip(self._recordings, self._renderers, strict=True):
+            recording.draw(renderer)
+        return tuple(renderer.frame() for renderer in self._renderers)
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Give the renderers back."""
+        for renderer in self._renderers:
+            renderer.close()
+        self._renderers = []
+
+    # Parts of it
+
+    def _start(self, envs: NDArray[np.int64], options: Mapping[str, Any]) -> dict[str, Any]:
+        """Start episodes; what was drawn, as infos."""
+        for recording in self._recordings:
+            recording.start()
+        start = self.batch.reset(envs, [self._generators[env] for env in envs], options)
+        self._started[envs] = True
+        for recording in self._recordings:
+            if recording.env in envs:
+                recording.keep(True)
+        infos: dict[str, Any] = {}
+        mask = np.zeros(self.num_envs, bool)
+        mask[envs] = True
+        for name in ("crank_angle", "speed", "height", "x"):
+            values = np.zeros(self.num_envs)
+            values[envs] = start[name]
+            infos |= {name: values, f"_{name}": mask.copy()}
+        return infos
+
+    def _sum_up(self, infos: dict[str, Any], envs: NDArray[np.int64]) -> None:
+        mask = np.zeros(self.num_envs, bool)
+        mask[envs] = True
+        summaries = [self.batch.summary(int(env)) for env in envs]
+        whole: dict[str, Any] = {}
+        for name in summaries[0]:
+            values = np.zeros(self.num_envs)
+            values[envs] = [summary[name] for summary in summaries]
+            whole |= {name: values, f"_{name}": mask.copy()}
+        infos |= {"episode_summary": whole, "_episode_summary": mask}
+
+    def _show(self) -> None:
+        for recording in self._recordings:
+            if not self._ended[recording.env]:
+                recording.keep(False)
+
+    def _observed(self) -> NDArray[np.float32]:
+        return self.batch.seen[: self.num_envs].copy()
+
+    def _take(self, actions: Any) -> None:
+        try:
+            given = np.asarray(actions)
+        except ValueError:
+            given = np.empty(0, object)
+        if given.dtype.kind not in "fiu" or given.shape != (self.num_envs, e.ACTIONS):
+            raise ParameterError(
+                f"actions: expected finite numbers in [-1, 1], shape {(self.num_envs, e.ACTIONS)}, "
+                f"got {given.dtype} of shape {given.shape}"
+            )
+        if not np.isfinite(given).all():
+            rows = np.flatnonzero(~np.isfinite(given).all(1)).tolist()
+            raise ParameterError(
+                f"actions: expected finite numbers in [-1, 1], got others in rows {rows[:8]}"
+            )
+        self.batch.actions[: self.num_envs] = given
+
+    def _mask(self, given: Any) -> NDArray[np.bool_]:
+        if given is None:
+            return np.ones(self.num_envs, bool)
+        if (
+            not isinstance(given, np.ndarray)
+            or given.dtype != bool
+            or given.shape != (self.num_envs,)
+            or not given.any()
+        ):
+            raise ParameterError(
+                f"options['reset_mask']: expected a bool array of shape ({self.num_envs},) with at least one "
+                f"True, got {given!r}"
+            )
+        return given
+
+    def _seed(self, seed: Any, mask: NDArray[np.bool_]) -> None:
+        """Give the environments of the mask their generators."""
+        n = self.num_envs
+        if isinstance(seed, (list, tuple, np.ndarray)):
+            if len(seed) != n:
+                raise ParameterError(f"seed: expected one number or {n}, got {len(seed)}")
+            seeds = [None if value is None else _one_seed(value) for value in seed]
+        elif seed is None:
+            seeds = [None] * n
+        else:
+            first = _one_seed(seed)
+            seeds = [first + env for env in range(n)]
+        if not self._generators:
+            self._generators = [seeding.np_random(value)[0] for value in seeds]
+            return
+        for env in np.flatnonzero(mask):
+            if seeds[env] is not None:
+                self._generators[env] = seeding.np_random(seeds[env])[0]
+
+    def _refuse_closed(self, name: str) -> None:
+        if self.closed:
+            raise ClosedEnvironmentError(f"{name}() was called after close(): make a new one")
+
+    # State
+
+    def get_state(self) -> dict[str, Any]:
+        """Everything that changes, generators included: continuing from it is bit-identical.
+
+        Raises:
+            ResetNeeded: there are no episodes yet.
+        """
+        if not self._started.all():
+            raise ResetNeeded("get_state() was called before reset(): expected reset() first")
+        about = {"id": self.task.id, "settings": to_json(self.settings), "ended": self._ended.copy()}
+        generators = [generator.bit_generator.state for generator in self._generators]
+        return {**about, **self.batch.get_state(), "generator": generators}
+
+    def set_state(self, state: Mapping[str, Any]) -> NDArray[np.float32]:
+        """Put back what `get_state` gave; returns the observations there.
+
+        Raises:
+            ParameterError: a state of another id, geometry, setting or number of environments.
+        """
+        check_state(state, self.task.id, to_json(self.settings), ("ended",))
+        self.batch.set_state(state)
+        self._ended, self._started = np.array(state["ended"], bool), np.ones(self.num_envs, bool)
+        self._generators = [np.random.Generator(np.random.PCG64()) for _ in range(self.num_envs)]
+        for generator, values in zip(self._generators, state["generator"], strict=True):
+            generator.bit_generator.state = copy.deepcopy(values)
+        return self._observed()
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**vars(self), "_renderers": []}
+
+
+def _one_seed(value: Any) -> int:
+    number = check_number("seed", value, low=0)
+    if number != int(number):
+        raise ParameterError(f"seed: expected a whole number, 0 or more, got {value!r}")
+    return int(value)
+
+
+def _autoreset_mode(value: Any) -> AutoresetMode:
+    if isinstance(value, AutoresetMode):
+        return value
+    known = {mode.value: mode for mode in AutoresetMode} | {mode.name: mode for mode in AutoresetMode}
+    try:
+        return known[value]
+    except (KeyError, TypeError):
+        names = ", ".join(mode.name for mode in AutoresetMode)
+        raise ParameterError(f"autoreset_mode: expected one of {names}, got {value!r}") from None
