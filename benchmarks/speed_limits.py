@@ -90,8 +90,8 @@ def _pass(name: str, counts: dict[str, Counts], seconds: dict[Any, Floats]) -> d
 def _widths(made: TrunkEngine) -> dict[str, dict[int, int]]:
     """Floating-point instructions of the batch kernel by kind and width."""
     kernel: Any = advance_batch
-    fresh, memory = jit(kernel.py_func), made._memory
-    fresh(memory.data, *made._model, memory.constants, memory.reactions, DT, 1, False)
+    fresh = jit(kernel.py_func)
+    fresh(*made.arrays, DT, 1, False)
     found = instructions(assembly(fresh))
     return {kind: {width: found[kind, width] for width in WIDTHS} for kind in KINDS[:3]}
 

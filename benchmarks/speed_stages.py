@@ -132,7 +132,7 @@ class Pass:
     def __init__(self, made: TrunkEngine, lanes: int, together: bool = False) -> None:
         self.made, self.lanes, self.together = made, lanes, together
         self.legs = 1 if together else len(made.limbs)
-        model, tables, _ = made._model
+        _, model, tables, *_ = made.arrays
         self.given = self._filled(), tables, model[0]["settings"].copy()
 
     def _filled(self) -> NDArray[np.float64]:
@@ -154,13 +154,13 @@ class Pass:
             for k in range(out.size):
                 out[k] = memory[k]
 
-        jit(fill)(self.made._memory.data, *self.made._model, found)
+        jit(fill)(*self.made.arrays[:4], found)
         return found
 
     def loop(self, stage: Stage | None, legs: int, again: bool = True) -> Any:
         """The stage n times on these lanes, or once if not `again`: a function of `given`, h and n."""
         work, lanes, together = stage.work if stage else _nothing, self.lanes, self.together
-        record = self.made._model[0][0]
+        record = self.made.arrays[1][0]
         kind, eighths, law, cells = (int(record[k]) for k in ("kind", "eighths", "friction_law", "cells"))
         interpolated = bool(record["interpolated"])
 
@@ -172,7 +172,7 @@ class Pass:
                 memory[k] = filled[k]
             filters = address(settings)
             fixed = Model(
-                kind, eighths, law, interpolated, False, False, together, cells, address(tables),
+                kind, eighths, law, interpolated, False, False, False, together, cells, address(tables),
                 filters, 2, filters, filters, carray(address(tables), tables.shape), 0.0, 1.0,
             )  # fmt: skip
             for _ in range(n if again else 1):
