@@ -9,6 +9,7 @@ from __future__ import annotations
 import platform
 import statistics
 import time
+from typing import Any
 
 import gymnasium as gym
 from gymnasium.utils.performance import benchmark_render
@@ -38,13 +39,15 @@ def step_and_render(env: gym.Env, seconds: float) -> float:
 
 def main() -> None:
     with gym.make(ENV_ID, render_mode="rgb_array") as env:
-        size = "x".join(map(str, env.reset(seed=0) and env.render().shape[1::-1]))
+        env.reset(seed=0)
+        picture: Any = env.render()
+        size = "x".join(map(str, picture.shape[1::-1]))
         step_and_render(env, 0.5)  # compiles, and moves the leg
         life = env.metadata["render_fps"]
         print(f"hoof-env {hoof_env.__version__}, {ENV_ID}, {size}, Python {platform.python_version()}")
         print("| what | frames/s | lowest to highest | times real time |\n|---|---|---|---|")
         for name, measure in (
-            ("render alone", lambda: benchmark_render(env, target_duration=SECONDS)),
+            ("render alone", lambda: benchmark_render(env, target_duration=int(SECONDS))),
             ("step and render", lambda: step_and_render(env, SECONDS)),
         ):
             rates = sorted(measure() for _ in range(ROUNDS))

@@ -85,14 +85,18 @@ def scenes(preset: str) -> dict[str, Scene]:
     }
 
 
-def engine(scene: Scene, preset: str, num_envs: int = 1, spread: bool = True, **options: Any) -> TrunkEngine:
-    """The scene in this project's engine; if `spread`, each environment has its own crank angle."""
+def engine(
+    scene: Scene, preset: str, num_envs: int = 1, angles: str = "random", **options: Any
+) -> TrunkEngine:
+    """The scene in this project's engine. Crank angles are all round the circle, "random" in order or
+    "sorted", or "equal"."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", StepWarning)  # the cost of a step is asked, not its error
         made = TrunkEngine(
             scene.limbs, scene.trunk, load_ground(preset), sim_dt=DT, substeps=1, num_envs=num_envs, **options
         )
-    turns = np.arange(num_envs) / num_envs * 2 * np.pi if spread else np.zeros(num_envs)
+    order = np.random.default_rng(0).permutation(num_envs) if angles == "random" else np.arange(num_envs)
+    turns = 2 * np.pi / num_envs * (order if angles != "equal" else 0 * order)
     made.reset(scene.gait, np.array(scene.cranks)[:, None] + turns)
     return made
 

@@ -6,7 +6,14 @@ import re
 from collections import Counter
 from typing import Any
 
-KINDS = ("divisions", "square_roots", "arithmetic", "accesses")
+KINDS = ("divisions", "square roots", "arithmetic", "loads", "stores")
+WIDTHS = (64, 128, 256, 512)
+"""Bits that an instruction works on; 64 is one double, and whatever is not a vector."""
+
+_LINE = re.compile(r"^\t([a-z]\w*)(?:[ \t]+([^#\n]*))?", re.M)
+_WORK = re.compile(r"v(add|sub|mul|div|sqrt|min|max)[sp]d$")
+_WIDTH = {"x": 128, "y": 256, "z": 512}
+_NO_ACCESS = ("lea", "nop", "call", "jmp", "prefetch")
 
 
 def assembly(compiled: Any) -> str:
@@ -14,38 +21,24 @@ def assembly(compiled: Any) -> str:
     return "".join(compiled.inspect_asm().values())
 
 
-_WORK = re.compile(r"^\s+v(add|sub|mul|div|sqrt|min|max)(sd|pd)\s+(.*)$", re.M)
-_LANES = {"x": 2, "y": 4, "z": 8}
-
-
-def count_operations(assembly: str) -> Counter[str]:
-    """Doubles that AVX instructions work on, by kind, and those that they read or write in memory."""
-    counts: Counter[str] = Counter(dict.fromkeys(KINDS, 0))
-    for line in assembly.splitlines():
-        name, _, operands = line.strip().partition("\t")
-        if not name.startswith("v"):
-            continue
-        widths = [_LANES[w] for w in re.findall(r"%([xyz])mm", operands)]
-        lanes = 1 if name.endswith("sd") or not widths else max(widths)
-        counts["accesses"] += lanes if "(" in operands and "(%rip)" not in operands else 0
-        if work := _WORK.match("\t" + line.strip()):
-            counts[{"div": "divisions", "sqrt": "square_roots"}.get(work[1], "arithmetic")] += lanes
-    return counts
-
-
-def vector_widths(assembly: str) -> dict[str, int]:
-    """Floating-point instructions in x86 code: scalar, and packed by width in bits."""
-    found = {"scalar": 0, "128": 0, "256": 0, "512": 0}
-    for _, size, operands in _WORK.findall(assembly):
-        wide = max(_LANES[w] for w in re.findall(r"%([xyz])mm", operands))
-        found["scalar" if size == "sd" else str(64 * wide)] += 1
+def instructions(assembly: str) -> Counter[tuple[str, int]]:
+    """How many instructions there are of each of `KINDS` and `WIDTHS`; those of ("all", 0) are all. One that
+    also reads its operand from memory is a load, too; constants are not counted as such."""
+    found: Counter[tuple[str, int]] = Counter()
+    for name, operands in _LINE.findall(assembly):
+        found["all", 0] += 1
+        registers = [_WIDTH[r] for r in re.findall(r"%([xyz])mm", operands)]
+        width = max(registers) if registers and not name.endswith("sd") else 64
+        if work := _WORK.match(name):
+            kind = {"div": "divisions", "sqrt": "square roots"}.get(work[1], "arithmetic")
+            found[kind, width] += 1
+        if "(" in operands and "(%rip)" not in operands and not name.startswith(_NO_ACCESS):
+            last = re.sub(r"\{.*?\}", "", operands).rstrip()
+            found["stores" if last.endswith(")") else "loads", width] += 1
     return found
 
 
-def packed_and_not(assembly: str) -> dict[str, int]:
-    """Division and square root instructions in x86 code, packed and scalar."""
-    found = {f"{kind} {size}": 0 for kind in ("div", "sqrt") for size in ("packed", "scalar")}
-    for kind, size, _ in _WORK.findall(assembly):
-        if kind in ("div", "sqrt"):
-            found[f"{kind} {'packed' if size == 'pd' else 'scalar'}"] += 1
-    return found
+def by_kind(found: Counter[tuple[str, int]]) -> dict[str, int]:
+    """The same of all widths together, and "instructions" of any kind."""
+    totals = {kind: sum(found[kind, width] for width in WIDTHS) for kind in KINDS}
+    return {"instructions": found["all", 0]} | totals

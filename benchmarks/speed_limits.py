@@ -1,7 +1,8 @@
-"""What limits the batch: its stages one by one, the machine's ceilings, and experiments.
+"""What limits the speed: the stages of a step one by one, the machine's ceilings, and experiments.
 
-The ceilings are loops of one kind of independent packed operation. What a stage would take if nothing but its
-operations, or nothing but its accesses to memory, went at the ceiling says which of the two it is bound by.
+A pass is what the kernels' code does at a time: one leg, eight legs of a batch, the four legs of a horse or
+eight horses. What it would take if nothing but its divisions, its arithmetic, its loads or its stores went at
+the machine's ceiling says which of them it is bound by; the clock says how many instructions go side by side.
 """
 
 from __future__ import annotations
@@ -12,178 +13,180 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-import numba
 import numpy as np
-from numba import carray
 
-from benchmarks.speed_cases import BATCH, DT, engine, scenes, worked
-from benchmarks.speed_code import KINDS, assembly, packed_and_not, vector_widths
-from benchmarks.speed_rounds import interleave, spread
-from benchmarks.speed_stages import NOT_FIXED, STAGES, count_stage, fence, filled_tile, stage_loop
-from hoof_env._memory import doubles
-from hoof_env.dynamics.advance import TILE, advance_batch, run
+from benchmarks.speed_cases import BATCH, DT, STEPS, Scene, engine, scenes, worked
+from benchmarks.speed_ceilings import ceilings, clock
+from benchmarks.speed_code import KINDS, WIDTHS, assembly, by_kind, instructions
+from benchmarks.speed_rounds import Floats, interleave, spread
+from benchmarks.speed_stages import STAGES, STEP, Pass, jit
+from hoof_env.dynamics.advance import LANES, advance_batch, advance_one, run
 from hoof_env.dynamics.trunk_engine import TrunkEngine
 
+Timed = tuple[Callable[[], float], float]
+"""A run, and how many of what is asked it does."""
 
-def _jit(function: Any) -> Any:
-    return numba.njit(error_model="numpy")(function)
-
-
-LANES = 64
-
-
-@_jit
-def _divide(n):  # type: ignore[no-untyped-def]
-    x = carray(doubles(LANES), LANES)
-    for i in range(LANES):
-        x[i] = 1.0 + 0.01 * i
-    for _ in range(n):
-        for i in range(LANES):
-            x[i] = 1.7 / x[i]
-    return x[0]
-
-
-@_jit
-def _root(n):  # type: ignore[no-untyped-def]
-    x = carray(doubles(LANES), LANES)
-    for i in range(LANES):
-        x[i] = 1.0 + 0.01 * i
-    for _ in range(n):
-        for i in range(LANES):
-            x[i] = np.sqrt(x[i] + 2.3)
-    return x[0]
-
-
-@_jit
-def _multiply_add(n):  # type: ignore[no-untyped-def]
-    x = carray(doubles(LANES), LANES)
-    for i in range(LANES):
-        x[i] = 1.0 + 0.01 * i
-    for _ in range(n):
-        for i in range(LANES):
-            y = x[i]
-            for _ in range(8):
-                y = y * 0.7 + 0.3
-            x[i] = y
-    return x[0]
-
-
-@_jit
-def _copy(n):  # type: ignore[no-untyped-def]
-    rows = doubles(32 * LANES)
-    x = carray(rows, (32, LANES))
-    for k in range(32):
-        for i in range(LANES):
-            x[k, i] = 1.0 * i
-    for _ in range(n):
-        fence(rows)
-        for k in range(16):
-            for i in range(LANES):
-                x[k, i] = x[16 + k, i]
-    return x[0, 0]
-
-
-# name: (loop, elements for each turn)
-CEILINGS: dict[str, tuple[Any, int]] = {
-    "divisions": (_divide, LANES),
-    "square_roots": (_root, LANES),
-    "arithmetic": (_multiply_add, 16 * LANES),
-    "accesses": (_copy, 2 * 16 * LANES),
+PASSES = {
+    "leg, one": ("leg", 1, 1),
+    "leg, batch": ("leg", LANES, BATCH),
+    "horse, one": ("horse", 4, 1),
+    "horse, batch": ("horse", LANES, BATCH),
 }
-"""Loops that do nothing but one kind of operation; a copy in the nearest cache is one load and one store."""
+"""By name: scene, lanes, environments."""
 
+PIECE = "a step in one piece"
 
-def _kernel(tile: int, legs: int) -> Any:
-    def advance(arrays, model, h, steps, account):  # type: ignore[no-untyped-def]
-        run(arrays, model, h, steps, account, legs, tile, False)
+BOUNDS = {"divisions": KINDS[:2], "arithmetic": KINDS[2:3], "loads": KINDS[3:4], "stores": KINDS[4:]}
+"""Square roots go through the divider."""
 
-    return numba.njit(error_model="numpy")(advance)
+TURNS = 20000  # of a stage
+
+Counts = Counter[tuple[str, int]]
 
 
 def limits(preset: str, quick: bool, rounds: int) -> dict[str, Any]:
-    """Vector width, ceilings, stages of the leg on a fixed trunk and of the horse, and experiments."""
-    at = scenes(preset)
-    result: dict[str, Any] = {} if quick else _vectors(engine(at["leg"], preset, TILE))
-    turns, steps = (200, 10) if quick else (20000, 40)
-    runs: dict[str, Callable[[], float]] = {
-        f"ceiling {name}": partial(worked, _nothing, partial(loop, turns))
-        for name, (loop, _) in CEILINGS.items()
+    """Clock, ceilings, the stages of a pass, widths of the batch kernel's instructions, and experiments."""
+    turns, at = 200 if quick else 100000, scenes(preset)
+    runs: dict[Any, Timed] = {"clock": clock(10 * turns)}
+    for width in WIDTHS:
+        runs |= {(kind, width): timed for kind, timed in ceilings(width // 64, turns).items()}
+    counts: dict[str, dict[str, Counts]] = {}
+    for name, (scene, lanes, number) in {} if quick else PASSES.items():
+        made = engine(at[scene], preset, number)
+        one, counts[name] = Pass(made, lanes, together=number == 1 < lanes), {}
+        runs[name, "step"] = _advance(made, number // lanes if number > 1 else 1, STEPS[scene, number])
+        for title, stage in {**STAGES, PIECE: STEP}.items():
+            if not stage.moves or made.trunk.kind != "fixed":
+                found, work = one.count(stage), partial(one.loop(stage, one.legs), *one.given, DT, TURNS)
+                counts[name][title] = Counter({k: stage.calls * n for k, n in found.items()})
+                runs[name, title] = partial(worked, _nothing, work), TURNS / stage.calls
+    seconds = _each(runs, rounds)
+    return {
+        "clock_GHz": spread(1e-9 / seconds["clock"]),
+        "ceilings_per_ns": {w: {k: spread(1e-9 / seconds[k, w]) for k in KINDS} for w in WIDTHS},
+        "passes": {name: _pass(name, found, seconds) for name, found in counts.items()},
+        "widths": {} if quick else _widths(engine(at["leg"], preset, LANES)),
+        "experiments": {} if quick else experiments(preset, rounds),
     }
-    found: dict[str, dict[str, Counter[str]]] = {}
-    for scene in () if quick else ("leg", "horse"):
-        made, found[scene] = engine(at[scene], preset, TILE), {}
-        tile = filled_tile(made)
-        for name, (stage, _, _) in STAGES.items():
-            if name not in NOT_FIXED or made.trunk.kind != "fixed":
-                found[scene][name] = count_stage(name, made)
-                loop = stage_loop(stage, len(made.limbs))
-                work = partial(loop, *tile, made._model, 1e-6, turns // 20)
-                runs[f"{scene} {name}"] = partial(worked, _nothing, work)
-        runs[f"{scene} whole"] = _whole(engine(at[scene], preset, BATCH), steps)
-    seconds = interleave(runs, rounds)
-    rates = {name: per * turns / seconds[f"ceiling {name}"] for name, (_, per) in CEILINGS.items()}
-    result["ceilings_per_s"] = {name: spread(rate) for name, rate in rates.items()}
-    result["stages"] = {}
-    for scene, counts in found.items():
-        whole, rows = seconds[f"{scene} whole"] / (BATCH * steps), {}
-        for name, count in counts.items():
-            cost = seconds[f"{scene} {name}"] / (turns // 20 * TILE) * STAGES[name][1]
-            rows[name] = dict(count) | {
-                "ns": 1e9 * float(np.median(cost)),
-                "share": float(np.median(cost / whole)),
-            }
-        total = {k: sum(row[k] for row in rows.values()) for k in KINDS}
-        need = {k: total[k] / rates[k] / whole for k in KINDS}
-        result["stages"][scene] = {
-            "whole_ns": spread(whole * 1e9), "rows": rows, "total": total,
-            "division_share": spread(need["divisions"] + need["square_roots"]),
-            "arithmetic_share": spread(need["arithmetic"]), "access_share": spread(need["accesses"]),
-        }  # fmt: skip
-    result["experiments"] = {} if quick else experiments(preset, rounds)
-    return result
 
 
-def _vectors(made: TrunkEngine) -> dict[str, Any]:
-    """Widths in the code of the batch kernel; one from the cache has no code to look at."""
-    fresh = _jit(advance_batch.py_func)
-    fresh(made._arrays, made._model, DT, 1, False)
-    code = assembly(fresh)
-    return {"vector_instructions": vector_widths(code)} | packed_and_not(code)
+def _pass(name: str, counts: dict[str, Counts], seconds: dict[Any, Floats]) -> dict[str, Any]:
+    """Of one pass: what its stages do and take in a step, and how near the step comes to the ceilings."""
+
+    def needed(count: Counts, bound: str) -> Any:
+        return sum(count[k, w] * seconds[k, w] for k in BOUNDS[bound] for w in WIDTHS)
+
+    def row(count: Counts, spent: Floats) -> dict[str, Any]:
+        return by_kind(count) | {
+            "ns": spread(spent * 1e9),
+            "per_cycle": spread(count["all", 0] * seconds["clock"] / spent),
+            "of_ceiling": {bound: spread(needed(count, bound) / spent) for bound in BOUNDS},
+        }
+
+    rows = {title: row(count, seconds[name, title]) for title, count in counts.items()}
+    return {"rows": rows, "step": row(counts[PIECE], seconds[name, "step"])}
+
+
+def _widths(made: TrunkEngine) -> dict[str, dict[int, int]]:
+    """Floating-point instructions of the batch kernel by kind and width."""
+    kernel: Any = advance_batch
+    fresh = jit(kernel.py_func)
+    fresh(*made.arrays, DT, 1, False)
+    found = instructions(assembly(fresh))
+    return {kind: {width: found[kind, width] for width in WIDTHS} for kind in KINDS[:3]}
 
 
 def _nothing() -> None:
     pass
 
 
-def _whole(made: TrunkEngine, steps: int) -> Callable[[], float]:
+def _advance(made: TrunkEngine, passes: int, steps: int, kernel: Any = None) -> Timed:
+    """A call of so many steps, by another kernel if one is given; each counts as so many passes."""
+    made._run = kernel or made._run
     made.advance(steps=1, account=False)
     state = made.get_state()
-    return partial(worked, partial(made.set_state, state), partial(made.advance, steps=steps, account=False))
+    work = partial(made.advance, steps=steps, account=False)
+    return partial(worked, partial(made.set_state, state), work), passes * steps
 
 
-def experiments(preset: str, rounds: int) -> dict[str, Any]:
-    """Cost per leg-step of a batch of legs that is changed in one respect, over that of the plain one."""
-    leg, steps = scenes(preset)["leg"], 40
-    high = leg.trunk.height + 1.0
-    aloft = replace(leg, trunk=replace(leg.trunk, height=high))
-    plain = engine(leg, preset, BATCH)
-    runs = {
-        "plain": (_whole(plain, steps), BATCH * steps),
-        "all at one crank angle": (_whole(engine(leg, preset, BATCH, spread=False), steps), BATCH * steps),
-        "in the air": (_whole(engine(aloft, preset, BATCH), steps), BATCH * steps),
-        "64 environments": (_whole(engine(leg, preset, 64), 16 * steps), BATCH * steps),
-        "16384 environments": (_whole(engine(leg, preset, 16 * BATCH), steps), 16 * BATCH * steps),
+def _each(runs: dict[Any, Timed], rounds: int) -> dict[Any, Floats]:
+    """Seconds of one of what each run does, interleaved."""
+    seconds = interleave({name: run for name, (run, _) in runs.items()}, rounds)
+    return {name: seconds[name] / number for name, (_, number) in runs.items()}
+
+
+def _kernel(lanes: int, legs: int = 0) -> Any:
+    """`advance_batch` for other lanes, and a number of legs that the compiler knows if it is given."""
+
+    def advance(data, model, tables, ground, constants, reactions, h, steps, account):  # type: ignore[no-untyped-def]
+        number = legs if legs else model[0].legs
+        run(data, model, tables, ground, constants, reactions, h, steps, account, number, lanes, False)
+
+    return jit(advance)
+
+
+def _with_aligned_table(made: TrunkEngine, steps: int) -> Timed:
+    model, tables, ground = made._model
+    room = np.empty(tables.size + 7)
+    first = -room.ctypes.data % 64 // 8
+    aligned = room[first : first + tables.size].reshape(tables.shape)
+    aligned[:] = tables
+    made._model = model, aligned, ground
+    return _advance(made, made.num_envs, steps)
+
+
+def _legs(scene: Scene, count: int) -> Scene:
+    """So many legs on the scene's trunk; if it is fixed they do not feel each other."""
+    return replace(scene, limbs=scene.limbs[:1] * count, cranks=scene.cranks[:1] * count)
+
+
+def experiments(preset: str, rounds: int) -> dict[str, dict[str, Any]]:
+    """Cost of a leg-step of something that is changed in one respect, over that of the plain one."""
+    at = scenes(preset)
+    leg, horse = at["leg"], at["horse"]
+    high = replace(leg, trunk=replace(leg.trunk, height=leg.trunk.height + 1.0))
+
+    def cost(scene: Scene, number: int, steps: int, kernel: Any = None, **options: Any) -> Timed:
+        made = engine(scene, preset, number, **options)
+        return _advance(made, number * len(scene.limbs), steps, kernel)
+
+    batch = partial(cost, leg, BATCH)
+    groups = {
+        f"{BATCH} legs, 100 steps a call": {
+            "plain": batch(100),
+            "in the order of their crank angles": batch(100, angles="sorted"),
+            "all at one crank angle": batch(100, angles="equal"),
+            "in the air": cost(high, BATCH, 100),
+            "64 legs": cost(leg, 64, 1600),
+            "16384 legs": cost(leg, 16 * BATCH, 100),
+            "10 steps a call": batch(10),
+            "10 steps a call, 1032 legs": cost(leg, BATCH + LANES, 10),
+            "1 step a call": batch(1),
+            "1 step a call, 1032 legs": cost(leg, BATCH + LANES, 1),
+            "2 lanes": batch(100, _kernel(2)),
+            "4 lanes": batch(100, _kernel(4)),
+            "16 lanes": batch(100, _kernel(16)),
+            "two legs on each fixed trunk": cost(_legs(leg, 2), BATCH // 2, 100),
+            "table at a whole cache line": _with_aligned_table(engine(leg, preset, BATCH), 100),
+        },
+        "one leg": {
+            "plain": cost(leg, 1, 5000),
+            "in the air": cost(high, 1, 5000),
+            "by the kernel for any number of legs": cost(leg, 1, 5000, advance_one),
+            "two legs on the fixed trunk": cost(_legs(leg, 2), 1, 5000, _kernel(1, 2)),
+            "four legs on the fixed trunk": cost(_legs(leg, 4), 1, 5000, _kernel(1, 4)),
+        },
+        "one horse": {
+            "plain": cost(horse, 1, 1000),
+            "legs one after the other": cost(horse, 1, 1000, advance_one),
+        },
     }
-    for tile in (8, 16, 64, 128):
-        if tile != TILE:
-            made = engine(leg, preset, BATCH)
-            kernel, state = _kernel(tile, 1), made.get_state()
-            work = partial(kernel, made._arrays, made._model, DT, steps, False)
-            work()
-            made.set_state(state)
-            runs[f"tiles of {tile}"] = partial(worked, partial(made.set_state, state), work), BATCH * steps
-    seconds = interleave({name: r for name, (r, _) in runs.items()}, rounds)
-    base = seconds["plain"] / runs["plain"][1]
+    seconds = _each(
+        {(group, name): run for group, runs in groups.items() for name, run in runs.items()}, rounds
+    )
     return {
-        name: spread(seconds[name] / units / base) for name, (_, units) in runs.items() if name != "plain"
+        group: {
+            name: spread(seconds[group, name] / seconds[group, "plain"]) for name in runs if name != "plain"
+        }
+        for group, runs in groups.items()
     }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from benchmarks.speed_code import KINDS
+from benchmarks.speed_code import KINDS, WIDTHS
 from benchmarks.speed_rounds import told
 
 INTRO = """\
@@ -12,8 +12,8 @@ INTRO = """\
 
 Written by `make bench`; run it again for the numbers of your machine. Everything runs in one process on one
 thread, interleaved: {rounds} rounds, each with every case once in a new order, {clock} time. A ratio is taken
-within a round; given are the median and in brackets quartiles and extremes. Only ratios count. Stages and
-costs against size are in processor time."""
+within a round; given are the median and in brackets quartiles and extremes. Only ratios count. What limits it
+and costs against size are in processor time."""
 
 RATIOS = """\
 ## Ratios
@@ -34,17 +34,21 @@ SCALING = """\
 ![Cost against steps, legs and environments](scaling.svg)
 
 The straight line is a fixed cost and one for each step, leg or environment. Up to six environments are run
-one by one, more in tiles of 32."""
+one by one, more side by side, eight at a time. One trunk with one leg and one with four have kernels of their
+own, and with other numbers one that goes from leg to leg."""
 
-STAGES = """\
-Nanoseconds per environment, each stage alone in a loop over a tile; then what it does to one environment,
-in doubles, counted in its machine code, and what its operations alone, or its accesses to memory alone,
-would take at the machine's ceiling."""
+PASSES = """\
+A pass is what a kernel's code does at a time: a leg, the four legs of a horse, or eight environments of a
+batch. For each stage what all its calls in a step of a pass take, alone in a loop in the state where the
+runs begin, and the instructions in its machine code, both sides of branches included (a touch-down is rare);
+one that calculates with a number from memory is a load, too. Then what share of its time it would take if
+nothing but its divisions and square roots, its arithmetic, its loads or its stores went at the machine's
+ceiling."""
 
 EXPERIMENTS = """\
 ### Experiments
 
-Time per leg-step over that of the batch of 1024 legs, each at its own crank angle, in the same round."""
+Time per leg-step over that of what is named first, in the same round. Crank angles are in random order."""
 
 
 def table(head: list[str], rows: list[list[str]]) -> str:
@@ -110,13 +114,12 @@ def _walking(rows: list[dict[str, Any]]) -> str:
 
 
 def _start(start: dict[str, Any]) -> str:
-    warm, cold, every = (start[f"{k}_s"] for k in ("warm_start", "first_compile", "warm_start_all_kernels"))
-    rows = [
-        ["import, construct, first step; cached", *map(told, warm), _under(1, warm[0]["median"])],
-        ["the same with every kernel, cached", *(f"{s:.2f}" for s in every), ""],
-        ["the same with every kernel, compiled", *(f"{s:.1f}" for s in cold), _under(30, cold[0])],
-    ]
-    return "## Start\n\n" + table(["in a fresh process", "wall time s", "processor s", "bar"], rows)
+    cold, cached, warm = start["cold_s"], start["cached_s"], start["warm_one_leg_s"]
+    rows = [[name, *(f"{s:.2f}" for s in (*cold[name], *cached[name])), ""] for name in cold if name != "all"]
+    rows.append(["all", *(f"{s:.2f}" for s in (*cold["all"], *cached["all"])), _under(30, cold["all"][0])])
+    rows.append(["one leg: import, first step", "", "", *map(told, warm), _under(1, warm[0]["median"])])
+    head = ["in a fresh process", "compiled: wall s", "processor s", "cached: wall s", "processor s", "bar"]
+    return "## Start\n\n" + table(head, rows)
 
 
 def _under(bar: float, value: float) -> str:
@@ -133,42 +136,42 @@ def _scaling(curves: dict[str, dict[str, Any]]) -> str:
 
 
 def _limits(limits: dict[str, Any]) -> list[str]:
-    ceilings = limits["ceilings_per_s"]
-    rows = [[kind.replace("_", " "), told({k: v / 1e9 for k, v in ceilings[kind].items()})] for kind in KINDS]
-    parts = ["### The machine's ceilings", table(["kind", "10^9 a second"], rows)]
-    if "vector_instructions" in limits:
-        widths = limits["vector_instructions"]
-        said = ", ".join(f"{n} {'scalar' if w == 'scalar' else f'of {w} bit'}" for w, n in widths.items())
-        both = "; ".join(
-            f"{name} {limits[k + ' packed']} packed, {limits[k + ' scalar']} scalar"
-            for k, name in (("div", "divisions"), ("sqrt", "square roots"))
-        )
-        parts += ["### Vector width", f"Floating-point instructions of the batch kernel: {said}. {both}."]
-    middle = {kind: spread["median"] for kind, spread in ceilings.items()}
-    for scene, found in limits["stages"].items():
-        parts += [f"### Stages of one step: {scene}, in a batch", STAGES, _stages(found, middle)]
-        shares = (told(found[k]) for k in ("division_share", "arithmetic_share", "access_share"))
-        parts.append(
-            "Share of the ceiling that the whole step reaches: divisions and square roots {}, other "
-            "arithmetic {}, memory accesses {}.".format(*shares)
-        )
-    if limits["experiments"]:
-        rows = [[name, told(s)] for name, s in limits["experiments"].items()]
-        parts += [EXPERIMENTS, table(["changed", "time"], rows)]
+    ceilings, widths = limits["ceilings_per_ns"], [str(w) for w in WIDTHS]
+    rows = [[kind, *(f"{ceilings[w][kind]['median']:.3g}" for w in WIDTHS)] for kind in KINDS]
+    parts = [
+        "### The machine's ceilings",
+        f"Instructions a nanosecond by width in bits; the clock has {told(limits['clock_GHz'])} GHz.",
+        table(["kind", *widths], rows),
+    ]
+    if limits["widths"]:
+        rows = [[kind, *map(str, found.values())] for kind, found in limits["widths"].items()]
+        parts += ["### Vector width", "Instructions in the code of the batch kernel by width in bits."]
+        parts.append(table(["kind", *widths], rows))
+    if limits["passes"]:
+        parts += ["### Stages of a step", PASSES]
+    for name, found in limits["passes"].items():
+        parts += [f"#### {name}", _pass(found)]
+        parts.append(f"A step in the kernel: {told(found['step']['ns'], 4)} ns.")
+    parts += [EXPERIMENTS] if limits["experiments"] else []
+    for group, found in limits["experiments"].items():
+        parts.append(table([group, "time"], [[name, told(s)] for name, s in found.items()]))
     return parts
 
 
-def _stages(found: dict[str, Any], ceilings: dict[str, float]) -> str:
-    def line(name: str, ns: float, share: str, count: dict[str, Any]) -> list[str]:
-        work = sum(count[k] / ceilings[k] for k in KINDS if k != "accesses")
-        memory = count["accesses"] / ceilings["accesses"]
-        counts = (str(count[k]) for k in KINDS)
-        return [name, f"{ns:.2f}", share, *counts, f"{1e9 * work:.2f}", f"{1e9 * memory:.2f}"]
-
-    rows = [line(name, r["ns"], f"{100 * r['share']:.0f} %", r) for name, r in found["rows"].items()]
-    rows.append(line("all", sum(r["ns"] for r in found["rows"].values()), "", found["total"]))
-    rows.append(["the whole step", told(found["whole_ns"]), *[""] * 7])
-    head = ["stage", "ns", "share", *(k.replace("_", " ") for k in KINDS), "operations ns", "accesses ns"]
+def _pass(found: dict[str, Any]) -> str:
+    head = ["stage", "ns", "instructions", "a cycle", *KINDS]
+    head += [f"{bound}: share" for bound in found["step"]["of_ceiling"]]
+    rows = [
+        [
+            name,
+            f"{row['ns']['median']:.1f}",
+            str(row["instructions"]),
+            f"{row['per_cycle']['median']:.1f}",
+            *(str(row[kind]) for kind in KINDS),
+            *(f"{share['median']:.2f}" for share in row["of_ceiling"].values()),
+        ]
+        for name, row in (*found["rows"].items(), ("a step in the kernel", found["step"]))
+    ]
     return table(head, rows)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -15,51 +16,63 @@ from typing import Any
 import numpy as np
 
 from benchmarks.speed_cases import Scene, engine, scenes, worked
-from benchmarks.speed_rounds import interleave, spread
-from hoof_env.dynamics.advance import TILE
+from benchmarks.speed_rounds import Floats, interleave, spread
+from hoof_env.dynamics.advance import LANES
 from hoof_env.dynamics.trunk_engine import TrunkEngine
 
-Runs = dict[str, Callable[[], float]]
+KERNELS = {
+    "advance_leg": ("leg", 1, 1),
+    "advance_four": ("horse", 4, 1),
+    "advance_one": ("horse", 3, 1),
+    "advance_batch": ("leg", 1, 8),
+}
+"""Scene, legs and environments that each is used for."""
 
 _START = """
-import time
-begin = time.perf_counter()
+import json, time
+spent, last = {{}}, [time.perf_counter(), 0.0]
+def lap(name):
+    now = [time.perf_counter(), time.process_time()]
+    spent[name] = [b - a for a, b in zip(last, now)]
+    last[:] = now
 from benchmarks.speed_cases import engine, scenes
+from benchmarks.speed_scaling import KERNELS, on_legs
+from hoof_env.leg.profile import leg_profile
 at = scenes({preset!r})
-cases = [("leg", 1), ("horse", 1), ("leg", 1024), ("horse", 1024)]
-for options in {{}}, {{"reactions": True}}:
-    for name, n in cases:
-        engine(at[name], {preset!r}, n, **options).advance(steps=1)
-        if not {everything}:
-            break
-    if not {everything}:
-        break
-print(time.perf_counter() - begin, time.process_time())
+leg_profile(at["leg"].limbs[0].geometry)
+lap("import, table of the leg")
+for name in {kernels}:
+    scene, legs, number = KERNELS[name]
+    made = engine(on_legs(at[scene], legs), {preset!r}, number)
+    made.advance(steps=1)
+    assert made._run.__name__ == name
+    lap(name)
+print(json.dumps(spent))
 """
 
 
-def _start(preset: str, folder: str, everything: bool) -> tuple[float, float]:
-    """Wall time of import, construction and first steps in a fresh process, and its processor time [s]."""
-    environment = os.environ | {"NUMBA_CACHE_DIR": folder}
-    code = _START.format(preset=preset, everything=everything)
-    root = Path(__file__).resolve().parents[1]
+def _start(preset: str, folder: str, kernels: list[str]) -> dict[str, Floats]:
+    """Wall and processor time [s] of parts of a start in a fresh process, and of all: import, and for each
+    kernel construction and a first step."""
+    environment = os.environ | {"NUMBA_CACHE_DIR": folder, "HOOF_ENV_QUIET": "1"}
+    code, root = _START.format(preset=preset, kernels=kernels), Path(__file__).resolve().parents[1]
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=root, env=environment, capture_output=True, text=True, check=True
     )
-    wall, processor = done.stdout.split()[-2:]
-    return float(wall), float(processor)
+    spent = {name: np.array(both) for name, both in json.loads(done.stdout).items()}
+    return spent | {"all": np.sum(list(spent.values()), axis=0)}
 
 
 def startup(preset: str, starts: int = 5) -> dict[str, Any]:
-    """Compiling all kernels into an empty cache, then starts with a full one: wall and processor time [s]."""
+    """Wall and processor time [s] of the first start, in an empty cache, of all kernels; of the same again;
+    and of starts with one leg."""
     with tempfile.TemporaryDirectory() as folder:
-        compiled = _start(preset, folder, everything=True)
-        warm = np.array([_start(preset, folder, everything=False) for _ in range(starts)])
-        everything = _start(preset, folder, everything=True)
+        cold, again = (_start(preset, folder, list(KERNELS)) for _ in range(2))
+        warm = np.array([_start(preset, folder, ["advance_leg"])["all"] for _ in range(starts)])
     return {
-        "first_compile_s": compiled,
-        "warm_start_s": [spread(column) for column in warm.T],
-        "warm_start_all_kernels_s": everything,
+        "cold_s": {name: list(both) for name, both in cold.items()},
+        "cached_s": {name: list(both) for name, both in again.items()},
+        "warm_one_leg_s": [spread(column) for column in warm.T],
     }
 
 
@@ -69,8 +82,10 @@ def _advance(made: TrunkEngine, steps: int) -> Callable[[], float]:
     return partial(worked, partial(made.set_state, state), partial(made.advance, steps=steps, account=False))
 
 
-def _legs(scene: Scene, count: int) -> Scene:
-    """A free trunk on so many legs, half of them in front."""
+def on_legs(scene: Scene, count: int) -> Scene:
+    """The scene with so many legs, half of them in front, and a trunk for them."""
+    if count == len(scene.limbs):
+        return scene
     limb = scene.limbs[0]
     hips = [(0.6 - 1.2 * (i % 2), 0.0) for i in range(count)]
     trunk = replace(scene.trunk, mass=50.0 * count)
@@ -92,23 +107,21 @@ def scaling(preset: str, quick: bool, rounds: int) -> dict[str, dict[str, Any]]:
     one = engine(at["leg"], preset)
     curves["one leg against steps"] = lengths, lengths, [_advance(one, n) for n in lengths]
     for title, envs, count in (("one trunk against legs", 1, 1000), ("batch of 256 against legs", 256, 20)):
-        made = [engine(_legs(at["horse"], n), preset, envs if not quick else min(envs, 32)) for n in numbers]
+        made = [
+            engine(on_legs(at["horse"], n), preset, envs if not quick else min(envs, 32)) for n in numbers
+        ]
         units = [n * e.num_envs * count for n, e in zip(numbers, made, strict=True)]
         curves[title] = numbers, units, [_advance(e, count) for e in made]
+    steps = 10 if quick else 1000
     for name in ("leg", "horse"):
-        steps = [max(10, (20000 if name == "leg" else 5000) // n) for n in sizes]
-        runs = [_advance(engine(at[name], preset, n), s) for n, s in zip(sizes, steps, strict=True)]
-        curves[f"{name} against environments"] = (
-            sizes,
-            [n * s for n, s in zip(sizes, steps, strict=True)],
-            runs,
-        )
+        runs = [_advance(engine(at[name], preset, n), steps) for n in sizes]
+        curves[f"{name} against environments"] = sizes, [n * steps for n in sizes], runs
     named = {f"{t} {k}": run for t, (_, _, runs) in curves.items() for k, run in enumerate(runs)}
     seconds = interleave(named, rounds)
     return {
         title: {
             "x": xs,
-            "line_from": TILE if "environments" in title and not quick else xs[0],
+            "line_from": LANES if "environments" in title and not quick else xs[0],
             "per_unit_s": [spread(seconds[f"{title} {k}"] / unit) for k, unit in enumerate(units)],
         }
         for title, (xs, units, _) in curves.items()

@@ -1,6 +1,7 @@
 """The benchmark runs without peers, writes its files, and its arithmetic is right."""
 
 import json
+import platform
 import sys
 
 import numpy as np
@@ -9,11 +10,12 @@ import pytest
 pytest.importorskip("matplotlib")
 
 from benchmarks import speed
-from benchmarks.speed_cases import Case
-from benchmarks.speed_code import count_operations, packed_and_not, vector_widths
+from benchmarks.speed_cases import Case, engine, scenes
+from benchmarks.speed_code import by_kind, instructions
 from benchmarks.speed_report import speed_table
 from benchmarks.speed_rounds import interleave, spread
 from benchmarks.speed_scaling import line_error
+from benchmarks.speed_stages import STAGES, Pass
 
 
 def test_quick_mode_runs_without_peers_and_writes_its_files(tmp_path, monkeypatch, capsys):
@@ -64,17 +66,39 @@ def test_every_case_runs_once_a_round_in_changing_order():
 def test_machine_code_is_counted_by_width():
     code = "\n".join(
         [
+            "loop:",
+            "\t.p2align\t4",
             "\tvmulpd\t(%rax), %zmm1, %zmm2",
             "\tvdivpd\t%ymm1, %ymm2, %ymm3",
             "\tvsqrtsd\t%xmm1, %xmm2, %xmm3",
             "\tvaddpd\t.LCPI0_1(%rip), %xmm1, %xmm2",
-            "\tvmovupd\t%zmm2, 64(%rsp)",
-            "\tmovq\t8(%rsp), %rax",
+            "\tvmovupd\t%zmm2, 64(%rsp) {%k1}",
+            "\tvmovapd\t%zmm2, %zmm3",
+            "\tmovq\t8(%rsp), %rax  # 8-byte Reload",
+            "\tleaq\t8(%rsp), %rax",
+            "\tretq",
         ]
     )
-    assert count_operations(code) == {"arithmetic": 10, "divisions": 4, "square_roots": 1, "accesses": 16}
-    assert vector_widths(code) == {"scalar": 1, "128": 1, "256": 1, "512": 1}
-    assert packed_and_not(code) == {"div packed": 1, "div scalar": 0, "sqrt packed": 0, "sqrt scalar": 1}
+    found = instructions(code)
+    assert +found == {
+        ("all", 0): 9, ("arithmetic", 512): 1, ("divisions", 256): 1, ("square roots", 64): 1,
+        ("arithmetic", 128): 1, ("loads", 512): 1, ("stores", 512): 1, ("loads", 64): 1,
+    }  # fmt: skip
+    assert by_kind(found) == {
+        "instructions": 9, "divisions": 1, "square roots": 1, "arithmetic": 2, "loads": 2, "stores": 1,
+    }  # fmt: skip
+
+
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="counts x86 code")
+def test_a_stage_is_counted_for_all_legs():
+    """One division for a crank, whatever the loop around it; the trunk's 3 x 3 system has one of its own."""
+    horse = Pass(engine(scenes("identified")["horse"], "identified", 8), lanes=8)
+    legs, trunk = (horse.count(STAGES[name]) for name in ("feel the leg", "accelerate the trunk"))
+    bits = {
+        kind: sum(n * w for (k, w), n in legs.items() if k == kind) for kind in ("divisions", "square roots")
+    }
+    assert bits == {"divisions": 4 * 8 * 64, "square roots": 0}
+    assert by_kind(trunk)["divisions"] * 4 == by_kind(legs)["divisions"]
 
 
 def test_departure_from_a_straight_line():

@@ -1,0 +1,110 @@
+"""The machine's ceilings: loops of one kind of instruction, each independent of the others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba.core import types
+
+from benchmarks.speed_cases import worked
+from benchmarks.speed_stages import fence, jit
+from hoof_env._jit import inlined
+from hoof_env._lanes import root, rows, write
+from hoof_env._memory import address, doubles, intrinsic
+
+WIDE = 16
+"""Rows that a turn of a loop works on: enough to fill every pipeline, few enough for registers."""
+
+
+@intrinsic
+def _consume(context: Any, x: Any) -> Any:
+    """Let the compiler believe that somebody uses the lanes `x` in a register."""
+
+    def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        kind = ir.FunctionType(ir.VoidType(), [values[0].type])
+        builder.asm(kind, "", "v", [values[0]], side_effect=True)
+        return context.get_dummy_value()
+
+    return types.void(x), emit
+
+
+@inlined
+def _divide(x, k):  # type: ignore[no-untyped-def]
+    x[k] = 1.7 / x[k]
+
+
+@inlined
+def _root(x, k):  # type: ignore[no-untyped-def]
+    x[k] = root(x[k])
+
+
+@inlined
+def _multiply_add(x, k):  # type: ignore[no-untyped-def]
+    x[k] = x[k] * 0.7 + 0.3
+
+
+@inlined
+def _load(x, k):  # type: ignore[no-untyped-def]
+    fence(x)
+    _consume(x[k])
+
+
+@inlined
+def _store(x, k):  # type: ignore[no-untyped-def]
+    x[k] = 1.0
+    fence(x)
+
+
+_BODIES = {
+    "divisions": (_divide, 1),
+    "square roots": (_root, 1),
+    "arithmetic": (_multiply_add, 2),
+    "loads": (_load, 1),
+    "stores": (_store, 1),
+}
+"""By kind: what is done with a row, and how many instructions that is."""
+
+
+def _loop(body: Any, lanes: int) -> Any:
+    def loop(out, n):  # type: ignore[no-untyped-def]
+        x = rows(doubles(WIDE * lanes), lanes)
+        for k in range(WIDE):
+            x[k] = 1.0 + 0.01 * k
+        for _ in range(n):
+            for k in range(WIDE):
+                body(x, k)
+        for k in range(WIDE):
+            write(x[k], address(out), k * lanes, 1)
+
+    return jit(loop)
+
+
+def ceilings(lanes: int, turns: int) -> dict[str, tuple[Callable[[], float], int]]:
+    """By kind: a loop on vectors of so many lanes, and how many instructions it does."""
+    out = np.zeros(WIDE * lanes)
+    found: dict[str, tuple[Callable[[], float], int]] = {}
+    for kind, (body, count) in _BODIES.items():
+        work = partial(_loop(body, lanes), out, turns)
+        found[kind] = partial(worked, _nothing, work), turns * WIDE * count
+    return found
+
+
+def _nothing() -> None:
+    pass
+
+
+@jit
+def _squares(n):  # type: ignore[no-untyped-def]
+    x = 3
+    for _ in range(n):
+        x = x * x
+    return x
+
+
+def clock(turns: int) -> tuple[Callable[[], float], int]:
+    """A loop and how many cycles it takes: a chain of products of whole numbers, three cycles each on x86."""
+    return partial(worked, _nothing, partial(_squares, turns)), 3 * turns
