@@ -196,11 +196,11 @@ class EpisodeBatch:
         ended: int = self._step(self._desk)
         if ended < 0:
             raise ParameterError("action: expected finite numbers, got some that are not")
-        if self.target_speed:
+        if ended & e.SWITCHED:
             n = self.num_envs
             for env in np.flatnonzero(self.episode[e.STEPS, :n] >= self.episode[e.SWITCH, :n]):
                 self._draw_target(int(env), generators[int(env)])
-        return ended > 0
+        return ended & 1 > 0
 
     def summary(self, env: int) -> dict[str, float]:
         """Figures of an episode.
