@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
@@ -14,9 +13,9 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.trunk_model import LIFT_OFF
 from hoof_env.envs import episode as e
-from hoof_env.envs.batch import EpisodeBatch, check_state
+from hoof_env.envs.batch import EpisodeBatch, check_state, generator_of
 from hoof_env.envs.recording import Recording
-from hoof_env.envs.start import check_options
+from hoof_env.envs.start import check_seed
 from hoof_env.envs.tasks import TASKS, to_json
 from hoof_env.errors import ParameterError, check_choice
 from hoof_env.gait.parameters import PARAMETERS, GaitParameters
@@ -123,19 +122,21 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Start an episode; the manual page has the options."""
         self._refuse_closed("reset")
-        super().reset(seed=seed)
-        checked = check_options(options, self.gaits)
+        checked = self.batch.check_options(options)  # before the generator is touched
+        super().reset(seed=check_seed(seed))
         if self._recording is not None:
             self._recording.start()
         start = self.batch.reset([0], [self.np_random], checked)
         self._state = "running"
         if self._recording is not None:
             self._show(restart=True)
-        info = {name: float(start[name][0]) for name in ("crank_angle", "speed", "height", "x")}
-        return self._seen.copy(), {
-            **info,
-            "gait": dict(zip(PARAMETERS, start["gaits"][0].tolist(), strict=True)),
+        info: dict[str, Any] = {
+            name: float(start[name][0]) for name in ("crank_angle", "speed", "height", "x")
         }
+        info["gait"] = dict(zip(PARAMETERS, start["gaits"][0].tolist(), strict=True))
+        if start["parameters"]:
+            info["parameters"] = {name: float(values[0]) for name, values in start["parameters"].items()}
+        return self._seen.copy(), info
 
     def step(
         self, action: NDArray[np.float32]
@@ -189,6 +190,7 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self.render_mode is None:
             gym.logger.warn("render() was called without a render_mode: pass 'rgb_array' or 'human'")
             return None
+        self._refuse_closed("render")
         if self._state == "new":
             raise ResetNeeded("render() was called before reset(): expected reset() first")
         frame: NDArray[np.uint8] | None = self._get_renderer().frame()
@@ -235,6 +237,7 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         Raises:
             ResetNeeded: there is no episode yet.
         """
+        self._refuse_closed("get_state")
         if self._state != "running":
             raise ResetNeeded("get_state() was called before reset(): expected reset() first")
         about = {"id": self.task.id, "settings": to_json(self.settings)}
@@ -246,10 +249,13 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         Raises:
             ParameterError: a state of another id, version, geometry or setting, or one that lacks a part.
         """
+        self._refuse_closed("set_state")
         check_state(state, self.task.id, to_json(self.settings))
+        generator = generator_of(state["generator"])
         self.batch.set_state(state)
-        self.np_random.bit_generator.state = copy.deepcopy(state["generator"])
-        self._state = "running"
+        self.np_random, self._state = generator, "running"
+        if self._recording is not None:
+            self._recording.forget()
         return self._seen.copy()
 
     def __getstate__(self) -> dict[str, Any]:
