@@ -52,6 +52,7 @@ class EpisodeBatch:
         task, settings: what it is.
         engine: the mechanics of all.
         names: of the observation's entries.
+        kernel, desk: one control step of all is `kernel(desk)`; then comes `follow`.
         episode: memory of the episodes, rows as in `episode`, shape (EPISODE_ROWS, columns).
 
     Raises:
@@ -138,10 +139,10 @@ class EpisodeBatch:
     def _open(self) -> None:
         """Make the desk: addresses of the arrays as they are now."""
         one, many = (e.step_one, e.look_one), (e.step_batch, e.look_batch)
-        self._step, self._look = one if self.engine.is_few else many
+        self.kernel, self._look = one if self.engine.is_few else many
         arrays = (*self.engine.arrays, self.episode, self._task, self.actions, self.seen)
         slots = [[a.ctypes.data, *a.shape, *[0] * (3 - a.ndim)] for a in arrays]
-        self._desk = np.array(slots, np.int64).ravel()
+        self.desk = np.array(slots, np.int64).ravel()
 
     # Episodes
 
@@ -214,7 +215,7 @@ class EpisodeBatch:
             for env, generator in zip(which, generators, strict=True):
                 columns[e.TARGET, env] = generator.uniform(*self.target_speed)
                 self._draw_target(int(env), generator)
-        self._look(self._desk)
+        self._look(self.desk)
         return {**vars(start), "parameters": drawn}
 
     def _draw_target(self, env: int, generator: np.random.Generator) -> None:
@@ -234,14 +235,19 @@ class EpisodeBatch:
         Raises:
             ParameterError: an action is not a number; nothing has happened then.
         """
-        ended: int = self._step(self._desk)
-        if ended < 0:
+        return self.follow(self.kernel(self.desk), generators, idle)
+
+    def follow(
+        self, said: int, generators: Sequence[np.random.Generator], idle: NDArray[np.bool_] | None = None
+    ) -> bool:
+        """`step` after its kernel, which said so."""
+        if said < 0:
             raise ParameterError("action: expected finite numbers, got some that are not")
-        if ended & e.SWITCHED:
+        if said & e.SWITCHED:
             due = self.episode[e.STEPS, : self.num_envs] >= self.episode[e.SWITCH, : self.num_envs]
             for env in np.flatnonzero(due if idle is None else due & ~idle):
                 self._draw_target(int(env), generators[int(env)])
-        return bool(ended & 1)
+        return bool(said & 1)
 
     def summary(self, env: int) -> dict[str, float]:
         """Figures of an episode.
@@ -313,10 +319,10 @@ class EpisodeBatch:
         self.engine.set_state(state["engine"])
         self.episode[:, : self.num_envs] = episode
         self._varied[:] = True
-        self._look(self._desk)
+        self._look(self.desk)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {key: value for key, value in vars(self).items() if key not in ("_desk", "_step", "_look")}
+        return {key: value for key, value in vars(self).items() if key not in ("desk", "kernel", "_look")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
