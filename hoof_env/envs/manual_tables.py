@@ -61,8 +61,7 @@ SETTINGS: Rows = {
     "reward_weights": ("", "mapping of the weights that are to differ from those above"),
     "randomize": (
         "",
-        "physical parameters to draw at each reset, as the reset option `parameters`; None, as in an"
-        " evaluation, for none",
+        "physical parameters to draw at each reset, as the reset option `parameters`; None for none",
     ),
 }
 """Unit and meaning of each field of `tasks.Settings`."""
@@ -83,12 +82,12 @@ WEIGHTS: Rows = {
 OPTIONS: Rows = {
     "gait": ("", "name of a gait of the preset, mapping of the four gait parameters, or `GaitParameters`"),
     "crank_angle": ("rad", "at the start"),
-    "speed": ("m/s", "forward, at the start"),
-    "height": ("m", "of O above y = 0, at the start; suspended"),
+    "speed": ("m/s", "forward, at the start; 0 on a fixed trunk"),
+    "height": ("m", "of O above y = 0, at the start; where a suspended trunk does not fail at once"),
     "x": ("m", "of O, at the start"),
     "parameters": (
         "",
-        "mapping of physical parameters of the episode, each a number, or two to draw between",
+        "mapping of physical parameters of this episode, each a number, or two to draw between",
     ),
 }
 """Unit and meaning of the reset options."""
@@ -106,7 +105,7 @@ HILLS: Rows = {
 
 VECTOR: Rows = {
     "autoreset_mode": ("", "a `gymnasium.vector.AutoresetMode` or its name; also SAME_STEP and DISABLED"),
-    "max_episode_steps": ("", "control steps of an episode, instead of `episode_seconds`"),
+    "max_episode_steps": ("", "control steps that an episode lasts at most, besides `episode_seconds`"),
     "render_mode": ("", '"rgb_array"'),
     "rendered": ("", "how many are drawn, the first ones: `render` gives a frame of each, (H, W, 3) uint8"),
 }

@@ -73,8 +73,12 @@ speed uniform in 0 to $start_speed m/s; $start.
 
 $options
 
-The `info` of `reset` has `gait`, `crank_angle`, `speed`, `height` and `x` as they were used. Physical
-parameters are $parameters.
+The `info` of `reset` has `gait`, `crank_angle`, `speed`, `height` and `x` as they were used, and
+`parameters` where some were set or drawn. These last one episode; there are:
+$parameters.
+
+The argument `randomize` draws physical parameters at each reset. So does the wrapper
+`hoof_env.RandomizeParameters`, which can be switched off for an evaluation. An option has the last word.
 
 ```python
 import gymnasium as gym
