@@ -11,29 +11,22 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from agents import runs
 from agents.command import run
-from agents.evaluate import find_policy
-from agents.learning_bar import FIRST_SEED, read_rows
+from agents.evaluate import find_policy, play
+from agents.learned_gait import ENV_ID, Episode, audit, draw_strides, watch
+from agents.learning_bar import EPISODES, FIRST_SEED, read_rows, returns
 from hoof_env.errors import DataFileError
 
-Floats = NDArray[np.float64]
-ENV_ID = "hoof_env/HorseLeg-v0"
-SETTLED = 4.0
-"""Seconds of an episode that the strides leave out."""
-
-SHORTEST = 0.1
-"""A touch-down so soon after another [s] belongs to the same stride."""
-
-POINTS = 200
-"""Of a stride."""
+SIMPLE = ("idle", "airborne", "drag", "bang-bang", "random")
+TRIED, TRIED_AGAIN, AGAIN_SEED = 2048, 32, 5000
+"""Constant actions tried, an episode each; how many of the best are tried again, in as many episodes each as
+there is room for; and the first seed of these."""
 
 
 @dataclass(frozen=True)
@@ -44,98 +37,25 @@ class Args:
     """the page; its pictures go into the folder beside it of the same name"""
 
 
-@dataclass(frozen=True)
-class Episode:
-    """An episode substep by substep.
-
-    Attributes:
-        record: state and report of the engine by name, shape (substeps + 1,).
-        account: the engine's, at the end.
-        terms: sums of the reward's terms.
-        summary: figures of the episode.
-        leg: the environment.
-    """
-
-    record: dict[str, Floats]
-    account: dict[str, float]
-    terms: dict[str, float]
-    summary: dict[str, float]
-    leg: Any
+def simple_returns(env_id: str) -> dict[str, float]:
+    """Mean returns of the simple policies over the scored episodes, and of the best constant action."""
+    with runs.make_env(env_id) as env:
+        seeds = range(FIRST_SEED, FIRST_SEED + EPISODES)
+        found = {
+            name: float(np.mean([one["return"] for one in play(env, find_policy(name, env, env_id), seeds)]))
+            for name in SIMPLE
+        }
+    return found | {"best constant": best_constant(env_id)}
 
 
-def watch(policy: str) -> Episode:
-    """Play one episode and run an engine beside it that keeps its account."""
-    env = runs.make_env(ENV_ID)
-    leg: Any = env.unwrapped
-    player = find_policy(policy, env, ENV_ID)
-    observation, info = env.reset(seed=FIRST_SEED)
-    engine = leg.engine.alone()
-    engine.set_column(0, leg.engine.column(0))
-    rows: list[dict[str, Any]] = [engine.run(None, 0)]
-    terms: dict[str, float] = {}
-    done = False
-    while not done:
-        action, _ = player.predict(observation)
-        observation, _, terminated, truncated, info = env.step(action)
-        beside = engine.run(leg.command_of(action), leg.batch.substeps)
-        rows.append({name: values[1:] for name, values in beside.items()})
-        for key in filter(lambda key: key.startswith("reward_"), info):
-            terms[key] = terms.get(key, 0.0) + info[key]
-        done = terminated or truncated
-    names = [name for name in rows[0] if name != "result"]
-    record = {name: np.concatenate([row[name] for row in rows]).squeeze() for name in names}
-    record["time"] = leg.sim_dt * np.arange(len(record["time"]))
-    record["normal"] = record["toe_normal"] + record["heel_normal"]
-    account = {name: float(np.ravel(value)[0]) for name, value in engine.account.items()}
-    return Episode(record, account, terms, info["episode_summary"], leg)
-
-
-def strides(episode: Episode) -> dict[str, Floats]:
-    """Steady strides from touch-down to touch-down: columns by name, shape (strides, `POINTS`), and the
-    "duration" of each [s]."""
-    r, threshold = episode.record, 0.05 * episode.leg.weight
-    down = np.flatnonzero((r["normal"][1:] > threshold) & (r["normal"][:-1] <= threshold))
-    down = down[r["time"][down] > SETTLED]
-    down = down[np.r_[True, np.diff(r["time"][down]) > SHORTEST]]
-    found: dict[str, list[Floats]] = {name: [] for name in ("theta_rate", "phi", "normal", "y")}
-    for first, last in pairwise(down):
-        place = np.linspace(first, last, POINTS)
-        for name, rows in found.items():
-            rows.append(np.interp(place, np.arange(len(r["time"])), r[name]))
-    return {name: np.array(rows) for name, rows in found.items()} | {"duration": np.diff(r["time"][down])}
-
-
-def audit(episode: Episode) -> dict[str, float]:
-    """Where impulse and energy of an episode came from and went, by row of the page's table."""
-    r, a, leg = episode.record, episode.account, episode.leg
-    trunk = leg.engine.trunk
-    seconds, metres = r["time"][-1], r["x"][-1] - r["x"][0]
-    weight = leg.weight
-    sag = float(np.mean(trunk.height - r["y"]))
-    spring, damper = trunk.stiffness * sag * seconds, trunk.damping * (r["y"][0] - r["y"][-1])
-    work = a["crank_work"] + a["swing_work"]
-    losses = ("ground_loss", "friction_loss", "drag_loss", "damper_loss")
-    lost = sum(a[name] for name in losses)
-    momentum = r["momentum_y"][-1] - r["momentum_y"][0]
-    borne = (1 - trunk.share) * weight * seconds + spring + damper
-    return {
-        "return [-]": sum(episode.terms.values()),
-        "speed [m/s]": metres / seconds,
-        "stances [1/s]": episode.summary["stances"] / seconds,
-        "mean peak of a stance [kN]": 1e-3
-        * episode.summary["stance_peak_sum_n"]
-        / episode.summary["stances"],
-        "distance a stance [m]": metres / episode.summary["stances"],
-        "ground bears [of the weight]": a["impulse_y"] / weight / seconds,
-        "the rest of the animal bears [of the weight]": borne / weight / seconds,
-        "of that by sagging [of the weight]": spring / weight / seconds,
-        "vertical momentum gained [of the weight]": momentum / weight / seconds,
-        "not accounted for [of the weight]": (a["impulse_y"] + borne - momentum) / weight / seconds - 1,
-        "work of the crank [J/m]": a["crank_work"] / metres,
-        "work of the swing [J/m]": a["swing_work"] / metres,
-        **{f"{name.replace('_', ': ')} [J/m]": a[name] / metres for name in losses},
-        "kept as speed and height [J/m]": (work - lost) / metres,
-    }
+def best_constant(env_id: str) -> float:
+    """Mean return of the best of `TRIED` constant actions, drawn at random and the same for everyone."""
+    envs = runs.make_vec_env(env_id, TRIED)
+    actions = np.random.default_rng(0).uniform(-1, 1, (TRIED, 4)).astype(np.float32)
+    best = np.argsort(returns(envs, lambda _: actions))[-TRIED_AGAIN:]
+    again = np.repeat(actions[best], TRIED // TRIED_AGAIN, axis=0)
+    scores = returns(envs, lambda _: again, AGAIN_SEED).reshape(TRIED_AGAIN, -1)
+    return float(scores.mean(1).max())
 
 
 def draw_curves(folders: list[Path], path: Path) -> None:
@@ -162,34 +82,6 @@ def draw_curves(folders: list[Path], path: Path) -> None:
     figure.savefig(path, dpi=110)
 
 
-def draw_strides(episodes: dict[str, Episode], path: Path) -> None:
-    """Crank speed, swing, force and height through a stride, one column for each policy."""
-    from matplotlib.figure import Figure
-
-    from hoof_env.paper.figure_style import BLUE, GREY, ORANGE
-
-    shown = (
-        ("theta_rate", "crank speed [rad/s]", 1.0), ("phi", "swing angle [rad]", 1.0),
-        ("normal", "normal force [kN]", 1e-3), ("y", "height of the trunk [m]", 1.0),
-    )  # fmt: skip
-    figure = Figure(figsize=(9, 8.5), layout="constrained")
-    grid = figure.subplots(len(shown), len(episodes), sharex=True, sharey="row")
-    for column, (name, colour) in enumerate(zip(episodes, (BLUE, ORANGE), strict=True)):
-        found = strides(episodes[name])
-        for row, (key, label, factor) in enumerate(shown):
-            axes, values = grid[row][column], factor * found[key]
-            phase = np.linspace(0, 1, POINTS)
-            axes.plot(phase, values.T, color=colour, lw=0.6, alpha=0.3)
-            axes.plot(phase, np.median(values, 0), color=colour, lw=2)
-            axes.grid(axis="y", color=GREY, alpha=0.15)
-            if column == 0:
-                axes.set_ylabel(label)
-        lasting = np.median(found["duration"])
-        grid[0][column].set_title(f"{name}: {len(found['duration'])} strides of {lasting:.2f} s (median)")
-        grid[-1][column].set_xlabel("part of the stride, from touch-down to touch-down")
-    figure.savefig(path, dpi=110)
-
-
 def bar_table(folders: list[Path]) -> str:
     """Seconds to beat every scripted gait, by id and seed."""
     lines = [
@@ -204,6 +96,17 @@ def bar_table(folders: list[Path]) -> str:
         ]
         last = [f"{read_rows(folder / 'curve.csv', int(seed))[-1]['return']:.1f}" for seed in found["seeds"]]
         lines.append(f"| `{found['env_id']}` | {gaits} | {', '.join(each)} | {', '.join(last)} |")
+    return "\n".join(lines)
+
+
+def simple_table(folders: list[Path]) -> str:
+    """Mean returns of scripted gaits, simple policies and the best constant action, by id."""
+    names = ("run", "walk", *SIMPLE, "best constant")
+    lines = [f"| id | {' | '.join(names)} |", "|---|" + "---|" * len(names)]
+    for folder in folders:
+        found = _bar(folder)
+        values = found["scripted"] | simple_returns(found["env_id"])
+        lines.append(f"| `{found['env_id']}` | {' | '.join(f'{values[name]:.1f}' for name in names)} |")
     return "\n".join(lines)
 
 
@@ -252,8 +155,11 @@ def report(args: Args) -> None:
     with matplotlib.rc_context(STYLE):
         draw_curves(folders, pictures / "curves.png")
         draw_strides(episodes, pictures / "strides.png")
-    text = put(args.page.read_text(encoding="utf-8"), "bar", bar_table(folders))
-    runs.write_text(args.page, put(text, "audit", audit_table(episodes)))
+    tables = {"bar": bar_table(folders), "simple": simple_table(folders), "audit": audit_table(episodes)}
+    text = args.page.read_text(encoding="utf-8")
+    for name, table in tables.items():
+        text = put(text, name, table)
+    runs.write_text(args.page, text)
 
 
 def main(argv: list[str] | None = None) -> None:
