@@ -96,8 +96,12 @@ def audit(episode: Episode) -> dict[str, float]:
     sag = float(np.mean(trunk.height - r["y"]))
     spring, damper = trunk.stiffness * sag * seconds, trunk.damping * (r["y"][0] - r["y"][-1])
     work = a["crank_work"] + a["swing_work"]
-    losses = ("ground_loss", "friction_loss", "drag_loss", "damper_loss")
-    lost = sum(a[name] for name in losses)
+    losses = {
+        "lost to friction of the hoof [J/m]": a["friction_loss"],
+        "lost in the ground [J/m]": a["ground_loss"],
+        "lost to the suspension's damper [J/m]": a["damper_loss"],
+        "lost to drag of the trunk [J/m]": a["drag_loss"],
+    }
     momentum = r["momentum_y"][-1] - r["momentum_y"][0]
     borne = (1 - trunk.share) * weight * seconds + spring + damper
     return {
@@ -115,8 +119,8 @@ def audit(episode: Episode) -> dict[str, float]:
         "not accounted for [of the weight]": (a["impulse_y"] + borne - momentum) / weight / seconds - 1,
         "work of the crank [J/m]": a["crank_work"] / metres,
         "work of the swing [J/m]": a["swing_work"] / metres,
-        **{f"{name.replace('_', ': ')} [J/m]": a[name] / metres for name in losses},
-        "kept as speed and height [J/m]": (work - lost) / metres,
+        **{name: value / metres for name, value in losses.items()},
+        "kept as speed and height [J/m]": (work - sum(losses.values())) / metres,
     }
 
 

@@ -21,6 +21,7 @@ from agents.command import run
 from agents.evaluate import find_policy, play
 from agents.learned_gait import ENV_ID, Episode, audit, draw_strides, watch
 from agents.learning_bar import EPISODES, FIRST_SEED, read_rows, returns
+from hoof_env.envs.tasks import TASKS
 from hoof_env.errors import DataFileError
 
 SIMPLE = ("idle", "airborne", "drag", "bang-bang", "random")
@@ -103,8 +104,8 @@ def simple_table(folders: list[Path]) -> str:
     """Mean returns of scripted gaits, simple policies and the best constant action, by id."""
     names = ("run", "walk", *SIMPLE, "best constant")
     lines = [f"| id | {' | '.join(names)} |", "|---|" + "---|" * len(names)]
-    for folder in folders:
-        found = _bar(folder)
+    family = [task.id for task in TASKS.values()]
+    for found in filter(lambda found: found["env_id"] in family, map(_bar, folders)):
         values = found["scripted"] | simple_returns(found["env_id"])
         lines.append(f"| `{found['env_id']}` | {' | '.join(f'{values[name]:.1f}' for name in names)} |")
     return "\n".join(lines)
