@@ -82,8 +82,8 @@ class EpisodeBatch:
         self.height = check_number("hip_height", height, low=LOWEST * nominal, high=HIGHEST * nominal)
         self.groups = check_groups(s.observation, GROUPS)
         self.randomize = check_parameters("randomize", s.randomize or {})
-        self.target_speed = _two("target_speed", s.target_speed, -20.0) if s.target_speed else None
-        self.target_seconds = _two("target_seconds", s.target_seconds, self.dt)
+        self.target_speed = None if s.target_speed is None else _two("target_speed", s.target_speed, -20.0)
+        self.target_seconds = _two("target_seconds", s.target_seconds, self.dt if self.target_speed else 0.0)
         self._terrain, self._found_good = make_terrain(s.terrain), ""
         trunk, ground, drive = self._physics({})
         substeps = None
@@ -390,7 +390,7 @@ def check_state(state: Any, env_id: str, settings: Mapping[str, Any], parts: Seq
         raise ParameterError(f"state: expected what get_state gives, but {', '.join(missing)} is missing")
     if state["id"] != env_id:
         raise ParameterError(f"state: expected one of {env_id}, got one of {state['id']}")
-    there = state["settings"]
+    there = state["settings"] if isinstance(state["settings"], Mapping) else {}
     unlike = [f"{k}: {v!r} here, {there.get(k)!r} there" for k, v in settings.items() if there.get(k) != v]
     if unlike:
         raise ParameterError(f"state: of other settings; {'; '.join(unlike)}")

@@ -57,7 +57,7 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.observation_space = spaces.Box(-1.0, 1.0, (len(self.observation_names),), np.float32)
         self.action_space = spaces.Box(-1.0, 1.0, (e.ACTIONS,), np.float32)
         self.render_mode = render_mode
-        self.metadata = {**type(self).metadata, "render_fps": round(1 / self.batch.dt)}  # type: ignore[misc]
+        self.metadata = {**type(self).metadata, "render_fps": max(1, round(1 / self.batch.dt))}  # type: ignore[misc]
         self._recording: Recording | None = Recording(self.batch) if render_mode else None
         self._renderer: Any = None
         self._state = "new"

@@ -80,7 +80,7 @@ class HorseLegVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.metadata = {  # type: ignore[misc]
             **type(self).metadata,
-            "render_fps": round(1 / self.batch.dt),
+            "render_fps": max(1, round(1 / self.batch.dt)),
             "autoreset_mode": self.autoreset_mode,
         }
         self.render_mode, self.spec = render_mode, None
