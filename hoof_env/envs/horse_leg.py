@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.trunk_model import LIFT_OFF
 from hoof_env.envs import episode as e
-from hoof_env.envs.batch import EpisodeBatch, check_state, generator_of
+from hoof_env.envs.batch import EpisodeBatch
 from hoof_env.envs.recording import Recording
 from hoof_env.envs.start import check_seed
+from hoof_env.envs.state import check_state, generator_of
 from hoof_env.envs.tasks import TASKS, to_json
 from hoof_env.errors import ParameterError, check_choice
 from hoof_env.gait.parameters import PARAMETERS, GaitParameters
