@@ -86,8 +86,8 @@ def draw_curves(folders: list[Path], path: Path) -> None:
 def bar_table(folders: list[Path]) -> str:
     """Seconds to beat every scripted gait, by id and seed."""
     lines = [
-        "| id | scripted gaits | beaten after, wall s (processor s), seed by seed | last returns |",
-        "|---|---|---|---|",
+        "| id | scripted | beaten after wall s (processor s) by seed | last returns | steps | steps/s |",
+        "|---|---|---|---|---|---|",
     ]
     for folder in folders:
         found = _bar(folder)
@@ -95,8 +95,18 @@ def bar_table(folders: list[Path]) -> str:
         each = [
             f"{one['wall_s']:.1f} ({one['cpu_s']:.1f})" if one else "not" for one in found["seeds"].values()
         ]
-        last = [f"{read_rows(folder / 'curve.csv', int(seed))[-1]['return']:.1f}" for seed in found["seeds"]]
-        lines.append(f"| `{found['env_id']}` | {gaits} | {', '.join(each)} | {', '.join(last)} |")
+        ends = [read_rows(folder / "curve.csv", int(seed))[-1] for seed in found["seeds"]]
+        last = ", ".join(f"{end['return']:.1f}" for end in ends)
+        rate = sum(end["steps"] for end in ends) / sum(end["cpu_s"] for end in ends)
+        cells = (
+            f"`{found['env_id']}`",
+            gaits,
+            ", ".join(each),
+            last,
+            f"{ends[0]['steps']:,.0f}",
+            f"{rate:,.0f}",
+        )
+        lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
 
 
