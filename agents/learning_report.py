@@ -66,7 +66,10 @@ def draw_curves(folders: list[Path], path: Path) -> None:
     from hoof_env.paper.figure_style import BLUE, GREY, ORANGE
 
     figure = Figure(figsize=(9, 2.8 * -(-len(folders) // 2)), layout="constrained")
-    for axes, folder in zip(figure.subplots(-(-len(folders) // 2), 2).flat, folders, strict=False):
+    panels = figure.subplots(-(-len(folders) // 2), 2).flatten()
+    for axes in panels[len(folders) :]:
+        axes.set_axis_off()
+    for axes, folder in zip(panels, folders, strict=False):
         found = _bar(folder)
         for seed in found["seeds"]:
             rows = read_rows(folder / "curve.csv", int(seed))
@@ -77,7 +80,7 @@ def draw_curves(folders: list[Path], path: Path) -> None:
             f"scripted {best}", (1, found["scripted"][best]), (-2, 3), color=ORANGE, ha="right",
             xycoords=axes.get_yaxis_transform(), textcoords="offset points",
         )  # fmt: skip
-        axes.set(title=found["env_id"], xlabel="seconds of training", ylabel="mean return")
+        axes.set(title=found["env_id"], xlabel="wall time of training [s]", ylabel="mean return")
         axes.set_xlim(left=0)
         axes.grid(axis="y", color=GREY, alpha=0.15)
     figure.savefig(path, dpi=110)
