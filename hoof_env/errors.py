@@ -16,6 +16,10 @@ class ParameterError(HoofEnvError, ValueError):
     """A parameter has a wrong type, is not finite or lies outside its range."""
 
 
+class UnknownArgumentError(ParameterError, TypeError):
+    """A keyword that an environment does not take: a TypeError too, as of any Python function."""
+
+
 class GeometryError(ParameterError):
     """The linkage cannot be assembled or cannot turn through a full revolution."""
 

@@ -84,6 +84,8 @@ def check_options(options: Any, gaits: Mapping[str, GaitParameters]) -> dict[str
     known = ("gait", *OPTIONS)
     if options is None:
         return {}
+    if isinstance(options, Mapping):  # Minari hands its own option on to the environment
+        options = {key: value for key, value in options.items() if key != "minari_autoseed"}
     if not isinstance(options, Mapping) or not set(options) <= set(known):
         raise ParameterError(f"options: expected a mapping with some of {', '.join(known)}, got {options!r}")
     checked = dict(options)

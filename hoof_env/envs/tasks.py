@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass, fields, replace
 from types import MappingProxyType
 from typing import Any
 
-from hoof_env.errors import ParameterError
+from hoof_env.errors import UnknownArgumentError
 
 
 @dataclass(frozen=True)
@@ -87,14 +87,14 @@ class Task:
         """Its settings with some changed.
 
         Raises:
-            ParameterError: an unknown setting.
+            UnknownArgumentError: an unknown setting.
         """
         known = [item.name for item in fields(Settings)]
         for name in changes:
             if name not in known:
                 near = difflib.get_close_matches(name, known, 1)
                 hint = f"; did you mean {near[0]}?" if near else f" (known: {', '.join(known)})"
-                raise ParameterError(f"{self.id}: no such argument: {name}{hint}")
+                raise UnknownArgumentError(f"{self.id}: unexpected keyword argument {name!r}{hint}")
         return replace(Settings(), **{**self.defaults, **changes})
 
 

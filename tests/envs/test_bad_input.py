@@ -17,8 +17,8 @@ from hoof_env.gait.parameters import load_gait
 LEG, NAN = "hoof_env/HorseLeg-v0", float("nan")
 
 ARGUMENTS = [
-    ({"trunk_mas": 80.0}, "HorseLeg-v0: no such argument: trunk_mas; did you mean trunk_mass?"),
-    ({"wings": 2}, r"no such argument: wings \(known: preset, trunk, "),
+    ({"trunk_mas": 80.0}, "HorseLeg-v0: unexpected keyword argument 'trunk_mas'; did you mean trunk_mass?"),
+    ({"wings": 2}, r"unexpected keyword argument 'wings' \(known: preset, trunk, "),
     ({"task": "fly"}, "task: expected one of leg, .*got 'fly'"),
     ({"preset": "no_such_leg"}, "preset: expected one of first_fit, identified, got 'no_such_leg'"),
     ({"trunk": "floating"}, "trunk: expected one of fixed, rail, suspended, got 'floating'"),
