@@ -33,6 +33,7 @@ _PUBLIC = {
     "HorseLegMOEnv": "hoof_env.envs.multi_objective",
     "HorseLegVectorEnv": "hoof_env.envs.vector",
     "Sb3VecEnv": "hoof_env.envs.sb3",
+    "RandomizeParameters": "hoof_env.envs.randomize",
     "make_policy": "hoof_env.envs.policies",
     "HoofEnvError": "hoof_env.errors",
     "ParameterError": "hoof_env.errors",

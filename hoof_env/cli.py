@@ -241,6 +241,21 @@ def trunks() -> None:
     study(_say)
 
 
+def manual(id: str = "hoof_env/HorseLeg-v0", out: Path | None = None) -> None:
+    """Print the manual page of an environment, or write those of all.
+
+    Args:
+        id: the environment.
+        out: folder for a page of each id, and their index; made if need be.
+    """
+    from hoof_env.envs.manual import page_of, write_pages
+
+    if out is None:
+        _say(page_of(id))
+    else:
+        _say(f"{len(write_pages(out))} files written; read {out / 'README.md'} first")
+
+
 COMMANDS: dict[str, Callable[..., None]] = {
     "reproduce": reproduce,
     "identify": identify,
@@ -250,6 +265,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "render": render,
     "play": play,
     "export": export,
+    "manual": manual,
 }
 
 

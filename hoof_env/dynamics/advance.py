@@ -37,6 +37,7 @@ from hoof_env.dynamics.lanes_strides import count_stride, forget_sums
 from hoof_env.dynamics.lanes_time import begin_step, end_step, next_stage, weigh_stage
 from hoof_env.dynamics.reactions import CONSTANTS, OUTPUTS
 from hoof_env.dynamics.trunk import FIXED
+from hoof_env.dynamics.vectors import put, vector
 
 LANES = 8
 """Environments side by side in a batch: one vector of 512 bits."""
@@ -145,6 +146,7 @@ def load_limb_rows(limb, data, start, row, stride):  # type: ignore[no-untyped-d
     forget_sums(limb)
     fill(limb, b.COMMAND, 4, data, start + AT_COMMAND * row, row, stride)
     fill(limb, b.HIP_ON_TRUNK, LIMB_SETTINGS, data, start + AT_LIMB_SETTINGS * row, row, stride)
+    put(limb, b.HIP, vector(limb, b.HIP_ON_TRUNK))  # stays so unless the trunk pitches
     level_ground(limb)
 
 

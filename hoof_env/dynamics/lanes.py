@@ -40,7 +40,7 @@ def evaluate(trunk, limbs, legs, model, elapsed):  # type: ignore[no-untyped-def
         look_up_functions(trunk, limb, model)
         place_frame(trunk, limb, elapsed)
         if model.kind != FIXED:
-            gather_leg(trunk, limb, model.together)
+            gather_leg(trunk, limb, model.kind, model.together)
     if model.kind != FIXED:
         move_trunk(trunk, model.kind)
     for i in range(legs):
@@ -85,7 +85,6 @@ def place_frame(trunk, limb, elapsed):  # type: ignore[no-untyped-def]
     turn = plane(cos_beta, sin_beta)
     s, ds = turn * vector(limb, b.VALUES + f.S_X), turn * vector(limb, b.VALUES + f.DS_X)
     put(limb, b.TURN, turn)
-    put(limb, b.HIP, vector(trunk, t.TURN) * vector(limb, b.HIP_ON_TRUNK))
     put(limb, b.S, s)
     put(limb, b.DS, ds)
     put(limb, b.U, ds + k * across(s))
@@ -129,15 +128,17 @@ def clear_trunk(trunk, kind):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def gather_leg(trunk, limb, together):  # type: ignore[no-untyped-def]
+def gather_leg(trunk, limb, kind, together):  # type: ignore[no-untyped-def]
     """Add a leg to the first moment, momentum, inertia and spin of all about the trunk's centre of mass."""
-    hip, s, w, sway = vector(limb, b.HIP), vector(limb, b.S), limb[b.SPIN], limb[b.SWAY]
-    frame, moment = limb[b.FRAME], limb[b.MASS] * hip
+    s, w, sway = vector(limb, b.S), limb[b.SPIN], limb[b.SWAY]
     drift = w * vector(limb, b.U) + sway * across(s)
-    add_vector(trunk, t.MOMENT, moment + s, together)
+    if kind == FREE:
+        put(limb, b.HIP, vector(trunk, t.TURN) * vector(limb, b.HIP_ON_TRUNK))
+        hip, frame = vector(limb, b.HIP), limb[b.FRAME]
+        add(trunk, t.ROUND, dot(hip, limb[b.MASS] * hip + 2.0 * s) + frame, together)
+        add(trunk, t.SWIRL, cross(hip, drift) + limb[b.COUPLING] * w + frame * sway, together)
+    add_vector(trunk, t.MOMENT, limb[b.MASS] * vector(limb, b.HIP) + s, together)
     add_vector(trunk, t.DRIFT, drift, together)
-    add(trunk, t.ROUND, dot(hip, moment + 2.0 * s) + frame, together)
-    add(trunk, t.SWIRL, cross(hip, drift) + limb[b.COUPLING] * w + frame * sway, together)
 
 
 @inlined
@@ -190,7 +191,7 @@ def settle(trunk, limbs, legs, model, starts):  # type: ignore[no-untyped-def]
         limb = below(limbs, i * b.ROWS)
         look_up_functions(trunk, limb, model)
         place_frame(trunk, limb, 0.0)
-        gather_leg(trunk, limb, model.together)
+        gather_leg(trunk, limb, model.kind, model.together)
     place, velocity, rate = vector(trunk, t.CENTRE), vector(trunk, t.MOMENTUM), trunk[t.SPIN]
     moment, drift, per_mass = vector(trunk, t.MOMENT), vector(trunk, t.DRIFT), trunk[t.PER_MASS]
     centre = place + per_mass * moment

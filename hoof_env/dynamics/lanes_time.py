@@ -6,7 +6,7 @@ from hoof_env._jit import inlined
 from hoof_env._lanes import below, choose
 from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
-from hoof_env.dynamics.trunk import FIXED
+from hoof_env.dynamics.trunk import FIXED, FREE
 from hoof_env.gait.motion_law import INNER, SPEED
 from hoof_env.ground.exact_math import clip
 
@@ -24,10 +24,13 @@ def bend_filters(limb, settings):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def go_on(trunk, to, start, factor, slope):  # type: ignore[no-untyped-def]
-    """trunk[to] = trunk[start] + factor trunk[slope] for all rows that move."""
-    for k in range(t.MOVING):
+def go_on(trunk, kind, to, start, factor, slope):  # type: ignore[no-untyped-def]
+    """trunk[to] = trunk[start] + factor trunk[slope] for all rows that move; two are of the pitch."""
+    for k in range(t.MOVING - 2):
         trunk[to + k] = trunk[start + k] + factor * trunk[slope + k]
+    if kind == FREE:
+        for k in range(t.MOVING - 2, t.MOVING):
+            trunk[to + k] = trunk[start + k] + factor * trunk[slope + k]
 
 
 @inlined
@@ -50,7 +53,7 @@ def weigh_stage(trunk, limbs, legs, model, weight):  # type: ignore[no-untyped-d
     if weight == 0.0:
         return
     if model.kind != FIXED:
-        go_on(trunk, t.MEAN, t.MEAN, weight, t.FLOW)
+        go_on(trunk, model.kind, t.MEAN, t.MEAN, weight, t.FLOW)
     for i in range(legs):
         limb = below(limbs, i * b.ROWS)
         limb[b.SPIN_MEAN] = limb[b.SPIN_MEAN] + weight * limb[b.SPIN]
@@ -69,7 +72,7 @@ def prescribed(limb, elapsed):  # type: ignore[no-untyped-def]
 def next_stage(trunk, limbs, legs, model, elapsed):  # type: ignore[no-untyped-def]
     """Go `elapsed` [s] from the step's start with the derivatives of the present stage."""
     if model.kind != FIXED:
-        go_on(trunk, t.NOW, t.FIRST, elapsed, t.FLOW)
+        go_on(trunk, model.kind, t.NOW, t.FIRST, elapsed, t.FLOW)
     for i in range(legs):
         limb = below(limbs, i * b.ROWS)
         is_motor = limb[b.MOTOR] > 0.0
@@ -93,7 +96,7 @@ def end_step(trunk, limbs, legs, model, h):  # type: ignore[no-untyped-def]
     if model.kind != FIXED:
         if model.new_rates:
             use_new_rates(trunk, h)
-        go_on(trunk, t.FIRST, t.FIRST, h, t.MEAN)
+        go_on(trunk, model.kind, t.FIRST, t.FIRST, h, t.MEAN)
     trunk[t.TIME] = trunk[t.TIME] + h
     for i in range(legs):
         limb = below(limbs, i * b.ROWS)

@@ -53,7 +53,8 @@ def start(
             raise ParameterError(
                 f"theta_rate: leg {i} is prescribed to turn at {gaits[i, 0]} rad/s, got {spin[i]}"
             )
-        if not np.isfinite(engine.profiles[i](angle[i])[0]).all():
+        turns = limb.geometry.full_turn  # then its links have a place everywhere
+        if not turns and not np.isfinite(engine.profiles[i](angle[i])[0]).all():
             raise ParameterError(f"theta: the links of leg {i} have no place at some of {angle[i]} rad")
     at = {name: spread(name, value, (n,), FARTHEST) for name, value in trunk.items()}
     kind = TRUNKS.index(engine.trunk.kind)

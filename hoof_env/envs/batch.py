@@ -24,7 +24,15 @@ from hoof_env.envs import episode as e
 from hoof_env.envs.grounds import make_terrain
 from hoof_env.envs.observation import GROUPS, HALF_RANGE, MIDDLE, check_groups, entries, places
 from hoof_env.envs.reward import RewardWeights
-from hoof_env.envs.start import HIGHEST, LOWEST, check_parameters, draw_parameters, draw_starts
+from hoof_env.envs.start import (
+    HIGHEST,
+    LOWEST,
+    check_options,
+    check_parameters,
+    draw_parameters,
+    draw_starts,
+    extremes,
+)
 from hoof_env.envs.tasks import Settings, Task
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait.parameters import LIMITS, GaitParameters, gait_names, load_gait
@@ -44,6 +52,7 @@ class EpisodeBatch:
         task, settings: what it is.
         engine: the mechanics of all.
         names: of the observation's entries.
+        kernel, desk: one control step of all is `kernel(desk)`; then comes `follow`.
         episode: memory of the episodes, rows as in `episode`, shape (EPISODE_ROWS, columns).
 
     Raises:
@@ -78,6 +87,8 @@ class EpisodeBatch:
             Limb(self.geometry, drive=drive), trunk, ground, terrain,
             sim_dt=s.sim_dt, integrator=s.integrator, num_envs=num_envs, strides=True,
         )  # fmt: skip
+        self._check_extremes(self.randomize)
+        self._varied = np.zeros(num_envs, bool)
         self.names = [entry[0] for entry in entries(self.groups, s.trunk)]
         columns = self.engine.columns
         self.episode = np.zeros((e.EPISODE_ROWS, columns))
@@ -128,35 +139,62 @@ class EpisodeBatch:
     def _open(self) -> None:
         """Make the desk: addresses of the arrays as they are now."""
         one, many = (e.step_one, e.look_one), (e.step_batch, e.look_batch)
-        self._step, self._look = one if self.engine.is_few else many
+        self.kernel, self._look = one if self.engine.is_few else many
         arrays = (*self.engine.arrays, self.episode, self._task, self.actions, self.seen)
         slots = [[a.ctypes.data, *a.shape, *[0] * (3 - a.ndim)] for a in arrays]
-        self._desk = np.array(slots, np.int64).ravel()
+        self.desk = np.array(slots, np.int64).ravel()
 
     # Episodes
+
+    def limit(self, steps: int) -> None:
+        """Truncate episodes after so many control steps, if not before."""
+        self.steps_per_episode = min(steps, self.steps_per_episode)
+        self._task["episode_steps"] = self.steps_per_episode
+
+    def check_options(self, options: Any) -> dict[str, Any]:
+        """Reset options as `reset` takes them; whatever can be wrong with them is found here, so that a
+        refused reset changes nothing.
+
+        Raises:
+            ParameterError: an unknown option, or a value out of range.
+        """
+        checked = check_options(options, self.gaits, self.engine.trunk)
+        self._check_extremes(self.randomize | checked.get("parameters", {}))
+        return checked
+
+    def _check_extremes(self, parameters: Mapping[str, float | tuple[float, float]]) -> None:
+        for values in extremes(parameters) if parameters else ():
+            self._physics(values)
 
     def reset(
         self,
         envs: Sequence[int] | NDArray[np.int64],
         generators: Sequence[np.random.Generator],
         options: Mapping[str, Any],
-    ) -> dict[str, Floats]:
+    ) -> dict[str, Any]:
         """Start episodes in some environments.
 
         Args:
             envs: which.
             generators: of each of them.
-            options: as `start.check_options` gives them.
+            options: as `check_options` gives them.
 
         Returns:
-            What was drawn, by name, one row an environment: gaits, crank_angle, speed, height, x.
+            What was drawn, by name, one row an environment: gaits, crank_angle, speed, height, x; and
+            "parameters", those of this episode by name.
         """
         which, columns = np.asarray(envs, np.int64), self.episode
-        if parameters := {**self.randomize, **options.get("parameters", {})}:
-            for env, generator in zip(which, generators, strict=True):
-                trunk, ground, drive = self._physics(draw_parameters(parameters, generator))
+        parameters = self.randomize | options.get("parameters", {})
+        drawn = {name: np.zeros(len(which)) for name in parameters}
+        if parameters or self._varied[which].any():  # what was set for one episode is not for the next
+            for k, (env, generator) in enumerate(zip(which, generators, strict=True)):
+                values = draw_parameters(parameters, generator)
+                for name, value in values.items():
+                    drawn[name][k] = value
+                trunk, ground, drive = self._physics(values)
                 self.engine.vary(int(env), trunk, ground, drive)
                 columns[e.WEIGHT, env] = (trunk.mass + self.geometry.mass) * GRAVITY
+            self._varied[which] = bool(parameters)
         start = draw_starts(
             options, generators, self.engine.profiles[0], self.engine.trunk, self.gaits, self.engine.terrain
         )
@@ -177,8 +215,8 @@ class EpisodeBatch:
             for env, generator in zip(which, generators, strict=True):
                 columns[e.TARGET, env] = generator.uniform(*self.target_speed)
                 self._draw_target(int(env), generator)
-        self._look(self._desk)
-        return vars(start)
+        self._look(self.desk)
+        return {**vars(start), "parameters": drawn}
 
     def _draw_target(self, env: int, generator: np.random.Generator) -> None:
         """Draw the next commanded speed, and when."""
@@ -187,20 +225,29 @@ class EpisodeBatch:
         self.episode[e.SWITCH, env] = now + round(generator.uniform(*self.target_seconds) / self.dt)
         self.episode[e.NEXT_TARGET, env] = generator.uniform(*self.target_speed)
 
-    def step(self, generators: Sequence[np.random.Generator]) -> bool:
+    def step(self, generators: Sequence[np.random.Generator], idle: NDArray[np.bool_] | None = None) -> bool:
         """One control step under `actions`; returns whether any episode ended.
+
+        Args:
+            generators: of all environments.
+            idle: those whose episode is over, shape (num_envs,): nothing is drawn for them.
 
         Raises:
             ParameterError: an action is not a number; nothing has happened then.
         """
-        ended: int = self._step(self._desk)
-        if ended < 0:
+        return self.follow(self.kernel(self.desk), generators, idle)
+
+    def follow(
+        self, said: int, generators: Sequence[np.random.Generator], idle: NDArray[np.bool_] | None = None
+    ) -> bool:
+        """`step` after its kernel, which said so."""
+        if said < 0:
             raise ParameterError("action: expected finite numbers, got some that are not")
-        if self.target_speed:
-            n = self.num_envs
-            for env in np.flatnonzero(self.episode[e.STEPS, :n] >= self.episode[e.SWITCH, :n]):
+        if said & e.SWITCHED:
+            due = self.episode[e.STEPS, : self.num_envs] >= self.episode[e.SWITCH, : self.num_envs]
+            for env in np.flatnonzero(due if idle is None else due & ~idle):
                 self._draw_target(int(env), generators[int(env)])
-        return ended > 0
+        return bool(said & 1)
 
     def summary(self, env: int) -> dict[str, float]:
         """Figures of an episode.
@@ -259,16 +306,23 @@ class EpisodeBatch:
         Raises:
             ParameterError: the state is of another task, geometry or setting.
         """
-        episode = np.asarray(state["episode"], np.float64)
-        if episode.shape != (e.EPISODE_ROWS, self.num_envs):
-            expected = (e.EPISODE_ROWS, self.num_envs)
-            raise ParameterError(f"state['episode']: expected shape {expected}, got {episode.shape}")
+        expected = (e.EPISODE_ROWS, self.num_envs)
+        try:
+            episode = np.asarray(state["episode"], np.float64)
+        except (TypeError, ValueError):
+            raise ParameterError(f"state['episode']: expected numbers, got {state['episode']!r}") from None
+        if episode.shape != expected:
+            raise ParameterError(
+                f"state['episode']: expected shape {expected} for {self.num_envs} environments, "
+                f"got {episode.shape}"
+            )
         self.engine.set_state(state["engine"])
         self.episode[:, : self.num_envs] = episode
-        self._look(self._desk)
+        self._varied[:] = True
+        self._look(self.desk)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {key: value for key, value in vars(self).items() if key not in ("_desk", "_step", "_look")}
+        return {key: value for key, value in vars(self).items() if key not in ("desk", "kernel", "_look")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
@@ -312,3 +366,17 @@ def check_state(state: Any, env_id: str, settings: Mapping[str, Any], parts: Seq
     unlike = [f"{k}: {v!r} here, {there.get(k)!r} there" for k, v in settings.items() if there.get(k) != v]
     if unlike:
         raise ParameterError(f"state: of other settings; {'; '.join(unlike)}")
+
+
+def generator_of(state: Any) -> np.random.Generator:
+    """A generator in the state that a `PCG64` had.
+
+    Raises:
+        ParameterError: no such state.
+    """
+    generator = np.random.Generator(np.random.PCG64())
+    try:
+        generator.bit_generator.state = state
+    except (TypeError, ValueError, KeyError):
+        raise ParameterError(f"state['generator']: expected the state of a PCG64, got {state!r}") from None
+    return generator

@@ -49,8 +49,9 @@ EPISODE_ROWS = 24
 SUMS = ("time", "distance", "work", "impulse", "loaded_time", "stances", "peak_sum", "highest")
 TERMS = ("reward_progress", "reward_peak", "reward_energy", "reward_action", "reward_failure")
 FAILED, TRUNCATED = 1, 2
-NOT_A_NUMBER = -1
-"""What a step returns if an action is none; nothing has happened then."""
+NOT_A_NUMBER, SWITCHED = -1, 2
+"""What a step returns if an action is none, and nothing has happened then; 1 if an episode ended, and 2 more
+if somewhere another speed is commanded now."""
 
 AHEAD = (0.25, 0.5, 0.75, 1.0)
 """Where the height of the ground is seen, from O forward [m]."""
@@ -112,7 +113,8 @@ def add_to(mine, episode, row, x, n, columns):  # type: ignore[no-untyped-def]
 
 @inlined
 def judge_step(mine, data, episode, task, n, columns):  # type: ignore[no-untyped-def]
-    """Terms of the reward, totals of the episode, and whether it ends. Returns where it does."""
+    """Terms of the reward, totals of the episode, and whether it ends. Returns where it does, and
+    where another speed is commanded."""
     limb = TRUNK_ROWS
     good = read(mine, data, AT_RESULT * columns + n, 1) == 0.0  # else the state is of before: nothing is paid
     x, y = read(mine, data, AT_REPORT * columns + n, 1), read(mine, data, (AT_REPORT + 1) * columns + n, 1)
@@ -160,7 +162,7 @@ def judge_step(mine, data, episode, task, n, columns):  # type: ignore[no-untype
     highest = choose(good, read(mine, data, (limb + b.HIGHEST) * columns + n, 1), 0.0)
     before = read(mine, episode, HIGHEST * columns + n, 1)
     write(larger(before, highest), episode, HIGHEST * columns + n, 1)
-    return ended > 0.0
+    return ended > 0.0, switch
 
 
 @inlined
@@ -211,7 +213,7 @@ def look(mine, data, episode, ground, model, seen, task, n, columns):  # type: i
 
 @pasted
 def step_all(desk, lanes, advance):  # type: ignore[no-untyped-def]
-    """One control step; returns how many environments ended, or `NOT_A_NUMBER`."""
+    """One control step; returns what `NOT_A_NUMBER` and `SWITCHED` say."""
     columns, mine = desk[2], rows(doubles(lanes), lanes)
     data, episode = _double_at(desk[0]), _double_at(desk[6 * _SLOTS])
     actions, seen = _single_at(desk[8 * _SLOTS]), _single_at(desk[9 * _SLOTS])
@@ -236,8 +238,11 @@ def step_all(desk, lanes, advance):  # type: ignore[no-untyped-def]
     )
     ended = 0
     for n in range(0, columns, lanes):
-        if anywhere(judge_step(mine, data, episode, what, n, columns)):
-            ended += 1
+        done, switch = judge_step(mine, data, episode, what, n, columns)
+        if anywhere(done):
+            ended |= 1
+        if anywhere(switch):
+            ended |= SWITCHED
         look(mine, data, episode, ground, model[0], seen, what, n, columns)
     return ended
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
@@ -14,15 +13,15 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.trunk_model import LIFT_OFF
 from hoof_env.envs import episode as e
-from hoof_env.envs.batch import EpisodeBatch, check_state
+from hoof_env.envs.batch import EpisodeBatch, check_state, generator_of
 from hoof_env.envs.recording import Recording
-from hoof_env.envs.start import check_options
+from hoof_env.envs.start import check_seed
 from hoof_env.envs.tasks import TASKS, to_json
 from hoof_env.errors import ParameterError, check_choice
 from hoof_env.gait.parameters import PARAMETERS, GaitParameters
 
 RENDER_MODES = ("human", "rgb_array")
-_SHAPE, _NUMBERS = (e.ACTIONS,), (np.dtype(np.float32), np.dtype(np.float64))
+_SHAPE, _SINGLE = (e.ACTIONS,), np.dtype(np.float32)
 
 
 class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
@@ -63,6 +62,7 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         """Views of the batch that every step reads or writes."""
         self._terms = self.batch.episode[e.TERM : e.TERM + len(e.TERMS), 0]
         self._action, self._seen = self.batch.actions[0], self.batch.seen[0]
+        self._step, self._desk = self.batch.kernel, self.batch.desk
 
     # What pictures, records and policies read
 
@@ -123,32 +123,37 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Start an episode; the manual page has the options."""
         self._refuse_closed("reset")
-        super().reset(seed=seed)
-        checked = check_options(options, self.gaits)
+        checked = self.batch.check_options(options)  # before the generator is touched
+        super().reset(seed=check_seed(seed))
         if self._recording is not None:
             self._recording.start()
         start = self.batch.reset([0], [self.np_random], checked)
         self._state = "running"
         if self._recording is not None:
             self._show(restart=True)
-        info = {name: float(start[name][0]) for name in ("crank_angle", "speed", "height", "x")}
-        return self._seen.copy(), {
-            **info,
-            "gait": dict(zip(PARAMETERS, start["gaits"][0].tolist(), strict=True)),
+        info: dict[str, Any] = {
+            name: float(start[name][0]) for name in ("crank_angle", "speed", "height", "x")
         }
+        info["gait"] = dict(zip(PARAMETERS, start["gaits"][0].tolist(), strict=True))
+        if start["parameters"]:
+            info["parameters"] = {name: float(values[0]) for name, values in start["parameters"].items()}
+        return self._seen.copy(), info
 
     def step(
         self, action: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """Command the gait parameters for `dt`."""
-        batch = self.batch
         if self._state != "running":
             self._refuse_closed("step")
             raise ResetNeeded("step() was called before reset(): expected reset() first")
-        self._take(action)
+        if type(action) is np.ndarray and action.dtype is _SINGLE and action.shape == _SHAPE:
+            self._action[:] = action
+        else:
+            self._take(action)
         if self._recording is not None:
             self._recording.start()
-        ended = batch.step((self.np_random,))
+        said = self._step(self._desk)  # not through the batch: a call costs as much as a substep
+        ended = bool(said) and self.batch.follow(said, (self.np_random,))
         progress, peak, energy, change, failure = self._terms.tolist()
         info: dict[str, Any] = {
             "reward_progress": progress,
@@ -159,26 +164,24 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         }
         failed = truncated = False
         if ended:
-            failed = bool(batch.episode[e.ENDED, 0] == e.FAILED)
+            failed = bool(self.batch.episode[e.ENDED, 0] == e.FAILED)
             truncated = not failed
-            info["episode_summary"] = batch.summary(0)
+            info["episode_summary"] = self.batch.summary(0)
             if failed:
-                info["failure"] = batch.failure(0)
+                info["failure"] = self.batch.failure(0)
         if self._recording is not None:
             self._show()
         return self._seen.copy(), progress + peak + energy + change + failure, failed, truncated, info
 
     def _take(self, action: Any) -> None:
         """Put an action where the kernel finds it."""
-        if type(action) is not np.ndarray or action.shape != _SHAPE or action.dtype not in _NUMBERS:
-            try:
-                given = np.asarray(action)
-            except ValueError:
-                given = np.empty(0)
-            if given.shape != _SHAPE or given.dtype.kind not in "fiu":
-                raise ParameterError(f"action: expected 4 finite numbers in [-1, 1], got {action!r}")
-            action = given
-        self._action[:] = action
+        try:
+            given = np.asarray(action)
+        except ValueError:
+            given = np.empty(0)
+        if given.shape != _SHAPE or given.dtype.kind not in "fiu":
+            raise ParameterError(f"action: expected 4 finite numbers in [-1, 1], got {action!r}")
+        self._action[:] = given
 
     def _refuse_closed(self, name: str) -> None:
         if self._state == "closed":
@@ -189,6 +192,7 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self.render_mode is None:
             gym.logger.warn("render() was called without a render_mode: pass 'rgb_array' or 'human'")
             return None
+        self._refuse_closed("render")
         if self._state == "new":
             raise ResetNeeded("render() was called before reset(): expected reset() first")
         frame: NDArray[np.uint8] | None = self._get_renderer().frame()
@@ -235,6 +239,7 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         Raises:
             ResetNeeded: there is no episode yet.
         """
+        self._refuse_closed("get_state")
         if self._state != "running":
             raise ResetNeeded("get_state() was called before reset(): expected reset() first")
         about = {"id": self.task.id, "settings": to_json(self.settings)}
@@ -246,15 +251,18 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         Raises:
             ParameterError: a state of another id, version, geometry or setting, or one that lacks a part.
         """
+        self._refuse_closed("set_state")
         check_state(state, self.task.id, to_json(self.settings))
+        generator = generator_of(state["generator"])
         self.batch.set_state(state)
-        self.np_random.bit_generator.state = copy.deepcopy(state["generator"])
-        self._state = "running"
+        self.np_random, self._state = generator, "running"
+        if self._recording is not None:
+            self._recording.forget()
         return self._seen.copy()
 
     def __getstate__(self) -> dict[str, Any]:
         """Copies and pickles leave the window behind; it belongs to this process and this environment."""
-        views = ("_terms", "_action", "_seen")
+        views = ("_terms", "_action", "_seen", "_step", "_desk")
         return {**{k: v for k, v in vars(self).items() if k not in views}, "_renderer": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:

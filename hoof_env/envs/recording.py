@@ -33,6 +33,11 @@ class Recording:
         """Before a step or a reset: remember where it begins."""
         self._before = self.batch.engine.column(self.env)
 
+    def forget(self) -> None:
+        """After a jump to another state: what was before did not lead to it."""
+        self._before = None
+        self._waiting.clear()
+
     def last(self) -> dict[str, NDArray[np.float64]]:
         """State and report by name at each substep of the last control step; at the start, after a reset."""
         now = self.batch.engine.column(self.env)

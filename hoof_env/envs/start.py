@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hoof_env.dynamics.arguments import count
 from hoof_env.dynamics.trunk import Trunk
 from hoof_env.envs.tasks import PER_EPISODE
 from hoof_env.errors import ParameterError, check_choice, check_number
@@ -103,11 +104,6 @@ def draw_starts(
             x = np.array([generator.uniform(low, max(low, high)) for generator in generators])
         ground = terrain.height_at(x[:, None] + REACH).max(1)
     if trunk.kind == "suspended":
-        if not LOWEST * trunk.height < height[0] < HIGHEST * trunk.height:
-            raise ParameterError(
-                f"options['height']: expected {LOWEST:g} to {HIGHEST:g} times {trunk.height:g} m, "
-                f"outside which an episode fails, got {height[0]:g}"
-            )
         if "height" not in options:
             height = np.maximum(height, ground - hoof_height(profile, chosen, theta))
     elif "crank_angle" not in options:
@@ -119,11 +115,20 @@ def draw_starts(
     return Starts(chosen, theta, speed, height, x)
 
 
-def check_options(options: Any, gaits: Mapping[str, GaitParameters]) -> dict[str, Any]:
+def check_seed(seed: Any) -> int | None:
+    """A seed as Gymnasium takes it.
+
+    Raises:
+        ParameterError: not a whole number from 0.
+    """
+    return None if seed is None else count("seed", seed, low=0)
+
+
+def check_options(options: Any, gaits: Mapping[str, GaitParameters], trunk: Trunk) -> dict[str, Any]:
     """Reset options with their values checked and the gait as `GaitParameters`.
 
     Raises:
-        ParameterError: an unknown option, or a value out of range.
+        ParameterError: an unknown option, or a value out of range or that the trunk cannot have.
     """
     known = ("gait", "parameters", *OPTIONS)
     if options is None:
@@ -136,11 +141,28 @@ def check_options(options: Any, gaits: Mapping[str, GaitParameters]) -> dict[str
     for name, (low, high) in OPTIONS.items():
         if name in checked:
             checked[name] = check_number(f"options[{name!r}]", checked[name], low=low, high=high)
+    _check_trunk(checked, trunk)
     if checked.get("gait") is not None:
         checked["gait"] = _gait(checked["gait"], gaits)
     if "parameters" in checked:
         checked["parameters"] = check_parameters("options['parameters']", checked["parameters"])
     return checked
+
+
+def _check_trunk(options: Mapping[str, float], trunk: Trunk) -> None:
+    """Raise where a trunk cannot be at a height or have a speed."""
+    height, speed = options.get("height", trunk.height), options.get("speed", 0.0)
+    if trunk.kind != "suspended" and height != trunk.height:
+        raise ParameterError(
+            f"options['height']: a {trunk.kind} trunk is at {trunk.height:g} m, got {height:g} m"
+        )
+    if not LOWEST * trunk.height < height < HIGHEST * trunk.height:
+        raise ParameterError(
+            f"options['height']: expected {LOWEST:g} to {HIGHEST:g} times {trunk.height:g} m, "
+            f"outside which an episode fails, got {height:g}"
+        )
+    if trunk.kind == "fixed" and speed != 0.0:
+        raise ParameterError(f"options['speed']: expected 0 of a fixed trunk, got {speed:g}")
 
 
 def check_parameters(name: str, given: Any) -> dict[str, float | tuple[float, float]]:
@@ -165,6 +187,15 @@ def check_parameters(name: str, given: Any) -> dict[str, float | tuple[float, fl
         else:
             found[key] = check_number(f"{name}[{key!r}]", value)
     return found
+
+
+def extremes(given: Mapping[str, float | tuple[float, float]]) -> list[dict[str, float]]:
+    """Values among which all that can be drawn lie: lowest, highest, and the closest friction thresholds."""
+    low, high = (
+        {name: value[end] if isinstance(value, tuple) else value for name, value in given.items()}
+        for end in (0, 1)
+    )
+    return [low, high, low | {name: value for name, value in high.items() if name == "friction_slow"}]
 
 
 def draw_parameters(

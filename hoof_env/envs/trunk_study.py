@@ -29,35 +29,47 @@ last but one)."""
 SETTLE, WINDOW = 10.0, 10.0
 """Seconds left out and seconds measured."""
 
+FIGURES = (
+    "mean_force_n", "peak_force_n", "weight_share", "speed_m_s", "sinkage_m", "bounce_m", "duty_factor",
+)  # fmt: skip
+
 
 def measure(gait: str, trunk: dict[str, Any]) -> dict[str, float]:
     """Steady motion of a trunk under a scripted gait.
 
     Returns:
-        mean_force_n (normal force), peak_force_n (resultant), weight_share (mean force over weight),
-        speed_m_s, sinkage_m (nominal less mean height), bounce_m (highest less lowest), duty_factor; NaN if
-        the episode fails (the trunk leaves its range of heights).
+        `FIGURES`: mean_force_n (normal force), peak_force_n (resultant), weight_share (mean force over
+        weight), speed_m_s, sinkage_m (nominal less mean height), bounce_m (highest less lowest), duty_factor
+        (normal force above 0); NaN if the episode fails (the trunk leaves its range of heights).
     """
     env = gym.make("hoof_env/HorseLeg-v0", episode_seconds=SETTLE + WINDOW, **trunk)
     leg: Any = env.unwrapped
     observation, _ = env.reset(seed=0, options={"gait": gait, "crank_angle": 0.0, "speed": 0.0})
-    policy, traces, ended = make_policy(gait, env), [], False
+    policy, ended = make_policy(gait, env), False
+    records = [leg.record()]
     while not ended:
         observation, _, failed, truncated, _ = env.step(policy.predict(observation)[0])
-        traces.append(leg.trace)
+        records.append(leg.record())
         ended = failed or truncated
-    trace = np.concatenate(traces)[round(SETTLE / leg.sim_dt) :]
     if failed:
-        trace = np.full(1, np.nan, trace.dtype)
-    return {
-        "mean_force_n": float(trace["normal"].mean()),
-        "peak_force_n": float(trace["grf"].max()),
-        "weight_share": float(trace["normal"].mean() / leg.weight),
-        "speed_m_s": float((trace["trunk_x"][-1] - trace["trunk_x"][0]) / WINDOW),
-        "sinkage_m": float(leg.engine.trunk.height - trace["trunk_y"].mean()),
-        "bounce_m": float(np.ptp(trace["trunk_y"])),
-        "duty_factor": float((trace["normal"] > 0).mean()) if not failed else float("nan"),
-    }
+        return dict.fromkeys(FIGURES, float("nan"))
+
+    def steady(name: str) -> Any:
+        return np.concatenate([record[name].ravel() for record in records])[1 + round(SETTLE / leg.sim_dt) :]
+
+    x, y = steady("x"), steady("y")
+    normal = steady("toe_normal") + steady("heel_normal")
+    friction = steady("toe_friction") + steady("heel_friction")
+    values = (
+        normal.mean(),
+        np.hypot(normal, friction).max(),
+        normal.mean() / leg.weight,
+        (x[-1] - x[0]) / WINDOW,
+        leg.engine.trunk.height - y.mean(),
+        np.ptp(y),
+        (normal > 0).mean(),
+    )
+    return dict(zip(FIGURES, map(float, values), strict=True))
 
 
 def study(progress: Callable[[str], None] | None = None) -> str:
@@ -70,16 +82,11 @@ def study(progress: Callable[[str], None] | None = None) -> str:
         progress("\n".join(lines))
     for gait in ("walk", "run"):
         for trunk in TRUNKS:
-            m = measure(gait, trunk)
-            cells = ["fails"] * 7
-            if np.isfinite(m["mean_force_n"]):
-                cells = [
-                    *(f"{m[name]:.0f}" for name in ("mean_force_n", "peak_force_n")),
-                    *(
-                        f"{m[name]:.2f}"
-                        for name in ("weight_share", "speed_m_s", "sinkage_m", "bounce_m", "duty_factor")
-                    ),
-                ]
+            measured = measure(gait, trunk)
+            cells = [
+                "fails" if np.isnan(value) else f"{value:.0f}" if name.endswith("_n") else f"{value:.2f}"
+                for name, value in measured.items()
+            ]
             lines.append(f"| {gait} | {_name(trunk)} | {' | '.join(cells)} |")
             if progress:
                 progress(lines[-1])

@@ -22,11 +22,11 @@ from numpy.typing import NDArray
 from hoof_env.dynamics.arguments import count
 from hoof_env.dynamics.trunk_model import LIFT_OFF
 from hoof_env.envs import episode as e
-from hoof_env.envs.batch import EpisodeBatch, check_state
+from hoof_env.envs.batch import EpisodeBatch, check_state, generator_of
 from hoof_env.envs.recording import Recording
-from hoof_env.envs.start import check_options
+from hoof_env.envs.start import check_seed
 from hoof_env.envs.tasks import TASKS, to_json
-from hoof_env.errors import ParameterError, check_choice, check_number
+from hoof_env.errors import ParameterError, check_choice
 
 MOST_ENVS = 1_000_000
 
@@ -38,7 +38,8 @@ class HorseLegVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
         num_envs: how many.
         task, settings: as of `HorseLegEnv`.
         autoreset_mode: an `AutoresetMode` or its value: NEXT_STEP (default), SAME_STEP or DISABLED.
-        max_episode_steps: control steps of an episode; None for `episode_seconds`.
+        max_episode_steps: episodes are no longer than so many control steps, as under Gymnasium's TimeLimit;
+            else `episode_seconds` alone ends them.
         render_mode: "rgb_array"; `render` gives a frame of each of the first `rendered` environments.
         rendered: how many are drawn.
 
@@ -70,10 +71,9 @@ class HorseLegVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
             check_choice("render_mode", render_mode, self.metadata["render_modes"])
         self.task = TASKS[check_choice("task", task, TASKS)]
         self.settings = self.task.settings(settings)
-        if max_episode_steps is not None:
-            steps = count("max_episode_steps", max_episode_steps)
-            self.settings = self.task.settings({**settings, "episode_seconds": steps * self.settings.dt})
         self.batch = EpisodeBatch(self.task, self.settings, self.num_envs)
+        if max_episode_steps is not None:
+            self.batch.limit(count("max_episode_steps", max_episode_steps))
         self.single_observation_space = spaces.Box(-1.0, 1.0, (len(self.batch.names),), np.float32)
         self.single_action_space = spaces.Box(-1.0, 1.0, (e.ACTIONS,), np.float32)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
@@ -109,9 +109,9 @@ class HorseLegVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
             ParameterError: a bad seed, option or mask.
         """
         self._refuse_closed("reset")
-        options = dict(options or {})
-        mask = self._mask(options.pop("reset_mask", None))
-        checked = check_options(options or None, self.batch.gaits)
+        rest: Any = dict(options) if isinstance(options, Mapping) else options
+        mask = self._mask(rest.pop("reset_mask", None) if isinstance(rest, dict) else None)
+        checked = self.batch.check_options(rest)
         self._seed(seed, mask)
         start = self._start(np.flatnonzero(mask), checked)
         self._ended[mask] = False
@@ -139,7 +139,7 @@ class HorseLegVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
         self._take(actions)
         for recording in self._recordings:
             recording.start()
-        batch.step(self._generators)
+        batch.step(self._generators, again)
         ended = batch.episode[e.ENDED, :n]
         terminated, truncated = ended == e.FAILED, ended == e.TRUNCATED
         terms = batch.episode[e.TERM : e.TERM + len(e.TERMS), :n].copy()
@@ -166,8 +166,8 @@ class HorseLegVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
         last = np.full(self.num_envs, None, dtype=object)
         for env in np.flatnonzero(done):
             last[env] = self.batch.seen[env].copy()
-        final = {key: value for key, value in infos.items() if not key.startswith("_")}
-        masks = {f"_{key}": infos.get(f"_{key}", done.copy()) for key in final}
+        final = {key: copy.deepcopy(value) for key, value in infos.items() if not key.startswith("_")}
+        masks = {f"_{key}": done.copy() for key in final}
         self._show()
         start = self._start(np.flatnonzero(done), {})
         infos |= {"final_obs": last, "_final_obs": done.copy()}
@@ -179,6 +179,7 @@ class HorseLegVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
         if self.render_mode is None:
             gym.logger.warn("render() was called without a render_mode: pass render_mode='rgb_array'")
             return None
+        self._refuse_closed("render")
         if not self._started.all():
             raise ResetNeeded("render() was called before reset(): expected reset() first")
         from hoof_env.envs.rendering import Renderer
@@ -213,25 +214,29 @@ class HorseLegVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
         for recording in self._recordings:
             if recording.env in envs:
                 recording.keep(True)
-        infos: dict[str, Any] = {}
+        infos = self._rows({name: start[name] for name in ("crank_angle", "speed", "height", "x")}, envs)
+        if start["parameters"]:
+            infos |= {"parameters": self._rows(start["parameters"], envs), "_parameters": self._of(envs)}
+        return infos
+
+    def _of(self, envs: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """A mask of some environments."""
         mask = np.zeros(self.num_envs, bool)
         mask[envs] = True
-        for name in ("crank_angle", "speed", "height", "x"):
-            values = np.zeros(self.num_envs)
-            values[envs] = start[name]
-            infos |= {name: values, f"_{name}": mask.copy()}
+        return mask
+
+    def _rows(self, found: Mapping[str, Any], envs: NDArray[np.int64]) -> dict[str, Any]:
+        """Values of some environments as Gymnasium's infos: arrays of all, and masks."""
+        infos: dict[str, Any] = {}
+        for name, values in found.items():
+            infos[name], infos[f"_{name}"] = np.zeros(self.num_envs), self._of(envs)
+            infos[name][envs] = values
         return infos
 
     def _sum_up(self, infos: dict[str, Any], envs: NDArray[np.int64]) -> None:
-        mask = np.zeros(self.num_envs, bool)
-        mask[envs] = True
         summaries = [self.batch.summary(int(env)) for env in envs]
-        whole: dict[str, Any] = {}
-        for name in summaries[0]:
-            values = np.zeros(self.num_envs)
-            values[envs] = [summary[name] for summary in summaries]
-            whole |= {name: values, f"_{name}": mask.copy()}
-        infos |= {"episode_summary": whole, "_episode_summary": mask}
+        found = {name: [summary[name] for summary in summaries] for name in summaries[0]}
+        infos |= {"episode_summary": self._rows(found, envs), "_episode_summary": self._of(envs)}
 
     def _show(self) -> None:
         for recording in self._recordings:
@@ -279,11 +284,11 @@ class HorseLegVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
         if isinstance(seed, (list, tuple, np.ndarray)):
             if len(seed) != n:
                 raise ParameterError(f"seed: expected one number or {n}, got {len(seed)}")
-            seeds = [None if value is None else _one_seed(value) for value in seed]
+            seeds = [check_seed(value) for value in seed]
         elif seed is None:
             seeds = [None] * n
         else:
-            first = _one_seed(seed)
+            first = count("seed", seed, low=0)
             seeds = [first + env for env in range(n)]
         if not self._generators:
             self._generators = [seeding.np_random(value)[0] for value in seeds]
@@ -304,6 +309,7 @@ class HorseLegVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
         Raises:
             ResetNeeded: there are no episodes yet.
         """
+        self._refuse_closed("get_state")
         if not self._started.all():
             raise ResetNeeded("get_state() was called before reset(): expected reset() first")
         about = {"id": self.task.id, "settings": to_json(self.settings), "ended": self._ended.copy()}
@@ -316,23 +322,20 @@ class HorseLegVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
         Raises:
             ParameterError: a state of another id, geometry, setting or number of environments.
         """
+        self._refuse_closed("set_state")
         check_state(state, self.task.id, to_json(self.settings), ("ended",))
+        ended, n = np.array(state["ended"]), self.num_envs
+        if ended.dtype != bool or ended.shape != (n,) or len(state["generator"]) != n:
+            raise ParameterError(f"state: expected one of {n} environments, got one of {len(ended)}")
+        generators = [generator_of(values) for values in state["generator"]]
         self.batch.set_state(state)
-        self._ended, self._started = np.array(state["ended"], bool), np.ones(self.num_envs, bool)
-        self._generators = [np.random.Generator(np.random.PCG64()) for _ in range(self.num_envs)]
-        for generator, values in zip(self._generators, state["generator"], strict=True):
-            generator.bit_generator.state = copy.deepcopy(values)
+        self._ended, self._started, self._generators = ended, np.ones(n, bool), generators
+        for recording in self._recordings:
+            recording.forget()
         return self._observed()
 
     def __getstate__(self) -> dict[str, Any]:
         return {**vars(self), "_renderers": []}
-
-
-def _one_seed(value: Any) -> int:
-    number = check_number("seed", value, low=0)
-    if number != int(number):
-        raise ParameterError(f"seed: expected a whole number, 0 or more, got {value!r}")
-    return int(value)
 
 
 def _autoreset_mode(value: Any) -> AutoresetMode:

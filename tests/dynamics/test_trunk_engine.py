@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from hoof_env.dynamics.drive import Motor, Prescribed
 from hoof_env.dynamics.limb import Limb
 from hoof_env.dynamics.plain import PlainHorse
+from hoof_env.dynamics.result import Result
 from hoof_env.dynamics.trunk import TRUNKS, Trunk
 from hoof_env.dynamics.trunk_engine import TrunkEngine
 from hoof_env.gait.motion_law import FILTER, FilterSettings, command_filters
@@ -97,7 +98,8 @@ def put_somewhere(engine, rng, depth):
             1 / rng.uniform(0.1, 1.5, (legs, n)),
         )
     engine.set_state(state)
-    assert not engine.advance(command, 0).any()
+    fallen = Result.FALLEN  # a state put together at random may have the trunk in the ground: it is reported
+    assert np.isin(engine.advance(command, 0), (Result.OK, fallen)).all()
 
 
 def oracle(engine, horse, e):

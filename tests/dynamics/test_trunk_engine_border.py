@@ -71,7 +71,7 @@ def test_an_engine_that_cannot_be(changes, message):
         ("free", {"gaits": [RUN]}, "gaits: expected one or 2, got 1"),
         ("free", {"gaits": [RUN] * 3}, "gaits: expected one or 2, got 3"),
         ("free", {"gaits": [RUN, "walk"]}, "gaits: expected GaitParameters, one or more, got .*'walk'"),
-        ("free", {"gaits": RUN.to_array()}, "gaits: expected GaitParameters, one or more, got array"),
+        ("free", {"gaits": RUN.to_array()}, "gaits: expected shape .2, 4, 3., got .4,."),
         ("free", {"theta": np.nan}, "theta: expected finite numbers, got nan"),
         ("free", {"theta": [0.0, np.inf]}, "theta: expected finite numbers, got .*inf"),
         ("free", {"theta": None}, "theta: expected finite numbers, got None"),

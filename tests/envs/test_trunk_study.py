@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import inspect
-
 import numpy as np
 import pytest
 
-from hoof_env.envs.horse_leg import HorseLegEnv
+from hoof_env.envs.tasks import Settings
 from hoof_env.envs.trunk_study import DEFAULT, TRUNKS, measure, study
 
 
 def test_the_studied_default_is_the_environments_default():
-    defaults = inspect.signature(HorseLegEnv).parameters
-    assert {name: defaults[name].default for name in DEFAULT} == DEFAULT
+    assert {name: getattr(Settings(), name) for name in DEFAULT} == DEFAULT
 
 
 def test_steady_vertical_balance_of_the_suspension():

@@ -1,0 +1,153 @@
+"""How fast the environments are, beside Gymnasium's HalfCheetah-v5 and EnvPool's, in one process on one thread.
+
+    python -m benchmarks.env_speed          writes benchmarks/results/env_speed.json and .md
+
+An environment step is 20 substeps of 1 ms here and 5 of 10 ms there. Random actions, observations, rewards and
+resets included, rounds interleaved; a ratio is taken within a round. EnvPool is measured where it is
+installed, with one thread and as many environments as serve it best; else HalfCheetah-v5 stands for it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+
+import hoof_env  # noqa: F401  registers the ids
+from benchmarks.speed import machine
+from benchmarks.speed_peers import has
+from benchmarks.speed_rounds import interleave, spread, told
+
+IDS = ("HorseLeg", "HorseLegRail", "HorseLegSpeed", "HorseLegTerrain")
+BATCH = 1024
+SINGLE_BAR, VECTOR_BARS = 5.0, (20.0, 35.0)
+POOLS = (64, 256, 1024)
+
+
+def single(env_id: str, steps: int) -> Callable[[], float]:
+    """Seconds of `steps` single steps with random actions."""
+    env = gym.make(env_id)
+    env.action_space.seed(0)
+    actions = [env.action_space.sample() for _ in range(steps)]
+    env.reset(seed=0)
+
+    def run() -> float:
+        begin = time.perf_counter()
+        for action in actions:
+            _, _, terminated, truncated, _ = env.step(action)
+            if terminated or truncated:
+                env.reset()
+        return time.perf_counter() - begin
+
+    run()
+    return run
+
+
+def vector(envs: Any, width: int, steps: int) -> Callable[[], float]:
+    """Seconds of `steps` steps of all environments with random actions."""
+    generator = np.random.default_rng(0)
+    actions = [generator.uniform(-1, 1, (envs.num_envs, width)).astype(np.float32) for _ in range(8)]
+
+    def run() -> float:
+        begin = time.perf_counter()
+        for k in range(steps):
+            envs.step(actions[k % 8])
+        return time.perf_counter() - begin
+
+    run()
+    return run
+
+
+def pool(num_envs: int, steps: int) -> Callable[[], float]:
+    """The same for EnvPool's HalfCheetah on one thread."""
+    import envpool
+
+    envs = envpool.make("HalfCheetah-v4", env_type="gymnasium", num_envs=num_envs, num_threads=1)
+    envs.reset()
+    generator = np.random.default_rng(0)
+    actions = [generator.uniform(-1, 1, (num_envs, 6)) for _ in range(8)]
+
+    def run() -> float:
+        begin = time.perf_counter()
+        for k in range(steps):
+            envs.step(actions[k % 8])
+        return time.perf_counter() - begin
+
+    run()
+    return run
+
+
+def measure(rounds: int, steps: int) -> dict[str, Any]:
+    """Rates and ratios."""
+    runs: dict[str, Callable[[], float]] = {"HalfCheetah-v5, single": single("HalfCheetah-v5", steps)}
+    units = {"HalfCheetah-v5, single": steps}
+    for name in IDS:
+        env_id = f"hoof_env/{name}-v0"
+        runs[f"{name}, single"], units[f"{name}, single"] = single(env_id, steps), steps
+        envs = gym.make_vec(env_id, num_envs=BATCH)
+        envs.reset(seed=0)
+        many = max(steps // 20, 5)
+        title = f"{name}, {BATCH} at once"
+        runs[title], units[title] = vector(envs, 4, many), many * BATCH
+    if has("envpool"):
+        for size in POOLS:
+            title, few = f"EnvPool HalfCheetah-v4, {size} at once", max(4 * steps // size, 2)
+            runs[title], units[title] = pool(size, few), few * size
+    seconds = interleave(runs, rounds)
+    rate = {name: units[name] / seconds[name] for name in runs}
+    pools = [name for name in rate if name.startswith("EnvPool")]
+    reference = max(pools, key=lambda name: float(np.median(rate[name])), default="HalfCheetah-v5, single")
+    rows = []
+    for name in rate:
+        alone = name.endswith("single")
+        beside = "HalfCheetah-v5, single" if alone else reference
+        rows.append(
+            {"case": name, "rate": spread(rate[name]), "beside": beside,
+             "ratio": spread(rate[name] / rate[beside]),
+             "bars": None if "Cheetah" in name else [SINGLE_BAR] if alone else list(VECTOR_BARS)}
+        )  # fmt: skip
+    return {"machine": machine(), "rounds": rounds, "rows": rows}
+
+
+def page(found: dict[str, Any]) -> str:
+    """The table as Markdown."""
+    lines = [
+        "# How fast the environments are", "",
+        "Written by `python -m benchmarks.env_speed`, part of `make bench`. One process, one thread,"
+        f" {found['rounds']} interleaved rounds of wall time: median (quartiles; extremes).", "",
+        "| | |", "|---|---|",
+        *[f"| {key} | {value} |" for key, value in found["machine"].items()], "",
+        "| case | environment steps/s | beside | ratio | bars |", "|---|---|---|---|---|",
+    ]  # fmt: skip
+    for row in found["rows"]:
+        bars = "".join(
+            f"{bar:g}: {'met' if row['ratio']['median'] >= bar else 'not met'} " for bar in row["bars"] or ()
+        )
+        rate = row["rate"]["median"]
+        lines.append(f"| {row['case']} | {rate:,.0f} | {row['beside']} | {told(row['ratio'])} | {bars.strip()} |")
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    """Measure, print and write."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--rounds", type=int, default=25)
+    parser.add_argument("--steps", type=int, default=2000, help="of a single environment in a round")
+    parser.add_argument("--out", type=Path, default=Path("benchmarks/results"))
+    given = parser.parse_args()
+    found = measure(given.rounds, given.steps)
+    text = page(found)
+    print(text)
+    given.out.mkdir(parents=True, exist_ok=True)
+    (given.out / "env_speed.json").write_text(json.dumps(found, indent=1) + "\n")
+    (given.out / "env_speed.md").write_text(text)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,262 @@
+"""The manual page of each id, in Gymnasium's form: `manual_text` filled from what the environments run on."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import math
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import fields
+from pathlib import Path
+from string import Template
+from typing import Any
+
+from hoof_env.dynamics.trunk_model import LIFT_OFF
+from hoof_env.envs import manual_tables as tables
+from hoof_env.envs import start
+from hoof_env.envs.episode import TERMS
+from hoof_env.envs.grounds import HILLS
+from hoof_env.envs.horse_leg_fixed import HorseLegFixedEnv
+from hoof_env.envs.manual_text import PAGE
+from hoof_env.envs.multi_objective import HorseLegMOEnv
+from hoof_env.envs.observation import GROUPS, entries
+from hoof_env.envs.reference_observation import layout
+from hoof_env.envs.reward import RewardWeights
+from hoof_env.envs.tasks import PER_EPISODE, TASKS, Settings, to_json
+from hoof_env.errors import OutputError, check_choice
+from hoof_env.gait.motion_law import FilterSettings
+from hoof_env.gait.parameters import LIMITS
+from hoof_env.leg.geometry import load_geometry
+
+_CLASSES: Mapping[str, Any] = {"fixed": HorseLegFixedEnv, "mo": HorseLegMOEnv}
+_NAMES = {name: task.name for name, task in TASKS.items()} | {"fixed": "HorseLegFixed", "mo": "HorseLegMO"}
+
+PAGES = tuple(_NAMES)
+"""The tasks, and two ids whose pages are the docstrings of their classes."""
+
+INDEX = "README.md"
+
+
+def page(task: str) -> str:
+    """The manual page of a task in Markdown; `task` is one of `PAGES`.
+
+    Raises:
+        ParameterError: there is no such page.
+    """
+    check_choice("task", task, PAGES)
+    if task in _CLASSES:
+        return _of_class(task)
+    what, settings = TASKS[task], TASKS[task].settings({})
+    text = Template(PAGE).substitute(
+        name=what.name,
+        id=what.id,
+        summary=what.summary,
+        about=what.about,
+        action_space=f"Box(-1, 1, ({len(LIMITS)},), float32)",
+        actions=_actions(),
+        observation_space=f"Box(-1, 1, ({len(observed(task))},), float32)",
+        observations=_observations(settings),
+        other_groups=", ".join(f"`{group}`" for group in GROUPS if group not in settings.observation),
+        rewards=_rewards(settings),
+        target_reward="Progress counts up to the commanded speed; what goes beyond it is subtracted."
+        if settings.target_speed
+        else "",
+        lift_off=f"{100 * LIFT_OFF:g}",
+        start_speed=f"{start.START_SPEED:g}",
+        start=_start(settings),
+        options=_table(("Option", "Unit", "Range", "Meaning"), _options()),
+        parameters=", ".join(f"`{name}`" for name in PER_EPISODE),
+        leaves=_leaves(settings),
+        seconds=literal(settings.episode_seconds),
+        figures=_table(("Figure", "Unit", "Meaning"), _quoted(tables.SUMMARY)),
+        vector_arguments=_table(("Argument", "Default", "Meaning"), _vector_arguments()),
+        bold=", **bold** where they are not those of [HorseLeg](HorseLeg.md)" if what.defaults else "",
+        settings=_table(("Name", "Default", "Unit", "Meaning"), _settings(settings, what.defaults)),
+        terrain=_terrain() if settings.terrain else "",
+    )
+    return re.sub(r"\n{3,}", "\n\n", text)
+
+
+def page_of(id: str) -> str:
+    """The manual page of a registered id.
+
+    Raises:
+        ParameterError: not an id of this package.
+    """
+    ids = {f"hoof_env/{name}-v0": task for task, name in _NAMES.items()}
+    return page(ids[check_choice("id", id, ids)])
+
+
+def index() -> str:
+    """All ids in one table, in Markdown."""
+    rows = []
+    for task, name in _NAMES.items():
+        what = TASKS.get(task)
+        summary = what.summary if what else _docstring(task)[0]
+        reference = what.reference if what else {"fixed": "the zero action", "mo": "run"}[task]
+        native = "yes" if what else "no"
+        rows.append(
+            (f"[`hoof_env/{name}-v0`]({name}.md)", summary, str(len(observed(task))), reference, native)
+        )
+    head = ("id", "what it is", "observation", "reference gait", "native vector environment")
+    return (
+        "# Environments\n\nWritten by `hoof-env manual --out docs/environments`.\n\n"
+        f"{_table(head, rows)}\n\n"
+        "Actions are `Box(-1, 1, (4,), float32)`, observations boxes of so many numbers in [-1, 1]. Idle,"
+        " airborne, foot-dragging and bang-bang policies must stay below the reference gait.\n"
+    )
+
+
+def write_pages(out: Path) -> list[Path]:
+    """Write all pages and the index into a folder, which is made if need be; returns the files.
+
+    Raises:
+        OutputError: the folder cannot be made or written to.
+    """
+    texts = {INDEX: index(), **{f"{name}.md": page(task) for task, name in _NAMES.items()}}
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        for name, text in texts.items():
+            (out / name).write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise OutputError(f"cannot write to {out}: {error.strerror or error}") from None
+    return [out / name for name in texts]
+
+
+def observed(task: str) -> tuple[str, ...]:
+    """Names of the observation's entries of a page's id, by default."""
+    if task == "fixed":
+        return layout("fixed")
+    settings = TASKS["leg" if task == "mo" else task].settings({})
+    return tuple(entry[0] for entry in entries(settings.observation, settings.trunk))
+
+
+# Parts of a page
+
+
+def _actions() -> str:
+    bounds = FilterSettings().to_array()[:, 1]
+    rows = []
+    for k, (low, high) in enumerate(LIMITS.values()):
+        name, _, unit = GROUPS["gait"][k]
+        fastest = f"{bounds[k]:g} {GROUPS['gait'][len(LIMITS) + k][2]}"
+        rows.append((str(k), name, f"{low:.5g}", f"{high:.5g}", unit, fastest))
+    return _table(("Num", "Command", "At -1", "At +1", "Unit", "Fastest change"), rows)
+
+
+def _observations(settings: Settings) -> str:
+    rows = [(*entry, group) for group in settings.observation for entry in entries([group], settings.trunk)]
+    head = ("Num", "Observation", "Scaling", "Unit before scaling", "Group")
+    return _table(head, [(str(k), *row) for k, row in enumerate(rows)])
+
+
+def _rewards(settings: Settings) -> str:
+    weights = RewardWeights.of(settings.reward_weights)
+    rows = []
+    for term, item in zip(TERMS, fields(RewardWeights), strict=True):
+        unit, meaning = tables.WEIGHTS[item.name]
+        rows.append((f"`{term}`", f"`{item.name}`", f"{getattr(weights, item.name):g}", unit, meaning))
+    return _table(("Term", "Weight", "Default", "Unit", "Meaning"), rows)
+
+
+def _start(settings: Settings) -> str:
+    parts = [
+        {
+            "suspended": "the trunk at its nominal height, or higher where the hoof would be in the ground",
+            "rail": "a crank angle with the hoof in the ground is drawn again",
+        }[settings.trunk],
+        f"anywhere on the terrain but within {start.MARGIN:g} m of its ends"
+        if settings.terrain
+        else "at x = 0",
+    ]
+    if settings.target_speed:
+        parts.append(
+            "commanded speeds uniform in `target_speed`, each for a time uniform in `target_seconds`"
+        )
+    return "; ".join(parts)
+
+
+def _leaves(settings: Settings) -> str:
+    if settings.trunk != "suspended":
+        return ""
+    height = settings.hip_height or load_geometry(settings.preset).hip_height
+    return f" O leaves {start.LOWEST:g} to {start.HIGHEST:g} times its nominal height, {height:.4g} m, or"
+
+
+def _options() -> Iterable[tuple[str, ...]]:
+    for name, (unit, meaning) in tables.OPTIONS.items():
+        low, high = start.OPTIONS.get(name, (0.0, 0.0))
+        within = "" if low == high else f"{low:.7g} to {high:.7g}" if math.isfinite(high) else f"from {low:g}"
+        yield f"`{name}`", unit, within, meaning
+
+
+def _vector_arguments() -> Iterable[tuple[str, ...]]:
+    from hoof_env.envs.vector import HorseLegVectorEnv
+
+    for name, item in inspect.signature(HorseLegVectorEnv).parameters.items():
+        if name in tables.VECTOR:
+            yield f"`{name}`", literal(getattr(item.default, "name", item.default)), tables.VECTOR[name][1]
+
+
+def _settings(settings: Settings, changed: Iterable[str]) -> Iterable[tuple[str, ...]]:
+    for name, value in to_json(settings).items():
+        default = f"**{literal(value)}**" if name in changed else literal(value)
+        yield f"`{name}`", default, *tables.SETTINGS[name]
+    yield "`render_mode`", "None", "", '"rgb_array" or "human"'
+
+
+def _terrain() -> str:
+    rows = [(f"`{name}`", literal(value), *tables.HILLS[name]) for name, value in HILLS.items()]
+    return (
+        "### Terrain\n\nHills go straight from one random height to the next, each at its own slope, over"
+        " patches of random stiffness and friction. They take:\n\n"
+        f"{_table(('Name', 'Default', 'Unit', 'Meaning'), rows)}"
+    )
+
+
+# Pages from docstrings
+
+
+def _docstring(task: str) -> tuple[str, list[str]]:
+    """First line and sections of a class."""
+    head, *sections = re.split(r"\n(?=## )", inspect.getdoc(_CLASSES[task]) or "")
+    return head.strip(), sections
+
+
+def _of_class(task: str) -> str:
+    """The page of a class: its docstring, an example and the table of its observation."""
+    name, (head, sections) = _NAMES[task], _docstring(task)
+    scaling = {entry[0]: entry for group in GROUPS.values() for entry in group}
+    rows = [(str(k), *scaling[entry]) for k, entry in enumerate(observed(task))]
+    table = _table(("Num", "Observation", "Scaling", "Unit before scaling"), rows)
+    parts = [f"# {name}", head, PAGE.split("\n\n", 2)[2].split("\n\nenvs = ")[0] + "\n```"]
+    for section in sections:
+        title, text = section.split("\n", 1)
+        parts += [title.title(), text.strip()]
+        parts += [table] if title.lower() == "## observation space" else []
+    linked = re.sub("`hoof_env/HorseLeg-v0`", "[HorseLeg](HorseLeg.md)", "\n\n".join(parts))
+    return linked.replace("$id", f"hoof_env/{name}-v0") + "\n"
+
+
+# Markdown
+
+
+def literal(value: Any) -> str:
+    """A plain value as Python writes it, numbers short."""
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f'"{key}": {literal(item)}' for key, item in value.items()) + "}"
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(map(literal, value)) + "]"
+    if isinstance(value, float):
+        return f"{value:g}"
+    return "None" if value is None else json.dumps(value)
+
+
+def _quoted(rows: tables.Rows) -> Iterable[tuple[str, ...]]:
+    return ((f"`{name}`", *row) for name, row in rows.items())
+
+
+def _table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    first, *rest = (f"| {' | '.join(cells)} |" for cells in (head, *rows))
+    return "\n".join([first, "|" + "---|" * (first.count(" | ") + 1), *rest])

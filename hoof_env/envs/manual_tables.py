@@ -1,0 +1,129 @@
+"""What the manual pages say of settings, reward terms, reset options and figures: unit and meaning, by name.
+
+Defaults, limits and weights are read from the data that has them, never written here.
+"""
+
+from __future__ import annotations
+
+from hoof_env.dynamics.schemes import SCHEMES
+from hoof_env.dynamics.trunk import ONE_LEG
+from hoof_env.envs.grounds import SPACING
+from hoof_env.envs.start import HIGHEST, LOWEST
+from hoof_env.ground.friction import FRICTION_LAWS
+from hoof_env.ground.normal_force import NORMAL_LAWS
+from hoof_env.leg.geometry import preset_names
+
+Rows = dict[str, tuple[str, str]]
+
+
+def _one_of(names: object) -> str:
+    return ", ".join(f'"{name}"' for name in names)  # type: ignore[attr-defined]
+
+
+SETTINGS: Rows = {
+    "preset": ("", f"leg and gaits: {_one_of(preset_names())}, or a JSON file"),
+    "trunk": ("", f"{_one_of(ONE_LEG)}; a fixed one stays where it is"),
+    "hip_height": (
+        "m",
+        f"nominal height of O, the crank centre, {LOWEST:g} to {HIGHEST:g} times the geometry's own;"
+        " None for that",
+    ),
+    "trunk_mass": ("kg", "of the trunk that goes with this leg"),
+    "trunk_share": ("-", "part of the weight of trunk and leg that the leg must bear; suspended"),
+    "trunk_stiffness": ("N/m", "of the suspension's spring; suspended"),
+    "trunk_damping": ("N s/m", "of the suspension's damper; suspended"),
+    "trunk_drag": ("N s/m", "resistance to forward motion"),
+    "stiffness": ("N/m^n", "K of the contact law (Eq. 14)"),
+    "exponent": ("-", "n of the contact law, 1 to 3 in steps of 1/8"),
+    "normal_law": ("", _one_of(NORMAL_LAWS)),
+    "restitution": ("-", "nominal coefficient of restitution, 0 to 1"),
+    "approach_floor": ("m/s", "smallest approach speed in the damping term"),
+    "friction_law": ("", _one_of(FRICTION_LAWS)),
+    "friction": ("-", "mu_k"),
+    "friction_slow": ("m/s", "lower threshold of the friction law"),
+    "friction_fast": ("m/s", "upper threshold of the friction law"),
+    "terrain": (
+        "",
+        'None for level ground, {"kind": "slope", "angle": rad}, {"kind": "hills", ...} as in'
+        " [HorseLegTerrain](HorseLegTerrain.md#terrain), or what `Terrain.to_dict` gives",
+    ),
+    "drive": ("", '"prescribed": the crank follows its command; "motor": a servo that the ground can slow'),
+    "motor_gain": ("N m s/rad", "torque of the motor per difference of crank speed"),
+    "motor_torque": ("N m", "largest torque of the motor, at the crank"),
+    "motor_inertia": ("kg m^2", "of its rotor, at the crank"),
+    "integrator": ("", _one_of(SCHEMES)),
+    "sim_dt": ("s", "substep; it is divided where ground, suspension or motor need shorter ones"),
+    "dt": ("s", "control step, a whole multiple of `sim_dt`"),
+    "episode_seconds": ("s", "time limit of an episode"),
+    "target_speed": ("m/s", "lowest and highest commanded speed; None for no command"),
+    "target_seconds": ("s", "shortest and longest time for which a command holds"),
+    "observation": ("", "groups to observe, in this order"),
+    "reward_weights": ("", "mapping of the weights that are to differ from those above"),
+    "randomize": (
+        "",
+        "physical parameters to draw at each reset, as the reset option `parameters`; None for none",
+    ),
+}
+"""Unit and meaning of each field of `tasks.Settings`."""
+
+WEIGHTS: Rows = {
+    "progress": ("1/m", "forward travel of the trunk"),
+    "peak": (
+        "1/kN",
+        "minus the increase of the stance's running peak GRF, the highest of all substeps; the charges of"
+        " one stance add up to its peak",
+    ),
+    "energy": ("1/kJ", "minus the positive work of crank and swing drive; braking is not recovered"),
+    "action": ("-", "minus the mean squared change of the action"),
+    "failure": ("1/s", "once, minus `episode_seconds`, when the episode fails"),
+}
+"""Unit and meaning of each field of `reward.RewardWeights`."""
+
+OPTIONS: Rows = {
+    "gait": ("", "name of a gait of the preset, mapping of the four gait parameters, or `GaitParameters`"),
+    "crank_angle": ("rad", "at the start"),
+    "speed": ("m/s", "forward, at the start; 0 on a fixed trunk"),
+    "height": ("m", "of O above y = 0, at the start; where a suspended trunk does not fail at once"),
+    "x": ("m", "of O, at the start"),
+    "parameters": (
+        "",
+        "mapping of physical parameters of this episode, each a number, or two to draw between",
+    ),
+}
+"""Unit and meaning of the reset options."""
+
+HILLS: Rows = {
+    "seed": ("-", "another one, another terrain"),
+    "length": ("m", "of it; the ground goes on level beyond"),
+    "rise": ("m", "heights are within +- this"),
+    "slope": ("-", "steepest slope"),
+    "patch": ("m", f"mean length of a patch of ground; knots are {SPACING:g} m apart"),
+    "stiffness": ("-", "lowest and highest factor on `stiffness`"),
+    "friction": ("-", "lowest and highest factor on `friction`"),
+}
+"""Unit and meaning of what hills are described by."""
+
+VECTOR: Rows = {
+    "autoreset_mode": ("", "a `gymnasium.vector.AutoresetMode` or its name; also SAME_STEP and DISABLED"),
+    "max_episode_steps": ("", "control steps that an episode lasts at most, besides `episode_seconds`"),
+    "render_mode": ("", '"rgb_array"'),
+    "rendered": ("", "how many are drawn, the first ones: `render` gives a frame of each, (H, W, 3) uint8"),
+}
+"""Meaning of what the vector environment takes besides."""
+
+SUMMARY: Rows = {
+    "seconds": ("s", "how long it lasted"),
+    "distance_m": ("m", "forward travel"),
+    "speed_m_s": ("m/s", "its mean speed"),
+    "peak_grf_n": ("N", "highest resultant GRF of any substep"),
+    "mean_grf_n": ("N", "mean normal force over the whole time"),
+    "stance_peak_sum_n": ("N", "sum of the peaks of all stances"),
+    "stances": ("-", "how many"),
+    "duty_factor": ("-", "part of the time with load on the hoof"),
+    "drive_work_j": ("J", "positive work of both drives"),
+    "cost_of_transport": ("-", "work per weight and distance; infinite without forward progress"),
+    "weight_share": ("-", "mean normal force over weight: what the leg bore"),
+    "support_share": ("-", "the rest, which rail or suspension bore"),
+    "failed": ("-", "0 or 1"),
+}
+"""Unit and meaning of the figures of an episode."""

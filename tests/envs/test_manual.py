@@ -1,0 +1,219 @@
+"""The manual pages say what the environments do, and the committed ones are those that the command writes."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import math
+import re
+from dataclasses import fields
+from pathlib import Path
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from hoof_env import cli
+from hoof_env.envs import manual
+from hoof_env.envs import manual_tables as tables
+from hoof_env.envs.grounds import HILLS
+from hoof_env.envs.reward import RewardWeights
+from hoof_env.envs.start import OPTIONS
+from hoof_env.envs.tasks import PER_EPISODE, TASKS, Settings, to_json
+from hoof_env.envs.vector import HorseLegVectorEnv
+from hoof_env.errors import ParameterError
+from hoof_env.gait.parameters import LIMITS, load_gait
+
+DOCS = Path(__file__).parents[2] / "docs" / "environments"
+IDS = {page: re.search(r'gym.make\("(.+?)"', manual.page(page))[1] for page in manual.PAGES}
+
+
+def section(page, title):
+    return re.split(r"\n## ", page.split(f"\n## {title}\n", 1)[1])[0]
+
+
+def rows(text):
+    """Cells of the first table of a text, without its head."""
+    lines = text.splitlines()
+    first = next(k for k, line in enumerate(lines) if line.startswith("|"))
+    table = lines[first + 2 :]
+    stop = next((k for k, line in enumerate(table) if not line.startswith("|")), len(table))
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in table[:stop]]
+
+
+def test_every_id_has_a_page():
+    assert sorted(IDS.values()) == sorted(name for name in gym.registry if name.startswith("hoof_env/"))
+
+
+def test_committed_pages_are_what_the_command_writes(tmp_path, capsys):
+    assert cli.main(["manual", "--out", str(tmp_path)]) == 0
+    assert f"read {tmp_path / 'README.md'} first" in capsys.readouterr().out
+    written = {file.name: file.read_text("utf-8") for file in tmp_path.iterdir()}
+    committed = {file.name: file.read_text("utf-8") for file in DOCS.iterdir()}
+    assert written == committed, "run `hoof-env manual --out docs/environments`"
+
+
+def test_a_page_is_printed(capsys):
+    assert cli.main(["manual", "--id", IDS["rail"]]) == 0
+    assert capsys.readouterr().out.strip() == manual.page("rail").strip()
+
+
+def test_unknown_pages_and_folders_are_one_line(tmp_path, capsys):
+    (tmp_path / "file").touch()
+    assert cli.main(["manual", "--id", "HorseLeg"]) == 2
+    assert cli.main(["manual", "--out", str(tmp_path / "file")]) == 2
+    assert capsys.readouterr().err.count("hoof-env: error: ") == 2
+    with pytest.raises(ParameterError, match=r"task: expected one of .*rail"):
+        manual.page("trot")
+
+
+@pytest.mark.parametrize("page", manual.PAGES)
+def test_tables_match_the_spaces(page):
+    text, env = manual.page(page), gym.make(IDS[page])
+    seen = section(text, "Observation Space")
+    if page != "mo":  # whose spaces are the leg's
+        assert f"`Box(-1, 1, {env.action_space.shape}, float32)`" in section(text, "Action Space")
+        assert f"`Box(-1, 1, {env.observation_space.shape}, float32)`" in seen
+    for space in (env.action_space, env.observation_space):
+        assert space.dtype == np.float32
+        assert (space.low == -1).all()
+        assert (space.high == 1).all()
+    table = rows(seen)
+    assert [int(row[0]) for row in table] == list(range(env.observation_space.shape[0]))
+    assert tuple(row[1] for row in table) == tuple(env.unwrapped.observation_names)
+
+
+@pytest.mark.parametrize("page", TASKS)
+def test_actions_command_what_the_table_says(page):
+    leg = gym.make(IDS[page]).unwrapped
+    table = rows(section(manual.page(page), "Action Space"))
+    for column, action in ((2, -1.0), (3, 1.0)):
+        said = [float(row[column]) for row in table]
+        assert leg.command_of(np.full(4, action, np.float32)) == pytest.approx(said, rel=1e-4)
+    bounds = leg.engine.filters.to_array()[:, 1]
+    assert [float(row[5].split()[0]) for row in table] == bounds.tolist()
+    assert len(table) == len(LIMITS)
+
+
+@pytest.mark.parametrize("page", TASKS)
+def test_observations_are_scaled_as_the_table_says(page):
+    env = gym.make(IDS[page])
+    leg = env.unwrapped
+    env.reset(seed=5, options={"speed": 1.0})
+    leg.record()
+    run = leg.action_for(load_gait("run", leg.settings.preset))
+    table = {row[1]: row[2] for row in rows(section(manual.page(page), "Observation Space"))}
+    checked, landed = set(), False
+    for _ in range(60):
+        observation = env.step(run)[0]
+        now = {name: float(values[-1].ravel()[0]) for name, values in leg.record().items()}
+        there = {
+            "forward speed": now["vx"], "vertical speed": now["vy"], "height": now["y"],
+            "toe load": now["toe_normal"], "heel load": now["heel_normal"],
+            "toe contact": now["toe_penetration"] > 0, "heel contact": now["heel_penetration"] > 0,
+            "crank speed": now["crank_speed"], "swing offset": now["swing_offset"],
+            "swing sine coefficient": now["swing_sin"], "swing cosine coefficient": now["swing_cos"],
+            "rate of crank speed": now["crank_speed_rate"], "rate of swing offset": now["swing_offset_rate"],
+            "rate of swing sine coefficient": now["swing_sin_rate"],
+            "rate of swing cosine coefficient": now["swing_cos_rate"],
+            "sin(crank angle)": math.sin(now["theta"]), "cos(crank angle)": math.cos(now["theta"]),
+        }  # fmt: skip
+        for point in ("toe", "heel"):
+            slowness = now[f"{point}_slowness"]
+            there[f"{point} approach speed"] = 1 / slowness if slowness > 0 else 0.0
+        for k, parameter in enumerate(("crank speed", "swing offset", "swing sine coefficient")):
+            there[f"previous action: {parameter}"] = float(run[k])
+        ground = leg.terrain.height_at(now["x"])
+        for name in table:
+            if ahead := re.match(r"height of the ground ([\d.]+) m ahead", name):
+                there[name] = float(leg.terrain.height_at(now["x"] + float(ahead[1])) - ground)
+        landed |= bool(there["heel contact"])
+        for place, (name, scaling) in enumerate(table.items()):
+            if name in there:
+                checked.add(name)
+                expected = scaled(scaling, float(there[name]), leg)
+                assert observation[place] == pytest.approx(expected, abs=2e-6), name
+    assert landed
+    assert len(table) - len(checked) <= 3
+
+
+def scaled(scaling, x, leg):
+    """What a cell of the table makes of a number."""
+    if scaling in ("none", "0 or 1"):
+        return x
+    if action := re.fullmatch(r"as action (\d)", scaling):
+        low, high = list(LIMITS.values())[int(action[1])]
+        return (2 * x - low - high) / (high - low)
+    if part := re.fullmatch(r"/ ([\d.]+)", scaling):
+        return np.clip(x / float(part[1]), -1, 1)
+    formula = scaling.replace("3 weights", f"(3 * {leg.weight})").replace("hip height", f"{leg.batch.height}")
+    return eval(formula, {"tanh": math.tanh, "x": x})
+
+
+@pytest.mark.parametrize("page", TASKS)
+def test_every_setting_is_documented_with_its_default(page):
+    made = gym.make(IDS[page]).unwrapped.settings
+    table = rows(section(manual.page(page), "Arguments"))
+    *settings, render_mode = [(row[0].strip("`"), row[1].strip("*")) for row in table]
+    assert render_mode == ("render_mode", "None")
+    assert [name for name, _ in settings] == [item.name for item in fields(Settings)]
+    for name, value in settings:
+        assert eval(value) == to_json(made)[name], name
+    bold = {row[0].strip("`") for row in table if row[1].startswith("**")}
+    assert bold == set(TASKS[page].defaults)
+
+
+def test_the_tables_have_what_there_is_and_nothing_else():
+    assert list(tables.SETTINGS) == [item.name for item in fields(Settings)]
+    assert list(tables.WEIGHTS) == [item.name for item in fields(RewardWeights)]
+    assert set(tables.OPTIONS) == {"gait", "parameters", *OPTIONS}
+    assert list(tables.HILLS) == list(HILLS)
+    known = inspect.signature(HorseLegVectorEnv).parameters
+    assert set(tables.VECTOR) == {*known} - {"num_envs", "task", "settings"}
+    assert all(meaning for table in (tables.SETTINGS, tables.OPTIONS) for _, meaning in table.values())
+
+
+@pytest.mark.parametrize("page", TASKS)
+def test_rewards_options_and_figures_are_those_of_the_environment(page):
+    text, env = manual.page(page), gym.make(IDS[page], episode_seconds=0.02)
+    weights = RewardWeights.of(env.unwrapped.settings.reward_weights)
+    _, started = env.reset(seed=0, options={"parameters": {"friction": 0.3}})
+    info = env.step(np.zeros(4, np.float32))[4]
+    table = rows(section(text, "Rewards"))
+    assert [row[0].strip("`") for row in table] == [name for name in info if name.startswith("reward_")]
+    assert [float(row[2]) for row in table] == [getattr(weights, row[1].strip("`")) for row in table]
+    figures = [row[0].strip("`") for row in rows(section(text, "Episode End"))]
+    assert figures == list(info["episode_summary"])
+    assert set(info) == {row[0].strip("`") for row in table} | {"episode_summary"}
+    start = section(text, "Starting State")
+    assert {row[0].strip("`") for row in rows(start)} == set(started)
+    assert all(f"`{name}`" in start for name in PER_EPISODE)
+
+
+@pytest.mark.parametrize("page", manual.PAGES)
+def test_examples_run(page):
+    blocks = re.findall(r"```python\n(.*?)```", manual.page(page), re.DOTALL)
+    assert len(blocks) == (4 if page in TASKS else 1)
+    for block in blocks:
+        exec(compile(block, page, "exec"), {})
+
+
+@pytest.mark.parametrize("page", TASKS)
+def test_settings_survive_json(page):
+    made = gym.make(IDS[page]).unwrapped.settings
+    plain = json.loads(json.dumps(to_json(made)))
+    env = gym.make(IDS[page], **plain)
+    assert to_json(env.unwrapped.settings) == plain
+    again = gym.make(gym.envs.registration.EnvSpec.from_json(env.spec.to_json()))
+    assert to_json(again.unwrapped.settings) == plain
+    seen = [made.reset(seed=3)[0].tobytes() for made in (env, again, gym.make(IDS[page]))]
+    assert len(set(seen)) == 1
+
+
+def test_links_lead_somewhere():
+    for file in DOCS.glob("*.md"):
+        for target, _, anchor in re.findall(r"\]\(([^)#]+)(#([\w-]+))?\)", file.read_text("utf-8")):
+            there = DOCS / target
+            assert there.exists(), f"{file.name}: {target}"
+            headings = [line.lstrip("# ").lower() for line in there.read_text("utf-8").splitlines()]
+            assert not anchor or anchor in headings, f"{file.name}: {target}#{anchor}"

@@ -1,0 +1,251 @@
+"""The native vector environment against Gymnasium's own over single environments, to the bit."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from family import FALLS, IDS, actions, same
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+
+MODES = list(AutoresetMode)
+SHORT = {"episode_seconds": 0.3}
+TARGETS = {"target_speed": (0.5, 3.0), "target_seconds": (0.02, 0.1)}
+"""Commands that change every few steps, also in the step after the last of an episode."""
+
+SETTINGS = {
+    "short": SHORT,
+    "falls": {**FALLS, "episode_seconds": 2.0},
+    "targets": {**SHORT, **TARGETS, "observation": ("crank", "hoof", "target")},
+    "randomized": {**SHORT, "randomize": {"trunk_mass": (60.0, 120.0), "friction": (0.2, 0.8)}},
+    "motor": {**SHORT, "drive": "motor"},
+}
+
+
+def both(env_id, n, mode=AutoresetMode.NEXT_STEP, **settings):
+    """Ours, and Gymnasium's over single environments."""
+    ours = gym.make_vec(env_id, num_envs=n, autoreset_mode=mode, **settings)
+    theirs = SyncVectorEnv([lambda: gym.make(env_id, **settings)] * n, autoreset_mode=mode)
+    return ours, theirs
+
+
+def check_infos(ours, theirs):
+    """All of theirs that are ours too, values only where they are valid."""
+    for key, there in theirs.items():
+        if key.startswith("_") or key in ("gait", "failure"):
+            continue
+        here, mask = ours[key], theirs[f"_{key}"]
+        same(ours.get(f"_{key}", np.ones_like(mask)) & mask, mask)
+        if isinstance(there, dict):
+            check_infos(here, there)
+        else:
+            assert len(here) == len(mask)
+            same(np.array([*here[mask]]), np.array([*there[mask]]))
+
+
+def check_step(ours, theirs, taken):
+    one, two = ours.step(taken), theirs.step(taken)
+    for a, b in zip(one[:4], two[:4], strict=True):
+        same(a, b)
+    check_infos(one[4], two[4])
+    return one
+
+
+def drive(ours, theirs, steps, mode):
+    """Step both, resetting by hand what nobody else resets; returns how many episodes ended."""
+    ends = 0
+    for k, taken in enumerate(actions(1, steps, ours.num_envs)):
+        *_, terminated, truncated, _ = check_step(ours, theirs, taken)
+        done = terminated | truncated
+        ends += done.sum()
+        if mode == AutoresetMode.DISABLED and done.any():
+            seeds = None if k % 2 else [7 * k + i for i in range(ours.num_envs)]
+            one, two = (
+                env.reset(seed=seeds, options={"reset_mask": done, "speed": 0.25}) for env in (ours, theirs)
+            )
+            same(one[0], two[0])
+            check_infos(one[1], two[1])
+    return ends
+
+
+@pytest.mark.parametrize("mode", MODES, ids=lambda mode: mode.name)
+@pytest.mark.parametrize("env_id", IDS)
+def test_every_row_is_the_single_environment(env_id, mode):
+    ours, theirs = both(env_id, 8, mode, **SHORT)
+    one, two = ours.reset(seed=3), theirs.reset(seed=3)
+    same(one[0], two[0])
+    check_infos(one[1], two[1])
+    assert drive(ours, theirs, 70, mode) >= 24
+
+
+@pytest.mark.parametrize("mode", MODES, ids=lambda mode: mode.name)
+@pytest.mark.parametrize("name", SETTINGS)
+def test_settings_do_not_matter_to_that(name, mode):
+    ours, theirs = both(IDS[0], 9, mode, **SETTINGS[name])
+    same(ours.reset(seed=11)[0], theirs.reset(seed=11)[0])
+    assert drive(ours, theirs, 90, mode) >= 4
+
+
+@pytest.mark.parametrize("n", [1, 3, 8, 9, 100])
+def test_any_number_of_them(n):
+    ours, theirs = both(IDS[0], n, episode_seconds=0.1)
+    same(ours.reset(seed=0)[0], theirs.reset(seed=0)[0])
+    assert drive(ours, theirs, 14, AutoresetMode.NEXT_STEP) == 2 * n
+
+
+def test_seeds_one_each_and_going_on_without():
+    ours, theirs = both(IDS[-1], 4, **SHORT)
+    for seed in ([5, 6, 5, 0], [None, 1, None, 2], None, 8, [None] * 4):
+        one, two = ours.reset(seed=seed), theirs.reset(seed=seed)
+        same(one[0], two[0])
+        check_infos(one[1], two[1])
+        check_step(ours, theirs, actions(0, 4))
+    start = ours.reset(seed=[3, 3, 4, 4])[0]
+    same(start[0], start[1])
+    assert (start[1] != start[2]).any()
+
+
+def test_a_mask_starts_those_and_no_others():
+    ours, theirs = both(IDS[0], 5)
+    for env in (ours, theirs):
+        env.reset(seed=1)
+    mask = np.array([True, False, False, True, False])
+    before, *_ = check_step(ours, theirs, actions(2, 5))
+    given = {"reset_mask": mask, "gait": "walk"}
+    (one, infos), (two, _) = ours.reset(options=given), theirs.reset(options=dict(given))
+    same(one, two)
+    assert list(given) == ["reset_mask", "gait"]  # what came is left alone
+    same(one[~mask], before[~mask])
+    same(infos["_x"], mask)
+    for taken in actions(3, 20, 5):
+        check_step(ours, theirs, taken)
+
+
+@pytest.mark.parametrize("mode", MODES, ids=lambda mode: mode.name)
+def test_every_call_returns_fresh_arrays(mode):
+    env = gym.make_vec(IDS[0], num_envs=8, autoreset_mode=mode, episode_seconds=0.04)
+
+    def arrays(value):
+        if isinstance(value, dict):
+            return [found for item in value.values() for found in arrays(item)]
+        if isinstance(value, np.ndarray) and value.dtype.kind != "O":
+            return [value]
+        return [] if value is None else [found for item in value for found in arrays(item)]
+
+    seen = arrays(env.reset(seed=0))
+    for k in range(5):
+        if mode == AutoresetMode.DISABLED and k in (2, 4):
+            seen += arrays(env.reset())
+        seen += arrays(env.step(actions(k, 8)))
+    copies = [array.copy() for array in seen]
+    env.reset()
+    env.step(actions(9, 8))
+    for array, kept in zip(seen, copies, strict=True):
+        same(array, kept)
+    for i, one in enumerate(seen):
+        assert not any(np.shares_memory(one, two) for two in seen[i + 1 :])
+
+
+def test_gymnasium_finds_what_it_asks_for():
+    for mode in MODES:
+        for given in (mode, mode.value, mode.name):
+            env = gym.make_vec(IDS[0], num_envs=8, autoreset_mode=given, dt=0.04, sim_dt=2e-3)
+            assert env.metadata["autoreset_mode"] is env.unwrapped.autoreset_mode is mode
+        assert env.metadata["render_fps"] == 25
+        single = gym.make(IDS[0]).unwrapped
+        assert env.single_observation_space == single.observation_space
+        assert env.single_action_space == single.action_space
+        assert env.observation_space.shape == (8, *single.observation_space.shape)
+        assert env.action_space.shape == (8, 4)
+        assert env.spec.id == IDS[0]
+    assert type(env.unwrapped).metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
+
+
+@pytest.mark.parametrize("mode", MODES, ids=lambda mode: mode.name)
+def test_it_owns_the_time_limit(mode):
+    """As Gymnasium's TimeLimit around the single environment, without which that would go on."""
+    ours = gym.make_vec(IDS[0], num_envs=8, autoreset_mode=mode, max_episode_steps=6)
+    theirs = SyncVectorEnv([lambda: gym.make(IDS[0], max_episode_steps=6)] * 8, autoreset_mode=mode)
+    same(ours.reset(seed=0)[0], theirs.reset(seed=0)[0])
+    for k, taken in enumerate(actions(0, 30, 8)):
+        one, two = ours.step(taken), theirs.step(taken)
+        for a, b in zip(one[:4], two[:4], strict=True):
+            same(a, b)
+        if mode == AutoresetMode.DISABLED and one[3].any():
+            assert k % 6 == 5
+            same(ours.reset()[0], theirs.reset()[0])
+    longer = gym.make_vec(IDS[0], num_envs=2, max_episode_steps=600, episode_seconds=0.1)
+    longer.reset(seed=0)
+    assert [longer.step(actions(k, 2))[3].all() for k in range(5)] == [False] * 4 + [True]
+
+
+def test_an_idle_row_draws_nothing():
+    """In NEXT_STEP the row whose episode ended is stepped along with the others."""
+    settings = {"episode_seconds": 0.1, "target_speed": (0.5, 3.0), "target_seconds": (0.12, 0.12)}
+    ours, theirs = both(IDS[0], 8, **settings)
+    same(ours.reset(seed=0)[0], theirs.reset(seed=0)[0])
+    for taken in actions(0, 20, 8):
+        check_step(ours, theirs, taken)
+
+
+def finals(env, count=40, seed=4):
+    return [env.step(taken) for taken in actions(seed, count, env.num_envs)]
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
+@pytest.mark.parametrize("n", [3, 9])
+@pytest.mark.parametrize("env_id", IDS)
+def test_a_copy_goes_on_alike_and_apart(env_id, n, copied):
+    env = gym.make_vec(env_id, num_envs=n, **SHORT, randomize={"trunk_mass": (70.0, 90.0)}).unwrapped
+    env.reset(seed=1)
+    finals(env, 20)
+    twin = copied(env)
+    for one, two in zip(finals(env), finals(twin), strict=True):
+        for a, b in zip(one, two, strict=True):
+            same(a, b)
+
+
+@pytest.mark.parametrize("mode", MODES[:2], ids=lambda mode: mode.name)
+@pytest.mark.parametrize("n", [3, 9])
+@pytest.mark.parametrize("env_id", IDS)
+def test_a_state_goes_on_alike_also_elsewhere(env_id, n, mode):
+    settings = {**SHORT, "randomize": {"friction": (0.2, 0.8)}, "autoreset_mode": mode}
+    env, other = (gym.make_vec(env_id, num_envs=n, **settings).unwrapped for _ in range(2))
+    env.reset(seed=1)
+    finals(env, 15)  # the next call starts new episodes
+    state = env.get_state()
+    kept = pickle.dumps(state)
+    first = finals(env)
+    assert pickle.dumps(state) == kept
+    observed = env.set_state(state)
+    again = finals(env)
+    same(other.set_state(pickle.loads(kept)), observed)
+    for one, two, three in zip(first, again, finals(other), strict=True):
+        for a, b, c in zip(one, two, three, strict=True):
+            same(a, b)
+            same(a, c)
+
+
+def test_frames_of_the_first_environments_and_two_closes():
+    pytest.importorskip("pygame")
+    env = gym.make_vec(IDS[0], num_envs=8, render_mode="rgb_array", rendered=2, **SHORT)
+    env.reset(seed=0)
+    finals(env, 17)
+    frames = env.render()
+    assert [frame.shape for frame in frames] == [(540, 960, 3)] * 2
+    single = gym.make(IDS[0], render_mode="rgb_array", **SHORT)
+    twin = copy.deepcopy(env)
+    finals(twin, 3)
+    assert (twin.render()[0] != frames[0]).any()
+    same(env.render()[0], frames[0])
+    single.reset(seed=1)
+    rows = actions(4, 17, 8)[:, 1]
+    for k, taken in enumerate(rows):  # the 16th starts a new episode
+        _ = single.reset() if k == 15 else single.step(taken)
+    same(single.render(), frames[1])
+    for one in (env, single):
+        one.close()
+        one.close()
