@@ -130,7 +130,9 @@ def page(found: dict[str, Any]) -> str:
             f"{bar:g}: {'met' if row['ratio']['median'] >= bar else 'not met'} " for bar in row["bars"] or ()
         )
         rate = row["rate"]["median"]
-        lines.append(f"| {row['case']} | {rate:,.0f} | {row['beside']} | {told(row['ratio'])} | {bars.strip()} |")
+        lines.append(
+            f"| {row['case']} | {rate:,.0f} | {row['beside']} | {told(row['ratio'])} | {bars.strip()} |"
+        )
     return "\n".join(lines) + "\n"
 
 

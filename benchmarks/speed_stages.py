@@ -68,7 +68,7 @@ STAGES: dict[str, Stage] = {
     ),
     "place the frame": _each(lambda trunk, limb, model, h: m.place_frame(trunk, limb, h)),
     "gather the legs": _each(
-        lambda trunk, limb, model, h: m.gather_leg(trunk, limb, model.together), moves=True
+        lambda trunk, limb, model, h: m.gather_leg(trunk, limb, model.kind, model.together), moves=True
     ),
     "move the trunk": _trunk(lambda trunk, kind: m.move_trunk(trunk, kind)),
     "meet the ground": _each(lambda trunk, limb, model, h: meet_ground(trunk, limb, model)),
