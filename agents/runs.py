@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
+import numpy as np
 
 import hoof_env  # noqa: F401  (registers the environments)
 from hoof_env._output import staged
@@ -46,6 +47,27 @@ def make_env(env_id: str, **kwargs: Any) -> gym.Env[Any, Any]:
         return gym.make(env_id, **kwargs)
     except (gym.error.Error, ModuleNotFoundError, TypeError) as error:
         raise ParameterError(f"environment {env_id!r} with {kwargs or 'no arguments'}: {error}") from None
+
+
+def make_vec_env(env_id: str, n_envs: int, **kwargs: Any) -> Any:
+    """Environments side by side as Stable-Baselines3's `VecEnv`: in one call where the id has a vector
+    environment of this package, else one after the other. A pipe to another process would cost more.
+
+    Raises:
+        ParameterError: as `make_env`.
+    """
+    with make_env(env_id, **kwargs) as env:
+        spec = env.spec
+    if spec is not None and str(spec.vector_entry_point).startswith("hoof_env."):
+        from hoof_env.envs.sb3 import Sb3VecEnv
+
+        many = Sb3VecEnv(spec.id, n_envs, **kwargs)
+        many.reset()  # the first step compiles; the training's own reset seeds all again
+        many.step(np.zeros((n_envs, *(many.action_space.shape or ())), np.float32))
+        return many
+    from stable_baselines3.common.vec_env import DummyVecEnv
+
+    return DummyVecEnv([lambda: make_env(env_id, disable_env_checker=True, **kwargs)] * n_envs)
 
 
 def warm_up(env: gym.Env[Any, Any]) -> None:

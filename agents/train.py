@@ -1,7 +1,7 @@
 """Train an agent with Stable-Baselines3.
 
     python -m agents.train                                  the full training of hoof_env/HorseLeg-v0
-    python -m agents.train --steps 300000 --max-minutes 2   a quick one
+    python -m agents.train --steps 300000                   a quick one
     tensorboard --logdir runs                               watch it
 
 Ctrl-C stops after the current step and keeps the model; pressed twice it stops at once and keeps only
@@ -85,8 +85,12 @@ class Trained:
         )
 
 
-def train(args: Args) -> Trained:
+def train(args: Args, *also: Any) -> Trained:
     """Train as `args` say and fill the run folder. SIGINT, SIGTERM and the time limit end it early.
+
+    Args:
+        args: see there.
+        also: more callbacks of Stable-Baselines3.
 
     Raises:
         ParameterError, DataFileError: the arguments, the environment or the hyperparameters do not fit.
@@ -120,8 +124,9 @@ def train(args: Args) -> Trained:
     # Importing torch takes seconds: only now
     import stable_baselines3
     import torch
+    from stable_baselines3.common.callbacks import CallbackList
     from stable_baselines3.common.logger import configure
-    from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv, VecMonitor, VecNormalize
+    from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
 
     # The run folder
     record = {
@@ -141,10 +146,9 @@ def train(args: Args) -> Trained:
     runs.write_text(folder / "run.json", json.dumps(record, indent=2) + "\n")
     runs.write_text(folder / "config.yml", yaml.safe_dump({args.env_id: settings}, sort_keys=False))
 
-    # Environments, side by side in this process: they are faster than what a pipe to another would cost
     torch.set_num_threads(args.torch_threads)
-    make_env = lambda: runs.make_env(args.env_id, disable_env_checker=True, **env_kwargs)  # noqa: E731
-    envs: VecEnv = VecMonitor(DummyVecEnv([make_env] * n_envs), str(folder / "monitor.csv"))
+    many = runs.make_vec_env(args.env_id, n_envs, **env_kwargs)
+    envs: VecEnv = VecMonitor(many, str(folder / "monitor.csv"))
     normalize = settings.get("normalize", False)
     if normalize:
         arguments = {"gamma": settings.get("gamma", 0.99)} | (
@@ -164,7 +168,7 @@ def train(args: Args) -> Trained:
         watch = make_watch(folder, steps, args.checkpoint_every, args.max_minutes)
         started = time.monotonic()
         with stop_on_signals(watch):
-            model.learn(steps, callback=watch)
+            model.learn(steps, callback=CallbackList([watch, *also]))
             seconds = time.monotonic() - started
             runs.save_model(model, folder / "model.zip")
         return Trained(folder, model.num_timesteps, seconds, watch.stopped_by)

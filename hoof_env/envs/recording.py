@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hoof_env.dynamics.result import Result
 from hoof_env.envs.batch import EpisodeBatch
 from hoof_env.envs.render_instant import columns_of_engine, instants
 
@@ -39,10 +40,11 @@ class Recording:
         self._waiting.clear()
 
     def last(self) -> dict[str, NDArray[np.float64]]:
-        """State and report by name at each substep of the last control step; at the start, after a reset."""
-        now = self.batch.engine.column(self.env)
-        time = self.batch.engine.state["time"][self.env]
-        if time == 0.0 or self._before is None:
+        """State and report by name at each substep of the last control step; of where it is, after a reset or
+        a step that could not be simulated."""
+        engine = self.batch.engine
+        now, starts = engine.column(self.env), engine.state["time"][self.env] == 0.0
+        if self._before is None or starts or engine.results[self.env] != Result.OK:
             return self._run(now, 0)
         return {
             name: values[1:] for name, values in self._run(self._before, self.batch.substeps, now).items()

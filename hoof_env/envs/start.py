@@ -35,9 +35,9 @@ OPTIONS = {
 HANDED_ON = ("minari_autoseed",)
 """Options that others put there for themselves: Minari hands its own on to the environment."""
 
-FLAT, MARGIN, REACH = Terrain.flat(), 50.0, np.linspace(-1.0, 1.0, 21)
-"""Level ground; how far from its ends an episode on a terrain begins [m], for it goes somewhere; where a hoof
-may come down, from O [m]."""
+FLAT, MARGIN, REACH = Terrain.flat(), 50.0, 1.0
+"""Level ground; how far from its ends an episode on a terrain begins [m], for it goes somewhere; how far
+ahead and behind O a hoof may come down [m]."""
 
 MOST_TRIES = 100
 """Draws of a crank angle at which the hoof is above the ground."""
@@ -84,7 +84,8 @@ def draw_starts(
     other the crank angle is drawn again.
 
     Args:
-        terrain: an episode begins anywhere on it but near its ends; at 0 if it is level.
+        terrain: an episode begins anywhere on it but near its ends; at 0 if it is level, short, or one slope,
+            which leaves the height at which a trunk can hang.
         own_gait: instead of one between walk and run.
     """
     n = len(generators)
@@ -99,10 +100,10 @@ def draw_starts(
     height, x = np.full(n, options.get("height", trunk.height)), np.full(n, options.get("x", 0.0))
     ground = np.zeros(n)
     if terrain != FLAT:
-        if "x" not in options:
-            low, high = terrain.x[0] + MARGIN, terrain.x[-1] - MARGIN
-            x = np.array([generator.uniform(low, max(low, high)) for generator in generators])
-        ground = terrain.height_at(x[:, None] + REACH).max(1)
+        low, high = terrain.x[0] + MARGIN, terrain.x[-1] - MARGIN
+        if "x" not in options and low < high and len(terrain.height) > 2:
+            x = np.array([generator.uniform(low, high) for generator in generators])
+        ground = _highest(terrain, x)
     if trunk.kind == "suspended":
         if "height" not in options:
             height = np.maximum(height, ground - hoof_height(profile, chosen, theta))
@@ -147,6 +148,14 @@ def check_options(options: Any, gaits: Mapping[str, GaitParameters], trunk: Trun
     if "parameters" in checked:
         checked["parameters"] = check_parameters("options['parameters']", checked["parameters"])
     return checked
+
+
+def _highest(terrain: Terrain, x: Floats) -> Floats:
+    """Highest ground within `REACH` of `x`, shape (n,): it is at an end or at a knot."""
+    low, high = x[:, None] - REACH, x[:, None] + REACH
+    first = np.ceil((low - terrain.start) / terrain.spacing)
+    knots = terrain.start + terrain.spacing * (first + np.arange(int(2 * REACH / terrain.spacing) + 1))
+    return terrain.height_at(np.hstack([low, np.clip(knots, low, high), high])).max(1)
 
 
 def _check_trunk(options: Mapping[str, float], trunk: Trunk) -> None:

@@ -117,9 +117,10 @@ TASKS: Mapping[str, Task] = MappingProxyType(
             "A horse's leg that keeps a commanded speed, which changes.",
             _SUSPENDED
             + " Every 2 to 4 s a new speed is commanded. Progress is paid up to it; what goes beyond costs"
-            " as much.",
+            " as much; a metre pays twice what it pays elsewhere, for here it is asked for.",
             {
-                "target_speed": (0.5, 3.5),
+                "target_speed": (1.0, 4.0),
+                "reward_weights": {"progress": 2.0},
                 "observation": ("crank", "gait", "trunk", "hoof", "action", "target"),
             },
         ),
@@ -130,7 +131,7 @@ TASKS: Mapping[str, Task] = MappingProxyType(
             + " The ground rises and falls, and is harder, softer or more slippery in places; an episode"
             " begins anywhere on it. The heights ahead are observed, what the ground is made of is not.",
             {
-                "terrain": {"kind": "hills", "seed": 0},
+                "terrain": {"kind": "hills", "seed": 0, "rise": 0.05},
                 "observation": ("crank", "gait", "trunk", "hoof", "action", "ground"),
             },
         ),

@@ -27,18 +27,35 @@ def same(one, two) -> None:
         assert one.keys() == two.keys()
         for key in one:
             same(one[key], two[key])
+    elif isinstance(one, (list, tuple)) or getattr(one, "dtype", None) == np.dtype(object):
+        for a, b in zip(one, two, strict=True):
+            same(a, b)
+    elif one is None or isinstance(one, (int, str)):
+        assert one == two
     else:
         a, b = np.asarray(one), np.asarray(two)
-        if a.dtype == object:
-            for x, y in zip(a, b, strict=True):
-                assert (x is None) == (y is None)
-                if x is not None:
-                    same(x, y)
-        else:
-            assert (a.dtype, a.shape) == (b.dtype, b.shape)
-            assert a.tobytes() == b.tobytes(), (one, two)
+        assert (a.dtype, a.shape) == (b.dtype, b.shape)
+        assert a.tobytes() == b.tobytes(), (one, two)
 
 
 def roll(env, count: int, seed: int = 5):
     """What random actions lead to: a list of (observation, reward, terminated, truncated)."""
     return [env.step(action)[:4] for action in actions(seed, count)]
+
+
+def together(records):
+    """What `env.unwrapped.record()` gave after several steps as one array for each name, shape (n,), with the
+    forces on the hoof as "normal" and "grf"."""
+    trace = {name: np.concatenate([record[name].ravel() for record in records]) for name in records[0]}
+    normal, friction = (trace[f"toe_{name}"] + trace[f"heel_{name}"] for name in ("normal", "friction"))
+    return trace | {"normal": normal, "grf": np.hypot(normal, friction)}
+
+
+def substeps(env, action) -> dict[str, np.ndarray]:
+    """Substeps of an episode, from its start to its end, under one action."""
+    records, done = [env.unwrapped.record()], False
+    while not done:
+        *_, terminated, truncated, _ = env.step(action)
+        records.append(env.unwrapped.record())
+        done = terminated or truncated
+    return together(records[1:])

@@ -9,14 +9,14 @@ import warnings
 import gymnasium as gym
 import numpy as np
 import pytest
+from family import FALLS, IDS, actions, roll, same
 from gymnasium.utils.env_checker import check_env
 from stable_baselines3.common.env_checker import check_env as sb3_check_env
 
-import hoof_env
-
 SETUPS = [
-    ("hoof_env/HorseLeg-v0", {}),
-    ("hoof_env/HorseLeg-v0", {"trunk": "rail"}),
+    *((env_id, {}) for env_id in IDS),
+    ("hoof_env/HorseLeg-v0", FALLS),
+    ("hoof_env/HorseLeg-v0", {"drive": "motor"}),
     ("hoof_env/HorseLeg-v0", {"trunk": "fixed"}),
     ("hoof_env/HorseLegFixed-v0", {"gait": "walk"}),
     ("hoof_env/HorseLegFixed-v0", {"gait": "run", "solver": "paper", "episode_seconds": 0.1}),
@@ -29,12 +29,14 @@ def setup(request):
 
 
 def run(env, seed, steps=60, policy_seed=5):
-    """Observations, rewards, flags and traces of random actions."""
+    """Observations, rewards, flags and substeps of random actions."""
     generator = np.random.default_rng(policy_seed)
     history = [env.reset(seed=seed)[0]]
     for _ in range(steps):
         obs, reward, terminated, truncated, _ = env.step(generator.uniform(-1, 1, 4).astype(np.float32))
-        history += [obs, reward, terminated, truncated, env.unwrapped.trace]
+        leg = env.unwrapped
+        happened = list(leg.record().values()) if hasattr(leg, "record") else [leg.trace]
+        history += [obs, reward, terminated, truncated, *happened]
         if terminated or truncated:
             history.append(env.reset()[0])
     return history
@@ -60,31 +62,89 @@ def test_other_seed_other_start():
 
 def test_observations_stay_in_the_box_and_none_is_constant(setup):
     env = gym.make(setup[0], **setup[1])
-    history = [
-        item for item in run(env, 3, 1000) if isinstance(item, np.ndarray) and item.dtype == np.float32
-    ]
-    observations = np.array(history)
+    seen = [env.reset(seed=3)[0]]
+    for action in actions(5, 1000):
+        observation, _, terminated, truncated, _ = env.step(action)
+        seen += [observation, *([env.reset()[0]] if terminated or truncated else [])]
+    observations = np.array(seen)
     assert np.isfinite(observations).all()
     assert np.abs(observations).max() <= 1.0
-    constant = [
-        name
-        for name, column in zip(env.unwrapped.observation_names, observations.T, strict=True)
-        if np.ptp(column) == 0
-    ]
+    names = zip(env.unwrapped.observation_names, observations.T, strict=True)
     if setup[1].get("solver") != "paper":  # its short episodes end before the first contact
-        assert constant == []
+        assert [name for name, column in names if np.ptp(column) == 0] == []
 
 
 def test_every_call_returns_fresh_data():
     env = gym.make("hoof_env/HorseLeg-v0")
-    first, _ = env.reset(seed=1)
-    kept = first.copy()
+    first, info = env.reset(seed=1)
+    record = env.unwrapped.record()
+    kept = copy.deepcopy((first, info, record))
     second, *_ = env.step(np.ones(4, np.float32))
-    trace, kept_trace = env.unwrapped.trace, env.unwrapped.trace.tobytes()
-    env.step(-np.ones(4, np.float32))
-    np.testing.assert_array_equal(first, kept)
-    assert trace.tobytes() == kept_trace
     assert not np.shares_memory(first, second)
+    later = env.unwrapped.record()
+    kept_too = copy.deepcopy((second, later))
+    env.step(-np.ones(4, np.float32))
+    for now, before in zip((first, info, record, second, later), kept + kept_too, strict=True):
+        same(now, before)
+
+
+@pytest.mark.parametrize("env_id", IDS)
+@pytest.mark.parametrize("settings", [{}, FALLS], ids=["", "falls"])
+def test_types_and_infos_of_a_step(env_id, settings):
+    """Plain Python numbers, and few keys, which vector environments of others copy one by one."""
+    env = gym.make(env_id, episode_seconds=2.0, **settings)
+    env.reset(seed=0)
+    done = False
+    while not done:
+        _, reward, terminated, truncated, info = env.step(env.action_space.sample())
+        assert (type(reward), type(terminated), type(truncated)) == (float, bool, bool)
+        terms = [value for key, value in info.items() if key.startswith("reward_")]
+        assert [type(term) for term in terms] == [float] * 5
+        assert reward == sum(terms)
+        assert len(info) <= 8
+        done = terminated or truncated
+        assert set(info) - {f"reward_{name}" for name in NAMES} == (
+            ({"episode_summary", "failure"} if terminated else {"episode_summary"}) if done else set()
+        )
+    assert all(type(value) is float for value in info["episode_summary"].values())
+
+
+NAMES = ("progress", "peak", "energy", "action", "failure")
+
+
+@pytest.mark.parametrize("env_id", IDS)
+def test_what_is_observed_does_not_change_what_is_paid(env_id):
+    whole, few = gym.make(env_id), gym.make(env_id, observation=["hoof"])
+    starts = [env.reset(seed=3)[0] for env in (whole, few)]
+    assert starts[0].size > starts[1].size == 7
+    for one, two in zip(roll(whole, 500), roll(few, 500), strict=True):
+        same(one[1:], two[1:])
+
+
+def test_groups_are_the_same_numbers_in_the_order_that_was_asked_for():
+    names = gym.make(IDS[0]).unwrapped.observation_names
+    turned = gym.make(IDS[0], observation=["action", "hoof", "crank"]).unwrapped
+    places = [names.index(name) for name in turned.observation_names]
+    whole = gym.make(IDS[0])
+    same(whole.reset(seed=3)[0][places], turned.reset(seed=3)[0])
+    for one, two in zip(roll(whole, 200), roll(turned, 200), strict=True):
+        same(one[0][places], two[0])
+
+
+def test_recording_changes_nothing_and_says_what_is_observed():
+    plain, recorded = (gym.make(IDS[0]).unwrapped for _ in range(2))
+    plain.reset(seed=1), recorded.reset(seed=1)
+    assert recorded.record()["time"].shape == (1, 1)
+    for k, action in enumerate(actions(0, 100)):
+        one, two = plain.step(action), recorded.step(action)
+        same(one[:4], two[:4])
+        record = recorded.record()
+        np.testing.assert_allclose(record["time"][:, 0], 0.02 * k + 1e-3 * np.arange(1, 21), atol=1e-9)
+        seen = dict(zip(recorded.observation_names, two[0].tolist(), strict=True))
+        assert seen["forward speed"] == pytest.approx(np.tanh(record["vx"][-1].item() / 5), abs=1e-6)
+        assert seen["sin(crank angle)"] == pytest.approx(np.sin(record["theta"][-1].item()), abs=1e-6)
+        load = record["toe_normal"][-1].item() / (3 * recorded.weight)
+        assert seen["toe load"] == pytest.approx(np.tanh(load), abs=1e-6)
 
 
 def test_time_limit_truncates_in_seconds():
@@ -96,36 +156,63 @@ def test_time_limit_truncates_in_seconds():
 
 def test_ids_work_in_a_fresh_process_by_module_prefix():
     assert gym.make("hoof_env:hoof_env/HorseLeg-v0").spec.id == "hoof_env/HorseLeg-v0"
-    assert set(hoof_env._ENTRY_POINTS) <= set(gym.registry)
+    assert len(IDS) == 4
 
 
 def test_spec_is_json_serialisable():
     env = gym.make("hoof_env/HorseLeg-v0", trunk="rail", reward_weights={"peak": 0.5})
     again = gym.make(gym.envs.registration.EnvSpec.from_json(env.spec.to_json()))
-    assert again.unwrapped.weights.peak == 0.5
+    assert again.unwrapped.batch.weights.peak == 0.5
     assert again.unwrapped.engine.trunk.kind == "rail"
 
 
-def test_deep_copy_goes_on_identically():
-    env = gym.make("hoof_env/HorseLeg-v0").unwrapped
+COPIES = {"deepcopy": copy.deepcopy, "pickle": lambda env: pickle.loads(pickle.dumps(env))}
+
+
+@pytest.mark.parametrize("copied", COPIES)
+@pytest.mark.parametrize("env_id", IDS)
+def test_a_copy_goes_on_identically_and_apart(env_id, copied):
+    env = gym.make(env_id, randomize={"friction": (0.2, 0.8)}, episode_seconds=1.0).unwrapped
     env.reset(seed=2)
-    for _ in range(30):
-        env.step(np.full(4, 0.3, np.float32))
-    twin = copy.deepcopy(env)
-    for _ in range(30):
-        one, two = env.step(np.full(4, -0.3, np.float32)), twin.step(np.full(4, -0.3, np.float32))
-        np.testing.assert_array_equal(one[0], two[0])
-        assert one[1] == two[1]
+    roll(env, 30)
+    twin, kept = COPIES[copied](env), env.get_state()
+    one = roll(env, 30)
+    same(twin.get_state(), kept)
+    for a, b in zip(one, roll(twin, 30), strict=True):
+        same(a, b)
+    same(env.reset(), twin.reset())
 
 
-def test_copies_of_a_drawing_environment_draw_for_themselves():
+@pytest.mark.parametrize("env_id", IDS)
+def test_a_state_goes_on_identically_also_elsewhere(env_id):
+    settings = {"episode_seconds": 1.0, "randomize": {"trunk_mass": (60.0, 120.0)}}
+    env, other = (gym.make(env_id, **settings).unwrapped for _ in range(2))
+    env.reset(seed=2)
+    roll(env, 30)
+    state = env.get_state()
+    kept = pickle.dumps(state)
+    first = roll(env, 20), env.reset(), roll(env, 5)
+    assert pickle.dumps(state) == kept
+    for one in (env, other):
+        same(one.set_state(pickle.loads(kept)), one.batch.seen[0])
+        again = roll(one, 20), one.reset(), roll(one, 5)
+        for a, b in zip(first[0] + first[2], again[0] + again[2], strict=True):
+            same(a, b)
+        same(first[1], again[1])
+
+
+@pytest.mark.parametrize("copied", COPIES)
+@pytest.mark.parametrize("env_id", IDS)
+def test_copies_of_a_drawing_environment_draw_for_themselves(env_id, copied):
     pytest.importorskip("pygame")
-    env = gym.make("hoof_env/HorseLeg-v0", render_mode="rgb_array").unwrapped
+    env = gym.make(env_id, render_mode="rgb_array").unwrapped
     env.reset(seed=2)
-    env.render()
-    for twin in (copy.deepcopy(env), pickle.loads(pickle.dumps(env))):
-        one, two = env.engine.state.copy(), twin.engine.state
-        assert one.body == two.body
-        twin.step(np.zeros(4, np.float32))
-        assert twin.render().shape == env.render().shape
-        assert env.engine.state.body == one.body
+    roll(env, 10)
+    before, state = env.render(), env.get_state()
+    twin = COPIES[copied](env)
+    roll(twin, 10)
+    assert (twin.render() != before).any()
+    same(env.render(), before)
+    same(env.get_state(), state)
+    env.close()
+    assert twin.render().shape == before.shape

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gymnasium as gym
 import numpy as np
 import pytest
+from family import together
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -16,18 +17,19 @@ from hoof_env.envs.stance import new_account, summarize, take_account
 TERMS = ("reward_progress", "reward_peak", "reward_energy", "reward_action", "reward_failure")
 
 
-def rollout(env, policy, seed):
-    """Return, list of infos and the traces of one episode."""
+def rollout(env, policy, seed, recorded=False):
+    """Return and list of infos of one episode, and with `recorded` its substeps by name."""
     observation, _ = env.reset(seed=seed)
-    total, infos, traces, done = 0.0, [], [], False
+    total, infos, records, done = 0.0, [], [env.unwrapped.record()] if recorded else [], False
     while not done:
         action, _ = policy.predict(observation, episode_start=not infos)
         observation, reward, terminated, truncated, info = env.step(action)
         assert reward == sum(info[term] for term in TERMS)
         total, done = total + reward, terminated or truncated
         infos.append(info)
-        traces.append(env.unwrapped.trace)
-    return total, infos, np.concatenate(traces)
+        if recorded:
+            records.append(env.unwrapped.record())
+    return total, infos, together(records[1:]) if recorded else {}
 
 
 def stance_peaks(trace, threshold):
@@ -48,18 +50,31 @@ def stance_peaks(trace, threshold):
 @pytest.mark.parametrize("trunk", ["suspended", "rail", "fixed"])
 def test_terms_add_up_and_each_stance_pays_its_peak(name, trunk):
     env = gym.make("hoof_env/HorseLeg-v0", trunk=trunk, episode_seconds=4.0)
-    _, infos, trace = rollout(env, make_policy(name, env), seed=4)
+    _, infos, trace = rollout(env, make_policy(name, env), 4, recorded=True)
+    assert len(trace["time"]) == 4000
     paid = -sum(info["reward_peak"] for info in infos) * 1000 / RewardWeights().peak
     assert paid == pytest.approx(sum(stance_peaks(trace, 0.05 * env.unwrapped.weight)), rel=1e-9)
-    work = (
-        np.sum(np.maximum(trace["crank_power"], 0) + np.maximum(trace["hip_power"], 0)) * env.unwrapped.sim_dt
-    )
+    work = np.sum(np.maximum(trace["crank_power"], 0) + np.maximum(trace["hip_power"], 0)) * 1e-3
     assert -sum(info["reward_energy"] for info in infos) == pytest.approx(
         RewardWeights().energy * work / 1000, rel=1e-9
     )
-    if trunk != "fixed":
-        travelled = trace["trunk_x"][-1]
-        assert sum(info["reward_progress"] for info in infos) == pytest.approx(travelled, rel=1e-9, abs=1e-12)
+    progress = sum(info["reward_progress"] for info in infos)
+    if trunk == "fixed":
+        slid = sum(trace[f"{point}_normal"] * trace[f"{point}_slide"] for point in ("toe", "heel"))
+        down = trace["normal"] > 0
+        assert progress == pytest.approx(-1e-3 * np.sum(slid[down] / trace["normal"][down]), rel=1e-9)
+    else:
+        assert progress == pytest.approx(trace["x"][-1], rel=1e-9, abs=1e-12)
+
+
+def test_action_term_is_the_mean_square_of_the_change():
+    env = gym.make("hoof_env/HorseLeg-v0").unwrapped
+    env.reset(seed=0, options={"gait": "run"})
+    before = env.action_for(env.gaits["run"]).astype(float)
+    for action in (np.full(4, 5.0), np.array([0.5, -0.25, 0.0, 1.0]), np.array([0.5, -0.25, 0.0, 1.0])):
+        info, now = env.step(action)[4], np.clip(action, -1, 1)
+        assert info["reward_action"] == pytest.approx(-0.02 * np.mean((now - before) ** 2), rel=1e-9)
+        before = now
 
 
 @given(
@@ -184,7 +199,7 @@ def test_failing_never_pays_more_than_going_on_badly():
 
     worst = min(rollout(env, Wild(), seed)[0] for seed in range(60))
     assert worst < -30  # the search did find policies that go badly wrong
-    assert RewardWeights().failure * env.unwrapped.episode_seconds > -1.5 * worst
+    assert RewardWeights().failure * env.unwrapped.settings.episode_seconds > -1.5 * worst
 
 
 def test_a_collapse_terminates_and_is_charged_once():
@@ -195,21 +210,22 @@ def test_a_collapse_terminates_and_is_charged_once():
         trunk_share=1.0,
         reward_weights={"failure": 7.0},
     )
-    _, infos, trace = rollout(env, make_policy("airborne", env), seed=0)
+    _, infos, trace = rollout(env, make_policy("airborne", env), 0, recorded=True)
     assert "height" in infos[-1]["failure"]
     assert [info["reward_failure"] for info in infos[-2:]] == [0.0, -70.0]
     assert infos[-1]["episode_summary"]["failed"] == 1.0
-    assert trace["trunk_y"][-1] < 0.6 * env.unwrapped.engine.trunk.height
+    assert trace["y"][-1] < 0.6 * env.unwrapped.engine.trunk.height < trace["y"][-21]
 
 
-def test_summary_agrees_with_the_trace():
+def test_summary_agrees_with_the_substeps():
     env = gym.make("hoof_env/HorseLeg-v0")
-    _, infos, trace = rollout(env, make_policy("run", env), seed=1)
+    _, infos, trace = rollout(env, make_policy("run", env), 1, recorded=True)
     summary = infos[-1]["episode_summary"]
     assert summary["seconds"] == pytest.approx(10.0)
     assert summary["mean_grf_n"] == pytest.approx(trace["normal"].mean())
-    assert summary["peak_grf_n"] == trace["grf"].max()
+    assert summary["peak_grf_n"] == pytest.approx(trace["grf"].max(), rel=1e-12)
+    assert summary["stances"] == len(stance_peaks(trace, 0.05 * env.unwrapped.weight))
     assert summary["duty_factor"] == pytest.approx((trace["normal"] > 0).mean())
-    assert summary["speed_m_s"] == pytest.approx(trace["trunk_x"][-1] / 10)
+    assert summary["speed_m_s"] == pytest.approx(trace["x"][-1] / 10)
     work = summary["cost_of_transport"] * env.unwrapped.weight * summary["distance_m"]
     assert work == pytest.approx(summary["drive_work_j"])
