@@ -12,7 +12,7 @@ import pytest
 
 from hoof_env import __version__, cli
 from hoof_env.dynamics.engine import GRAVITY
-from hoof_env.dynamics.result import Result
+from hoof_env.dynamics.trunk_rows import MOMENTUM
 from hoof_env.envs.policies import make_policy
 from hoof_env.errors import HoofEnvError, OutputError, ParameterError
 from hoof_env.export.files import MOT_COLUMNS, export_episode, write
@@ -146,7 +146,9 @@ def test_a_step_that_failed_is_not_recorded():
             def predict(self, observation, **options):
                 self.steps += 1
                 if self.steps == 4:
-                    env.unwrapped.engine.advance = lambda *_: Result.NOT_FINITE
+                    state = env.unwrapped.get_state()
+                    state["engine"]["trunk"][MOMENTUM : MOMENTUM + 2] = 1e308
+                    env.unwrapped.set_state(state)
                 return run.predict(observation, **options)
 
         record = record_episode(env, Breaks(), 0)

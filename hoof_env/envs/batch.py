@@ -18,6 +18,7 @@ from hoof_env.dynamics.drive import Drive, Motor, Prescribed
 from hoof_env.dynamics.engine import GRAVITY
 from hoof_env.dynamics.limb import Limb
 from hoof_env.dynamics.result import Result
+from hoof_env.dynamics.step_length import StepLength
 from hoof_env.dynamics.trunk import ONE_LEG, Trunk
 from hoof_env.dynamics.trunk_engine import TrunkEngine
 from hoof_env.envs import episode as e
@@ -38,6 +39,7 @@ from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait.parameters import LIMITS, GaitParameters, gait_names, load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
+from hoof_env.leg.profile import leg_profile
 
 Floats = NDArray[np.float64]
 
@@ -81,13 +83,15 @@ class EpisodeBatch:
         self.randomize = check_parameters("randomize", s.randomize or {})
         self.target_speed = _two("target_speed", s.target_speed, -20.0) if s.target_speed else None
         self.target_seconds = _two("target_seconds", s.target_seconds, self.dt)
-        terrain = make_terrain(s.terrain)
+        self._terrain, self._found_good = make_terrain(s.terrain), ""
         trunk, ground, drive = self._physics({})
+        substeps = None
+        if self.randomize:
+            substeps = max(self._parts(corner, None) for corner in ({}, *extremes(self.randomize)))
         self.engine = TrunkEngine(
-            Limb(self.geometry, drive=drive), trunk, ground, terrain,
+            Limb(self.geometry, drive=drive), trunk, ground, self._terrain, substeps=substeps,
             sim_dt=s.sim_dt, integrator=s.integrator, num_envs=num_envs, strides=True,
         )  # fmt: skip
-        self._check_extremes(self.randomize)
         self._varied = np.zeros(num_envs, bool)
         self.names = [entry[0] for entry in entries(self.groups, s.trunk)]
         columns = self.engine.columns
@@ -163,8 +167,19 @@ class EpisodeBatch:
         return checked
 
     def _check_extremes(self, parameters: Mapping[str, float | tuple[float, float]]) -> None:
-        for values in extremes(parameters) if parameters else ():
-            self._physics(values)
+        """Raise where something that can be drawn is out of range, warn where it needs shorter substeps."""
+        if parameters and self._found_good != (words := repr(parameters)):
+            for corner in extremes(parameters):
+                self._parts(corner, self.engine.substeps)
+            self._found_good = words
+
+    def _parts(self, changes: Mapping[str, float], asked: int | None) -> int:
+        """Into how many parts `sim_dt` is cut with some settings changed, see `StepLength.choose`."""
+        trunk, ground, drive = self._physics(changes)
+        limb, s = Limb(self.geometry, drive=drive), self.settings
+        profiles = [leg_profile(self.geometry)]
+        length = StepLength((limb,), profiles, trunk, ground, self._terrain, s.integrator)
+        return length.choose(s.sim_dt, asked, stacklevel=5)
 
     def reset(
         self,

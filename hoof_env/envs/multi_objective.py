@@ -52,7 +52,7 @@ class HorseLegMOEnv(HorseLegEnv):
     |---|---|---|---|
     | 0 | progress | `reward_progress` | m |
     | 1 | peak force | `reward_peak` | 0.3 per kN |
-    | 2 | energy | `reward_energy` + `reward_action` | 0.1 per kJ, 0.02 per squared change |
+    | 2 | energy | `reward_energy` + `reward_action` | 0.1 per kJ, 0.03 per squared change |
 
     Each also bears a third of `reward_failure`. The terms themselves stay in `info`.
 

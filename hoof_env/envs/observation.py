@@ -70,7 +70,7 @@ def check_groups(groups: Any, known: Iterable[str]) -> tuple[str, ...]:
     """
     names = tuple(known)
     given = tuple(groups) if isinstance(groups, (list, tuple)) else ()
-    if not given or len(set(given)) < len(given) or not set(given) <= set(names):
+    if not given or not all(group in names and given.count(group) == 1 for group in given):
         raise ParameterError(f"observation: expected a list of some of {', '.join(names)}, got {groups!r}")
     return given
 

@@ -28,7 +28,8 @@ class Recording:
         self.batch, self.env = batch, env
         self._engine = copy.copy(batch.engine) if batch.num_envs == 1 else batch.engine.alone()
         self._before: NDArray[np.float64] | None = None
-        self._waiting: deque[tuple[bool, Any]] = deque(maxlen=round(SHOWN / batch.dt) + 1)
+        self._waiting: deque[Any] = deque(maxlen=round(SHOWN / batch.dt) + 1)
+        self._restarted = False
 
     def start(self) -> None:
         """Before a step or a reset: remember where it begins."""
@@ -37,7 +38,7 @@ class Recording:
     def forget(self) -> None:
         """After a jump to another state: what was before did not lead to it."""
         self._before = None
-        self._waiting.clear()
+        self.keep(True)
 
     def last(self) -> dict[str, NDArray[np.float64]]:
         """State and report by name at each substep of the last control step; of where it is, after a reset or
@@ -60,15 +61,21 @@ class Recording:
         return record
 
     def keep(self, restart: bool) -> None:
-        """Keep the last control step for a picture."""
-        self._waiting.append((restart, self.last()))
+        """Keep the last control step for a picture; on a `restart` it shows nothing of before."""
+        if restart:
+            self._waiting.clear()
+            self._restarted = True
+        self._waiting.append(self.last())
 
     def draw(self, renderer: Any) -> None:
-        """Give a renderer what was kept."""
+        """Give a renderer what was kept, or where it is if it has seen nothing yet."""
         engine = self.batch.engine
+        if self._restarted:
+            renderer.reset()
+            self._restarted = False
+        if renderer.is_empty and not self._waiting:
+            self._waiting.append(self.last())
         while self._waiting:
-            restart, record = self._waiting.popleft()
-            if restart:
-                renderer.reset()
             command = engine.command_in(engine.column(self.env))[0]
-            renderer.add(instants(columns_of_engine(record, engine.terrain, command=command)))
+            columns = columns_of_engine(self._waiting.popleft(), engine.terrain, command=command)
+            renderer.add(instants(columns))

@@ -103,7 +103,7 @@ class ReferenceLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     | `reward_progress` | `progress` = 1 per m | forward travel of the trunk |
     | `reward_peak` | `peak` = 0.3 per kN | minus the increase of the stance's running peak GRF, the maximum over all substeps; the terms of one stance add up to its peak |
     | `reward_energy` | `energy` = 0.1 per kJ | minus the positive work of crank and swing drive; braking power is not recovered |
-    | `reward_action` | `action` = 0.02 | minus the mean squared change of the action |
+    | `reward_action` | `action` = 0.03 | minus the mean squared change of the action |
     | `reward_failure` | `failure` = 30 per s | once, minus this times `episode_seconds`, when the episode fails |
 
     A stance opens when the normal force on the hoof rises above 5 % of the weight, as on a force plate. It

@@ -100,6 +100,11 @@ class Renderer:
         """The instant that is drawn next; `ResetNeeded` if there is none."""
         return self._check_seen()
 
+    @property
+    def is_empty(self) -> bool:
+        """Whether there is nothing to draw yet."""
+        return self._now is None
+
     def reset(self) -> None:
         """A new episode: forget the force history and the paths of the hoof."""
         self._now = None

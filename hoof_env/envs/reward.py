@@ -28,7 +28,7 @@ class RewardWeights:
     progress: float = 1.0
     peak: float = 0.3
     energy: float = 0.1
-    action: float = 0.02
+    action: float = 0.03
     failure: float = 30.0
 
     def __post_init__(self) -> None:

@@ -28,30 +28,36 @@ class Sb3VecEnv(VecEnv):
         num_envs: how many.
         settings: arguments of the environment.
 
+    Attributes:
+        terms: of the last rewards by name, shape (num_envs,) each.
+
     Raises:
-        ParameterError: an id without a native vector environment, or a bad argument.
+        ParameterError: an id without a native vector environment, another autoreset mode than SAME_STEP, or a
+            bad argument.
     """
 
     def __init__(self, env_id: str = "hoof_env/HorseLeg-v0", num_envs: int = 64, **settings: Any) -> None:
         settings.setdefault("autoreset_mode", AutoresetMode.SAME_STEP)
-        made = gym.make_vec(env_id, num_envs=num_envs, vectorization_mode="vector_entry_point", **settings)
-        envs = made.unwrapped
+        try:
+            many: dict[str, Any] = {"num_envs": num_envs, "vectorization_mode": "vector_entry_point"}
+            envs = gym.make_vec(env_id, **many, **settings).unwrapped
+        except gym.error.Error:
+            envs = None
         if not isinstance(envs, HorseLegVectorEnv):
             raise ParameterError(f"env_id: expected an id of this package with many at once, got {env_id!r}")
+        if envs.autoreset_mode != AutoresetMode.SAME_STEP:
+            raise ParameterError(f"autoreset_mode: expected SAME_STEP, got {settings['autoreset_mode']!r}")
         self.envs, self.render_mode = envs, envs.render_mode
         self._actions: NDArray[Any] | None = None
+        self.terms = {name: np.zeros(num_envs) for name in e.TERMS}
         super().__init__(num_envs, envs.single_observation_space, envs.single_action_space)
-
-    @property
-    def terms(self) -> dict[str, NDArray[np.float64]]:
-        """Terms of the last rewards by name, shape (num_envs,) each."""
-        rows = self.envs.batch.episode[e.TERM : e.TERM + len(e.TERMS), : self.num_envs]
-        return dict(zip(e.TERMS, rows.copy(), strict=True))
 
     def reset(self) -> NDArray[np.float32]:
         """Observations at the start of all episodes."""
         seeds = list(self._seeds)
-        options = self._options[0] if self._options and self._options[0] else None
+        options = self._options[0] or None
+        if any((other or None) != options for other in self._options):
+            raise ParameterError(f"options: expected the same for all environments, got {self._options!r}")
         observations, _ = self.envs.reset(seed=None if None in seeds else seeds, options=options)
         self.reset_infos = [{} for _ in range(self.num_envs)]
         self._reset_seeds()
@@ -65,6 +71,7 @@ class Sb3VecEnv(VecEnv):
     def step_wait(self) -> Any:
         """Take the step."""
         observations, rewards, terminated, truncated, infos = self.envs.step(self._actions)  # type: ignore[arg-type]
+        self.terms = {name: infos[name] for name in e.TERMS}
         dones = terminated | truncated
         each: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         if dones.any():
@@ -84,8 +91,7 @@ class Sb3VecEnv(VecEnv):
 
     def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
         """Frames of the environments that are drawn."""
-        frames = self.envs.render() or ()
-        return [*frames, *[None] * (self.num_envs - len(frames))]
+        return list(self.envs.render() or ())
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         """The attribute of the whole, once for each index."""

@@ -199,12 +199,20 @@ def check_parameters(name: str, given: Any) -> dict[str, float | tuple[float, fl
 
 
 def extremes(given: Mapping[str, float | tuple[float, float]]) -> list[dict[str, float]]:
-    """Values among which all that can be drawn lie: lowest, highest, and the closest friction thresholds."""
+    """Corners of what can be drawn: all lowest, all highest, closest friction thresholds, and what asks for
+    the shortest steps under a light and a heavy trunk."""
     low, high = (
         {name: value[end] if isinstance(value, tuple) else value for name, value in given.items()}
         for end in (0, 1)
     )
-    return [low, high, low | {name: value for name, value in high.items() if name == "friction_slow"}]
+
+    def mixed(names: Sequence[str], base: dict[str, float], other: dict[str, float]) -> dict[str, float]:
+        return base | {name: other[name] for name in names if name in other}
+
+    close = mixed(("friction_slow",), low, high)
+    hard = mixed(("restitution", "approach_floor", "trunk_mass"), high, low)
+    corners = (low, high, close, hard, mixed(("trunk_mass",), hard, high))
+    return [corner for k, corner in enumerate(corners) if corner not in corners[:k]]
 
 
 def draw_parameters(

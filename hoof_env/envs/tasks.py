@@ -131,7 +131,7 @@ TASKS: Mapping[str, Task] = MappingProxyType(
             + " The ground rises and falls, and is harder, softer or more slippery in places; an episode"
             " begins anywhere on it. The heights ahead are observed, what the ground is made of is not.",
             {
-                "terrain": {"kind": "hills", "seed": 0, "rise": 0.05},
+                "terrain": {"kind": "hills", "seed": 0, "rise": 0.05, "stiffness": [0.25, 2.0]},
                 "observation": ("crank", "gait", "trunk", "hoof", "action", "ground"),
             },
         ),

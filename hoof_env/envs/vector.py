@@ -115,7 +115,9 @@ class HorseLegVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
         self._seed(seed, mask)
         start = self._start(np.flatnonzero(mask), checked)
         self._ended[mask] = False
-        return self._observed(), start
+        observations = self._observed()
+        observations[~self._started] = 0.0
+        return observations, start
 
     def step(
         self, actions: NDArray[np.float32]

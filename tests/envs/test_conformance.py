@@ -210,9 +210,32 @@ def test_copies_of_a_drawing_environment_draw_for_themselves(env_id, copied):
     roll(env, 10)
     before, state = env.render(), env.get_state()
     twin = COPIES[copied](env)
+    assert twin.render().shape == before.shape  # where it is, for the window stayed behind
     roll(twin, 10)
     assert (twin.render() != before).any()
     same(env.render(), before)
     same(env.get_state(), state)
     env.close()
     assert twin.render().shape == before.shape
+
+
+def test_a_picture_of_an_episode_shows_nothing_of_another():
+    """Neither of the last one, however late it is drawn, nor of where a state was put back from."""
+    pytest.importorskip("pygame")
+    env, other = (gym.make(IDS[0], render_mode="rgb_array", dt=0.1).unwrapped for _ in range(2))
+    env.reset(seed=0)
+    roll(env, 20)
+    env.render()
+    for one in (env, other):
+        one.reset(seed=1)
+        roll(one, 60)
+    state, last = env.get_state(), other.render()
+    same(env.render(), last)
+    env.reset(seed=2)
+    roll(env, 20)
+    env.render()
+    env.set_state(state)
+    assert (env.render() != last).any()  # the way there is not known
+    third = gym.make(IDS[0], render_mode="rgb_array", dt=0.1).unwrapped
+    third.set_state(state)
+    same(env.render(), third.render())

@@ -73,7 +73,7 @@ def test_action_term_is_the_mean_square_of_the_change():
     before = env.action_for(env.gaits["run"]).astype(float)
     for action in (np.full(4, 5.0), np.array([0.5, -0.25, 0.0, 1.0]), np.array([0.5, -0.25, 0.0, 1.0])):
         info, now = env.step(action)[4], np.clip(action, -1, 1)
-        assert info["reward_action"] == pytest.approx(-0.02 * np.mean((now - before) ** 2), rel=1e-9)
+        assert info["reward_action"] == pytest.approx(-0.03 * np.mean((now - before) ** 2), rel=1e-9)
         before = now
 
 

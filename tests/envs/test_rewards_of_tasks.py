@@ -1,0 +1,74 @@
+"""On every id the reference gait beats the simplest policies."""
+
+import functools
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from hoof_env.envs.policies import make_policy
+from hoof_env.envs.tasks import TASKS
+
+SEEDS = 40
+MARGIN = 3.0
+"""Return by which the reference gait is ahead over ten seconds, in the mean of so many episodes."""
+
+DT = 0.02
+PACES = (3, 5, 6, 8, 12, 25, 50)
+"""Control steps between two flips of a bang-bang policy."""
+
+
+def mean_return(task, act, options=None):
+    """Of `SEEDS` episodes side by side; `act` maps observations and time to actions."""
+    envs = gym.make_vec(TASKS[task].id, num_envs=SEEDS, autoreset_mode="DISABLED")
+    observations, _ = envs.reset(seed=0, options=options)
+    total, ended = np.zeros(SEEDS), np.zeros(SEEDS, bool)
+    for step in range(500):
+        actions = np.asarray(act(observations, step * DT), np.float32)
+        observations, rewards, terminated, truncated, _ = envs.step(np.broadcast_to(actions, (SEEDS, 4)))
+        total, ended = total + rewards, ended | terminated | truncated
+        if ended.any():
+            break
+    assert truncated.all()  # in good order, all at once
+    return total.mean()
+
+
+def scripted(task, name, each):
+    """A policy of `make_policy` for all environments: one command for all, or one policy each."""
+    env = gym.make(TASKS[task].id)
+    policies = [make_policy(name, env, seed) for seed in range(SEEDS if each else 1)]
+    return lambda seen, _: np.array([p.predict(one)[0] for p, one in zip(policies, seen, strict=False)])
+
+
+@functools.cache
+def reference(task):
+    return mean_return(task, scripted(task, TASKS[task].reference, each=False))
+
+
+@pytest.mark.parametrize("name", ["idle", "airborne", "drag", "random"])
+@pytest.mark.parametrize("task", TASKS)
+def test_simple_policies_stay_below_the_reference(task, name):
+    each = name != "idle"
+    assert mean_return(task, scripted(task, name, each)) < reference(task) - MARGIN
+
+
+@pytest.mark.parametrize("pace", PACES)
+@pytest.mark.parametrize("task", TASKS)
+def test_bang_bang_of_any_pace_stays_below_the_reference(task, pace):
+    flip = lambda _, time: np.full(4, 1.0 if round(time / DT) // pace % 2 else -1.0)  # noqa: E731
+    assert mean_return(task, flip) < reference(task) - MARGIN
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_hopping_on_the_swing_with_the_crank_stopped_stays_below_the_reference(task):
+    """Waves of the swing: many at once, no one of them pays."""
+    generator = np.random.default_rng(0)
+    middle, size, phase = generator.uniform(-1, 1, (3, SEEDS, 4))
+    pulse = 2 * np.pi * generator.uniform(0.2, 8.0, (SEEDS, 1))
+
+    def wave(_, time):
+        actions = np.clip(middle + size * np.sin(pulse * time + np.pi * phase), -1, 1)
+        actions[:, 0] = -1.0
+        return actions
+
+    assert mean_return(task, wave) < reference(task) - MARGIN

@@ -1,0 +1,81 @@
+"""The adapter for Stable-Baselines3 against its own `DummyVecEnv` over single environments."""
+
+from __future__ import annotations
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from family import FALLS, IDS, actions, same
+
+pytest.importorskip("stable_baselines3")
+from stable_baselines3 import PPO
+from stable_baselines3.common.evaluation import evaluate_policy
+from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor, VecNormalize
+
+from hoof_env import Sb3VecEnv
+
+
+def both(env_id, n, **settings):
+    return Sb3VecEnv(env_id, n, **settings), DummyVecEnv([lambda: gym.make(env_id, **settings)] * n)
+
+
+SHORT = {"episode_seconds": 0.3}
+
+
+@pytest.mark.parametrize(("env_id", "settings"), [*((env_id, SHORT) for env_id in IDS), (IDS[0], FALLS)])
+def test_it_says_what_theirs_says(env_id, settings):
+    ours, theirs = both(env_id, 8, **settings)
+    assert (ours.observation_space, ours.action_space) == (theirs.observation_space, theirs.action_space)
+    ours.seed(3), theirs.seed(3)
+    same(ours.reset(), theirs.reset())
+    ends = []
+    for k, taken in enumerate(actions(0, 120, 8)):
+        one, two = ours.step(taken), theirs.step(taken)
+        for a, b in zip(one[:3], two[:3], strict=True):
+            same(a, b)
+        same(np.array(list(ours.terms.values())).sum(0).astype(np.float32), one[1])
+        for env in np.flatnonzero(one[2]):
+            info, there = one[3][env], two[3][env]
+            for name in ("terminal_observation", "TimeLimit.truncated", "episode_summary"):
+                same(info[name], there[name])
+            ends.append(info["TimeLimit.truncated"])
+        assert all(info == {} for info, done in zip(one[3], one[2], strict=True) if not done)
+        if k == 60:  # only seeds and options given since the last reset count
+            ours.seed(9), theirs.seed(9)
+            ours.set_options({"gait": "walk"}), theirs.set_options({"gait": "walk"})
+        if k in (60, 80):
+            same(ours.reset(), theirs.reset())
+    assert len(ends) > (2 if settings is FALLS else 50)
+    assert not any(ends) if settings is FALLS else all(ends)
+
+
+def test_methods_of_a_vec_env():
+    env = Sb3VecEnv(IDS[0], 3)
+    assert env.get_attr("render_mode") == [None] * 3
+    assert env.get_attr("num_envs", indices=1) == [3]
+    assert env.env_is_wrapped(VecMonitor) == [False] * 3
+    env.set_attr("mark", 5)
+    assert env.get_attr("mark") == [5] * 3
+    env.reset()
+    assert env.env_method("get_state")[0]["id"] == IDS[0]
+    env.close()
+    env.close()
+
+
+def test_pictures():
+    pytest.importorskip("pygame")
+    env = Sb3VecEnv(IDS[0], 2, render_mode="rgb_array")
+    env.reset()
+    assert env.get_images()[0].shape == (540, 960, 3)
+    assert env.render().ndim == 3
+
+
+def test_monitor_evaluation_and_training():
+    env = VecMonitor(Sb3VecEnv(IDS[0], 16, episode_seconds=0.5), info_keywords=("episode_summary",))
+    model = PPO("MlpPolicy", VecNormalize(env), n_steps=32, batch_size=128, n_epochs=1, seed=0, device="cpu")
+    model.learn(1024)
+    assert len(model.ep_info_buffer) > 16
+    assert {info["l"] for info in model.ep_info_buffer} == {25}
+    returns, lengths = evaluate_policy(model, env, n_eval_episodes=20, return_episode_rewards=True)
+    assert lengths == [25] * 20
+    assert np.isfinite(returns).all()
