@@ -15,7 +15,7 @@ help:
 	@echo 'make test        lint, types and tests'
 	@echo 'make test-peers  the engine against MuJoCo and Exudyn, which it installs'
 	@echo 'make test-ecosystem  every RL library on every id, in environments under .ecosystem/: 6 GB, some minutes'
-	@echo 'make bench       how fast the engine is beside MuJoCo and Exudyn, which it installs'
+	@echo 'make bench       how fast engine and environments are beside MuJoCo, Exudyn and EnvPool'
 	@echo 'make lint        lint and types alone'
 	@echo 'make setup       make .venv and nothing more'
 	@echo 'make clean       remove .venv and the caches; runs/ stays'
@@ -43,7 +43,9 @@ test-ecosystem: setup
 bench: setup
 	@echo 'pip install mujoco exudyn' && $(PY) -m pip install -q -c constraints.txt -e '.[peers]' || \
 	  echo 'some are not there: fewer comparisons'
+	@$(PY) -m pip install -q -c constraints.txt envpool || echo 'no EnvPool here: HalfCheetah-v5 stands for it'
 	@$(PY) -m benchmarks.speed
+	@$(PY) -m benchmarks.env_speed
 
 lint: setup
 	@echo 'ruff check' && $(PY) -m ruff check -q --output-format concise

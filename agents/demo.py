@@ -53,7 +53,7 @@ class Budget:
     params: tuple[str, ...] = ()
 
 
-FULL = Budget(steps=500_000, max_minutes=3.0, episodes=20, film_seconds=8.0)
+FULL = Budget(steps=1_000_000, max_minutes=3.0, episodes=20, film_seconds=8.0)
 QUICK = Budget(2_048, 1.0, 2, 0.4, params=("n_envs=4", "n_steps=512", "batch_size=512", "n_epochs=1"))
 
 
@@ -147,7 +147,7 @@ def train_agent(args: Args, budget: Budget, stage: Path) -> train.Trained:
     )
     if trained.stopped_by:
         raise KeyboardInterrupt
-    for name in runs.FILES:
+    for name in filter(lambda name: (folder / name).is_file(), (*runs.FILES, runs.STATISTICS)):
         os.replace(folder / name, stage / name)
     shutil.rmtree(folder)  # TensorBoard's curves are in monitor.csv too
     return trained

@@ -149,10 +149,10 @@ def make_scorer(args: Args, kwargs: dict[str, Any], seed: int) -> Any:
     return Scorer()
 
 
-def returns(envs: Any, predict: Any) -> NDArray[np.float64]:
-    """Returns of one episode in each of `envs`, a `VecEnv`, from seed `FIRST_SEED` on; `predict` maps
+def returns(envs: Any, predict: Any, first_seed: int = FIRST_SEED) -> NDArray[np.float64]:
+    """Returns of one episode in each of `envs`, a `VecEnv`, from seed `first_seed` on; `predict` maps
     observations to actions."""
-    envs.seed(FIRST_SEED)
+    envs.seed(first_seed)
     observation, total, going = envs.reset(), np.zeros(envs.num_envs), np.ones(envs.num_envs, bool)
     while going.any():
         observation, reward, done, _ = envs.step(predict(observation))

@@ -34,6 +34,8 @@ from hoof_env.errors import DataFileError, ParameterError
 FILES = ("model.zip", "config.yml", "run.json", "monitor.csv")
 """What a run without normalisation and checkpoints leaves, TensorBoard's files aside."""
 
+STATISTICS = "vecnormalize.pkl"
+
 PACKAGES = ("hoof-env", "numpy", "gymnasium", "numba", "stable-baselines3", "torch")
 
 
@@ -111,7 +113,7 @@ def save_model(model: Any, path: Path) -> None:
     with staged(path.parent) as stage:
         model.save(stage / path.name)
         if model.get_vec_normalize_env() is not None:
-            model.get_vec_normalize_env().save(str(stage / "vecnormalize.pkl"))
+            model.get_vec_normalize_env().save(str(stage / STATISTICS))
 
 
 @dataclass(frozen=True)
@@ -162,7 +164,7 @@ class SavedModel:
         from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
         algorithm = getattr(stable_baselines3, self.record.get("algo", "ppo").upper())
-        statistics, normalize = self.path.with_name("vecnormalize.pkl"), None
+        statistics, normalize = self.path.with_name(STATISTICS), None
         try:
             model = algorithm.load(self.path, device="cpu")
             if statistics.is_file():

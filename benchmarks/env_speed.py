@@ -1,10 +1,11 @@
-"""How fast the environments are, beside Gymnasium's HalfCheetah-v5 and EnvPool's, in one process on one thread.
+"""How fast the environments are, beside Gymnasium's HalfCheetah-v5 and EnvPool's, on one thread.
 
     python -m benchmarks.env_speed          writes benchmarks/results/env_speed.json and .md
 
-An environment step is 20 substeps of 1 ms here and 5 of 10 ms there. Random actions, observations, rewards and
-resets included, rounds interleaved; a ratio is taken within a round. EnvPool is measured where it is
-installed, with one thread and as many environments as serve it best; else HalfCheetah-v5 stands for it.
+An environment step is 20 substeps of 1 ms here and 5 of 10 ms there. One process, random actions,
+observations, rewards and resets included, rounds interleaved; a ratio is taken within a round. EnvPool is
+measured where it is installed, with one thread and as many environments as serve it best; else HalfCheetah-v5
+stands for it.
 """
 
 from __future__ import annotations
@@ -129,10 +130,14 @@ def page(found: dict[str, Any]) -> str:
         bars = "".join(
             f"{bar:g}: {'met' if row['ratio']['median'] >= bar else 'not met'} " for bar in row["bars"] or ()
         )
-        rate = row["rate"]["median"]
-        lines.append(
-            f"| {row['case']} | {rate:,.0f} | {row['beside']} | {told(row['ratio'])} | {bars.strip()} |"
+        cells = (
+            row["case"],
+            f"{row['rate']['median']:,.0f}",
+            row["beside"],
+            told(row["ratio"]),
+            bars.strip(),
         )
+        lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
 
 

@@ -1,4 +1,4 @@
-"""Rooms import from rooms on their left only: leg and ground, gait, dynamics, envs, and what stands at the end."""
+"""Rooms import from their left only: leg and ground, gait, dynamics, envs, and what stands at the end."""
 
 import ast
 from pathlib import Path

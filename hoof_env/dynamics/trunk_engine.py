@@ -262,8 +262,9 @@ class TrunkEngine:
                 the engine's own.
 
         Raises:
-            ParameterError: what environments share differs.
+            ParameterError: what environments share differs, or there is no such environment.
         """
+        env = count("env", env, low=0, most=self.num_envs - 1)
         trunk, ground = trunk or self.trunk, ground or self.ground
         shared = {
             "trunk.kind": (trunk.kind, self.trunk.kind),

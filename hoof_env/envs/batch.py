@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hoof_env.dynamics.advance import LIMB, TRUNK, TRUNK_ROWS
 from hoof_env.dynamics.drive import Drive, Motor, Prescribed
 from hoof_env.dynamics.engine import GRAVITY
 from hoof_env.dynamics.limb import Limb
@@ -258,11 +259,23 @@ class EpisodeBatch:
         """`step` after its kernel, which said so."""
         if said < 0:
             raise ParameterError("action: expected finite numbers, got some that are not")
+        if said & 1 and self.engine.results.any():
+            self._look_again()
         if said & e.SWITCHED:
             due = self.episode[e.STEPS, : self.num_envs] >= self.episode[e.SWITCH, : self.num_envs]
             for env in np.flatnonzero(due if idle is None else due & ~idle):
                 self._draw_target(int(env), generators[int(env)])
         return bool(said & 1)
+
+    def _look_again(self) -> None:
+        """Observe the last good state of what could not be simulated, whose report is of where it broke."""
+        data, broken = self.engine.arrays[0], np.flatnonzero(self.engine.results)
+        kept, limb = data.copy(), LIMB["report"]
+        self.engine.advance(None, 0)
+        for rows in (TRUNK["report"], slice(TRUNK_ROWS + limb.start, TRUNK_ROWS + limb.stop)):
+            kept[rows, broken] = data[rows, broken]
+        data[:] = kept
+        self._look(self.desk)
 
     def summary(self, env: int) -> dict[str, float]:
         """Figures of an episode.

@@ -30,14 +30,19 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     Args:
         task: name in `tasks.TASKS`; the registered ids set it.
         render_mode: "rgb_array" or "human".
-        settings: any of `tasks.Settings`; `manual.page(task)` says what they mean.
+        settings: any of `tasks.Settings`; the manual page (`manual`) says what they mean.
 
     Attributes:
+        task, settings: the task and its settings.
         batch: the episode, a batch of one.
         observation_names: of the observation's entries.
+        action_space, observation_space: boxes from -1 to 1, float32, of shapes (4,) and
+            (len(observation_names),).
 
     Raises:
         ParameterError: a bad argument, option or action, with what was given and what was expected.
+        ResetNeeded: a step, a picture or the state before the first reset.
+        ClosedEnvironmentError: anything after `close`.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": list(RENDER_MODES), "render_fps": 50}  # type: ignore[misc]
@@ -65,6 +70,13 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._step, self._desk = self.batch.kernel, self.batch.desk
 
     # What pictures, records and policies read
+
+    @property
+    def manual(self) -> str:
+        """The manual page of the id, Markdown."""
+        from hoof_env.envs.manual import page_of
+
+        return page_of(self.task.id)
 
     @property
     def geometry(self) -> Any:
@@ -121,7 +133,19 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Start an episode; the manual page has the options."""
+        """Start an episode.
+
+        Args:
+            seed: of the generator, a whole number from 0; None goes on with it.
+            options: "gait", "crank_angle" [rad], "speed" [m/s], "height" [m], "x" [m], "parameters"; see
+                the manual page.
+
+        Returns:
+            The observation, float32, and what was drawn or set.
+
+        Raises:
+            ParameterError: a bad seed or option; nothing has changed then.
+        """
         self._refuse_closed("reset")
         checked = self.batch.check_options(options)  # before the generator is touched
         super().reset(seed=check_seed(seed))
@@ -142,7 +166,18 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     def step(
         self, action: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
-        """Command the gait parameters for `dt`."""
+        """Command the gait parameters for `dt`.
+
+        Args:
+            action: 4 finite numbers, clipped to [-1, 1].
+
+        Returns:
+            Observation (float32), reward, terminated, truncated, and the reward's terms by name; at the end
+            of an episode also "episode_summary", and "failure" if it failed.
+
+        Raises:
+            ParameterError: the action has a wrong shape or is not finite; nothing has happened then.
+        """
         if self._state != "running":
             self._refuse_closed("step")
             raise ResetNeeded("step() was called before reset(): expected reset() first")
@@ -188,7 +223,8 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             raise gym.error.ClosedEnvironmentError(f"{name}() was called after close(): make a new one")
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Draw the present state: an (H, W, 3) uint8 array for "rgb_array", a window for "human"."""
+        """Draw the present state: an (H, W, 3) uint8 array for "rgb_array", a window for "human"; None
+        without a mode."""
         if self.render_mode is None:
             gym.logger.warn("render() was called without a render_mode: pass 'rgb_array' or 'human'")
             return None

@@ -35,9 +35,9 @@ class HorseLegVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
     """`num_envs` environments of a task, stepped together.
 
     Args:
-        num_envs: how many.
+        num_envs: how many, 1 to `MOST_ENVS`.
         task, settings: as of `HorseLegEnv`.
-        autoreset_mode: an `AutoresetMode` or its value: NEXT_STEP (default), SAME_STEP or DISABLED.
+        autoreset_mode: an `AutoresetMode`, its name or its value: NEXT_STEP, SAME_STEP or DISABLED.
         max_episode_steps: episodes are no longer than so many control steps, as under Gymnasium's TimeLimit;
             else `episode_seconds` alone ends them.
         render_mode: "rgb_array"; `render` gives a frame of each of the first `rendered` environments.

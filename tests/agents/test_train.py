@@ -14,7 +14,7 @@ import yaml
 from stable_baselines3 import PPO
 
 from agents.command import parse_pairs
-from agents.runs import SavedModel, make_env
+from agents.runs import FILES, STATISTICS, SavedModel, make_env
 from agents.train import Args, train
 from hoof_env.errors import DataFileError, OutputError, ParameterError
 from tests.agents.conftest import SHORT, TINY, train_tiny
@@ -31,7 +31,7 @@ def curve(folder: Path) -> list[tuple[str, str]]:
 
 def test_run_folder(trained):
     names = {path.name for path in trained.folder.iterdir()}
-    assert names == {"model.zip", "run.json", "config.yml", "monitor.csv", "checkpoints", "tensorboard"}
+    assert names == {*FILES, STATISTICS, "checkpoints", "tensorboard"}
     assert trained.steps == 256
     assert trained.stopped_by is None
     assert {path.name for path in (trained.folder / "checkpoints").iterdir()} == {

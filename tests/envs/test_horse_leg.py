@@ -212,9 +212,10 @@ def test_a_step_that_could_not_be_simulated_pays_for_nothing_but_the_failure():
     assert reward != 0.0
     before, state = env.batch.summary(0), env.get_state()
     state["engine"]["trunk"][t.MOMENTUM : t.MOMENTUM + 2] = 1e308
-    env.set_state(state)
-    _, reward, terminated, _, info = env.step(run)
+    there = env.set_state(state)
+    seen, reward, terminated, _, info = env.step(run)
     assert terminated
+    np.testing.assert_array_equal(seen, there)
     assert "finite" in info["failure"]
     assert reward == info["reward_failure"] == -300.0
     assert info["episode_summary"] == {**before, "failed": 1.0}
