@@ -66,7 +66,10 @@ def draw_curves(folders: list[Path], path: Path) -> None:
     from hoof_env.paper.figure_style import BLUE, GREY, ORANGE
 
     figure = Figure(figsize=(9, 2.8 * -(-len(folders) // 2)), layout="constrained")
-    for axes, folder in zip(figure.subplots(-(-len(folders) // 2), 2).flat, folders, strict=False):
+    panels = figure.subplots(-(-len(folders) // 2), 2).flatten()
+    for axes in panels[len(folders) :]:
+        axes.set_axis_off()
+    for axes, folder in zip(panels, folders, strict=False):
         found = _bar(folder)
         for seed in found["seeds"]:
             rows = read_rows(folder / "curve.csv", int(seed))
@@ -77,7 +80,7 @@ def draw_curves(folders: list[Path], path: Path) -> None:
             f"scripted {best}", (1, found["scripted"][best]), (-2, 3), color=ORANGE, ha="right",
             xycoords=axes.get_yaxis_transform(), textcoords="offset points",
         )  # fmt: skip
-        axes.set(title=found["env_id"], xlabel="seconds of training", ylabel="mean return")
+        axes.set(title=found["env_id"], xlabel="wall time of training [s]", ylabel="mean return")
         axes.set_xlim(left=0)
         axes.grid(axis="y", color=GREY, alpha=0.15)
     figure.savefig(path, dpi=110)
@@ -86,8 +89,8 @@ def draw_curves(folders: list[Path], path: Path) -> None:
 def bar_table(folders: list[Path]) -> str:
     """Seconds to beat every scripted gait, by id and seed."""
     lines = [
-        "| id | scripted gaits | beaten after, wall s (processor s), seed by seed | last returns |",
-        "|---|---|---|---|",
+        "| id | scripted | beaten after wall s (processor s) by seed | last returns | steps | steps/s |",
+        "|---|---|---|---|---|---|",
     ]
     for folder in folders:
         found = _bar(folder)
@@ -95,8 +98,18 @@ def bar_table(folders: list[Path]) -> str:
         each = [
             f"{one['wall_s']:.1f} ({one['cpu_s']:.1f})" if one else "not" for one in found["seeds"].values()
         ]
-        last = [f"{read_rows(folder / 'curve.csv', int(seed))[-1]['return']:.1f}" for seed in found["seeds"]]
-        lines.append(f"| `{found['env_id']}` | {gaits} | {', '.join(each)} | {', '.join(last)} |")
+        ends = [read_rows(folder / "curve.csv", int(seed))[-1] for seed in found["seeds"]]
+        last = ", ".join(f"{end['return']:.1f}" for end in ends)
+        rate = sum(end["steps"] for end in ends) / sum(end["cpu_s"] for end in ends)
+        cells = (
+            f"`{found['env_id']}`",
+            gaits,
+            ", ".join(each),
+            last,
+            f"{ends[0]['steps']:,.0f}",
+            f"{rate:,.0f}",
+        )
+        lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
 
 

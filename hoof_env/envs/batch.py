@@ -8,14 +8,13 @@ number of its neighbours: starts are drawn from a generator of its own, and the 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.advance import LIMB, TRUNK, TRUNK_ROWS
-from hoof_env.dynamics.drive import Drive, Motor, Prescribed
+from hoof_env.dynamics.drive import Drive
 from hoof_env.dynamics.engine import GRAVITY
 from hoof_env.dynamics.limb import Limb
 from hoof_env.dynamics.result import Result
@@ -25,16 +24,9 @@ from hoof_env.dynamics.trunk_engine import TrunkEngine
 from hoof_env.envs import episode as e
 from hoof_env.envs.grounds import make_terrain
 from hoof_env.envs.observation import GROUPS, HALF_RANGE, MIDDLE, check_groups, entries, places
+from hoof_env.envs.parameters import check_parameters, draw_parameters, extremes, physics
 from hoof_env.envs.reward import RewardWeights
-from hoof_env.envs.start import (
-    HIGHEST,
-    LOWEST,
-    check_options,
-    check_parameters,
-    draw_parameters,
-    draw_starts,
-    extremes,
-)
+from hoof_env.envs.start import HIGHEST, LOWEST, check_options, draw_starts
 from hoof_env.envs.tasks import Settings, Task
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait.parameters import LIMITS, GaitParameters, gait_names, load_gait
@@ -82,8 +74,8 @@ class EpisodeBatch:
         self.height = check_number("hip_height", height, low=LOWEST * nominal, high=HIGHEST * nominal)
         self.groups = check_groups(s.observation, GROUPS)
         self.randomize = check_parameters("randomize", s.randomize or {})
-        self.target_speed = _two("target_speed", s.target_speed, -20.0) if s.target_speed else None
-        self.target_seconds = _two("target_seconds", s.target_seconds, self.dt)
+        self.target_speed = None if s.target_speed is None else _two("target_speed", s.target_speed, -20.0)
+        self.target_seconds = _two("target_seconds", s.target_seconds, self.dt if self.target_speed else 0.0)
         self._terrain, self._found_good = make_terrain(s.terrain), ""
         trunk, ground, drive = self._physics({})
         substeps = None
@@ -106,23 +98,7 @@ class EpisodeBatch:
 
     def _physics(self, changes: Mapping[str, float]) -> tuple[Trunk, Ground, Drive]:
         """Trunk, ground and drive with some settings changed."""
-        s = replace(self.settings, **dict(changes))  # type: ignore[arg-type]
-        trunk = Trunk(
-            s.trunk,
-            s.trunk_mass,
-            s.trunk_share,
-            s.trunk_stiffness,
-            s.trunk_damping,
-            s.trunk_drag,
-            self.height,
-        )
-        ground = Ground(
-            s.stiffness, s.exponent, s.normal_law, s.restitution, s.approach_floor, "interpolated",
-            s.friction_law, s.friction, s.friction_slow, s.friction_fast, s.trunk_mass,
-        )  # fmt: skip
-        if s.drive == "prescribed":
-            return trunk, ground, Prescribed()
-        return trunk, ground, Motor(s.motor_gain, s.motor_torque, s.motor_inertia, 1.0)
+        return physics(self.settings, self.height, changes)
 
     def _task_record(self) -> NDArray[Any]:
         found = np.zeros(1, e.TASK)
@@ -376,35 +352,3 @@ def _substeps(dt: float, sim_dt: float) -> int:
             f"(ratio {ratio:g}; at most {MOST_SUBSTEPS})"
         )
     return round(ratio)
-
-
-def check_state(state: Any, env_id: str, settings: Mapping[str, Any], parts: Sequence[str] = ()) -> None:
-    """Raise unless `state` is one that `get_state` of such an environment gave.
-
-    Raises:
-        ParameterError: it lacks a part, or is of another id or of other settings.
-    """
-    names = ("id", "settings", "engine", "episode", "generator", *parts)
-    missing = [name for name in names if not isinstance(state, Mapping) or name not in state]
-    if missing:
-        raise ParameterError(f"state: expected what get_state gives, but {', '.join(missing)} is missing")
-    if state["id"] != env_id:
-        raise ParameterError(f"state: expected one of {env_id}, got one of {state['id']}")
-    there = state["settings"]
-    unlike = [f"{k}: {v!r} here, {there.get(k)!r} there" for k, v in settings.items() if there.get(k) != v]
-    if unlike:
-        raise ParameterError(f"state: of other settings; {'; '.join(unlike)}")
-
-
-def generator_of(state: Any) -> np.random.Generator:
-    """A generator in the state that a `PCG64` had.
-
-    Raises:
-        ParameterError: no such state.
-    """
-    generator = np.random.Generator(np.random.PCG64())
-    try:
-        generator.bit_generator.state = state
-    except (TypeError, ValueError, KeyError):
-        raise ParameterError(f"state['generator']: expected the state of a PCG64, got {state!r}") from None
-    return generator

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.trunk_model import LIFT_OFF
 from hoof_env.envs import episode as e
-from hoof_env.envs.batch import EpisodeBatch, check_state, generator_of
+from hoof_env.envs.batch import EpisodeBatch
 from hoof_env.envs.recording import Recording
 from hoof_env.envs.start import check_seed
+from hoof_env.envs.state import check_state, generator_of
 from hoof_env.envs.tasks import TASKS, to_json
 from hoof_env.errors import ParameterError, check_choice
 from hoof_env.gait.parameters import PARAMETERS, GaitParameters
@@ -57,7 +58,7 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.observation_space = spaces.Box(-1.0, 1.0, (len(self.observation_names),), np.float32)
         self.action_space = spaces.Box(-1.0, 1.0, (e.ACTIONS,), np.float32)
         self.render_mode = render_mode
-        self.metadata = {**type(self).metadata, "render_fps": round(1 / self.batch.dt)}  # type: ignore[misc]
+        self.metadata = {**type(self).metadata, "render_fps": max(1, round(1 / self.batch.dt))}  # type: ignore[misc]
         self._recording: Recording | None = Recording(self.batch) if render_mode else None
         self._renderer: Any = None
         self._state = "new"

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.arguments import count
 from hoof_env.dynamics.trunk import Trunk
-from hoof_env.envs.tasks import PER_EPISODE
+from hoof_env.envs.parameters import check_parameters
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait.parameters import GaitParameters, paper_gaits
 from hoof_env.ground.terrain import Terrain
@@ -172,57 +172,6 @@ def _check_trunk(options: Mapping[str, float], trunk: Trunk) -> None:
         )
     if trunk.kind == "fixed" and speed != 0.0:
         raise ParameterError(f"options['speed']: expected 0 of a fixed trunk, got {speed:g}")
-
-
-def check_parameters(name: str, given: Any) -> dict[str, float | tuple[float, float]]:
-    """Physical parameters of an episode: a number each, or two to draw between.
-
-    Raises:
-        ParameterError: not a mapping, a parameter that cannot change, or values that are none.
-    """
-    if not isinstance(given, Mapping) or not set(given) <= set(PER_EPISODE):
-        raise ParameterError(
-            f"{name}: expected a mapping with some of {', '.join(PER_EPISODE)}, got {given!r}"
-        )
-    found: dict[str, float | tuple[float, float]] = {}
-    for key, value in given.items():
-        if isinstance(value, (list, tuple)):
-            if len(value) != 2:
-                raise ParameterError(f"{name}[{key!r}]: expected a number or two, got {value!r}")
-            low, high = (check_number(f"{name}[{key!r}][{k}]", v) for k, v in enumerate(value))
-            if low > high:
-                raise ParameterError(f"{name}[{key!r}]: expected the lower one first, got {value!r}")
-            found[key] = low, high
-        else:
-            found[key] = check_number(f"{name}[{key!r}]", value)
-    return found
-
-
-def extremes(given: Mapping[str, float | tuple[float, float]]) -> list[dict[str, float]]:
-    """Corners of what can be drawn: all lowest, all highest, closest friction thresholds, and what asks for
-    the shortest steps under a light and a heavy trunk."""
-    low, high = (
-        {name: value[end] if isinstance(value, tuple) else value for name, value in given.items()}
-        for end in (0, 1)
-    )
-
-    def mixed(names: Sequence[str], base: dict[str, float], other: dict[str, float]) -> dict[str, float]:
-        return base | {name: other[name] for name in names if name in other}
-
-    close = mixed(("friction_slow",), low, high)
-    hard = mixed(("restitution", "approach_floor", "trunk_mass"), high, low)
-    corners = (low, high, close, hard, mixed(("trunk_mass",), hard, high))
-    return [corner for k, corner in enumerate(corners) if corner not in corners[:k]]
-
-
-def draw_parameters(
-    given: Mapping[str, float | tuple[float, float]], generator: np.random.Generator
-) -> dict[str, float]:
-    """A value for each parameter."""
-    return {
-        name: float(generator.uniform(*value)) if isinstance(value, tuple) else value
-        for name, value in given.items()
-    }
 
 
 def _gait(value: Any, gaits: Mapping[str, GaitParameters]) -> GaitParameters:

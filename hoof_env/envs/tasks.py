@@ -142,7 +142,11 @@ TASKS: Mapping[str, Task] = MappingProxyType(
 
 def to_json(settings: Settings) -> dict[str, Any]:
     """The settings as values that JSON can hold."""
-    return {
-        key: list(value) if isinstance(value, tuple) else dict(value) if isinstance(value, Mapping) else value
-        for key, value in asdict(settings).items()
-    }
+    return {key: _plain(value) for key, value in asdict(settings).items()}
+
+
+def _plain(value: Any) -> Any:
+    """Lists for tuples, however deep, as JSON gives them back."""
+    if isinstance(value, Mapping):
+        return {key: _plain(inner) for key, inner in value.items()}
+    return [_plain(inner) for inner in value] if isinstance(value, (list, tuple)) else value

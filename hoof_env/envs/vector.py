@@ -22,11 +22,13 @@ from numpy.typing import NDArray
 from hoof_env.dynamics.arguments import count
 from hoof_env.dynamics.trunk_model import LIFT_OFF
 from hoof_env.envs import episode as e
-from hoof_env.envs.batch import EpisodeBatch, check_state, generator_of
+from hoof_env.envs.batch import EpisodeBatch
 from hoof_env.envs.recording import Recording
 from hoof_env.envs.start import check_seed
+from hoof_env.envs.state import check_state, generator_of
 from hoof_env.envs.tasks import TASKS, to_json
 from hoof_env.errors import ParameterError, check_choice
+from hoof_env.gait.parameters import PARAMETERS
 
 MOST_ENVS = 1_000_000
 
@@ -44,7 +46,8 @@ class HorseLegVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
         rendered: how many are drawn.
 
     Rewards are float64, shape (num_envs,). Infos hold the five reward terms; when an episode ends its
-    figures, too, as "episode_summary", one array for each figure, with masks under "_episode_summary".
+    figures, too, as "episode_summary", one array for each figure, with masks under "_episode_summary", and
+    why it failed as "failure".
 
     Raises:
         ParameterError: a bad argument, option or action.
@@ -80,7 +83,7 @@ class HorseLegVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.metadata = {  # type: ignore[misc]
             **type(self).metadata,
-            "render_fps": round(1 / self.batch.dt),
+            "render_fps": max(1, round(1 / self.batch.dt)),
             "autoreset_mode": self.autoreset_mode,
         }
         self.render_mode, self.spec = render_mode, None
@@ -169,7 +172,7 @@ class HorseLegVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
         for env in np.flatnonzero(done):
             last[env] = self.batch.seen[env].copy()
         final = {key: copy.deepcopy(value) for key, value in infos.items() if not key.startswith("_")}
-        masks = {f"_{key}": done.copy() for key in final}
+        masks = {f"_{key}": infos.get(f"_{key}", done).copy() for key in final}
         self._show()
         start = self._start(np.flatnonzero(done), {})
         infos |= {"final_obs": last, "_final_obs": done.copy()}
@@ -217,6 +220,8 @@ class HorseLegVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
             if recording.env in envs:
                 recording.keep(True)
         infos = self._rows({name: start[name] for name in ("crank_angle", "speed", "height", "x")}, envs)
+        gaits = dict(zip(PARAMETERS, start["gaits"].T, strict=True))
+        infos |= {"gait": self._rows(gaits, envs), "_gait": self._of(envs)}
         if start["parameters"]:
             infos |= {"parameters": self._rows(start["parameters"], envs), "_parameters": self._of(envs)}
         return infos
@@ -239,6 +244,10 @@ class HorseLegVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
         summaries = [self.batch.summary(int(env)) for env in envs]
         found = {name: [summary[name] for summary in summaries] for name in summaries[0]}
         infos |= {"episode_summary": self._rows(found, envs), "_episode_summary": self._of(envs)}
+        failed = envs[self.batch.episode[e.ENDED, envs] == e.FAILED]
+        if failed.size:
+            infos |= {"failure": np.full(self.num_envs, None, object), "_failure": self._of(failed)}
+            infos["failure"][failed] = [self.batch.failure(int(env)) for env in failed]
 
     def _show(self) -> None:
         for recording in self._recordings:

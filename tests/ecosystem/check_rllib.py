@@ -21,7 +21,7 @@ def cluster():
 def test_ppo(env_id, mode):
     """PPO, two iterations of 256 steps, two runners, `hoof_env:` before the id; sync and native."""
     if mode == "vector_entry_point" and gym.spec(env_id).vector_entry_point is None:
-        pytest.skip("no vector_entry_point yet")
+        pytest.skip("no native vector environment")
     config = (
         PPOConfig()
         .environment(f"hoof_env:{env_id}", env_config={"episode_seconds": 0.4})

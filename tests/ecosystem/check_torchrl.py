@@ -31,7 +31,7 @@ def test_gym_wrapper(env_id):
 def test_native_vector(env_id, mode):
     """`GymWrapper` of the native vector environment, restarting on the same step or not at all."""
     if gym.spec(env_id).vector_entry_point is None:
-        pytest.skip("no vector_entry_point yet")
+        pytest.skip("no native vector environment")
     mode = gym.vector.AutoresetMode[mode.upper()]
     envs = gym.make_vec(env_id, num_envs=4, vectorization_mode="vector_entry_point", autoreset_mode=mode)
     check_env_specs(GymWrapper(envs, device="cpu"), seed=0)

@@ -11,8 +11,6 @@ import hoof_env  # noqa: F401  (registers the environments)
 collect_ignore = ["third_party"]  # somebody else's project
 
 MULTI_OBJECTIVE = "hoof_env.envs.multi_objective:"
-if not any(str(spec.entry_point).startswith(MULTI_OBJECTIVE) for spec in gym.registry.values()):
-    gym.register("hoof_env/HorseLegMO-v0", f"{MULTI_OBJECTIVE}HorseLegMOEnv", disable_env_checker=True)
 
 OURS = sorted(
     (spec for spec in gym.registry.values() if spec.namespace == "hoof_env"), key=lambda spec: spec.id

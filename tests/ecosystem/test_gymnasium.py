@@ -21,7 +21,7 @@ def envs(request, env_id):
     """Two environments side by side, ten steps an episode, warnings as errors."""
     mode = "vector_entry_point" if request.param == "native" else request.param
     if request.param == "native" and gym.spec(env_id).vector_entry_point is None:
-        pytest.skip("no vector_entry_point yet")
+        pytest.skip("no native vector environment")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)  # torch's

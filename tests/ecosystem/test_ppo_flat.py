@@ -13,7 +13,7 @@ from agents.ppo_flat import Args, learn
 def test_learn(env_id, vectorization):
     """`agents/ppo_flat.py`, 1024 steps, sync and native."""
     if vectorization == "vector_entry_point" and gym.spec(env_id).vector_entry_point is None:
-        pytest.skip("no vector_entry_point yet")
+        pytest.skip("no native vector environment")
     learned = learn(
         Args(
             env_id=env_id,

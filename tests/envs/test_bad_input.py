@@ -280,6 +280,7 @@ STATES = {
     "a version": (
         lambda state: {**state, "id": "hoof_env/HorseLeg-v1"}, "got one of hoof_env/HorseLeg-v1",
     ),
+    "no settings": (lambda state: {**state, "settings": 5}, "of other settings; preset: 'first_fit' here"),
     "no engine": (lambda state: {**state, "engine": {}}, "state: .* is missing"),
     "not a number": (
         lambda state: {**state, "engine": {**state["engine"], "trunk": state["engine"]["trunk"] * NAN}},

@@ -62,8 +62,8 @@ def test_other_seed_other_start():
 
 def test_observations_stay_in_the_box_and_none_is_constant(setup):
     env = gym.make(setup[0], **setup[1])
-    seen = [env.reset(seed=3)[0]]
-    for action in actions(5, 1000):
+    seen, slow = [env.reset(seed=3)[0]], setup[0] not in IDS
+    for action in actions(5, 100 if slow else 1000):
         observation, _, terminated, truncated, _ = env.step(action)
         seen += [observation, *([env.reset()[0]] if terminated or truncated else [])]
     observations = np.array(seen)
@@ -164,6 +164,31 @@ def test_spec_is_json_serialisable():
     again = gym.make(gym.envs.registration.EnvSpec.from_json(env.spec.to_json()))
     assert again.unwrapped.batch.weights.peak == 0.5
     assert again.unwrapped.engine.trunk.kind == "rail"
+
+
+def test_a_state_fits_the_environment_that_a_json_spec_makes():
+    """Where tuples have become lists."""
+    settings = {"randomize": {"friction": (0.2, 0.8)}, "terrain": {"kind": "hills", "friction": (0.5, 1.5)}}
+    env = gym.make(IDS[0], target_speed=(0.5, 2.0), **settings)
+    env.reset(seed=0)
+    again = gym.make(gym.envs.registration.EnvSpec.from_json(env.spec.to_json())).unwrapped
+    same(again.set_state(env.unwrapped.get_state()), env.unwrapped.batch.seen[0])
+    again.reset()
+
+
+def test_a_speed_of_nought_is_commanded():
+    env = gym.make(IDS[0], target_speed=0.0, trunk_drag=0.0, reward_weights={"peak": 0.0, "energy": 0.0})
+    env.reset(seed=0, options={"speed": 1.0, "crank_angle": 0.0, "height": 2.0})
+    info = env.step(np.zeros(4, np.float32))[4]
+    assert info["reward_progress"] == pytest.approx(-0.02, rel=0.1)
+
+
+def test_the_slowest_pictures_are_one_a_second():
+    pytest.importorskip("pygame")
+    env = gym.make(IDS[0], dt=3.0, render_mode="rgb_array")
+    assert env.metadata["render_fps"] == 1
+    env.reset(seed=0)
+    assert env.render().shape == (540, 960, 3)
 
 
 COPIES = {"deepcopy": copy.deepcopy, "pickle": lambda env: pickle.loads(pickle.dumps(env))}

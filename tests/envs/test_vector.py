@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from family import FALLS, IDS, actions, same
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from gymnasium.wrappers.vector import NormalizeReward, RecordEpisodeStatistics
 
 MODES = list(AutoresetMode)
 SHORT = {"episode_seconds": 0.3}
@@ -35,7 +36,7 @@ def both(env_id, n, mode=AutoresetMode.NEXT_STEP, **settings):
 def check_infos(ours, theirs):
     """All of theirs that are ours too, values only where they are valid."""
     for key, there in theirs.items():
-        if key.startswith("_") or key in ("gait", "failure"):
+        if key.startswith("_"):
             continue
         here, mask = ours[key], theirs[f"_{key}"]
         same(ours.get(f"_{key}", np.ones_like(mask)) & mask, mask)
@@ -43,7 +44,7 @@ def check_infos(ours, theirs):
             check_infos(here, there)
         else:
             assert len(here) == len(mask)
-            same(np.array([*here[mask]]), np.array([*there[mask]]))
+            same([*here[mask]], [*there[mask]])
 
 
 def check_step(ours, theirs, taken):
@@ -249,3 +250,22 @@ def test_frames_of_the_first_environments_and_two_closes():
     for one in (env, single):
         one.close()
         one.close()
+
+
+@pytest.mark.parametrize("mode", MODES[:2], ids=lambda mode: mode.name)
+def test_gymnasiums_wrappers_see_what_they_see_of_their_own(mode):
+    """Returns and lengths of episodes, and rewards scaled by their running variance."""
+    pair = [RecordEpisodeStatistics(NormalizeReward(env)) for env in both(IDS[0], 8, mode, **SHORT)]
+    for env in pair:
+        env.reset(seed=0)
+    ends = 0
+    for taken in actions(0, 50, 8):
+        one, two = (env.step(taken) for env in pair)
+        same(one[1], two[1])
+        assert ("episode" in one[4]) == ("episode" in two[4])
+        if "episode" in one[4]:
+            ends += one[4]["_episode"].sum()
+            for name in ("r", "l"):
+                same(one[4]["episode"][name], two[4]["episode"][name])
+    assert ends >= 16
+    assert set(pair[0].length_queue) == {15}

@@ -1,0 +1,81 @@
+"""Masses, springs, ground and motors of an episode: checked, drawn, and made of the settings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from hoof_env.dynamics.drive import Drive, Motor, Prescribed
+from hoof_env.dynamics.trunk import Trunk
+from hoof_env.envs.tasks import PER_EPISODE, Settings
+from hoof_env.errors import ParameterError, check_number
+from hoof_env.ground.contact import Ground
+
+
+def physics(settings: Settings, height: float, changes: Mapping[str, float]) -> tuple[Trunk, Ground, Drive]:
+    """Trunk at a height [m], ground and drive of some settings with others changed."""
+    s = replace(settings, **dict(changes))  # type: ignore[arg-type]
+    trunk = Trunk(
+        s.trunk, s.trunk_mass, s.trunk_share, s.trunk_stiffness, s.trunk_damping, s.trunk_drag, height
+    )  # fmt: skip
+    ground = Ground(
+        s.stiffness, s.exponent, s.normal_law, s.restitution, s.approach_floor, "interpolated",
+        s.friction_law, s.friction, s.friction_slow, s.friction_fast, s.trunk_mass,
+    )  # fmt: skip
+    if s.drive == "prescribed":
+        return trunk, ground, Prescribed()
+    return trunk, ground, Motor(s.motor_gain, s.motor_torque, s.motor_inertia, 1.0)
+
+
+def check_parameters(name: str, given: Any) -> dict[str, float | tuple[float, float]]:
+    """Physical parameters of an episode: a number each, or two to draw between.
+
+    Raises:
+        ParameterError: not a mapping, a parameter that cannot change, or values that are none.
+    """
+    if not isinstance(given, Mapping) or not set(given) <= set(PER_EPISODE):
+        raise ParameterError(
+            f"{name}: expected a mapping with some of {', '.join(PER_EPISODE)}, got {given!r}"
+        )
+    found: dict[str, float | tuple[float, float]] = {}
+    for key, value in given.items():
+        if isinstance(value, (list, tuple)):
+            if len(value) != 2:
+                raise ParameterError(f"{name}[{key!r}]: expected a number or two, got {value!r}")
+            low, high = (check_number(f"{name}[{key!r}][{k}]", v) for k, v in enumerate(value))
+            if low > high:
+                raise ParameterError(f"{name}[{key!r}]: expected the lower one first, got {value!r}")
+            found[key] = low, high
+        else:
+            found[key] = check_number(f"{name}[{key!r}]", value)
+    return found
+
+
+def extremes(given: Mapping[str, float | tuple[float, float]]) -> list[dict[str, float]]:
+    """Corners of what can be drawn: all lowest, all highest, closest friction thresholds, and what asks for
+    the shortest steps under a light and a heavy trunk."""
+    low, high = (
+        {name: value[end] if isinstance(value, tuple) else value for name, value in given.items()}
+        for end in (0, 1)
+    )
+
+    def mixed(names: Sequence[str], base: dict[str, float], other: dict[str, float]) -> dict[str, float]:
+        return base | {name: other[name] for name in names if name in other}
+
+    close = mixed(("friction_slow",), low, high)
+    hard = mixed(("restitution", "approach_floor", "trunk_mass"), high, low)
+    corners = (low, high, close, hard, mixed(("trunk_mass",), hard, high))
+    return [corner for k, corner in enumerate(corners) if corner not in corners[:k]]
+
+
+def draw_parameters(
+    given: Mapping[str, float | tuple[float, float]], generator: np.random.Generator
+) -> dict[str, float]:
+    """A value for each parameter."""
+    return {
+        name: float(generator.uniform(*value)) if isinstance(value, tuple) else value
+        for name, value in given.items()
+    }
