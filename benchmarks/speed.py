@@ -88,6 +88,10 @@ PRESET = "identified"
 
 def measure(preset: str, quick: bool, peers: bool, rounds: int) -> dict[str, Any]:
     """All of it; what `speed.json` holds."""
+    start = None
+    if not quick:
+        _say("start")
+        start = startup(preset)
     found, notes = cases.our_cases(preset, quick), []
     mujoco = peers and has("mujoco")
     if mujoco:
@@ -109,10 +113,6 @@ def measure(preset: str, quick: bool, peers: bool, rounds: int) -> dict[str, Any
     curves = scaling(preset, quick, max(2, rounds // 2))
     for curve in curves.values():
         curve["line_error"] = line_error(curve)
-    start = None
-    if not quick:
-        _say("start")
-        start = startup(preset)
     return {
         "machine": machine(), "preset": preset, "quick": quick, "clock": cases.CLOCK,
         "rounds": rounds, "dt_s": cases.DT,
