@@ -1,7 +1,7 @@
 """The one place where kernels are compiled: numba, serial, cached, without fast-math.
 
-Kernels are plain scalar functions over NumPy records and arrays. Fast-math stays off, so that a result does
-not depend on how the compiler arranged a loop.
+Kernels are plain functions over NumPy records and arrays, or over lanes (`_lanes`). Fast-math stays off, so
+that a result does not depend on how the compiler arranged a loop.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def kernel(function: F) -> F:
 
 def inlined(function: F) -> F:
     """A part of a kernel that is compiled into whatever calls it, so that the shapes of the caller's arrays
-    are known there and its loops over lanes become vector code."""
+    are known there."""
     import numba
 
     options: Any = {"error_model": "numpy", "forceinline": True}

@@ -165,16 +165,16 @@ def judge(trunk, limbs, legs, together):  # type: ignore[no-untyped-def]
         total, stuck = lane_sum(level(trunk, 0.0), total), lane_sum(level(trunk, 0.0), stuck)
     lost = choose(stuck > 0.0, float(DEAD_POINT), float(NOT_FINITE))
     fell = choose(trunk[t.FELL] > 0.0, float(FALLEN), float(OK))
-    return choose(total - total != 0.0, lost, fell)
+    return choose((total - total != 0.0) | (stuck > 0.0), lost, fell)
 
 
 @inlined
-def replace(old, new, count, data, start, row, stride, result):  # type: ignore[no-untyped-def]
-    """Put `count` rows into memory where all is well."""
+def replace(old, new, count, data, start, row, stride, good):  # type: ignore[no-untyped-def]
+    """Put `count` rows into memory where they are good."""
     for k in range(count):
         at = start + k * row
         before = read(old, data, at, stride)
-        write(choose(result == float(OK), new[k], before), data, at, stride)
+        write(choose(good, new[k], before), data, at, stride)
 
 
 @pasted
@@ -234,8 +234,9 @@ def run(data, model, tables, ground, constants, reactions, h, steps, keeps_accou
         for i in range(legs):
             first = (TRUNK_ROWS + i * LIMB_ROWS) * row + n
             load_limb_rows(below(limbs, i * b.ROWS), at, first, row, far)
+        before = read(trunk, at, AT_RESULT * row + n, near)
+        starts = before == STARTS
         if steps < 0:
-            starts = read(trunk, at, AT_RESULT * row + n, near) == STARTS
             if not anywhere(starts):
                 continue
             begin_step(trunk, limbs, legs, inside)
@@ -244,16 +245,19 @@ def run(data, model, tables, ground, constants, reactions, h, steps, keeps_accou
         run_steps(trunk, limbs, legs, inside, account, shape, found, h, max(steps, 0), keeps_account, reacts)
         report_trunk(trunk, at, AT_REPORT * row + n, row, near)
         result = judge(trunk, limbs, legs, together)
+        good = result == float(OK)
+        if steps < 0:  # the others are as they were; a start that cannot be is kept as it is
+            result, good = choose(starts, result, before), starts
         write(result, at, AT_RESULT * row + n, near)
-        replace(trunk, trunk, TRUNK_STATES, at, n, row, near, result)
+        replace(trunk, trunk, TRUNK_STATES, at, n, row, near, good)
         for k in range(ACCOUNTS):
             place = (AT_ACCOUNT + k) * row + n
             account[k] = account[k] + read(account, at, place, near)
-        replace(trunk, account, ACCOUNTS, at, AT_ACCOUNT * row + n, row, near, result)
+        replace(trunk, account, ACCOUNTS, at, AT_ACCOUNT * row + n, row, near, good)
         for i in range(legs):
             limb, first = below(limbs, i * b.ROWS), (TRUNK_ROWS + i * LIMB_ROWS) * row + n
             report_leg(trunk, limb, at, first + AT_LIMB_REPORT * row, row, far)
-            replace(trunk, limb, LIMB_STORED, at, first, row, far, result)
+            replace(trunk, limb, LIMB_STORED, at, first, row, far, good)
             if reacts:
                 for k in range(OUTPUTS):
                     place = (i * OUTPUTS + k) * row + n

@@ -2,8 +2,8 @@
 
 Every function is one stage of the mechanics on rows of memory (`trunk_rows` as t, `limb_rows` as b). A row
 holds `Lanes`, one for each environment, which do not know of each other; compiled for one lane or eight, a
-number has the same bits: only + - * / and sqrt, no fast-math, no branch that depends on a lane. Where the
-lanes are the legs of one trunk (`together`) each has a copy of the trunk, and sums go over all.
+number has the same bits: only + - * / and sqrt, no fast-math, no branch on a lane that changes a bit. Where
+the lanes are the legs of one trunk (`together`) each has a copy of the trunk, and sums go over all.
 
 A leg enters as functions of its crank angle theta (`leg.profile` as f): toe and heel, the first moment s and
 the inertias a, b, c; ' is d/dtheta, _t and _tt are time derivatives. With the world angle beta = pitch +
@@ -18,7 +18,7 @@ all bodies together: in flight it is kept to round-off, whatever the scheme.
 from __future__ import annotations
 
 from hoof_env._jit import inlined, pasted
-from hoof_env._lanes import across, below, choose, cross, dot, level, plane
+from hoof_env._lanes import across, below, choose, cross, dot, level, plane, size
 from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
 from hoof_env.dynamics.lanes_ground import meet_ground
@@ -61,7 +61,7 @@ def look_up_functions(trunk, limb, model):  # type: ignore[no-untyped-def]
     angle = limb[b.ANGLE]
     look_up(below(limb, b.VALUES), model.tables, limb[b.FIRST], model.cells, angle)
     value = limb[b.VALUES]
-    trunk[t.STUCK] = choose((angle == angle) & (value != value), 1.0, trunk[t.STUCK])
+    trunk[t.STUCK] = choose((size(angle) <= t.FARTHEST) & (value != value), 1.0, trunk[t.STUCK])
 
 
 @inlined

@@ -59,7 +59,7 @@ CONTACT_ROWS = 15
 """Toe's rows begin at CONTACT, heel's at CONTACT + CONTACT_ROWS; the names below count from there."""
 (
     SPOT, _, DEPTH, DEPTH_RATE,  # where the point is, penetration and its rate [m, m/s]
-    NORMAL_X, NORMAL_Y, FIRMNESS, ROUGHNESS,  # the ground there: normal, factors of K and mu
+    NORMAL_X, _, FIRMNESS, ROUGHNESS,  # the ground there: normal, factors of K and mu
     SLIDE, SPRING,  # speed along the ground [m/s]; the part of the normal force that comes back [N]
     SLOWNESS,  # 1 / approach speed [s/m]
     NORMAL, RUB,  # force along the ground's normal and along the ground [N]

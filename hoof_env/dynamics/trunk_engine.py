@@ -49,10 +49,12 @@ from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.profile import leg_profile
 
 FEW = 6
-"""Up to so many environments are run one by one: a tile would be mostly empty."""
+"""Up to so many environments are run one by one: eight lanes would be mostly empty."""
 
 MOST_LEGS = 32
-"""Legs of an engine; its kernels work on the stack, where a tile takes up to 75 kB a leg."""
+"""Legs of an engine; its kernels work on the stack, where eight lanes take 15 kB a leg."""
+
+_FIRST_ROW = b.PARAMETERS.index("first_row")
 
 MOST_STEPS = 10**12
 """Substeps of a call, which are counted in 64 bits."""
@@ -192,11 +194,18 @@ class TrunkEngine:
 
     def column(self, env: int) -> Floats:
         """All memory of one environment: state, settings, command, report; shape (rows,)."""
-        return self._memory.data[:, env].copy()
+        return self._memory.data[:, self._env(env)].copy()
 
     def set_column(self, env: int, column: Floats) -> None:
         """Put back what `column` gave, of an engine like this one."""
-        self._memory.data[:, env] = column
+        whole = self._memory.data
+        given = finite("column", np.nan_to_num(column))  # numbers; those that are none stay so
+        if given.shape != whole.shape[:1]:
+            raise ParameterError(f"column: expected shape {whole.shape[:1]}, got {given.shape}")
+        whole[:, self._env(env)] = column
+
+    def _env(self, env: Any) -> int:
+        return count("env", env, low=0, most=self.num_envs - 1)
 
     def command_in(self, column: Floats) -> Floats:
         """The command in such a column, shape (legs, 4)."""
@@ -258,16 +267,19 @@ class TrunkEngine:
 
         Args:
             env: which.
-            trunk, ground, drive: instead of the engine's, whose kind, exponent and laws they share; None is
-                the engine's own.
+            trunk, ground, drive: instead of the engine's, whose kinds, height, exponent and laws they share;
+                None is the engine's own. `total_mass`, `weight`, `tally` and `step_limits` stay those of the
+                engine.
 
         Raises:
             ParameterError: what environments share differs, or there is no such environment.
         """
-        env = count("env", env, low=0, most=self.num_envs - 1)
-        trunk, ground = trunk or self.trunk, ground or self.ground
+        env = self._env(env)
+        trunk = self.trunk if trunk is None else one_of("trunk", trunk, Trunk)
+        ground = self.ground if ground is None else one_of("ground", ground, Ground)
         shared = {
             "trunk.kind": (trunk.kind, self.trunk.kind),
+            "trunk.height": (trunk.height, self.trunk.height),
             "exponent": (ground.exponent, self.ground.exponent),
         }
         shared["friction_law"] = (ground.friction_law, self.ground.friction_law)
@@ -276,6 +288,9 @@ class TrunkEngine:
             if given != own:
                 raise ParameterError(f"{name}: expected {own!r}, which all environments share, got {given!r}")
         limbs = [limb if drive is None else replace(limb, drive=drive) for limb in self.limbs]
+        for limb, own_limb in zip(limbs, self.limbs, strict=True):
+            if type(limb.drive) is not type(own_limb.drive):
+                raise ParameterError(f"drive: expected a {type(own_limb.drive).__name__}, got {limb.drive!r}")
         m = self._memory
         m.trunk_settings[:, env], m.limb_settings[:, :, env] = settings_of(self, trunk, ground, limbs)
 
@@ -313,7 +328,9 @@ class TrunkEngine:
         finite("state['trunk'], places and pitch", trunk[t.CENTRE : t.CENTRE + 2, reset], FARTHEST)
         finite("state['trunk'], places and pitch", trunk[t.PITCH, reset], FARTHEST)
         finite("state['limbs'], crank angles", limbs[:, b.THETA, reset], FARTHEST)
+        arrays["limb_settings"][:, _FIRST_ROW] = self._memory.limb_settings[:, _FIRST_ROW]  # an address
         self._put(arrays)
+        self._memory.result[reset], self._memory.stride_sums[:] = 0.0, 0.0
         self._look()
 
     # Motion
@@ -335,9 +352,10 @@ class TrunkEngine:
         Raises:
             ParameterError: the command has a wrong shape or is not finite.
         """
+        steps = count("steps", steps, 0, MOST_STEPS // self.substeps)
         if command is not None:
             self._command(command)
-        self._go(count("steps", steps, 0, MOST_STEPS // self.substeps), account)
+        self._go(steps, account)
         if steps and self._memory.result.any():
             self._look()
         return self._memory.result.astype(np.int64)
@@ -381,7 +399,7 @@ class TrunkEngine:
 
     def _look(self) -> None:
         """Evaluate where the state is, and change nothing but the report."""
-        kept = self._copy((*STATE, "result"))
+        kept = self._copy((*STATE, "stride_sums", "result"))
         self._go(0)
         self._put(kept)
 

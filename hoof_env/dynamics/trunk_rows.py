@@ -46,3 +46,7 @@ spring and damper, ..., the ground's (`ground.contact.Ground`), and the height b
 fallen through it [m]."""
 
 ROWS = 68
+
+FARTHEST = 1e9
+"""Largest angles [rad] and places [m] of a state, which are as good as numbers are fine there: to 6e-10 at
+1e6, to 6e-7 at 1e9; also the largest rates of a start, whose squares are then numbers still."""

@@ -18,9 +18,7 @@ from hoof_env.errors import ParameterError
 if TYPE_CHECKING:
     from hoof_env.dynamics.trunk_engine import TrunkEngine
 
-FARTHEST = 1e9
-"""Largest angles [rad] and places [m] of a state, which are as good as numbers are fine there: to 6e-10 at
-1e6, to 6e-7 at 1e9; also the largest rates of a start, whose squares are then numbers still."""
+FARTHEST = t.FARTHEST
 
 
 def start(
