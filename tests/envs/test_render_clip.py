@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -71,13 +72,22 @@ def test_a_failure_leaves_the_old_film_as_it_was(tmp_path):
     assert [file.name for file in tmp_path.iterdir()] == ["run.mp4"]
 
 
+def _is_begun(folder):
+    """Whether a film is being written; the trial folder that the command makes first comes and goes."""
+    try:
+        return any(file.stat().st_size for file in folder.glob(".unfinished-*/*"))
+    except FileNotFoundError:
+        return False
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT to another process")
 def test_an_interrupt_is_one_line_and_leaves_nothing_behind(tmp_path):
     command = [sys.executable, "-m", "hoof_env.cli", "render", "--out", str(tmp_path / "x.mp4")]
     options = ["--seconds", "1000", "--args", "episode_seconds=1000"]
     with subprocess.Popen([*command, *options], stderr=subprocess.PIPE, text=True) as process:
-        while not any(file.stat().st_size for file in tmp_path.glob(".unfinished-*/*")):
+        while not _is_begun(tmp_path):
             assert process.poll() is None
+            time.sleep(0.01)
         process.send_signal(signal.SIGINT)
         _, errors = process.communicate(timeout=60)
     assert process.returncode == 130
