@@ -20,8 +20,9 @@ from benchmarks.speed_ceilings import ceilings, clock
 from benchmarks.speed_code import KINDS, WIDTHS, assembly, by_kind, instructions
 from benchmarks.speed_rounds import Floats, interleave, spread
 from benchmarks.speed_stages import STAGES, STEP, Pass, jit
-from hoof_env.dynamics.advance import LANES, advance_batch, advance_one, run
+from hoof_env.dynamics.advance import LANES, advance_batch, run
 from hoof_env.dynamics.trunk_engine import TrunkEngine
+from hoof_env.dynamics.trunk_model import new_memory
 
 Timed = tuple[Callable[[], float], float]
 """A run, and how many of what is asked it does."""
@@ -125,6 +126,14 @@ def _kernel(lanes: int, legs: int = 0) -> Any:
     return jit(advance)
 
 
+def _without_idle(made: TrunkEngine) -> TrunkEngine:
+    """The engine with memory for its environments alone."""
+    column = made._memory.data[:, : made.num_envs]
+    made._memory = new_memory(made, made.num_envs)
+    made._memory.data[:] = column
+    return made
+
+
 def _with_aligned_table(made: TrunkEngine, steps: int) -> Timed:
     model, tables, ground = made._model
     room = np.empty(tables.size + 7)
@@ -148,9 +157,12 @@ def experiments(preset: str, rounds: int) -> dict[str, dict[str, Any]]:
 
     def cost(scene: Scene, number: int, steps: int, kernel: Any = None, **options: Any) -> Timed:
         made = engine(scene, preset, number, **options)
+        if kernel and number == 1:
+            made = _without_idle(made)
         return _advance(made, number * len(scene.limbs), steps, kernel)
 
     batch = partial(cost, leg, BATCH)
+    bare = _without_idle(engine(leg, preset, BATCH))
     groups = {
         f"{BATCH} legs, 100 steps a call": {
             "plain": batch(100),
@@ -160,9 +172,9 @@ def experiments(preset: str, rounds: int) -> dict[str, dict[str, Any]]:
             "64 legs": cost(leg, 64, 1600),
             "16384 legs": cost(leg, 16 * BATCH, 100),
             "10 steps a call": batch(10),
-            "10 steps a call, 1032 legs": cost(leg, BATCH + LANES, 10),
+            "10 steps a call, rows of memory 8 KiB apart": _advance(bare, BATCH, 10),
             "1 step a call": batch(1),
-            "1 step a call, 1032 legs": cost(leg, BATCH + LANES, 1),
+            "1 step a call, rows of memory 8 KiB apart": _advance(bare, BATCH, 1),
             "2 lanes": batch(100, _kernel(2)),
             "4 lanes": batch(100, _kernel(4)),
             "16 lanes": batch(100, _kernel(16)),
@@ -172,13 +184,13 @@ def experiments(preset: str, rounds: int) -> dict[str, dict[str, Any]]:
         "one leg": {
             "plain": cost(leg, 1, 5000),
             "in the air": cost(high, 1, 5000),
-            "by the kernel for any number of legs": cost(leg, 1, 5000, advance_one),
+            "by a kernel for any number of legs": cost(leg, 1, 5000, _kernel(1)),
             "two legs on the fixed trunk": cost(_legs(leg, 2), 1, 5000, _kernel(1, 2)),
             "four legs on the fixed trunk": cost(_legs(leg, 4), 1, 5000, _kernel(1, 4)),
         },
         "one horse": {
             "plain": cost(horse, 1, 1000),
-            "legs one after the other": cost(horse, 1, 1000, advance_one),
+            "legs one after the other": cost(horse, 1, 1000, _kernel(1)),
         },
     }
     seconds = _each(

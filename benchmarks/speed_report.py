@@ -33,9 +33,8 @@ SCALING = """\
 
 ![Cost against steps, legs and environments](scaling.svg)
 
-The straight line is a fixed cost and one for each step, leg or environment. Up to six environments are run
-one by one, more side by side, eight at a time. One trunk with one leg and one with four have kernels of their
-own, and with other numbers one that goes from leg to leg."""
+The straight line is a fixed cost and one for each step, leg or environment. Up to six environments of one leg
+or of four are run one by one, more, or those with other numbers of legs, side by side, eight at a time."""
 
 PASSES = """\
 A pass is what a kernel's code does at a time: a leg, the four legs of a horse, or eight environments of a

@@ -23,7 +23,6 @@ from hoof_env.dynamics.trunk_engine import TrunkEngine
 KERNELS = {
     "advance_leg": ("leg", 1, 1),
     "advance_four": ("horse", 4, 1),
-    "advance_one": ("horse", 3, 1),
     "advance_batch": ("leg", 1, 8),
 }
 """Scene, legs and environments that each is used for."""
@@ -106,12 +105,9 @@ def scaling(preset: str, quick: bool, rounds: int) -> dict[str, dict[str, Any]]:
     curves: dict[str, tuple[list[int], list[int], list[Callable[[], float]]]] = {}
     one = engine(at["leg"], preset)
     curves["one leg against steps"] = lengths, lengths, [_advance(one, n) for n in lengths]
-    for title, envs, count in (("one trunk against legs", 1, 1000), ("batch of 256 against legs", 256, 20)):
-        made = [
-            engine(on_legs(at["horse"], n), preset, envs if not quick else min(envs, 32)) for n in numbers
-        ]
-        units = [n * e.num_envs * count for n, e in zip(numbers, made, strict=True)]
-        curves[title] = numbers, units, [_advance(e, count) for e in made]
+    made = [engine(on_legs(at["horse"], n), preset, 32 if quick else 256) for n in numbers]
+    units = [n * e.num_envs * 20 for n, e in zip(numbers, made, strict=True)]
+    curves["batch of 256 against legs"] = numbers, units, [_advance(e, 20) for e in made]
     steps = 10 if quick else 1000
     for name in ("leg", "horse"):
         runs = [_advance(engine(at[name], preset, n), steps) for n in sizes]
@@ -149,7 +145,7 @@ def draw(curves: dict[str, dict[str, Any]], folder: Path) -> None:
         (
             "legs on one trunk",
             "step of the trunk",
-            {"one trunk against legs": "one trunk", "batch of 256 against legs": "batch of 256, per trunk"},
+            {"batch of 256 against legs": "batch of 256, per trunk"},
         ),
         (
             "environments in a batch",

@@ -95,7 +95,7 @@ def _announce_compiling() -> None:
             if self.depth == 1:
                 self.started = time.monotonic()
                 if not self.is_told:
-                    _say("compiling kernels for this machine, once (about 20 s) ...")
+                    _say("compiling kernels for this machine, once (about half a minute) ...")
                 self.is_told = True
 
         def on_end(self, event: Any) -> None:

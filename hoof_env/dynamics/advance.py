@@ -1,9 +1,8 @@
 """The engine's kernels: environments come from the engine's memory, go step after step, and go back.
 
-`advance_leg`, `advance_four`, `advance_one` and `advance_batch` are one function, compiled for one leg alone,
-for four lanes that are the legs of one trunk, for one lane and any number of legs, and for `LANES`
-environments side by side. What they work on lives on the stack, where the compiler keeps what it can in
-registers.
+`advance_leg`, `advance_four` and `advance_batch` are one function, compiled for one leg alone, for four lanes
+that are the legs of one trunk, and for `LANES` environments side by side with any number of legs. What they
+work on lives on the stack, where the compiler keeps what it can in registers.
 
 An engine's memory is one matrix `data`, a column for each environment: the rows of the trunk, then those of
 each leg, as `TRUNK` and `LIMB` have them.
@@ -274,13 +273,6 @@ def advance_leg(data, model, tables, ground, constants, reactions, h, steps, kee
 def advance_four(data, model, tables, ground, constants, reactions, h, steps, keeps_account):  # type: ignore[no-untyped-def]
     """Each environment by itself; they have four legs, side by side."""
     run(data, model, tables, ground, constants, reactions, h, steps, keeps_account, 1, 4, True)
-
-
-@kernel
-def advance_one(data, model, tables, ground, constants, reactions, h, steps, keeps_account):  # type: ignore[no-untyped-def]
-    """Each environment by itself; they have any number of legs, one after the other."""
-    legs = model[0].legs
-    run(data, model, tables, ground, constants, reactions, h, steps, keeps_account, legs, 1, False)
 
 
 @kernel

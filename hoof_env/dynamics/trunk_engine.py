@@ -26,7 +26,6 @@ from hoof_env.dynamics.advance import (
     advance_batch,
     advance_four,
     advance_leg,
-    advance_one,
 )
 from hoof_env.dynamics.arguments import Floats, all_of, count, finite, flag, one_of
 from hoof_env.dynamics.drive import Drive
@@ -49,7 +48,7 @@ from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.profile import leg_profile
 
 FEW = 6
-"""Up to so many environments are run one by one: eight lanes would be mostly empty."""
+"""Up to so many environments of one leg or four are run one by one: eight lanes would be mostly empty."""
 
 MOST_LEGS = 32
 """Legs of an engine; its kernels work on the stack, where eight lanes take 15 kB a leg."""
@@ -77,6 +76,12 @@ class Reactions(NamedTuple):
     lock: Floats
     driver: Floats
     hip: Floats
+
+
+def _columns(num_envs: int) -> int:
+    """Whole groups of lanes; one more where rows of memory would begin in the same few sets of the cache."""
+    columns = -(-num_envs // LANES) * LANES
+    return columns + LANES if columns % 128 == 0 else columns
 
 
 class TrunkEngine:
@@ -143,10 +148,10 @@ class TrunkEngine:
         asked = None if substeps is None else count("substeps", substeps, most=MOST_STEPS)
         self.substeps = length.choose(self.sim_dt, asked)
         self.reacts, self.counts_strides = flag("reactions", reactions), flag("strides", strides)
-        self.is_few = self.num_envs <= FEW
-        alone = {1: advance_leg, 4: advance_four}.get(len(self.limbs), advance_one)
-        self._run = alone if self.is_few else advance_batch
-        self._memory = new_memory(self, self.num_envs if self.is_few else -(-self.num_envs // LANES) * LANES)
+        alone = {1: advance_leg, 4: advance_four}.get(len(self.limbs))
+        self.is_few = alone is not None and self.num_envs <= FEW
+        self._run = (alone if self.is_few else None) or advance_batch
+        self._memory = new_memory(self, self.num_envs if self.is_few else _columns(self.num_envs))
         self._model = new_model(self)
 
     def __getstate__(self) -> dict[str, Any]:
