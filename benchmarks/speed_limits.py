@@ -157,7 +157,7 @@ def experiments(preset: str, rounds: int) -> dict[str, dict[str, Any]]:
 
     def cost(scene: Scene, number: int, steps: int, kernel: Any = None, **options: Any) -> Timed:
         made = engine(scene, preset, number, **options)
-        if kernel and number == 1:
+        if kernel:  # whose lanes need not divide what there is
             made = _without_idle(made)
         return _advance(made, number * len(scene.limbs), steps, kernel)
 
