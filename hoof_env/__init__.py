@@ -29,7 +29,6 @@ _PUBLIC = {
     "LegEngine": "hoof_env.dynamics.engine",
     "ConstrainedLeg": "hoof_env.dynamics.constrained",
     "HorseLegEnv": "hoof_env.envs.horse_leg",
-    "HorseLegFixedEnv": "hoof_env.envs.horse_leg_fixed",
     "HorseLegMOEnv": "hoof_env.envs.multi_objective",
     "HorseLegVectorEnv": "hoof_env.envs.vector",
     "Sb3VecEnv": "hoof_env.envs.sb3",
@@ -44,7 +43,13 @@ _PUBLIC = {
 
 __all__ = ["__version__", *_PUBLIC]
 
-_TASKS = {"HorseLeg": "leg", "HorseLegRail": "rail", "HorseLegSpeed": "speed", "HorseLegTerrain": "terrain"}
+_TASKS = {
+    "HorseLeg": "leg",
+    "HorseLegRail": "rail",
+    "HorseLegSpeed": "speed",
+    "HorseLegTerrain": "terrain",
+    "HorseLegFixed": "fixed",
+}
 
 
 def __getattr__(name: str) -> Any:
@@ -71,7 +76,6 @@ for _name, _task in _TASKS.items():
         vector_entry_point="hoof_env.envs.vector:HorseLegVectorEnv",
         kwargs={"task": _task},
     )
-_register("HorseLegFixed-v0", entry_point="hoof_env.envs.horse_leg_fixed:HorseLegFixedEnv")
 _register(
     "HorseLegMO-v0",
     entry_point="hoof_env.envs.multi_objective:HorseLegMOEnv",

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 import hoof_env
 from hoof_env._output import check_folder
 from hoof_env.envs.policies import Scripted, make_policy, policy_names
-from hoof_env.envs.render_instant import UNITS, Columns, columns_of_engine, columns_of_trace
+from hoof_env.envs.render_instant import UNITS, Columns, columns_of_engine
 from hoof_env.errors import DataFileError, OutputError, ParameterError, check_number
 from hoof_env.gait.parameters import PARAMETERS, GaitParameters
 from hoof_env.ground.terrain import Terrain
@@ -88,9 +88,7 @@ def substeps(env: Any, command: NDArray[np.float64] | None = None) -> Columns:
         Arrays by the fields of `Instant`.
     """
     leg = env.unwrapped
-    if hasattr(leg, "record"):
-        return columns_of_engine(leg.record(), leg.terrain, command=command)
-    return columns_of_trace(leg.trace, command, leg.engine.state.filters["value"])
+    return columns_of_engine(leg.record(), leg.terrain, command=command)
 
 
 def parse_arguments(option: str, items: Sequence[str]) -> dict[str, Any]:

@@ -38,7 +38,15 @@ from hoof_env.dynamics.schemes import SCHEMES
 from hoof_env.dynamics.step_length import StepLength
 from hoof_env.dynamics.tally import Tally, tally
 from hoof_env.dynamics.trunk import Trunk
-from hoof_env.dynamics.trunk_model import differences, layout, memory_of, new_memory, new_model, settings_of
+from hoof_env.dynamics.trunk_model import (
+    Memory,
+    differences,
+    layout,
+    memory_of,
+    new_memory,
+    new_model,
+    settings_of,
+)
 from hoof_env.dynamics.trunk_start import FARTHEST, start
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait.motion_law import FilterSettings
@@ -76,6 +84,14 @@ class Reactions(NamedTuple):
     lock: Floats
     driver: Floats
     hip: Floats
+
+
+def _named(memory: Memory) -> dict[str, Floats]:
+    """State and report by name, as views."""
+    parts = ((t.STATE, memory.trunk), (TRUNK_REPORT, memory.trunk_report))
+    found = {name: rows[k] for names, rows in parts for k, name in enumerate(names)}
+    limbs = ((b.STATE, memory.limbs), (LIMB_REPORT, memory.limb_report))
+    return found | {name: rows[:, k] for names, rows in limbs for k, name in enumerate(names)}
 
 
 def _columns(num_envs: int) -> int:
@@ -378,14 +394,20 @@ class TrunkEngine:
             ParameterError: as `advance`.
         """
         steps, every = count("steps", steps, low=0), count("every", every)
-        result = self.advance(command, 0)
-        rows = [self.state | self.report]
-        for done in range(0, steps, every):
-            result = self.advance(None, min(every, steps - done))
-            if result.any():
+        self.advance(command, 0)
+        m, rows = self._memory, 1 + -(-steps // every)
+        whole = np.empty((*m.data.shape, rows))
+        whole[..., 0] = m.data
+        for row in range(1, rows):
+            self._go(min(every, steps - (row - 1) * every), True)
+            if m.result.any():
+                self._look()
+                rows = row
                 break
-            rows.append(self.state | self.report)
-        return {name: np.array([row[name] for row in rows]) for name in rows[0]} | {"result": result}
+            whole[..., row] = m.data
+        kept = memory_of(whole[..., :rows], self.num_envs, m.constants, m.reactions)
+        named = {name: np.moveaxis(values, -1, 0) for name, values in _named(kept).items()}
+        return named | {"result": self.results}
 
     def _command(self, command: ArrayLike) -> None:
         given, whole = finite("command", command), self._memory.command
@@ -421,18 +443,14 @@ class TrunkEngine:
     def state(self) -> dict[str, Floats]:
         """The state by name: rows of `trunk_rows.STATE`, shape (num_envs,), and of `limb_rows.STATE`, shape
         (legs, num_envs)."""
-        a = self._memory
-        return {name: a.trunk[k].copy() for k, name in enumerate(t.STATE)} | {
-            name: a.limbs[:, k].copy() for k, name in enumerate(b.STATE)
-        }
+        named = _named(self._memory)
+        return {name: named[name].copy() for name in (*t.STATE, *b.STATE)}
 
     @property
     def report(self) -> dict[str, Floats]:
         """What acts at the present instant: `lanes_report.TRUNK_REPORT` and `LIMB_REPORT` by name."""
-        a = self._memory
-        return {name: a.trunk_report[k].copy() for k, name in enumerate(TRUNK_REPORT)} | {
-            name: a.limb_report[:, k].copy() for k, name in enumerate(LIMB_REPORT)
-        }
+        named = _named(self._memory)
+        return {name: named[name].copy() for name in (*TRUNK_REPORT, *LIMB_REPORT)}
 
     @property
     def account(self) -> dict[str, Floats]:

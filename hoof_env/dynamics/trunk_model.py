@@ -70,11 +70,11 @@ class Memory(NamedTuple):
 
 
 def memory_of(data: Floats, num_envs: int, constants: Floats, reactions: Floats) -> Memory:
-    """`Memory` with the parts of `data`, whose last columns may be idle."""
+    """`Memory` with the parts of `data`, whose last columns may be idle; more axes may follow."""
     legs = len(constants)
     trunk, limbs = (
         data[:TRUNK_ROWS, :num_envs],
-        data[TRUNK_ROWS:].reshape(legs, LIMB_ROWS, -1)[:, :, :num_envs],
+        data[TRUNK_ROWS:].reshape(legs, LIMB_ROWS, *data.shape[1:])[:, :, :num_envs],
     )
     t_parts = {name: trunk[rows] for name, rows in TRUNK.items()}
     l_parts = {name: limbs[:, rows] for name, rows in LIMB.items()}

@@ -16,20 +16,23 @@ from numpy.typing import NDArray
 from hoof_env.dynamics.advance import LIMB, TRUNK, TRUNK_ROWS
 from hoof_env.dynamics.drive import Drive
 from hoof_env.dynamics.engine import GRAVITY
+from hoof_env.dynamics.integrators import INTEGRATORS
 from hoof_env.dynamics.limb import Limb
 from hoof_env.dynamics.result import Result
+from hoof_env.dynamics.schemes import SCHEMES
 from hoof_env.dynamics.step_length import StepLength
 from hoof_env.dynamics.trunk import ONE_LEG, Trunk
 from hoof_env.dynamics.trunk_engine import TrunkEngine
 from hoof_env.envs import episode as e
 from hoof_env.envs.grounds import make_terrain
-from hoof_env.envs.observation import GROUPS, HALF_RANGE, MIDDLE, check_groups, entries, places
-from hoof_env.envs.parameters import check_parameters, draw_parameters, extremes, physics
+from hoof_env.envs.observation import GROUPS, HALF_RANGE, HIGH, LOW, MIDDLE, check_groups, entries, places
+from hoof_env.envs.paper_solver import PaperSolver, check_paper
+from hoof_env.envs.parameters import check_parameters, draw_parameters, extremes, physics, resolved
 from hoof_env.envs.reward import RewardWeights
 from hoof_env.envs.start import HIGHEST, LOWEST, check_options, draw_starts
 from hoof_env.envs.tasks import Settings, Task
 from hoof_env.errors import ParameterError, check_choice, check_number
-from hoof_env.gait.parameters import LIMITS, GaitParameters, gait_names, load_gait
+from hoof_env.gait.parameters import GaitParameters, gait_names, load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.profile import leg_profile
@@ -55,12 +58,20 @@ class EpisodeBatch:
     """
 
     def __init__(self, task: Task, settings: Settings, num_envs: int) -> None:
-        self.task, self.settings, self.num_envs = task, settings, num_envs
-        s = settings
+        self.task, self.num_envs = task, num_envs
+        self.settings = s = resolved(settings)
+        is_paper = s.solver == "paper"
         check_choice("trunk", s.trunk, ONE_LEG)
+        check_choice("integrator", s.integrator, INTEGRATORS if is_paper else SCHEMES)
         check_choice("drive", s.drive, ("prescribed", "motor"))
+        for name in ("baumgarte_alpha", "baumgarte_beta"):
+            check_number(name, getattr(s, name), low=0.0)
+        if is_paper:
+            check_paper(s)
         self.geometry = load_geometry(s.preset)
         self.gaits = {name: load_gait(name, s.preset) for name in gait_names(s.preset)}
+        self.gait = None if s.gait is None else self.gaits[check_choice("gait", s.gait, self.gaits)]
+        self._base = MIDDLE if self.gait is None else self.gait.to_array()
         self.weights = RewardWeights.of(s.reward_weights)
         self.substeps = _substeps(s.dt, s.sim_dt)
         self.dt = s.sim_dt * self.substeps
@@ -73,9 +84,14 @@ class EpisodeBatch:
         height = nominal if s.hip_height is None else s.hip_height
         self.height = check_number("hip_height", height, low=LOWEST * nominal, high=HIGHEST * nominal)
         self.groups = check_groups(s.observation, GROUPS)
-        self.randomize = check_parameters("randomize", s.randomize or {})
+        self.randomize = check_parameters("randomize", s.randomize or {}, s.drive)
         self.target_speed = None if s.target_speed is None else _two("target_speed", s.target_speed, -20.0)
         self.target_seconds = _two("target_seconds", s.target_seconds, self.dt if self.target_speed else 0.0)
+        for group, needed in (("target", "target_speed"), ("ground", "terrain")):
+            if group in self.groups and not getattr(s, needed):
+                raise ParameterError(
+                    f"observation: {group!r} is constant without {needed}, got {needed}=None"
+                )
         self._terrain, self._found_good = make_terrain(s.terrain), ""
         trunk, ground, drive = self._physics({})
         substeps = None
@@ -83,8 +99,10 @@ class EpisodeBatch:
             substeps = max(self._parts(corner, None) for corner in ({}, *extremes(self.randomize)))
         self.engine = TrunkEngine(
             Limb(self.geometry, drive=drive), trunk, ground, self._terrain, substeps=substeps,
-            sim_dt=s.sim_dt, integrator=s.integrator, num_envs=num_envs, strides=True,
+            sim_dt=s.sim_dt, integrator="midpoint" if is_paper else s.integrator,
+            num_envs=num_envs, strides=True,
         )  # fmt: skip
+        self.paper = PaperSolver(s, self.engine, self.substeps) if is_paper else None
         self._varied = np.zeros(num_envs, bool)
         self.names = [entry[0] for entry in entries(self.groups, s.trunk)]
         columns = self.engine.columns
@@ -102,9 +120,9 @@ class EpisodeBatch:
 
     def _task_record(self) -> NDArray[Any]:
         found = np.zeros(1, e.TASK)
-        task, low_high = found[0], np.array(list(LIMITS.values()))
-        task["base"] = task["middle"] = MIDDLE
-        task["half"], task["low"], task["high"] = HALF_RANGE, low_high[:, 0], low_high[:, 1]
+        task = found[0]
+        task["base"], task["middle"] = self._base, MIDDLE
+        task["half"], task["low"], task["high"] = HALF_RANGE, LOW, HIGH
         task["rate_bound"] = self.engine.filters.to_array()[:, 1]
         w = self.weights
         task["weights"] = w.progress, w.peak, w.energy, w.action, w.failure
@@ -120,10 +138,21 @@ class EpisodeBatch:
     def _open(self) -> None:
         """Make the desk: addresses of the arrays as they are now."""
         one, many = (e.step_one, e.look_one), (e.step_batch, e.look_batch)
-        self.kernel, self._look = one if self.engine.is_few else many
+        self.kernel, self._look = one if self.engine.is_few or self.paper else many
+        if self.paper:
+            self.kernel = self._step_paper
         arrays = (*self.engine.arrays, self.episode, self._task, self.actions, self.seen)
         slots = [[a.ctypes.data, *a.shape, *[0] * (3 - a.ndim)] for a in arrays]
         self.desk = np.array(slots, np.int64).ravel()
+
+    def _step_paper(self, desk: NDArray[np.int64]) -> int:
+        """As `episode.step_one`, with the paper's solver."""
+        assert self.paper
+        if not e.take_one(desk):
+            return e.NOT_A_NUMBER
+        self.paper.advance()
+        said: int = e.judge_one(desk)
+        return said
 
     # Episodes
 
@@ -139,7 +168,12 @@ class EpisodeBatch:
         Raises:
             ParameterError: an unknown option, or a value out of range.
         """
-        checked = check_options(options, self.gaits, self.engine.trunk)
+        s = self.settings
+        checked = {**self.task.start, **check_options(options, self.gaits, self.engine.trunk, s.drive)}
+        if self.paper and checked.get("parameters"):
+            raise ParameterError(
+                f"options['parameters']: expected none with solver=\"paper\", got {checked['parameters']!r}"
+            )
         self._check_extremes(self.randomize | checked.get("parameters", {}))
         return checked
 
@@ -188,8 +222,9 @@ class EpisodeBatch:
                 columns[e.WEIGHT, env] = (trunk.mass + self.geometry.mass) * GRAVITY
             self._varied[which] = bool(parameters)
         start = draw_starts(
-            options, generators, self.engine.profiles[0], self.engine.trunk, self.gaits, self.engine.terrain
-        )
+            options, generators, self.engine.profiles[0], self.engine.trunk, self.gaits, self.engine.terrain,
+            self.gait,
+        )  # fmt: skip
         self.engine.reset(
             start.gaits.T[None],
             start.crank_angle[None],
@@ -207,6 +242,8 @@ class EpisodeBatch:
             for env, generator in zip(which, generators, strict=True):
                 columns[e.TARGET, env] = generator.uniform(*self.target_speed)
                 self._draw_target(int(env), generator)
+        if self.paper:
+            self.paper.start(which.tolist(), start.gaits, start.crank_angle, start.x)
         self._look(self.desk)
         return {**vars(start), "parameters": drawn}
 
@@ -235,7 +272,7 @@ class EpisodeBatch:
         """`step` after its kernel, which said so."""
         if said < 0:
             raise ParameterError("action: expected finite numbers, got some that are not")
-        if said & 1 and self.engine.results.any():
+        if said & 1 and not self.paper and self.engine.results.any():
             self._look_again()
         if said & e.SWITCHED:
             due = self.episode[e.STEPS, : self.num_envs] >= self.episode[e.SWITCH, : self.num_envs]
@@ -290,19 +327,22 @@ class EpisodeBatch:
     # Actions
 
     def command_of(self, action: Any) -> Floats:
-        """Gait parameters that an action commands, shape (4,); the action is clipped to [-1, 1]."""
-        return MIDDLE + HALF_RANGE * np.clip(np.asarray(action, np.float64), -1.0, 1.0)
+        """Gait parameters that an action commands, shape (4,); the action is clipped to [-1, 1], and they to
+        their limits."""
+        wanted = self._base + HALF_RANGE * np.clip(np.asarray(action, np.float64), -1.0, 1.0)
+        return np.clip(wanted, LOW, HIGH)
 
     def action_for(self, gaits: GaitParameters | Floats) -> NDArray[np.float32]:
         """The action that commands a gait, or gaits of shape (n, 4), to float32 precision."""
         values = gaits.to_array() if isinstance(gaits, GaitParameters) else gaits
-        return np.clip((values - MIDDLE) / HALF_RANGE, -1, 1).astype(np.float32)
+        return np.clip((values - self._base) / HALF_RANGE, -1, 1).astype(np.float32)
 
     # State
 
     def get_state(self) -> dict[str, Any]:
         """Everything that changes, but for the generators."""
-        return {"engine": self.engine.get_state(), "episode": self.episode[:, : self.num_envs].copy()}
+        found = {"engine": self.engine.get_state(), "episode": self.episode[:, : self.num_envs].copy()}
+        return found | ({"paper": self.paper.get_state()} if self.paper else {})
 
     def set_state(self, state: Mapping[str, Any]) -> None:
         """Put back what `get_state` gave.
@@ -321,6 +361,8 @@ class EpisodeBatch:
                 f"got {episode.shape}"
             )
         self.engine.set_state(state["engine"])
+        if self.paper:
+            self.paper.set_state(state.get("paper", {}))
         self.episode[:, : self.num_envs] = episode
         self._varied[:] = True
         self._look(self.desk)

@@ -212,31 +212,28 @@ def look(mine, data, episode, ground, model, seen, task, n, columns):  # type: i
 
 
 @pasted
-def step_all(desk, lanes, advance):  # type: ignore[no-untyped-def]
-    """One control step; returns what `NOT_A_NUMBER` and `SWITCHED` say."""
+def take_all(desk, lanes):  # type: ignore[no-untyped-def]
+    """Take all actions, or none: whether they are numbers."""
     columns, mine = desk[2], rows(doubles(lanes), lanes)
     data, episode = _double_at(desk[0]), _double_at(desk[6 * _SLOTS])
-    actions, seen = _single_at(desk[8 * _SLOTS]), _single_at(desk[9 * _SLOTS])
+    actions, task = _single_at(desk[8 * _SLOTS]), carray(_task_at(desk[7 * _SLOTS]), (1,))
+    good = True
+    for k in range(columns * ACTIONS):
+        good &= size(float(actions[k])) < np.inf
+    if good:
+        for n in range(0, columns, lanes):
+            take_action(mine, actions, episode, data, task[0], n, columns)
+    return good
+
+
+@pasted
+def judge_all(desk, lanes):  # type: ignore[no-untyped-def]
+    """Reward and observe what has been simulated; returns what `SWITCHED` says."""
+    columns, mine = desk[2], rows(doubles(lanes), lanes)
+    data, episode, seen = _double_at(desk[0]), _double_at(desk[6 * _SLOTS]), _single_at(desk[9 * _SLOTS])
     task, model = carray(_task_at(desk[7 * _SLOTS]), (1,)), carray(_model_at(desk[_SLOTS]), (1,))
     ground = carray(_double_at(desk[3 * _SLOTS]), (desk[3 * _SLOTS + 1], desk[3 * _SLOTS + 2]))
-    what = task[0]
-    for k in range(columns * ACTIONS):
-        if not (size(float(actions[k])) < np.inf):
-            return NOT_A_NUMBER
-    for n in range(0, columns, lanes):
-        take_action(mine, actions, episode, data, what, n, columns)
-    advance(
-        carray(data, (desk[1], desk[2])),
-        model,
-        carray(_double_at(desk[2 * _SLOTS]), (desk[2 * _SLOTS + 1], desk[2 * _SLOTS + 2])),
-        ground,
-        carray(_double_at(desk[4 * _SLOTS]), (desk[4 * _SLOTS + 1], desk[4 * _SLOTS + 2])),
-        carray(_double_at(desk[5 * _SLOTS]), (desk[5 * _SLOTS + 1], desk[5 * _SLOTS + 2], columns * 0)),
-        what.h,
-        what.substeps,
-        desk[1] < 0,  # never: the account of energy is not kept here
-    )
-    ended = 0
+    what, ended = task[0], 0
     for n in range(0, columns, lanes):
         done, switch = judge_step(mine, data, episode, what, n, columns)
         if anywhere(done):
@@ -245,6 +242,26 @@ def step_all(desk, lanes, advance):  # type: ignore[no-untyped-def]
             ended |= SWITCHED
         look(mine, data, episode, ground, model[0], seen, what, n, columns)
     return ended
+
+
+@pasted
+def step_all(desk, lanes, advance):  # type: ignore[no-untyped-def]
+    """One control step; returns what `NOT_A_NUMBER` and `SWITCHED` say."""
+    if not take_all(desk, lanes):
+        return NOT_A_NUMBER
+    task = carray(_task_at(desk[7 * _SLOTS]), (1,))
+    advance(
+        carray(_double_at(desk[0]), (desk[1], desk[2])),
+        carray(_model_at(desk[_SLOTS]), (1,)),
+        carray(_double_at(desk[2 * _SLOTS]), (desk[2 * _SLOTS + 1], desk[2 * _SLOTS + 2])),
+        carray(_double_at(desk[3 * _SLOTS]), (desk[3 * _SLOTS + 1], desk[3 * _SLOTS + 2])),
+        carray(_double_at(desk[4 * _SLOTS]), (desk[4 * _SLOTS + 1], desk[4 * _SLOTS + 2])),
+        carray(_double_at(desk[5 * _SLOTS]), (desk[5 * _SLOTS + 1], desk[5 * _SLOTS + 2], desk[2] * 0)),
+        task[0].h,
+        task[0].substeps,
+        desk[1] < 0,  # never: the account of energy is not kept here
+    )
+    return judge_all(desk, lanes)
 
 
 @pasted
@@ -268,6 +285,18 @@ def step_one(desk):  # type: ignore[no-untyped-def]
 def step_batch(desk):  # type: ignore[no-untyped-def]
     """One control step of `LANES` environments at a time."""
     return step_all(desk, LANES, advance_batch)
+
+
+@kernel
+def take_one(desk):  # type: ignore[no-untyped-def]
+    """Actions of each environment by itself, for a solver that is not a kernel."""
+    return take_all(desk, 1)
+
+
+@kernel
+def judge_one(desk):  # type: ignore[no-untyped-def]
+    """What follows the physics of each environment by itself."""
+    return judge_all(desk, 1)
 
 
 @kernel

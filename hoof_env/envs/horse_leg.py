@@ -112,7 +112,7 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     @property
     def sim_dt(self) -> float:
         """Substep [s]."""
-        return self.settings.sim_dt
+        return self.batch.settings.sim_dt
 
     def command_of(self, action: Any) -> NDArray[np.float64]:
         """Gait parameters that an action commands, shape (4,); the action is clipped to [-1, 1]."""

@@ -17,11 +17,9 @@ from hoof_env.envs import manual_tables as tables
 from hoof_env.envs import start
 from hoof_env.envs.episode import TERMS
 from hoof_env.envs.grounds import HILLS
-from hoof_env.envs.horse_leg_fixed import HorseLegFixedEnv
 from hoof_env.envs.manual_text import PAGE
 from hoof_env.envs.multi_objective import HorseLegMOEnv
 from hoof_env.envs.observation import GROUPS, entries
-from hoof_env.envs.reference_observation import layout
 from hoof_env.envs.reward import RewardWeights
 from hoof_env.envs.tasks import PER_EPISODE, TASKS, Settings, to_json
 from hoof_env.errors import OutputError, check_choice
@@ -29,11 +27,11 @@ from hoof_env.gait.motion_law import FilterSettings
 from hoof_env.gait.parameters import LIMITS
 from hoof_env.leg.geometry import load_geometry
 
-_CLASSES: Mapping[str, Any] = {"fixed": HorseLegFixedEnv, "mo": HorseLegMOEnv}
-_NAMES = {name: task.name for name, task in TASKS.items()} | {"fixed": "HorseLegFixed", "mo": "HorseLegMO"}
+_CLASSES: Mapping[str, Any] = {"mo": HorseLegMOEnv}
+_NAMES = {name: task.name for name, task in TASKS.items()} | {"mo": "HorseLegMO"}
 
 PAGES = tuple(_NAMES)
-"""The tasks, and two ids whose pages are the docstrings of their classes."""
+"""The tasks, and an id whose page is the docstring of its class."""
 
 INDEX = "README.md"
 
@@ -54,7 +52,10 @@ def page(task: str) -> str:
         summary=what.summary,
         about=what.about,
         action_space=f"Box(-1, 1, ({len(LIMITS)},), float32)",
-        actions=_actions(),
+        actions=_actions(settings),
+        offsets=f"It is added to the {settings.gait}, and the sum is clipped to the commands' limits.\n\n"
+        if settings.gait
+        else "",
         observation_space=f"Box(-1, 1, ({len(observed(task))},), float32)",
         observations=_observations(settings),
         other_groups=", ".join(f"`{group}`" for group in GROUPS if group not in settings.observation),
@@ -63,8 +64,7 @@ def page(task: str) -> str:
         if settings.target_speed
         else "",
         lift_off=f"{100 * LIFT_OFF:g}",
-        start_speed=f"{start.START_SPEED:g}",
-        start=_start(settings),
+        start=_start(settings, what.start),
         options=_table(("Option", "Unit", "Range", "Meaning"), _options()),
         parameters=", ".join(f"`{name}`" for name in PER_EPISODE),
         leaves=_leaves(settings),
@@ -94,7 +94,7 @@ def index() -> str:
     for task, name in _NAMES.items():
         what = TASKS.get(task)
         summary = what.summary if what else _docstring(task)[0]
-        reference = what.reference if what else {"fixed": "the zero action", "mo": "run"}[task]
+        reference = what.reference if what else "run"
         native = "yes" if what else "no"
         rows.append(
             (f"[`hoof_env/{name}-v0`]({name}.md)", summary, str(len(observed(task))), reference, native)
@@ -126,8 +126,6 @@ def write_pages(out: Path) -> list[Path]:
 
 def observed(task: str) -> tuple[str, ...]:
     """Names of the observation's entries of a page's id, by default."""
-    if task == "fixed":
-        return layout("fixed")
     settings = TASKS["leg" if task == "mo" else task].settings({})
     return tuple(entry[0] for entry in entries(settings.observation, settings.trunk))
 
@@ -135,14 +133,18 @@ def observed(task: str) -> tuple[str, ...]:
 # Parts of a page
 
 
-def _actions() -> str:
+def _actions(settings: Settings) -> str:
     bounds = FilterSettings().to_array()[:, 1]
     rows = []
     for k, (low, high) in enumerate(LIMITS.values()):
         name, _, unit = GROUPS["gait"][k]
+        if settings.gait:
+            low, high = -(high - low) / 2, (high - low) / 2
         fastest = f"{bounds[k]:g} {GROUPS['gait'][len(LIMITS) + k][2]}"
         rows.append((str(k), name, f"{low:.5g}", f"{high:.5g}", unit, fastest))
-    return _table(("Num", "Command", "At -1", "At +1", "Unit", "Fastest change"), rows)
+    return _table(
+        ("Num", "Offset of" if settings.gait else "Command", "At -1", "At +1", "Unit", "Fastest change"), rows
+    )
 
 
 def _observations(settings: Settings) -> str:
@@ -160,11 +162,16 @@ def _rewards(settings: Settings) -> str:
     return _table(("Term", "Weight", "Default", "Unit", "Meaning"), rows)
 
 
-def _start(settings: Settings) -> str:
+def _start(settings: Settings, options: Mapping[str, float]) -> str:
+    between = "gait parameters on the line between the preset's walk and run"
     parts = [
+        f"Crank angle {options['crank_angle']:g}" if "crank_angle" in options else "Crank angle uniform",
+        f"{'the ' + settings.gait if settings.gait else between}, at rest in the filters",
+        "at rest" if settings.trunk == "fixed" else f"speed uniform in 0 to {start.START_SPEED:g} m/s",
         {
             "suspended": "the trunk at its nominal height, or higher where the hoof would be in the ground",
             "rail": "a crank angle with the hoof in the ground is drawn again",
+            "fixed": "the trunk at its nominal height",
         }[settings.trunk],
         f"anywhere on the terrain but within {start.MARGIN:g} m of its ends"
         if settings.terrain

@@ -5,6 +5,7 @@ Defaults, limits and weights are read from the data that has them, never written
 
 from __future__ import annotations
 
+from hoof_env.dynamics.integrators import INTEGRATORS
 from hoof_env.dynamics.schemes import SCHEMES
 from hoof_env.dynamics.trunk import ONE_LEG
 from hoof_env.envs.grounds import SPACING
@@ -22,6 +23,10 @@ def _one_of(names: object) -> str:
 
 SETTINGS: Rows = {
     "preset": ("", f"leg and gaits: {_one_of(preset_names())}, or a JSON file"),
+    "gait": (
+        "",
+        "gait that actions are offsets to and episodes start in; None for neither",
+    ),
     "trunk": ("", f"{_one_of(ONE_LEG)}; a fixed one stays where it is"),
     "hip_height": (
         "m",
@@ -33,8 +38,8 @@ SETTINGS: Rows = {
     "trunk_stiffness": ("N/m", "of the suspension's spring; suspended"),
     "trunk_damping": ("N s/m", "of the suspension's damper; suspended"),
     "trunk_drag": ("N s/m", "resistance to forward motion"),
-    "stiffness": ("N/m^n", "K of the contact law (Eq. 14)"),
-    "exponent": ("-", "n of the contact law, 1 to 3 in steps of 1/8"),
+    "stiffness": ("N/m^n", "K of the contact law (Eq. 14); None for the preset's"),
+    "exponent": ("-", "n of the contact law, 1 to 3 in steps of 1/8; None for the preset's"),
     "normal_law": ("", _one_of(NORMAL_LAWS)),
     "restitution": ("-", "nominal coefficient of restitution, 0 to 1"),
     "approach_floor": ("m/s", "smallest approach speed in the damping term"),
@@ -51,8 +56,19 @@ SETTINGS: Rows = {
     "motor_gain": ("N m s/rad", "torque of the motor per difference of crank speed"),
     "motor_torque": ("N m", "largest torque of the motor, at the crank"),
     "motor_inertia": ("kg m^2", "of its rotor, at the crank"),
-    "integrator": ("", _one_of(SCHEMES)),
-    "sim_dt": ("s", "substep; it is divided where ground, suspension or motor need shorter ones"),
+    "solver": ("", '"exact": the closed form; "paper": Eq. 8 as the paper solves it, on a fixed trunk'),
+    "baumgarte_alpha": ("1/s", "alpha of the paper's solver"),
+    "baumgarte_beta": ("1/s", "beta of the paper's solver; by default as printed, sqrt(2 alpha)"),
+    "integrator": (
+        "",
+        f"{_one_of(SCHEMES)}; of the paper's solver {_one_of(INTEGRATORS)}; None for midpoint, and for the"
+        " paper's Euler",
+    ),
+    "sim_dt": (
+        "s",
+        "substep; it is divided where ground, suspension or motor need shorter ones; None for the solver's"
+        " own, 1e-4 or the paper's 1e-3",
+    ),
     "dt": ("s", "control step, a whole multiple of `sim_dt`"),
     "episode_seconds": ("s", "time limit of an episode"),
     "target_speed": ("m/s", "lowest and highest commanded speed; None for no command"),

@@ -38,8 +38,8 @@ Why the defaults are what they are: [environment.md](../environment.md).
 
 $actions
 
-`env.unwrapped.action_for(gait)` is the action of a `GaitParameters`; `command_of(action)` are the four
-parameters of an action.
+${offsets}`env.unwrapped.action_for(gait)` is the action of a `GaitParameters`; `command_of(action)` are the
+four parameters of an action.
 
 ## Observation Space
 
@@ -66,8 +66,7 @@ It closes when the force falls below (lift-off), or after one crank revolution, 
 
 ## Starting State
 
-Crank angle uniform; gait parameters on the line between the preset's walk and run, at rest in the filters;
-speed uniform in 0 to $start_speed m/s; $start.
+$start.
 
 `reset(options=...)` sets any of these:
 

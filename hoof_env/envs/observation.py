@@ -12,9 +12,9 @@ from hoof_env.envs.episode import AHEAD
 from hoof_env.errors import ParameterError
 from hoof_env.gait.parameters import LIMITS
 
-_LOW, _HIGH = (np.array([limit[i] for limit in LIMITS.values()]) for i in (0, 1))
-MIDDLE, HALF_RANGE = (_LOW + _HIGH) / 2, (_HIGH - _LOW) / 2
-"""Middle and half range of the gait parameters, shape (4,)."""
+LOW, HIGH = (np.array([limit[i] for limit in LIMITS.values()]) for i in (0, 1))
+MIDDLE, HALF_RANGE = (LOW + HIGH) / 2, (HIGH - LOW) / 2
+"""Limits, middle and half range of the gait parameters, shape (4,)."""
 
 GROUPS: dict[str, tuple[tuple[str, str, str], ...]] = {
     "crank": (("sin(crank angle)", "none", "-"), ("cos(crank angle)", "none", "-")),

@@ -10,19 +10,40 @@ import numpy as np
 
 from hoof_env.dynamics.drive import Drive, Motor, Prescribed
 from hoof_env.dynamics.trunk import Trunk
-from hoof_env.envs.tasks import PER_EPISODE, Settings
-from hoof_env.errors import ParameterError, check_number
+from hoof_env.envs.tasks import PER_EPISODE, SOLVERS, Settings
+from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.ground.contact import Ground
+from hoof_env.ground.preset import load_ground
+
+
+def resolved(settings: Settings) -> Settings:
+    """The settings with values for None: the ground of the preset, the solver's own scheme and step.
+
+    Raises:
+        ParameterError, DataFileError: an unknown solver, or a preset that cannot be read.
+    """
+    is_paper = check_choice("solver", settings.solver, SOLVERS) == "paper"
+    s: Any = settings
+    if s.stiffness is None or s.exponent is None:
+        ground = load_ground(s.preset, stiffness=s.stiffness, exponent=s.exponent)
+        s = replace(s, stiffness=ground.stiffness, exponent=ground.exponent)
+    if s.integrator is None:
+        s = replace(s, integrator="euler" if is_paper else "midpoint")
+    if s.sim_dt is None:
+        s = replace(s, sim_dt=1e-3 if is_paper else 1e-4)
+    done: Settings = s
+    return done
 
 
 def physics(settings: Settings, height: float, changes: Mapping[str, float]) -> tuple[Trunk, Ground, Drive]:
-    """Trunk at a height [m], ground and drive of some settings with others changed."""
+    """Trunk at a height [m], ground and drive of some `resolved` settings with others changed."""
     s = replace(settings, **dict(changes))  # type: ignore[arg-type]
     trunk = Trunk(
         s.trunk, s.trunk_mass, s.trunk_share, s.trunk_stiffness, s.trunk_damping, s.trunk_drag, height
     )  # fmt: skip
     ground = Ground(
-        s.stiffness, s.exponent, s.normal_law, s.restitution, s.approach_floor, "interpolated",
+        s.stiffness, s.exponent, s.normal_law, s.restitution, s.approach_floor,
+        "sampled" if s.solver == "paper" else "interpolated",
         s.friction_law, s.friction, s.friction_slow, s.friction_fast, s.trunk_mass,
     )  # fmt: skip
     if s.drive == "prescribed":
@@ -30,16 +51,20 @@ def physics(settings: Settings, height: float, changes: Mapping[str, float]) -> 
     return trunk, ground, Motor(s.motor_gain, s.motor_torque, s.motor_inertia, 1.0)
 
 
-def check_parameters(name: str, given: Any) -> dict[str, float | tuple[float, float]]:
+def check_parameters(name: str, given: Any, drive: str) -> dict[str, float | tuple[float, float]]:
     """Physical parameters of an episode: a number each, or two to draw between.
 
     Raises:
-        ParameterError: not a mapping, a parameter that cannot change, or values that are none.
+        ParameterError: not a mapping, a parameter that cannot change or that the drive has not, or values
+            that are none.
     """
     if not isinstance(given, Mapping) or not set(given) <= set(PER_EPISODE):
         raise ParameterError(
             f"{name}: expected a mapping with some of {', '.join(PER_EPISODE)}, got {given!r}"
         )
+    for key in given:
+        if key.startswith("motor_") and drive != "motor":
+            raise ParameterError(f"{name}: {key!r} is of drive='motor', got drive={drive!r}")
     found: dict[str, float | tuple[float, float]] = {}
     for key, value in given.items():
         if isinstance(value, (list, tuple)):

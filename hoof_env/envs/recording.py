@@ -44,6 +44,8 @@ class Recording:
         """State and report by name at each substep of the last control step; of where it is, after a reset or
         a step that could not be simulated."""
         engine = self.batch.engine
+        if self.batch.paper:
+            return self.batch.paper.record(self.env)
         now, starts = engine.column(self.env), engine.state["time"][self.env] == 0.0
         if self._before is None or starts or engine.results[self.env] != Result.OK:
             return self._run(now, 0)

@@ -91,38 +91,3 @@ def take_account(account, trace, h, start_x, fixed):  # type: ignore[no-untyped-
     account.distance += account.progress
     account.total_work += account.work
     account.peak_sum += account.peak_increase
-
-
-def summarize(account: Any, weight: float, failed: bool) -> dict[str, float]:
-    """Figures of an episode.
-
-    Args:
-        account: record of dtype `ACCOUNT`.
-        weight: of trunk and leg [N].
-        failed: whether the episode ended by failure.
-
-    Returns:
-        seconds, distance_m, speed_m_s, peak_grf_n (highest of the episode), mean_grf_n (normal force over
-        the whole time), stance_peak_sum_n, stances, duty_factor, drive_work_j (braking is not recovered),
-        cost_of_transport (work per weight and distance; infinite without forward progress), weight_share
-        (mean normal force over weight: what the leg bore), support_share (the rest: what the rail or the
-        suspension bore), failed (0 or 1).
-    """
-    seconds, distance, work = float(account["time"]), float(account["distance"]), float(account["total_work"])
-    time = max(seconds, 1e-12)
-    mean_force = float(account["impulse"]) / time
-    return {
-        "seconds": seconds,
-        "distance_m": distance,
-        "speed_m_s": distance / time,
-        "peak_grf_n": float(account["highest"]),
-        "mean_grf_n": mean_force,
-        "stance_peak_sum_n": float(account["peak_sum"]),
-        "stances": float(account["stances"]),
-        "duty_factor": float(account["loaded_time"]) / time,
-        "drive_work_j": work,
-        "cost_of_transport": work / (weight * distance) if distance > 0 else float("inf"),
-        "weight_share": mean_force / weight,
-        "support_share": 1 - mean_force / weight,
-        "failed": float(failed),
-    }

@@ -125,7 +125,9 @@ def check_seed(seed: Any) -> int | None:
     return None if seed is None else count("seed", seed, low=0)
 
 
-def check_options(options: Any, gaits: Mapping[str, GaitParameters], trunk: Trunk) -> dict[str, Any]:
+def check_options(
+    options: Any, gaits: Mapping[str, GaitParameters], trunk: Trunk, drive: str
+) -> dict[str, Any]:
     """Reset options with their values checked and the gait as `GaitParameters`.
 
     Raises:
@@ -146,7 +148,7 @@ def check_options(options: Any, gaits: Mapping[str, GaitParameters], trunk: Trun
     if checked.get("gait") is not None:
         checked["gait"] = _gait(checked["gait"], gaits)
     if "parameters" in checked:
-        checked["parameters"] = check_parameters("options['parameters']", checked["parameters"])
+        checked["parameters"] = check_parameters("options['parameters']", checked["parameters"], drive)
     return checked
 
 

@@ -7,12 +7,21 @@ settings, its starts and what is observed, and in nothing else.
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from types import MappingProxyType
 from typing import Any
 
 from hoof_env.errors import UnknownArgumentError
+from hoof_env.leg.geometry import DEFAULT_PRESET
+
+PRINTED_BETA = math.sqrt(2 * 15.0)
+"""Baumgarte's beta as the paper's Table 1 prints it, sqrt(2 alpha) [1/s]; sqrt(2) alpha = 21.2 is probably
+meant."""
+
+SOLVERS = ("exact", "paper")
+"""The closed form, and Eq. 8 as the paper solves it."""
 
 
 @dataclass(frozen=True)
@@ -20,6 +29,7 @@ class Settings:
     """Everything that can be set, plain values that JSON can hold; `HorseLegEnv` says what they mean."""
 
     preset: str = "first_fit"
+    gait: str | None = None
     trunk: str = "suspended"
     hip_height: float | None = None
     trunk_mass: float = 80.0
@@ -27,7 +37,7 @@ class Settings:
     trunk_stiffness: float = 4000.0
     trunk_damping: float = 1130.0
     trunk_drag: float = 20.0
-    stiffness: float = 2e4
+    stiffness: float = 2e4  # this and three more may be None until `parameters.resolved`
     exponent: float = 1.5
     normal_law: str = "lankarani-nikravesh"
     restitution: float = 0.5
@@ -41,6 +51,9 @@ class Settings:
     motor_gain: float = 100.0
     motor_torque: float = 600.0
     motor_inertia: float = 0.5
+    solver: str = "exact"
+    baumgarte_alpha: float = 15.0
+    baumgarte_beta: float = PRINTED_BETA
     integrator: str = "midpoint"
     sim_dt: float = 1e-3
     dt: float = 0.02
@@ -69,6 +82,7 @@ class Task:
         summary: one line.
         about: what is asked, for the manual page.
         defaults: settings.
+        start: reset options, unless others are given.
         reference: the scripted gait that simple policies must stay below.
     """
 
@@ -76,6 +90,7 @@ class Task:
     summary: str
     about: str
     defaults: Mapping[str, Any]
+    start: Mapping[str, Any] = field(default_factory=dict)
     reference: str = "run"
 
     @property
@@ -134,6 +149,31 @@ TASKS: Mapping[str, Task] = MappingProxyType(
                 "terrain": {"kind": "hills", "seed": 0, "rise": 0.05, "stiffness": [0.25, 2.0]},
                 "observation": ("crank", "gait", "trunk", "hoof", "action", "ground"),
             },
+        ),
+        "fixed": Task(
+            "HorseLegFixed",
+            "The paper's set-up: one gait on a fixed trunk, one crank revolution.",
+            "The trunk stays where it is and a policy commands offsets from the paper's walk or run; the zero"
+            " action is exactly that gait, and reproduces the paper: `hoof-env reproduce` runs this"
+            ' environment. `solver="exact"` follows the closed form at 0.1 ms, `solver="paper"` integrates'
+            " Eq. 8 (42 coordinates, 42 multipliers, Baumgarte) with explicit Euler at 1 ms and samples the"
+            " approach speed at the first step inside the ground. Restitution 1 is the paper's elastic"
+            " condition, 0 its inelastic one.",
+            {
+                "preset": DEFAULT_PRESET,
+                "gait": "walk",
+                "trunk": "fixed",
+                "stiffness": None,
+                "exponent": None,
+                "restitution": 1.0,
+                "approach_floor": 1e-4,
+                "friction_fast": 1e-2,
+                "integrator": None,
+                "sim_dt": None,
+                "episode_seconds": 1.0,
+            },
+            start={"crank_angle": 0.0},
+            reference="walk",
         ),
     }
 )

@@ -15,13 +15,18 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from hoof_env.dynamics.engine import GRAVITY, LegEngine
 from hoof_env.dynamics.result import Result
 from hoof_env.dynamics.trace import new_trace
-from hoof_env.envs.reference_leg import ReferenceLegEnv
-from hoof_env.envs.reference_start import HIGHEST, LOWEST
-from hoof_env.envs.stance import LIFT_OFF
+from hoof_env.dynamics.trunk_model import LIFT_OFF
+from hoof_env.envs.parameters import physics
+from hoof_env.envs.start import HIGHEST, LOWEST, draw_starts
+from hoof_env.envs.tasks import TASKS
 from hoof_env.errors import ParameterError
-from hoof_env.gait.parameters import GaitParameters
+from hoof_env.gait.parameters import GaitParameters, gait_names, load_gait
+from hoof_env.ground.terrain import Terrain
+from hoof_env.leg.geometry import load_geometry
+from hoof_env.leg.profile import leg_profile
 
 SETTLE = 10.0
 """Seconds from a start that are left out. In flight the forward speed follows within 4.4 s (mass over drag);
@@ -115,9 +120,17 @@ class Course:
     """
 
     def __init__(self, preset: str | Path, starts: int) -> None:
-        self.env, self.starts = ReferenceLegEnv(preset=str(preset)), starts
-        self.trunk = self.env.engine.trunk
-        self.load = self.trunk.share * self.env.weight
+        settings = TASKS["leg"].settings({"preset": str(preset)})
+        self.geometry, self.sim_dt = load_geometry(preset), settings.sim_dt
+        self.trunk, ground, _ = physics(settings, self.geometry.hip_height, {})
+        self.engine = LegEngine(self.geometry, self.trunk, ground, self.sim_dt)
+        self.weight = (self.trunk.mass + self.geometry.mass) * GRAVITY
+        self.load, self.count = self.trunk.share * self.weight, starts
+        gaits = {name: load_gait(name, preset) for name in gait_names(preset)}
+        generators = [np.random.default_rng(seed) for seed in range(starts)]
+        self._starts = draw_starts(
+            {}, generators, leg_profile(self.geometry), self.trunk, gaits, Terrain.flat()
+        )
 
     def measure(self, gait: GaitParameters) -> Carriage:
         """Command the gait from every start and measure `STRIDES` strides after `SETTLE` seconds.
@@ -128,11 +141,11 @@ class Course:
         if gait.crank_speed == 0:
             raise ParameterError("crank_speed: expected a gait whose crank turns, got 0 rad/s")
         rides, heights = [], []
-        for seed in range(self.starts):
-            trace, survived = self._ride(gait, seed)
+        for k in range(self.count):
+            trace, survived = self._ride(gait, k)
             if survived < 1:
                 fallen = dict.fromkeys(Carriage.__annotations__, math.nan)
-                return Carriage(**{**fallen, "survived": (seed + survived) / self.starts})
+                return Carriage(**{**fallen, "survived": (k + survived) / self.count})
             rides.append(self._figures(trace[-self._rows(gait, STRIDES) :]))
             heights.append(by_phase(trace["theta"], trace["trunk_y"]))
         speeds = [ride["speed_m_s"] for ride in rides]
@@ -144,13 +157,17 @@ class Course:
         )
 
     def _rows(self, gait: GaitParameters, strides: int) -> int:
-        return round(strides * 2 * np.pi / gait.crank_speed / self.env.sim_dt)
+        return round(strides * 2 * np.pi / gait.crank_speed / self.sim_dt)
 
-    def _ride(self, gait: GaitParameters, seed: int) -> tuple[NDArray[np.void], float]:
+    def _ride(self, gait: GaitParameters, k: int) -> tuple[NDArray[np.void], float]:
         """The last strides, one more than is measured, and the part of the time that the trunk survived."""
-        self.env.reset(seed=seed)
-        trace = new_trace(round(SETTLE / self.env.sim_dt) + self._rows(gait, STRIDES + 1))
-        result = self.env.engine.advance(gait.to_array(), trace)
+        begin = self._starts
+        self.engine.reset(
+            GaitParameters.from_array(begin.gaits[k]), theta=float(begin.crank_angle[k]),
+            height=float(begin.height[k]), speed=float(begin.speed[k]),
+        )  # fmt: skip
+        trace = new_trace(round(SETTLE / self.sim_dt) + self._rows(gait, STRIDES + 1))
+        result = self.engine.advance(gait.to_array(), trace)
         height = trace["trunk_y"] / self.trunk.height
         fallen = ~((height > LOWEST) & (height < HIGHEST))
         if fallen.any() or result is not Result.OK:
@@ -160,14 +177,14 @@ class Course:
     def _figures(self, trace: NDArray[np.void]) -> dict[str, float]:
         """Of whole strides."""
         force, height = trace["normal"], trace["trunk_y"]
-        loaded = force > LIFT_OFF * self.env.weight
+        loaded = force > LIFT_OFF * self.weight
         clearance = -np.maximum(trace["toe_penetration"], trace["heel_penetration"])
-        seconds = len(trace) * self.env.sim_dt
+        seconds = len(trace) * self.sim_dt
         tilt = np.degrees(np.abs(trace["hoof_angle"]))
         return {
             "load_share": float(force.mean() / self.load),
             "peak_share": float(force.max() / self.load),
-            "speed_m_s": float(trace["trunk_vx"].sum() * self.env.sim_dt / seconds),
+            "speed_m_s": float(trace["trunk_vx"].sum() * self.sim_dt / seconds),
             "rise_m": float(height.mean() - self.trunk.height),
             "bounce_m": float(np.ptp(height)),
             "duty_factor": float((force > 0).mean()),

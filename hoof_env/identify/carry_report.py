@@ -135,9 +135,9 @@ def page(rows: Mapping[str, Carriage], found: Found, course: Course, command: st
 
 {table(rows)}
 
-The trunk is the environment's default: {course.env.weight:.0f} N with the leg, of which the leg must
+The trunk is the environment's default: {course.weight:.0f} N with the leg, of which the leg must
 bear a load of {course.load:.0f} N at rest, on a spring of {trunk.stiffness:g} N/m. Forces are vertical.
-Means of {course.starts} of the environment's starts, {STRIDES} strides each after {SETTLE:g} s; the last
+Means of {course.count} of the environment's starts, {STRIDES} strides each after {SETTLE:g} s; the last
 two numbers are the largest differences among all of them. Over steady strides the mean force is the load plus
 the spring's stiffness times the trunk's height over its rest. {NAME} is called a walk for its speed
 and stride rate; a duty factor above 0.5, the other mark of a walk, is not demanded.

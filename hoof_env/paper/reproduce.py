@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 import hoof_env  # noqa: F401  (registers the environments)
 from hoof_env._output import staged
+from hoof_env.envs.trace_names import trace_of
 from hoof_env.errors import HoofEnvError
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import Geometry
@@ -100,14 +101,15 @@ def run_cycle(gait: str, solver: str, **settings: Any) -> Trace:
     try:
         env.reset(seed=0)
         action = np.zeros(env.action_space.shape or (), np.float32)
-        parts, terminated, truncated = [env.get_wrapper_attr("trace")], False, False
+        leg: Any = env.unwrapped
+        parts, terminated, truncated = [trace_of(leg.record())], False, False
         while not truncated:
             _, _, terminated, truncated, _ = env.step(action)
             if terminated:
                 raise HoofEnvError(
                     f"{gait} with solver {solver!r}: the simulation failed before the end of its cycle"
                 )
-            parts.append(env.get_wrapper_attr("trace"))
+            parts.append(trace_of(leg.record()))
     finally:
         env.close()
     return np.concatenate(parts)

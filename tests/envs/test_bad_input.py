@@ -335,7 +335,7 @@ def test_states_of_other_numbers_of_environments():
 
 def test_adapter():
     with pytest.raises(ParameterError, match="env_id: expected an id of this package with many at once, got"):
-        Sb3VecEnv("hoof_env/HorseLegFixed-v0", 2)
+        Sb3VecEnv("hoof_env/HorseLegMO-v0", 2)
     with pytest.raises(ParameterError, match="autoreset_mode: expected SAME_STEP, got 'NEXT_STEP'"):
         Sb3VecEnv(LEG, 2, autoreset_mode="NEXT_STEP")
     env = Sb3VecEnv(LEG, 2)

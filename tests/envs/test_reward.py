@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from hoof_env.dynamics.trace import new_trace
 from hoof_env.envs.policies import make_policy
 from hoof_env.envs.reward import RewardWeights
-from hoof_env.envs.stance import new_account, summarize, take_account
+from hoof_env.envs.stance import new_account, take_account
 
 TERMS = ("reward_progress", "reward_peak", "reward_energy", "reward_action", "reward_failure")
 
@@ -96,7 +96,7 @@ def test_account_over_any_load_and_any_split(loads, chunk, turn, threshold):
     peaks = stance_peaks(trace, threshold)
     assert paid == pytest.approx(sum(peaks), rel=1e-9, abs=1e-9)
     assert account["stances"] == len(peaks)
-    assert summarize(account, 800.0, False)["peak_grf_n"] == trace["grf"].max()
+    assert account["highest"] == trace["grf"].max()
 
 
 def test_a_hoof_that_never_lifts_pays_every_revolution():

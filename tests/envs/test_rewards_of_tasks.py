@@ -10,8 +10,9 @@ from hoof_env.envs.policies import make_policy
 from hoof_env.envs.tasks import TASKS
 
 SEEDS = 40
-MARGIN = 3.0
-"""Return by which the reference gait is ahead over ten seconds, in the mean of so many episodes."""
+MARGIN = dict.fromkeys(TASKS, 3.0) | {"fixed": 0.3}
+"""Return by which the reference gait is ahead over ten seconds, or the one of the paper's set-up, in the mean
+of so many episodes."""
 
 DT = 0.02
 PACES = (3, 5, 6, 8, 12, 25, 50)
@@ -49,14 +50,14 @@ def reference(task):
 @pytest.mark.parametrize("task", TASKS)
 def test_simple_policies_stay_below_the_reference(task, name):
     each = name != "idle"
-    assert mean_return(task, scripted(task, name, each)) < reference(task) - MARGIN
+    assert mean_return(task, scripted(task, name, each)) < reference(task) - MARGIN[task]
 
 
 @pytest.mark.parametrize("pace", PACES)
 @pytest.mark.parametrize("task", TASKS)
 def test_bang_bang_of_any_pace_stays_below_the_reference(task, pace):
     flip = lambda _, time: np.full(4, 1.0 if round(time / DT) // pace % 2 else -1.0)  # noqa: E731
-    assert mean_return(task, flip) < reference(task) - MARGIN
+    assert mean_return(task, flip) < reference(task) - MARGIN[task]
 
 
 @pytest.mark.parametrize("task", TASKS)
@@ -71,4 +72,4 @@ def test_hopping_on_the_swing_with_the_crank_stopped_stays_below_the_reference(t
         actions[:, 0] = -1.0
         return actions
 
-    assert mean_return(task, wave) < reference(task) - MARGIN
+    assert mean_return(task, wave) < reference(task) - MARGIN[task]

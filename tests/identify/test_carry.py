@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from hoof_env import cli
+from hoof_env.envs.horse_leg import HorseLegEnv
 from hoof_env.envs.policies import make_policy, policy_names
-from hoof_env.envs.reference_leg import ReferenceLegEnv
 from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.gait.parameters import LIMITS, PARAMETERS, GaitParameters, gait_names, load_gait
 from hoof_env.identify import carry_report
@@ -40,7 +40,7 @@ def test_impulse_balance_of_a_steady_gait(course, carriages, name):
     assert carriage.unsteady_m < 1e-4
     spring = trunk.stiffness * carriage.rise_m
     assert carriage.load_share * course.load == pytest.approx(course.load + spring, abs=0.2)
-    assert course.load == pytest.approx(0.8 * (80 + course.env.geometry.mass) * 9.81)
+    assert course.load == pytest.approx(0.8 * (80 + course.geometry.mass) * 9.81)
 
 
 def test_the_papers_walk_does_not_carry_and_the_one_found_does(carriages):
@@ -58,18 +58,17 @@ def test_the_papers_walk_does_not_carry_and_the_one_found_does(carriages):
 
 def test_what_is_measured_is_what_an_episode_of_the_environment_gives(course, carriages):
     """The policy of the same name, through the environment's own account."""
-    env = course.env
+    env = HorseLegEnv(preset=LEG)
     env.gaits[NAME] = CARRIES
-    try:
-        policy, forces, x = make_policy(NAME, env), [], []
-        observation, _ = env.reset(seed=5)
-        for step in range(500):
-            observation, *_ = env.step(policy.predict(observation)[0])
-            if step >= 400:
-                forces.extend(env.trace["normal"])
-                x.append(env.trace["trunk_x"][-1])
-    finally:
-        del env.gaits[NAME]
+    policy, forces, x = make_policy(NAME, env), [], []
+    observation, _ = env.reset(seed=5)
+    env.record()
+    for step in range(500):
+        observation, *_ = env.step(policy.predict(observation)[0])
+        if step >= 400:
+            record = env.record()
+            forces.extend((record["toe_normal"] + record["heel_normal"]).ravel())
+            x.append(record["x"][-1].item())
     carriage = carriages[NAME]
     assert np.mean(forces) / course.load == pytest.approx(carriage.load_share, rel=0.005)
     assert np.max(forces) / course.load == pytest.approx(carriage.peak_share, rel=0.01)
@@ -82,7 +81,7 @@ def test_a_gait_more_leaves_the_starts_and_the_other_policies_as_they_were(tmp_p
     preset["gaits"][NAME] = dict(zip(PARAMETERS, CARRIES.to_array().tolist(), strict=True))
     path = tmp_path / "more.json"
     path.write_text(json.dumps(preset))
-    one, more = ReferenceLegEnv(preset=LEG), ReferenceLegEnv(preset=str(path))
+    one, more = HorseLegEnv(preset=LEG), HorseLegEnv(preset=str(path))
     assert policy_names(more) == [NAME, *policy_names(one)]
     for seed in range(3):
         (seen, info), (seen_more, info_more) = one.reset(seed=seed), more.reset(seed=seed)
@@ -101,7 +100,7 @@ def test_a_carrying_walk_that_ships_carries(name):
 
 
 def test_a_trunk_that_falls_is_graded_by_how_long_it_lasted(course, monkeypatch):
-    monkeypatch.setattr(course, "starts", 1)
+    monkeypatch.setattr(course, "count", 1)
     monkeypatch.setattr("hoof_env.identify.carry_measure.LOWEST", 0.97)
     early = course.measure(load_gait("walk", LEG))
     assert 0 < early.survived < 0.3

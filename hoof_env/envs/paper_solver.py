@@ -1,0 +1,150 @@
+"""The paper's solver (Eq. 8, `dynamics.constrained`) in the place of the engine's kernels.
+
+It takes commands from the engine's memory and writes there what reward and observation read, so that they are
+the same for both. One environment after the other, some ten thousand times slower.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoof_env.dynamics.constrained import ConstrainedLeg, ConstrainedState
+from hoof_env.dynamics.lanes_report import LIMB_REPORT, TRUNK_REPORT
+from hoof_env.dynamics.limb_rows import STATE as LIMB_STATE
+from hoof_env.dynamics.result import Result
+from hoof_env.dynamics.trace import new_trace
+from hoof_env.dynamics.trunk_engine import TrunkEngine
+from hoof_env.dynamics.trunk_model import LIFT_OFF, Memory, memory_of
+from hoof_env.dynamics.trunk_rows import STATE as TRUNK_STATE
+from hoof_env.envs.stance import ACCOUNT, take_account
+from hoof_env.envs.tasks import Settings
+from hoof_env.envs.trace_names import record_of
+from hoof_env.errors import ParameterError
+from hoof_env.gait.parameters import GaitParameters
+
+Floats = NDArray[np.float64]
+
+
+def check_paper(settings: Settings) -> None:
+    """Raise where settings ask of the paper's solver what it cannot do.
+
+    Raises:
+        ParameterError: a trunk that moves, a motor, ground that is not level, parameters that are drawn.
+    """
+    for name, expected in (
+        ("trunk", "fixed"),
+        ("drive", "prescribed"),
+        ("terrain", None),
+        ("randomize", None),
+    ):
+        given = getattr(settings, name)
+        if given != expected and not (expected is None and not given):
+            raise ParameterError(f'{name}: expected {expected!r} with solver="paper", got {given!r}')
+
+
+class PaperSolver:
+    """Legs solved as in the paper, one for each environment of an engine.
+
+    Attributes:
+        legs: the solvers.
+        traces: the rows of each one's last control step, or of its start.
+    """
+
+    def __init__(self, settings: Settings, engine: TrunkEngine, substeps: int) -> None:
+        s = settings
+        self.engine, self.substeps = engine, substeps
+        self.legs = [
+            ConstrainedLeg(
+                engine.limbs[0].geometry, engine.ground, s.sim_dt, engine.filters,
+                s.baumgarte_alpha, s.baumgarte_beta, s.integrator, engine.trunk.height,
+            )
+            for _ in range(engine.num_envs)
+        ]  # fmt: skip
+        self.traces = [new_trace(1) for _ in self.legs]
+        self._accounts = np.zeros(len(self.legs), ACCOUNT)
+        self._accounts["threshold"] = LIFT_OFF * engine.weight
+
+    def start(self, envs: Sequence[int], gaits: Floats, crank_angle: Floats, x: Floats) -> None:
+        """Start some environments; arguments as of `Starts`."""
+        for k, env in enumerate(envs):
+            gait = GaitParameters.from_array(gaits[k])
+            self.traces[env] = self.legs[env].reset(gait, float(crank_angle[k]), x=float(x[k]))
+            threshold = self._accounts["threshold"][env]
+            self._accounts[env] = np.zeros((), ACCOUNT)
+            self._accounts["threshold"][env] = threshold
+            self._put(env, self._memory())
+
+    def advance(self) -> None:
+        """One control step of all, under the commands in the engine's memory."""
+        memory, h = self._memory(), self.legs[0].sim_dt
+        for env, leg in enumerate(self.legs):
+            trace = new_trace(self.substeps)
+            result = leg.advance(memory.command[0, :, env], trace)
+            memory.result[env] = result
+            memory.stride_sums[:, :, env] = 0.0
+            if result is Result.OK:
+                self.traces[env] = trace
+                account = self._accounts[env]
+                before = account.copy()
+                take_account(account, trace, h, 0.0, True)
+                since = [account[name] - before[name] for name in ("impulse", "loaded_time", "stances")]
+                highest, travel = trace["grf"].max(), account["progress"]
+                memory.stride_sums[0, :, env] = (
+                    account["peak_increase"], highest, account["work"], *since, travel,
+                )  # fmt: skip
+                self._put(env, memory)
+
+    def record(self, env: int) -> dict[str, Floats]:
+        """What `Recording.last` gives: the rows of the last control step by the engine's names."""
+        return record_of(self.traces[env], self.legs[env].state.filters)
+
+    def get_state(self) -> dict[str, Any]:
+        """What changes besides the engine's memory."""
+        states = [{name: array.copy() for name, array in vars(leg.state).items()} for leg in self.legs]
+        return {
+            "legs": states,
+            "accounts": self._accounts.copy(),
+            "last": np.array([trace[-1] for trace in self.traces]),
+        }
+
+    def set_state(self, state: Mapping[str, Any]) -> None:
+        """Put back what `get_state` gave, after the engine's memory.
+
+        Raises:
+            ParameterError: the state is not of such a solver.
+        """
+        try:
+            legs = [ConstrainedState(**{k: np.array(v) for k, v in one.items()}) for one in state["legs"]]
+            accounts, last = np.array(state["accounts"], ACCOUNT), np.array(state["last"], new_trace(0).dtype)
+            if not len(legs) == len(accounts) == len(last) == len(self.legs):
+                raise ValueError
+        except (KeyError, TypeError, ValueError, AttributeError):
+            raise ParameterError(
+                f"state['paper']: expected what get_state gives of {len(self.legs)} legs, got {state!r:.60}"
+            ) from None
+        self._accounts = accounts
+        memory = self._memory()
+        for env, (leg, leg_state) in enumerate(zip(self.legs, legs, strict=True)):
+            leg.state, self.traces[env] = leg_state, last[env : env + 1]
+            self._put(env, memory)
+
+    def _memory(self) -> Memory:
+        data, _, _, _, constants, reactions = self.engine.arrays
+        return memory_of(data, self.engine.num_envs, constants, reactions)
+
+    def _put(self, env: int, memory: Memory) -> None:
+        """Write where a leg is, as the kernels do."""
+        now = {
+            name: values.item()
+            for name, values in record_of(self.traces[env][-1:], self.legs[env].state.filters).items()
+        }
+        memory.trunk[:, env] = [now[name] for name in TRUNK_STATE]
+        memory.trunk_report[:, env] = [now[name] for name in TRUNK_REPORT]
+        memory.limbs[0, :, env] = [now[name] for name in LIMB_STATE]
+        memory.limb_report[0, :, env] = [now[name] for name in LIMB_REPORT]
+        account = self._accounts[env]
+        memory.strides[0, :, env] = account["open"], account["opened_at"], account["peak"]
