@@ -169,7 +169,7 @@ class EpisodeBatch:
             ParameterError: an unknown option, or a value out of range.
         """
         s = self.settings
-        checked = {**self.task.start, **check_options(options, self.gaits, self.engine.trunk, s.drive)}
+        checked = check_options(options, self.gaits, self.engine.trunk, s.drive)
         if self.paper and checked.get("parameters"):
             raise ParameterError(
                 f"options['parameters']: expected none with solver=\"paper\", got {checked['parameters']!r}"
@@ -210,6 +210,7 @@ class EpisodeBatch:
             "parameters", those of this episode by name.
         """
         which, columns = np.asarray(envs, np.int64), self.episode
+        options = {**self.task.start, **options}
         parameters = self.randomize | options.get("parameters", {})
         drawn = {name: np.zeros(len(which)) for name in parameters}
         if parameters or self._varied[which].any():  # what was set for one episode is not for the next

@@ -127,8 +127,8 @@ def reproduce(progress: Callable[[str], None] | None = None, *, preset: str | No
     """
     tell = progress or _silent
     settings: dict[str, Any] = {} if preset is None else {"preset": preset}
-    engine, published = gymnasium.make(ENVIRONMENT, **settings).get_wrapper_attr("engine"), load_published()
-    geometry, ground = engine.geometry, engine.ground
+    leg: Any = gymnasium.make(ENVIRONMENT, **settings).unwrapped
+    geometry, ground, published = leg.geometry, leg.engine.ground, load_published()
     traces: dict[tuple[str, str, str], Trace] = {}
     rows: list[dict[str, Any]] = []
     medians: dict[str, dict[str, dict[float, float]]] = {}

@@ -18,11 +18,20 @@ LEG, NAN = "hoof_env/HorseLeg-v0", float("nan")
 
 ARGUMENTS = [
     ({"trunk_mas": 80.0}, "HorseLeg-v0: unexpected keyword argument 'trunk_mas'; did you mean trunk_mass?"),
-    ({"wings": 2}, r"unexpected keyword argument 'wings' \(known: preset, trunk, "),
-    ({"task": "fly"}, "task: expected one of leg, .*got 'fly'"),
+    ({"wings": 2}, r"unexpected keyword argument 'wings' \(known: preset, gait, trunk, "),
+    ({"task": "fly"}, "task: expected one of fixed, leg, .*got 'fly'"),
     ({"preset": "no_such_leg"}, "preset: expected one of first_fit, identified, got 'no_such_leg'"),
     ({"trunk": "floating"}, "trunk: expected one of fixed, rail, suspended, got 'floating'"),
     ({"trunk": 3}, "trunk: expected one of fixed, rail, suspended, got 3"),
+    ({"gait": "trot"}, "gait: expected one of run, walk, got 'trot'"),
+    ({"solver": "fast"}, "solver: expected one of exact, paper, got 'fast'"),
+    ({"solver": "paper", "integrator": "euler"}, "trunk: expected 'fixed' with solver=\"paper\""),
+    ({"observation": ["crank", "target"]}, "observation: 'target' is constant without target_speed"),
+    ({"observation": ["crank", "ground"]}, "observation: 'ground' is constant without terrain"),
+    (
+        {"randomize": {"motor_gain": 3.0}},
+        "randomize: 'motor_gain' is of drive='motor', got drive='prescribed'",
+    ),
     ({"drive": "belt"}, "drive: expected one of motor, prescribed, got 'belt'"),
     ({"normal_law": "hertz"}, "normal_law: expected one of .*lankarani-nikravesh.*got 'hertz'"),
     ({"friction_law": "stick"}, "friction_law: expected one of ambrosio.*got 'stick'"),

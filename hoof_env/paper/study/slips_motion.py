@@ -77,7 +77,7 @@ def paper_leg(
     env: Any = gymnasium.make(
         ENVIRONMENT, gait=gait, solver="paper", baumgarte_beta=beta, **settings
     ).unwrapped
-    return env.engine, env.gait
+    return env.batch.paper.legs[0], env.batch.gait
 
 
 def drift(preset: str | None, gait: str, beta: float, printed: bool) -> Drift:
