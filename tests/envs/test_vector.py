@@ -65,7 +65,8 @@ def drive(ours, theirs, steps, mode):
         if mode == AutoresetMode.DISABLED and done.any():
             seeds = None if k % 2 else [7 * k + i for i in range(ours.num_envs)]
             one, two = (
-                env.reset(seed=seeds, options={"reset_mask": done, "crank_angle": 0.25}) for env in (ours, theirs)
+                env.reset(seed=seeds, options={"reset_mask": done, "crank_angle": 0.25})
+                for env in (ours, theirs)
             )
             same(one[0], two[0])
             check_infos(one[1], two[1])

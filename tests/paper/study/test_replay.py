@@ -30,19 +30,21 @@ MADE = ("t", "toe_x", "toe_vx", "toe_penetration", "toe_rate", "toe_approach", "
 LAWS = (
     {"restitution": 1.0},
     {"restitution": 0.0},
-    {"normal_law": "flores", "restitution": 0.3, "exponent": 1.2, "stiffness": 7e4, "friction": 0.8},
+    {"normal_law": "flores", "restitution": 0.3, "exponent": 1.25, "stiffness": 7e4, "friction": 0.8},
 )
 
 
 @pytest.mark.parametrize("gait", GAITS)
 @pytest.mark.parametrize("settings", LAWS)
-def test_on_the_exact_motion_it_is_the_environment_to_the_last_bit(gait, settings):
+def test_on_the_exact_motion_it_is_the_environment(gait, settings):
+    """Two contact kernels, written twice."""
     made, run = (
         replay(exact_cycle(gait, None), ground_of(None, **settings)),
         run_cycle(gait, "exact", **settings),
     )
     for name in MADE:
-        np.testing.assert_array_equal(made[name], run[name], err_msg=name)
+        atol = 1e-9 * max(np.abs(run[name]).max(), 1.0)
+        np.testing.assert_allclose(made[name], run[name], rtol=0, atol=atol, err_msg=name)
     assert np.isnan(made["crank_torque"]).all()
 
 
