@@ -28,6 +28,7 @@ import gymnasium as gym
 import numpy as np
 
 import hoof_env  # noqa: F401  (registers the environments)
+from agents.settings import algorithm_class
 from hoof_env._output import staged
 from hoof_env.errors import DataFileError, ParameterError
 
@@ -36,7 +37,7 @@ FILES = ("model.zip", "config.yml", "run.json", "monitor.csv")
 
 STATISTICS = "vecnormalize.pkl"
 
-PACKAGES = ("hoof-env", "numpy", "gymnasium", "numba", "stable-baselines3", "torch")
+PACKAGES = ("hoof-env", "numpy", "gymnasium", "numba", "stable-baselines3", "sb3-contrib", "torch")
 
 
 def make_env(env_id: str, **kwargs: Any) -> gym.Env[Any, Any]:
@@ -160,10 +161,9 @@ class SavedModel:
         """
         self._check(self.record, {"env_id": env_id, **describe_spaces(env)})
 
-        import stable_baselines3
         from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
-        algorithm = getattr(stable_baselines3, self.record.get("algo", "ppo").upper())
+        algorithm = algorithm_class(self.record.get("algo", "ppo"))
         statistics, normalize = self.path.with_name(STATISTICS), None
         try:
             model = algorithm.load(self.path, device="cpu")

@@ -28,7 +28,7 @@ import yaml
 
 from agents import runs
 from agents.command import parse_pairs, run
-from agents.settings import FOLDER, load_settings, model_arguments
+from agents.settings import FOLDER, algorithm_class, load_settings, model_arguments
 from hoof_env._output import check_folder
 from hoof_env.errors import OutputError, ParameterError, check_number
 
@@ -37,8 +37,8 @@ from hoof_env.errors import OutputError, ParameterError, check_number
 class Args:
     env_id: str = "hoof_env/HorseLeg-v0"
     """registered environment; module:id imports the module first"""
-    algo: Literal["ppo"] = "ppo"
-    """algorithm of Stable-Baselines3, with its file in agents/hyperparams"""
+    algo: Literal["ppo", "sac", "td3", "tqc"] = "ppo"
+    """algorithm of Stable-Baselines3 or sb3-contrib, with its file in agents/hyperparams"""
     seed: int = 0
     """of the environments, the network and the sampling"""
     steps: int | None = None
@@ -122,7 +122,6 @@ def train(args: Args, *also: Any) -> Trained:
     check_folder(folder)
 
     # Importing torch takes seconds: only now
-    import stable_baselines3
     import torch
     from stable_baselines3.common.callbacks import CallbackList
     from stable_baselines3.common.logger import configure
@@ -156,9 +155,10 @@ def train(args: Args, *also: Any) -> Trained:
         )
         envs = VecNormalize(envs, **arguments)
     try:
-        algorithm = getattr(stable_baselines3, args.algo.upper())
+        algorithm = algorithm_class(args.algo)
+        arguments = model_arguments(settings, int(np.prod(envs.action_space.shape or 1)))
         try:
-            model = algorithm(env=envs, seed=args.seed, device=args.device, **model_arguments(settings))
+            model = algorithm(env=envs, seed=args.seed, device=args.device, **arguments)
         except (TypeError, ValueError, AssertionError, RuntimeError) as error:  # torch's, for the device
             said = f"hyperparameters of {args.algo} for {args.env_id} on device {args.device!r}: {error}"
             raise ParameterError(said) from None
