@@ -1,0 +1,252 @@
+"""Write a trained policy as one file that needs no Stable-Baselines3: ONNX, or TorchScript.
+
+    python -m agents.export runs/ppo-HorseLeg-v0-s0 --out policy.onnx      onnxruntime reads it
+    python -m agents.export runs/ppo-HorseLeg-v0-s0/model.zip --out policy.pt     torch.jit.load reads it
+
+The file maps observations of the environment, shape (batch, k), to deterministic actions, (batch, n), float32
+both: the normalisation of observations and the limits of actions are inside. It is kept only if it gives the
+actions of the model it was made from. What it is for stands in its metadata (`hoof_env/onnx_policy.py`);
+examples/run_policy.py plays an ONNX file in twenty lines.
+
+A model file is a pickle and can run any code when it is loaded: give only files that you trust. An ONNX file
+is data.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from tyro.conf import Positional
+
+import hoof_env
+from agents import runs
+from agents.command import run
+from hoof_env._output import check_folder, staged
+from hoof_env.errors import DataFileError, HoofEnvError, OutputError, ParameterError
+from hoof_env.onnx_policy import INPUT, LISTS, OUTPUT, OnnxPolicy, describe
+
+SUFFIXES = (".onnx", ".pt")
+OPSET = 18
+"""Of the ONNX file; onnxruntime reads it from 1.14 on."""
+
+TRIED = 1000
+"""Random observations on which file and model must agree."""
+
+TOLERANCE = 1e-5
+"""By how much an action may differ, as a part of the half range of the action space."""
+
+
+@dataclass(frozen=True)
+class Args:
+    model: Positional[Path]
+    """run folder of agents.train, or a .zip of Stable-Baselines3"""
+    out: Path
+    """file to write: .onnx or .pt (TorchScript)"""
+    env_id: str | None = None
+    """environment of a model without run.json"""
+
+
+def export(model: Path, out: Path, env_id: str | None = None, **about: str) -> float:
+    """Write the policy of a model and return the largest difference of an action, as in `TOLERANCE`.
+
+    Args:
+        model: run folder or .zip.
+        out: ends in one of `SUFFIXES`.
+        env_id: what it is for; otherwise what run.json says.
+        about: more metadata.
+
+    Raises:
+        ParameterError: another suffix, no environment known, or a policy that observes or does something
+            else than vectors. DataFileError: no such model, or it does not fit, or the file acts otherwise.
+        OutputError: it cannot be written. HoofEnvError: a package is missing.
+    """
+    if out.suffix not in SUFFIXES:
+        raise ParameterError(f"out: expected a file that ends in {' or '.join(SUFFIXES)}, got {str(out)!r}")
+    if out.is_dir():
+        raise OutputError(f"cannot write to {str(out)!r}: expected a file, got a folder")
+    saved = runs.SavedModel.find(model)
+    env_id = env_id or saved.record.get("env_id")
+    if env_id is None:
+        raise ParameterError(f"env_id: expected one, for there is no run.json beside {saved.path}")
+    kwargs = saved.record.get("env_kwargs", {}) if env_id == saved.record.get("env_id") else {}
+    check_folder(out.parent)
+    with runs.make_env(env_id, **kwargs) as env:
+        trained = saved.load(env, env_id)
+        metadata = {
+            "env_id": env_id, "env_kwargs": kwargs, "hoof_env": hoof_env.__version__,
+            "algo": saved.record.get("algo", type(trained.model).__name__.lower()), **describe(env), **about,
+        }  # fmt: skip
+        observations = some_observations(env.observation_space)
+        with staged(out.parent) as stage:
+            file = stage / out.name
+            write = write_onnx if out.suffix == ".onnx" else write_torchscript
+            write(module_of(trained), observations[:2], file, metadata)
+            read = OnnxPolicy(file).predict if out.suffix == ".onnx" else read_torchscript(file)
+            off = difference(trained, read, observations)
+            if not off <= TOLERANCE:
+                raise DataFileError(
+                    f"model {saved.path}: expected a file that acts within {TOLERANCE:g} of it, got {off:.2g}"
+                )
+    return off
+
+
+def some_observations(space: gym.Space[Any]) -> Any:
+    """`TRIED` random observations, a few of them far outside of what is usual, shape (TRIED, k), float32.
+
+    Raises:
+        ParameterError: not a space of vectors.
+    """
+    if not isinstance(space, gym.spaces.Box) or len(space.shape) != 1:
+        raise ParameterError(f"model: expected one that observes vectors, got {space}")
+    space.seed(0)
+    rows = np.stack([space.sample() for _ in range(TRIED)]).astype(np.float32)
+    rows[::10] *= 100
+    return rows
+
+
+def module_of(trained: Any) -> Any:
+    """The policy as a torch module from observations to deterministic actions, as `predict` computes them.
+
+    Raises:
+        ParameterError: a recurrent policy, or actions that are not vectors.
+    """
+    import torch
+
+    policy = trained.model.policy
+    space = trained.model.action_space
+    if not isinstance(space, gym.spaces.Box) or len(space.shape) != 1 or hasattr(policy, "lstm_actor"):
+        raise ParameterError(f"model: expected a memoryless policy with vectors for actions, got {space}")
+    statistics = getattr(trained.normalize, "__self__", None)
+    if statistics is not None and not statistics.norm_obs:
+        statistics = None
+
+    class Deterministic(torch.nn.Module):
+        low: Any
+        high: Any
+        mean: Any
+        scale: Any
+
+        def __init__(self) -> None:
+            super().__init__()
+            self.policy = policy
+            self.register_buffer("low", torch.as_tensor(space.low))
+            self.register_buffer("high", torch.as_tensor(space.high))
+            if statistics is not None:  # in float64, as VecNormalize computes
+                self.register_buffer("mean", torch.as_tensor(statistics.obs_rms.mean))
+                scale = np.sqrt(statistics.obs_rms.var + statistics.epsilon)
+                self.register_buffer("scale", torch.as_tensor(scale))
+
+        def forward(self, observation: Any) -> Any:
+            if statistics is not None:
+                far = (observation.double() - self.mean) / self.scale
+                observation = far.clamp(-statistics.clip_obs, statistics.clip_obs).float()
+            action = self.policy._predict(observation, deterministic=True)
+            if policy.squash_output:  # in [-1, 1]: to the limits of the space
+                return self.low + 0.5 * (action + 1.0) * (self.high - self.low)
+            return torch.clamp(action, self.low, self.high)
+
+    policy.set_training_mode(False)
+    return Deterministic().eval()
+
+
+@contextmanager
+def _quietly() -> Iterator[None]:
+    """Without the exporters' notes and without the checks of distributions, which cannot be traced."""
+    from torch.distributions import Distribution
+
+    logger = logging.getLogger("torch.onnx")
+    level, checked = logger.level, Distribution._validate_args
+    logger.setLevel(logging.ERROR)
+    Distribution.set_default_validate_args(False)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        logger.setLevel(level)
+        Distribution.set_default_validate_args(checked)
+
+
+def write_onnx(module: Any, example: Any, path: Path, metadata: dict[str, Any]) -> None:
+    """Write a module as ONNX with any number of rows.
+
+    Raises:
+        HoofEnvError: a package is missing.
+    """
+    import torch
+
+    try:
+        import onnx  # noqa: F401
+        import onnxscript  # noqa: F401
+    except ImportError as error:
+        raise HoofEnvError(f'writing ONNX needs {error.name}: pip install "hoof-env[train,onnx]"') from None
+    with _quietly():
+        program: Any = torch.onnx.export(
+            module, (torch.as_tensor(example),), dynamo=True, opset_version=OPSET, verbose=False,
+            input_names=[INPUT], output_names=[OUTPUT],
+            dynamic_shapes=({0: torch.export.Dim("batch")},),
+        )  # fmt: skip
+    graph = program.model.graph
+    for part in (graph, *graph, *graph.inputs, *graph.outputs, *graph.initializers.values()):
+        part.metadata_props.clear()  # stack traces, with the folders of this machine
+    program.model.metadata_props.clear()
+    for key, value in metadata.items():
+        program.model.metadata_props[key] = json.dumps(value) if key in LISTS else str(value)
+    program.save(path, external_data=False)
+
+
+def write_torchscript(module: Any, example: Any, path: Path, metadata: dict[str, Any]) -> None:
+    """Write a module as TorchScript; the metadata are its extra file metadata.json."""
+    import torch
+
+    with _quietly(), torch.no_grad():
+        script = torch.jit.trace(module, torch.as_tensor(example))
+        torch.jit.save(script, str(path), _extra_files={"metadata.json": json.dumps(metadata).encode()})
+
+
+def read_torchscript(path: Path) -> Any:
+    """The file as a function of observations, as `predict`."""
+    import torch
+
+    with _quietly():
+        script = torch.jit.load(str(path))
+
+    def predict(observation: Any) -> tuple[Any, None]:
+        with torch.no_grad():
+            return script(torch.as_tensor(np.atleast_2d(observation))).numpy(), None
+
+    return predict
+
+
+def difference(trained: Any, predict: Any, observations: Any) -> float:
+    """The largest difference of an action, many observations at once and one alone, NaN if one is none."""
+    space = trained.model.action_space
+    half = (space.high - space.low) / 2
+    wanted, _ = trained.predict(observations)
+    alone = [predict(row)[0].reshape(-1) for row in observations[:20]]
+    both = (predict(observations)[0], np.array(alone))
+    return float(max(np.max(np.abs(found - wanted[: len(found)]) / half) for found in both))
+
+
+def main(argv: list[str] | None = None) -> None:
+    import tyro
+
+    args = tyro.cli(Args, args=argv, prog="python -m agents.export", description=__doc__)
+    off = export(args.model, args.out, args.env_id)
+    print(
+        f"written: {args.out} ({args.out.stat().st_size / 1000:.0f} kB); on {TRIED} random observations its "
+        f"actions differ from the model's by {off:.1g} of their half range at most"
+    )
+
+
+if __name__ == "__main__":
+    run(main)
