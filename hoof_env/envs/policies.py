@@ -1,17 +1,20 @@
-"""Scripted policies: the gaits of a preset and the simplest things a policy can do wrong.
+"""Scripted policies: gaits of a preset or a file, and the simplest things a policy can do wrong.
 
 All have Stable-Baselines3's `predict`, so that scripted and trained policies are interchangeable.
 """
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.envs.start import extreme_posture
-from hoof_env.errors import check_choice
+from hoof_env.errors import DataFileError, check_choice
 from hoof_env.gait.parameters import GaitParameters, paper_gaits
 from hoof_env.leg.profile import leg_profile
 
@@ -111,3 +114,67 @@ def make_policy(name: str, env: Any, seed: int = 0) -> Scripted:
         return leg.action_for(gaits if gaits.ndim > 1 else GaitParameters.from_array(gaits))
 
     return Scripted(hold, leg.dt)
+
+
+def open_loop(parameters: Mapping[str, Any], dt: float) -> Scripted:
+    """A policy that sees nothing: constant actions, or with a first harmonic of a clock,
+
+        a(t) = constant + sin * sin(2 pi f t) + cos * cos(2 pi f t),   t the time since the episode began.
+
+    Args:
+        parameters: "constant", shape (4,), or (n, 4) for n environments; and, if there is a clock, "sin" and
+            "cos" of the same shape and "frequency_hz", a number or shape (n,). The environment clips the sum.
+        dt: control step [s].
+    """
+    constant = np.asarray(parameters["constant"], float)
+    if "frequency_hz" not in parameters:
+        return Scripted(lambda observation, time: constant, dt)
+    sine, cosine = (np.asarray(parameters[name], float) for name in ("sin", "cos"))
+    rate = 2 * np.pi * np.asarray(parameters["frequency_hz"], float)
+
+    def act(observation: Any, time: Any) -> Any:
+        phase = np.asarray(rate * time)[..., None]
+        return constant + sine * np.sin(phase) + cosine * np.cos(phase)
+
+    return Scripted(act, dt)
+
+
+def read_open_loop(path: Path, env: Any = None) -> Scripted:
+    """The open-loop gait of a file, which `agents.open_loop` writes.
+
+    Args:
+        path: a JSON object with "parameters" as `open_loop` takes them, of one environment; "dt", control
+            step [s]; and "gait", the four gait parameters that the constant commands.
+        env: what it is for, whose control step the clock then has; None for that of the file.
+
+    Raises:
+        DataFileError: it cannot be read, lacks a part, or the environment's actions command other gaits.
+    """
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+        given, dt, gait = (
+            found["parameters"],
+            float(found["dt"]),
+            np.array(list(found["gait"].values()), float),
+        )
+        shapes = {"constant": (4,), "sin": (4,), "cos": (4,), "frequency_hz": ()}
+        clocked = "frequency_hz" in given
+        if set(given) != (set(shapes) if clocked else {"constant"}):
+            raise ValueError(f"parameters {sorted(given)}")
+        for name, value in given.items():
+            if np.shape(value) != shapes[name] or not np.isfinite(np.asarray(value, float)).all():
+                raise ValueError(f"{name} {value!r}")
+    except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
+        raise DataFileError(
+            f"open-loop gait {path}: expected the JSON object of agents.open_loop with parameters, dt and "
+            f"gait: {error!r}"
+        ) from None
+    if env is not None:
+        leg, dt = env.unwrapped, getattr(env.unwrapped, "dt", dt)
+        meant = getattr(leg, "command_of", lambda action: np.full(4, np.nan))(np.array(given["constant"]))
+        if not np.allclose(meant, gait, atol=1e-6):
+            raise DataFileError(
+                f"open-loop gait {path}: expected an environment whose actions command gaits as those of "
+                f"{found.get('env_id')} do, got {type(leg).__name__}, where this one is {meant.tolist()}"
+            )
+    return open_loop(given, dt)
