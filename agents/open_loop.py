@@ -43,15 +43,9 @@ EPISODES = {"constant": 10_240, "clocked": 30_720}
 """Of a search, by family."""
 
 KEPT = (
-    "return",
-    "speed_m_s",
-    "stance_peak_n",
-    "cost_of_transport",
-    "peak_grf_n",
-    "weight_share",
-    "stances",
+    "return", "speed_m_s", "stance_peak_n", "cost_of_transport", "peak_grf_n", "weight_share", "stances",
     "failed",
-)
+)  # fmt: skip
 """Figures of an episode whose means are kept."""
 
 
@@ -66,7 +60,9 @@ class Args:
     objective: Literal["return", "peak", "transport"] = "return"
     """highest mean return; or, at --speed or more, least mean peak force of a stance or cost of transport"""
     speed: float | None = None
-    """mean speed of episodes that "peak" and "transport" ask for [m/s]"""
+    """mean speed that "peak" and "transport" ask for [m/s]"""
+    weight_share: float | None = None
+    """mean part of the weight that they ask the leg to bear"""
     restarts: int = 5
     """searches, of seeds 0, 1, ..."""
     episodes: int | None = None
@@ -76,7 +72,7 @@ class Args:
     start: Path | None = None
     """file of a gait whose constants every second search begins with"""
     out: Path | None = None
-    """file; otherwise runs/open_loop/ENV-FAMILY[-OBJECTIVE-SPEED].json"""
+    """file; otherwise runs/open_loop/ENV-FAMILY[-OBJECTIVE-SPEED[-share-SHARE]].json"""
 
 
 def optimise(args: Args) -> dict[str, Any]:
@@ -94,20 +90,25 @@ def optimise(args: Args) -> dict[str, Any]:
     check_number("episodes", episodes, low=3 * ROWS, high=1e7)
     if (args.objective == "return") != (args.speed is None):
         raise ParameterError(f"speed: expected one for 'peak' and 'transport' alone, got {args.speed!r}")
+    if args.objective == "return" and args.weight_share is not None:
+        raise ParameterError("weight_share: expected none for 'return', where nothing is asked for")
     if args.speed is not None:
         check_number("speed", args.speed, low=0, high=20)
+    if args.weight_share is not None:
+        check_number("weight_share", args.weight_share, low=0, high=1)
     kwargs = parse_pairs("--env-kwargs", args.env_kwargs)
     path = args.out or Path("runs/open_loop", file_name(args))
     about: dict[str, Any] = {
         "env_id": args.env_id, "env_kwargs": kwargs, "family": args.family, "objective": args.objective,
-        "speed": args.speed, "episodes_of_a_search": episodes, "test_episodes": args.test_episodes,
+        "speed": args.speed, "weight_share": args.weight_share,
+        "episodes_of_a_search": episodes, "test_episodes": args.test_episodes,
         "start": stored(args.start)["parameters"]["constant"] if args.start else None,
     }  # fmt: skip
     restarts = earlier(path, about)
     check_folder(path.parent)
-    court = Court(args.env_id, kwargs, args.family, args.objective, args.speed)
+    court = Court(args.env_id, kwargs, args.family, args.objective, args.speed, args.weight_share)
     left = [seed for seed in range(args.restarts) if seed not in [one["seed"] for one in restarts]]
-    found = write(path, about, court, restarts) if restarts else {}
+    found: dict[str, Any] = {}
     with tqdm(total=episodes * len(left), unit=" episodes", leave=False, disable=None) as bar:
         for k, seed in enumerate(left):
             bar.set_description(f"{path.stem}, search {seed}")
@@ -125,11 +126,11 @@ def optimise(args: Args) -> dict[str, Any]:
             one["cpu_s"] = round(time.process_time() - used, 1)
             one["mean"] = means(court.test(parameters, args.test_episodes))
             restarts.append(one | ({"interrupted": True} if interrupted else {}))
-            found = write(path, about, court, restarts)
+            found = write(path, about, court, restarts, found)
             if interrupted:
                 raise KeyboardInterrupt
             bar.n = (k + 1) * episodes  # a search may have converged before
-    return found
+    return found or write(path, about, court, restarts, {})
 
 
 def means(episodes: Episodes) -> dict[str, float | None]:
@@ -138,21 +139,32 @@ def means(episodes: Episodes) -> dict[str, float | None]:
     return {key: value if math.isfinite(value) else None for key, value in found.items()}
 
 
-def write(path: Path, about: dict[str, Any], court: Court, restarts: list[dict[str, Any]]) -> dict[str, Any]:
-    """Write the best of the searches, scored, and all of them; returns what the file holds."""
+def write(
+    path: Path, about: dict[str, Any], court: Court, restarts: list[dict[str, Any]], before: dict[str, Any]
+) -> dict[str, Any]:
+    """Write the best of the searches, scored, and all of them; returns what the file holds.
+
+    Args:
+        path, about: the file, and what was asked for.
+        court: the judge.
+        restarts: the searches.
+        before: what the file held, or nothing.
+    """
     best = min(restarts, key=lambda one: one["cost"])
-    episodes = court.test(best["parameters"], about["test_episodes"])
-    interval = {}
-    for key, mean in means(episodes).items():
-        found = estimate([one[key] for one in episodes]) if mean is not None else None
-        interval[key] = [found.low, found.high] if found else None
+    score = before.get("score")
+    if before.get("parameters") != best["parameters"]:
+        episodes = court.test(best["parameters"], about["test_episodes"])
+        score = {"first_seed": TEST_SEED, "mean": means(episodes), "interval95": {}}
+        for key, mean in score["mean"].items():
+            found = estimate([one[key] for one in episodes]) if mean is not None else None
+            score["interval95"][key] = [found.low, found.high] if found else None
     gait = court.leg.command_of(np.array(best["parameters"]["constant"])).tolist()
     whole = {
         **about,
         "parameters": best["parameters"],
         "gait": dict(zip(PARAMETERS, gait, strict=True)),
         "dt": court.leg.dt,
-        "score": {"first_seed": TEST_SEED, "mean": means(episodes), "interval95": interval},
+        "score": score,
         "episodes": sum(one["episodes"] for one in restarts),
         **{key: round(sum(one[key] for one in restarts), 1) for key in ("wall_s", "cpu_s")},
         "command": runs.command(),
@@ -173,7 +185,7 @@ def earlier(path: Path, about: dict[str, Any]) -> list[dict[str, Any]]:
         return []
     with suppress(OSError, ValueError, KeyError, TypeError, AttributeError):
         found = json.loads(path.read_text(encoding="utf-8"))
-        if all(found[key] == value for key, value in about.items()):
+        if all(found.get(key) == value for key, value in about.items()):
             return [one for one in found["restarts"] if not one.get("interrupted")]
     raise DataFileError(f"{path}: expected searches with {about} to go on with; name another --out")
 
@@ -181,6 +193,7 @@ def earlier(path: Path, about: dict[str, Any]) -> list[dict[str, Any]]:
 def file_name(args: Args) -> str:
     """What the file of a search is called."""
     asked = "" if args.objective == "return" else f"-{args.objective}-{args.speed:g}"
+    asked += "" if args.weight_share is None else f"-share-{args.weight_share:g}"
     return f"{args.env_id.rpartition('/')[2]}-{args.family}{asked}.json"
 
 

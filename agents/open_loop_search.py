@@ -37,7 +37,7 @@ TEST_SEED, SEARCH_SEED = 1000, 10_000_000
 """First seeds of the final score, `agents.evaluate`'s, and of the searches."""
 
 SHORTFALL = 10.0
-"""What 1 m/s too little costs, and failing always: more than it can save."""
+"""What 1 m/s or a whole weight too little costs, and failing always: more than it can save."""
 
 
 def decode(family: str, x: Floats) -> dict[str, Floats]:
@@ -48,23 +48,32 @@ def decode(family: str, x: Floats) -> dict[str, Floats]:
     return {"constant": x[..., :4], "sin": x[..., 4:8], "cos": x[..., 8:12], "frequency_hz": frequency}
 
 
-def cost(episodes: Episodes, objective: str, speed: float, weight: float) -> float:
+def cost(episodes: Episodes, objective: str, weight: float, speed: float = 0.0, share: float = 0.0) -> float:
     """What a search makes small.
 
     Args:
         episodes: of one candidate.
-        objective: "return"; or "peak" or "transport", under the condition of a speed: mean peak force of a
-            stance [weights], and work per weight and distance of all episodes together.
-        speed: mean speed that is asked for [m/s].
+        objective: "return"; or, under conditions, "peak" or "transport": mean peak force of a stance
+            [weights], and work per weight and distance of all episodes together.
         weight: of trunk and leg [N].
+        speed, share: conditions: mean speed [m/s] and part of the weight that the leg bears, or more.
     """
     mean = {
         key: float(np.mean([one[key] for one in episodes]))
-        for key in ("return", "speed_m_s", "stance_peak_n", "drive_work_j", "distance_m", "failed")
+        for key in (
+            "return",
+            "speed_m_s",
+            "stance_peak_n",
+            "drive_work_j",
+            "distance_m",
+            "weight_share",
+            "failed",
+        )
     }
     if objective == "return":
         return -mean["return"]
-    penalty = SHORTFALL * (max(0.0, speed - mean["speed_m_s"]) + mean["failed"])
+    missing = max(0.0, speed - mean["speed_m_s"]) + max(0.0, share - mean["weight_share"])
+    penalty = SHORTFALL * (missing + mean["failed"])
     if objective == "peak":
         return mean["stance_peak_n"] / weight + penalty
     transport = mean["drive_work_j"] / (weight * max(mean["distance_m"], 0.1))  # who stands is only too slow
@@ -77,7 +86,7 @@ class Court:
     Args:
         env_id, env_kwargs: the environment.
         family: of the candidates.
-        objective, speed: as of `cost`.
+        objective, speed, share: as of `cost`.
 
     Attributes:
         leg: a single environment like the rows.
@@ -88,20 +97,28 @@ class Court:
     """
 
     def __init__(
-        self, env_id: str, env_kwargs: dict[str, Any], family: str, objective: str, speed: float | None
+        self,
+        env_id: str,
+        env_kwargs: dict[str, Any],
+        family: str,
+        objective: str = "return",
+        speed: float | None = None,
+        share: float | None = None,
     ) -> None:
-        self.leg: Any = runs.make_env(env_id, **env_kwargs).unwrapped
+        leg: Any = runs.make_env(env_id, **env_kwargs).unwrapped
         envs = make_rows(env_id, ROWS, **env_kwargs)
         if envs is None:
             raise ParameterError(f"env_id: expected an id of this package with many at once, got {env_id!r}")
-        self.envs, self.spent = envs, 0
-        self.family, self.objective, self.speed = family, objective, speed or 0.0
+        self.leg, self.envs, self.spent = leg, envs, 0
+        self.family = family
+        conditions = {"speed": speed or 0.0, "share": share or 0.0}
+        self._cost: dict[str, Any] = {"objective": objective, "weight": leg.weight, **conditions}
 
     def costs(self, x: Floats, seeds: Sequence[int]) -> list[float]:
         """`cost` of candidates, shape (n, size), that meet the same starts; n * len(seeds) is `ROWS`."""
         episodes = self._play(decode(self.family, np.repeat(x, len(seeds), axis=0)), [*seeds] * len(x))
         each = [episodes[k : k + len(seeds)] for k in range(0, len(episodes), len(seeds))]
-        return [cost(some, self.objective, self.speed, self.leg.weight) for some in each]
+        return [cost(some, **self._cost) for some in each]
 
     def test(self, parameters: dict[str, Any], count: int) -> Episodes:
         """Episodes of the final score of one candidate."""

@@ -89,16 +89,17 @@ def test_decoding_reaches_all_frequencies():
 def test_costs():
     one = {
         "return": 5.0, "speed_m_s": 2.0, "stance_peak_n": 1000.0, "drive_work_j": 3000.0, "distance_m": 20.0,
-        "failed": 0.0,
+        "weight_share": 0.5, "failed": 0.0,
     }  # fmt: skip
     other = one | {"return": 7.0, "stance_peak_n": 3000.0, "drive_work_j": 1000.0}
-    assert cost([one, other], "return", 0.0, 500.0) == -6.0
-    assert cost([one, other], "peak", 2.0, 500.0) == pytest.approx(4.0)
-    assert cost([one, other], "transport", 1.0, 500.0) == pytest.approx(0.2)
-    assert cost([one], "transport", 2.5, 500.0) == pytest.approx(0.3 + 5.0)  # half a metre per second short
+    assert cost([one, other], "return", 500.0) == -6.0
+    assert cost([one, other], "peak", 500.0, speed=2.0) == pytest.approx(4.0)
+    assert cost([one, other], "transport", 500.0, speed=1.0) == pytest.approx(0.2)
+    assert cost([one], "transport", 500.0, speed=2.5) == pytest.approx(0.3 + 5.0)  # 0.5 m/s too slow
+    assert cost([one], "peak", 500.0, share=0.6) == pytest.approx(2.0 + 1.0)  # bears a tenth too little
     back = one | {"speed_m_s": -1.0, "distance_m": -10.0}
-    assert cost([back], "transport", 1.0, 500.0) > cost([one], "transport", 1.0, 500.0) + 10
-    assert cost([one | {"failed": 1.0}], "peak", 0.0, 500.0) > cost([one], "peak", 0.0, 500.0) + 5
+    assert cost([back], "transport", 500.0, speed=1.0) > cost([one], "transport", 500.0, speed=1.0) + 10
+    assert cost([one | {"failed": 1.0}], "peak", 500.0) > cost([one], "peak", 500.0) + 5
 
 
 @pytest.mark.parametrize("family", SIZES)
@@ -180,7 +181,8 @@ def test_the_command_prints_scores(tmp_path, capsys):
         ({"restarts": 0}, "restarts"), ({"episodes": 10}, "episodes"),
         ({"test_episodes": 1}, "test_episodes"),
         ({"speed": 2.0}, "speed"), ({"objective": "peak"}, "speed"),
-        ({"objective": "peak", "speed": -1.0}, "speed"), ({"env_id": "hoof_env/Cow-v0"}, "Cow"),
+        ({"weight_share": 0.5}, "weight_share"), ({"objective": "peak", "speed": -1.0}, "speed"),
+        ({"env_id": "hoof_env/Cow-v0"}, "Cow"),
         ({"env_id": "Pendulum-v1", "env_kwargs": ()}, "many at once"),
     ],
 )  # fmt: skip
