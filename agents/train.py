@@ -236,9 +236,10 @@ def make_model(args: Args, settings: dict[str, Any], many: Any, folder: Path) ->
         given = normalize if isinstance(normalize, dict) else {}
         envs = VecNormalize(envs, **{"gamma": settings.get("gamma", 0.99)} | given)
     arguments = model_arguments(settings, int(np.prod(envs.action_space.shape or 1)))
-    if "buffer_size" in arguments:  # more would be written into every checkpoint, empty
-        arguments["buffer_size"] = min(arguments["buffer_size"], settings["n_timesteps"] + settings["n_envs"])
     try:
+        if "buffer_size" in arguments:  # more would stand empty in every checkpoint
+            most = settings["n_timesteps"] + settings["n_envs"]
+            arguments["buffer_size"] = min(arguments["buffer_size"], most)
         return algorithm_class(args.algo)(env=envs, seed=args.seed, device=args.device, **arguments)
     except (TypeError, ValueError, AssertionError, RuntimeError) as error:  # torch's, for the device
         said = f"hyperparameters of {args.algo} for {args.env_id} on device {args.device!r}: {error}"

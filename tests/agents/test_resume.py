@@ -85,7 +85,7 @@ def test_a_stopped_run_goes_on_as_if_it_had_not_been(algo, tmp_path):
 
 def test_killed_again_and_again(tmp_path):
     """SIGKILL at random moments: the command with --resume ends as one that was never killed."""
-    steps = 128 * 100
+    steps = 128 * 60
     argv = [
         "--steps", str(steps), "--n-envs", "4", "--checkpoint-every", "0.02", "--resume",
         "--env-kwargs", *SHORT, "--params", *TINY,
