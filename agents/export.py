@@ -8,8 +8,7 @@ both: the normalisation of observations and the limits of actions are inside. It
 actions of the model it was made from. What it is for stands in its metadata (`hoof_env/onnx_policy.py`);
 examples/run_policy.py plays an ONNX file in twenty lines.
 
-A model file is a pickle and can run any code when it is loaded: give only files that you trust. An ONNX file
-is data.
+A .zip is a pickle and can run any code when it is loaded: give only files that you trust. ONNX is data.
 """
 
 from __future__ import annotations
@@ -30,6 +29,7 @@ from tyro.conf import Positional
 import hoof_env
 from agents import runs
 from agents.command import run
+from agents.policy_module import module_of
 from hoof_env._output import check_folder, staged
 from hoof_env.errors import DataFileError, HoofEnvError, OutputError, ParameterError
 from hoof_env.onnx_policy import INPUT, LISTS, OUTPUT, OnnxPolicy, describe
@@ -55,47 +55,65 @@ class Args:
     """environment of a model without run.json"""
 
 
-def export(model: Path, out: Path, env_id: str | None = None, **about: str) -> float:
+def export(model: Path, out: Path, env_id: str | None = None) -> float:
     """Write the policy of a model and return the largest difference of an action, as in `TOLERANCE`.
 
     Args:
         model: run folder or .zip.
         out: ends in one of `SUFFIXES`.
         env_id: what it is for; otherwise what run.json says.
-        about: more metadata.
 
     Raises:
-        ParameterError: another suffix, no environment known, or a policy that observes or does something
-            else than vectors. DataFileError: no such model, or it does not fit, or the file acts otherwise.
-        OutputError: it cannot be written. HoofEnvError: a package is missing.
+        ParameterError: another suffix, or no environment known. DataFileError: no such model.
+        Others as `write_policy`.
     """
-    if out.suffix not in SUFFIXES:
-        raise ParameterError(f"out: expected a file that ends in {' or '.join(SUFFIXES)}, got {str(out)!r}")
-    if out.is_dir():
-        raise OutputError(f"cannot write to {str(out)!r}: expected a file, got a folder")
+    check_place(out)
     saved = runs.SavedModel.find(model)
     env_id = env_id or saved.record.get("env_id")
     if env_id is None:
         raise ParameterError(f"env_id: expected one, for there is no run.json beside {saved.path}")
     kwargs = saved.record.get("env_kwargs", {}) if env_id == saved.record.get("env_id") else {}
-    check_folder(out.parent)
     with runs.make_env(env_id, **kwargs) as env:
         trained = saved.load(env, env_id)
-        metadata = {
-            "env_id": env_id, "env_kwargs": kwargs, "hoof_env": hoof_env.__version__,
-            "algo": saved.record.get("algo", type(trained.model).__name__.lower()), **describe(env), **about,
-        }  # fmt: skip
-        observations = some_observations(env.observation_space)
-        with staged(out.parent) as stage:
-            file = stage / out.name
-            write = write_onnx if out.suffix == ".onnx" else write_torchscript
-            write(module_of(trained), observations[:2], file, metadata)
-            read = OnnxPolicy(file).predict if out.suffix == ".onnx" else read_torchscript(file)
-            off = difference(trained, read, observations)
-            if not off <= TOLERANCE:
-                raise DataFileError(
-                    f"model {saved.path}: expected a file that acts within {TOLERANCE:g} of it, got {off:.2g}"
-                )
+        metadata = about(env, env_id, kwargs, saved.record)
+    return write_policy(trained, out, metadata)
+
+
+def check_place(out: Path) -> None:
+    """Raise unless a policy can be written there: `ParameterError` for its suffix, else `OutputError`."""
+    if out.suffix not in SUFFIXES:
+        raise ParameterError(f"out: expected a file that ends in {' or '.join(SUFFIXES)}, got {str(out)!r}")
+    if out.is_dir():
+        raise OutputError(f"cannot write to {str(out)!r}: expected a file, got a folder")
+    check_folder(out.parent)
+
+
+def about(env: Any, env_id: str, env_kwargs: dict[str, Any], record: dict[str, Any]) -> dict[str, Any]:
+    """The metadata of a policy for an environment; `record` is the run.json of its training, or empty."""
+    known = {key: str(record[key]) for key in ("algo", "seed") if key in record}
+    here = {"env_id": env_id, "env_kwargs": env_kwargs, "hoof_env": hoof_env.__version__}
+    return here | describe(env) | known
+
+
+def write_policy(trained: runs.TrainedPolicy, out: Path, metadata: dict[str, Any]) -> float:
+    """Write a policy to `out`, an older file is replaced, and return the largest difference of an action.
+
+    Raises:
+        ParameterError: a policy that observes or does something else than vectors, or remembers.
+        DataFileError: the file does not act as the policy does; it is not kept.
+        OutputError: it cannot be written. HoofEnvError: a package is missing.
+    """
+    observations = some_observations(trained.model.observation_space)
+    module, onnx = module_of(trained), out.suffix == ".onnx"
+    with staged(out.parent) as stage:
+        file = stage / out.name
+        (write_onnx if onnx else write_torchscript)(module, observations[:2], file, metadata)
+        predict = OnnxPolicy(file).predict if onnx else read_torchscript(file)
+        off = difference(trained, predict, observations)
+        if not off <= TOLERANCE:
+            raise DataFileError(
+                f"{out}: expected actions within {TOLERANCE:g} of the model's, got {off:.2g}; not kept"
+            )
     return off
 
 
@@ -111,51 +129,6 @@ def some_observations(space: gym.Space[Any]) -> Any:
     rows = np.stack([space.sample() for _ in range(TRIED)]).astype(np.float32)
     rows[::10] *= 100
     return rows
-
-
-def module_of(trained: Any) -> Any:
-    """The policy as a torch module from observations to deterministic actions, as `predict` computes them.
-
-    Raises:
-        ParameterError: a recurrent policy, or actions that are not vectors.
-    """
-    import torch
-
-    policy = trained.model.policy
-    space = trained.model.action_space
-    if not isinstance(space, gym.spaces.Box) or len(space.shape) != 1 or hasattr(policy, "lstm_actor"):
-        raise ParameterError(f"model: expected a memoryless policy with vectors for actions, got {space}")
-    statistics = getattr(trained.normalize, "__self__", None)
-    if statistics is not None and not statistics.norm_obs:
-        statistics = None
-
-    class Deterministic(torch.nn.Module):
-        low: Any
-        high: Any
-        mean: Any
-        scale: Any
-
-        def __init__(self) -> None:
-            super().__init__()
-            self.policy = policy
-            self.register_buffer("low", torch.as_tensor(space.low))
-            self.register_buffer("high", torch.as_tensor(space.high))
-            if statistics is not None:  # in float64, as VecNormalize computes
-                self.register_buffer("mean", torch.as_tensor(statistics.obs_rms.mean))
-                scale = np.sqrt(statistics.obs_rms.var + statistics.epsilon)
-                self.register_buffer("scale", torch.as_tensor(scale))
-
-        def forward(self, observation: Any) -> Any:
-            if statistics is not None:
-                far = (observation.double() - self.mean) / self.scale
-                observation = far.clamp(-statistics.clip_obs, statistics.clip_obs).float()
-            action = self.policy._predict(observation, deterministic=True)
-            if policy.squash_output:  # in [-1, 1]: to the limits of the space
-                return self.low + 0.5 * (action + 1.0) * (self.high - self.low)
-            return torch.clamp(action, self.low, self.high)
-
-    policy.set_training_mode(False)
-    return Deterministic().eval()
 
 
 @contextmanager
