@@ -4,7 +4,7 @@
 #   TORCH_INDEX=URL     where Linux takes PyTorch from; empty for pip's own index, which has the CUDA build
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-peers test-ecosystem bench lint clean
+.PHONY: help setup demo test test-peers test-ecosystem bench baselines lint clean
 
 PY := .venv/bin/python
 PYTHONS := $(or $(PYTHON),$(PY) python3 python3.13 python3.12 python3.11)
@@ -16,6 +16,7 @@ help:
 	@echo 'make test-peers  the engine against MuJoCo and Exudyn, which it installs'
 	@echo 'make test-ecosystem  every RL library on every id, in environments under .ecosystem/: 6 GB, some minutes'
 	@echo 'make bench       how fast engine and environments are beside MuJoCo, Exudyn and EnvPool'
+	@echo 'make baselines   the agents of docs/baselines.md, hours; ARGS="--subset nightly": a small part, minutes'
 	@echo 'make lint        lint and types alone'
 	@echo 'make setup       make .venv and nothing more'
 	@echo 'make clean       remove .venv and the caches; runs/ stays'
@@ -46,6 +47,10 @@ bench: setup
 	@$(PY) -m pip install -q -c constraints.txt envpool || echo 'no EnvPool here: HalfCheetah-v5 stands for it'
 	@$(PY) -m benchmarks.speed
 	@$(PY) -m benchmarks.env_speed
+
+baselines: setup
+	@echo 'pip install rliable' && $(PY) -m pip install -q -c constraints.txt -e '.[baselines]'
+	@$(PY) -m agents.baselines $(ARGS)
 
 lint: setup
 	@echo 'ruff check' && $(PY) -m ruff check -q --output-format concise

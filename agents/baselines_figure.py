@@ -21,7 +21,7 @@ def over_time(row: Row, key: str) -> tuple[Floats, Floats]:
     first, last = max(c[1][key] for c in curves), min(c[-1][key] for c in curves)
     x = np.geomspace(first, max(last, first), POINTS)
     each = [np.interp(x, [p[key] for p in c], [p["return"] for p in c]) for c in curves]
-    return x, iqm(each, reps=2000)
+    return x, iqm(each)
 
 
 def draw_curves(rows: Sequence[Row], gaits: Mapping[str, Reference], path: Path) -> None:

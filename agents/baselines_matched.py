@@ -59,7 +59,7 @@ class Compared:
 
 def of_row(name: str, row: Row) -> Compared:
     """An entry as it was scored."""
-    return Compared(name, {key: row.over_seeds(key) for key in COLUMNS})
+    return Compared(name, row.intervals)
 
 
 def of_reference(name: str, found: Reference) -> Compared:
@@ -72,7 +72,7 @@ def told_speed(row: Row, speed: float) -> Compared:
     kwargs: dict[str, Any] = {"target_speed": [speed, speed]}
     each = [figures(score_vector(str(one.folder), SPEED, FINAL_SEEDS, **kwargs)) for one in row.results]
     name = f"{row.title} of HorseLegSpeed-v0, told {speed:g} m/s"
-    return Compared(name, {key: over_seeds([one[key] for one in each]) for key in COLUMNS})
+    return Compared(name, over_seeds(each))
 
 
 def scaled_runs() -> tuple[list[tuple[float, float]], np.ndarray]:

@@ -32,7 +32,7 @@ from agents.baselines_results import (
     versions_of,
 )
 from agents.baselines_run import COLUMNS
-from agents.baselines_stats import Interval, over_seeds
+from agents.baselines_stats import Interval
 from agents.command import run
 from agents.learning_report import put
 from agents.throughput import RESULT as THROUGHPUT
@@ -73,7 +73,7 @@ def results_table(rows: Sequence[Row], gaits: dict[str, dict[str, Reference]]) -
 
 def row_cells(row: Row, known: dict[str, Reference]) -> list[str]:
     """The cells of an entry from its seeds on."""
-    count, returns = len(row.results), np.array(row.each("return"))
+    count, returns = len(row.results), np.array([one.figures["return"] for one in row.results])
     wall = np.median([one.final["wall_s"] for one in row.results])
 
     def above(name: str) -> str:
@@ -83,7 +83,7 @@ def row_cells(row: Row, known: dict[str, Reference]) -> list[str]:
     return [
         str(count) if count == row.entry.seeds else f"{count} of {row.entry.seeds}",
         f"{np.median([one.final['steps'] for one in row.results]):,.0f}", f"{wall:,.0f}",
-        over_seeds(returns.tolist()).text(), f"{returns.mean():.1f}",
+        row.intervals["return"].text(), f"{returns.mean():.1f}",
         f"{returns.min():.1f} to {returns.max():.1f}", above("run"), above(OPEN_LOOP),
         f"{len(seconds)}/{count}" + (f": {np.median(seconds):.0f} ({max(seconds):.0f})" if seconds else ""),
     ]  # fmt: skip
@@ -106,9 +106,7 @@ def figures_table(rows: Sequence[Row], gaits: dict[str, dict[str, Reference]]) -
             (one.name, one.intervals) for one in known.values()
         ]
         named += [
-            (row.title, {key: row.over_seeds(key) for key in SHOWN if row.each(key)})
-            for row in rows
-            if row.entry.env_id == env_id and not row.entry.label
+            (row.title, row.intervals) for row in rows if row.entry.env_id == env_id and not row.entry.label
         ]
         for name, found in named:
             cells = [
@@ -121,14 +119,14 @@ def figures_table(rows: Sequence[Row], gaits: dict[str, dict[str, Reference]]) -
 def best_of(rows: Sequence[Row]) -> Row | None:
     """The entry of HorseLeg-v0 with the highest return."""
     asked = [row for row in rows if row.entry.env_id == LEG and not row.entry.label]
-    return max(asked, key=lambda row: row.over_seeds("return").mean, default=None)
+    return max(asked, key=lambda row: row.intervals["return"].mean, default=None)
 
 
 def bars_table(rows: Sequence[Row], known: dict[str, Reference], matched: str) -> str:
     """What was asked of the baselines, and whether they do it."""
     best, found = best_of(rows), {}
     if best is not None:
-        told = best.over_seeds("return")
+        told = best.intervals["return"]
         for name in known:
             other = known[name].intervals["return"]
             word = "met" if told.above(other) else "not met"

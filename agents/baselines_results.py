@@ -61,13 +61,10 @@ class Row:
         """Algorithm, and what sets the entry apart."""
         return " ".join(filter(None, (self.entry.algo.upper(), self.entry.label)))
 
-    def each(self, figure: str) -> list[float]:
-        """A figure of each seed, none where the id does not have it."""
-        return [one.figures[figure] for one in self.results if figure in one.figures]
-
-    def over_seeds(self, figure: str) -> Interval:
-        """A figure over seeds."""
-        return over_seeds(self.each(figure))
+    @cached_property
+    def intervals(self) -> dict[str, Interval]:
+        """Figures over seeds, those that the id has."""
+        return over_seeds([one.figures for one in self.results])
 
     def beaten(self, level: float) -> list[dict[str, float] | None]:
         """Of each seed the first row of its curve with a return above `level`."""

@@ -6,7 +6,7 @@ Agarwal et al. 2021, Deep reinforcement learning at the edge of the statistical 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,6 +27,8 @@ class Interval:
 
     def text(self, digits: int = 1, factor: float = 1.0) -> str:
         """As a table shows it."""
+        if math.isnan(self.mean):
+            return ""
         mean, low, high = (f"{factor * x:.{digits}f}" for x in (self.mean, self.low, self.high))
         return mean if math.isnan(self.low) else f"{mean} [{low}, {high}]"
 
@@ -35,15 +37,20 @@ class Interval:
         return self.low > other.high
 
 
-def iqm(scores: ArrayLike, reps: int = 5000) -> Floats:
+REPS = 5000
+"""Of a bootstrap."""
+
+
+def iqm(scores: ArrayLike) -> Floats:
     """Interquartile mean over seeds and its interval.
 
     Args:
-        scores: of each seed, shape (seeds,), or along a curve, shape (seeds, points).
-        reps: of the bootstrap, which draws the same numbers each time.
+        scores: of each seed, shape (seeds,), or several numbers of each, shape (seeds, n), that are
+            resampled apart.
 
     Returns:
-        Mean, low and high, shape (3,) or (3, points); low and high are NaN for one seed.
+        Mean, low and high, shape (3,) or (3, n); low and high are NaN for one seed. The bootstrap draws the
+        same numbers each time.
 
     Raises:
         ParameterError: rliable is not installed.
@@ -67,11 +74,13 @@ def iqm(scores: ArrayLike, reps: int = 5000) -> Floats:
         found = np.stack([over_seeds(curve), *[np.full(curve.shape[2], np.nan)] * 2])
     else:
         np.random.seed(0)  # noqa: NPY002  rliable draws from here whatever generator it is given
-        means, bounds = get_interval_estimates({"": curve}, over_seeds, reps=reps)
+        means, bounds = get_interval_estimates({"": curve}, over_seeds, reps=REPS)
         found = np.stack([means[""], *bounds[""]])
     return found.reshape(3, *values.shape[1:])
 
 
-def over_seeds(scores: Sequence[float]) -> Interval:
-    """`iqm` of one number a seed."""
-    return Interval(*map(float, iqm(scores)))
+def over_seeds(each: Sequence[Mapping[str, float]]) -> dict[str, Interval]:
+    """`iqm` of every figure that the seeds have in common, by name."""
+    names = [name for name in each[0] if all(name in one for one in each)]
+    found = iqm([[one[name] for name in names] for one in each])
+    return {name: Interval(*map(float, column)) for name, column in zip(names, found.T, strict=True)}
