@@ -80,8 +80,8 @@ def write_index(folder: Path) -> None:
     """Write README.md, the table of the policies in `folder`."""
     lines = [
         "# Trained policies", "",
-        "One for each id, made by `python -m agents.ship`; docs/policies.md says how to use them. Mean returns",
-        "in the same episodes, and the bootstrap's 95 % interval.", "",
+        "One for each id, made by `python -m agents.ship`; docs/policies.md says how to use them.",
+        "Mean returns in the same episodes, and the bootstrap's 95 % interval.", "",
         "| id | policy | return | open-loop | run | card |", "|---|---|---|---|---|---|",
     ]  # fmt: skip
     for path in sorted(folder.glob("*/score.json")):
