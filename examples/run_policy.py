@@ -18,5 +18,5 @@ for seed in range(1000, 1003):
     while not done:
         (actions,) = policy.run(["action"], {"observation": observation[np.newaxis]})
         observation, reward, terminated, truncated, _ = env.step(actions[0])
-        total, done = total + reward, terminated or truncated
+        total, done = total + np.sum(reward), terminated or truncated
     print(f"{about['env_id']}, episode {seed}: return {total:.2f}")
