@@ -127,7 +127,7 @@ def bars_table(rows: Sequence[Row], known: dict[str, Reference], matched: str) -
     best, found = best_of(rows), {}
     if best is not None:
         told = best.intervals["return"]
-        for name in known:
+        for name in (name for name in ("run", OPEN_LOOP) if name in known):
             other = known[name].intervals["return"]
             word = "met" if told.above(other) else "not met"
             found[f"the best agent returns more than {name}, intervals apart"] = (
@@ -147,13 +147,10 @@ def bars_table(rows: Sequence[Row], known: dict[str, Reference], matched: str) -
 
 
 def made_table(rows: Sequence[Row]) -> str:
-    """Commands and settings of each entry, and the versions of all."""
-    lines = ["| command of the first seed | settings |", "|---|---|"]
-    for row in rows:
-        told = ", ".join(f"{key} {value}" for key, value in settings_of(row).items()).replace("|", "\\|")
-        lines.append(f"| `{row.command}` | {told} |")
+    """The command of each entry's first seed, and the versions of all."""
+    commands = "\n".join(f"    {row.command}" for row in rows)
     versions = ", ".join(f"{name} {value}" for name, value in versions_of(rows).items())
-    return "\n".join(lines) + f"\n\nVersions: {versions}."
+    return f"The first seed of each:\n\n{commands}\n\nVersions: {versions}.\n"
 
 
 def write_csv(rows: Sequence[Row], folder: Path) -> None:

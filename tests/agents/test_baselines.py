@@ -15,7 +15,7 @@ import pytest
 
 import hoof_env  # noqa: F401  registers the ids
 from agents import baselines, baselines_matched, baselines_report, baselines_run, baselines_stats
-from agents.baselines_matched import Compared, dominates, scaled_runs
+from agents.baselines_matched import Compared, dominates, scaled_runs, told
 from agents.baselines_plan import (
     CURVE_SEEDS,
     FINAL_SEEDS,
@@ -217,6 +217,18 @@ def compared(speed, *lower):
 )
 def test_dominance(agent, is_better):
     assert dominates(agent, compared(2.0, 2.0, 2.0, 2.0)) == is_better
+
+
+def test_who_bears_less_is_told():
+    light, heavy = (Interval(x, x - 0.01, x + 0.01) for x in (0.2, 0.7))
+    agent, run = compared(2.0, 1.0, 1.0, 1.0), compared(2.0, 2.0, 2.0, 2.0)
+    agent, run = (
+        replace(one, intervals={**one.intervals, "weight_share": share})
+        for one, share in ((agent, light), (run, heavy))
+    )
+    assert told(agent, run) == "yes, bearing less of the weight"
+    assert told(replace(agent, intervals={**agent.intervals, "weight_share": heavy}), run) == "yes"
+    assert told(run, agent) == "no"
 
 
 def test_scaled_runs_begin_with_the_run_and_stay_what_they_are():
