@@ -24,10 +24,17 @@ SCRIPTED = ("run", "walk")
 FIGURES = {
     "return": ("return", 1.0, 1), "speed_m_s": ("speed m/s", 1.0, 2), "stance_peak_n": ("peak kN", 1e-3, 2),
     "cost_of_transport": ("cost of transport", 1.0, 3), "weight_share": ("weight share", 1.0, 2),
+    "peak_grf_n": ("highest kN", 1e-3, 1), "stances": ("stances", 1.0, 0),
 }  # fmt: skip
 """Columns of the tables: title, factor, digits."""
 
+BARE = ("weight_share", "peak_grf_n", "stances")
+"""Columns without intervals."""
+
 FRONT_ID = "hoof_env/HorseLeg-v0"
+
+TOO_SLOW, TOO_LITTLE = 0.1, 0.02
+"""By so much less speed [m/s], or less of the weight, than was asked for a gait is no answer."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +70,9 @@ def _figure(key: str, mean: float | None, bounds: Any) -> tuple[float | None, st
     if mean is None:
         return None, "∞"
     low, high = (f"{factor * bound:.{digits}f}" for bound in bounds)
-    return mean, f"{factor * mean:.{digits}f}" + (f" [{low}, {high}]" if low != high else "")
+    return mean, f"{factor * mean:.{digits}f}" + (
+        f" [{low}, {high}]" if low != high and key not in BARE else ""
+    )
 
 
 def _row(*cells: str) -> str:
@@ -96,15 +105,23 @@ def front_table(files: list[dict[str, Any]]) -> str:
     """Gaits of least peak and of least cost of transport, by the speed that was asked for."""
     rows = []
     for found in front(files):
-        costs = [one["cost"] for one in sorted(found["restarts"], key=lambda one: one["cost"])]
         cells = [text for key, (_, text) in figures_of(found).items() if key != "return"]
         gait = ", ".join(f"{value:.2f}" for value in found["gait"].values())
         least = {"peak": "peak", "transport": "cost of transport"}[found["objective"]]
         least += f", bearing {found['weight_share']:g}" if found.get("weight_share") else ""
-        spread = ", ".join(f"{value:.2f}" for value in costs)
-        rows.append([f"least {least}", f"{found['speed']:g}", *cells, spread, gait])
+        rows.append([f"least {least}", f"{found['speed']:g}", *cells, _found_by_each(found), gait])
     titles = [title for key, (title, _, _) in FIGURES.items() if key != "return"]
-    return _table(["asked for", "at least m/s", *titles, "costs of the searches", "gait"], rows)
+    return _table(["asked for", "at least m/s", *titles, "found by each search", "gait"], rows)
+
+
+def _found_by_each(found: dict[str, Any]) -> str:
+    """The figure that each search made small, the least first; a dash for one that misses a condition."""
+    key = {"peak": "stance_peak_n", "transport": "cost_of_transport"}[found["objective"]]
+    _, factor, digits = FIGURES[key]
+    least = found["speed"] - TOO_SLOW, (found.get("weight_share") or 0.0) - TOO_LITTLE
+    means = [one["mean"] for one in found["restarts"]]
+    kept = [one[key] for one in means if one["speed_m_s"] > least[0] and one["weight_share"] > least[1]]
+    return ", ".join([f"{factor * x:.{digits}f}" for x in sorted(kept)] + ["-"] * (len(means) - len(kept)))
 
 
 def front(files: list[dict[str, Any]]) -> list[dict[str, Any]]:
