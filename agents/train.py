@@ -113,22 +113,17 @@ def train(args: Args, *also: Any) -> Trained:
     # Importing torch takes seconds: only now
     import torch
     from stable_baselines3.common.callbacks import CallbackList
-    from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
-    from torch.utils.tensorboard import SummaryWriter
 
     runs.write_text(folder / "run.json", json.dumps(record, indent=2) + "\n")
     runs.write_text(folder / "config.yml", yaml.safe_dump({args.env_id: settings}, sort_keys=False))
     torch.set_num_threads(args.torch_threads)
-    many = runs.make_vec_env(args.env_id, n_envs, **env_kwargs)
+    envs = many = runs.make_vec_env(args.env_id, n_envs, **env_kwargs)
     try:
         algorithm = algorithm_class(args.algo)
         resumed = checkpoints.Resumed(found[0], algorithm, many, args.device) if found else None
         model = resumed.model if resumed else make_model(args, settings, many, folder)
-        curves = TensorBoardOutputFormat(str(folder / "tensorboard"))
-        if resumed:  # what was logged after the checkpoint is not shown
-            curves.writer.close()
-            curves.writer = SummaryWriter(str(folder / "tensorboard"), purge_step=model.num_timesteps + 1)
-        model.set_logger(Logger(str(folder / "tensorboard"), [curves]))
+        envs = model.env
+        model.set_logger(make_logger(folder / "tensorboard", model.num_timesteps + 1 if resumed else 0))
         watch = make_watch(folder, steps, args.checkpoint_every, args.max_minutes, resumed)
         callbacks = CallbackList([watch, *also])
         through = False
@@ -150,7 +145,7 @@ def train(args: Args, *also: Any) -> Trained:
                 checkpoints.tidy(folder, keep=0)
         return Trained(folder, model.num_timesteps, seconds, watch.stopped_by)
     finally:
-        many.close()
+        envs.close()
 
 
 def checked(args: Args) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -244,6 +239,17 @@ def make_model(args: Args, settings: dict[str, Any], many: Any, folder: Path) ->
     except (TypeError, ValueError, AssertionError, RuntimeError) as error:  # torch's, for the device
         said = f"hyperparameters of {args.algo} for {args.env_id} on device {args.device!r}: {error}"
         raise ParameterError(said) from None
+
+
+def make_logger(folder: Path, hidden: int) -> Any:
+    """A logger for TensorBoard; of what an earlier process logged, steps from `hidden` on are not shown."""
+    from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
+    from torch.utils.tensorboard import SummaryWriter
+
+    curves = TensorBoardOutputFormat(str(folder))
+    curves.writer.close()
+    curves.writer = SummaryWriter(str(folder), purge_step=hidden)
+    return Logger(str(folder), [curves])
 
 
 def main(argv: list[str] | None = None) -> int:
