@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -41,6 +42,21 @@ REPS = 5000
 """Of a bootstrap."""
 
 
+def library() -> Any:
+    """rliable's bootstrap.
+
+    Raises:
+        ParameterError: it is not installed.
+    """
+    try:
+        from rliable.library import get_interval_estimates  # type: ignore[import-untyped]
+    except ImportError as error:
+        raise ParameterError(
+            f"intervals: expected rliable (pip install 'hoof-env[baselines]'): {error}"
+        ) from None
+    return get_interval_estimates
+
+
 def iqm(scores: ArrayLike) -> Floats:
     """Interquartile mean over seeds and its interval.
 
@@ -55,14 +71,9 @@ def iqm(scores: ArrayLike) -> Floats:
     Raises:
         ParameterError: rliable is not installed.
     """
-    try:
-        from rliable.library import get_interval_estimates  # type: ignore[import-untyped]
-    except ImportError as error:
-        raise ParameterError(
-            f"intervals: expected rliable (pip install 'hoof-env[baselines]'): {error}"
-        ) from None
     from scipy.stats import trim_mean
 
+    get_interval_estimates = library()
     values = np.asarray(scores, np.float64)
     curve = values.reshape(len(values), 1, -1)  # rliable's runs, tasks, points
 
