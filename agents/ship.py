@@ -215,7 +215,7 @@ class Trembling:
 def tolerance(policy: Any, env_id: str, returns: Sequence[float]) -> float:
     """By how much the mean return of the first `CHECKED` episodes may differ on another machine.
 
-    Episodes are chaotic: the last bits of an action change them. Measured by playing them once more with a
+    The last bits of an action can change an episode. Measured by playing them once more with a
     `Trembling` policy: four standard errors of the mean difference, and 1 % of the mean.
     """
     again = score_vector(Trembling(policy), env_id, SCORE_SEEDS[:CHECKED])

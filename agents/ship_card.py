@@ -136,7 +136,13 @@ def write_curve(folder: Path, scores: Sequence[Score], path: Path) -> None:
                 scored = [(1e-6 * float(row["steps"]), float(row["return"])) for row in csv.DictReader(file)]
             axes.plot(*zip(*scored, strict=True), color=GREEN, lw=1, label="without noise on the way")
         here = scores[0].estimates["return"].mean
-        axes.plot(steps[-1], here, "o", color=GREEN, label=f"this policy, without noise: {here:.1f}")
+        axes.plot(
+            1e-6 * length(folder, runs.read_record(folder))[0],
+            here,
+            "o",
+            color=GREEN,
+            label=f"this policy, without noise: {here:.1f}",
+        )
         for score in scores[1:]:
             level = score.estimates["return"].mean
             axes.axhline(level, color=ORANGE, lw=1, ls="--")
