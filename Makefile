@@ -4,7 +4,7 @@
 #   TORCH_INDEX=URL     where Linux takes PyTorch from; empty for pip's own index, which has the CUDA build
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-peers test-ecosystem bench lint clean
+.PHONY: help setup demo test kernels test-slow test-peers test-ecosystem bench baselines lint clean
 
 PY := .venv/bin/python
 PYTHONS := $(or $(PYTHON),$(PY) python3 python3.13 python3.12 python3.11)
@@ -13,9 +13,11 @@ IS_SUPPORTED := import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 
 help:
 	@echo 'make demo        reproduce the paper, train an agent, write runs/demo/report.html'
 	@echo 'make test        lint, types and tests'
+	@echo 'make test-slow   in full what make test samples'
 	@echo 'make test-peers  the engine against MuJoCo and Exudyn, which it installs'
 	@echo 'make test-ecosystem  every RL library on every id, in environments under .ecosystem/: 6 GB, some minutes'
 	@echo 'make bench       how fast engine and environments are beside MuJoCo, Exudyn and EnvPool'
+	@echo 'make baselines   the agents of docs/baselines.md, hours; ARGS="--subset nightly": a small part, minutes'
 	@echo 'make lint        lint and types alone'
 	@echo 'make setup       make .venv and nothing more'
 	@echo 'make clean       remove .venv and the caches; runs/ stays'
@@ -30,8 +32,17 @@ setup:
 demo: setup
 	@$(PY) -m agents.demo
 
-test: lint
-	@echo 'pytest' && $(PY) -m pytest -q -n auto
+# Compiling and mypy take one processor each, so both go on at once. A file's tests stay in one process: the
+# others would make its fixtures again.
+test: setup
+	@$(MAKE) --no-print-directory -j2 lint kernels
+	@echo 'pytest' && $(PY) -m pytest -q -n auto --dist loadfile
+
+kernels: setup
+	@echo 'kernels' && $(PY) -m tests.kernels
+
+test-slow: setup
+	@echo 'pytest -m slow' && $(PY) -m pytest -q -m slow
 
 test-peers: setup
 	@echo 'pip install mujoco exudyn' && $(PY) -m pip install -q -c constraints.txt -e '.[peers]'
@@ -46,6 +57,10 @@ bench: setup
 	@$(PY) -m pip install -q -c constraints.txt envpool || echo 'no EnvPool here: HalfCheetah-v5 stands for it'
 	@$(PY) -m benchmarks.speed
 	@$(PY) -m benchmarks.env_speed
+
+baselines: setup
+	@echo 'pip install rliable' && $(PY) -m pip install -q -c constraints.txt -e '.[baselines]'
+	@$(PY) -m agents.baselines $(ARGS)
 
 lint: setup
 	@echo 'ruff check' && $(PY) -m ruff check -q --output-format concise

@@ -120,11 +120,15 @@ def is_model(name: str) -> bool:
 
 
 def find_policy(name: str, env: gym.Env[Any, Any], env_id: str) -> Any:
-    """A scripted policy by its name, or a trained one by its path.
+    """A scripted policy by its name, or a trained one or an open-loop gait by its path.
 
     Raises:
-        ParameterError: unknown name. DataFileError: no such model, or one that does not fit.
+        ParameterError: unknown name. DataFileError: no such model or gait, or one that does not fit.
     """
+    if name == "open-loop" or name.endswith(".json"):
+        from agents.open_loop import load_open_loop
+
+        return load_open_loop(env_id if name == "open-loop" else name, env)
     if is_model(name):
         return runs.SavedModel.find(Path(name)).load(env, env_id)
     names = policy_names(env) if hasattr(env.unwrapped, "gaits") else []

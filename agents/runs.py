@@ -1,14 +1,16 @@
 """The folder of one training run: what stands in it, how it is written and how a model is read back.
 
+    policy.*          the trained policy as plain data (agents/safe.py): this is what is loaded
     model.zip         the trained model (Stable-Baselines3)
     vecnormalize.pkl  statistics, only where the hyperparameters ask for normalisation
     config.yml        the hyperparameters that were used, in rl-baselines3-zoo's form
-    run.json          environment, spaces, command, arguments, versions
+    run.json          environment, its settings and spaces, command, arguments, versions; when it is through,
+                      steps and seconds under "finished"
     monitor.csv       return, length and time of every training episode
-    checkpoints/N/    the model, and its statistics, after N steps
+    checkpoints/N/    what `--resume` goes on from (agents/checkpoints.py), until the training is through
     tensorboard/      curves
 
-A model file is a pickle and can run any code when it is loaded: load only files that you trust.
+A .zip or .pkl is a pickle and can run any code when it is loaded: load only files that you trust.
 """
 
 from __future__ import annotations
@@ -18,8 +20,9 @@ import platform
 import shlex
 import subprocess
 import sys
+import warnings
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, is_dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -27,16 +30,19 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-import hoof_env  # noqa: F401  (registers the environments)
+import hoof_env  # also registers the environments
+from agents.safe import ABOUT, WEIGHTS, load_policy, save_policy
+from agents.settings import algorithm_class
 from hoof_env._output import staged
 from hoof_env.errors import DataFileError, ParameterError
 
-FILES = ("model.zip", "config.yml", "run.json", "monitor.csv")
-"""What a run without normalisation and checkpoints leaves, TensorBoard's files aside."""
+FILES = ("model.zip", WEIGHTS, ABOUT, "config.yml", "run.json", "monitor.csv")
+"""What a run without normalisation leaves, TensorBoard's files aside."""
 
 STATISTICS = "vecnormalize.pkl"
+CHECKPOINTS = "checkpoints"
 
-PACKAGES = ("hoof-env", "numpy", "gymnasium", "numba", "stable-baselines3", "torch")
+PACKAGES = ("hoof-env", "numpy", "gymnasium", "numba", "stable-baselines3", "sb3-contrib", "torch")
 
 
 def make_env(env_id: str, **kwargs: Any) -> gym.Env[Any, Any]:
@@ -109,19 +115,54 @@ def write_text(path: Path, text: str) -> None:
 
 
 def save_model(model: Any, path: Path) -> None:
-    """Write an SB3 model, and the statistics of its `VecNormalize` if it has one, never half a file."""
+    """Write an SB3 model, its policy as plain data, and the statistics of its `VecNormalize` if it has one,
+    never half a file."""
     with staged(path.parent) as stage:
-        model.save(stage / path.name)
-        if model.get_vec_normalize_env() is not None:
-            model.get_vec_normalize_env().save(str(stage / STATISTICS))
+        write_model(model, stage, path.name)
+
+
+def write_model(model: Any, folder: Path, name: str = "model.zip") -> None:
+    """As `save_model`, straight into `folder`."""
+    model.save(folder / name)
+    save_policy(model, folder)
+    if model.get_vec_normalize_env() is not None:
+        model.get_vec_normalize_env().save(str(folder / STATISTICS))
+
+
+def describe_env(env: gym.Env[Any, Any]) -> dict[str, Any]:
+    """What a policy for an environment depends on, as JSON gives it back: spaces and all settings."""
+    settings = getattr(env.unwrapped, "settings", None)
+    found = (
+        {"settings": asdict(settings)} if is_dataclass(settings) and not isinstance(settings, type) else {}
+    )
+    plain: dict[str, Any] = json.loads(json.dumps({**describe_spaces(env), **found}, default=str))
+    return plain
+
+
+def read_record(folder: Path) -> dict[str, Any]:
+    """The content of run.json in `folder`; empty if there is none.
+
+    Raises:
+        DataFileError: it cannot be read.
+    """
+    path = folder / "run.json"
+    if not path.is_file():
+        return {}
+    try:
+        record = json.loads(path.read_text(encoding="utf-8"))
+        return {**record, "env_id": record["env_id"], "algo": record["algo"]}
+    except (OSError, ValueError, TypeError, KeyError) as error:
+        raise DataFileError(
+            f"{path}: expected the JSON object of agents.train with env_id and algo: {error!r}"
+        ) from None
 
 
 @dataclass(frozen=True)
 class SavedModel:
-    """A model file and what its run folder says about it; nothing has been unpickled yet.
+    """A model file and what its run folder says about it; nothing has been read into it yet.
 
     Attributes:
-        path: of the .zip.
+        path: of model.zip or another .zip; beside a model.zip the policy as plain data is what is loaded.
         record: content of run.json, empty where there is none.
     """
 
@@ -130,40 +171,52 @@ class SavedModel:
 
     @classmethod
     def find(cls, path: Path) -> SavedModel:
-        """The model at `path`, which is a .zip or a run folder.
+        """The model at `path`: a .zip, or a run folder, whose last checkpoint serves until it has a model.
 
         Raises:
             DataFileError: there is none, or its run.json cannot be read.
         """
-        file = path / "model.zip" if path.is_dir() else path
-        if not file.is_file():
+        saved = cls(path / "model.zip" if path.is_dir() else path, {})
+        if path.is_dir() and not (saved.path.is_file() or saved.is_plain):
+            found = [one for one in (path / CHECKPOINTS).glob("*") if one.name.isdigit()]
+            saved = cls(max(found, key=lambda one: int(one.name), default=path) / "model.zip", {})
+        if not (saved.path.is_file() or saved.is_plain):
             raise DataFileError(
-                f"model {path}: expected a .zip of agents.train or its run folder, found no {file}"
+                f"model {path}: expected a .zip of agents.train or its run folder, found no {saved.path}"
             )
-        for folder in file.parents[:3:2]:  # a checkpoint is two deeper
-            beside = folder / "run.json"
-            if beside.is_file():
-                try:
-                    record = json.loads(beside.read_text(encoding="utf-8"))
-                    return cls(file, {**record, "env_id": record["env_id"], "algo": record["algo"]})
-                except (OSError, ValueError, TypeError, KeyError) as error:
-                    raise DataFileError(
-                        f"{beside}: expected the JSON object of agents.train with env_id and algo: {error!r}"
-                    ) from None
-        return cls(file, {})
+        for folder in saved.path.parents[:3:2]:  # a checkpoint is two deeper
+            if record := read_record(folder):
+                return cls(saved.path, record)
+        return saved
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it can be read without running code of the file."""
+        beside = self.path.with_name(ABOUT), self.path.with_name(WEIGHTS)
+        return self.path.name == "model.zip" and all(file.is_file() for file in beside)
 
     def load(self, env: gym.Env[Any, Any], env_id: str) -> TrainedPolicy:
-        """Unpickle the model for `env`. This can run any code that the file holds.
+        """The policy for `env`, from plain data where there is some; else a .zip is unpickled, which can run
+        any code that it holds, and a warning says so. Warns, too, of other settings or another hoof-env.
 
         Raises:
             DataFileError: not a model, or one for another environment or other spaces.
         """
-        self._check(self.record, {"env_id": env_id, **describe_spaces(env)})
+        here = {"env_id": env_id, **describe_env(env)}
+        self._refuse(self.record, here)
+        self._warn(here.get("settings"))
+        if self.is_plain:
+            model, normalize = load_policy(self.path.parent)
+        else:
+            warnings.warn(f"{self.path} is a pickle, which can run any code: trusted?", stacklevel=2)
+            model, normalize = self._unpickle(env)
+        self._refuse(describe_spaces(model), here)
+        return TrainedPolicy(model, normalize)
 
-        import stable_baselines3
+    def _unpickle(self, env: gym.Env[Any, Any]) -> tuple[Any, Any]:
         from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
-        algorithm = getattr(stable_baselines3, self.record.get("algo", "ppo").upper())
+        algorithm = algorithm_class(self.record.get("algo", "ppo"))
         statistics, normalize = self.path.with_name(STATISTICS), None
         try:
             model = algorithm.load(self.path, device="cpu")
@@ -174,13 +227,31 @@ class SavedModel:
             raise DataFileError(
                 f"model {self.path}: expected a model saved by Stable-Baselines3, cannot read it ({reason})"
             ) from None
-        self._check(describe_spaces(model), describe_spaces(env))
-        return TrainedPolicy(model, normalize)
+        return model, normalize
 
-    def _check(self, found: dict[str, Any], wanted: dict[str, str]) -> None:
-        for key, value in wanted.items():
-            if found.get(key, value) != value:
-                raise DataFileError(f"model {self.path}: trained for {key} {found[key]}, expected {value}")
+    def _refuse(self, there: dict[str, Any], here: dict[str, Any]) -> None:
+        keys = ("env_id", "observation_space", "action_space")
+        unlike = [
+            f"{key} {there[key]}, expected {here[key]}"
+            for key in keys
+            if there.get(key, here[key]) != here[key]
+        ]
+        if unlike:
+            versions = [str(one.get("env_id")).rpartition("-v") for one in (there, here)]
+            if versions[0][0] == versions[1][0] != "" and versions[0][2] != versions[1][2]:
+                unlike.append("another version of an id is another task")
+            raise DataFileError(f"model {self.path}: trained for {'; '.join(unlike)}")
+
+    def _warn(self, here: dict[str, Any] | None) -> None:
+        there, made_with = self.record.get("settings"), self.record.get("versions", {}).get("hoof-env")
+        unlike = []
+        if there is not None and here is not None:
+            names = sorted(key for key in {*there, *here} if there.get(key) != here.get(key))
+            unlike = [f"{key}={there.get(key)!r}, here {here.get(key)!r}" for key in names]
+        if made_with not in (None, hoof_env.__version__):
+            unlike.append(f"hoof-env {made_with}, here {hoof_env.__version__}")
+        if unlike:
+            warnings.warn(f"model {self.path}: trained with {'; '.join(unlike)}", stacklevel=3)
 
 
 @dataclass(frozen=True)
@@ -188,8 +259,8 @@ class TrainedPolicy:
     """A trained policy that sees observations as it saw them in training.
 
     Attributes:
-        model: of Stable-Baselines3.
-        normalize: of the `VecNormalize` it was trained with, or None.
+        model: of Stable-Baselines3; nothing but its policy is there when it was read from plain data.
+        normalize: observations as the policy saw them in training, or None.
     """
 
     model: Any

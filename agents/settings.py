@@ -4,16 +4,40 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Mapping
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
 
-from hoof_env.errors import DataFileError
+from hoof_env.errors import DataFileError, ParameterError, check_choice
 
+ALGORITHMS = {
+    "ppo": "stable_baselines3",
+    "sac": "stable_baselines3",
+    "td3": "stable_baselines3",
+    "tqc": "sb3_contrib",
+}
+"""Where each algorithm lives; each has its file in `FOLDER`."""
 FOLDER = Path(__file__).parent / "hyperparams"
 SCHEDULED = ("learning_rate", "clip_range", "clip_range_vf")
 """Keys that may hold `lin_<x>`: falling linearly from x to zero over the training."""
+
+
+def algorithm_class(name: str) -> Any:
+    """The class of an algorithm of `ALGORITHMS`.
+
+    Raises:
+        ParameterError: another name, or its library is not installed.
+    """
+    module = ALGORITHMS[check_choice("algo", name, ALGORITHMS)]
+    try:
+        return getattr(import_module(module), name.upper())
+    except ModuleNotFoundError as error:
+        raise ParameterError(
+            f"algo {name}: expected {module} to be installed (pip install 'hoof-env[train]'): {error}"
+        ) from None
 
 
 def load_settings(path: Path, env_id: str) -> dict[str, Any]:
@@ -39,17 +63,23 @@ def load_settings(path: Path, env_id: str) -> dict[str, Any]:
     return dict(entry)
 
 
-def model_arguments(settings: Mapping[str, Any]) -> dict[str, Any]:
-    """The part of `settings` that the algorithm's constructor takes, schedules and network arguments built.
+def model_arguments(settings: Mapping[str, Any], actions: int = 1) -> dict[str, Any]:
+    """The part of `settings` that the algorithm's constructor takes; schedules, noise on `actions` numbers
+    and network arguments are built.
 
     Raises:
-        DataFileError: a schedule or `policy_kwargs` is not in the zoo's form.
+        DataFileError: a schedule, the noise or `policy_kwargs` is not in the zoo's form.
     """
     from stable_baselines3.common.utils import LinearSchedule
 
     arguments = {
         key: value for key, value in settings.items() if key not in ("n_envs", "n_timesteps", "normalize")
     }
+    if isinstance(arguments.get("train_freq"), list):  # [1, episode]: YAML knows no tuple
+        arguments["train_freq"] = tuple(arguments["train_freq"])
+    kind, spread = arguments.pop("noise_type", None), arguments.pop("noise_std", 0.1)
+    if kind is not None:
+        arguments["action_noise"] = _action_noise(kind, spread, actions)
     for key in SCHEDULED:
         value = arguments.get(key)
         if isinstance(value, str):
@@ -65,6 +95,19 @@ def model_arguments(settings: Mapping[str, Any]) -> dict[str, Any]:
     if isinstance(arguments.get("policy_kwargs"), str):
         arguments["policy_kwargs"] = _dict_call(arguments["policy_kwargs"])
     return arguments
+
+
+def _action_noise(kind: Any, spread: Any, actions: int) -> Any:
+    """What is added to the actions while learning; both kinds in units of the action."""
+    from stable_baselines3.common.noise import NormalActionNoise, OrnsteinUhlenbeckActionNoise
+
+    known = {"normal": NormalActionNoise, "ornstein-uhlenbeck": OrnsteinUhlenbeckActionNoise}
+    if kind not in known or isinstance(spread, bool) or not isinstance(spread, (int, float)) or spread < 0:
+        raise DataFileError(
+            f"hyperparameters noise_type, noise_std: expected one of {', '.join(known)} and a number of 0 or "
+            f"more, got {kind!r} and {spread!r}"
+        )
+    return known[kind](np.zeros(actions), np.full(actions, float(spread)))
 
 
 def _dict_call(text: str) -> dict[str, Any]:

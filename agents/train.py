@@ -2,33 +2,29 @@
 
     python -m agents.train                                  the full training of hoof_env/HorseLeg-v0
     python -m agents.train --steps 300000                   a quick one
+    python -m agents.train --out runs/mine --resume         go on where it was stopped or killed, else start
     tensorboard --logdir runs                               watch it
 
-Ctrl-C stops after the current step and keeps the model; pressed twice it stops at once and keeps only
-checkpoints. What a run folder holds is written in agents/runs.py. The same seed, arguments, machine and
-versions give the same run.
+Ctrl-C stops after the current rollout and keeps the model and a checkpoint; pressed twice it stops at once
+and keeps only checkpoints. What a run folder holds is written in agents/runs.py. The same seed, arguments,
+machine and versions give the same run, resumed or not (agents/checkpoints.py says where that ends).
 """
 
 from __future__ import annotations
 
 import json
-import signal
-import sys
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
-from types import FrameType
 from typing import Any, Literal
 
 import numpy as np
 import yaml
 
-from agents import runs
+from agents import checkpoints, runs
 from agents.command import parse_pairs, run
-from agents.settings import FOLDER, load_settings, model_arguments
+from agents.settings import FOLDER, algorithm_class, load_settings, model_arguments
+from agents.watch import EndedError, check_divergence, make_watch, stop_on_signals
 from hoof_env._output import check_folder
 from hoof_env.errors import OutputError, ParameterError, check_number
 
@@ -37,8 +33,8 @@ from hoof_env.errors import OutputError, ParameterError, check_number
 class Args:
     env_id: str = "hoof_env/HorseLeg-v0"
     """registered environment; module:id imports the module first"""
-    algo: Literal["ppo"] = "ppo"
-    """algorithm of Stable-Baselines3, with its file in agents/hyperparams"""
+    algo: Literal["ppo", "sac", "td3", "tqc"] = "ppo"
+    """algorithm of Stable-Baselines3 or sb3-contrib, with its file in agents/hyperparams"""
     seed: int = 0
     """of the environments, the network and the sampling"""
     steps: int | None = None
@@ -54,10 +50,12 @@ class Args:
     """YAML file in rl-baselines3-zoo's format; otherwise agents/hyperparams/ALGO.yml"""
     out: Path | None = None
     """run folder; otherwise runs/ALGO-ENV-sSEED-TIME"""
-    checkpoint_every: int = 250_000
-    """steps between two checkpoints; 0: none"""
+    resume: bool = False
+    """go on with the run in --out, which the same command began; without one there, start it"""
+    checkpoint_every: float = 30.0
+    """seconds between two checkpoints, which stand between two rollouts; the last two are kept; 0: none"""
     max_minutes: float | None = None
-    """stop after this time even if steps are left"""
+    """stop after this time, counted from this start, even if steps are left"""
     device: str = "cpu"
     """torch device; small networks are fastest on the CPU"""
     torch_threads: int = 1
@@ -90,50 +88,101 @@ def train(args: Args, *also: Any) -> Trained:
 
     Args:
         args: see there.
-        also: more callbacks of Stable-Baselines3.
+        also: more callbacks of Stable-Baselines3; on a resume they begin anew.
 
     Raises:
-        ParameterError, DataFileError: the arguments, the environment or the hyperparameters do not fit.
+        ParameterError, DataFileError: the arguments, the environment or the hyperparameters do not fit, or
+            are not those of the run to go on with.
         OutputError: the run folder cannot be written or already holds a run.
+        DivergedError: a loss or the policy is not finite any more; the checkpoints before that stay.
     """
-    # What is asked for: all checked before anything slow starts or any file is written
+    env_kwargs, settings = checked(args)
+    n_envs, steps = settings["n_envs"], settings["n_timesteps"]
+    name = args.env_id.rpartition("/")[2]
+    folder = args.out or Path("runs", f"{args.algo}-{name}-s{args.seed}-{datetime.now():%Y%m%d-%H%M%S}")
+    record = make_record(args, env_kwargs)
+    earlier = find_earlier(args, folder, record, settings)
+    if finished := earlier.get("finished"):
+        return Trained(folder, finished["steps"], finished["seconds"], None)
+    check_folder(folder)
+    checkpoints.tidy(folder)
+    found = checkpoints.checkpoints(folder) if earlier else []
+    if found:
+        record = {**earlier, "resumed": [*earlier.get("resumed", []), int(found[0].name)]}
+
+    # Importing torch takes seconds: only now
+    import torch
+    from stable_baselines3.common.callbacks import CallbackList
+
+    runs.write_text(folder / "run.json", json.dumps(record, indent=2) + "\n")
+    runs.write_text(folder / "config.yml", yaml.safe_dump({args.env_id: settings}, sort_keys=False))
+    torch.set_num_threads(args.torch_threads)
+    envs = many = runs.make_vec_env(args.env_id, n_envs, **env_kwargs)
+    try:
+        algorithm = algorithm_class(args.algo)
+        resumed = checkpoints.Resumed(found[0], algorithm, many, args.device) if found else None
+        model = resumed.model if resumed else make_model(args, settings, many, folder)
+        envs = model.env
+        model.set_logger(make_logger(folder / "tensorboard", model.num_timesteps + 1 if resumed else 0))
+        watch = make_watch(folder, steps, args.checkpoint_every, args.max_minutes, resumed)
+        callbacks = CallbackList([watch, *also])
+        through = False
+        with stop_on_signals(watch):
+            try:
+                model.learn(steps - model.num_timesteps, callbacks, reset_num_timesteps=not resumed)
+                through = True
+            except EndedError:
+                callbacks.on_training_end()
+            except ValueError:  # torch's distributions and the environment refuse what is not finite
+                check_divergence(model, folder)
+                raise
+            seconds = watch.seconds
+            check_divergence(model, folder)
+            runs.save_model(model, folder / "model.zip")
+            if through:
+                record["finished"] = {"steps": model.num_timesteps, "seconds": round(seconds, 3)}
+                runs.write_text(folder / "run.json", json.dumps(record, indent=2) + "\n")
+                checkpoints.tidy(folder, keep=0)
+        return Trained(folder, model.num_timesteps, seconds, watch.stopped_by)
+    finally:
+        envs.close()
+
+
+def checked(args: Args) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Arguments of the environment, and settings; all checked before anything slow starts or is written."""
     env_kwargs = parse_pairs("--env-kwargs", args.env_kwargs)
     settings = load_settings(args.hyperparams or FOLDER / f"{args.algo}.yml", args.env_id)
     settings |= parse_pairs("--params", args.params)
     settings |= {"n_timesteps": args.steps} if args.steps is not None else {}
     settings |= {"n_envs": args.n_envs} if args.n_envs is not None else {}
-    n_envs = int(check_number("n_envs", settings["n_envs"], low=1, high=4096))
-    steps = int(check_number("steps", settings["n_timesteps"], low=1))
+    settings["n_envs"] = int(check_number("n_envs", settings["n_envs"], low=1, high=4096))
+    settings["n_timesteps"] = int(check_number("steps", settings["n_timesteps"], low=1))
     if args.seed < 0:
         raise ParameterError(f"seed: expected 0 or more, got {args.seed}")
     check_number("checkpoint_every", args.checkpoint_every, low=0)
     check_number("torch_threads", args.torch_threads, low=1)
     if args.max_minutes is not None:
         check_number("max_minutes", args.max_minutes, low=0.0, exclusive_low=True)
-    name = args.env_id.rpartition("/")[2]
-    folder = args.out or Path("runs", f"{args.algo}-{name}-s{args.seed}-{datetime.now():%Y%m%d-%H%M%S}")
-    if (folder / "model.zip").exists() or (folder / "checkpoints").exists():
-        raise OutputError(
-            f"{folder} already holds a trained model; choose another folder, or remove that one"
-        )
+    if args.resume and args.out is None:
+        raise ParameterError("--resume: expected the folder of the run, too: --out FOLDER")
+    return env_kwargs, settings
+
+
+def make_record(args: Args, env_kwargs: dict[str, Any]) -> dict[str, Any]:
+    """What run.json says of a run that starts."""
     with runs.make_env(args.env_id, **env_kwargs) as env:
-        spaces = runs.describe_spaces(env)
+        if hasattr(env.unwrapped, "reward_space"):
+            raise ParameterError(
+                f"{args.env_id}: expected one number for a reward, got a vector; train on an environment "
+                "that adds it up by reward_weights"
+            )
+        about = runs.describe_env(env)
         runs.warm_up(env)
-    check_folder(folder)
-
-    # Importing torch takes seconds: only now
-    import stable_baselines3
-    import torch
-    from stable_baselines3.common.callbacks import CallbackList
-    from stable_baselines3.common.logger import configure
-    from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
-
-    # The run folder
-    record = {
+    return {
         "env_id": args.env_id,
         "env_kwargs": env_kwargs,
         "algo": args.algo,
-        **spaces,
+        **about,
         "seed": args.seed,
         "args": {
             key: str(value) if isinstance(value, Path) else value
@@ -143,98 +192,64 @@ def train(args: Args, *also: Any) -> Trained:
         "command": runs.command(),
         "versions": runs.versions(),
     }
-    runs.write_text(folder / "run.json", json.dumps(record, indent=2) + "\n")
-    runs.write_text(folder / "config.yml", yaml.safe_dump({args.env_id: settings}, sort_keys=False))
 
-    torch.set_num_threads(args.torch_threads)
-    many = runs.make_vec_env(args.env_id, n_envs, **env_kwargs)
-    envs: VecEnv = VecMonitor(many, str(folder / "monitor.csv"))
-    normalize = settings.get("normalize", False)
-    if normalize:
-        arguments = {"gamma": settings.get("gamma", 0.99)} | (
-            normalize if isinstance(normalize, dict) else {}
+
+def find_earlier(
+    args: Args, folder: Path, record: dict[str, Any], settings: dict[str, Any]
+) -> dict[str, Any]:
+    """The record of the run in `folder` to go on with, empty if there is none.
+
+    Raises:
+        OutputError: there is a run, but none to go on with. ParameterError: it was begun otherwise.
+    """
+    earlier = runs.read_record(folder)
+    held = (folder / "model.zip").exists() or (folder / runs.CHECKPOINTS).exists()
+    if held and not (args.resume and earlier):
+        raise OutputError(
+            f"{folder} already holds a trained model; choose another folder, remove that one, or go on with "
+            "its run by --resume"
         )
-        envs = VecNormalize(envs, **arguments)
+    if not args.resume or not held:
+        return {}
+    keys = ("env_id", "env_kwargs", "settings", "observation_space", "action_space", "algo", "seed")
+    pairs = {key: (earlier.get(key), record.get(key)) for key in keys}
+    pairs["hoof-env"] = earlier["versions"].get("hoof-env"), record["versions"].get("hoof-env")
+    used = load_settings(folder / "config.yml", args.env_id)
+    pairs |= {key: (used.get(key), settings.get(key)) for key in {**used, **settings}}
+    unlike = [f"{key}: {there!r} there, {now!r} here" for key, (there, now) in pairs.items() if there != now]
+    if unlike:
+        raise ParameterError(f"--resume: expected what {folder} was begun with; {'; '.join(unlike)}")
+    return earlier
+
+
+def make_model(args: Args, settings: dict[str, Any], many: Any, folder: Path) -> Any:
+    """The algorithm as `settings` build it, on environments whose episodes go into monitor.csv."""
+    from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
+
+    envs: VecEnv = VecMonitor(many, str(folder / "monitor.csv"))
+    if normalize := settings.get("normalize", False):
+        given = normalize if isinstance(normalize, dict) else {}
+        envs = VecNormalize(envs, **{"gamma": settings.get("gamma", 0.99)} | given)
+    arguments = model_arguments(settings, int(np.prod(envs.action_space.shape or 1)))
     try:
-        algorithm = getattr(stable_baselines3, args.algo.upper())
-        try:
-            model = algorithm(env=envs, seed=args.seed, device=args.device, **model_arguments(settings))
-        except (TypeError, ValueError, AssertionError, RuntimeError) as error:  # torch's, for the device
-            said = f"hyperparameters of {args.algo} for {args.env_id} on device {args.device!r}: {error}"
-            raise ParameterError(said) from None
-        model.set_logger(configure(str(folder / "tensorboard"), ["tensorboard"]))
-
-        # Train
-        watch = make_watch(folder, steps, args.checkpoint_every, args.max_minutes)
-        started = time.monotonic()
-        with stop_on_signals(watch):
-            model.learn(steps, callback=CallbackList([watch, *also]))
-            seconds = time.monotonic() - started
-            runs.save_model(model, folder / "model.zip")
-        return Trained(folder, model.num_timesteps, seconds, watch.stopped_by)
-    finally:
-        envs.close()
+        if "buffer_size" in arguments:  # more would stand empty in every checkpoint
+            most = settings["n_timesteps"] + settings["n_envs"]
+            arguments["buffer_size"] = min(arguments["buffer_size"], most)
+        return algorithm_class(args.algo)(env=envs, seed=args.seed, device=args.device, **arguments)
+    except (TypeError, ValueError, AssertionError, RuntimeError) as error:  # torch's, for the device
+        said = f"hyperparameters of {args.algo} for {args.env_id} on device {args.device!r}: {error}"
+        raise ParameterError(said) from None
 
 
-def make_watch(folder: Path, steps: int, checkpoint_every: int, max_minutes: float | None) -> Any:
-    """The callback that shows progress, keeps checkpoints, logs gait figures and ends the training early."""
-    from stable_baselines3.common.callbacks import BaseCallback
-    from tqdm import tqdm
+def make_logger(folder: Path, hidden: int) -> Any:
+    """A logger for TensorBoard; of what an earlier process logged, steps from `hidden` on are not shown."""
+    from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
+    from torch.utils.tensorboard import SummaryWriter
 
-    class Watch(BaseCallback):
-        stopped_by: int | None = None
-
-        def _on_training_start(self) -> None:
-            self.deadline = time.monotonic() + 60 * max_minutes if max_minutes else np.inf
-            self.next_checkpoint = checkpoint_every or np.inf
-            rest = 0.3 if sys.stderr.isatty() else 10.0  # seconds between two lines, where each is kept
-            self.bar = tqdm(total=steps, unit=" steps", unit_scale=True, smoothing=0.1, mininterval=rest)
-            self.summaries: list[dict[str, float]] = []
-
-        def _on_step(self) -> bool:
-            self.bar.update(self.training_env.num_envs)
-            for index in np.flatnonzero(self.locals["dones"]):
-                self.summaries.append(self.locals["infos"][index].get("episode_summary", {}))
-            if self.num_timesteps >= self.next_checkpoint:
-                self.next_checkpoint += checkpoint_every
-                runs.save_model(self.model, folder / "checkpoints" / str(self.num_timesteps) / "model.zip")
-            return self.stopped_by is None and time.monotonic() < self.deadline
-
-        def _on_rollout_end(self) -> None:
-            if self.model.ep_info_buffer:
-                returns = [episode["r"] for episode in self.model.ep_info_buffer]
-                self.bar.set_postfix_str(f"return {np.mean(returns):.1f}", refresh=False)
-            for summary in self.summaries:
-                for key, value in summary.items():
-                    if np.isfinite(value):  # the cost of transport is infinite without progress
-                        self.logger.record_mean(f"gait/{key}", value)
-            self.summaries.clear()
-
-        def _on_training_end(self) -> None:
-            self.bar.close()
-
-    return Watch()
-
-
-@contextmanager
-def stop_on_signals(watch: Any) -> Iterator[None]:
-    """Let the first SIGINT or SIGTERM end the training in good order; the second acts as it always does."""
-    previous: dict[int, Any] = {}
-
-    def stop(number: int, frame: FrameType | None) -> None:
-        watch.stopped_by = number
-        restore()
-
-    def restore() -> None:
-        for number, handler in previous.items():
-            signal.signal(number, handler)
-
-    for number in (signal.SIGINT, signal.SIGTERM):
-        previous[number] = signal.signal(number, stop)
-    try:
-        yield
-    finally:
-        restore()
+    curves = TensorBoardOutputFormat(str(folder))
+    curves.writer.close()
+    curves.writer = SummaryWriter(str(folder), purge_step=hidden)
+    return Logger(str(folder), [curves])
 
 
 def main(argv: list[str] | None = None) -> int:

@@ -23,6 +23,7 @@ from hoof_env.errors import DataFileError, OutputError, ParameterError, check_nu
 from hoof_env.gait.parameters import PARAMETERS, GaitParameters
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
+from hoof_env.onnx_policy import OnnxPolicy
 
 NOT_RECORDED = ("swing_offset", "swing_sin", "swing_cos")
 """Fields of `Instant` that a record lacks: they are known at the end of a control step only."""
@@ -148,6 +149,7 @@ def find_policy(name: str, env: gym.Env[Any, Any], env_id: str, seed: int = 0) -
     Args:
         name: as "run", as "6.28,0.7,-0.2,-0.3" (crank speed [rad/s], swing offset, sine and cosine
             coefficient [rad]), or the .zip or run folder of a model. A model is a pickle: it can run code.
+            A policy's .onnx file, or the folder of one that is shipped, is data.
         env, env_id: what it is for.
         seed: of "random".
 
@@ -158,6 +160,8 @@ def find_policy(name: str, env: gym.Env[Any, Any], env_id: str, seed: int = 0) -
     names = policy_names(env)
     if name in names:
         return make_policy(name, env, seed)
+    if OnnxPolicy.stands_at(Path(name)):
+        return OnnxPolicy(Path(name)).load(env, env_id)
     if name.endswith(".zip") or Path(name, "model.zip").is_file():
         return _trained(Path(name), env, env_id)
     if len(numbers := name.split(",")) == len(PARAMETERS):

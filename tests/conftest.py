@@ -1,7 +1,10 @@
-"""For all tests: compiling says nothing, whose lines some tests would count."""
+"""For all tests: compiling says nothing, whose lines some tests would count, and nobody computes in threads:
+there is a process on each processor, and threads that wait for others spin."""
 
 import os
 
 from hoof_env._jit import QUIET
 
 os.environ.setdefault(QUIET, "1")
+for library in ("OMP", "OPENBLAS", "MKL"):
+    os.environ.setdefault(f"{library}_NUM_THREADS", "1")

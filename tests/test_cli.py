@@ -12,7 +12,7 @@ HOOF_ENV = [sys.executable, "-m", "hoof_env.cli"]
 
 def hoof_env(*arguments):
     return subprocess.run(
-        [*HOOF_ENV, *map(str, arguments)], capture_output=True, text=True, timeout=120, check=False
+        [*HOOF_ENV, *map(str, arguments)], capture_output=True, text=True, timeout=300, check=False
     )
 
 
@@ -87,7 +87,7 @@ def test_an_interrupt_is_one_line_and_leaves_nothing_behind(tmp_path):
     ) as process:
         process.stdout.readline()  # the first condition is done, the others remain
         process.send_signal(signal.SIGINT)
-        _, errors = process.communicate(timeout=60)
+        _, errors = process.communicate(timeout=300)
     assert process.returncode == 130
     assert errors == "interrupted\n"
     assert list(tmp_path.iterdir()) == []

@@ -132,7 +132,7 @@ def test_unreachable_package_index(checkout: Path) -> None:
         "PIP_RETRIES": "1",
     }
     command = [sys.executable, "scripts/setup_venv.py"]
-    ended = subprocess.run(command, cwd=checkout, env=ours, capture_output=True, text=True, timeout=120)
+    ended = subprocess.run(command, cwd=checkout, env=ours, capture_output=True, text=True, timeout=300)
     assert ended.returncode == 1
     assert len(ended.stderr.splitlines()) == 1
     assert "the package index cannot be reached" in ended.stderr

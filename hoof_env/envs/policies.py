@@ -1,18 +1,20 @@
-"""Scripted policies: the gaits of a preset and the simplest things a policy can do wrong.
+"""Scripted policies: gaits of a preset or a file, and the simplest things a policy can do wrong.
 
 All have Stable-Baselines3's `predict`, so that scripted and trained policies are interchangeable.
 """
 
 from __future__ import annotations
 
-import math
+import json
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.envs.start import extreme_posture
-from hoof_env.errors import check_choice
+from hoof_env.errors import DataFileError, check_choice
 from hoof_env.gait.parameters import GaitParameters, paper_gaits
 from hoof_env.leg.profile import leg_profile
 
@@ -29,24 +31,39 @@ class Policy(Protocol):
 
 
 class Scripted:
-    """A policy for one environment as a function of (observation, time since its creation or `reset` [s])."""
+    """A policy as a function of (observation, time since the episode began [s]), for one environment or many.
+
+    Args:
+        act: gives the action, shape (4,), for an observation of shape (k,) and a time. To serve many
+            environments it must also take shapes (n, k) and (n,) and give (n, 4), or (4,) for all.
+        dt: control step [s].
+    """
 
     def __init__(self, act: Any, dt: float) -> None:
-        self._act, self._dt, self._steps = act, dt, 0
+        self._act, self._dt = act, dt
+        self.reset()
 
     def reset(self) -> None:
-        """Start an episode."""
-        self._steps = 0
+        """Start an episode, in all environments."""
+        self._steps = np.zeros((), int)
 
     def predict(
         self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
     ) -> tuple[Action, None]:
-        """Action for one observation; `episode_start` (bool or array of one) restarts the clock."""
-        if episode_start is not None and bool(np.all(episode_start)):
-            self.reset()
-        time = self._steps * self._dt
-        self._steps += 1
-        return np.asarray(self._act(observation, time), dtype=np.float32), None
+        """Action for an observation, or actions for many, shape (n, 4).
+
+        `episode_start` (bool, or an array with one entry for each environment) restarts clocks, and so does
+        another number of environments.
+        """
+        rows = np.shape(observation)[:-1]
+        if self._steps.shape != rows:
+            self._steps = np.zeros(rows, int)
+        if episode_start is not None:
+            again = np.broadcast_to(episode_start, rows) if rows else bool(np.all(episode_start))
+            self._steps = np.where(again, 0, self._steps)
+        action = np.asarray(self._act(observation, self._steps * self._dt), dtype=np.float32)
+        self._steps = self._steps + 1
+        return np.broadcast_to(action, (*rows, action.shape[-1])).copy(), None
 
 
 POLICIES = ("idle", "random", "bang-bang", "drag", "airborne")
@@ -76,9 +93,10 @@ def make_policy(name: str, env: Any, seed: int = 0) -> Scripted:
         return Scripted(lambda observation, time: action, leg.dt)
     if name == "random":
         generator = np.random.default_rng(seed)
-        return Scripted(lambda observation, time: generator.uniform(-1, 1, 4), leg.dt)
+        return Scripted(lambda observation, time: generator.uniform(-1, 1, (*np.shape(time), 4)), leg.dt)
     if name == "bang-bang":
-        return Scripted(lambda observation, time: np.full(4, 1.0 if int(time / 0.25) % 2 else -1.0), leg.dt)
+        high = lambda time: np.asarray(time / 0.25).astype(int)[..., None] % 2  # noqa: E731
+        return Scripted(lambda observation, time: np.where(high(time), np.ones(4), -np.ones(4)), leg.dt)
     offsets = [gait.swing_offset for gait in paper_gaits(leg.gaits).values()]
     middle = sum(offsets) / len(offsets)
     rest = leg.action_for(GaitParameters(0.0, middle, 0.0, 0.0))
@@ -87,11 +105,76 @@ def make_policy(name: str, env: Any, seed: int = 0) -> Scripted:
     offsets = [middle] if name == "drag" else np.linspace(0.0, 1.4, 15).tolist()
     offset, target = extreme_posture(leg_profile(leg.geometry), offsets, name == "drag")
 
-    def hold(observation: Any, time: float) -> Action:
+    def hold(observation: Any, time: Any) -> Action:
         """Turn the crank (it turns one way only) to `target` and stop; "drag" then swings to and fro."""
-        ahead = (target - math.atan2(observation[0], observation[1])) % (2 * np.pi)
-        speed = 2.0 * ahead if 0.05 < ahead < np.pi * 1.5 else 0.0
-        swing = 0.15 * math.sin(np.pi * time) if name == "drag" else 0.0
-        return leg.action_for(GaitParameters(min(speed, 2 * np.pi), offset + swing, 0.0, 0.0))
+        ahead = (target - np.arctan2(*np.asarray(observation, float)[..., :2].T)) % (2 * np.pi)
+        speed = np.where((ahead > 0.05) & (ahead < np.pi * 1.5), np.minimum(2 * ahead, 2 * np.pi), 0.0)
+        swing = 0.15 * np.sin(np.pi * np.asarray(time)) if name == "drag" else 0.0
+        gaits = np.stack(np.broadcast_arrays(speed, offset + swing, 0.0, 0.0), -1)
+        return leg.action_for(gaits if gaits.ndim > 1 else GaitParameters.from_array(gaits))
 
     return Scripted(hold, leg.dt)
+
+
+def open_loop(parameters: Mapping[str, Any], dt: float) -> Scripted:
+    """A policy that sees nothing: constant actions, or with a first harmonic of a clock,
+
+        a(t) = constant + sin * sin(2 pi f t) + cos * cos(2 pi f t),   t the time since the episode began.
+
+    Args:
+        parameters: "constant", shape (4,), or (n, 4) for n environments; and, if there is a clock, "sin" and
+            "cos" of the same shape and "frequency_hz", a number or shape (n,). The environment clips the sum.
+        dt: control step [s].
+    """
+    constant = np.asarray(parameters["constant"], float)
+    if "frequency_hz" not in parameters:
+        return Scripted(lambda observation, time: constant, dt)
+    sine, cosine = (np.asarray(parameters[name], float) for name in ("sin", "cos"))
+    rate = 2 * np.pi * np.asarray(parameters["frequency_hz"], float)
+
+    def act(observation: Any, time: Any) -> Any:
+        phase = np.asarray(rate * time)[..., None]
+        return constant + sine * np.sin(phase) + cosine * np.cos(phase)
+
+    return Scripted(act, dt)
+
+
+def read_open_loop(path: Path, env: Any = None) -> Scripted:
+    """The open-loop gait of a file, which `agents.open_loop` writes.
+
+    Args:
+        path: a JSON object with "parameters" as `open_loop` takes them, of one environment; "dt", control
+            step [s]; and "gait", the four gait parameters that the constant commands.
+        env: what it is for, whose control step the clock then has; None for that of the file.
+
+    Raises:
+        DataFileError: it cannot be read, lacks a part, or the environment's actions command other gaits.
+    """
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+        given, dt, gait = (
+            found["parameters"],
+            float(found["dt"]),
+            np.array(list(found["gait"].values()), float),
+        )
+        shapes = {"constant": (4,), "sin": (4,), "cos": (4,), "frequency_hz": ()}
+        clocked = "frequency_hz" in given
+        if set(given) != (set(shapes) if clocked else {"constant"}):
+            raise ValueError(f"parameters {sorted(given)}")
+        for name, value in given.items():
+            if np.shape(value) != shapes[name] or not np.isfinite(np.asarray(value, float)).all():
+                raise ValueError(f"{name} {value!r}")
+    except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
+        raise DataFileError(
+            f"open-loop gait {path}: expected the JSON object of agents.open_loop with parameters, dt and "
+            f"gait: {error!r}"
+        ) from None
+    if env is not None:
+        leg, dt = env.unwrapped, getattr(env.unwrapped, "dt", dt)
+        meant = getattr(leg, "command_of", lambda action: np.full(4, np.nan))(np.array(given["constant"]))
+        if not np.allclose(meant, gait, atol=1e-6):
+            raise DataFileError(
+                f"open-loop gait {path}: expected an environment whose actions command gaits as those of "
+                f"{found.get('env_id')} do, got {type(leg).__name__}, where this one is {meant.tolist()}"
+            )
+    return open_loop(given, dt)

@@ -6,36 +6,75 @@ import gymnasium as gym
 import pytest
 import yaml
 from stable_baselines3 import PPO
+from stable_baselines3.common.noise import OrnsteinUhlenbeckActionNoise
 from torch import nn
 
 import hoof_env
-from agents.settings import FOLDER, SCHEDULED, load_settings, model_arguments
-from hoof_env.errors import DataFileError
+from agents.settings import ALGORITHMS, FOLDER, SCHEDULED, algorithm_class, load_settings, model_arguments
+from hoof_env.errors import DataFileError, ParameterError
 
-ENTRIES = yaml.safe_load((FOLDER / "ppo.yml").read_text())
+FILES = {name: yaml.safe_load((FOLDER / f"{name}.yml").read_text()) for name in ALGORITHMS}
+ENTRIES = FILES["ppo"]
+OF_ZOO = {"n_envs", "n_timesteps", "normalize", "env_wrapper", "frame_stack", "callback", "env_kwargs"}
+"""Keys that the zoo keeps to itself; what it leaves goes to the constructor."""
 
 
-def test_entries_are_ids_that_exist():
+@pytest.mark.parametrize("entries", FILES.values(), ids=FILES)
+def test_entries_are_ids_that_exist(entries):
     assert hoof_env.__version__
-    assert {name for name in ENTRIES if name != "default"} <= set(gym.registry)
-    assert {"hoof_env/HorseLeg-v0", "default"} <= set(ENTRIES)
+    assert {name for name in entries if name != "default"} <= set(gym.registry)
+    assert {"hoof_env/HorseLeg-v0", "default"} <= set(entries)
 
 
-@pytest.mark.parametrize("entry", ENTRIES.values(), ids=ENTRIES)
-def test_the_zoo_reads_every_entry(entry):
-    """By its rules, what its own keys leave goes to the constructor, and a schedule in words is lin_<x>."""
-    of_zoo = {"n_envs", "n_timesteps", "normalize", "env_wrapper", "frame_stack", "callback", "env_kwargs"}
-    assert set(entry) - of_zoo <= set(inspect.signature(PPO.__init__).parameters)
+@pytest.mark.parametrize(
+    ("algo", "entry"), [(algo, entry) for algo, entries in FILES.items() for entry in entries.values()]
+)
+def test_the_zoo_reads_every_entry(algo, entry):
+    """By its rules, schedules in words, which are lin_<x>, and noise aside."""
+    taken = set(inspect.signature(algorithm_class(algo).__init__).parameters)
+    assert set(entry) - OF_ZOO - ({"noise_type", "noise_std"} if algo == "td3" else set()) <= taken
     assert int(entry["n_timesteps"]) > 0
-    assert isinstance(entry["normalize"], (bool, dict))
+    assert isinstance(entry.get("normalize", False), (bool, dict))
     for key in SCHEDULED:
         if isinstance(entry.get(key), str):
             schedule, start = entry[key].split("_")
             assert schedule == "lin"
             assert float(start) > 0
-    assert (entry["n_envs"] * entry["n_steps"]) % entry[
-        "batch_size"
-    ] == 0  # else SB3 warns of a cut mini-batch
+    if algo == "ppo":  # else SB3 warns of a cut mini-batch
+        assert (entry["n_envs"] * entry["n_steps"]) % entry["batch_size"] == 0
+
+
+@pytest.mark.parametrize("algo", ["sac", "td3", "tqc"])
+def test_off_policy_files_build_their_models(algo):
+    settings = load_settings(FOLDER / f"{algo}.yml", "hoof_env/HorseLeg-v0") | {"buffer_size": 10}
+    model = algorithm_class(algo)(env="Pendulum-v1", device="cpu", **model_arguments(settings))
+    assert model.train_freq.frequency == settings["train_freq"]
+    assert (model.action_noise is None) == ("noise_type" not in settings)
+
+
+def test_noise_and_episodes_in_the_zoo_s_form():
+    settings = {"noise_type": "ornstein-uhlenbeck", "noise_std": 0.5, "train_freq": [2, "episode"]}
+    arguments = model_arguments(settings, actions=3)
+    assert arguments.keys() == {"action_noise", "train_freq"}
+    assert arguments["train_freq"] == (2, "episode")
+    assert isinstance(arguments["action_noise"], OrnsteinUhlenbeckActionNoise)
+    assert arguments["action_noise"]().shape == (3,)
+
+
+@pytest.mark.parametrize(
+    "noise", [{"noise_type": "pink"}, {"noise_type": "normal", "noise_std": -1}], ids=str
+)
+def test_unknown_noise(noise):
+    with pytest.raises(DataFileError, match="noise_type"):
+        model_arguments(noise)
+
+
+def test_an_algorithm_that_is_not_there(monkeypatch):
+    with pytest.raises(ParameterError, match="dqn"):
+        algorithm_class("dqn")
+    monkeypatch.setitem(ALGORITHMS, "tqc", "sb3_contrib_of_tomorrow")
+    with pytest.raises(ParameterError, match=r"pip install 'hoof-env\[train\]'"):
+        algorithm_class("tqc")
 
 
 def test_the_algorithm_takes_the_entry():

@@ -36,15 +36,16 @@ def test_endless():
 
 @pytest.fixture
 def result(tmp_path, monkeypatch, request):
-    """What a check comes to whose last test sleeps as long as the parameter says [s]."""
+    """What a check comes to whose last test sleeps for the first parameter, within the second [s]."""
+    sleeps, seconds = request.param
     monkeypatch.setattr(run, "RESULTS", tmp_path)
-    (tmp_path / "check_sample.py").write_text(PROGRAM.replace("WAIT", str(request.param)))
+    (tmp_path / "check_sample.py").write_text(PROGRAM.replace("WAIT", str(sleeps)))
     (tmp_path / "pytest.ini").touch()
     monkeypatch.setattr(run, "CHECKOUT_FOLDER", tmp_path)
-    return run.check("check_sample", libraries=["gymnasium"], seconds=5)
+    return run.check("check_sample", libraries=["gymnasium"], seconds=seconds)
 
 
-@pytest.mark.parametrize("result", [0], indirect=True)
+@pytest.mark.parametrize("result", [(0, 300)], indirect=True)
 def test_a_failure_is_told_and_does_not_stop_the_rest(result):
     good, told = verdict(result)
     assert not good
@@ -60,13 +61,13 @@ def test_a_failure_is_told_and_does_not_stop_the_rest(result):
     ]
 
 
-@pytest.mark.parametrize("result", [600], indirect=True)
+@pytest.mark.parametrize("result", [(600, 12)], indirect=True)
 def test_an_endless_test_is_ended_and_what_ran_before_it_is_kept(result):
     good, told = verdict(result)
     assert not good
-    assert told.endswith("stopped after 5 s")
+    assert told.endswith("stopped after 12 s")
     assert len(result["rows"]) == 4
-    assert "**stopped after 5 s**" in markdown([result])
+    assert "**stopped after 12 s**" in markdown([result])
 
 
 def test_a_check_whose_library_is_missing_fails():

@@ -19,11 +19,8 @@ from hoof_env.paper.study.replay import euler_cycle, exact_cycle, ground_of, rep
 
 
 @pytest.fixture(scope="module")
-def section():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(numerics, "BETA_SWEEP", np.linspace(0, 40, 9))
-        patch.setattr(numerics, "STEP_SWEEP", np.array([500, 1000, 2000]))
-        yield numerics.examine_numerics(None, lambda line: None)
+def section(few_points):
+    return numerics.examine_numerics(None, lambda line: None)
 
 
 @pytest.fixture(scope="module")

@@ -13,8 +13,8 @@ PARTS = ["numerics", "laws", "sensitivity", "slips", "claims"]
 
 
 @pytest.fixture(scope="module")
-def result(reproduction):
-    """The real study, each figure replaced by one that is quick to draw."""
+def result(reproduction, few_points):
+    """The real study with few points, each figure replaced by one that is quick to draw."""
     pytest.importorskip("matplotlib")
     from matplotlib.figure import Figure
 

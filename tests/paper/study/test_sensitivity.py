@@ -8,19 +8,14 @@ import pytest
 from hoof_env.paper.measure import measure_stance
 from hoof_env.paper.published import load_published
 from hoof_env.paper.reproduce import GAITS
-from hoof_env.paper.study import sensitivity
 from hoof_env.paper.study.by_construction import LAWS, confirm
 from hoof_env.paper.study.replay import exact_cycle, ground_of, replay
 from hoof_env.paper.study.sensitivity import PARAMETERS, examine_sensitivity
 
 
 @pytest.fixture(scope="module")
-def section():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sensitivity, "LEVELS", np.linspace(-20e-3, 20e-3, 5))
-        patch.setattr(sensitivity, "FRICTIONS", np.array([0.0, 0.4, 1.0]))
-        patch.setattr(sensitivity, "FAST", np.array([2e-3, 1e-2, 10.0]))
-        yield examine_sensitivity(None, lambda line: None)
+def section(few_points):
+    return examine_sensitivity(None, lambda line: None)
 
 
 def test_what_follows_from_the_construction_holds(section):

@@ -1,0 +1,155 @@
+"""The table of baselines: many trainings, one process each, and the page that they make.
+
+    python -m agents.baselines                        all of docs/baselines.md: hours on two cores
+    python -m agents.baselines --subset nightly       a small one in minutes, into a folder of its own
+    python -m agents.baselines --only sac td3         some rows of it
+
+What is trained is in agents/baselines_plan.py. A training that is done is not repeated; Ctrl-C, or kill -9,
+and the same command go on where it was. Each has its log beside its results, RUN/log.txt.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from agents import baselines_stats
+from agents.baselines_plan import FOLDERS, PLANS, Run, runs_of
+from agents.baselines_run import CURVE, FINAL, read_curve
+from agents.command import run
+from hoof_env._output import check_folder
+from hoof_env.errors import ParameterError, check_number
+
+
+@dataclass(frozen=True)
+class Args:
+    subset: Literal["full", "nightly"] = "full"
+    """which plan; the nightly one is written beside its runs and never over the full table"""
+    only: tuple[str, ...] = ()
+    """only trainings with one of these in their names, which are ALGO-ENV-sSEED"""
+    workers: int = 2
+    """trainings at a time, one thread each"""
+    out: Path | None = None
+    """folder; otherwise runs/baselines or runs/baselines-nightly"""
+    report: bool = True
+    """write the page when nothing is left"""
+
+
+def train_all(args: Args) -> list[Run]:
+    """Train what is not done yet; returns the trainings that failed.
+
+    Raises:
+        ParameterError: no training of that name. OutputError: the folder cannot be written.
+        KeyboardInterrupt: Ctrl-C; everything can go on.
+    """
+    check_number("workers", args.workers, low=1)
+    folder = args.out or FOLDERS[args.subset]
+    asked = [
+        one
+        for one in runs_of(PLANS[args.subset])
+        if not args.only or any(text in one.name for text in args.only)
+    ]
+    if not asked:
+        raise ParameterError(f"only: expected a part of a training's name, got {args.only!r}")
+    check_folder(folder)
+    return work_off(asked, folder, args.workers)
+
+
+def work_off(asked: Sequence[Run], folder: Path, workers: int) -> list[Run]:
+    """Train so many at a time until all are done; returns those that failed."""
+    from tqdm import tqdm
+
+    waiting = [one for one in asked if not (folder / one.name / FINAL).is_file()]
+    running: dict[Run, subprocess.Popen[bytes]] = {}
+    failed: list[Run] = []
+    done = len(asked) - len(waiting)
+    rest = 1.0 if sys.stderr.isatty() else 60.0  # seconds between two lines, where each is kept
+    with tqdm(
+        total=len(asked), initial=done, mininterval=rest, bar_format="{l_bar}{bar:20}{r_bar}", unit=" runs"
+    ) as bar:
+        try:
+            while waiting or running:
+                while waiting and len(running) < workers:
+                    one = waiting.pop(0)
+                    running[one] = start(one, folder)
+                time.sleep(0.5)
+                for one in [one for one, process in running.items() if process.poll() is not None]:
+                    running.pop(one)
+                    if (folder / one.name / FINAL).is_file():
+                        done += 1
+                    else:
+                        failed.append(one)
+                        tqdm.write(f"{one.name} failed: {last_line(folder / one.name)}")
+                now = {one.name: share_done(one, folder) for one in running}
+                bar.n = round(done + sum(now.values()), 2)
+                told = ", ".join(f"{name} {share:.0%}" for name, share in now.items())
+                bar.set_postfix_str(f"{told}; {len(waiting)} wait", refresh=False)
+                bar.update(0)
+        finally:
+            stop(running)
+    return failed
+
+
+def start(one: Run, folder: Path) -> subprocess.Popen[bytes]:
+    """Begin a training, or go on with it, in a process that Ctrl-C does not reach."""
+    (folder / one.name).mkdir(parents=True, exist_ok=True)
+    threads = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
+    with (folder / one.name / "log.txt").open("ab") as log:
+        return subprocess.Popen(
+            [sys.executable, "-m", "agents.baselines_run", *one.command(folder)],
+            stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True,
+            env=os.environ | threads,
+        )  # fmt: skip
+
+
+def stop(running: dict[Run, subprocess.Popen[bytes]]) -> None:
+    """Let trainings end in good order, each with a checkpoint."""
+    for process in running.values():
+        process.terminate()
+    for process in running.values():
+        process.wait()
+
+
+def share_done(one: Run, folder: Path) -> float:
+    """How much of a training is done, as far as its curve tells."""
+    rows = read_curve(folder / one.name / CURVE)
+    points = (rows[-1]["steps"] / max(rows[1]["steps"], 1.0)) if len(rows) > 1 else 0.0
+    return min(points / one.entry.points, 0.99)
+
+
+def last_line(folder: Path) -> str:
+    """What a log says last."""
+    lines = (folder / "log.txt").read_text(encoding="utf-8", errors="replace").split("\n")
+    return next((line for line in reversed(lines) if line.strip()), "said nothing")
+
+
+def main(argv: list[str] | None = None) -> int:
+    import tyro
+
+    def interrupt(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, interrupt)
+    args = tyro.cli(Args, args=argv, prog="python -m agents.baselines", description=__doc__)
+    if args.report:
+        baselines_stats.library()  # what is missing is told before hours are spent
+    failed = train_all(args)
+    if args.report:
+        from agents import baselines_report
+
+        page = baselines_report.report(baselines_report.Args(args.subset, args.out))
+        print(f"written: {page}")
+    for one in failed:
+        print(f"failed: {one.name}", file=sys.stderr)
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    run(main)

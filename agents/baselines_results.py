@@ -1,0 +1,170 @@
+"""What the trainings of a plan left, entry by entry, and what scripted policies get in the same episodes."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from agents.baselines_plan import CURVE_SEEDS, FINAL_SEEDS, Entry, Run, figures
+from agents.baselines_run import CURVE, FINAL, read_curve
+from agents.baselines_stats import Interval, over_seeds
+from agents.evaluate import estimate
+from agents.score import score_vector
+from hoof_env.errors import DataFileError, HoofEnvError
+
+GAITS = ("run", "walk")
+OPEN_LOOP = "open-loop"
+"""Name of the gait that CMA-ES found for an id, without learning."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """One training that is done."""
+
+    folder: Path
+    final: dict[str, Any]
+
+    @cached_property
+    def figures(self) -> dict[str, float]:
+        """Of the last policy on fresh episodes."""
+        return figures(self.final["episodes"])
+
+    @cached_property
+    def curve(self) -> list[dict[str, float]]:
+        """Rows of its curve.csv."""
+        return read_curve(self.folder / CURVE)
+
+    @cached_property
+    def record(self) -> dict[str, Any]:
+        """Its run.json."""
+        found: dict[str, Any] = json.loads((self.folder / "run.json").read_text(encoding="utf-8"))
+        return found
+
+
+@dataclass(frozen=True)
+class Row:
+    """An entry with the trainings of it that are done."""
+
+    entry: Entry
+    results: tuple[Result, ...]
+
+    @property
+    def title(self) -> str:
+        """Algorithm, and what sets the entry apart."""
+        return " ".join(filter(None, (self.entry.algo.upper(), self.entry.label)))
+
+    @cached_property
+    def intervals(self) -> dict[str, Interval]:
+        """Figures over seeds, those that the id has."""
+        return over_seeds([one.figures for one in self.results])
+
+    def beaten(self, level: float) -> list[dict[str, float] | None]:
+        """Of each seed the first row of its curve with a return above `level`."""
+        return [first_above(one.curve, level) for one in self.results]
+
+    @property
+    def command(self) -> str:
+        """What trains its first seed, without the folder."""
+        told = Run(self.entry, 0).command(Path())
+        cut = told.index("--out")
+        return shlex.join(["python", "-m", "agents.baselines_run", *told[:cut], *told[cut + 2 :]])
+
+
+def first_above(curve: Sequence[dict[str, float]], level: float) -> dict[str, float] | None:
+    """The first row of a learning curve with a return above `level`."""
+    return next((row for row in curve if row["return"] > level), None)
+
+
+def read_results(plan: Sequence[Entry], folder: Path) -> list[Row]:
+    """What is done of a plan; entries without a training that is done are left out.
+
+    Raises:
+        DataFileError: nothing is done, a result cannot be read, or seeds of one entry were trained with
+            different settings.
+    """
+    rows = []
+    for entry in plan:
+        found = []
+        for one in (folder / Run(entry, seed).name for seed in range(entry.seeds)):
+            if (one / FINAL).is_file():
+                try:
+                    found.append(Result(one, json.loads((one / FINAL).read_text(encoding="utf-8"))))
+                except (OSError, ValueError) as error:
+                    raise DataFileError(
+                        f"{one / FINAL}: expected what agents.baselines_run wrote: {error}"
+                    ) from None
+        settings = {(one.folder / "config.yml").read_text(encoding="utf-8"): one.folder for one in found}
+        if len(settings) > 1:
+            raise DataFileError(
+                f"{entry.name}: expected seeds of the same settings, got different config.yml in "
+                f"{' and '.join(map(str, settings.values()))}; remove what is outdated"
+            )
+        if found:
+            rows.append(Row(entry, tuple(found)))
+    if not rows:
+        raise DataFileError(f"{folder}: expected trainings of agents.baselines, found none that is done")
+    return rows
+
+
+def settings_of(row: Row) -> dict[str, Any]:
+    """The hyperparameters that an entry was trained with."""
+    (found,) = yaml.safe_load((row.results[0].folder / "config.yml").read_text(encoding="utf-8")).values()
+    return dict(found)
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A policy that learns nothing.
+
+    Attributes:
+        figures: means over fresh episodes.
+        intervals: of the means over these episodes.
+        curve_return: mean return over the episodes of the learning curves.
+    """
+
+    name: str
+    figures: dict[str, float]
+    intervals: dict[str, Interval]
+    curve_return: float
+
+
+def references(env_id: str, env_kwargs: dict[str, Any] | None = None) -> dict[str, Reference]:
+    """The paper's gaits and the open-loop gait of an id on the episodes of the agents; those that it has."""
+    found = {}
+    for name in (*GAITS, OPEN_LOOP):
+        try:
+            found[name] = reference(name, name, env_id, env_kwargs or {})
+        except HoofEnvError:
+            if name in GAITS:
+                raise
+    return found
+
+
+def reference(name: str, policy: Any, env_id: str, env_kwargs: dict[str, Any]) -> Reference:
+    """Score a policy that learns nothing, as `agents.score.score_vector` takes it."""
+    episodes = score_vector(policy, env_id, FINAL_SEEDS, **env_kwargs)
+    means = figures(episodes)
+    intervals = {}
+    for key, mean in means.items():
+        around = estimate([one[key] for one in episodes])
+        low, high = (np.nan if bound is None else bound for bound in (around.low, around.high))
+        intervals[key] = Interval(mean, low, high)
+    curve = score_vector(policy, env_id, CURVE_SEEDS, **env_kwargs)
+    return Reference(name, means, intervals, float(np.mean([one["return"] for one in curve])))
+
+
+def versions_of(rows: Sequence[Row]) -> dict[str, str]:
+    """Versions that the trainings were made with; several of one package stand beside each other."""
+    found: dict[str, set[str]] = {}
+    for one in (one for row in rows for one in row.results):
+        for name, value in one.record["versions"].items():
+            found.setdefault(name, set()).add(value)
+    return {name: ", ".join(sorted(values)) for name, values in found.items()}

@@ -1,0 +1,223 @@
+"""Checkpoints: all that a training goes on from, in a folder that is whole or is not there.
+
+A checkpoint stands between two rollouts. `checkpoints/N/`, after N steps, holds
+
+    model.zip         weights, optimisers, counters, schedules, action noise (Stable-Baselines3)
+    vecnormalize.pkl  statistics, where there is normalisation
+    replay.pkl        replay buffer, where there is one
+    state.pkl         environments, generators, where monitor.csv stood
+    policy.*          the policy as agents/safe.py writes it
+
+What goes on from there has the bits of a run that was never stopped: on the same machine, on the CPU, with
+the same number of threads, with environments that have `get_state` and `set_state`, without gSDE (which draws
+its noise anew) and without max_episode_steps around an environment that is not native. Other environments
+start new episodes, with other seeds than the first ones. These files are pickles: resume only runs that you
+trust.
+"""
+
+from __future__ import annotations
+
+import copy
+import os
+import pickle
+import random
+import shutil
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from agents import runs
+from hoof_env.errors import DataFileError, OutputError
+
+KEPT = 2
+REPLAY, STATE = "replay.pkl", "state.pkl"
+UNFINISHED = ".unfinished-"
+
+
+@contextmanager
+def whole(folder: Path) -> Iterator[Path]:
+    """A folder that is there with all its files, on the disk, once the block has succeeded, else not at all.
+
+    Raises:
+        OutputError: it cannot be written.
+    """
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        stage = Path(tempfile.mkdtemp(prefix=UNFINISHED, dir=folder.parent))
+        try:
+            yield stage
+            for path in (*stage.iterdir(), stage):
+                _flush(path)
+            stage.rename(folder)
+            _flush(folder.parent)
+        finally:
+            shutil.rmtree(stage, ignore_errors=True)
+    except OSError as error:
+        raise OutputError(f"cannot write {str(folder)!r}: {error.strerror or error}") from None
+
+
+def checkpoints(run: Path) -> list[Path]:
+    """The checkpoints of a run, the last one first; whatever else was left half-done is not among them."""
+    found = (path for path in (run / runs.CHECKPOINTS).glob("*") if path.name.isdigit())
+    return sorted(found, key=lambda path: int(path.name), reverse=True)
+
+
+def tidy(run: Path, keep: int = KEPT) -> None:
+    """Remove all checkpoints but the last ones, and what killed processes left; no checkpoint is ever seen
+    half-removed."""
+    for path in checkpoints(run)[keep:]:
+        path.rename(path.with_name(f"{UNFINISHED}{path.name}"))
+    for folder in (run, run / runs.CHECKPOINTS):
+        for path in folder.glob(f"{UNFINISHED}*"):
+            shutil.rmtree(path, ignore_errors=True)
+    if not keep:
+        shutil.rmtree(run / runs.CHECKPOINTS, ignore_errors=True)
+
+
+def save(model: Any, run: Path, seconds: float) -> None:
+    """Write a checkpoint of a model between two rollouts, `seconds` into the training; older ones go."""
+    import torch
+    from stable_baselines3.common.vec_env import VecMonitor
+
+    monitor = _layer(model.env, VecMonitor)
+    normalize = model.get_vec_normalize_env()
+    state = {
+        "seconds": seconds,
+        "monitor": {
+            name: getattr(monitor, name) for name in ("episode_returns", "episode_lengths", "episode_count")
+        },
+        "monitor_bytes": (run / "monitor.csv").stat().st_size,
+        "returns": None if normalize is None else normalize.returns,
+        "environments": _environment_states(model.env),
+        "generators": {
+            "python": random.getstate(),
+            "numpy": np.random.get_state(),  # noqa: NPY002  (Stable-Baselines3 draws from it)
+            "torch": torch.get_rng_state(),
+            "actions": model.action_space.np_random.bit_generator.state,
+        },
+    }
+    with whole(run / runs.CHECKPOINTS / str(model.num_timesteps)) as stage:
+        runs.write_model(model, stage)
+        if getattr(model, "replay_buffer", None) is not None:
+            model.save_replay_buffer(stage / REPLAY)
+        (stage / STATE).write_bytes(pickle.dumps(state))
+    tidy(run)
+
+
+class Resumed:
+    """A model that goes on from a checkpoint, its environments too.
+
+    Args:
+        checkpoint: folder.
+        algorithm: class of the model.
+        many: `VecEnv` without wrappers, as the run had it.
+        device: of torch.
+
+    Attributes:
+        model: of Stable-Baselines3; call `model.learn(rest, reset_num_timesteps=False)`.
+        seconds: of training up to here.
+
+    Raises:
+        DataFileError: the checkpoint cannot be read or is of other environments.
+    """
+
+    def __init__(self, checkpoint: Path, algorithm: Any, many: Any, device: str) -> None:
+        from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
+
+        try:
+            self._state = pickle.loads((checkpoint / STATE).read_bytes())
+            self.seconds: float = self._state["seconds"]
+            monitor = VecMonitor(many)
+            envs: Any = monitor
+            if (checkpoint / runs.STATISTICS).exists():
+                envs = VecNormalize.load(str(checkpoint / runs.STATISTICS), monitor)
+            self.model = algorithm.load(checkpoint / "model.zip", env=envs, device=device, force_reset=False)
+            if (checkpoint / REPLAY).exists():
+                self.model.load_replay_buffer(checkpoint / REPLAY)
+            self._put_back(monitor, many)
+        except Exception as error:  # a damaged pickle may raise anything
+            reason = f"{type(error).__name__}: {error}".splitlines()[0]
+            raise DataFileError(
+                f"checkpoint {checkpoint}: cannot go on from it ({reason}); without it an earlier one serves"
+            ) from None
+        self._continue_monitor(monitor, checkpoint.parents[1] / "monitor.csv")
+        self._noise = copy.deepcopy(getattr(self.model, "action_noise", None))
+
+    def _put_back(self, monitor: Any, many: Any) -> None:
+        states, model = self._state["environments"], self.model
+        if states is None:
+            model._last_obs = None  # the training resets them
+            many.seed((model.seed or 0) + model.num_timesteps)
+            return
+        many.reset()
+        _set_environment_states(many, states)
+        for name, value in self._state["monitor"].items():
+            setattr(monitor, name, value)
+        if self._state["returns"] is not None:
+            model.get_vec_normalize_env().returns = self._state["returns"]
+
+    def _continue_monitor(self, monitor: Any, path: Path) -> None:
+        """Episodes after the checkpoint are played again: their rows go, and time goes on from there."""
+        from stable_baselines3.common.monitor import ResultsWriter
+
+        monitor.t_start = time.time() - self.seconds
+        there = path.exists()
+        if there:
+            os.truncate(path, min(path.stat().st_size, self._state["monitor_bytes"]))
+        header = {"t_start": monitor.t_start, "env_id": "None"}
+        monitor.results_writer = ResultsWriter(str(path), header=header, override_existing=not there)
+
+    def start(self) -> None:
+        """Put back what setting up a training draws from or resets; call it when the training starts."""
+        import torch
+
+        generators = self._state["generators"]
+        random.setstate(generators["python"])
+        np.random.set_state(generators["numpy"])  # noqa: NPY002
+        torch.set_rng_state(generators["torch"])
+        self.model.action_space.np_random.bit_generator.state = generators["actions"]
+        if self._noise is not None:
+            self.model.action_noise = self._noise
+
+
+def _layer(envs: Any, kind: type) -> Any:
+    """The wrapper of that class."""
+    while not isinstance(envs, kind):
+        envs = envs.venv
+    return envs
+
+
+def _environment_states(envs: Any) -> list[Any] | None:
+    """States of the environments, None if one has none."""
+    from hoof_env.envs.sb3 import Sb3VecEnv
+
+    if isinstance(envs.unwrapped, Sb3VecEnv):
+        return [envs.unwrapped.envs.get_state()]
+    try:
+        return [env.get_wrapper_attr("get_state")() for env in envs.unwrapped.envs]
+    except AttributeError:
+        return None
+
+
+def _set_environment_states(many: Any, states: list[Any]) -> None:
+    from hoof_env.envs.sb3 import Sb3VecEnv
+
+    single = [many.envs] if isinstance(many, Sb3VecEnv) else [env.unwrapped for env in many.envs]
+    for env, state in zip(single, states, strict=True):
+        env.set_state(state)
+
+
+def _flush(path: Path) -> None:
+    """Have the disk hold it before anything relies on it."""
+    if path.is_dir() and os.name != "posix":  # Windows cannot flush a folder
+        return
+    number = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
+    try:
+        os.fsync(number)
+    finally:
+        os.close(number)

@@ -1,0 +1,257 @@
+"""Trainings on a Ray cluster: many of Stable-Baselines3, or one of RLlib on several workers.
+
+    python -m agents.distribute trials --seeds 5                                      five seeds
+    python -m agents.distribute trials --seeds 3 --space 'learning_rate=[1e-3,5e-4]'  a sweep
+    python -m agents.distribute trials --samples 20 --asha --space 'learning_rate=loguniform(1e-4,1e-2)'
+    python -m agents.distribute rllib --workers 2                                     RLlib's PPO
+
+Without --address a cluster of this machine's cores is made and ended with the command. A worker that dies is
+replaced and its trial goes on from its last checkpoint. Ctrl-C keeps what is there; the same command, given
+again, runs what is missing. docs/distribute.md tells how to use a real cluster and where results land.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import json
+import logging
+import os
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from agents import runs
+from agents.command import parse_pairs, run
+from agents.distribute_space import ENV, check_keys, parse_space
+from agents.settings import algorithm_class
+from agents.train import Args as TrainArgs
+from agents.train import checked
+from hoof_env.errors import HoofEnvError, OutputError, ParameterError, check_number
+
+ROOT = Path(__file__).resolve().parents[1]
+
+SHIPPED = {
+    "working_dir": str(ROOT),
+    "excludes": ["/.*", "/runs", "/docs", "/dist", "/build", "__pycache__", "*.pyc"],
+}
+"""Runtime environment of trials on a cluster: the checkout, without what no training needs."""
+
+
+@dataclass(frozen=True)
+class Cluster:
+    address: str | None = None
+    """a running Ray cluster: auto (this machine is part of it), host:port or ray://host:10001"""
+    cpus: int | None = None
+    """of the cluster that is made where no address is given; otherwise all"""
+    runtime_env: tuple[str, ...] = ()
+    """more for Ray's runtime_env on a cluster: key=value ..., or one JSON object, as
+    '{"pip": ["numba", "stable-baselines3"]}'"""
+    retries: int = 3
+    """of each trial whose worker dies or fails"""
+    out: str = "runs/distribute"
+    """folder that all machines see, or s3://... and the like; each experiment has its own folder there"""
+
+
+@dataclass(frozen=True)
+class Trials(Cluster):
+    """Trainings of agents.train, each a trial of Ray Tune: seeds, sweeps, searches."""
+
+    env_id: str = "hoof_env/HorseLeg-v0"
+    """registered environment"""
+    algo: str = "ppo"
+    """algorithm of agents.train"""
+    seeds: int = 1
+    """trainings of each setting, from seed 0 on"""
+    space: tuple[str, ...] = ()
+    """what is varied: key=[JSON, ...] runs all, key=loguniform(a,b) and the like of ray.tune draw; a key is a
+    hyperparameter, or env.ARGUMENT of the environment"""
+    samples: int = 1
+    """draws of the distributions in --space; the same for each seed"""
+    asha: bool = False
+    """give up the worse trials early (asynchronous successive halving)"""
+    steps: int | None = None
+    """of each training; otherwise n_timesteps of the hyperparameter file"""
+    env_kwargs: tuple[str, ...] = ()
+    """arguments of the environment: key=value ..., or one JSON object"""
+    params: tuple[str, ...] = ()
+    """hyperparameters to change: key=value ..., or one JSON object"""
+    report_every: int = 100_000
+    """steps between two scores, which are checkpoints as well"""
+    cpus_per_trial: int = 1
+    """cores that a trial asks of the cluster, and threads of torch"""
+
+
+@dataclass(frozen=True)
+class Rllib(Cluster):
+    """One training by RLlib's PPO, its environments on several workers."""
+
+    env_id: str = "hoof_env/HorseLeg-v0"
+    """registered environment with a native vector environment"""
+    workers: int = 2
+    """processes with environments; one more learns"""
+    n_envs: int = 64
+    """environments of each worker"""
+    steps: int = 1_000_000
+    """environment steps in all"""
+    seed: int = 0
+    """of environments and network"""
+    env_kwargs: tuple[str, ...] = ()
+    """arguments of the environment: key=value ..., or one JSON object"""
+
+
+def prepare(args: Trials) -> dict[str, Any]:
+    """The parameter space of `args`: constants, an `Axis` for what varies, a list of seeds; all checked.
+
+    Raises:
+        ParameterError, DataFileError: the arguments, the environment, the space or the file do not fit.
+    """
+    for name in ("seeds", "samples", "report_every", "cpus_per_trial"):
+        check_number(name, getattr(args, name), low=1)
+    algorithm_class(args.algo)
+    asked: dict[str, Any] = {"env_id": args.env_id, "algo": args.algo, "torch_threads": args.cpus_per_trial}
+    one = TrainArgs(**asked, steps=args.steps, env_kwargs=args.env_kwargs, params=args.params)
+    env_kwargs, settings = checked(one)
+    axes = parse_space(args.space)
+    check_keys(axes, args.algo, settings)
+    if args.samples > 1 and all(axis.draw == "grid_search" for axis in axes):
+        raise ParameterError(f"samples: expected 1 where --space draws nothing, got {args.samples}")
+    with runs.make_env(args.env_id, **env_kwargs) as env:
+        runs.warm_up(env)  # kernels are compiled before workers want them
+    for axis in axes:
+        for value in axis.values if axis.key.startswith(ENV) else ():
+            runs.make_env(args.env_id, **env_kwargs | {axis.key.removeprefix(ENV): value}).close()
+    return {
+        "train": asked | {"steps": settings["n_timesteps"]},
+        "env_kwargs": env_kwargs,
+        "params": parse_pairs("--params", args.params),
+        "report_every": args.report_every,
+        "command": runs.command(),
+        **{axis.key: axis for axis in axes},
+        "seed": list(range(args.seeds)),
+    }
+
+
+def run_trials(args: Trials) -> int:
+    """Run the trials of `args` that have not ended yet and write their table; see `fit` for the rest."""
+    plan = prepare(args)
+    start(args)
+    from ray import tune
+    from ray.tune.schedulers import ASHAScheduler
+    from ray.tune.search.basic_variant import BasicVariantGenerator
+
+    from agents.distribute_trial import FIXED, train_trial
+
+    axes = [key for key in plan if key not in FIXED]
+    space = plan | {key: plan[key].build() for key in axes} | {"seed": tune.grid_search(plan["seed"])}
+    steps = plan["train"]["steps"]
+    asha = ASHAScheduler("steps", max_t=steps, grace_period=min(args.report_every, steps))
+    varied = [*axes, "seed"]
+    config = tune.TuneConfig(
+        metric="return", mode="max", num_samples=args.samples,
+        search_alg=BasicVariantGenerator(constant_grid_search=True, random_state=0),
+        scheduler=asha if args.asha else None,
+        reuse_actors=True,  # libraries are imported and kernels read once for each worker
+        trial_dirname_creator=lambda trial: _folder_name(trial, varied),
+    )  # fmt: skip
+    trainable = tune.with_resources(train_trial, {"cpu": args.cpus_per_trial})
+    tuner = {"trainable": trainable, "param_space": space, "tune_config": config}
+    name = f"{args.algo}-{args.env_id.rpartition('/')[2]}"
+    return fit(args, name, tuner, varied, checkpoint_config=tune.CheckpointConfig(num_to_keep=1))
+
+
+def _folder_name(trial: Any, varied: list[str]) -> str:
+    told = ",".join(f"{key}={trial.config[key]}" for key in varied)
+    number = trial.trial_id.rpartition("_")[2]
+    return f"{number}-" + "".join(c if c.isalnum() or c in "=,.-_" else "_" for c in told)[:100]
+
+
+def start(args: Cluster) -> None:
+    """Join the cluster at `args.address`, or make one of this machine's cores.
+
+    Raises:
+        ParameterError: Ray is not installed, or there is no cluster at that address.
+    """
+    kind = "rllib" if isinstance(args, Rllib) else "tune"
+    needed = {"tune": ("ray", "pandas"), "rllib": ("ray", "pandas", "torch", "dm_tree")}[kind]
+    extra = {"tune": "distribute", "rllib": "ray"}[kind]
+    missing = [name for name in needed if not importlib.util.find_spec("tree" if name == "dm_tree" else name)]
+    if missing:
+        raise ParameterError(
+            f"expected ray[{kind}] to be installed, found no {', '.join(missing)}: "
+            f"pip install 'hoof-env[{extra}]'"
+        )
+    check_number("retries", args.retries, low=0)
+    os.environ.setdefault("RAY_AIR_NEW_OUTPUT", "0")
+    import ray
+
+    asked: dict[str, Any] = {"address": args.address or "local", "log_to_driver": False}
+    if args.address:
+        asked["runtime_env"] = SHIPPED | parse_pairs("--runtime-env", args.runtime_env)
+    else:
+        asked |= {"num_cpus": args.cpus, "include_dashboard": False}
+        if args.cpus is not None:
+            check_number("cpus", args.cpus, low=1)
+    # A failure is told in one line by agents.distribute_report
+    logging.getLogger("ray.tune.execution.tune_controller").setLevel(logging.CRITICAL)
+    try:
+        ray.init(logging_level=logging.ERROR, **asked)
+    except (ConnectionError, OSError, RuntimeError, ValueError) as error:
+        said = str(error).strip().splitlines() or [type(error).__name__]
+        where = f"a Ray cluster at {args.address!r}" if args.address else "a Ray cluster on this machine"
+        raise ParameterError(f"address: expected {where}, cannot reach it: {said[0]}") from None
+
+
+def fit(args: Cluster, name: str, tuner: dict[str, Any], varied: list[str], **running: Any) -> int:
+    """Run or go on with the experiment whose name the arguments give, and write its table.
+
+    Args:
+        args: the command's.
+        name: start of the experiment's folder in `args.out`; a digest of what is asked for follows.
+        tuner: arguments of `ray.tune.Tuner`.
+        varied: keys of the parameter space for the table.
+        running: more arguments of `ray.tune.RunConfig`.
+
+    Returns:
+        The exit code: 0, 1 where a trial failed for good, 130 after Ctrl-C.
+    """
+    from ray import tune
+
+    from agents.distribute_report import Progress, write_table
+
+    asked = {key: value for key, value in asdict(args).items() if key not in Cluster.__dataclass_fields__}
+    digest = hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()[:8]
+    storage = args.out if "://" in args.out else str(Path(args.out).absolute())
+    folder = f"{storage}/{name}-{digest}"
+    config = tune.RunConfig(
+        name=f"{name}-{digest}", storage_path=storage, verbose=0, callbacks=[Progress()],
+        failure_config=tune.FailureConfig(max_failures=args.retries), **running,
+    )  # fmt: skip
+    try:
+        if tune.Tuner.can_restore(folder):
+            print(f"going on with {folder}", flush=True)
+            experiment = tune.Tuner.restore(folder, tuner["trainable"], resume_errored=True)
+        else:
+            experiment = tune.Tuner(**tuner, run_config=config)
+        results = experiment.fit()
+    except OSError as error:
+        raise OutputError(f"cannot write to {args.out!r}: {error}") from None
+    except tune.TuneError as error:
+        raise HoofEnvError(f"Ray Tune: {str(error).strip().splitlines()[0]}") from None
+    return write_table(results, folder, varied)
+
+
+def main(argv: list[str] | None = None) -> int:
+    import tyro
+
+    from agents.distribute_rllib import run_rllib
+
+    choice = (
+        Annotated[Trials, tyro.conf.subcommand("trials")] | Annotated[Rllib, tyro.conf.subcommand("rllib")]
+    )
+    args: Any = tyro.cli(choice, args=argv, prog="python -m agents.distribute", description=__doc__)
+    return run_rllib(args) if isinstance(args, Rllib) else run_trials(args)
+
+
+if __name__ == "__main__":
+    run(main)

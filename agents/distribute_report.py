@@ -1,0 +1,103 @@
+"""What a person sees of an experiment of Ray Tune: a bar, a line for each retry, a table at the end."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+from typing import Any
+
+from ray import tune
+from tqdm import tqdm
+
+from agents import runs
+
+
+def figures(found: dict[str, Any] | None) -> dict[str, Any]:
+    """Of a report of `distribute_trial` or of RLlib: return, steps and seconds of training."""
+    found = found or {}
+    runner = found.get("env_runners", {})
+    return {
+        "return": found.get("return", runner.get("episode_return_mean")),
+        "steps": found.get("steps", found.get("num_env_steps_sampled_lifetime")),
+        "train_s": found.get("train_s", found.get("time_total_s")),
+    }
+
+
+class Progress(tune.Callback):
+    """A bar over trials, and a line when one ends, when its worker died and when it goes on."""
+
+    def setup(self, **info: Any) -> None:
+        self.shown: tuple[int, str] = (-1, "")
+        self.bar: Any = None  # made where the experiment runs: Ray may send this object there
+
+    def on_step_end(self, iteration: int, trials: list[Any], **info: Any) -> None:
+        ended = sum(trial.status in ("TERMINATED", "ERROR") for trial in trials)
+        if self.bar is None:
+            self.bar = tqdm(unit=" trials", initial=ended, mininterval=0.0)
+        best = [x for trial in trials if (x := figures(trial.last_result)["return"]) is not None]
+        running = sum(trial.status == "RUNNING" for trial in trials)
+        told = f"{running} running" + (f", best return {max(best):.1f}" if best else "")
+        if (ended, told) != self.shown:
+            self.shown, self.bar.total, self.bar.n = (ended, told), len(trials), ended
+            self.bar.set_postfix_str(told)
+
+    def on_trial_recover(self, iteration: int, trials: list[Any], trial: Any, **info: Any) -> None:
+        self._tell(trial, f"{reason(trial.get_error())} Retry {trial.num_failures}")
+
+    def on_trial_restore(self, iteration: int, trials: list[Any], trial: Any, **info: Any) -> None:
+        steps = figures(trial.last_result)["steps"]
+        self._tell(trial, f"goes on from its checkpoint after {steps or 0:,.0f} steps")
+
+    def on_trial_error(self, iteration: int, trials: list[Any], trial: Any, **info: Any) -> None:
+        self._tell(trial, f"{reason(trial.get_error())} No retry is left")
+
+    def on_trial_complete(self, iteration: int, trials: list[Any], trial: Any, **info: Any) -> None:
+        self._tell(trial, f"done, return {figures(trial.last_result)['return']}")
+
+    def on_experiment_end(self, trials: list[Any], **info: Any) -> None:
+        if self.bar is not None:
+            self.bar.close()
+
+    def _tell(self, trial: Any, what: str) -> None:
+        tqdm.write(f"trial {trial.trial_id.rpartition('_')[2]}: {what}")
+
+
+def reason(error: Exception | None) -> str:
+    """In one line: Ray puts the news first, a traceback last."""
+    said = str(error).strip().splitlines() or ["unknown"]
+    lines = [line.strip() for line in said if not line.startswith("Failure #")]
+    return lines[-1] if "Traceback" in str(error) else lines[0]
+
+
+def write_table(results: Any, folder: str, varied: list[str]) -> int:
+    """Write `folder`/trials.csv where that is a path, print what came of the trials.
+
+    Returns:
+        The exit code: 0, 1 where a trial failed for good, 130 where one has not ended.
+    """
+    rows, reasons = [], []
+    for result in sorted(results, key=lambda result: Path(result.path).name):
+        found, config = result.metrics or {}, result.config or {}
+        kept = result.checkpoint.path if result.checkpoint else ""
+        why = reason(result.error) if result.error else found.get("failed")
+        state = "failed" if why else "done" if found.get("done") else "unfinished"
+        reasons += [f"  {kept or 'a trial'}: {why}"] if why else []
+        rows.append(
+            {key: config.get(key) for key in varied}
+            | figures(found)
+            | {"state": state, "run": str(kept).removeprefix(f"{folder}/")}
+        )
+    if "://" not in folder and rows:
+        text = io.StringIO()
+        writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+        runs.write_text(Path(folder, "trials.csv"), text.getvalue())
+    counts = {state: sum(row["state"] == state for row in rows) for state in ("done", "failed", "unfinished")}
+    print(", ".join(f"{count} {state}" for state, count in counts.items() if count) + f": {folder}")
+    print("\n".join(reasons), end="\n" if reasons else "")
+    if counts["unfinished"]:
+        print("interrupted; the same command goes on")
+        return 130
+    return 1 if counts["failed"] else 0

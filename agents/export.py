@@ -1,0 +1,225 @@
+"""Write a trained policy as one file that needs no Stable-Baselines3: ONNX, or TorchScript.
+
+    python -m agents.export runs/ppo-HorseLeg-v0-s0 --out policy.onnx      onnxruntime reads it
+    python -m agents.export runs/ppo-HorseLeg-v0-s0/model.zip --out policy.pt     torch.jit.load reads it
+
+The file maps observations of the environment, shape (batch, k), to deterministic actions, (batch, n), float32
+both: the normalisation of observations and the limits of actions are inside. It is kept only if it gives the
+actions of the model it was made from. What it is for stands in its metadata (`hoof_env/onnx_policy.py`);
+examples/run_policy.py plays an ONNX file in twenty lines.
+
+A .zip is a pickle and can run any code when it is loaded: give only files that you trust. ONNX is data.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from tyro.conf import Positional
+
+import hoof_env
+from agents import runs
+from agents.command import run
+from agents.policy_module import module_of
+from hoof_env._output import check_folder, staged
+from hoof_env.errors import DataFileError, HoofEnvError, OutputError, ParameterError
+from hoof_env.onnx_policy import INPUT, LISTS, OUTPUT, OnnxPolicy, describe
+
+SUFFIXES = (".onnx", ".pt")
+OPSET = 18
+"""Of the ONNX file; onnxruntime reads it from 1.14 on."""
+
+TRIED = 1000
+"""Random observations on which file and model must agree."""
+
+TOLERANCE = 1e-5
+"""By how much an action may differ, as a part of the half range of the action space."""
+
+
+@dataclass(frozen=True)
+class Args:
+    model: Positional[Path]
+    """run folder of agents.train, or a .zip of Stable-Baselines3"""
+    out: Path
+    """file to write: .onnx or .pt (TorchScript)"""
+    env_id: str | None = None
+    """environment of a model without run.json"""
+
+
+def export(model: Path, out: Path, env_id: str | None = None) -> float:
+    """Write the policy of a model and return the largest difference of an action, as in `TOLERANCE`.
+
+    Args:
+        model: run folder or .zip.
+        out: ends in one of `SUFFIXES`.
+        env_id: what it is for; otherwise what run.json says.
+
+    Raises:
+        ParameterError: another suffix, or no environment known. DataFileError: no such model.
+        Others as `write_policy`.
+    """
+    check_place(out)
+    saved = runs.SavedModel.find(model)
+    env_id = env_id or saved.record.get("env_id")
+    if env_id is None:
+        raise ParameterError(f"env_id: expected one, for there is no run.json beside {saved.path}")
+    kwargs = saved.record.get("env_kwargs", {}) if env_id == saved.record.get("env_id") else {}
+    with runs.make_env(env_id, **kwargs) as env:
+        trained = saved.load(env, env_id)
+        metadata = about(env, env_id, kwargs, saved.record)
+    return write_policy(trained, out, metadata)
+
+
+def check_place(out: Path) -> None:
+    """Raise unless a policy can be written there: `ParameterError` for its suffix, else `OutputError`."""
+    if out.suffix not in SUFFIXES:
+        raise ParameterError(f"out: expected a file that ends in {' or '.join(SUFFIXES)}, got {str(out)!r}")
+    if out.is_dir():
+        raise OutputError(f"cannot write to {str(out)!r}: expected a file, got a folder")
+    check_folder(out.parent)
+
+
+def about(env: Any, env_id: str, env_kwargs: dict[str, Any], record: dict[str, Any]) -> dict[str, Any]:
+    """The metadata of a policy for an environment; `record` is the run.json of its training, or empty."""
+    known = {key: str(record[key]) for key in ("algo", "seed") if key in record}
+    here = {"env_id": env_id, "env_kwargs": env_kwargs, "hoof_env": hoof_env.__version__}
+    return here | describe(env) | known
+
+
+def write_policy(trained: runs.TrainedPolicy, out: Path, metadata: dict[str, Any]) -> float:
+    """Write a policy to `out`, an older file is replaced, and return the largest difference of an action.
+
+    Raises:
+        ParameterError: a policy that observes or does something else than vectors, or remembers.
+        DataFileError: the file does not act as the policy does; it is not kept.
+        OutputError: it cannot be written. HoofEnvError: a package is missing.
+    """
+    observations = some_observations(trained.model.observation_space)
+    module, onnx = module_of(trained), out.suffix == ".onnx"
+    with staged(out.parent) as stage:
+        file = stage / out.name
+        (write_onnx if onnx else write_torchscript)(module, observations[:2], file, metadata)
+        predict = OnnxPolicy(file).predict if onnx else read_torchscript(file)
+        off = difference(trained, predict, observations)
+        if not off <= TOLERANCE:
+            raise DataFileError(
+                f"{out}: expected actions within {TOLERANCE:g} of the model's, got {off:.2g}; not kept"
+            )
+    return off
+
+
+def some_observations(space: gym.Space[Any]) -> Any:
+    """`TRIED` random observations, a few of them far outside of what is usual, shape (TRIED, k), float32.
+
+    Raises:
+        ParameterError: not a space of vectors.
+    """
+    if not isinstance(space, gym.spaces.Box) or len(space.shape) != 1:
+        raise ParameterError(f"model: expected one that observes vectors, got {space}")
+    space.seed(0)
+    rows = np.stack([space.sample() for _ in range(TRIED)]).astype(np.float32)
+    rows[::10] *= 100
+    return rows
+
+
+@contextmanager
+def _quietly() -> Iterator[None]:
+    """Without the exporters' notes and without the checks of distributions, which cannot be traced."""
+    from torch.distributions import Distribution
+
+    logger = logging.getLogger("torch.onnx")
+    level, checked = logger.level, Distribution._validate_args
+    logger.setLevel(logging.ERROR)
+    Distribution.set_default_validate_args(False)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        logger.setLevel(level)
+        Distribution.set_default_validate_args(checked)
+
+
+def write_onnx(module: Any, example: Any, path: Path, metadata: dict[str, Any]) -> None:
+    """Write a module as ONNX with any number of rows.
+
+    Raises:
+        HoofEnvError: a package is missing.
+    """
+    import torch
+
+    try:
+        import onnx  # noqa: F401
+        import onnxscript  # noqa: F401
+    except ImportError as error:
+        raise HoofEnvError(f'writing ONNX needs {error.name}: pip install "hoof-env[train,onnx]"') from None
+    with _quietly():
+        program: Any = torch.onnx.export(
+            module, (torch.as_tensor(example),), dynamo=True, opset_version=OPSET, verbose=False,
+            input_names=[INPUT], output_names=[OUTPUT],
+            dynamic_shapes=({0: torch.export.Dim("batch")},),
+        )  # fmt: skip
+    graph = program.model.graph
+    for part in (graph, *graph, *graph.inputs, *graph.outputs, *graph.initializers.values()):
+        part.metadata_props.clear()  # stack traces, with the folders of this machine
+    program.model.metadata_props.clear()
+    for key, value in metadata.items():
+        program.model.metadata_props[key] = json.dumps(value) if key in LISTS else str(value)
+    program.save(path, external_data=False)
+
+
+def write_torchscript(module: Any, example: Any, path: Path, metadata: dict[str, Any]) -> None:
+    """Write a module as TorchScript; the metadata are its extra file metadata.json."""
+    import torch
+
+    with _quietly(), torch.no_grad():
+        script = torch.jit.trace(module, torch.as_tensor(example))
+        torch.jit.save(script, str(path), _extra_files={"metadata.json": json.dumps(metadata).encode()})
+
+
+def read_torchscript(path: Path) -> Any:
+    """The file as a function of observations, as `predict`."""
+    import torch
+
+    with _quietly():
+        script = torch.jit.load(str(path))
+
+    def predict(observation: Any) -> tuple[Any, None]:
+        with torch.no_grad():
+            return script(torch.as_tensor(np.atleast_2d(observation))).numpy(), None
+
+    return predict
+
+
+def difference(trained: Any, predict: Any, observations: Any) -> float:
+    """The largest difference of an action, many observations at once and one alone, NaN if one is none."""
+    space = trained.model.action_space
+    half = (space.high - space.low) / 2
+    wanted, _ = trained.predict(observations)
+    alone = [predict(row)[0].reshape(-1) for row in observations[:20]]
+    both = (predict(observations)[0], np.array(alone))
+    return float(max(np.max(np.abs(found - wanted[: len(found)]) / half) for found in both))
+
+
+def main(argv: list[str] | None = None) -> None:
+    import tyro
+
+    args = tyro.cli(Args, args=argv, prog="python -m agents.export", description=__doc__)
+    off = export(args.model, args.out, args.env_id)
+    print(
+        f"written: {args.out} ({args.out.stat().st_size / 1000:.0f} kB); on {TRIED} random observations its "
+        f"actions differ from the model's by {off:.1g} of their half range at most"
+    )
+
+
+if __name__ == "__main__":
+    run(main)

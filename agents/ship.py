@@ -1,0 +1,272 @@
+"""Ship trained policies: a small folder for each id, everything in it made by one command.
+
+    python -m agents.ship runs/baselines                for each id the best of all runs beneath this folder
+    python -m agents.ship runs/ppo-HorseLeg-v0-s0       this run
+
+The best of an id is that with the highest mean return in episodes on which nothing is reported. Its folder
+agents/policies/NAME is written whole or not at all:
+
+    policy.onnx         the policy, as agents.export writes it; agents.evaluate and hoof-env render play it
+    policy.safetensors  the weights, with policy.json, for Stable-Baselines3 (agents/safe.py)
+    run.json, config.yml   how it was trained
+    score.json          returns in fixed episodes beside those of gaits, and how far other machines may be off
+    card.md, curve.png, film.gif   the model card and its pictures
+
+agents/policies/README.md lists all that are there.
+"""
+
+from __future__ import annotations
+
+import json
+import shlex
+import shutil
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from tyro.conf import Positional
+
+from agents import runs
+from agents.baselines_plan import FINAL_SEEDS as SCORE_SEEDS
+from agents.command import run
+from agents.evaluate import Score, to_json
+from agents.export import about, write_policy
+from agents.score import score_vector
+from agents.ship_card import write_card, write_curve, write_index
+from hoof_env._output import check_folder, staged
+from hoof_env.errors import DataFileError, OutputError, ParameterError, check_choice, check_number
+from hoof_env.onnx_policy import FILE, OnnxPolicy
+
+POLICIES = Path(__file__).with_name("policies")
+CHOOSING_SEEDS = range(500_000, 500_100)
+"""Episodes by which the best of several runs is chosen; no training and no reported score plays them."""
+
+CHECKED = 20
+"""Episodes, from the first of the score on, that are played again to check a shipped policy."""
+
+GAITS = ("run", "walk", "carrying_walk", "open-loop")
+"""Scored beside the policy, where an id has them."""
+
+STANDS_FOR = {"hoof_env/HorseLegMO-v0": "hoof_env/HorseLeg-v0"}
+"""An id without a run gets the policy of another: the same leg, and the sum of its rewards is the other's."""
+
+LIMIT, FILM_LIMIT = 1_000_000, 750_000
+"""Bytes of a folder and of the film in it, which is made shorter where it is larger."""
+
+COPIED = ("policy.safetensors", "policy.json", "config.yml")
+NOT_COPIED = ("args",)
+"""Of run.json: paths of the machine that trained; the command says the rest."""
+
+
+@dataclass(frozen=True)
+class Args:
+    runs: Positional[Path]
+    """a run folder of agents.train, or a folder with several beneath it"""
+    out: Path = POLICIES
+    """folder for the policies' folders"""
+    ids: tuple[str, ...] = ()
+    """only these environments"""
+    seconds: float = 4.0
+    """of the film"""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A run, of how many it is the best, and its mean return in `CHOOSING_SEEDS`, None for an only one."""
+
+    saved: runs.SavedModel
+    among: int = 1
+    value: float | None = None
+
+
+def find_runs(folder: Path) -> dict[str, list[runs.SavedModel]]:
+    """The trained models in or beneath a folder by environment, those with arguments of it left out.
+
+    Raises:
+        DataFileError: there is none.
+    """
+    found: dict[str, list[runs.SavedModel]] = {}
+    for record in (
+        [folder / "run.json"] if (folder / "run.json").is_file() else sorted(folder.rglob("run.json"))
+    ):
+        if not any((record.parent / name).is_file() for name in ("model.zip", "policy.json")):
+            print(f"passed over {record.parent}: it is not through")
+            continue
+        saved = runs.SavedModel.find(record.parent)
+        if not saved.record.get("env_kwargs"):
+            found.setdefault(saved.record["env_id"], []).append(saved)
+    if not found:
+        raise DataFileError(f"runs {folder}: expected a run of agents.train, or a folder with some, got none")
+    return found
+
+
+def choose(saved: Sequence[runs.SavedModel], env_id: str) -> Choice:
+    """The run whose policy has the highest mean return in `CHOOSING_SEEDS`."""
+    from tqdm import tqdm
+
+    if len(saved) == 1:
+        return Choice(saved[0])
+    values = []
+    with runs.make_env(env_id) as env:
+        for one in tqdm(saved, desc=f"runs of {env_id}", leave=False, disable=None):
+            episodes = score_vector(one.load(env, env_id), env_id, CHOOSING_SEEDS)
+            values.append(float(np.mean([episode["return"] for episode in episodes])))
+    best = int(np.argmax(values))
+    return Choice(saved[best], len(saved), values[best])
+
+
+def ship(choice: Choice, env_id: str, out: Path, seconds: float = 4.0) -> dict[str, Any]:
+    """Write the folder of one policy; returns what its score.json holds.
+
+    Args:
+        choice: the run.
+        env_id: for which it is shipped: its own or one that `STANDS_FOR` it.
+        out: the folder for all policies.
+        seconds: of the film.
+
+    Raises:
+        DataFileError: the model does not fit. OutputError: the folder cannot be written or gets too large.
+        HoofEnvError: a package is missing.
+    """
+    from hoof_env.envs.render_clip import render_episode
+
+    saved, trained_on = choice.saved, choice.saved.record["env_id"]
+    record = {key: value for key, value in saved.record.items() if key not in NOT_COPIED}
+    record |= {"command": shown_command(record.get("command", "")), "env_id": env_id}
+    with runs.make_env(trained_on) as env:
+        trained = saved.load(env, trained_on)
+    with runs.make_env(env_id) as env:
+        metadata = about(env, env_id, {}, record)
+    folder = out / env_id.rpartition("/")[2]
+    with staged(folder) as stage:
+        write_policy(trained, stage / FILE, metadata)
+        policy = OnnxPolicy(stage / FILE)  # what is shipped is what is scored
+        scores = [Score("policy", score_vector(policy, trained_on, SCORE_SEEDS)), *gaits(trained_on)]
+        score = score_record(policy, scores, env_id, trained_on)
+        if env_id != trained_on:
+            record["trained_on"] = trained_on
+            score["objectives"] = objectives(policy, env_id)
+        for name in COPIED:
+            if saved.path.with_name(name).is_file():
+                shutil.copyfile(saved.path.with_name(name), stage / name)
+        (stage / "run.json").write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
+        text = json.dumps(score, indent=1, allow_nan=False)
+        (stage / "score.json").write_text(text + "\n", encoding="utf-8")
+        write_curve(saved.path.parent, scores, stage / "curve.png")
+        film = stage / "film.gif"
+        while not film.is_file() or film.stat().st_size > FILM_LIMIT:
+            render_episode(
+                film, str(stage / FILE), env_id,
+                seed=SCORE_SEEDS[0], seconds=seconds, fps=20, size=(480, 270),
+            )  # fmt: skip
+            seconds *= 0.75
+        write_card(stage, env_id, record, score, scores, choice)
+        size = sum(file.stat().st_size for file in stage.iterdir())
+        if size > LIMIT:
+            raise OutputError(f"{folder}: expected at most {LIMIT:,} bytes, got {size:,}")
+    return score
+
+
+@cache
+def gaits(env_id: str) -> list[Score]:
+    """The scores of those of `GAITS` that an id has."""
+    found = []
+    for name in GAITS:
+        try:
+            found.append(Score(name, score_vector(name, env_id, SCORE_SEEDS)))
+        except (ParameterError, DataFileError):  # it has no such gait
+            continue
+    return found
+
+
+def score_record(policy: Any, scores: Sequence[Score], env_id: str, played_on: str) -> dict[str, Any]:
+    """What score.json holds: means and intervals of all, and the returns of the first, the policy."""
+    data = to_json(scores)["policies"]
+    for one in data.values():
+        del one["episodes"]
+    returns = [episode["return"] for episode in scores[0].episodes]
+    return {
+        "env_id": env_id,
+        "played_on": played_on,
+        "seeds": [SCORE_SEEDS.start, SCORE_SEEDS.stop],
+        "policies": data,
+        "returns": [round(value, 4) for value in returns],
+        "check": {"episodes": CHECKED, "tolerance": round(tolerance(policy, played_on, returns), 3)},
+        "command": shown_command(runs.command()),
+        "versions": runs.versions(),
+    }
+
+
+class Trembling:
+    """A policy whose actions are off by a millionth: another machine's arithmetic, exaggerated."""
+
+    def __init__(self, policy: Any) -> None:
+        self._policy, self._generator = policy, np.random.default_rng(0)
+
+    def predict(self, observation: Any, *args: Any, **kwargs: Any) -> tuple[Any, Any]:
+        """As the policy's."""
+        actions, state = self._policy.predict(observation, *args, **kwargs)
+        return actions + self._generator.uniform(-1e-6, 1e-6, actions.shape).astype(np.float32), state
+
+
+def tolerance(policy: Any, env_id: str, returns: Sequence[float]) -> float:
+    """By how much the mean return of the first `CHECKED` episodes may differ on another machine.
+
+    The last bits of an action can change an episode. Measured by playing them once more with a
+    `Trembling` policy: four standard errors of the mean difference, and 1 % of the mean.
+    """
+    again = score_vector(Trembling(policy), env_id, SCORE_SEEDS[:CHECKED])
+    off = np.array([episode["return"] for episode in again]) - returns[: len(again)]
+    return float(4 * np.sqrt(np.mean(off**2) / len(off)) + 0.01 * abs(np.mean(returns)))
+
+
+def objectives(policy: Any, env_id: str) -> dict[str, float]:
+    """Mean return of each objective of a multi-objective id over the checked episodes."""
+    from hoof_env.envs.multi_objective import OBJECTIVES
+
+    sums = np.zeros(len(OBJECTIVES))
+    with runs.make_env(env_id) as env:
+        for seed in SCORE_SEEDS[:CHECKED]:
+            observation, _ = env.reset(seed=seed)
+            done = False
+            while not done:
+                observation, reward, terminated, truncated, _ = env.step(policy.predict(observation)[0])
+                sums, done = sums + np.asarray(reward), terminated or truncated
+    return dict(zip(OBJECTIVES, (sums / CHECKED).round(4).tolist(), strict=True))
+
+
+def shown_command(command: str) -> str:
+    """A command without --out and without folders of this machine."""
+    words = shlex.split(command)
+    while "--out" in words:
+        del words[words.index("--out") : words.index("--out") + 2]
+    here = f"{Path.cwd()}/"
+    shown = [word.removeprefix(here) for word in words]
+    return shlex.join([Path(word).name if Path(word).is_absolute() else word for word in shown])
+
+
+def main(argv: list[str] | None = None) -> None:
+    import tyro
+
+    args = tyro.cli(Args, args=argv, prog="python -m agents.ship", description=__doc__)
+    check_number("seconds", args.seconds, low=0, exclusive_low=True)
+    check_folder(args.out)
+    found = find_runs(args.runs)
+    sources = {env_id: env_id for env_id in found}
+    sources |= {one: other for one, other in STANDS_FOR.items() if one not in found and other in found}
+    choices: dict[str, Choice] = {}
+    for env_id in args.ids or sources:
+        source = sources[check_choice("ids", env_id, sources)]
+        if source not in choices:
+            choices[source] = choose(found[source], source)
+        score = ship(choices[source], env_id, args.out, args.seconds)
+        mean = {name: one["mean"]["return"] for name, one in score["policies"].items()}
+        write_index(args.out)
+        print(f"{env_id}: " + ", ".join(f"{name} {value:.2f}" for name, value in mean.items()), flush=True)
+
+
+if __name__ == "__main__":
+    run(main)

@@ -1,0 +1,296 @@
+"""Search good settings of a learner with Optuna: each trial is a whole training from nothing.
+
+    python -m agents.tune --algo ppo --env-id hoof_env/HorseLeg-v0 --trials 30 --steps 1500000
+    python -m agents.tune --trials 60 --steps 1500000          the same study goes on until it has 60
+
+A trial draws settings from agents/studies/spaces.yml, trains by agents.train, and is scored as it goes on
+64 episodes with which no training starts; a bad one is pruned. Its training has a seed of its own, so that
+no setting wins by a lucky one. Ctrl-C ends the trial in hand; the same command goes on with the study, even
+after kill -9, when the trial that was killed is run again. One process works on a study. Into the folder go
+study.db (Optuna's), best.yml (in rl-baselines3-zoo's format, for --hyperparams of agents.train), trials.csv,
+study.json and trials/N, the run folders.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import yaml
+
+from agents import runs
+from agents.command import parse_pairs, run
+from agents.settings import FOLDER, load_settings
+from agents.train import Args as TrainArgs
+from agents.train import train
+from hoof_env._output import check_folder
+from hoof_env.errors import DataFileError, ParameterError, check_number
+
+SPACES = Path(__file__).parent / "studies" / "spaces.yml"
+EPISODES, FIRST_SEED = 64, 1000
+"""Scored episodes; trainings start theirs from other seeds."""
+
+
+@dataclass(frozen=True)
+class Args:
+    algo: Literal["ppo", "sac", "td3", "tqc"] = "ppo"
+    """algorithm, with its file in agents/hyperparams"""
+    env_id: str = "hoof_env/HorseLeg-v0"
+    """registered environment; module:id imports the module first"""
+    env_kwargs: tuple[str, ...] = ()
+    """its arguments: key=value ..., or one JSON object"""
+    trials: int = 20
+    """that the study has in the end, those of earlier starts counted"""
+    steps: int | None = None
+    """of each trial; otherwise n_timesteps of the hyperparameter file"""
+    scores: int = 10
+    """how often a trial is scored, the last time at its end"""
+    params: tuple[str, ...] = ()
+    """settings that are held: key=value ..., or one JSON object; they are not drawn"""
+    space: Path = SPACES
+    """YAML file of what is drawn"""
+    pruner: Literal["median", "hyperband", "none"] = "median"
+    """what ends a bad trial early"""
+    seed: int = 0
+    """of the search; trial n trains with seed + n"""
+    out: Path | None = None
+    """folder of the study; otherwise runs/tune/ALGO-ENV"""
+
+
+def load_space(path: Path, algo: str) -> dict[str, Any]:
+    """The ranges of `algo` in a file like agents/studies/spaces.yml: key to a list, or to a mapping with
+    "uniform" or "log" [low, high] and perhaps "lin".
+
+    Raises:
+        DataFileError: not such a file, or a range that is none.
+    """
+    try:
+        space = yaml.safe_load(path.read_text(encoding="utf-8"))[algo]
+        for key, how in space.items():
+            if not (isinstance(how, list) and how):
+                (low, high) = how["log"] if "log" in how else how["uniform"]
+                if not low < high or ("log" in how and low <= 0):
+                    raise ValueError(f"{key}: {how}")
+    except (OSError, yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError) as error:
+        raise DataFileError(
+            f"search space {path}: expected for {algo} keys with lists, or uniform or log: [low, high]; "
+            f"{type(error).__name__}: {error}"
+        ) from None
+    return dict(space)
+
+
+def draw(trial: Any, space: Mapping[str, Any], base: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings for an Optuna trial: drawn from `space`, the others of the same setting as in `base`."""
+    chosen: dict[str, Any] = {}
+    for key, how in space.items():
+        value: Any
+        if isinstance(how, list):
+            value = trial.suggest_categorical(key, how)
+            if isinstance(value, str) and value.startswith("["):  # Optuna chooses between plain values only
+                value = json.loads(value)
+        else:
+            low, high = how["log"] if "log" in how else how["uniform"]
+            value = float(f"{trial.suggest_float(key, low, high, log='log' in how):.3g}")
+            value = f"lin_{value:g}" if how.get("lin") else value
+        name, _, inner = key.partition(".")
+        chosen[name] = {**chosen.get(name, base.get(name) or {}), inner: value} if inner else value
+    return chosen
+
+
+def make_scorer(env_id: str, env_kwargs: Mapping[str, Any], every: int, report: Any = None) -> Any:
+    """The callback that scores the policy every `every` steps and at the end; `curve` has rows of (steps,
+    mean return). `report(steps, score)` may say after each but the last that the training is to end."""
+    from stable_baselines3.common.callbacks import BaseCallback
+
+    class Scorer(BaseCallback):
+        curve: list[tuple[int, float]]
+        stopped = False
+
+        def _on_training_start(self) -> None:
+            self.curve, self.next = [], every
+            self.envs = runs.make_vec_env(env_id, EPISODES, **env_kwargs)
+
+        def _on_step(self) -> bool:
+            if self.num_timesteps >= self.next:
+                self.next += every
+                self._score()
+                self.stopped = bool(report and report(*self.curve[-1]))
+            return not self.stopped
+
+        def _on_training_end(self) -> None:
+            if not self.curve or self.num_timesteps > self.curve[-1][0]:
+                self._score()
+            self.envs.close()
+
+        def _score(self) -> None:
+            self.curve.append((self.num_timesteps, mean_return(self.model, self.envs)))
+
+    return Scorer()
+
+
+def mean_return(model: Any, envs: Any) -> float:
+    """Mean return of a model over one episode in each of `envs`, the same episodes each time."""
+    envs.seed(FIRST_SEED)
+    normalize = model.get_vec_normalize_env()
+    observations, going = envs.reset(), np.ones(envs.num_envs, bool)
+    total = np.zeros(envs.num_envs)
+    while going.any():
+        seen = normalize.normalize_obs(observations) if normalize else observations
+        observations, rewards, dones, _ = envs.step(model.predict(seen, deterministic=True)[0])
+        total += np.where(going, rewards, 0.0)
+        going &= ~dones
+    return float(total.mean())
+
+
+def tune(args: Args) -> Any:
+    """Run the study of `args` until it has all trials; returns the Optuna study.
+
+    Raises:
+        ParameterError, DataFileError: the arguments, the environment, the space or the settings do not fit,
+            or the study in the folder was begun with others.
+        OutputError: the folder cannot be written. KeyboardInterrupt: Ctrl-C; finished trials stay.
+    """
+    check_number("trials", args.trials, low=1)
+    check_number("scores", args.scores, low=1)
+    kwargs, held = parse_pairs("--env-kwargs", args.env_kwargs), parse_pairs("--params", args.params)
+    base = load_settings(FOLDER / f"{args.algo}.yml", args.env_id) | held
+    base["n_timesteps"] = int(check_number("steps", args.steps or base["n_timesteps"], low=1))
+    space = {
+        key: how for key, how in load_space(args.space, args.algo).items() if key.split(".")[0] not in held
+    }
+    with runs.make_env(args.env_id, **kwargs) as env:
+        runs.warm_up(env)
+    folder = args.out or Path("runs/tune", f"{args.algo}-{args.env_id.rpartition('/')[2]}")
+    check_folder(folder)
+    study = open_study(args, folder, {"env_kwargs": kwargs, "base": base, "space": space})
+
+    def objective(trial: Any) -> float:
+        import optuna
+
+        settings = base | draw(trial, space, base)
+
+        def report(steps: int, score: float) -> bool:
+            trial.report(score, steps)
+            return bool(trial.should_prune())
+
+        out = folder / "trials" / str(trial.number)
+        shutil.rmtree(out, ignore_errors=True)
+        trial.set_user_attr("settings", settings)
+        scorer = make_scorer(args.env_id, kwargs, -(-base["n_timesteps"] // args.scores), report)
+        training = TrainArgs(
+            env_id=args.env_id, algo=args.algo, env_kwargs=args.env_kwargs, out=out,
+            params=(json.dumps(settings),), seed=args.seed + trial.number, checkpoint_every=0,
+        )  # fmt: skip
+        try:
+            trained = train(training, scorer)
+        except ArithmeticError:  # diverged: no settings to go on with
+            raise optuna.TrialPruned from None
+        trial.set_user_attr("curve", scorer.curve)
+        trial.set_user_attr("seconds", round(trained.seconds, 1))
+        if trained.stopped_by:
+            raise KeyboardInterrupt
+        if scorer.stopped:
+            raise optuna.TrialPruned
+        return scorer.curve[-1][1]
+
+    def keep(study: Any, trial: Any) -> None:
+        curve = trial.user_attrs.get("curve") or [(0, float("nan"))]
+        print(f"trial {trial.number}: {trial.state.name.lower()}, {curve[-1][1]:.1f}", flush=True)
+        write_study(study, folder, args.env_id)
+
+    while (left := args.trials - len(finished(study))) > 0:
+        study.optimize(objective, n_trials=left, callbacks=[keep])
+    write_study(study, folder, args.env_id)
+    return study
+
+
+def finished(study: Any) -> list[Any]:
+    """Trials that ended by themselves; interrupted and killed ones have failed."""
+    return [trial for trial in study.trials if trial.state.name in ("COMPLETE", "PRUNED")]
+
+
+def open_study(args: Args, folder: Path, about: dict[str, Any]) -> Any:
+    """The study in `folder`, made if need be.
+
+    Raises:
+        ParameterError: Optuna is missing, or the study was begun with other settings.
+    """
+    try:
+        import optuna
+    except ModuleNotFoundError:
+        raise ParameterError("agents.tune needs Optuna: pip install 'hoof-env[tune]'") from None
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    pruners = {
+        # By the median of five whole trials at the least, and not before a third of a training
+        "median": optuna.pruners.MedianPruner(5, n_warmup_steps=about["base"]["n_timesteps"] // 3),
+        "hyperband": optuna.pruners.HyperbandPruner(
+            about["base"]["n_timesteps"] // 10, about["base"]["n_timesteps"]
+        ),
+        "none": optuna.pruners.NopPruner(),
+    }
+    study = optuna.create_study(
+        storage=f"sqlite:///{folder / 'study.db'}",
+        study_name="study",
+        sampler=optuna.samplers.TPESampler(seed=args.seed, multivariate=True, n_startup_trials=8),
+        pruner=pruners[args.pruner],
+        direction="maximize",
+        load_if_exists=True,
+    )
+    about = {"algo": args.algo, "env_id": args.env_id, **about}
+    begun = study.user_attrs.get("about", about)
+    if unlike := [key for key in about if begun.get(key) != json.loads(json.dumps(about[key]))]:
+        raise ParameterError(
+            f"{folder} holds a study with other {', '.join(unlike)}; choose another folder by --out"
+        )
+    for trial in study.get_trials(states=[optuna.trial.TrialState.RUNNING]):  # killed: once more
+        study.tell(trial.number, state=optuna.trial.TrialState.FAIL)
+        study.enqueue_trial(trial.params)
+    study.set_user_attr("about", about)
+    study.set_user_attr("command", runs.command())
+    study.set_user_attr("versions", runs.versions())
+    return study
+
+
+def write_study(study: Any, folder: Path, env_id: str) -> None:
+    """Write best.yml, trials.csv and study.json."""
+    rows = io.StringIO()
+    names = sorted({name for trial in study.trials for name in trial.params})
+    writer = csv.writer(rows, lineterminator="\n")
+    writer.writerow(["trial", "state", "score", "steps", "seconds", *names])
+    for trial in study.trials:
+        steps, score = (trial.user_attrs.get("curve") or [("", "")])[-1]
+        score = round(score, 3) if score != "" else ""
+        about = [trial.number, trial.state.name.lower(), score, steps, trial.user_attrs.get("seconds", "")]
+        writer.writerow(about + [trial.params.get(name, "") for name in names])
+    runs.write_text(folder / "trials.csv", rows.getvalue())
+    done = [trial for trial in study.trials if trial.state.name == "COMPLETE"]
+    best = max(done, key=lambda trial: trial.value, default=None)
+    found = {
+        **study.user_attrs,
+        "best": best and {"trial": best.number, "score": best.value, **best.user_attrs},
+    }
+    runs.write_text(folder / "study.json", json.dumps(found, indent=1) + "\n")
+    if best:
+        settings = yaml.safe_dump({env_id: best.user_attrs["settings"]}, sort_keys=False)
+        head = f"# Trial {best.number} of agents.tune: mean return {best.value:.2f} of {EPISODES} episodes\n"
+        runs.write_text(folder / "best.yml", head + settings)
+
+
+def main(argv: list[str] | None = None) -> None:
+    import tyro
+
+    args = tyro.cli(Args, args=argv, prog="python -m agents.tune", description=__doc__)
+    write = tune(args)
+    best = write.user_attrs["about"]
+    print(f"{best['algo']} on {best['env_id']}: {len(finished(write))} trials")
+
+
+if __name__ == "__main__":
+    run(main)

@@ -1,0 +1,22 @@
+"""Play a policy without a learning library: python examples/run_policy.py POLICY.onnx"""
+
+import json
+import sys
+
+import gymnasium
+import numpy as np
+import onnxruntime
+
+import hoof_env  # noqa: F401  (registers the environments)
+
+policy = onnxruntime.InferenceSession(sys.argv[1])
+about = policy.get_modelmeta().custom_metadata_map
+env = gymnasium.make(about["env_id"], **json.loads(about["env_kwargs"]))
+for seed in range(1000, 1003):
+    observation, _ = env.reset(seed=seed)
+    total, done = 0.0, False
+    while not done:
+        (actions,) = policy.run(["action"], {"observation": observation[np.newaxis]})
+        observation, reward, terminated, truncated, _ = env.step(actions[0])
+        total, done = total + np.sum(reward), terminated or truncated
+    print(f"{about['env_id']}, episode {seed}: return {total:.2f}")

@@ -1,0 +1,302 @@
+"""The baselines: the plan is what is asked, trainings go on where they stopped, the page says so."""
+
+import csv
+import json
+import os
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from itertools import pairwise
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import hoof_env  # noqa: F401  registers the ids
+from agents import baselines, baselines_matched, baselines_report, baselines_run, baselines_stats
+from agents.baselines_matched import Compared, dominates, scaled_runs, told
+from agents.baselines_plan import (
+    CURVE_SEEDS,
+    FINAL_SEEDS,
+    LEG,
+    MATCHED,
+    MATCHED_SPEED,
+    PLANS,
+    Entry,
+    Run,
+    figures,
+    runs_of,
+)
+from agents.baselines_results import Reference, read_results, references
+from agents.baselines_run import CURVE, FINAL, Args, read_curve, train_one
+from agents.baselines_stats import Interval, iqm
+from agents.settings import FOLDER, load_settings
+from hoof_env.errors import DataFileError, ParameterError
+from tests.agents.conftest import SHORT, TINY
+
+# The plan
+
+
+def test_the_full_plan_is_what_is_asked():
+    counted = {(one.algo, one.env_id): one.seeds for one in PLANS["full"] if not one.label}
+    assert {key: n for key, n in counted.items() if key[1] == LEG} == {
+        (algo, LEG): 10 for algo in ("ppo", "sac", "td3", "tqc")
+    }
+    single = {name for name in gym.registry if name.startswith("hoof_env/") and "MO" not in name}
+    assert {env_id for algo, env_id in counted if algo == "ppo"} == single
+    assert all(counted["ppo", env_id] == 5 for env_id in single - {LEG})
+
+
+@pytest.mark.parametrize("plan", PLANS.values(), ids=PLANS)
+def test_no_training_starts_from_a_scored_seed_or_shares_a_folder(plan):
+    every = list(runs_of(plan))
+    assert len({one.name for one in every}) == len(every) == sum(entry.seeds for entry in plan)
+    for one in every:
+        rows = load_settings(FOLDER / f"{one.entry.algo}.yml", one.entry.env_id)["n_envs"]
+        assert one.seed + rows <= CURVE_SEEDS.start < CURVE_SEEDS.stop <= FINAL_SEEDS.start
+
+
+def test_the_matched_speed_is_the_runs_and_no_less():
+    run = references(LEG)["run"]
+    assert run.intervals["speed_m_s"].high < MATCHED_SPEED < 1.1 * run.figures["speed_m_s"]
+
+
+def test_the_cost_of_transport_is_that_of_the_whole():
+    one = {"distance_m": 10.0, "drive_work_j": 800.0, "mean_grf_n": 400.0, "weight_share": 0.5,
+           "return": 1.0, "cost_of_transport": 0.1}  # fmt: skip
+    back = {**one, "distance_m": -5.0, "cost_of_transport": np.inf}
+    assert figures([one])["cost_of_transport"] == pytest.approx(0.1)
+    assert figures([one, back])["cost_of_transport"] == pytest.approx(1600 / 800 / 5)
+    assert np.isnan(figures([back])["cost_of_transport"])
+
+
+# One training
+
+
+def tiny(folder, **changes):
+    given = {"steps": 512, "points": 4, "env_kwargs": SHORT, "params": ("n_envs=4", *TINY), "out": folder}
+    return Args(**given | changes)
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("baselines") / "one"
+    assert train_one(tiny(folder))
+    return folder
+
+
+def test_a_training_leaves_its_curve_and_its_score(done):
+    curve, final = read_curve(done / CURVE), json.loads((done / FINAL).read_text())
+    assert [row["steps"] for row in curve] == [0, 128, 256, 384, 512]
+    assert all(a["wall_s"] < b["wall_s"] for a, b in pairwise(curve))
+    assert final["steps"] == 512
+    assert len(final["episodes"]) == len(FINAL_SEEDS)
+
+
+def test_what_is_done_is_not_done_again(done, monkeypatch):
+    monkeypatch.setattr(baselines_run, "train", lambda *_: pytest.fail("was trained"))
+    assert train_one(tiny(done))
+
+
+def test_an_orphan_stops_and_goes_on_to_the_same_curve(done, tmp_path, monkeypatch):
+    calls = iter(range(10**6))
+    monkeypatch.setattr(os, "getppid", lambda: 1 if next(calls) > 70 else 2)
+    assert not train_one(tiny(tmp_path / "one"))
+    assert not (tmp_path / "one" / FINAL).exists()
+    stopped = read_curve(tmp_path / "one" / CURVE)[-1]["steps"]
+    assert 0 < stopped < 512
+    monkeypatch.undo()
+    assert train_one(tiny(tmp_path / "one"))
+    again = {row["steps"]: row["return"] for row in read_curve(tmp_path / "one" / CURVE)}
+    whole = {row["steps"]: row["return"] for row in read_curve(done / CURVE)}
+    assert {steps: again[steps] for steps in whole} == whole
+    assert (
+        json.loads((tmp_path / "one" / FINAL).read_text())["episodes"]
+        == json.loads((done / FINAL).read_text())["episodes"]
+    )
+
+
+# Many trainings
+
+PLAN = [Run(Entry("ppo", LEG, 3), seed) for seed in range(3)]
+
+
+def pretend(monkeypatch, program):
+    """Trainings that are `program` in the folder given to it; returns how many ran at once, each time."""
+    counts, alive = [], []
+
+    def start(one, folder):
+        (folder / one.name).mkdir(parents=True, exist_ok=True)
+        (folder / one.name / "log.txt").write_text("it was odd\n")
+        alive[:] = [process for process in alive if process.poll() is None]
+        alive.append(subprocess.Popen([sys.executable, "-c", program, str(folder / one.name)]))
+        counts.append(len(alive))
+        return alive[-1]
+
+    monkeypatch.setattr(baselines, "start", start)
+    return counts, alive
+
+
+FINISH = (
+    "import sys, pathlib; p = pathlib.Path(sys.argv[1]); 's1' in p.name or (p / 'final.json').write_text('')"
+)
+
+
+def test_all_are_trained_once_and_failures_are_told(tmp_path, monkeypatch, capsys):
+    counts, _ = pretend(monkeypatch, FINISH)
+    assert baselines.work_off(PLAN, tmp_path, workers=2) == [PLAN[1]]
+    assert len(counts) == 3
+    assert max(counts) <= 2
+    assert f"{PLAN[1].name} failed: it was odd" in capsys.readouterr().out
+    assert baselines.work_off(PLAN, tmp_path, workers=1) == [PLAN[1]]  # the failed one alone is tried again
+    assert len(counts) == 4
+
+
+def test_an_interrupt_ends_what_runs(tmp_path, monkeypatch):
+    _, alive = pretend(monkeypatch, "import time; time.sleep(60)")
+    monkeypatch.setattr(baselines, "share_done", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+    began = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        baselines.work_off(PLAN, tmp_path, workers=2)
+    assert time.monotonic() - began < 30
+    assert len(alive) == 2
+    assert all(process.poll() is not None for process in alive)
+
+
+def test_a_name_that_nothing_has(tmp_path):
+    with pytest.raises(ParameterError, match="gallop"):
+        baselines.train_all(baselines.Args(only=("gallop",), out=tmp_path))
+
+
+# Statistics
+
+
+def test_the_interval_is_the_percentile_bootstrap_of_the_trimmed_mean(monkeypatch):
+    pytest.importorskip("rliable")
+    monkeypatch.setattr(baselines_stats, "REPS", 1000)
+    from scipy.stats import bootstrap, trim_mean
+
+    sample = np.random.default_rng(0).normal(40, 2, 10)
+    found = iqm(sample)
+    same = bootstrap((sample,), lambda x, axis: trim_mean(x, 0.25, axis=axis), method="percentile", rng=1)
+    assert found[0] == pytest.approx(np.sort(sample)[2:8].mean())
+    assert found[1:] == pytest.approx(same.confidence_interval, abs=0.2)
+    several = iqm(np.stack([sample, sample + 1], axis=1))
+    assert several.shape == (3, 2)
+    assert several[:, 1] - several[:, 0] == pytest.approx(1.0, abs=0.3)
+    assert (several == iqm(np.stack([sample, sample + 1], axis=1))).all()
+
+
+def test_one_seed_has_no_interval():
+    pytest.importorskip("rliable")
+    found = iqm([3.0])
+    assert found[0] == 3.0
+    assert np.isnan(found[1:]).all()
+    assert Interval(*found).text() == "3.0"
+    assert not Interval(*found).above(Interval(1.0, 1.0, 1.0))
+
+
+# Matched speed
+
+
+def compared(speed, *lower):
+    keys = ("peak_grf_n", "stance_peak_n", "cost_of_transport")
+    around = {key: Interval(x, x - 0.1, x + 0.1) for key, x in zip(keys, lower, strict=True)}
+    return Compared("", {"speed_m_s": Interval(speed, speed, speed), **around})
+
+
+@pytest.mark.parametrize(
+    ("agent", "is_better"),
+    [
+        (compared(2.0, 1.0, 1.0, 1.0), True),
+        (compared(1.9, 1.0, 1.0, 1.0), False),  # slower
+        (compared(2.0, 1.0, 1.0, 1.9), False),  # intervals meet
+        (compared(2.0, 3.0, 1.0, 1.0), False),
+    ],
+)
+def test_dominance(agent, is_better):
+    assert dominates(agent, compared(2.0, 2.0, 2.0, 2.0)) == is_better
+
+
+def test_who_bears_less_is_told():
+    light, heavy = (Interval(x, x - 0.01, x + 0.01) for x in (0.2, 0.7))
+    agent, run = compared(2.0, 1.0, 1.0, 1.0), compared(2.0, 2.0, 2.0, 2.0)
+    agent, run = (
+        replace(one, intervals={**one.intervals, "weight_share": share})
+        for one, share in ((agent, light), (run, heavy))
+    )
+    assert told(agent, run) == "yes, bearing less of the weight"
+    assert told(replace(agent, intervals={**agent.intervals, "weight_share": heavy}), run) == "yes"
+    assert told(run, agent) == "no"
+
+
+def test_scaled_runs_begin_with_the_run_and_stay_what_they_are():
+    factors, actions = scaled_runs()
+    assert factors[0] == (1.0, 1.0)
+    assert (np.abs(actions) <= 1).all()
+    with gym.make(LEG) as env:
+        leg = env.unwrapped
+        run, last = leg.gaits["run"], factors[-1]
+        assert actions[0] == pytest.approx(leg.action_for(run))
+        swung = replace(run, crank_speed=last[0] * run.crank_speed, swing_sin=last[1] * run.swing_sin,
+                        swing_cos=last[1] * run.swing_cos)  # fmt: skip
+        assert leg.batch.command_of(actions[-1]) == pytest.approx(swung.to_array(), abs=1e-5)
+
+
+# The page
+
+SMALL = (Entry("ppo", LEG, 3), Entry("sac", LEG, 2), Entry("ppo", LEG, 2, label=MATCHED))
+
+
+def pretend_results(folder, done):
+    """Folders as trainings leave them, with returns of seeds that are known."""
+    final = json.loads((done / FINAL).read_text())
+    for one in runs_of(SMALL):
+        here = folder / one.name
+        here.mkdir(parents=True)
+        for name in ("config.yml", "run.json", CURVE):
+            (here / name).write_text((done / name).read_text())
+        level = 40.0 + one.seed if one.entry.algo == "ppo" else 1.0
+        episodes = [{**episode, "return": level} for episode in final["episodes"]]
+        (here / FINAL).write_text(json.dumps({**final, "seed": one.seed, "episodes": episodes}))
+
+
+@pytest.fixture
+def page(done, tmp_path, monkeypatch):
+    pytest.importorskip("rliable")
+    pretend_results(tmp_path / "runs", done)
+    point = {key: Interval(x, x, x) for key, x in (
+        ("return", 6.0), ("speed_m_s", 2.0), ("peak_grf_n", 4e3), ("stance_peak_n", 3500.0),
+        ("cost_of_transport", 1.3), ("weight_share", 0.7))}  # fmt: skip
+    known = {name: Reference(name, {"return": 6.0}, point, 6.0) for name in ("run", "walk", "open-loop")}
+    monkeypatch.setattr(baselines_report, "references", lambda env_id: known)
+    monkeypatch.setattr(baselines_matched, "sped_up", lambda speed: [])
+    monkeypatch.setattr(baselines_stats, "REPS", 100)
+    monkeypatch.setitem(PLANS, "nightly", SMALL)
+    args = baselines_report.Args("nightly", tmp_path / "runs", tmp_path / "page.md")
+    return baselines_report.report(args)
+
+
+def test_the_page_says_what_the_runs_say(page):
+    text = page.read_text()
+    (line,) = (line for line in text.splitlines() if line.startswith(f"| `{LEG}` | PPO | 3 |"))
+    assert "| 41.0 [40" in line  # the IQM of 40, 41 and 42
+    assert "| 40.0 to 42.0 | 3/3 | 3/3 |" in line
+    assert "| SAC | 2 |" in text
+    assert "met: PPO 41.0" in text
+    assert "is no result" in text.splitlines()[2]
+    with (page.with_suffix("") / "curves.csv").open() as file:
+        assert len(list(csv.DictReader(file))) == 5 * 7
+    assert (page.with_suffix("") / "HorseLeg-v0.png").stat().st_size > 10_000
+
+
+def test_seeds_of_other_settings_are_not_mixed(page, tmp_path):
+    (tmp_path / "runs" / "ppo-HorseLeg-v0-s1" / "config.yml").write_text("x: {gamma: 0.5}\n")
+    with pytest.raises(DataFileError, match=r"same settings.*-s2 and .*-s1"):
+        read_results(SMALL, tmp_path / "runs")
+
+
+def test_nothing_done(tmp_path):
+    with pytest.raises(DataFileError, match="found none"):
+        read_results(SMALL, tmp_path)

@@ -1,0 +1,84 @@
+"""Distributed trainings, as far as they go without Ray; tests/ecosystem/check_distribute.py has the rest."""
+
+import importlib.util
+
+import pytest
+
+from agents.distribute import Rllib, Trials, main, prepare, start
+from agents.distribute_space import Axis, parse_space
+from hoof_env.errors import HoofEnvError, ParameterError
+
+
+def test_space():
+    listed, drawn, chosen = parse_space(
+        ["n_steps=[16, 32]", "learning_rate=loguniform(1e-4, 1e-2)", "gae_lambda=choice([1])"]
+    )
+    assert listed == Axis("n_steps", "grid_search", ([16, 32],))
+    assert listed.values == [16, 32]
+    assert drawn == Axis("learning_rate", "loguniform", (1e-4, 1e-2))
+    assert chosen.values == [1]
+
+
+@pytest.mark.parametrize(
+    "item",
+    [
+        "gamma",
+        "gamma=",
+        "gamma=0.9",
+        "gamma=[]",
+        "=[1]",
+        "gamma=uniform(1)",
+        "gamma=gauss(0, 1)",
+        "gamma=uniform(low=0, high=1)",
+        "gamma=choice(1)",
+        "gamma=choice([])",
+        "gamma=uniform(open('x'), 1)",
+        "gamma=[1",
+    ],
+)
+def test_bad_space(item):
+    with pytest.raises(ParameterError, match="--space: expected key="):
+        parse_space([item])
+
+
+def test_plan():
+    plan = prepare(Trials(seeds=3, steps=1000, space=("gamma=[0.9]", "env.trunk=['rail']".replace("'", '"'))))
+    assert plan["seed"] == [0, 1, 2]
+    assert plan["train"]["steps"] == 1000
+    assert plan["gamma"].values == [0.9]
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"space": ("horsepower=[1]",)}, "'horsepower'"),
+        ({"space": ("seed=[1]",)}, "'seed'"),
+        ({"space": ("env.wheels=[4]",)}, "wheels"),
+        ({"space": ('env.trunk=["flying"]',)}, "flying"),
+        ({"space": ("gamma=[0.9]", "gamma=[0.8]")}, "gamma is given twice"),
+        ({"samples": 4}, "samples"),
+        ({"seeds": 0}, "seeds"),
+        ({"report_every": 0}, "report_every"),
+        ({"steps": 0}, "steps"),
+        ({"algo": "prayer"}, "prayer"),
+        ({"env_id": "hoof_env/Cow-v0"}, "Cow"),
+        ({"env_kwargs": ("wheels=4",)}, "wheels"),
+    ],
+    ids=str,
+)
+def test_bad_plan(changes, said):
+    with pytest.raises(HoofEnvError, match=said):
+        prepare(Trials(**changes))
+
+
+@pytest.mark.parametrize(("args", "extra"), [(Trials(), "distribute"), (Rllib(), "ray")])
+def test_without_ray(monkeypatch, args, extra):
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(ParameterError, match=rf"pip install 'hoof-env\[{extra}\]'"):
+        start(args)
+
+
+def test_help_names_both(capsys):
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    assert {"trials", "rllib"} <= set(capsys.readouterr().out.split())

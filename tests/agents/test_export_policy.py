@@ -1,0 +1,193 @@
+"""Exported policies act as their models do, fit what they are for, and play without a learning library."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from sb3_contrib import TQC
+from stable_baselines3 import PPO, SAC, TD3
+from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
+
+pytest.importorskip("onnxruntime", reason='needs pip install "hoof-env[onnx]"')
+pytest.importorskip("onnxscript", reason='needs pip install "hoof-env[onnx]"')
+
+from agents import export
+from agents.export import main, write_policy
+from agents.runs import SavedModel, TrainedPolicy, make_env
+from hoof_env.errors import DataFileError, HoofEnvError, OutputError, ParameterError
+from hoof_env.onnx_policy import OnnxPolicy
+from hoof_env.records import find_policy
+
+ENV_ID, ROOT = "hoof_env/HorseLeg-v0", Path(__file__).parents[2]
+LEG = {"episode_seconds": 0.4}
+
+
+@pytest.fixture(scope="module")
+def exported(trained, tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("exported") / "policy.onnx"
+    main([str(trained.folder), "--out", str(path)])
+    return path
+
+
+def untrained(algorithm, normalized: bool) -> TrainedPolicy:
+    """A policy for actions from -2 to 2, seldom within them, and statistics far from 0 and 1."""
+    envs = DummyVecEnv([lambda: gym.make("Pendulum-v1")])
+    arguments = {"policy_kwargs": {"net_arch": [8]}, "seed": 0, "device": "cpu"}
+    model = algorithm("MlpPolicy", envs, **arguments)
+    if algorithm is PPO:
+        model.policy.action_net.weight.data *= 300
+    if not normalized:
+        return TrainedPolicy(model, None)
+    statistics = VecNormalize(envs, clip_obs=1.5)
+    statistics.obs_rms.mean[:], statistics.obs_rms.var[:] = (0.3, -0.2, 2.0), (0.04, 0.5, 9.0)
+    return TrainedPolicy(model, statistics.normalize_obs)
+
+
+@pytest.mark.parametrize("normalized", [True, False])
+@pytest.mark.parametrize("algorithm", [PPO, SAC, TD3, TQC])
+def test_torchscript_acts_as_the_model(tmp_path, algorithm, normalized):
+    policy = untrained(algorithm, normalized)
+    assert write_policy(policy, tmp_path / "policy.pt", {"env_id": "Pendulum-v1"}) < 1e-5
+    rows = np.random.default_rng(1).normal(0, 3, (50, 3)).astype(np.float32)
+    actions, _ = export.read_torchscript(tmp_path / "policy.pt")(rows)
+    wanted, _ = policy.predict(rows)
+    np.testing.assert_allclose(actions, wanted, atol=2e-5)
+    assert np.ptp(wanted) > 0.1
+    assert np.abs(actions).max() <= 2
+
+
+def test_onnx_acts_as_the_model(tmp_path):
+    policy = untrained(SAC, normalized=True)  # PPO is `exported`
+    assert write_policy(policy, tmp_path / "policy.onnx", {"env_id": "Pendulum-v1"}) < 1e-5
+    rows = np.random.default_rng(1).normal(0, 3, (5, 10, 3)).astype(np.float32)
+    actions, state = OnnxPolicy(tmp_path / "policy.onnx").predict(rows, "state")
+    wanted, _ = policy.predict(rows.reshape(-1, 3))
+    np.testing.assert_allclose(actions.reshape(-1, 1), wanted, atol=2e-5)
+    assert (actions.shape, state) == ((5, 10, 1), "state")
+
+
+def test_an_exported_policy_plays_the_model_s_episode(trained, exported):
+    def play(policy, env):
+        observation, _ = env.reset(seed=5)
+        rewards, done = [], False
+        while not done:
+            observation, reward, terminated, truncated, _ = env.step(policy.predict(observation)[0])
+            rewards.append(reward)
+            done = terminated or truncated
+        return rewards
+
+    with make_env(ENV_ID, **LEG) as env:
+        ours = play(find_policy(str(exported), env, ENV_ID), env)
+        assert ours == play(find_policy(str(exported.parent), env, ENV_ID), env)
+        assert ours == pytest.approx(play(SavedModel.find(trained.folder).load(env, ENV_ID), env), abs=1e-4)
+
+
+def test_metadata(exported):
+    record = OnnxPolicy(exported).record
+    with make_env(ENV_ID, **LEG) as env:
+        assert record["observation_names"] == list(env.unwrapped.observation_names)
+    assert record["env_id"] == ENV_ID
+    assert record["env_kwargs"] == LEG
+    assert (record["algo"], record["seed"]) == ("ppo", "0")
+    assert record["action_names"] == ["crank_speed", "swing_offset", "swing_sin", "swing_cos"]
+    assert str(ROOT).encode() not in exported.read_bytes()
+
+
+def test_a_file_that_acts_otherwise_is_not_kept(tmp_path, monkeypatch):
+    right = export.module_of
+    monkeypatch.setattr(export, "module_of", lambda trained: _Shifted(right(trained)))
+    path = tmp_path / "policy.pt"
+    path.write_text("older")
+    with pytest.raises(DataFileError, match="within 1e-05 of the model's, got 5e-05"):
+        write_policy(untrained(TD3, normalized=False), path, {})
+    assert [one.name for one in tmp_path.iterdir()] == ["policy.pt"]
+    assert path.read_text() == "older"
+
+
+def _Shifted(module):
+    import torch
+
+    class Shifted(torch.nn.Module):
+        def __init__(self):
+            super().__init__()
+            self.inner = module
+
+        def forward(self, observation):
+            return self.inner(observation) + 1e-4
+
+    return Shifted()
+
+
+def test_a_policy_that_does_not_fit_is_refused(exported):
+    for env_id, kwargs, said in (
+        ("hoof_env/HorseLegRail-v0", {}, "env_id hoof_env/HorseLeg-v0, expected hoof_env/HorseLegRail-v0"),
+        (ENV_ID, {"trunk": "rail"}, "observation_space"),
+        (ENV_ID, {"observation": ["gait", "crank", "trunk", "hoof", "action"]}, "observation_names"),
+    ):
+        with make_env(env_id, **kwargs) as env, pytest.raises(DataFileError, match=said):
+            find_policy(str(exported), env, env_id)
+
+
+def test_unreadable_files(exported, tmp_path):
+    content = exported.read_bytes()
+    (tmp_path / "half.onnx").write_bytes(content[: len(content) // 2])
+    (tmp_path / "text.onnx").write_text("no graph")
+    (tmp_path / "empty.onnx").touch()
+    for name in ("half", "text", "empty", "none"):
+        with pytest.raises(DataFileError, match=rf"{name}\.onnx: expected an ONNX file of agents\.export"):
+            OnnxPolicy(tmp_path / f"{name}.onnx")
+
+
+def test_a_graph_of_somebody_else_is_refused(tmp_path, exported):
+    import onnx
+
+    graph = onnx.load(exported)
+    del graph.metadata_props[:]
+    onnx.save(graph, tmp_path / "bare.onnx")
+    with pytest.raises(DataFileError, match=r"bare\.onnx: expected an ONNX file of agents\.export"):
+        OnnxPolicy(tmp_path / "bare.onnx")
+
+
+def test_bad_arguments(trained, tmp_path):
+    with pytest.raises(ParameterError, match=r"\.onnx or \.pt, got 'policy\.h5'"):
+        export.export(trained.folder, Path("policy.h5"))
+    (tmp_path / "is.pt").mkdir()
+    with pytest.raises(OutputError, match="got a folder"):
+        export.export(trained.folder, tmp_path / "is.pt")
+    with pytest.raises(DataFileError, match="nowhere"):
+        export.export(Path("nowhere"), tmp_path / "policy.pt")
+
+
+def test_missing_packages_are_named(tmp_path, exported, monkeypatch):
+    for missing, act in (
+        ("onnxruntime", lambda: OnnxPolicy(exported)),
+        ("onnxscript", lambda: write_policy(untrained(TD3, False), tmp_path / "policy.onnx", {})),
+    ):
+        with monkeypatch.context() as without:
+            without.setitem(sys.modules, missing, None)
+            with pytest.raises(HoofEnvError, match=rf"{missing}: pip install \"hoof-env\[.*onnx\]\""):
+                act()
+
+
+def test_the_example_plays_a_policy_without_a_learning_library(trained, exported):
+    script = ROOT / "examples" / "run_policy.py"
+    code = [line for line in script.read_text().splitlines() if line.strip()]
+    assert len(code) <= 20
+    after = (
+        "import runpy, sys; runpy.run_path(sys.argv.pop(1), run_name='__main__');"
+        "assert not {'torch', 'stable_baselines3'} & {*sys.modules}"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", after, str(script), str(exported)], capture_output=True, text=True, cwd=ROOT
+    )
+    assert not done.stderr
+    found = [float(value) for value in re.findall(r"return (\S+)", done.stdout)]
+    with make_env(ENV_ID, **LEG) as env:
+        from agents.evaluate import play
+
+        episodes = play(env, SavedModel.find(trained.folder).load(env, ENV_ID), range(1000, 1003))
+    assert found == pytest.approx([one["return"] for one in episodes], abs=0.01)

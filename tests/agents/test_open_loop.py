@@ -1,0 +1,230 @@
+"""CMA-ES over open-loop gaits: it finds what is known, files are whole, searches go on where they ended."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from agents import open_loop, open_loop_search
+from agents.evaluate import find_policy, play
+from agents.open_loop import GAITS, Args, load_open_loop, main, optimise
+from agents.open_loop_search import SIZES, cost, decode, search
+from agents.runs import make_env
+from agents.score import score_vector
+from hoof_env.errors import DataFileError, ParameterError
+
+ENV_ID = "hoof_env/HorseLeg-v0"
+SHORT = ("episode_seconds=0.4",)
+
+
+@pytest.fixture(autouse=True)
+def small(monkeypatch):
+    """Generations of 16 candidates with 4 starts."""
+    monkeypatch.setattr(open_loop_search, "STARTS", 4)
+    for module in (open_loop, open_loop_search):
+        monkeypatch.setattr(module, "ROWS", 64)
+
+
+def arguments(path, **changes):
+    return replace(
+        Args(env_kwargs=SHORT, restarts=2, episodes=64 * 4, test_episodes=8, out=path / "gait.json"),
+        **changes,
+    )
+
+
+class Bowl:
+    """A court where the distance to a point costs, and starts add noise that all candidates share."""
+
+    family = "constant"
+
+    def __init__(self, interrupt_after=None):
+        self.middle, self.met, self.left = np.array([0.3, -0.5, 0.9, 0.0]), [], interrupt_after
+
+    def costs(self, x, seeds):
+        if self.left is not None:
+            self.left -= 1
+            if self.left == 0:
+                raise KeyboardInterrupt
+        self.met.append(set(seeds))
+        noise = np.random.default_rng(seeds[0]).normal()
+        return [float(((one - self.middle) ** 2).sum() + noise) for one in x]
+
+
+def test_a_search_finds_the_bottom_of_a_bowl_and_never_meets_a_start_twice():
+    court, ticks = Bowl(), []
+    x, _, interrupted = search(court, 0, 64 * 40, lambda count, best: ticks.append(count))
+    np.testing.assert_allclose(x, court.middle, atol=0.05)
+    assert not interrupted
+    assert sum(map(len, court.met)) == len(set.union(*court.met))
+    assert min(set.union(*court.met)) > open_loop_search.TEST_SEED + 1_000_000
+    assert sum(ticks) <= 64 * 40
+    other = Bowl()
+    search(other, 1, 64 * 40, lambda *_: None)
+    assert not set.union(*court.met) & set.union(*other.met)
+
+
+def test_an_interrupted_search_keeps_the_best_so_far():
+    court = Bowl(interrupt_after=12)
+    x, _, interrupted = search(court, 0, 64 * 40, lambda *_: None)
+    assert interrupted
+    assert ((x - court.middle) ** 2).sum() < 0.5
+    with pytest.raises(KeyboardInterrupt):
+        search(Bowl(interrupt_after=1), 0, 64 * 40, lambda *_: None)
+
+
+def test_a_start_is_the_first_point(monkeypatch):
+    court = Bowl()
+    x, _, _ = search(court, 0, 64 * 3, lambda *_: None, start=court.middle)
+    assert ((x - court.middle) ** 2).sum() < 0.1
+
+
+def test_decoding_reaches_all_frequencies():
+    for end, frequency in ((-1.0, open_loop_search.SLOWEST), (1.0, open_loop_search.FASTEST)):
+        found = decode("clocked", np.r_[np.zeros(12), end])
+        assert found["frequency_hz"] == pytest.approx(frequency)
+        assert set(found) == {"constant", "sin", "cos", "frequency_hz"}
+
+
+def test_costs():
+    one = {
+        "return": 5.0, "speed_m_s": 2.0, "stance_peak_n": 1000.0, "drive_work_j": 3000.0, "distance_m": 20.0,
+        "weight_share": 0.5, "failed": 0.0,
+    }  # fmt: skip
+    other = one | {"return": 7.0, "stance_peak_n": 3000.0, "drive_work_j": 1000.0}
+    assert cost([one, other], "return", 500.0) == -6.0
+    assert cost([one, other], "peak", 500.0, speed=2.0) == pytest.approx(4.0)
+    assert cost([one, other], "transport", 500.0, speed=1.0) == pytest.approx(0.2)
+    assert cost([one], "transport", 500.0, speed=2.5) == pytest.approx(0.3 + 5.0)  # 0.5 m/s too slow
+    assert cost([one], "peak", 500.0, share=0.6) == pytest.approx(2.0 + 1.0)  # bears a tenth too little
+    back = one | {"speed_m_s": -1.0, "distance_m": -10.0}
+    assert cost([back], "transport", 500.0, speed=1.0) > cost([one], "transport", 500.0, speed=1.0) + 10
+    assert cost([one | {"failed": 1.0}], "peak", 500.0) > cost([one], "peak", 500.0) + 5
+
+
+@pytest.mark.parametrize("family", SIZES)
+def test_a_file_is_whole_and_its_gait_gets_the_score_it_names(tmp_path, family):
+    args = arguments(tmp_path, family=family)
+    found = optimise(args)
+    assert json.loads(args.out.read_text()) == found
+    assert [path.name for path in tmp_path.iterdir()] == ["gait.json"]
+    assert [one["seed"] for one in found["restarts"]] == [0, 1]
+    best = min(found["restarts"], key=lambda one: one["cost"])
+    assert found["parameters"] == best["parameters"]
+    assert found["score"]["mean"] == best["mean"]
+    low, high = found["score"]["interval95"]["return"]
+    assert low < found["score"]["mean"]["return"] < high
+    assert found["command"].startswith("python")
+    assert {"cma", "numpy", "python"} <= set(found["versions"])
+    with make_env(ENV_ID, episode_seconds=0.4) as env:
+        episodes = play(env, find_policy(str(args.out), env, ENV_ID), range(1000, 1008))
+    assert np.mean([one["return"] for one in episodes]) == pytest.approx(found["score"]["mean"]["return"])
+    assert score_vector(load_open_loop(args.out), ENV_ID, range(1000, 1008), episode_seconds=0.4) == episodes
+
+
+def test_searches_that_are_there_are_not_made_again(tmp_path, monkeypatch):
+    first = optimise(arguments(tmp_path, restarts=1))
+    monkeypatch.setattr(
+        open_loop,
+        "search",
+        lambda court, seed, *rest: (seed == 1 or pytest.fail("again")) and search(court, seed, *rest),
+    )
+    both = optimise(arguments(tmp_path, restarts=2))
+    assert both["restarts"][0] == first["restarts"][0]
+    assert optimise(arguments(tmp_path, restarts=2))["restarts"] == both["restarts"]
+    with pytest.raises(DataFileError, match="name another --out"):
+        optimise(arguments(tmp_path, objective="peak", speed=1.0))
+
+
+def test_ctrl_c_writes_the_best_so_far_and_the_next_call_searches_that_again(tmp_path, monkeypatch):
+    args = arguments(tmp_path, restarts=1)
+    monkeypatch.setattr(open_loop, "search", lambda *given: (*search(*given)[:2], True))
+    with pytest.raises(KeyboardInterrupt):
+        optimise(args)
+    kept = json.loads(args.out.read_text())
+    assert kept["restarts"][0]["interrupted"]
+    monkeypatch.setattr(open_loop, "search", search)
+    found = optimise(args)
+    assert len(found["restarts"]) == 1
+    assert "interrupted" not in found["restarts"][0]
+    assert found["parameters"] == kept["parameters"]  # the same seed finds the same
+
+
+def test_the_command_prints_scores(tmp_path, capsys):
+    out = tmp_path / "gait.json"
+    main(
+        [
+            "--env-kwargs",
+            *SHORT,
+            "--restarts",
+            "1",
+            "--episodes",
+            "192",
+            "--test-episodes",
+            "4",
+            "--objective",
+            "peak",
+            "--speed",
+            "0.1",
+            "--out",
+            str(out),
+        ]
+    )
+    printed = capsys.readouterr().out
+    assert "stance_peak_n" in printed
+    assert str(out) in printed
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"restarts": 0}, "restarts"), ({"episodes": 10}, "episodes"),
+        ({"test_episodes": 1}, "test_episodes"),
+        ({"speed": 2.0}, "speed"), ({"objective": "peak"}, "speed"),
+        ({"weight_share": 0.5}, "weight_share"), ({"objective": "peak", "speed": -1.0}, "speed"),
+        ({"env_id": "hoof_env/Cow-v0"}, "Cow"),
+        ({"env_id": "Pendulum-v1", "env_kwargs": ()}, "many at once"),
+    ],
+)  # fmt: skip
+def test_bad_input(tmp_path, changes, message):
+    with pytest.raises(ParameterError, match=message):
+        optimise(arguments(tmp_path, **changes))
+    assert not (tmp_path / "gait.json").exists()
+
+
+HIGHEST = sorted((*GAITS.glob("*-constant.json"), *GAITS.glob("*-clocked.json")))
+
+
+@pytest.mark.parametrize("path", HIGHEST, ids=lambda path: path.stem)
+def test_stored_gaits_get_their_scores(path):
+    found = open_loop.stored(path)
+    with make_env(found["env_id"], **found["env_kwargs"]) as env:
+        policy = load_open_loop(path, env)
+    episodes = score_vector(policy, found["env_id"], range(1000, 1008), **found["env_kwargs"])
+    for name in ("return", "speed_m_s", "stance_peak_n"):
+        mean, (low, high) = found["score"]["mean"][name], found["score"]["interval95"][name]
+        bound = 6 * (high - low)  # three standard errors of 8 episodes, where the interval is of 512
+        assert np.mean([one[name] for one in episodes]) == pytest.approx(mean, abs=bound)
+
+
+def test_stored_gaits_of_the_trade_off_are_what_they_are_called():
+    for path in GAITS.glob("*-peak-*.json"):
+        found = open_loop.stored(path)
+        assert path.stem.startswith(f"HorseLeg-v0-constant-peak-{found['speed']:g}")
+        assert found["score"]["mean"]["speed_m_s"] > found["speed"] - 0.1
+        if found.get("weight_share"):
+            assert found["score"]["mean"]["weight_share"] > found["weight_share"] - 0.02
+
+
+def test_an_id_names_its_best_stored_gait():
+    with make_env(ENV_ID) as env:
+        policy, found = (
+            find_policy("open-loop", env, ENV_ID),
+            open_loop.stored(GAITS / "HorseLeg-v0-constant.json"),
+        )
+        twin = load_open_loop(ENV_ID, env)
+    np.testing.assert_array_equal(policy.predict(np.zeros(24))[0], twin.predict(np.zeros(24))[0])
+    episodes = score_vector(policy, ENV_ID, range(1000, 1008))
+    assert np.mean([one["return"] for one in episodes]) > found["score"]["mean"]["return"] - 3
+    with pytest.raises(DataFileError, match=r"Cow-v0.*HorseLeg-v0-constant\.json"):
+        load_open_loop("hoof_env/Cow-v0")

@@ -1,0 +1,237 @@
+"""Trainings that are stopped, killed or diverge: what is left is whole and goes on as if nothing had been."""
+
+import csv
+import json
+import multiprocessing
+import os
+import random
+import shutil
+import signal
+import time
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from stable_baselines3.common.callbacks import BaseCallback
+
+from agents.checkpoints import REPLAY, STATE, checkpoints, whole
+from agents.runs import CHECKPOINTS, SavedModel, make_env
+from agents.safe import ABOUT, WEIGHTS
+from agents.train import Args, main, train
+from agents.watch import DivergedError
+from hoof_env.errors import DataFileError, OutputError, ParameterError
+from tests.agents.conftest import SHORT, TINY, train_tiny
+
+KILLS = 2
+ALWAYS = 1e-9  # seconds between two checkpoints: one between all rollouts
+TINY_OFF = (
+    "learning_starts=40", "batch_size=16", "gradient_steps=1", "train_freq=2", "gamma=0.9",
+    '{"policy_kwargs": {"net_arch": [8]}, "normalize": {"norm_obs": true}}',
+)  # fmt: skip
+NOISE = ("noise_type=ornstein-uhlenbeck", "noise_std=0.3")
+CASES = {
+    "ppo": {"params": (*TINY, "learning_rate=lin_0.01")},
+    "sac": {"params": TINY_OFF, "steps": 160},
+    "td3": {"params": (*TINY_OFF, *NOISE), "steps": 160},
+    "tqc": {"params": (*TINY_OFF, "learning_starts=100"), "steps": 160},
+}
+
+
+class At(BaseCallback):
+    """Do something to the model at a step."""
+
+    def __init__(self, step, action):
+        super().__init__()
+        self.step, self.action = step, action
+
+    def _on_step(self):
+        if self.num_timesteps >= self.step:
+            self.action(self.model)
+            self.step = float("inf")
+        return True
+
+
+def interrupt(model):
+    os.kill(os.getpid(), signal.SIGINT)
+
+
+def episodes(folder: Path) -> list[tuple[str, str]]:
+    with (folder / "monitor.csv").open() as file:
+        next(file)
+        return [(row["r"], row["l"]) for row in csv.DictReader(file)]
+
+
+def arguments(algo: str, out: Path, **changes) -> Args:
+    common = {"n_envs": 4, "env_kwargs": SHORT, "steps": 512, "checkpoint_every": 1000.0, "out": out}
+    return Args(algo=algo, **{**common, **CASES[algo], **changes})
+
+
+@pytest.mark.parametrize("algo", CASES)
+def test_a_stopped_run_goes_on_as_if_it_had_not_been(algo, tmp_path):
+    whole = train(arguments(algo, tmp_path / "whole"))
+    stopped = train(arguments(algo, tmp_path / "stopped"), At(90, interrupt))
+    assert stopped.stopped_by == signal.SIGINT
+    assert stopped.steps < whole.steps
+    assert SavedModel.find(stopped.folder).path == stopped.folder / "model.zip"
+    resumed = train(arguments(algo, tmp_path / "stopped", resume=True))
+    assert resumed.steps == whole.steps
+    assert (resumed.folder / WEIGHTS).read_bytes() == (whole.folder / WEIGHTS).read_bytes()
+    assert (resumed.folder / ABOUT).read_bytes() == (whole.folder / ABOUT).read_bytes()  # statistics
+    assert episodes(resumed.folder) == episodes(whole.folder)
+    assert json.loads((resumed.folder / "run.json").read_text())["resumed"] == [stopped.steps]
+    assert resumed.seconds > stopped.seconds
+    assert not (resumed.folder / CHECKPOINTS).exists()
+
+
+def test_killed_again_and_again(tmp_path):
+    """SIGKILL at random moments: the command with --resume ends as one that was never killed."""
+    steps = 128 * 60
+    argv = [
+        "--steps", str(steps), "--n-envs", "4", "--checkpoint-every", "0.02", "--resume",
+        "--env-kwargs", *SHORT, "--params", *TINY,
+    ]  # fmt: skip
+    folder, moments, kills = tmp_path / "killed", random.Random(), 0
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["agents.train", "hoof_env.envs.sb3", "torch.utils.tensorboard"])
+    for attempt in range(KILLS + 1):
+        before = checkpoints(folder)[:1]
+        process = context.Process(target=main, args=([*argv, "--out", str(folder)],))
+        process.start()
+        deadline = time.monotonic() + 60
+        while attempt < KILLS and checkpoints(folder)[:1] == before and process.is_alive():
+            assert time.monotonic() < deadline, "no checkpoint within a minute"
+            time.sleep(0.01)
+        if attempt < KILLS:
+            time.sleep(moments.uniform(0, 0.1))
+            process.kill()
+        process.join(120)
+        kills += process.exitcode == -signal.SIGKILL
+        for checkpoint in checkpoints(folder):
+            assert {STATE, "model.zip", WEIGHTS, ABOUT} <= {path.name for path in checkpoint.iterdir()}
+            assert zipfile.ZipFile(checkpoint / "model.zip").testzip() is None
+    assert kills == KILLS
+    assert process.exitcode == 0
+    record = json.loads((folder / "run.json").read_text())
+    assert record["finished"]["steps"] == steps
+    assert len(record["resumed"]) == KILLS
+    whole = train_tiny(tmp_path / "whole", steps=steps, checkpoint_every=0)
+    assert (folder / WEIGHTS).read_bytes() == (whole.folder / WEIGHTS).read_bytes()
+    assert episodes(folder) == episodes(whole.folder)
+    assert not list(folder.rglob(".unfinished-*"))
+
+
+def test_a_finished_run_is_not_run_again(trained):
+    again = train_tiny(trained.folder, resume=True)
+    assert (again.steps, again.stopped_by) == (256, None)
+    assert again.seconds == pytest.approx(trained.seconds, abs=1e-3)
+
+
+@pytest.fixture(scope="module")
+def stopped(tmp_path_factory):
+    out = tmp_path_factory.mktemp("runs") / "stopped"
+    return train(arguments("sac", out, checkpoint_every=ALWAYS), At(90, interrupt)).folder
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"seed": 1}, "seed: 0 there, 1 here"),
+        ({"steps": 200}, "n_timesteps: 160 there, 200 here"),
+        ({"params": (*TINY_OFF, "tau=0.5")}, "tau: None there, 0.5 here"),
+        ({"env_kwargs": (*SHORT, "trunk=rail")}, "trunk"),
+        ({"env_id": "hoof_env/HorseLegRail-v0"}, "HorseLegRail"),
+        ({"out": None}, "--out"),
+    ],
+    ids=str,
+)
+def test_another_command_does_not_resume(stopped, changes, said):
+    with pytest.raises((ParameterError, DataFileError), match=said):
+        train(arguments("sac", **{"out": stopped, "resume": True, **changes}))
+
+
+def test_a_run_is_gone_on_with_only_when_asked(stopped):
+    with pytest.raises(OutputError, match="--resume"):
+        train(arguments("sac", stopped))
+
+
+def test_a_damaged_checkpoint_is_named_and_an_earlier_one_serves(stopped, tmp_path):
+    folder = tmp_path / "run"
+    shutil.copytree(stopped, folder)
+    last, earlier = checkpoints(folder)
+    (last / REPLAY).write_bytes(b"no pickle")
+    with pytest.raises(DataFileError, match=rf"checkpoints/{last.name}: "):
+        train(arguments("sac", folder, resume=True))
+    shutil.rmtree(last)
+    assert train(arguments("sac", folder, resume=True)).steps == 160
+    assert json.loads((folder / "run.json").read_text())["resumed"][-1] == int(earlier.name)
+
+
+def test_environments_without_a_state_start_new_episodes(tmp_path):
+    pendulum = {
+        "env_id": "Pendulum-v1",
+        "n_envs": 2,
+        "steps": 1024,
+        "params": TINY,
+    }
+    stopped = train(Args(out=tmp_path / "run", **pendulum), At(700, interrupt))
+    assert stopped.steps == 704
+    assert train(Args(out=tmp_path / "run", resume=True, **pendulum)).steps == 1024
+    assert {length for _, length in episodes(tmp_path / "run")} == {"200"}
+
+
+@pytest.mark.parametrize("algo", ["ppo", "sac"])
+def test_divergence_stops_the_training(algo, tmp_path):
+    params = (*CASES[algo]["params"], "learning_rate=1e30")
+    with pytest.raises(DivergedError, match=r"diverged before step .* learning rate"):
+        train(arguments(algo, tmp_path / "run", params=params))
+    assert not (tmp_path / "run" / "model.zip").exists()
+
+
+@pytest.mark.parametrize(("algo", "network"), [("ppo", "value_net"), ("sac", "critic_target")])
+def test_the_last_good_checkpoint_survives(algo, network, tmp_path):
+    """A value that is not finite in a network that does not act, which nothing else would notice."""
+
+    def spoil(model):
+        next(getattr(model.policy, network).parameters()).data[0] = np.nan
+
+    with pytest.raises(DivergedError, match=r"last good checkpoint is .*checkpoints/128"):
+        train(arguments(algo, tmp_path / "run", checkpoint_every=ALWAYS), At(132, spoil))
+    with make_env("hoof_env/HorseLeg-v0", episode_seconds=0.4) as env:
+        saved = SavedModel.find(tmp_path / "run")
+        policy = saved.load(env, "hoof_env/HorseLeg-v0")
+    assert saved.path.parent.name == "128"
+    assert all(bool(one.isfinite().all()) for one in policy.model.policy.parameters())
+
+
+def test_a_checkpoint_is_whole_or_not_there(tmp_path):
+    def write(name, *raised):
+        with whole(tmp_path / "checkpoints" / name) as stage:
+            (stage / "file").write_text("half")
+            assert name not in {path.name for path in checkpoints(tmp_path)}
+            for error in raised:
+                raise error
+
+    write("5")
+    with pytest.raises(KeyboardInterrupt):
+        write("7", KeyboardInterrupt)
+    assert [path.name for path in (tmp_path / "checkpoints").iterdir()] == ["5"]
+    assert [path.name for path in checkpoints(tmp_path)[0].iterdir()] == ["file"]
+
+
+def test_curves_show_each_step_once(tmp_path):
+    """Of a process that died after its last checkpoint, what is played again is not shown."""
+    from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+    def die(model):
+        raise ZeroDivisionError
+
+    out = tmp_path / "run"
+    with pytest.raises(ZeroDivisionError):
+        train(arguments("ppo", out, checkpoint_every=ALWAYS), At(450, die))
+    for checkpoint in checkpoints(out)[:1]:
+        shutil.rmtree(checkpoint)  # it died long after one
+    train(arguments("ppo", out, resume=True))
+    curves = EventAccumulator(str(out / "tensorboard"))
+    curves.Reload()
+    assert [point.step for point in curves.Scalars("rollout/ep_rew_mean")] == [128, 256, 384, 512]

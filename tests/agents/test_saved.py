@@ -1,0 +1,160 @@
+"""Models on disk: the plain form acts as the zip does, runs no code, and refuses what does not fit."""
+
+import json
+import pickle
+import shutil
+import warnings
+
+import numpy as np
+import pytest
+import torch
+from stable_baselines3 import PPO
+from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
+
+from agents.runs import STATISTICS, SavedModel, make_env, save_model
+from agents.safe import ABOUT, WEIGHTS
+from agents.settings import algorithm_class
+from hoof_env.errors import DataFileError
+
+ENV_ID, SHORT = "hoof_env/HorseLeg-v0", {"episode_seconds": 0.4}
+
+
+@pytest.fixture(scope="module")
+def env():
+    with make_env(ENV_ID, **SHORT) as env:
+        yield env
+
+
+def save(folder, env, algo="ppo", seed=0, **policy_kwargs):
+    """A model that was never trained, its statistics those of a few random steps."""
+    envs = VecNormalize(DummyVecEnv([lambda: env]), clip_obs=2.0)
+    envs.reset()
+    for _ in range(5):
+        envs.step([envs.action_space.sample()])
+    kwargs = {"net_arch": [8], "activation_fn": torch.nn.ELU, **policy_kwargs}
+    kwargs |= {"n_quantiles": 5} if algo == "tqc" else {}
+    model = algorithm_class(algo)("MlpPolicy", envs, policy_kwargs=kwargs, device="cpu", seed=seed)
+    save_model(model, folder / "model.zip")
+    record = {
+        "env_id": ENV_ID,
+        "algo": algo,
+        "settings": {**vars(env.unwrapped.settings), "episode_seconds": 0.4},
+        "versions": {},
+    }
+    (folder / "run.json").write_text(json.dumps(record, default=str))
+    return model
+
+
+def change(path, **values):
+    path.write_text(json.dumps({**json.loads(path.read_text()), **values}))
+
+
+@pytest.mark.parametrize("algo", ["ppo", "sac", "td3", "tqc"])
+def test_plain_data_act_as_the_zip(algo, env, tmp_path):
+    save(tmp_path, env, algo)
+    plain = SavedModel.find(tmp_path).load(env, ENV_ID)
+    (tmp_path / WEIGHTS).unlink()
+    with pytest.warns(UserWarning, match="pickle"):
+        zipped = SavedModel.find(tmp_path).load(env, ENV_ID)
+    for seed in range(5):
+        observation, _ = env.reset(seed=seed)
+        np.testing.assert_array_equal(plain.predict(observation)[0], zipped.predict(observation)[0])
+        assert not np.array_equal(plain.normalize(observation), observation)
+    assert env.action_space.contains(plain.predict(observation)[0])
+
+
+def test_nothing_is_unpickled(env, tmp_path):
+    class Bomb:
+        def __reduce__(self):
+            return pytest.fail, ("unpickled",)
+
+    save(tmp_path, env)
+    for name in ("model.zip", STATISTICS):
+        (tmp_path / name).write_bytes(pickle.dumps(Bomb()))
+    policy = SavedModel.find(tmp_path).load(env, ENV_ID)
+    policy.predict(env.reset(seed=0)[0])
+    (tmp_path / "model.zip").unlink()
+    assert SavedModel.find(tmp_path).load(env, ENV_ID).predict(env.reset(seed=0)[0])
+
+
+def test_arguments_that_are_not_plain_leave_only_the_zip(env, tmp_path):
+    class Mine(torch.nn.ELU):
+        pass
+
+    save(tmp_path, env, activation_fn=Mine)
+    assert not (tmp_path / ABOUT).exists()
+    assert (tmp_path / "model.zip").exists()
+
+
+def test_a_zip_of_another_name_is_not_mistaken_for_the_plain_policy(env, tmp_path):
+    save(tmp_path, env)
+    shutil.copy(tmp_path / "model.zip", tmp_path / "best.zip")
+    with pytest.warns(UserWarning, match=r"best\.zip is a pickle"):
+        policy = SavedModel.find(tmp_path / "best.zip").load(env, ENV_ID)
+    assert isinstance(policy.model, PPO)
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"env_id": "hoof_env/HorseLeg-v7"}, "HorseLeg-v7, expected hoof_env/HorseLeg-v0; another version"),
+        ({"env_id": "hoof_env/HorseLegRail-v0"}, "HorseLegRail-v0, expected"),
+        (
+            {"observation_space": "Box(3)", "action_space": "Box(1)"},
+            r"Box\(3\), expected .*; action_space Box\(1\)",
+        ),
+    ],
+    ids=str,
+)
+def test_a_model_for_something_else(env, tmp_path, values, said):
+    save(tmp_path, env)
+    change(tmp_path / "run.json", **values)
+    with pytest.raises(DataFileError, match=said):
+        SavedModel.find(tmp_path).load(env, ENV_ID)
+
+
+def test_a_policy_of_other_spaces(env, tmp_path):
+    save(tmp_path, env)
+    (tmp_path / "run.json").unlink()
+    with make_env("Pendulum-v1") as pendulum, pytest.raises(DataFileError, match="observation_space"):
+        SavedModel.find(tmp_path).load(pendulum, "Pendulum-v1")
+
+
+def test_other_settings_and_versions_are_told(env, tmp_path):
+    save(tmp_path, env)
+    change(tmp_path / "run.json", settings={}, versions={"hoof-env": "0.0.1"})
+    with pytest.warns(UserWarning, match=r"episode_seconds=None, here 0\.4; .*hoof-env 0\.0\.1, here"):
+        SavedModel.find(tmp_path).load(env, ENV_ID)
+
+
+def test_a_model_that_fits_loads_without_a_word(env, trained):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        SavedModel.find(trained.folder).load(env, ENV_ID)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"format": 2},
+        {"algo": "os.system"},
+        {"policy": "CnnPolicyOfMine"},
+        {"policy_kwargs": {"net_arch": [8], "activation_fn": {"torch.nn": "init"}}},
+        {"policy_kwargs": {"net_arch": [9]}},
+        {"action_space": None},
+        {"normalize": {"mean": []}},
+    ],
+    ids=str,
+)
+def test_a_damaged_description(env, tmp_path, values):
+    save(tmp_path, env)
+    change(tmp_path / ABOUT, **values)
+    with pytest.raises(DataFileError, match=r"policy\.json"):
+        SavedModel.find(tmp_path).load(env, ENV_ID)
+
+
+def test_damaged_weights(env, tmp_path):
+    save(tmp_path, env)
+    (tmp_path / WEIGHTS).write_bytes((tmp_path / WEIGHTS).read_bytes()[:100])
+    with pytest.raises(DataFileError, match=r"policy\.json"):
+        SavedModel.find(tmp_path).load(env, ENV_ID)

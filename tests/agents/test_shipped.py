@@ -1,0 +1,136 @@
+"""Every shipped policy fits its id, still returns what its card says, and is what the command makes."""
+
+import json
+import re
+from pathlib import Path
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+pytest.importorskip("onnxruntime", reason='needs pip install "hoof-env[onnx]"')
+
+from agents import ship
+from agents.runs import make_env
+from agents.score import score_vector
+from hoof_env.errors import DataFileError
+from hoof_env.onnx_policy import OnnxPolicy
+from tests.agents.conftest import train_tiny
+
+FOLDERS = sorted(path.parent for path in ship.POLICIES.glob("*/score.json"))
+SHIPPED = pytest.mark.parametrize("folder", FOLDERS, ids=lambda path: path.name)
+NOT_YET = {"HorseLegFixed-v0"}
+
+
+def read(path: Path) -> dict:
+    return json.loads(path.read_text())
+
+
+def checked_mean(policy, score: dict) -> float:
+    """Mean return of the episodes by which a score is checked."""
+    first = score["seeds"][0]
+    episodes = score_vector(policy, score["played_on"], range(first, first + score["check"]["episodes"]))
+    return float(np.mean([episode["return"] for episode in episodes]))
+
+
+def test_every_id_has_a_policy():
+    ids = {name.removeprefix("hoof_env/") for name in gym.registry if name.startswith("hoof_env/")}
+    assert {path.name for path in FOLDERS} | NOT_YET == ids
+    index = (ship.POLICIES / "README.md").read_text()
+    assert all(f"({path.name}/card.md)" in index for path in FOLDERS)
+
+
+@SHIPPED
+def test_score(folder):
+    score = read(folder / "score.json")
+    with make_env(score["env_id"]) as env:
+        policy = OnnxPolicy(folder).load(env, score["env_id"])
+    recorded = np.mean(score["returns"][: score["check"]["episodes"]])
+    allowed = score["check"]["tolerance"]
+    assert checked_mean(policy, score) == pytest.approx(recorded, abs=allowed)
+    assert allowed < 0.2 * recorded  # so that it can fail
+    assert recorded > max(
+        score["policies"].get(name, {"mean": {"return": 0.0}})["mean"]["return"] for name in ("run", "walk")
+    )
+
+
+@SHIPPED
+def test_folder(folder):
+    files = {path.name: path.stat().st_size for path in folder.iterdir()}
+    assert {"policy.onnx", "run.json", "config.yml", "score.json", "card.md", "curve.png", "film.gif"} <= {
+        *files
+    }
+    assert sum(files.values()) <= ship.LIMIT
+    score, card = read(folder / "score.json"), (folder / "card.md").read_text()
+    assert score["env_id"].endswith(f"/{folder.name}")
+    assert np.mean(score["returns"]) == pytest.approx(score["policies"]["policy"]["mean"]["return"], abs=1e-3)
+    assert f"value: {np.mean(score['returns']):.2f} +/-" in card
+    for name in ("card.md", "run.json", "score.json", "policy.onnx"):
+        assert not re.search(rb"/(home|work|root|tmp|Users)/", (folder / name).read_bytes()), name
+
+
+def test_the_multi_objective_policy_returns_the_same_in_sum():
+    folder = ship.POLICIES / "HorseLegMO-v0"
+    score, total, done = read(folder / "score.json"), 0.0, False
+    seed, policy = score["seeds"][0], OnnxPolicy(folder)
+    with make_env(score["env_id"]) as env:
+        observation, _ = env.reset(seed=seed)
+        while not done:
+            observation, reward, terminated, truncated, _ = env.step(policy.predict(observation)[0])
+            total, done = total + reward.sum(), terminated or truncated
+    (alone,) = score_vector(policy, score["played_on"], [seed])
+    # Alone and as a row of many a network's last bits may differ, and so do chaotic episodes
+    assert total == pytest.approx(alone["return"], abs=1e-3)
+
+
+def test_a_run_is_shipped_by_one_command(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(ship, "SCORE_SEEDS", range(1_000_000, 1_000_003))
+    monkeypatch.setattr(ship, "CHOOSING_SEEDS", range(500_000, 500_002))
+    ship.gaits.cache_clear()
+    for seed in (0, 1):
+        train_tiny(tmp_path / "runs" / f"s{seed}", env_kwargs=(), steps=2048, seed=seed)
+    (tmp_path / "runs" / "unfinished").mkdir()
+    (tmp_path / "runs" / "unfinished" / "run.json").write_text("{}")
+    ship.main(
+        [
+            str(tmp_path / "runs"),
+            "--out",
+            str(tmp_path / "out"),
+            "--seconds",
+            "0.1",
+            "--ids",
+            "hoof_env/HorseLeg-v0",
+        ]
+    )
+    folder = tmp_path / "out" / "HorseLeg-v0"
+    test_folder(folder)
+    score = read(folder / "score.json")
+    assert checked_mean(OnnxPolicy(folder), {**score, "check": {"episodes": 3}}) == pytest.approx(
+        np.mean(score["returns"]), abs=1
+    )
+    assert {"policy", "run", "walk"} <= {*score["policies"]}
+    assert "the best of 2 runs" in (folder / "card.md").read_text()
+    said = capsys.readouterr().out
+    assert "passed over" in said
+    assert f"policy {np.mean(score['returns']):.2f}" in said
+    ship.gaits.cache_clear()
+
+
+def test_nothing_to_ship(tmp_path):
+    with pytest.raises(DataFileError, match="got none"):
+        ship.main([str(tmp_path), "--out", str(tmp_path / "out")])
+
+
+@pytest.mark.parametrize(
+    ("command", "shown"),
+    [
+        ("python -m agents.train --seed 3 --out runs/x", "python -m agents.train --seed 3"),
+        (
+            "python -m agents.train --hyperparams /srv/a/ppo.yml",
+            "python -m agents.train --hyperparams ppo.yml",
+        ),
+        ("", ""),
+    ],
+)
+def test_commands_name_no_folder_of_a_machine(command, shown):
+    assert ship.shown_command(command) == shown

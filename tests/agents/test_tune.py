@@ -1,0 +1,165 @@
+"""A study of tiny trainings: what it writes, that it goes on, prunes and is refused what misfits."""
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from agents.settings import load_settings
+from agents.train import Args as TrainArgs
+from agents.train import train
+from agents.tune import SPACES, Args, draw, finished, load_space, make_scorer, mean_return, tune
+from agents.watch import DivergedError
+from hoof_env.errors import DataFileError, ParameterError
+from tests.agents.conftest import SHORT
+
+optuna = pytest.importorskip("optuna")
+
+HELD = ("n_envs=4", "n_steps=32", "batch_size=64", "n_epochs=1", '{"policy_kwargs": {"net_arch": [8]}}')
+
+
+def tiny(out: Path, **changes) -> Args:
+    return Args(
+        **{"trials": 2, "steps": 256, "scores": 2, "env_kwargs": SHORT, "params": HELD, "out": out, **changes}
+    )
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    """A study of two trials."""
+    out = tmp_path_factory.mktemp("tune") / "study"
+    tune(tiny(out))
+    return out
+
+
+def rows(folder: Path) -> list[dict[str, str]]:
+    return list(csv.DictReader((folder / "trials.csv").open()))
+
+
+def test_what_a_study_leaves(folder):
+    found = json.loads((folder / "study.json").read_text())
+    trials = rows(folder)
+    assert [row["state"] for row in trials] == ["complete", "complete"]
+    best = max(trials, key=lambda row: float(row["score"]))
+    assert found["best"]["trial"] == int(best["trial"])
+    assert [steps for steps, _ in found["best"]["curve"]] == [128, 256]
+    used = load_settings(folder / "best.yml", "hoof_env/HorseLeg-v0")
+    assert used == found["best"]["settings"]
+    assert used["learning_rate"] == f"lin_{float(best['learning_rate']):.3g}"
+    assert used["n_steps"] == 32
+    assert "n_steps" not in best
+
+
+def test_the_best_settings_give_its_score_again(folder, tmp_path):
+    best = json.loads((folder / "study.json").read_text())["best"]
+    scorer = make_scorer("hoof_env/HorseLeg-v0", {"episode_seconds": 0.4}, 128)
+    train(
+        TrainArgs(
+            hyperparams=folder / "best.yml", seed=best["trial"], env_kwargs=SHORT, out=tmp_path / "run"
+        ),
+        scorer,
+    )
+    assert scorer.curve == [tuple(row) for row in best["curve"]]
+
+
+def test_a_study_goes_on(folder):
+    before = rows(folder)
+    study = tune(tiny(folder, trials=3))
+    assert len(finished(study)) == 3
+    assert rows(folder)[:2] == before
+
+
+def test_an_interrupted_trial_does_not_count(tmp_path, monkeypatch):
+    class Stopped:
+        stopped_by, seconds = 2, 1.0
+
+    with monkeypatch.context() as patch:
+        patch.setattr(
+            "agents.tune.train", lambda args, scorer: setattr(scorer, "curve", [(128, 1.0)]) or Stopped
+        )
+        with pytest.raises(KeyboardInterrupt):
+            tune(tiny(tmp_path))
+    study = tune(tiny(tmp_path, trials=1))
+    assert [trial.state.name for trial in study.trials] == ["FAIL", "COMPLETE"]
+
+
+def test_a_killed_trial_is_run_again(tmp_path):
+    """kill -9 leaves a trial that runs for ever."""
+    args = tiny(tmp_path, trials=1)
+    tune(args)
+    study = optuna.load_study(study_name="study", storage=f"sqlite:///{tmp_path / 'study.db'}")
+    killed = study.ask()
+    drawn = draw(killed, {"gamma": load_space(SPACES, "ppo")["gamma"]}, {})
+    study = tune(tiny(tmp_path))
+    assert [trial.state.name for trial in study.trials] == ["COMPLETE", "FAIL", "COMPLETE"]
+    assert study.trials[2].params["gamma"] == drawn["gamma"]
+
+
+def test_a_bad_trial_is_pruned(tmp_path):
+    scores = []
+
+    def report(steps, score):
+        scores.append((steps, score))
+        return True
+
+    scorer = make_scorer("hoof_env/HorseLeg-v0", {"episode_seconds": 0.4}, 128, report)
+    trained = train(TrainArgs(steps=512, params=HELD, env_kwargs=SHORT, out=tmp_path / "run"), scorer)
+    assert scorer.stopped
+    assert trained.steps < 512
+    assert scores == scorer.curve[:1]
+
+
+@pytest.mark.parametrize("algo", ["ppo", "sac", "td3", "tqc"])
+def test_every_algorithm_has_a_space(algo):
+    space = load_space(SPACES, algo)
+    base = {"policy_kwargs": {"net_arch": [8], "kept": 1}}
+    trial = optuna.create_study().ask()
+    settings = draw(trial, space, base)
+    assert set(settings) == {key.split(".")[0] for key in space}
+    assert settings["policy_kwargs"]["kept"] == 1
+    assert settings["policy_kwargs"]["net_arch"] != [8]
+    assert yaml.safe_load(yaml.safe_dump(settings)) == settings
+
+
+def test_mean_return_is_of_whole_episodes(trained):
+    """Of the same ones each time, where the model never acts better than in one step."""
+    from stable_baselines3 import PPO
+
+    from agents.runs import make_vec_env
+
+    model = PPO.load(trained.folder / "model.zip")
+    envs = make_vec_env("hoof_env/HorseLeg-v0", 3, episode_seconds=0.4)
+    first = mean_return(model, envs)
+    envs.step(np.zeros((3, 4)))
+    assert mean_return(model, envs) == first
+
+
+def test_refusals(folder, tmp_path):
+    with pytest.raises(ParameterError, match="other base"):
+        tune(tiny(folder, steps=512))
+    with pytest.raises(ParameterError, match="trials: expected"):
+        tune(tiny(tmp_path, trials=0))
+    for text in (
+        "ppo: {gamma: []}",
+        "ppo: {gamma: {uniform: [1, 0]}}",
+        "ppo: {gamma: {log: [0, 1]}}",
+        "sac: {}",
+        "ppo: 3",
+    ):
+        path = tmp_path / "space.yml"
+        path.write_text(text)
+        with pytest.raises(DataFileError, match="search space"):
+            load_space(path, "ppo")
+
+
+def test_a_trial_that_diverges_counts_as_pruned(tmp_path, monkeypatch):
+    def diverge(args, scorer):
+        raise DivergedError("a loss is nan")
+
+    monkeypatch.setattr("agents.tune.train", diverge)
+    study = tune(tiny(tmp_path))
+    assert [trial.state.name for trial in study.trials] == ["PRUNED", "PRUNED"]
+    assert not (tmp_path / "best.yml").exists()
