@@ -43,17 +43,15 @@ class Progress(tune.Callback):
             self.bar.set_postfix_str(told)
 
     def on_trial_recover(self, iteration: int, trials: list[Any], trial: Any, **info: Any) -> None:
-        self._tell(trial, f"{reason(trial.get_error())} Retry {trial.num_failures}")
-
-    def on_trial_restore(self, iteration: int, trials: list[Any], trial: Any, **info: Any) -> None:
-        steps = figures(trial.last_result)["steps"]
-        self._tell(trial, f"goes on from its checkpoint after {steps or 0:,.0f} steps")
+        kept = trial.latest_checkpoint_result
+        steps = figures(kept.metrics)["steps"] if kept else 0
+        self._tell(trial, f"{last_failure(trial)} Retry {trial.num_failures}, from step {steps:,.0f}")
 
     def on_trial_error(self, iteration: int, trials: list[Any], trial: Any, **info: Any) -> None:
-        self._tell(trial, f"{reason(trial.get_error())} No retry is left")
+        self._tell(trial, f"{last_failure(trial)} No retry is left")
 
     def on_trial_complete(self, iteration: int, trials: list[Any], trial: Any, **info: Any) -> None:
-        self._tell(trial, f"done, return {figures(trial.last_result)['return']}")
+        self._tell(trial, f"done, return {figures(trial.last_result)['return']:.2f}")
 
     def on_experiment_end(self, trials: list[Any], **info: Any) -> None:
         if self.bar is not None:
@@ -63,11 +61,17 @@ class Progress(tune.Callback):
         tqdm.write(f"trial {trial.trial_id.rpartition('_')[2]}: {what}")
 
 
-def reason(error: Exception | None) -> str:
-    """In one line: Ray puts the news first, a traceback last."""
-    said = str(error).strip().splitlines() or ["unknown"]
-    lines = [line.strip() for line in said if not line.startswith("Failure #")]
-    return lines[-1] if "Traceback" in str(error) else lines[0]
+def last_failure(trial: Any) -> str:
+    """Why a trial failed the last time, from the file where Tune tells it."""
+    path = Path(trial.error_file or "")
+    return reason(path.read_text() if path.is_file() else "")
+
+
+def reason(error: str) -> str:
+    """The last failure in one line: Ray puts the news first, but behind a traceback that of Python last."""
+    lines = [line.strip() for line in error.rpartition("Failure #")[2].strip().splitlines()]
+    lines = [line for line in lines if "(occurred at" not in line] or ["unknown."]
+    return lines[-1 if any(line.startswith("Traceback") for line in lines) else 0]
 
 
 def write_table(results: Any, folder: str, varied: list[str]) -> int:
@@ -77,11 +81,13 @@ def write_table(results: Any, folder: str, varied: list[str]) -> int:
         The exit code: 0, 1 where a trial failed for good, 130 where one has not ended.
     """
     rows, reasons = [], []
-    for result in sorted(results, key=lambda result: Path(result.path).name):
+    # Whether a trial that ended in an earlier run is done stands in its status alone
+    pairs = zip(results, results._experiment_analysis.trials, strict=True)
+    for result, trial in sorted(pairs, key=lambda pair: Path(pair[0].path).name):
         found, config = result.metrics or {}, result.config or {}
         kept = result.checkpoint.path if result.checkpoint else ""
-        why = reason(result.error) if result.error else found.get("failed")
-        state = "failed" if why else "done" if found.get("done") else "unfinished"
+        why = reason(str(result.error)) if result.error else found.get("failed")
+        state = "failed" if why else "done" if trial.status == "TERMINATED" else "unfinished"
         reasons += [f"  {kept or 'a trial'}: {why}"] if why else []
         rows.append(
             {key: config.get(key) for key in varied}
