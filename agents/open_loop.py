@@ -33,7 +33,7 @@ from agents.evaluate import estimate
 from agents.open_loop_search import ROWS, TEST_SEED, Court, Episodes, decode, search
 from hoof_env._output import check_folder
 from hoof_env.envs.policies import Scripted, read_open_loop
-from hoof_env.errors import DataFileError, ParameterError, check_number
+from hoof_env.errors import DataFileError, HoofEnvError, ParameterError, check_number
 from hoof_env.gait.parameters import PARAMETERS
 
 GAITS = Path(__file__).with_name("gaits")
@@ -79,11 +79,17 @@ def optimise(args: Args) -> dict[str, Any]:
     """Search, and write the file after every search; returns what it holds.
 
     Raises:
-        ParameterError: an argument does not fit. DataFileError, OutputError: the file is of something else,
-            or cannot be written. KeyboardInterrupt: Ctrl-C; what was found is in the file.
+        HoofEnvError: no CMA-ES is installed. ParameterError: an argument does not fit. DataFileError,
+            OutputError: the file is of something else, or cannot be written. KeyboardInterrupt: Ctrl-C; what
+            was found is in the file.
     """
-    from tqdm import tqdm
-
+    try:
+        import cma  # noqa: F401
+        from tqdm import tqdm
+    except ModuleNotFoundError as error:
+        raise HoofEnvError(
+            f'agents.open_loop needs {error.name}: pip install "hoof-env[train,identify]"'
+        ) from None
     check_number("restarts", args.restarts, low=1, high=1000)
     check_number("test_episodes", args.test_episodes, low=2, high=1e6)
     episodes = args.episodes or EPISODES[args.family]

@@ -1,6 +1,7 @@
 """CMA-ES over open-loop gaits: it finds what is known, files are whole, searches go on where they ended."""
 
 import json
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +13,7 @@ from agents.open_loop import GAITS, Args, load_open_loop, main, optimise
 from agents.open_loop_search import SIZES, cost, decode, search
 from agents.runs import make_env
 from agents.score import score_vector
-from hoof_env.errors import DataFileError, ParameterError
+from hoof_env.errors import DataFileError, HoofEnvError, ParameterError
 
 ENV_ID = "hoof_env/HorseLeg-v0"
 SHORT = ("episode_seconds=0.4",)
@@ -190,6 +191,12 @@ def test_bad_input(tmp_path, changes, message):
     with pytest.raises(ParameterError, match=message):
         optimise(arguments(tmp_path, **changes))
     assert not (tmp_path / "gait.json").exists()
+
+
+def test_without_cma_the_command_that_brings_it_is_named(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "cma", None)
+    with pytest.raises(HoofEnvError, match=r'needs cma: pip install "hoof-env\[train,identify\]"'):
+        optimise(arguments(tmp_path))
 
 
 HIGHEST = sorted((*GAITS.glob("*-constant.json"), *GAITS.glob("*-clocked.json")))
