@@ -98,6 +98,9 @@ class Rllib(Cluster):
     """of environments and network"""
     env_kwargs: tuple[str, ...] = ()
     """arguments of the environment: key=value ..., or one JSON object"""
+    params: tuple[str, ...] = ()
+    """hyperparameters of ppo.yml to change: key=value ..., or one JSON object; n_steps times n_envs there is
+    the batch, whatever the workers' n_envs"""
 
 
 def prepare(args: Trials) -> dict[str, Any]:

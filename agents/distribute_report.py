@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from ray import tune
 from tqdm import tqdm
@@ -25,14 +25,21 @@ def figures(found: dict[str, Any] | None) -> dict[str, Any]:
 
 
 class Progress(tune.Callback):
-    """A bar over trials, and a line when one ends, when its worker died and when it goes on."""
+    """A bar over trials, and a line when one ends, when its worker died and when it goes on.
+
+    Attributes:
+        going: ids of trials that had not ended at the last step; of the class, for Tune works with a copy.
+    """
+
+    going: ClassVar[set[str]] = set()
 
     def setup(self, **info: Any) -> None:
         self.shown: tuple[int, str] = (-1, "")
         self.bar: Any = None  # made where the experiment runs: Ray may send this object there
 
     def on_step_end(self, iteration: int, trials: list[Any], **info: Any) -> None:
-        ended = sum(trial.status in ("TERMINATED", "ERROR") for trial in trials)
+        Progress.going = {t.trial_id for t in trials if t.status not in ("TERMINATED", "ERROR")}
+        ended = len(trials) - len(Progress.going)
         if self.bar is None:
             self.bar = tqdm(unit=" trials", initial=ended, mininterval=0.0)
         best = [x for trial in trials if (x := figures(trial.last_result)["return"]) is not None]
@@ -74,6 +81,11 @@ def reason(error: str) -> str:
     return lines[-1 if any(line.startswith("Traceback") for line in lines) else 0]
 
 
+def is_done(trial: Any) -> bool:
+    """Whether a trial ended by itself or by its scheduler, in this run or an earlier one."""
+    return trial.status == "TERMINATED" and trial.trial_id not in Progress.going
+
+
 def write_table(results: Any, folder: str, varied: list[str]) -> int:
     """Write `folder`/trials.csv where that is a path, print what came of the trials.
 
@@ -81,13 +93,13 @@ def write_table(results: Any, folder: str, varied: list[str]) -> int:
         The exit code: 0, 1 where a trial failed for good, 130 where one has not ended.
     """
     rows, reasons = [], []
-    # Whether a trial that ended in an earlier run is done stands in its status alone
+    # Whether a trial is done stands in its status alone; but after Ctrl-C all look as if they were
     pairs = zip(results, results._experiment_analysis.trials, strict=True)
     for result, trial in sorted(pairs, key=lambda pair: Path(pair[0].path).name):
         found, config = result.metrics or {}, result.config or {}
         kept = result.checkpoint.path if result.checkpoint else ""
         why = reason(str(result.error)) if result.error else found.get("failed")
-        state = "failed" if why else "done" if trial.status == "TERMINATED" else "unfinished"
+        state = "failed" if why else "done" if is_done(trial) else "unfinished"
         reasons += [f"  {kept or 'a trial'}: {why}"] if why else []
         rows.append(
             {key: config.get(key) for key in varied}

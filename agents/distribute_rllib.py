@@ -26,7 +26,7 @@ def make_config(args: Rllib) -> Any:
     from ray.rllib.algorithms.ppo import PPOConfig
 
     env_kwargs = parse_pairs("--env-kwargs", args.env_kwargs)
-    settings = load_settings(FOLDER / "ppo.yml", args.env_id)
+    settings = load_settings(FOLDER / "ppo.yml", args.env_id) | parse_pairs("--params", args.params)
     rate = settings["learning_rate"]
     if isinstance(rate, str):  # lin_<x>
         rate = [[0, float(rate.removeprefix("lin_"))], [args.steps, 0.0]]

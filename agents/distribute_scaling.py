@@ -122,7 +122,17 @@ def trials(args: Args, workers: int, folder: Path) -> Found:
 
 def rllib(args: Args, workers: int, folder: Path) -> Found:
     """RLlib's iterations but for the first two."""
-    options = ("--workers", workers, "--cpus", workers + 1, "--steps", args.rllib_steps, "--out", folder)
+    options: tuple[object, ...] = (
+        "--workers",
+        workers,
+        "--cpus",
+        workers + 1,
+        "--steps",
+        args.rllib_steps,
+        "--out",
+        folder,
+    )
+    options += ("--params", "n_envs=128", "n_steps=32", "batch_size=1024", "n_epochs=4")  # short iterations
     command("agents.distribute", "rllib", *options).wait()
     (path,) = folder.glob("*/*/result.json")
     told = [json.loads(line) for line in path.read_text().splitlines()][2:]
