@@ -28,6 +28,7 @@ from agents.command import parse_pairs, run
 from hoof_env._output import check_folder
 from hoof_env.envs.policies import make_policy, policy_names
 from hoof_env.errors import OutputError, ParameterError, check_number
+from hoof_env.onnx_policy import OnnxPolicy
 
 DEFAULT_ENV = "hoof_env/HorseLeg-v0"
 
@@ -105,7 +106,7 @@ def play(
         while not done:
             action, _ = policy.predict(observation, episode_start=start, deterministic=True)
             observation, reward, terminated, truncated, info = env.step(action)
-            total, start, done = total + float(reward), np.zeros(1, bool), terminated or truncated
+            total, start, done = total + float(np.sum(reward)), np.zeros(1, bool), terminated or truncated
         summary = info.get("episode_summary", {})
         if "stances" in summary:
             summary["stance_peak_n"] = summary["stance_peak_sum_n"] / max(summary["stances"], 1.0)
@@ -116,7 +117,16 @@ def play(
 
 def is_model(name: str) -> bool:
     """Whether a policy's name is the path of a model rather than that of a scripted policy."""
-    return name.endswith(".zip") or Path(name).name != name or Path(name, "model.zip").is_file()
+    return name.endswith((".zip", ".onnx")) or Path(name).name != name or Path(name, "model.zip").is_file()
+
+
+def saved(path: Path) -> OnnxPolicy | runs.SavedModel:
+    """A policy in a file or a folder: an exported one, or a model of agents.train.
+
+    Raises:
+        DataFileError: there is none.
+    """
+    return OnnxPolicy(path) if OnnxPolicy.stands_at(path) else runs.SavedModel.find(path)
 
 
 def find_policy(name: str, env: gym.Env[Any, Any], env_id: str) -> Any:
@@ -130,7 +140,7 @@ def find_policy(name: str, env: gym.Env[Any, Any], env_id: str) -> Any:
 
         return load_open_loop(env_id if name == "open-loop" else name, env)
     if is_model(name):
-        return runs.SavedModel.find(Path(name)).load(env, env_id)
+        return saved(Path(name)).load(env, env_id)
     names = policy_names(env) if hasattr(env.unwrapped, "gaits") else []
     if name not in names:
         known = ", ".join(names) or f"none is scripted for {env_id}"
@@ -192,7 +202,7 @@ def evaluate(args: Args) -> tuple[list[Score], dict[str, Any]]:
         if path.is_dir():
             raise OutputError(f"cannot write to {str(path)!r}: expected a file, got a folder")
         check_folder(path.parent)
-    records = [runs.SavedModel.find(Path(name)).record for name in args.policy if is_model(name)]
+    records = [saved(Path(name)).record for name in args.policy if is_model(name)]
     record = next(filter(None, records), {})
     films = film_paths(args.video, args.policy) if args.video else {}
     env_id = args.env_id or record.get("env_id", DEFAULT_ENV)

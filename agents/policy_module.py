@@ -26,7 +26,8 @@ def statistics_of(normalize: Any) -> Statistics | None:
     if found is None or (isinstance(found, VecNormalize) and not found.norm_obs):
         return None
     if isinstance(found, VecNormalize):
-        mean, var, clip = found.obs_rms.mean, found.obs_rms.var, found.clip_obs
+        seen: Any = found.obs_rms  # one, for the observation is one array
+        mean, var, clip = seen.mean, seen.var, found.clip_obs
     else:
         mean, var, clip = found.mean, found.var, found.clip
     return Statistics(np.asarray(mean), np.sqrt(np.asarray(var) + found.epsilon), float(clip))

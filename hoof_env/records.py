@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 import hoof_env
 from hoof_env._output import check_folder
-from hoof_env.envs.policies import Scripted, make_policy, policy_names
+from hoof_env.envs.policies import Scripted, make_policy, policy_names, read_open_loop
 from hoof_env.envs.render_instant import UNITS, Columns, columns_of_engine
 from hoof_env.errors import DataFileError, OutputError, ParameterError, check_number
 from hoof_env.gait.parameters import PARAMETERS, GaitParameters
@@ -149,7 +149,7 @@ def find_policy(name: str, env: gym.Env[Any, Any], env_id: str, seed: int = 0) -
     Args:
         name: as "run", as "6.28,0.7,-0.2,-0.3" (crank speed [rad/s], swing offset, sine and cosine
             coefficient [rad]), or the .zip or run folder of a model. A model is a pickle: it can run code.
-            A policy's .onnx file, or the folder of one that is shipped, is data.
+            A policy's .onnx file, the folder of one that is shipped, or a gait's .json are data.
         env, env_id: what it is for.
         seed: of "random".
 
@@ -160,6 +160,8 @@ def find_policy(name: str, env: gym.Env[Any, Any], env_id: str, seed: int = 0) -
     names = policy_names(env)
     if name in names:
         return make_policy(name, env, seed)
+    if name.endswith(".json"):
+        return read_open_loop(Path(name), env)
     if OnnxPolicy.stands_at(Path(name)):
         return OnnxPolicy(Path(name)).load(env, env_id)
     if name.endswith(".zip") or Path(name, "model.zip").is_file():

@@ -20,7 +20,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 OLDEST, NEWEST = (3, 11), (3, 13)
-EXTRAS = "train,render,video,plot,identify,dev"
+EXTRAS = "train,render,video,plot,export,identify,baselines,tune,onnx,dev"
 NEEDED_GB = 3.0  # .venv itself takes 1.8 GB on Linux
 
 # On Linux the usual index gives PyTorch with CUDA, which is gigabytes; this one gives 0.2 GB.

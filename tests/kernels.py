@@ -25,8 +25,7 @@ def environments():
         env.reset(seed=0)
         for _ in range(2):
             env.step(np.zeros(4, np.float32))
-            if hasattr(env, "record"):
-                env.record()  # from the second step on
+            env.record()  # from the second step on
     envs = gym.make_vec("hoof_env/HorseLeg-v0", num_envs=9)
     envs.reset(seed=0)
     envs.step(np.zeros((9, 4), np.float32))
