@@ -13,6 +13,7 @@ machine and versions give the same run, resumed or not (agents/checkpoints.py sa
 from __future__ import annotations
 
 import json
+from contextlib import closing
 from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
@@ -127,7 +128,7 @@ def train(args: Args, *also: Any) -> Trained:
         watch = make_watch(folder, steps, args.checkpoint_every, args.max_minutes, resumed)
         callbacks = CallbackList([watch, *also])
         through = False
-        with stop_on_signals(watch):
+        with closing(watch), stop_on_signals(watch):
             try:
                 model.learn(steps - model.num_timesteps, callbacks, reset_num_timesteps=not resumed)
                 through = True

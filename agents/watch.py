@@ -66,6 +66,7 @@ def make_watch(
 
     class Watch(BaseCallback):
         stopped_by: int | None = None
+        bar: Any = None
         earlier = resumed.seconds if resumed else 0.0
 
         @property
@@ -111,8 +112,9 @@ def make_watch(
                         self.logger.record_mean(f"gait/{key}", value)
             self.summaries.clear()
 
-        def _on_training_end(self) -> None:
-            self.bar.close()
+        def close(self) -> None:
+            if self.bar is not None:
+                self.bar.close()
 
     return Watch()
 

@@ -80,13 +80,12 @@ def test_a_stopped_run_goes_on_as_if_it_had_not_been(algo, tmp_path):
     assert (resumed.folder / ABOUT).read_bytes() == (whole.folder / ABOUT).read_bytes()  # statistics
     assert episodes(resumed.folder) == episodes(whole.folder)
     assert json.loads((resumed.folder / "run.json").read_text())["resumed"] == [stopped.steps]
-    assert resumed.seconds > stopped.seconds
     assert not (resumed.folder / CHECKPOINTS).exists()
 
 
 def test_killed_again_and_again(tmp_path):
     """SIGKILL at random moments: the command with --resume ends as one that was never killed."""
-    steps = 128 * 60
+    steps = 128 * 40
     argv = [
         "--steps", str(steps), "--n-envs", "4", "--checkpoint-every", "0.02", "--resume",
         "--env-kwargs", *SHORT, "--params", *TINY,
