@@ -240,7 +240,7 @@ def fit(args: Cluster, name: str, tuner: dict[str, Any], varied: list[str], **ru
     except OSError as error:
         raise OutputError(f"cannot write to {args.out!r}: {error}") from None
     except tune.TuneError as error:
-        raise HoofEnvError(f"Ray Tune: {str(error).strip().splitlines()[0]}") from None
+        raise HoofEnvError(f"Ray Tune: {str(error).strip().splitlines()[-1]}") from None
     return write_table(results, folder, varied)
 
 

@@ -72,9 +72,8 @@ def run_rllib(args: Rllib) -> int:
     start(args)
     from ray import tune
 
-    config = tune.TuneConfig(
-        metric=RETURN, mode="max", trial_dirname_creator=lambda trial: f"seed={args.seed}"
-    )
+    # No metric: Tune would refuse iterations in which no episode ended
+    config = tune.TuneConfig(trial_dirname_creator=lambda trial: f"seed={args.seed}")
     tuner = {"trainable": "PPO", "param_space": make_config(args), "tune_config": config}
     return fit(
         args, f"rllib-{args.env_id.rpartition('/')[2]}", tuner, ["seed"],
@@ -83,7 +82,3 @@ def run_rllib(args: Rllib) -> int:
             num_to_keep=1, checkpoint_frequency=10, checkpoint_at_end=True
         ),
     )  # fmt: skip
-
-
-RETURN = "env_runners/episode_return_mean"
-"""Mean return of the last episodes that ended in training."""

@@ -119,7 +119,7 @@ def test_interrupted(tmp_path):
 
 def test_rllib_worker_killed(tmp_path):
     """RLlib's PPO: SIGKILL for one of two workers with environments; it is replaced and training goes on"""
-    small = ("rllib", "--cpus", "3", "--workers", "2", "--n-envs", "8", "--env-kwargs", "episode_seconds=0.4")
+    small = ("rllib", "--cpus", "3", "--workers", "2", "--n-envs", "8")
     process = start(tmp_path, *small, "--steps", "40000", "--params", "n_envs=128", "n_steps=32")
     wait_for(process, tmp_path, 2)
     (victim, *others) = env_runners(int(reports(tmp_path)[-1]["pid"]))
