@@ -106,7 +106,8 @@ def play(
         while not done:
             action, _ = policy.predict(observation, episode_start=start, deterministic=True)
             observation, reward, terminated, truncated, info = env.step(action)
-            total, start, done = total + float(np.asarray(reward).sum()), np.zeros(1, bool), terminated or truncated
+            total += float(np.asarray(reward).sum())  # of a vector, all objectives
+            start, done = np.zeros(1, bool), terminated or truncated
         summary = info.get("episode_summary", {})
         if "stances" in summary:
             summary["stance_peak_n"] = summary["stance_peak_sum_n"] / max(summary["stances"], 1.0)

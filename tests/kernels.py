@@ -37,11 +37,10 @@ def horse():
 
 
 def search():
-    """Costs of a leg; CMA-ES asks with rows of a transposed array, which are a type of their own."""
+    """Costs of a leg."""
     choice, x = encode(load_geometry(PRESET), *(load_gait(gait, PRESET) for gait in ("walk", "run")))
     objective = Objective(choice, paper_solver=True)
     objective.cost(np.array(x))
-    objective.cost(np.array([x, x]).T.copy()[:, 0])
 
 
 if __name__ == "__main__":

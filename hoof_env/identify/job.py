@@ -69,7 +69,9 @@ class _CmaEs:
         self.best, self.value, self.evaluations = y, np.inf, 0
 
     def advance(self, evaluate: Callable[[Array], float]) -> None:
-        points = self.es.ask()
+        points = [
+            np.ascontiguousarray(point) for point in self.es.ask()
+        ]  # rows of one: kernels know one type
         self.es.tell(points, [evaluate(point) for point in points])
         self.best, self.value = np.array(self.es.best.x), float(self.es.best.f)
         self.evaluations = int(self.es.countevals)
