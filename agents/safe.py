@@ -1,4 +1,5 @@
-"""A trained policy as plain data, so that reading it runs nothing that a file says.
+"""A trained policy as plain data, so that reading it runs nothing that a file says (it may ask for a large
+network, and so for memory).
 
     policy.safetensors  the weights
     policy.json         algorithm, kind of policy, its arguments, both spaces, statistics of the observations
@@ -38,14 +39,15 @@ def save_policy(model: Any, folder: Path) -> bool:
             "action_space": _box(model.action_space),
             "normalize": _statistics(normalize) if normalize is not None and normalize.norm_obs else None,
         }
-    except (TypeError, AttributeError, StopIteration):
+        text = json.dumps(about, indent=1, allow_nan=False) + "\n"
+    except (TypeError, ValueError, AttributeError, StopIteration):
         return False
     # A part that two names share is written twice: the format has no references
     weights = {
         key: value.detach().cpu().clone().contiguous() for key, value in model.policy.state_dict().items()
     }
     save_file(weights, folder / WEIGHTS)
-    (folder / ABOUT).write_text(json.dumps(about, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    (folder / ABOUT).write_text(text, encoding="utf-8")
     return True
 
 
@@ -56,7 +58,6 @@ def load_policy(folder: Path) -> tuple[Any, Any]:
         DataFileError: a file is missing or damaged, or does not describe a policy.
     """
     from gymnasium import spaces
-    from safetensors import SafetensorError
     from safetensors.torch import load_file
 
     def box(about: dict[str, Any]) -> spaces.Box:
@@ -80,11 +81,16 @@ def load_policy(folder: Path) -> tuple[Any, Any]:
         model.policy = model.policy_class(
             model.observation_space, model.action_space, lambda _: 0.0, **model.policy_kwargs
         )
-        model.policy.load_state_dict(load_file(folder / WEIGHTS))
+        weights = load_file(folder / WEIGHTS)
+        if not all(bool(one.isfinite().all()) for one in weights.values()):
+            raise ValueError(f"{WEIGHTS} holds numbers that are not finite")
+        model.policy.load_state_dict(weights)
         normalize = _Normalizer(**about["normalize"]) if about["normalize"] else None
+        if normalize is not None:
+            normalize.check(model.observation_space.shape)
     except ParameterError as error:
         raise DataFileError(f"model {folder / ABOUT}: {error}") from None
-    except (OSError, ValueError, TypeError, KeyError, AttributeError, RuntimeError, SafetensorError) as error:
+    except Exception as error:  # a damaged description may raise anything
         reason = f"{type(error).__name__}: {error}".splitlines()[0]
         raise DataFileError(
             f"model {folder / ABOUT}: expected a policy written by agents.train, cannot read it ({reason})"
@@ -97,7 +103,14 @@ class _Normalizer:
     """Observations as `VecNormalize` shows them; its formula."""
 
     def __init__(self, mean: list[float], var: list[float], epsilon: float, clip: float) -> None:
-        self.mean, self.var, self.epsilon, self.clip = np.array(mean), np.array(var), epsilon, clip
+        self.mean, self.var = np.array(mean, np.float64), np.array(var, np.float64)
+        self.epsilon, self.clip = float(epsilon), float(clip)
+
+    def check(self, shape: tuple[int, ...]) -> None:
+        """`ValueError` unless these are statistics of observations of that shape."""
+        sound = all(one.shape == shape and np.isfinite(one).all() for one in (self.mean, self.var))
+        if not sound or not (self.var + self.epsilon > 0).all() or not self.clip > 0:
+            raise ValueError(f"expected statistics of observations of shape {shape}")
 
     def __call__(self, observation: Any) -> Any:
         scaled = (observation - self.mean) / np.sqrt(self.var + self.epsilon)

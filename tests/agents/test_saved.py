@@ -8,6 +8,7 @@ import warnings
 import numpy as np
 import pytest
 import torch
+from safetensors.torch import save_file
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
@@ -143,6 +144,8 @@ def test_a_model_that_fits_loads_without_a_word(env, trained):
         {"policy_kwargs": {"net_arch": [9]}},
         {"action_space": None},
         {"normalize": {"mean": []}},
+        {"normalize": {"mean": [0.0], "var": [1.0], "epsilon": 1e-8, "clip": 10.0}},
+        {"normalize": {"mean": [0.0] * 24, "var": [-1.0] * 24, "epsilon": 1e-8, "clip": 10.0}},
     ],
     ids=str,
 )
@@ -150,6 +153,14 @@ def test_a_damaged_description(env, tmp_path, values):
     save(tmp_path, env)
     change(tmp_path / ABOUT, **values)
     with pytest.raises(DataFileError, match=r"policy\.json"):
+        SavedModel.find(tmp_path).load(env, ENV_ID)
+
+
+def test_weights_that_are_not_finite(env, tmp_path):
+    weights = save(tmp_path, env).policy.state_dict()
+    weights["log_std"][0] = torch.nan
+    save_file(weights, tmp_path / WEIGHTS)
+    with pytest.raises(DataFileError, match="not finite"):
         SavedModel.find(tmp_path).load(env, ENV_ID)
 
 
