@@ -42,6 +42,9 @@ Floats = NDArray[np.float64]
 LONGEST_EPISODE, MOST_SUBSTEPS = 1e6, 100_000
 """Seconds of an episode and substeps of a control step at most."""
 
+MOST_BAUMGARTE = 1e6
+"""Largest parameter of Baumgarte's [1/s]; a substep of 1 us integrates no larger one."""
+
 
 class EpisodeBatch:
     """`num_envs` episodes of a task.
@@ -65,7 +68,7 @@ class EpisodeBatch:
         check_choice("integrator", s.integrator, INTEGRATORS if is_paper else SCHEMES)
         check_choice("drive", s.drive, ("prescribed", "motor"))
         for name in ("baumgarte_alpha", "baumgarte_beta"):
-            check_number(name, getattr(s, name), low=0.0)
+            check_number(name, getattr(s, name), low=0.0, high=MOST_BAUMGARTE)
         if is_paper:
             check_paper(s)
         self.geometry = load_geometry(s.preset)
@@ -105,6 +108,8 @@ class EpisodeBatch:
         self.paper = PaperSolver(s, self.engine, self.substeps) if is_paper else None
         self._varied = np.zeros(num_envs, bool)
         self.names = [entry[0] for entry in entries(self.groups, s.trunk)]
+        if not self.names:
+            raise ParameterError(f"observation: nothing of {s.observation!r} is observed on a fixed trunk")
         columns = self.engine.columns
         self.episode = np.zeros((e.EPISODE_ROWS, columns))
         self.episode[e.ACTION : e.ACTION + e.ACTIONS] = 0.0
@@ -322,6 +327,8 @@ class EpisodeBatch:
 
     def failure(self, env: int) -> str:
         """Why an episode failed, for people."""
+        if self.paper and self.paper.apart[env]:
+            return "the linkage came apart; the state was put back to the last good one"
         result = Result(int(self.engine.results[env]))
         return result.message if result is not Result.OK else "the trunk left its range of heights"
 
@@ -361,9 +368,10 @@ class EpisodeBatch:
                 f"state['episode']: expected shape {expected} for {self.num_envs} environments, "
                 f"got {episode.shape}"
             )
+        of_paper = self.paper.read_state(state.get("paper")) if self.paper else None
         self.engine.set_state(state["engine"])
-        if self.paper:
-            self.paper.set_state(state.get("paper", {}))
+        if self.paper and of_paper:
+            self.paper.set_state(*of_paper)
         self.episode[:, : self.num_envs] = episode
         self._varied[:] = True
         self._look(self.desk)

@@ -27,6 +27,11 @@ from hoof_env.errors import ParameterError
 from hoof_env.gait.parameters import GaitParameters
 
 Floats = NDArray[np.float64]
+Records = NDArray[np.void]
+
+APART = 1.0
+"""A linkage that violates its constraints by more [m, rad] has diverged, though its numbers may still be
+finite, up to 1e300."""
 
 
 def check_paper(settings: Settings) -> None:
@@ -51,7 +56,8 @@ class PaperSolver:
 
     Attributes:
         legs: the solvers.
-        traces: the rows of each one's last control step, or of its start.
+        traces: the rows of each one's last control step; the one where it is after a start or a failure.
+        apart: whose loops came apart by more than `APART` in the last control step, which then failed.
     """
 
     def __init__(self, settings: Settings, engine: TrunkEngine, substeps: int) -> None:
@@ -65,7 +71,8 @@ class PaperSolver:
             for _ in range(engine.num_envs)
         ]  # fmt: skip
         self.traces = [new_trace(1) for _ in self.legs]
-        self._accounts = np.zeros(len(self.legs), ACCOUNT)
+        self.apart = np.zeros(len(self.legs), bool)
+        self._accounts: Records = np.zeros(len(self.legs), ACCOUNT)
         self._accounts["threshold"] = LIFT_OFF * engine.weight
 
     def start(self, envs: Sequence[int], gaits: Floats, crank_angle: Floats, x: Floats) -> None:
@@ -83,7 +90,11 @@ class PaperSolver:
         memory, h = self._memory(), self.legs[0].sim_dt
         for env, leg in enumerate(self.legs):
             trace = new_trace(self.substeps)
+            kept, self.traces[env] = leg.state.copy(), self.traces[env][-1:]
             result = leg.advance(memory.command[0, :, env], trace)
+            self.apart[env] = result is Result.OK and np.abs(leg.closure().error).max() > APART
+            if self.apart[env]:
+                result, leg.state = Result.NOT_FINITE, kept
             memory.result[env] = result
             memory.stride_sums[:, :, env] = 0.0
             if result is Result.OK:
@@ -111,26 +122,37 @@ class PaperSolver:
             "last": np.array([trace[-1] for trace in self.traces]),
         }
 
-    def set_state(self, state: Mapping[str, Any]) -> None:
-        """Put back what `get_state` gave, after the engine's memory.
+    def read_state(self, state: Any) -> tuple[list[ConstrainedState], Records, Records]:
+        """What `get_state` gave, as `set_state` takes it.
 
         Raises:
             ParameterError: the state is not of such a solver.
         """
         try:
-            legs = [ConstrainedState(**{k: np.array(v) for k, v in one.items()}) for one in state["legs"]]
+            legs = [_state_like(leg.state, one) for leg, one in zip(self.legs, state["legs"], strict=True)]
             accounts, last = np.array(state["accounts"], ACCOUNT), np.array(state["last"], new_trace(0).dtype)
-            if not len(legs) == len(accounts) == len(last) == len(self.legs):
+            if not len(accounts) == len(last) == len(legs):
                 raise ValueError
-        except (KeyError, TypeError, ValueError, AttributeError):
+            if not np.isfinite([(leg.q, leg.qd) for leg in legs]).all():
+                raise ValueError
+        except (KeyError, TypeError, ValueError, AttributeError, IndexError):
             raise ParameterError(
                 f"state['paper']: expected what get_state gives of {len(self.legs)} legs, got {state!r:.60}"
             ) from None
+        return legs, accounts, last
+
+    def set_state(self, legs: Sequence[ConstrainedState], accounts: Records, last: Records) -> None:
+        """Put back what `read_state` gave, after the engine's memory."""
         self._accounts = accounts
         memory = self._memory()
         for env, (leg, leg_state) in enumerate(zip(self.legs, legs, strict=True)):
             leg.state, self.traces[env] = leg_state, last[env : env + 1]
             self._put(env, memory)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        for leg in self.legs:
+            leg.state = _state_like(leg.state, vars(leg.state))
 
     def _memory(self) -> Memory:
         data, _, _, _, constants, reactions = self.engine.arrays
@@ -148,3 +170,10 @@ class PaperSolver:
         memory.limb_report[0, :, env] = [now[name] for name in LIMB_REPORT]
         account = self._accounts[env]
         memory.strides[0, :, env] = account["open"], account["opened_at"], account["peak"]
+
+
+def _state_like(own: ConstrainedState, given: Mapping[str, Any]) -> ConstrainedState:
+    """A copy of a given state with the types and shapes of one's own. NumPy's records are arrays after a
+    deep copy and cannot be written to after a pickle; kernels take records, and write to them."""
+    parts = {name: np.array(given[name], v.dtype).reshape(v.shape)[()] for name, v in vars(own).items()}
+    return ConstrainedState(**parts)

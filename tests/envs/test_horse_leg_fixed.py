@@ -1,10 +1,13 @@
 """The paper's set-up stands on the ground of its preset; the training environment keeps its own."""
 
+import copy
 import json
+import pickle
 
 import gymnasium as gym
 import numpy as np
 import pytest
+from family import actions, same
 
 import hoof_env  # noqa: F401
 from hoof_env.envs.trace_names import trace_of
@@ -65,3 +68,95 @@ def test_bad_values_are_refused(soft, tmp_path):
     path.write_text(json.dumps({**read_preset(soft), "ground": {"n": 1.4}}), encoding="utf-8")
     with pytest.raises(DataFileError, match=r"bad\.json.*'n'"):
         gym.make(FIXED, preset=str(path))
+
+
+PAPER = {"solver": "paper", "gait": "run", "autoreset_mode": "DISABLED"}
+
+
+def elsewhere(env):
+    """Another environment in the same state, which was pickled meanwhile."""
+    other = gym.make_vec(FIXED, num_envs=env.num_envs, **PAPER)
+    other.set_state(pickle.loads(pickle.dumps(env.get_state())))
+    return other
+
+
+def in_a_copy(env):
+    """The same with a state that was copied."""
+    other = gym.make_vec(FIXED, num_envs=env.num_envs, **PAPER)
+    other.set_state(copy.deepcopy(env.get_state()))
+    return other
+
+
+COPIES = [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env)), elsewhere, in_a_copy]
+
+
+@pytest.mark.parametrize("copied", COPIES, ids=["deepcopy", "pickle", "state", "copied state"])
+def test_the_papers_solver_goes_on_alike_from_a_copy(copied):
+    """In the air, through contact, and after a reset of some."""
+    env, mask = gym.make_vec(FIXED, num_envs=2, **PAPER), np.array([False, True])
+    env.reset(seed=1, options={"crank_angle": 1.5})
+    first, second = actions(0, 5, 2), actions(1, 8, 2)
+    for action in first:
+        env.step(action)
+    twin = copied(env)
+    highest = 0.0
+    for k, action in enumerate(second):
+        if k == 6:
+            same(*(e.reset(options={"reset_mask": mask, "gait": "walk"})[0] for e in (env, twin)))
+        one = env.step(action)
+        same(one[:4], twin.step(action)[:4])
+        highest = max(highest, env.batch.summary(0)["peak_grf_n"])
+    assert highest > 0
+
+
+def test_a_row_of_the_papers_solver_is_the_environment_alone():
+    env = gym.make_vec(FIXED, num_envs=3, **PAPER)
+    singles = [gym.make(FIXED, solver="paper", gait="run") for _ in range(3)]
+    options = {"crank_angle": 1.5}
+    starts = [one.reset(seed=4 + k, options=options)[0] for k, one in enumerate(singles)]
+    same(env.reset(seed=4, options=options)[0], np.array(starts))
+    for taken in actions(2, 6, 3):
+        rows = [one.step(action) for one, action in zip(singles, taken, strict=True)]
+        for whole, *each in zip(env.step(taken)[:4], *rows, strict=False):
+            same(whole, np.array(each))
+
+
+@pytest.mark.parametrize("settings", [{"baumgarte_beta": 1500.0}, {"baumgarte_alpha": 1e6}, {"sim_dt": 0.01}])
+def test_a_linkage_that_diverges_ends_the_episode_and_pays_nothing(settings):
+    env = gym.make(FIXED, solver="paper", gait="run", **settings).unwrapped
+    env.reset(seed=0)
+    env.record()
+    done = False
+    while not done:
+        before, time = env.batch.summary(0), env.batch.paper.legs[0].state.body["t"]
+        observation, reward, done, truncated, info = env.step(np.zeros(4, np.float32))
+        assert not truncated
+        assert np.isfinite(observation).all()
+        assert done or abs(reward) < 10
+    assert "last good" in info["failure"]
+    assert reward == info["reward_failure"] == -30.0
+    assert info["episode_summary"] == {**before, "failed": 1.0}
+    assert env.record()["time"].ravel() == pytest.approx([time])  # where it is
+
+
+def test_a_bad_state_of_the_papers_solver_is_refused_and_changes_nothing():
+    env = gym.make(FIXED, solver="paper").unwrapped
+    env.reset(seed=0)
+    then = env.get_state()
+    env.step(env.action_space.sample())
+    here = pickle.dumps(env.get_state())
+    infinite = copy.deepcopy(then["paper"])
+    infinite["legs"][0]["q"][3] = np.inf
+    short = {**then["paper"], "legs": [{**then["paper"]["legs"][0], "qd": np.zeros(41)}]}
+    message = r"state\['paper'\]: expected what get_state gives of 1 legs"
+    for bad in (None, 5, {}, {**then["paper"], "legs": []}, infinite, short):
+        with pytest.raises(ParameterError, match=message):
+            env.set_state({**then, "paper": bad})
+        assert pickle.dumps(env.get_state()) == here
+
+
+def test_parameters_that_no_step_integrates_and_empty_observations_are_refused():
+    with pytest.raises(ParameterError, match=r"baumgarte_beta: expected .*1e\+06\], got 1e\+200"):
+        gym.make(FIXED, solver="paper", baumgarte_beta=1e200)
+    with pytest.raises(ParameterError, match=r"observation: nothing of \['trunk'\] is observed on a fixed"):
+        gym.make(FIXED, observation=["trunk"])
