@@ -12,9 +12,11 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-from agents import checkpoints, runs
+from agents import checkpoints
+from agents.baselines_plan import CURVE_SEEDS
+from agents.baselines_run import policy_of
 from agents.distribute_space import ENV
-from agents.learning_bar import EPISODES, returns
+from agents.score import score_vector
 from agents.train import Args, train
 from agents.watch import DivergedError
 from hoof_env.errors import DataFileError, ParameterError
@@ -46,8 +48,9 @@ def train_trial(config: dict[str, Any]) -> None:
     if kept:
         kept.to_directory(str(folder))
     reporter = make_reporter(folder, config, env_kwargs, kept.get_metadata() if kept else {})
+    # The reporter keeps the checkpoints: two of the same step would not go into one folder
     args = Args(
-        **config["train"], seed=config["seed"], out=folder, resume=True,
+        **config["train"], seed=config["seed"], out=folder, resume=True, checkpoint_every=0,
         env_kwargs=(json.dumps(env_kwargs),), params=(json.dumps(params),),
     )  # fmt: skip
     sys.orig_argv = shlex.split(config["command"])
@@ -63,8 +66,8 @@ def train_trial(config: dict[str, Any]) -> None:
 
 def make_reporter(folder: Path, config: dict[str, Any], env_kwargs: dict[str, Any], last: Any) -> Any:
     """The callback that scores the policy, keeps a checkpoint and reports both to Tune. `last` holds the last
-    score: "return", mean over `EPISODES` fresh episodes; "steps"; "train_s", seconds of training, scores and
-    retried parts aside."""
+    score: "return", mean over the episodes of `CURVE_SEEDS`; "steps"; "train_s", seconds of training, scores
+    and retried parts aside."""
     from ray import tune
     from stable_baselines3.common.callbacks import BaseCallback
 
@@ -74,7 +77,6 @@ def make_reporter(folder: Path, config: dict[str, Any], env_kwargs: dict[str, An
         last: dict[str, float]
 
         def _on_training_start(self) -> None:
-            self.envs = runs.make_vec_env(env_id, EPISODES, **env_kwargs)
             self.train_s, self.since = self.last.get("train_s", 0.0), time.monotonic()
             self.next = self.num_timesteps + every
 
@@ -89,15 +91,14 @@ def make_reporter(folder: Path, config: dict[str, Any], env_kwargs: dict[str, An
 
         def _on_training_end(self) -> None:
             self._score()
-            self.envs.close()
 
         def _on_step(self) -> bool:
             return True
 
         def _score(self) -> None:
             self.train_s += time.monotonic() - self.since
-            predict = lambda observation: self.model.predict(observation, deterministic=True)[0]  # noqa: E731
-            score = float(returns(self.envs, predict).mean())
+            episodes = score_vector(policy_of(self.model), env_id, CURVE_SEEDS, **env_kwargs)
+            score = sum(one["return"] for one in episodes) / len(episodes)
             self.last = {"return": score, "steps": self.num_timesteps, "train_s": self.train_s}
 
         def report(self) -> None:
