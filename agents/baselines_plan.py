@@ -113,16 +113,16 @@ FIGURES = (
 )
 """What is kept of episodes, those of them that an id has."""
 
+TRANSPORT = ("distance_m", "drive_work_j", "mean_grf_n", "weight_share")
+"""What a cost of transport over several episodes is made of; the force by the share is the weight."""
+
 
 def figures(episodes: Sequence[Mapping[str, float]]) -> dict[str, float]:
     """Means over episodes of `FIGURES`; the cost of transport is that of the distance and work of all of
     them, NaN if they do not get forward."""
     found = {name: float(np.mean([one[name] for one in episodes])) for name in FIGURES if name in episodes[0]}
     if "cost_of_transport" in found:
-        distance, work, force, share = (
-            sum(one[name] for one in episodes)
-            for name in ("distance_m", "drive_work_j", "mean_grf_n", "weight_share")
-        )
+        distance, work, force, share = (sum(one[name] for one in episodes) for name in TRANSPORT)
         done = share and distance > 0
         found["cost_of_transport"] = work * share / (force * distance) if done else float("nan")
     return found

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from agents.baselines_plan import CURVE_SEEDS, FINAL_SEEDS, Entry, Run, figures
+from agents.baselines_plan import CURVE_SEEDS, FINAL_SEEDS, TRANSPORT, Entry, Run, figures
 from agents.baselines_run import CURVE, FINAL, read_curve
 from agents.baselines_stats import Interval, over_seeds
 from agents.evaluate import estimate
@@ -152,13 +152,29 @@ def reference(name: str, policy: Any, env_id: str, env_kwargs: dict[str, Any]) -
     """Score a policy that learns nothing, as `agents.score.score_vector` takes it."""
     episodes = score_vector(policy, env_id, FINAL_SEEDS, **env_kwargs)
     means = figures(episodes)
-    intervals = {}
-    for key, mean in means.items():
-        around = estimate([one[key] for one in episodes])
-        low, high = (np.nan if bound is None else bound for bound in (around.low, around.high))
-        intervals[key] = Interval(mean, low, high)
+    intervals = {key: over_episodes(key, mean, episodes) for key, mean in means.items()}
     curve = score_vector(policy, env_id, CURVE_SEEDS, **env_kwargs)
     return Reference(name, means, intervals, float(np.mean([one["return"] for one in curve])))
+
+
+def over_episodes(key: str, mean: float, episodes: Sequence[Mapping[str, float]]) -> Interval:
+    """The bootstrap's interval around one of `figures`, a mean over episodes; the cost of transport is one of
+    sums, of which whole episodes are drawn."""
+    from scipy.stats import bootstrap
+
+    if key != "cost_of_transport" or not np.isfinite(mean):
+        around = estimate([one[key] for one in episodes])
+        low, high = (np.nan if bound is None else bound for bound in (around.low, around.high))
+        return Interval(mean, low, high)
+    parts = np.array([[one[name] for one in episodes] for name in TRANSPORT])
+
+    def cost(drawn: Any, axis: int = -1) -> Any:
+        distance, work, force, share = parts[:, drawn].sum(axis)
+        return work * share / (force * distance)
+
+    rng = np.random.default_rng(0)
+    bounds = bootstrap((np.arange(len(episodes)),), cost, vectorized=True, rng=rng).confidence_interval
+    return Interval(mean, float(bounds.low), float(bounds.high))
 
 
 def versions_of(rows: Sequence[Row]) -> dict[str, str]:

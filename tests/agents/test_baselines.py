@@ -28,7 +28,7 @@ from agents.baselines_plan import (
     figures,
     runs_of,
 )
-from agents.baselines_results import Reference, read_results, references
+from agents.baselines_results import Reference, over_episodes, read_results, references
 from agents.baselines_run import CURVE, FINAL, Args, read_curve, train_one
 from agents.baselines_stats import Interval, iqm
 from agents.settings import FOLDER, load_settings
@@ -204,6 +204,21 @@ def compared(speed, *lower):
     keys = ("peak_grf_n", "stance_peak_n", "cost_of_transport")
     around = {key: Interval(x, x - 0.1, x + 0.1) for key, x in zip(keys, lower, strict=True)}
     return Compared("", {"speed_m_s": Interval(speed, speed, speed), **around})
+
+
+def test_the_interval_of_the_cost_of_transport_is_around_the_whole():
+    """Far and cheap, or short and dear: the mean of the costs of episodes is far from the cost of all."""
+    far = {"distance_m": 90.0, "drive_work_j": 90.0, "mean_grf_n": 1.0, "weight_share": 1.0,
+           "return": 1.0, "cost_of_transport": 1.0}  # fmt: skip
+    short = {**far, "distance_m": 1.0, "drive_work_j": 10.0, "cost_of_transport": 10.0}
+    episodes = [far, short] * 20
+    cost = figures(episodes)["cost_of_transport"]
+    found = over_episodes("cost_of_transport", cost, episodes)
+    assert found.low < found.mean == cost < found.high < 2
+    assert np.isnan(
+        over_episodes("cost_of_transport", np.nan, [{**far, "cost_of_transport": np.inf}] * 2).low
+    )
+    assert over_episodes("return", 1.0, episodes).low == 1.0
 
 
 @pytest.mark.parametrize(
