@@ -238,11 +238,13 @@ def open_study(args: Args, folder: Path, about: dict[str, Any]) -> Any:
     study = optuna.create_study(
         storage=f"sqlite:///{folder / 'study.db'}",
         study_name="study",
-        sampler=optuna.samplers.TPESampler(seed=args.seed, multivariate=True, n_startup_trials=8),
         pruner=pruners[args.pruner],
         direction="maximize",
         load_if_exists=True,
     )
+    # Of the same seed a study that goes on would draw again what it has drawn
+    seed = args.seed + len(study.trials)
+    study.sampler = optuna.samplers.TPESampler(seed=seed, multivariate=True, n_startup_trials=8)
     about = {"algo": args.algo, "env_id": args.env_id, **about}
     begun = study.user_attrs.get("about", about)
     if unlike := [key for key in about if begun.get(key) != json.loads(json.dumps(about[key]))]:

@@ -70,6 +70,7 @@ def test_a_study_goes_on(folder):
     study = tune(tiny(folder, trials=3))
     assert len(finished(study)) == 3
     assert rows(folder)[:2] == before
+    assert len({row["learning_rate"] for row in rows(folder)}) == 3
 
 
 def test_an_interrupted_trial_does_not_count(tmp_path, monkeypatch):
