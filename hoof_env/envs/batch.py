@@ -341,7 +341,8 @@ class EpisodeBatch:
         return np.clip(wanted, LOW, HIGH)
 
     def action_for(self, gaits: GaitParameters | Floats) -> NDArray[np.float32]:
-        """The action that commands a gait, or gaits of shape (n, 4), to float32 precision."""
+        """The action that commands a gait, or gaits of shape (n, 4), to float32 precision; the nearest one if
+        it is out of reach."""
         values = gaits.to_array() if isinstance(gaits, GaitParameters) else gaits
         return np.clip((values - self._base) / HALF_RANGE, -1, 1).astype(np.float32)
 

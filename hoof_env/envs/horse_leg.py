@@ -119,7 +119,8 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         return self.batch.command_of(action)
 
     def action_for(self, gait: GaitParameters) -> NDArray[np.float32]:
-        """The action that commands the given gait, to float32 precision."""
+        """The action that commands the given gait, to float32 precision; the nearest one if it is out of
+        reach."""
         return self.batch.action_for(gait)
 
     def record(self) -> dict[str, NDArray[np.float64]]:

@@ -53,9 +53,7 @@ def page(task: str) -> str:
         about=what.about,
         action_space=f"Box(-1, 1, ({len(LIMITS)},), float32)",
         actions=_actions(settings),
-        offsets=f"It is added to the {settings.gait}, and the sum is clipped to the commands' limits.\n\n"
-        if settings.gait
-        else "",
+        offsets=_offsets(settings.gait) if settings.gait else "",
         observation_space=f"Box(-1, 1, ({len(observed(task))},), float32)",
         observations=_observations(settings),
         other_groups=", ".join(f"`{group}`" for group in GROUPS if group not in settings.observation),
@@ -147,6 +145,16 @@ def _actions(settings: Settings) -> str:
     )
 
 
+def _offsets(gait: str) -> str:
+    limits = (
+        f"{low:.5g} to {high:.5g} {GROUPS['gait'][k][2]}" for k, (low, high) in enumerate(LIMITS.values())
+    )
+    return (
+        f'It is added to the {gait}, and the sums are clipped to {", ".join(limits)}. What is observed "as'
+        ' action" is -1 and 1 at these limits. A gait out of reach has the nearest action.\n\n'
+    )
+
+
 def _observations(settings: Settings) -> str:
     rows = [(*entry, group) for group in settings.observation for entry in entries([group], settings.trunk)]
     head = ("Num", "Observation", "Scaling", "Unit before scaling", "Group")
@@ -185,6 +193,8 @@ def _start(settings: Settings, options: Mapping[str, float]) -> str:
 
 
 def _leaves(settings: Settings) -> str:
+    if settings.trunk == "fixed":
+        return ' the linkage comes apart, which `solver="paper"` does not rule out, or'
     if settings.trunk != "suspended":
         return ""
     height = settings.hip_height or load_geometry(settings.preset).hip_height

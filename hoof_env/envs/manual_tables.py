@@ -56,9 +56,13 @@ SETTINGS: Rows = {
     "motor_gain": ("N m s/rad", "torque of the motor per difference of crank speed"),
     "motor_torque": ("N m", "largest torque of the motor, at the crank"),
     "motor_inertia": ("kg m^2", "of its rotor, at the crank"),
-    "solver": ("", '"exact": the closed form; "paper": Eq. 8 as the paper solves it, on a fixed trunk'),
+    "solver": (
+        "",
+        '"exact": the closed form; "paper": Eq. 8 as the paper solves it, on a fixed trunk'
+        " over level ground, with a prescribed drive and nothing drawn",
+    ),
     "baumgarte_alpha": ("1/s", "alpha of the paper's solver"),
-    "baumgarte_beta": ("1/s", "beta of the paper's solver; by default as printed, sqrt(2 alpha)"),
+    "baumgarte_beta": ("1/s", "beta of the paper's solver; by default as printed, sqrt(2 * 15)"),
     "integrator": (
         "",
         f"{_one_of(SCHEMES)}; of the paper's solver {_one_of(INTEGRATORS)}; None for midpoint, and for the"

@@ -91,6 +91,7 @@ def test_actions_command_what_the_table_says(page):
         said = [float(row[column]) for row in table]
         if gait := leg.gaits.get(leg.settings.gait):  # offsets, within the limits
             low, high = np.array(list(LIMITS.values())).T
+            assert all(f"{least:.5g} to {most:.5g} " in manual.page(page) for least, most in LIMITS.values())
             said = np.clip(gait.to_array() + said, low, high)
         assert leg.command_of(np.full(4, action, np.float32)) == pytest.approx(said, rel=1e-4, abs=1e-4)
     bounds = leg.engine.filters.to_array()[:, 1]
