@@ -104,6 +104,7 @@ def train(args: Args, *also: Any) -> Trained:
     record = make_record(args, env_kwargs)
     earlier = find_earlier(args, folder, record, settings)
     if finished := earlier.get("finished"):
+        checkpoints.tidy(folder, keep=0)  # of a process that was killed before it did so
         return Trained(folder, finished["steps"], finished["seconds"], None)
     check_folder(folder)
     checkpoints.tidy(folder)
@@ -214,12 +215,17 @@ def find_earlier(
         return {}
     keys = ("env_id", "env_kwargs", "settings", "observation_space", "action_space", "algo", "seed")
     pairs = {key: (earlier.get(key), record.get(key)) for key in keys}
-    pairs["hoof-env"] = earlier["versions"].get("hoof-env"), record["versions"].get("hoof-env")
+    pairs["hoof-env"] = earlier.get("versions", {}).get("hoof-env"), record["versions"].get("hoof-env")
     used = load_settings(folder / "config.yml", args.env_id)
     pairs |= {key: (used.get(key), settings.get(key)) for key in {**used, **settings}}
     unlike = [f"{key}: {there!r} there, {now!r} here" for key, (there, now) in pairs.items() if there != now]
     if unlike:
         raise ParameterError(f"--resume: expected what {folder} was begun with; {'; '.join(unlike)}")
+    kept = earlier.get("finished") or checkpoints.checkpoints(folder)
+    if (
+        not kept and earlier.get("args", {}).get("checkpoint_every") == 0
+    ):  # it would be lost
+        raise OutputError(f"--resume: {folder} holds a model, but no checkpoint to go on from")
     return earlier
 
 

@@ -154,6 +154,14 @@ def test_a_run_is_gone_on_with_only_when_asked(stopped):
         train(arguments("sac", stopped))
 
 
+def test_a_model_without_checkpoints_is_not_written_over(tmp_path):
+    train(arguments("ppo", tmp_path, checkpoint_every=0), At(90, interrupt))
+    before = (tmp_path / WEIGHTS).read_bytes()
+    with pytest.raises(OutputError, match="no checkpoint"):
+        train(arguments("ppo", tmp_path, checkpoint_every=0, resume=True))
+    assert (tmp_path / WEIGHTS).read_bytes() == before
+
+
 def test_a_damaged_checkpoint_is_named_and_an_earlier_one_serves(stopped, tmp_path):
     folder = tmp_path / "run"
     shutil.copytree(stopped, folder)
