@@ -222,9 +222,7 @@ def find_earlier(
     if unlike:
         raise ParameterError(f"--resume: expected what {folder} was begun with; {'; '.join(unlike)}")
     kept = earlier.get("finished") or checkpoints.checkpoints(folder)
-    if (
-        not kept and earlier.get("args", {}).get("checkpoint_every") == 0
-    ):  # it would be lost
+    if not kept and earlier.get("args", {}).get("checkpoint_every") == 0:  # it would be lost
         raise OutputError(f"--resume: {folder} holds a model, but no checkpoint to go on from")
     return earlier
 
