@@ -173,7 +173,7 @@ class PaperSolver:
 
 
 def _state_like(own: ConstrainedState, given: Mapping[str, Any]) -> ConstrainedState:
-    """A copy of a given state with the types and shapes of one's own. NumPy's records are arrays after a
-    deep copy and cannot be written to after a pickle; kernels take records, and write to them."""
+    """A copy of a given state with the types and shapes of one's own: kernels take NumPy's records and write
+    to them, but `np.array` makes arrays of them, and after a pickle nothing can be written."""
     parts = {name: np.array(given[name], v.dtype).reshape(v.shape)[()] for name, v in vars(own).items()}
     return ConstrainedState(**parts)
