@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,7 @@ COLUMNS: Mapping[str, tuple[str, float, int]] = {
     "speed_m_s": ("speed m/s", 1.0, 2),
     "stance_peak_n": ("stance peak kN", 1e-3, 2),
     "peak_grf_n": ("highest GRF kN", 1e-3, 2),
+    "peaks_per_metre": ("peaks per metre kN/m", 1e-3, 2),
     "cost_of_transport": ("cost of transport", 1.0, 3),
     "weight_share": ("weight share", 1.0, 2),
 }
@@ -59,22 +60,34 @@ class Point:
     figures: Mapping[str, float]
 
 
+def of_episodes(episodes: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    """`agents.baselines_plan.figures`, and the sum of the stances' peaks per metre [N/m], which the reward
+    charges, NaN for a gait that does not get forward."""
+    distance, peaks = (sum(one[name] for one in episodes) for name in ("distance_m", "stance_peak_sum_n"))
+    return figures(episodes) | {"peaks_per_metre": peaks / distance if distance > 0 else np.nan}
+
+
 def learned(rows: Iterable[Row]) -> list[Point]:
     """One point for each training."""
     return [
-        Point(LEARNED, row.entry.label, one.final["seed"], one.figures) for row in rows for one in row.results
+        Point(LEARNED, row.entry.label, one.final["seed"], of_episodes(one.final["episodes"]))
+        for row in rows
+        for one in row.results
     ]
 
 
 def others(folder: Path = GAITS) -> list[Point]:
-    """The paper's gaits on the episodes of the agents, and every stored open-loop gait as it was scored."""
-    found = [Point(SCRIPTED, name, -1, figures(score_vector(name, LEG, FINAL_SEEDS))) for name in PAPER]
-    for path in sorted(folder.glob("*.json")):
-        gait = stored(path)
-        if gait["env_id"] == LEG:
-            means = {key: np.nan if x is None else x for key, x in gait["score"]["mean"].items()}
-            found.append(Point(OPEN_LOOP, path.stem.removeprefix("HorseLeg-v0-"), -1, means))
-    return found
+    """The paper's gaits and every stored open-loop gait on the episodes of the agents."""
+    known = [(SCRIPTED, name, name) for name in PAPER]
+    known += [
+        (OPEN_LOOP, path.stem.removeprefix("HorseLeg-v0-"), str(path))
+        for path in sorted(folder.glob("*.json"))
+        if stored(path)["env_id"] == LEG
+    ]
+    return [
+        Point(kind, name, -1, of_episodes(score_vector(policy, LEG, FINAL_SEEDS)))
+        for kind, name, policy in known
+    ]
 
 
 def not_dominated(costs: Any) -> NDArray[np.bool_]:
@@ -135,7 +148,7 @@ def _cell(values: Sequence[float], factor: float, digits: int) -> str:
 
 def level_table(points: Sequence[Point]) -> str:
     """Speed by speed, the least that learned and open-loop gaits reach, of all and of those that bear."""
-    compared = ("stance_peak_n", "peak_grf_n", "cost_of_transport")
+    compared = ("stance_peak_n", "peaks_per_metre", "cost_of_transport")
     titles = [f"{COLUMNS[key][0]}, {kind}" for key in compared for kind in (LEARNED, OPEN_LOOP)]
     lines = [f"| bearing | at least m/s | {' | '.join(titles)} |", "|---|---|" + "---|" * len(titles)]
     for least in (0.0, BEARING):
@@ -158,26 +171,26 @@ def _best_cell(found: Point | None, key: str) -> str:
 
 
 def draw_front(points: Sequence[Point], weight: float, path: Path) -> None:
-    """Speed against stance peak, highest force and cost of transport; marks are filled with the colour of the
-    share of the weight that the leg bears."""
+    """Speed against stance peak, highest force, peaks per metre and cost of transport; the fill of a mark is
+    the share of the weight that the leg bears."""
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
     from hoof_env.paper.figure_style import BLUE, GREY, ORANGE
 
-    moving = [one for one in points if np.isfinite(one.figures["cost_of_transport"])]
     looks = {LEARNED: ("o", BLUE, 34), OPEN_LOOP: ("s", ORANGE, 26), SCRIPTED: ("D", "black", 60)}
-    figure = Figure(figsize=(11, 4.4), layout="constrained")
-    panels = figure.subplots(1, 3)
+    figure = Figure(figsize=(9, 8), layout="constrained")
+    panels = figure.subplots(2, 2).ravel()
     shown = (
         ("stance_peak_n", "mean peak force of a stance [body weights]", 1 / weight),
         ("peak_grf_n", "highest force of an episode [body weights]", 1 / weight),
+        ("peaks_per_metre", "peaks of all stances, per metre [body weights/m]", 1 / weight),
         ("cost_of_transport", "cost of transport [J/(N m)]", 1.0),
     )
     marks: Any = None
     for axes, (key, label, factor) in zip(panels, shown, strict=True):
         for kind, (marker, colour, size) in looks.items():
-            some = [one for one in moving if one.kind == kind]
+            some = [one for one in points if one.kind == kind and np.isfinite(one.figures[key])]
             x, y = (np.array([one.figures[name] for one in some]) for name in ("speed_m_s", key))
             if kind != SCRIPTED and len(some):
                 keep = not_dominated(np.stack([-x, y], 1))
@@ -197,16 +210,13 @@ def draw_front(points: Sequence[Point], weight: float, path: Path) -> None:
         axes.set_ylabel(label)
         axes.set_ylim(bottom=0)
         axes.grid(color=GREY, alpha=0.15)
-    handles: Callable[..., Line2D] = lambda name, look: Line2D(  # noqa: E731
-        [], [], marker=look[0], color=look[1], mfc="white", lw=0 if name == SCRIPTED else 1.2, label=name
-    )
     names = {LEARNED: "learned (PPO), and its front", OPEN_LOOP: "open loop (CMA-ES), and its front",
              SCRIPTED: "the paper's gaits"}  # fmt: skip
-    figure.legend(
-        handles=[handles(name, looks[kind]) for kind, name in names.items()],
-        loc="outside lower center",
-        ncols=3,
-    )
+    handles = [
+        Line2D([], [], marker=marker, color=colour, mfc="white", ls="" if kind == SCRIPTED else "-")
+        for kind, (marker, colour, _) in looks.items()
+    ]
+    figure.legend(handles, [names[kind] for kind in looks], loc="outside lower center", ncols=3)
     figure.colorbar(
         marks, ax=panels, label="share of the weight that the leg bears", fraction=0.025, pad=0.01
     )

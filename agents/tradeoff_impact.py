@@ -127,7 +127,7 @@ def draw_impact(played: Played, weight: float, path: Path) -> dict[str, Floats]:
 
     shown = (
         ("crank_speed", "crank speed [rad/s]"), ("hoof_angle", "hoof angle, heel up [°]"),
-        ("height", "lower end of the hoof above the ground [cm]"), ("force", "normal force [body weights]"),
+        ("height", "height of the hoof's lower end [cm]"), ("force", "normal force [body weights]"),
     )  # fmt: skip
     figure = Figure(figsize=(11, 6), layout="constrained")
     panels = list(figure.subplots(2, 3).flat)

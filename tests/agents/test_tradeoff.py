@@ -141,7 +141,7 @@ def plan(tmp_path):
     )  # fmt: skip
     one = {"return": 1.0, "speed_m_s": 3.0, "peak_grf_n": 4e3, "stance_peak_n": 3e3, "weight_share": 0.5,
            "failed": 0.0, "cost_of_transport": 0.5, "distance_m": 30.0, "drive_work_j": 12855.0,
-           "mean_grf_n": 428.5}  # fmt: skip
+           "mean_grf_n": 428.5, "stance_peak_sum_n": 36e3}  # fmt: skip
     for entry in (*made.entries, made.commanded):
         folder = made.folder / Run(entry, 0).name
         shutil.copytree(SHIPPED / entry.env_id.rpartition("/")[2], folder)
@@ -157,7 +157,7 @@ def test_the_page_says_what_was_done(plan, monkeypatch):
     for module in (tradeoff_front, tradeoff_impact):
         monkeypatch.setattr(module, "FINAL_SEEDS", range(2))
     text = tradeoff.report(plan).read_text()
-    assert "| learned cheap-4 | 3.00 | 3.00 | 4.00 | 0.500 | 0.50 |" in text
+    assert "| learned cheap-4 | 3.00 | 3.00 | 4.00 | 1.20 | 0.500 | 0.50 |" in text
     assert "| learned | 2 |" in text.partition("<!-- stiffness -->")[2]
     assert "is no result" in text
     beside = plan.page.with_suffix("")
