@@ -145,7 +145,8 @@ def plan(tmp_path):
     for entry in (*made.entries, made.commanded):
         folder = made.folder / Run(entry, 0).name
         shutil.copytree(SHIPPED / entry.env_id.rpartition("/")[2], folder)
-        final = {"seed": 0, "steps": 5, "cpu_s": 1.0, "episodes": [one]}
+        final = {"seed": 0, "steps": 5, "cpu_s": 1.0, "episodes": [one],
+                 "env_kwargs": parse_pairs("", entry.env_kwargs)}  # fmt: skip
         (folder / FINAL).write_text(json.dumps(final))
     return made
 
@@ -179,4 +180,11 @@ def test_the_page_says_what_was_done(plan, monkeypatch):
 def test_what_is_missing_is_named(plan):
     (plan.folder / Run(plan.commanded, 0).name / FINAL).unlink()
     with pytest.raises(DataFileError, match=r"ppo-HorseLegSpeed-v0: .*found none"):
+        tradeoff.report(plan)
+
+
+def test_a_training_of_another_reward_is_refused(plan):
+    path = plan.folder / Run(plan.entry(SLOW), 0).name / FINAL
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"env_kwargs": {}}))
+    with pytest.raises(DataFileError, match="outdated"):
         tradeoff.report(plan)
