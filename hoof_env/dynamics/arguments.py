@@ -11,6 +11,7 @@ from hoof_env.errors import ParameterError
 
 Floats = NDArray[np.float64]
 Kind = TypeVar("Kind")
+LARGEST = float(np.finfo(np.float64).max)
 
 
 def count(name: str, value: Any, low: int = 1, most: float = np.inf) -> int:
@@ -25,6 +26,10 @@ def count(name: str, value: Any, low: int = 1, most: float = np.inf) -> int:
 def spread(name: str, value: ArrayLike, shape: tuple[int, ...], most: float = np.inf) -> Floats:
     """`value` as `finite` does, broadcast to `shape`; one number a leg serves all environments."""
     given = finite(name, value, most)
+    if given.shape == shape:
+        return given
+    if not given.ndim:  # broadcast_to would take four times as long
+        return np.full(shape, given)
     if given.ndim == 1 and len(shape) == 2:
         given = given[:, None]
     try:
@@ -39,11 +44,11 @@ def finite(name: str, value: Any, most: float = np.inf) -> Floats:
         given = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):
         given = np.array(np.nan)
-    if value is None or not np.isfinite(given).all():
+    if (np.abs(given) <= min(most, LARGEST)).all():  # in one pass: every reset of an episode comes here
+        return given
+    if not np.isfinite(given).all():
         raise ParameterError(f"{name}: expected finite numbers, got {value!r}")
-    if np.any(np.abs(given) > most):
-        raise ParameterError(f"{name}: expected numbers within +-{most:g}, got {value!r}")
-    return given
+    raise ParameterError(f"{name}: expected numbers within +-{most:g}, got {value!r}")
 
 
 def one_of(name: str, value: Any, kind: type[Kind]) -> Kind:

@@ -47,7 +47,7 @@ def start(
     angle = spread("theta", theta, (legs, n), FARTHEST)
     spin = spread("theta_rate", gaits[:, 0] if theta_rate is None else theta_rate, (legs, n), FARTHEST)
     for i, limb in enumerate(engine.limbs):
-        if not isinstance(limb.drive, Motor) and np.any(spin[i] != gaits[i, 0]):
+        if not isinstance(limb.drive, Motor) and (spin[i] != gaits[i, 0]).any():
             raise ParameterError(
                 f"theta_rate: leg {i} is prescribed to turn at {gaits[i, 0]} rad/s, got {spin[i]}"
             )
@@ -60,9 +60,9 @@ def start(
         ("vx", (RAIL, SUSPENDED, FREE)), ("vy", (SUSPENDED, FREE)), ("pitch", (FREE,)),
         ("pitch_rate", (FREE,)),
     ):  # fmt: skip
-        if kind not in kinds and np.any(at[name] != 0):
+        if kind not in kinds and at[name].any():
             raise ParameterError(f"{name}: expected 0 of a {engine.trunk.kind} trunk, got {at[name]}")
-    if kind <= RAIL and np.any(at["y"] != engine.trunk.height):
+    if kind <= RAIL and (at["y"] != engine.trunk.height).any():
         raise ParameterError(f"y: a {engine.trunk.kind} trunk is at {engine.trunk.height:g} m, got {at['y']}")
     state = np.zeros((len(t.STATE), n))
     rows = (t.CENTRE, t.CENTRE + 1, t.MOMENTUM, t.MOMENTUM + 1, t.PITCH, t.SPIN)

@@ -69,7 +69,7 @@ class GroundPainter:
         self, brush: Brush, terrain: Terrain, size: tuple[int, int], scale: float, clear: float
     ) -> None:
         self._brush, self._size, self._scale, self._clear = brush, size, scale, clear
-        self._knots, self._heights = terrain.x, np.array(terrain.height)
+        self._knots, self._heights = terrain.x, terrain.height_at(terrain.x)
         self._stiffness, self._friction = np.array(terrain.stiffness), np.array(terrain.friction)
         self._level = bool(np.ptp(self._heights) == 0)
         self._labelled = [p for p in find_patches(terrain) if p.end - p.start > LABEL * brush.unit / scale]

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -169,14 +170,18 @@ class Terrain:
         values = {field.name: getattr(self, field.name) for field in fields(self)}
         return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
 
-    @property
+    @cached_property
     def x(self) -> NDArray[np.float64]:
-        """Where the knots are [m]."""
-        return self.start + self.spacing * np.arange(len(self.height), dtype=np.float64)
+        """Where the knots are [m]; read-only."""
+        return _frozen(self.start + self.spacing * np.arange(len(self.height), dtype=np.float64))
+
+    @cached_property
+    def _heights(self) -> NDArray[np.float64]:
+        return _frozen(np.array(self.height))
 
     def height_at(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Height [m] at `x` [m], same shape."""
-        return np.interp(x, self.x, self.height)
+        return np.interp(x, self.x, self._heights)
 
     def to_grid(self) -> TerrainGrid:
         """The terrain for the kernel `surface`."""
@@ -188,6 +193,11 @@ class Terrain:
         (height, stiffness, friction), (rise, harder, rougher) = rows[:, :-1], rises
         cells = np.column_stack([height, rise, 0.0 - slope * ny, ny, stiffness, harder, friction, rougher])
         return TerrainGrid(np.ascontiguousarray(cells), self.start - self.spacing, 1 / self.spacing)
+
+
+def _frozen(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    values.flags.writeable = False
+    return values
 
 
 def _knots(start: float, end: float, spacing: float) -> NDArray[np.float64]:
