@@ -9,10 +9,9 @@ A checkpoint stands between two rollouts. `checkpoints/N/`, after N steps, holds
     policy.*          the policy as agents/safe.py writes it
 
 What goes on from there has the bits of a run that was never stopped: on the same machine, on the CPU, with
-the same number of threads, with environments that have `get_state` and `set_state`, without gSDE (which draws
-its noise anew) and without max_episode_steps around an environment that is not native. Other environments
-start new episodes, with other seeds than the first ones. These files are pickles: resume only runs that you
-trust.
+the same number of threads, with environments that have `get_state` and `set_state`, and without
+max_episode_steps around an environment that is not native. Other environments start new episodes, with other
+seeds than the first ones. These files are pickles: resume only runs that you trust.
 """
 
 from __future__ import annotations
@@ -24,6 +23,7 @@ import random
 import shutil
 import tempfile
 import time
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -36,6 +36,8 @@ from hoof_env.errors import DataFileError, OutputError
 
 KEPT = 2
 REPLAY, STATE = "replay.pkl", "state.pkl"
+EXPLORATION = ("exploration_mat", "exploration_matrices")
+"""What gSDE drew for a rollout, before its first callback."""
 UNFINISHED = ".unfinished-"
 
 
@@ -100,6 +102,7 @@ def save(model: Any, run: Path, seconds: float) -> None:
             "torch": torch.get_rng_state(),
             "actions": model.action_space.np_random.bit_generator.state,
         },
+        "exploration": {name: getattr(_explorer(model), name) for name in EXPLORATION} if model.use_sde else {},
     }
     with whole(run / runs.CHECKPOINTS / str(model.num_timesteps)) as stage:
         runs.write_model(model, stage)
@@ -136,7 +139,11 @@ class Resumed:
             envs: Any = monitor
             if (checkpoint / runs.STATISTICS).exists():
                 envs = VecNormalize.load(str(checkpoint / runs.STATISTICS), monitor)
-            self.model = algorithm.load(checkpoint / "model.zip", env=envs, device=device, force_reset=False)
+            with warnings.catch_warnings():  # of n_steps without its buffer, which is loaded next
+                warnings.filterwarnings("ignore", "`n_steps=", UserWarning)
+                self.model = algorithm.load(
+                    checkpoint / "model.zip", env=envs, device=device, force_reset=False
+                )
             if (checkpoint / REPLAY).exists():
                 self.model.load_replay_buffer(checkpoint / REPLAY)
             self._put_back(monitor, many)
@@ -173,7 +180,12 @@ class Resumed:
         monitor.results_writer = ResultsWriter(str(path), header=header, override_existing=not there)
 
     def start(self) -> None:
-        """Put back what setting up a training draws from or resets; call it when the training starts."""
+        """Put back what setting up a training resets; call it when the training starts."""
+        if self._noise is not None:
+            self.model.action_noise = self._noise
+
+    def start_rollout(self) -> None:
+        """Put back what was drawn, and is drawn from; call it when the first rollout starts."""
         import torch
 
         generators = self._state["generators"]
@@ -181,8 +193,13 @@ class Resumed:
         np.random.set_state(generators["numpy"])  # noqa: NPY002
         torch.set_rng_state(generators["torch"])
         self.model.action_space.np_random.bit_generator.state = generators["actions"]
-        if self._noise is not None:
-            self.model.action_noise = self._noise
+        for name, drawn in self._state["exploration"].items():
+            setattr(_explorer(self.model), name, drawn)
+
+
+def _explorer(model: Any) -> Any:
+    """The distribution that holds gSDE's noise."""
+    return getattr(model, "actor", model.policy).action_dist
 
 
 def _layer(envs: Any, kind: type) -> Any:

@@ -86,6 +86,8 @@ def make_watch(
                 resumed.start()
 
         def _on_rollout_start(self) -> None:
+            if resumed and self.num_timesteps == self.model._num_timesteps_at_start:
+                resumed.start_rollout()
             check_divergence(self.model, folder)
             late = max_minutes is not None and time.monotonic() - self.started >= 60 * max_minutes
             end = self.stopped_by is not None or late
