@@ -102,7 +102,7 @@ def save(model: Any, run: Path, seconds: float) -> None:
             "torch": torch.get_rng_state(),
             "actions": model.action_space.np_random.bit_generator.state,
         },
-        "exploration": {name: getattr(_explorer(model), name) for name in EXPLORATION} if model.use_sde else {},
+        "exploration": {name: getattr(_explorer(model), name) for name in EXPLORATION if model.use_sde},
     }
     with whole(run / runs.CHECKPOINTS / str(model.num_timesteps)) as stage:
         runs.write_model(model, stage)
