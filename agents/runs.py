@@ -9,6 +9,7 @@
     monitor.csv       return, length and time of every training episode
     checkpoints/N/    what `--resume` goes on from (agents/checkpoints.py), until the training is through
     tensorboard/      curves
+    .lock             held while a process works here
 
 A .zip or .pkl is a pickle and can run any code when it is loaded: load only files that you trust.
 """
@@ -21,7 +22,8 @@ import shlex
 import subprocess
 import sys
 import warnings
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, is_dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -34,7 +36,7 @@ import hoof_env  # also registers the environments
 from agents.safe import ABOUT, WEIGHTS, load_policy, save_policy
 from agents.settings import algorithm_class
 from hoof_env._output import staged
-from hoof_env.errors import DataFileError, ParameterError
+from hoof_env.errors import DataFileError, OutputError, ParameterError
 
 FILES = ("model.zip", WEIGHTS, ABOUT, "config.yml", "run.json", "monitor.csv")
 """What a run without normalisation leaves, TensorBoard's files aside."""
@@ -43,6 +45,26 @@ STATISTICS = "vecnormalize.pkl"
 CHECKPOINTS = "checkpoints"
 
 PACKAGES = ("hoof-env", "numpy", "gymnasium", "numba", "stable-baselines3", "sb3-contrib", "torch")
+
+
+@contextmanager
+def alone(folder: Path) -> Iterator[None]:
+    """Nobody else works in the folder meanwhile; a process that is killed leaves it free.
+
+    Raises:
+        OutputError: another process is at work there.
+    """
+    from filelock import FileLock, Timeout
+
+    lock = FileLock(folder / ".lock")
+    try:
+        lock.acquire(timeout=0)
+    except Timeout:
+        raise OutputError(f"{folder}: another process is at work there; choose another folder") from None
+    try:
+        yield
+    finally:
+        lock.release()
 
 
 def make_env(env_id: str, **kwargs: Any) -> gym.Env[Any, Any]:

@@ -94,11 +94,10 @@ def train(args: Args, *also: Any) -> Trained:
     Raises:
         ParameterError, DataFileError: the arguments, the environment or the hyperparameters do not fit, or
             are not those of the run to go on with.
-        OutputError: the run folder cannot be written or already holds a run.
+        OutputError: the run folder cannot be written, already holds a run, or another process trains there.
         DivergedError: a loss or the policy is not finite any more; the checkpoints before that stay.
     """
     env_kwargs, settings = checked(args)
-    n_envs, steps = settings["n_envs"], settings["n_timesteps"]
     name = args.env_id.rpartition("/")[2]
     folder = args.out or Path("runs", f"{args.algo}-{name}-s{args.seed}-{datetime.now():%Y%m%d-%H%M%S}")
     record = make_record(args, env_kwargs)
@@ -107,6 +106,21 @@ def train(args: Args, *also: Any) -> Trained:
         checkpoints.tidy(folder, keep=0)  # of a process that was killed before it did so
         return Trained(folder, finished["steps"], finished["seconds"], None)
     check_folder(folder)
+    with runs.alone(folder):
+        return _train(args, folder, record, earlier, env_kwargs, settings, also)
+
+
+def _train(
+    args: Args,
+    folder: Path,
+    record: dict[str, Any],
+    earlier: dict[str, Any],
+    env_kwargs: dict[str, Any],
+    settings: dict[str, Any],
+    also: tuple[Any, ...],
+) -> Trained:
+    """`train` in a folder that nobody else works in."""
+    n_envs, steps = settings["n_envs"], settings["n_timesteps"]
     checkpoints.tidy(folder)
     found = checkpoints.checkpoints(folder) if earlier else []
     if found:

@@ -125,7 +125,9 @@ def make_scorer(env_id: str, env_kwargs: Mapping[str, Any], every: int, report: 
             return not self.stopped
 
         def _on_training_end(self) -> None:
-            if not self.curve or self.num_timesteps > self.curve[-1][0]:
+            if not self.stopped:
+                if self.curve and self.curve[-1][0] == self.num_timesteps:
+                    self.curve.pop()  # it is of before the last update
                 self._score()
             self.envs.close()
 
@@ -169,6 +171,14 @@ def tune(args: Args) -> Any:
         runs.warm_up(env)
     folder = args.out or Path("runs/tune", f"{args.algo}-{args.env_id.rpartition('/')[2]}")
     check_folder(folder)
+    with runs.alone(folder):
+        return _tune(args, folder, kwargs, base, space)
+
+
+def _tune(
+    args: Args, folder: Path, kwargs: dict[str, Any], base: dict[str, Any], space: dict[str, Any]
+) -> Any:
+    """`tune` in a folder that nobody else works in."""
     study = open_study(args, folder, {"env_kwargs": kwargs, "base": base, "space": space})
 
     def objective(trial: Any) -> float:

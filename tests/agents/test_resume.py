@@ -83,6 +83,14 @@ def test_a_stopped_run_goes_on_as_if_it_had_not_been(algo, tmp_path):
     assert not (resumed.folder / CHECKPOINTS).exists()
 
 
+def test_one_process_trains_in_a_folder(tmp_path):
+    def start_another(model):
+        with pytest.raises(OutputError, match="another process is at work there"):
+            train(arguments("ppo", tmp_path / "run", resume=True))
+
+    train(arguments("ppo", tmp_path / "run"), At(90, start_another))
+
+
 def test_killed_again_and_again(tmp_path):
     """SIGKILL at random moments: the command with --resume ends as one that was never killed."""
     steps = 128 * 40
@@ -137,7 +145,7 @@ def stopped(tmp_path_factory):
     [
         ({"seed": 1}, "seed: 0 there, 1 here"),
         ({"steps": 200}, "n_timesteps: 160 there, 200 here"),
-        ({"params": (*TINY_OFF, "tau=0.5")}, "tau: None there, 0.5 here"),
+        ({"params": (*TINY_OFF, "tau=0.5")}, "tau: 0.005 there, 0.5 here"),
         ({"env_kwargs": (*SHORT, "trunk=rail")}, "trunk"),
         ({"env_id": "hoof_env/HorseLegRail-v0"}, "HorseLegRail"),
         ({"out": None}, "--out"),
