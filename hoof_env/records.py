@@ -39,7 +39,7 @@ class Setting(NamedTuple):
     Attributes:
         geometry, terrain: the leg and what it stands on.
         weight_n: weight of trunk and leg [N].
-        suspended: whether the trunk hangs from a spring.
+        trunk: its kind, one of `dynamics.trunk.ONE_LEG`.
         lift_off_n: normal force that tells stance from swing [N].
         dt, sim_dt: control step and substep [s].
     """
@@ -47,7 +47,7 @@ class Setting(NamedTuple):
     geometry: Geometry
     terrain: Terrain
     weight_n: float
-    suspended: bool
+    trunk: str
     lift_off_n: float
     dt: float
     sim_dt: float
@@ -67,7 +67,7 @@ def setting(env: Any) -> Setting:
             leg.geometry,
             getattr(leg, "terrain", None) or Terrain.flat(),
             leg.weight,
-            leg.engine.trunk.kind == "suspended",
+            leg.engine.trunk.kind,
             LIFT_OFF * leg.weight,
             leg.dt,
             leg.sim_dt,

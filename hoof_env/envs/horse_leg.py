@@ -257,12 +257,12 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
         assert self._recording is not None
         if self._renderer is None:
-            weight = self.weight if self.settings.trunk == "suspended" else None
             self._renderer = Renderer(
                 self.geometry,
                 str(self.render_mode),
                 self.metadata["render_fps"],
-                weight_n=weight,
+                trunk=self.settings.trunk,
+                weight_n=self.weight,
                 lift_off_n=LIFT_OFF * self.weight,
                 terrain=self.terrain,
             )

@@ -194,8 +194,8 @@ class HorseLegVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
             self._renderers.append(
                 Renderer(
                     self.batch.geometry, "rgb_array", self.metadata["render_fps"],
-                    weight_n=weight if self.settings.trunk == "suspended" else None,
-                    lift_off_n=LIFT_OFF * weight, terrain=engine.terrain,
+                    trunk=self.settings.trunk, weight_n=weight, lift_off_n=LIFT_OFF * weight,
+                    terrain=engine.terrain,
                 )
             )  # fmt: skip
         for recording, renderer in zip(self._recordings, self._renderers, strict=True):
