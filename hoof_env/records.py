@@ -5,8 +5,7 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -90,37 +89,6 @@ def substeps(env: Any, command: NDArray[np.float64] | None = None) -> Columns:
     """
     leg = env.unwrapped
     return columns_of_engine(leg.record(), leg.terrain, command=command)
-
-
-def parse_arguments(option: str, items: Sequence[str]) -> dict[str, Any]:
-    """Read `key=value` items, or JSON objects, into one mapping; a value that is not JSON is kept as text.
-
-    >>> parse_arguments("--args", ["trunk=rail", "restitution=0.5"])
-    {'trunk': 'rail', 'restitution': 0.5}
-
-    Raises:
-        ParameterError: an item is neither.
-    """
-    pairs: dict[str, Any] = {}
-    for item in items:
-        key, equals, text = item.partition("=")
-        try:
-            if item.lstrip().startswith("{"):
-                pairs.update(json.loads(item))
-            elif equals and key.isidentifier():
-                pairs[key] = _value(text)
-            else:
-                raise ValueError(item)
-        except ValueError:
-            raise ParameterError(f"{option}: expected a JSON object or key=value, got {item!r}") from None
-    return pairs
-
-
-def _value(text: str) -> Any:
-    try:
-        return json.loads(text)
-    except ValueError:
-        return text
 
 
 def make_env(env_id: str, arguments: Mapping[str, Any] | None = None) -> gym.Env[Any, Any]:
