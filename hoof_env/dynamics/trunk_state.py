@@ -51,7 +51,7 @@ def read_state(
         if arrays[name].shape != shape:
             raise ParameterError(f"state[{name!r}]: expected shape {shape}, got {arrays[name].shape}")
     trunk, limbs = arrays["trunk"], arrays["limbs"]
-    reset = ~(np.isnan(trunk).all(0) & np.isnan(limbs).all((0, 1)))
+    reset: NDArray[np.bool_] = np.logical_not(np.isnan(trunk).all(0) & np.isnan(limbs).all((0, 1)))
     for name in STATE:
         finite(f"state[{name!r}]", arrays[name][..., reset])
     finite("state['trunk'], places and pitch", trunk[t.CENTRE : t.CENTRE + 2, reset], t.FARTHEST)
