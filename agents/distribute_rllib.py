@@ -66,7 +66,7 @@ def run_rllib(args: Rllib) -> int:
     check_number("seed", args.seed, low=0)
     kwargs = parse_pairs("--env-kwargs", args.env_kwargs)
     with runs.make_env(args.env_id, **kwargs) as env:
-        if env.spec is None or env.spec.vector_entry_point is None:
+        if env.spec is None or env.spec.vector_entry_point is None or hasattr(env.unwrapped, "reward_space"):
             raise ParameterError(f"env_id: expected one with a native vector environment, got {args.env_id}")
         runs.warm_up(env)
     start(args)

@@ -43,7 +43,7 @@ def write_card(
         loader=FileSystemLoader(TEMPLATES), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     ).get_template("model_card.md.j2")
     with runs.make_env(env_id) as env:
-        suspended = setting(env).suspended
+        suspended = setting(env).trunk == "suspended"
     steps, seconds = length(choice.saved.path.parent, record)
     text = template.render(
         env_id=env_id,

@@ -79,5 +79,6 @@ for _name, _task in _TASKS.items():
 _register(
     "HorseLegMO-v0",
     entry_point="hoof_env.envs.multi_objective:HorseLegMOEnv",
+    vector_entry_point="hoof_env.envs.multi_objective:refuse_many",
     disable_env_checker=True,  # it expects a number for a reward
 )

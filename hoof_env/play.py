@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env import records
+from hoof_env._arguments import parse_pairs
 from hoof_env.envs.render_instant import Instant, instants
 from hoof_env.errors import HoofEnvError, check_number
 from hoof_env.gait.parameters import GaitParameters
@@ -128,7 +129,7 @@ def play(
     """Open a window and let a person play; returns the game when it is left.
 
     Args:
-        env_id, arguments: the environment, its arguments as `records.parse_arguments` reads them.
+        env_id, arguments: the environment, its arguments as `parse_pairs` reads them.
         seed: of the first episode.
         slow: how many times slower than life it runs.
         size: of the picture [pixels].
@@ -146,7 +147,7 @@ def play(
         raise HoofEnvError('playing needs pygame-ce: pip install "hoof-env[render]"') from None
     from hoof_env.envs.rendering import new_renderer
 
-    with records.make_env(env_id, records.parse_arguments("--args", arguments)) as env:
+    with records.make_env(env_id, parse_pairs("--args", arguments)) as env:
         game = Game(env, seed)
         renderer = new_renderer(records.setting(env), 1 / game.dt, size)
         window = _open_window(pygame, (size[0], size[1] + _strip(size)), env_id)

@@ -5,8 +5,7 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -39,7 +38,7 @@ class Setting(NamedTuple):
     Attributes:
         geometry, terrain: the leg and what it stands on.
         weight_n: weight of trunk and leg [N].
-        suspended: whether the trunk hangs from a spring.
+        trunk: its kind, one of `dynamics.trunk.ONE_LEG`.
         lift_off_n: normal force that tells stance from swing [N].
         dt, sim_dt: control step and substep [s].
     """
@@ -47,7 +46,7 @@ class Setting(NamedTuple):
     geometry: Geometry
     terrain: Terrain
     weight_n: float
-    suspended: bool
+    trunk: str
     lift_off_n: float
     dt: float
     sim_dt: float
@@ -67,7 +66,7 @@ def setting(env: Any) -> Setting:
             leg.geometry,
             getattr(leg, "terrain", None) or Terrain.flat(),
             leg.weight,
-            leg.engine.trunk.kind == "suspended",
+            leg.engine.trunk.kind,
             LIFT_OFF * leg.weight,
             leg.dt,
             leg.sim_dt,
@@ -90,37 +89,6 @@ def substeps(env: Any, command: NDArray[np.float64] | None = None) -> Columns:
     """
     leg = env.unwrapped
     return columns_of_engine(leg.record(), leg.terrain, command=command)
-
-
-def parse_arguments(option: str, items: Sequence[str]) -> dict[str, Any]:
-    """Read `key=value` items, or JSON objects, into one mapping; a value that is not JSON is kept as text.
-
-    >>> parse_arguments("--args", ["trunk=rail", "restitution=0.5"])
-    {'trunk': 'rail', 'restitution': 0.5}
-
-    Raises:
-        ParameterError: an item is neither.
-    """
-    pairs: dict[str, Any] = {}
-    for item in items:
-        key, equals, text = item.partition("=")
-        try:
-            if item.lstrip().startswith("{"):
-                pairs.update(json.loads(item))
-            elif equals and key.isidentifier():
-                pairs[key] = _value(text)
-            else:
-                raise ValueError(item)
-        except ValueError:
-            raise ParameterError(f"{option}: expected a JSON object or key=value, got {item!r}") from None
-    return pairs
-
-
-def _value(text: str) -> Any:
-    try:
-        return json.loads(text)
-    except ValueError:
-        return text
 
 
 def make_env(env_id: str, arguments: Mapping[str, Any] | None = None) -> gym.Env[Any, Any]:

@@ -11,13 +11,14 @@ import numpy as np
 import pytest
 
 from hoof_env import __version__, cli
+from hoof_env._arguments import parse_pairs
 from hoof_env.dynamics.engine import GRAVITY
 from hoof_env.dynamics.trunk_rows import MOMENTUM
 from hoof_env.envs.policies import make_policy
 from hoof_env.errors import HoofEnvError, OutputError, ParameterError
 from hoof_env.export.files import MOT_COLUMNS, export_episode, write
 from hoof_env.leg.geometry import load_geometry
-from hoof_env.records import RECORD, describe, find_policy, make_env, parse_arguments, record_episode
+from hoof_env.records import RECORD, describe, find_policy, make_env, record_episode
 
 LEG = "hoof_env/HorseLeg-v0"
 
@@ -206,12 +207,12 @@ def test_policies_by_name_and_by_four_numbers():
 
 
 def test_arguments_are_pairs_or_objects():
-    assert parse_arguments("--args", ["trunk=rail", "dt=0.01", '{"preset": null}']) == {
+    assert parse_pairs("--args", ["trunk=rail", "dt=0.01", '{"preset": null}']) == {
         "trunk": "rail", "dt": 0.01, "preset": None,
     }  # fmt: skip
     for bad in ("trunk", "=3", "{trunk: 1}"):
         with pytest.raises(ParameterError, match="--args"):
-            parse_arguments("--args", [bad])
+            parse_pairs("--args", [bad])
 
 
 def test_a_wrapped_environment_is_recorded_alike(episode):

@@ -68,6 +68,10 @@ class State:
         """An independent copy."""
         return State(self.body.copy(), self.motion.copy(), self.filters.copy(), self.contacts.copy())
 
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        # A record that was pickled has memory that writing by name misses; one taken from an array has not.
+        vars(self).update({name: np.array(values)[()] for name, values in state.items()})
+
 
 @dataclass
 class Tables:

@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike, NDArray
 from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
 from hoof_env.dynamics.advance import (
-    LANES,
     LIMB,
     LIMB_ROWS,
     STARTS,
@@ -39,15 +38,16 @@ from hoof_env.dynamics.step_length import StepLength
 from hoof_env.dynamics.tally import Tally, tally
 from hoof_env.dynamics.trunk import Trunk
 from hoof_env.dynamics.trunk_model import (
-    Memory,
-    differences,
-    layout,
+    check_shared,
+    columns_for,
     memory_of,
+    named_rows,
     new_memory,
     new_model,
     settings_of,
 )
-from hoof_env.dynamics.trunk_start import FARTHEST, start
+from hoof_env.dynamics.trunk_start import gaits_of, start, which
+from hoof_env.dynamics.trunk_state import STATE, layout, read_state
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait.motion_law import FilterSettings
 from hoof_env.gait.parameters import GaitParameters
@@ -61,13 +61,8 @@ FEW = 6
 MOST_LEGS = 32
 """Legs of an engine; its kernels work on the stack, where eight lanes take 15 kB a leg."""
 
-_FIRST_ROW = b.PARAMETERS.index("first_row")
-
 MOST_STEPS = 10**12
 """Substeps of a call, which are counted in 64 bits."""
-
-STATE = ("trunk", "limbs", "strides", "command", "account", "trunk_settings", "limb_settings")
-"""Arrays that hold what changes."""
 
 
 class Reactions(NamedTuple):
@@ -84,20 +79,6 @@ class Reactions(NamedTuple):
     lock: Floats
     driver: Floats
     hip: Floats
-
-
-def _named(memory: Memory) -> dict[str, Floats]:
-    """State and report by name, as views."""
-    parts = ((t.STATE, memory.trunk), (TRUNK_REPORT, memory.trunk_report))
-    found = {name: rows[k] for names, rows in parts for k, name in enumerate(names)}
-    limbs = ((b.STATE, memory.limbs), (LIMB_REPORT, memory.limb_report))
-    return found | {name: rows[:, k] for names, rows in limbs for k, name in enumerate(names)}
-
-
-def _columns(num_envs: int) -> int:
-    """Whole groups of lanes; one more where rows of memory would begin in the same few sets of the cache."""
-    columns = -(-num_envs // LANES) * LANES
-    return columns + LANES if columns % 128 == 0 else columns
 
 
 class TrunkEngine:
@@ -167,7 +148,7 @@ class TrunkEngine:
         alone = {1: advance_leg, 4: advance_four}.get(len(self.limbs))
         self.is_few = alone is not None and self.num_envs <= FEW
         self._run = (alone if self.is_few else None) or advance_batch
-        self._memory = new_memory(self, self.num_envs if self.is_few else _columns(self.num_envs))
+        self._memory = new_memory(self, self.num_envs if self.is_few else columns_for(self.num_envs))
         self._model = new_model(self)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -271,8 +252,8 @@ class TrunkEngine:
             ParameterError: a value is not finite, of the wrong shape or forbidden by the trunk's kind, an
                 angle, place or rate is beyond `trunk_start.FARTHEST`, or a leg's links have no place there.
         """
-        where, a = self._which(envs), self._memory
-        values = self._gaits(gaits, where.size)
+        where, a = which(envs, self.num_envs), self._memory
+        values = gaits_of(gaits, len(self.limbs), where.size)
         height = self.trunk.height if y is None else y
         at = {"x": x, "y": height, "pitch": pitch, "vx": vx, "vy": vy, "pitch_rate": pitch_rate}
         a.trunk[:, where], a.limbs[:, :, where] = start(self, values, theta, theta_rate, at, where.size)
@@ -298,20 +279,8 @@ class TrunkEngine:
         env = self._env(env)
         trunk = self.trunk if trunk is None else one_of("trunk", trunk, Trunk)
         ground = self.ground if ground is None else one_of("ground", ground, Ground)
-        shared = {
-            "trunk.kind": (trunk.kind, self.trunk.kind),
-            "trunk.height": (trunk.height, self.trunk.height),
-            "exponent": (ground.exponent, self.ground.exponent),
-        }
-        shared["friction_law"] = (ground.friction_law, self.ground.friction_law)
-        shared["approach"] = (ground.approach, self.ground.approach)
-        for name, (given, own) in shared.items():
-            if given != own:
-                raise ParameterError(f"{name}: expected {own!r}, which all environments share, got {given!r}")
         limbs = [limb if drive is None else replace(limb, drive=drive) for limb in self.limbs]
-        for limb, own_limb in zip(limbs, self.limbs, strict=True):
-            if type(limb.drive) is not type(own_limb.drive):
-                raise ParameterError(f"drive: expected a {type(own_limb.drive).__name__}, got {limb.drive!r}")
+        check_shared(self, trunk, ground, limbs)
         m = self._memory
         m.trunk_settings[:, env], m.limb_settings[:, :, env] = settings_of(self, trunk, ground, limbs)
 
@@ -326,30 +295,7 @@ class TrunkEngine:
             ParameterError: the state belongs to an engine that would go on differently, lacks a part, or has
                 numbers that are not finite or beyond `FARTHEST`, in environments that were reset once.
         """
-        parts = (*STATE, "layout")
-        missing = sorted(set(parts) - set(state)) if isinstance(state, Mapping) else parts
-        if missing or not isinstance(state["layout"], Mapping):
-            lack = ", ".join(missing) or "a layout by name"
-            raise ParameterError(f"state: expected what get_state gives, but {lack} is missing")
-        if unlike := differences(layout(self), dict(state["layout"])):
-            raise ParameterError(f"state: of another engine; {unlike}")
-        arrays = {}
-        for name in STATE:
-            shape = getattr(self._memory, name).shape
-            try:
-                arrays[name] = np.array(state[name], dtype=np.float64)
-            except (TypeError, ValueError):
-                raise ParameterError(f"state[{name!r}]: expected numbers, got {state[name]!r}") from None
-            if arrays[name].shape != shape:
-                raise ParameterError(f"state[{name!r}]: expected shape {shape}, got {arrays[name].shape}")
-        trunk, limbs = arrays["trunk"], arrays["limbs"]
-        reset = ~(np.isnan(trunk).all(0) & np.isnan(limbs).all((0, 1)))
-        for name in STATE:
-            finite(f"state[{name!r}]", arrays[name][..., reset])
-        finite("state['trunk'], places and pitch", trunk[t.CENTRE : t.CENTRE + 2, reset], FARTHEST)
-        finite("state['trunk'], places and pitch", trunk[t.PITCH, reset], FARTHEST)
-        finite("state['limbs'], crank angles", limbs[:, b.THETA, reset], FARTHEST)
-        arrays["limb_settings"][:, _FIRST_ROW] = self._memory.limb_settings[:, _FIRST_ROW]  # an address
+        arrays, reset = read_state(self, self._memory, state)
         self._put(arrays)
         self._memory.result[reset], self._memory.stride_sums[:] = 0.0, 0.0
         self._look()
@@ -406,7 +352,7 @@ class TrunkEngine:
                 break
             whole[..., row] = m.data
         kept = memory_of(whole[..., :rows], self.num_envs, m.constants, m.reactions)
-        named = {name: np.moveaxis(values, -1, 0) for name, values in _named(kept).items()}
+        named = {name: np.moveaxis(values, -1, 0) for name, values in named_rows(kept).items()}
         return named | {"result": self.results}
 
     def _command(self, command: ArrayLike) -> None:
@@ -443,13 +389,13 @@ class TrunkEngine:
     def state(self) -> dict[str, Floats]:
         """The state by name: rows of `trunk_rows.STATE`, shape (num_envs,), and of `limb_rows.STATE`, shape
         (legs, num_envs)."""
-        named = _named(self._memory)
+        named = named_rows(self._memory)
         return {name: named[name].copy() for name in (*t.STATE, *b.STATE)}
 
     @property
     def report(self) -> dict[str, Floats]:
         """What acts at the present instant: `lanes_report.TRUNK_REPORT` and `LIMB_REPORT` by name."""
-        named = _named(self._memory)
+        named = named_rows(self._memory)
         return {name: named[name].copy() for name in (*TRUNK_REPORT, *LIMB_REPORT)}
 
     @property
@@ -491,31 +437,3 @@ class TrunkEngine:
             "this environment was never reset" if new else Result(int(code)).message
             for code, new in zip(self._memory.result, np.atleast_1d(never), strict=True)
         ]
-
-    def _gaits(self, gaits: Any, n: int) -> Floats:
-        """Gait parameters as numbers, shape (legs, 4, n)."""
-        legs = len(self.limbs)
-        if isinstance(gaits, np.ndarray):
-            given = finite("gaits", gaits, FARTHEST)
-            if given.shape != (legs, 4, n):
-                raise ParameterError(f"gaits: expected shape {(legs, 4, n)}, got {given.shape}")
-            return given
-        each = all_of("gaits", [gaits] * legs if isinstance(gaits, GaitParameters) else gaits, GaitParameters)
-        if len(each) != legs:
-            raise ParameterError(f"gaits: expected one or {legs}, got {len(each)}")
-        return np.repeat(np.array([gait.to_array() for gait in each])[:, :, None], n, 2)
-
-    def _which(self, envs: ArrayLike | None) -> NDArray[np.int64]:
-        if envs is None:
-            return np.arange(self.num_envs)
-        given = np.asarray(envs)
-        if given.dtype == bool and given.shape == (self.num_envs,):
-            return np.flatnonzero(given)
-        if given.shape == (0,):
-            return np.arange(0)
-        if given.dtype.kind in "iu" and given.ndim == 1 and np.all((given >= 0) & (given < self.num_envs)):
-            return given.astype(np.int64)
-        raise ParameterError(
-            f"envs: expected indices below {self.num_envs} or a mask of shape ({self.num_envs},), "
-            f"got {envs!r}"
-        )

@@ -1,20 +1,19 @@
-"""What the kernels of `TrunkEngine` work on: its settings as arrays, and what makes one engine another."""
+"""What the kernels of `TrunkEngine` work on: its memory, and its settings as arrays."""
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Sequence
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
-from hoof_env.dynamics.advance import LIMB, LIMB_ROWS, MODEL, TRUNK, TRUNK_ROWS
+from hoof_env.dynamics.advance import LANES, LIMB, LIMB_ROWS, MODEL, TRUNK, TRUNK_ROWS
 from hoof_env.dynamics.drive import Motor
 from hoof_env.dynamics.engine import GRAVITY
+from hoof_env.dynamics.lanes_report import LIMB_REPORT, TRUNK_REPORT
 from hoof_env.dynamics.limb import Limb
 from hoof_env.dynamics.reactions import OUTPUTS, leg_constants
 from hoof_env.dynamics.schemes import SCHEMES
@@ -85,6 +84,20 @@ def memory_of(data: Floats, num_envs: int, constants: Floats, reactions: Floats)
     )  # fmt: skip
 
 
+def named_rows(memory: Memory) -> dict[str, Floats]:
+    """State and report by name, as views."""
+    parts = ((t.STATE, memory.trunk), (TRUNK_REPORT, memory.trunk_report))
+    found = {name: rows[k] for names, rows in parts for k, name in enumerate(names)}
+    limbs = ((b.STATE, memory.limbs), (LIMB_REPORT, memory.limb_report))
+    return found | {name: rows[:, k] for names, rows in limbs for k, name in enumerate(names)}
+
+
+def columns_for(num_envs: int) -> int:
+    """Whole groups of lanes; one more where rows of memory would begin in the same few sets of the cache."""
+    columns = -(-num_envs // LANES) * LANES
+    return columns + LANES if columns % 128 == 0 else columns
+
+
 def new_memory(engine: TrunkEngine, columns: int) -> Memory:
     """Memory of an engine whose environments are nowhere, that is not a number, until they are reset."""
     legs = len(engine.limbs)
@@ -128,31 +141,23 @@ def new_model(engine: TrunkEngine) -> tuple[NDArray[Any], Floats, Floats]:
     return model, np.concatenate(tables), grid.cells
 
 
-def layout(engine: TrunkEngine) -> dict[str, Any]:
-    """Everything on which the bits of a run depend, by name, as values that JSON can hold."""
-    found: dict[str, Any] = {
-        name: getattr(engine, name) for name in ("num_envs", "sim_dt", "substeps", "integrator")
-    }
-    for name in ("trunk", "ground", "filters"):
-        found |= {f"{name}.{key}": value for key, value in asdict(getattr(engine, name)).items()}
-    found["terrain"] = _digest(engine.terrain.to_dict())
-    for i, limb in enumerate(engine.limbs):
-        shape = {
-            key: value for key, value in limb.geometry.to_dict().items() if key not in ("name", "provenance")
-        }
-        found |= {f"limbs[{i}].hip": list(limb.hip), f"limbs[{i}].drive": repr(limb.drive)}
-        found[f"limbs[{i}].geometry"] = _digest(shape)
-    return found
+def check_shared(engine: TrunkEngine, trunk: Trunk, ground: Ground, limbs: Sequence[Limb]) -> None:
+    """Raise where one environment's trunk, ground or drives differ in what the kernels take once for all.
 
-
-def differences(expected: dict[str, Any], given: dict[str, Any]) -> str:
-    """Where two layouts differ, for people; empty if nowhere."""
-    names = [name for name in {**expected, **given} if expected.get(name) != given.get(name)]
-    return "; ".join(f"{name}: expected {expected.get(name)!r}, got {given.get(name)!r}" for name in names)
-
-
-def _digest(value: Any) -> str:
-    return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()[:16]
+    Raises:
+        ParameterError: they do.
+    """
+    for name, given, own in (
+        ("trunk.kind", trunk.kind, engine.trunk.kind),
+        ("trunk.height", trunk.height, engine.trunk.height),
+        *((name, getattr(ground, name), getattr(engine.ground, name))
+          for name in ("exponent", "friction_law", "approach")),
+    ):  # fmt: skip
+        if given != own:
+            raise ParameterError(f"{name}: expected {own!r}, which all environments share, got {given!r}")
+    for limb, own_limb in zip(limbs, engine.limbs, strict=True):
+        if type(limb.drive) is not type(own_limb.drive):
+            raise ParameterError(f"drive: expected a {type(own_limb.drive).__name__}, got {limb.drive!r}")
 
 
 def settings_of(

@@ -1,24 +1,64 @@
-"""Where `TrunkEngine` starts: checks of gaits, crank angles and the place and speed of the trunk."""
+"""Where `TrunkEngine` starts: checks of environments, gaits, crank angles and the place and speed of the
+trunk."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
-from hoof_env.dynamics.arguments import Floats, spread
+from hoof_env.dynamics.arguments import Floats, all_of, finite, spread
 from hoof_env.dynamics.drive import Motor
 from hoof_env.dynamics.trunk import FREE, RAIL, SUSPENDED, TRUNKS
 from hoof_env.errors import ParameterError
+from hoof_env.gait.parameters import GaitParameters
 
 if TYPE_CHECKING:
     from hoof_env.dynamics.trunk_engine import TrunkEngine
 
 FARTHEST = t.FARTHEST
+
+
+def which(envs: ArrayLike | None, num_envs: int) -> NDArray[np.int64]:
+    """Environments of `num_envs` as indices; they are given as such, as a mask, or as None for all.
+
+    Raises:
+        ParameterError: neither, or there is no such environment.
+    """
+    if envs is None:
+        return np.arange(num_envs)
+    given = np.asarray(envs)
+    if given.dtype == bool and given.shape == (num_envs,):
+        return np.flatnonzero(given)
+    if given.shape == (0,):
+        return np.arange(0)
+    if given.dtype.kind in "iu" and given.ndim == 1 and np.all((given >= 0) & (given < num_envs)):
+        return given.astype(np.int64)
+    raise ParameterError(
+        f"envs: expected indices below {num_envs} or a mask of shape ({num_envs},), got {envs!r}"
+    )
+
+
+def gaits_of(gaits: Any, legs: int, n: int) -> Floats:
+    """Gait parameters, given as numbers or as `GaitParameters` for all legs or each, as numbers of shape
+    (legs, 4, n).
+
+    Raises:
+        ParameterError: not as many as legs, of another shape or type, or beyond `FARTHEST`.
+    """
+    if isinstance(gaits, np.ndarray):
+        given = finite("gaits", gaits, FARTHEST)
+        if given.shape != (legs, 4, n):
+            raise ParameterError(f"gaits: expected shape {(legs, 4, n)}, got {given.shape}")
+        return given
+    each = all_of("gaits", [gaits] * legs if isinstance(gaits, GaitParameters) else gaits, GaitParameters)
+    if len(each) != legs:
+        raise ParameterError(f"gaits: expected one or {legs}, got {len(each)}")
+    return np.repeat(np.array([gait.to_array() for gait in each])[:, :, None], n, 2)
 
 
 def start(

@@ -27,9 +27,18 @@ from hoof_env.envs import episode as e
 from hoof_env.envs.grounds import make_terrain
 from hoof_env.envs.observation import GROUPS, HALF_RANGE, HIGH, LOW, MIDDLE, check_groups, entries, places
 from hoof_env.envs.paper_solver import PaperSolver, check_paper
-from hoof_env.envs.parameters import check_parameters, draw_parameters, extremes, physics, resolved
+from hoof_env.envs.parameters import (
+    check_parameters,
+    draw_parameters,
+    extremes,
+    pair,
+    physics,
+    resolved,
+    substeps_of,
+)
 from hoof_env.envs.reward import RewardWeights
 from hoof_env.envs.start import HIGHEST, LOWEST, check_options, draw_starts
+from hoof_env.envs.summary import summary_of
 from hoof_env.envs.tasks import Settings, Task
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait.parameters import GaitParameters, gait_names, load_gait
@@ -39,8 +48,8 @@ from hoof_env.leg.profile import leg_profile
 
 Floats = NDArray[np.float64]
 
-LONGEST_EPISODE, MOST_SUBSTEPS = 1e6, 100_000
-"""Seconds of an episode and substeps of a control step at most."""
+LONGEST_EPISODE = 1e6
+"""Seconds of an episode at most."""
 
 MOST_BAUMGARTE = 1e6
 """Largest parameter of Baumgarte's [1/s]; a substep of 1 us integrates no larger one."""
@@ -76,7 +85,7 @@ class EpisodeBatch:
         self.gait = None if s.gait is None else self.gaits[check_choice("gait", s.gait, self.gaits)]
         self._base = MIDDLE if self.gait is None else self.gait.to_array()
         self.weights = RewardWeights.of(s.reward_weights)
-        self.substeps = _substeps(s.dt, s.sim_dt)
+        self.substeps = substeps_of(s.dt, s.sim_dt)
         self.dt = s.sim_dt * self.substeps
         low = self.dt * (1 - 1e-9)
         self.episode_seconds = check_number(
@@ -88,8 +97,8 @@ class EpisodeBatch:
         self.height = check_number("hip_height", height, low=LOWEST * nominal, high=HIGHEST * nominal)
         self.groups = check_groups(s.observation, GROUPS)
         self.randomize = check_parameters("randomize", s.randomize or {}, s.drive)
-        self.target_speed = None if s.target_speed is None else _two("target_speed", s.target_speed, -20.0)
-        self.target_seconds = _two("target_seconds", s.target_seconds, self.dt if self.target_speed else 0.0)
+        self.target_speed = None if s.target_speed is None else pair("target_speed", s.target_speed, -20.0)
+        self.target_seconds = pair("target_seconds", s.target_seconds, self.dt if self.target_speed else 0.0)
         for group, needed in (("target", "target_speed"), ("ground", "terrain")):
             if group in self.groups and not getattr(s, needed):
                 raise ParameterError(
@@ -297,33 +306,8 @@ class EpisodeBatch:
         self._look(self.desk)
 
     def summary(self, env: int) -> dict[str, float]:
-        """Figures of an episode.
-
-        seconds, distance_m, speed_m_s, peak_grf_n (highest of the episode), mean_grf_n (normal force over
-        the whole time), stance_peak_sum_n, stances, duty_factor, drive_work_j (braking is not recovered),
-        cost_of_transport (work per weight and distance; infinite without forward progress), weight_share
-        (mean normal force over weight: what the leg bore), support_share (the rest: what the rail or the
-        suspension bore), failed (0 or 1).
-        """
-        column = self.episode[:, env].tolist()
-        seconds, distance, work, impulse, loaded, stances, peaks, highest = column[e.TIME : e.HIGHEST + 1]
-        weight, time = column[e.WEIGHT], max(seconds, 1e-12)
-        mean = impulse / time
-        return {
-            "seconds": seconds,
-            "distance_m": distance,
-            "speed_m_s": distance / time,
-            "peak_grf_n": highest,
-            "mean_grf_n": mean,
-            "stance_peak_sum_n": peaks,
-            "stances": stances,
-            "duty_factor": loaded / time,
-            "drive_work_j": work,
-            "cost_of_transport": work / (weight * distance) if distance > 0 else float("inf"),
-            "weight_share": mean / weight,
-            "support_share": 1 - mean / weight,
-            "failed": float(column[e.ENDED] == e.FAILED),
-        }
+        """Figures of an episode, see `summary.summary_of`."""
+        return summary_of(self.episode[:, env].tolist())
 
     def failure(self, env: int) -> str:
         """Why an episode failed, for people."""
@@ -383,24 +367,3 @@ class EpisodeBatch:
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
         self._open()
-
-
-def _two(name: str, value: Any, low: float) -> tuple[float, float]:
-    """A range, or one number as one."""
-    pair = value if isinstance(value, (list, tuple)) else (value, value)
-    if len(pair) != 2:
-        raise ParameterError(f"{name}: expected two numbers, got {value!r}")
-    first = check_number(f"{name}[0]", pair[0], low=low, high=1e6)
-    return first, check_number(f"{name}[1]", pair[1], low=first, high=1e6)
-
-
-def _substeps(dt: float, sim_dt: float) -> int:
-    check_number("sim_dt", sim_dt, low=0, exclusive_low=True)
-    check_number("dt", dt, low=0, exclusive_low=True)
-    ratio = dt / sim_dt
-    if not 0.5 < ratio <= MOST_SUBSTEPS or abs(ratio - round(ratio)) > 1e-6:
-        raise ParameterError(
-            f"dt: expected a whole multiple of sim_dt = {sim_dt:g} s, got {dt:g} s "
-            f"(ratio {ratio:g}; at most {MOST_SUBSTEPS})"
-        )
-    return round(ratio)

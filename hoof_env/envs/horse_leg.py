@@ -123,6 +123,17 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         reach."""
         return self.batch.action_for(gait)
 
+    def episode_summary(self) -> dict[str, float]:
+        """Figures of the episode so far, those of `info["episode_summary"]`. That is missing where a wrapper
+        ends an episode, as that of `gymnasium.make(..., max_episode_steps=...)` does.
+
+        Raises:
+            ResetNeeded: there is no episode yet.
+        """
+        if self._state == "new":
+            raise ResetNeeded("episode_summary() was called before reset(): expected reset() first")
+        return self.batch.summary(0)
+
     def record(self) -> dict[str, NDArray[np.float64]]:
         """State and report of the engine at every substep of the last control step, or at the start, by name,
         time on the first axis. From the first call on substeps are kept."""
@@ -257,12 +268,12 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
         assert self._recording is not None
         if self._renderer is None:
-            weight = self.weight if self.settings.trunk == "suspended" else None
             self._renderer = Renderer(
                 self.geometry,
                 str(self.render_mode),
                 self.metadata["render_fps"],
-                weight_n=weight,
+                trunk=self.settings.trunk,
+                weight_n=self.weight,
                 lift_off_n=LIFT_OFF * self.weight,
                 terrain=self.terrain,
             )

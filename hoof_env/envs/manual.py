@@ -35,6 +35,8 @@ PAGES = tuple(_NAMES)
 
 INDEX = "README.md"
 
+MOVES = "The trunk moves by what friction gives it and feels every link swing. "
+
 
 def page(task: str) -> str:
     """The manual page of a task in Markdown; `task` is one of `PAGES`.
@@ -51,6 +53,7 @@ def page(task: str) -> str:
         id=what.id,
         summary=what.summary,
         about=what.about,
+        trunk="" if settings.trunk == "fixed" else MOVES,
         action_space=f"Box(-1, 1, ({len(LIMITS)},), float32)",
         actions=_actions(settings),
         offsets=_offsets(settings.gait) if settings.gait else "",

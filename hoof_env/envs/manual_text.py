@@ -25,8 +25,7 @@ The leg is the closed-loop linkage of Batbaatar & Wagatsuma (2021): 14 links tur
 hoof triangle that meets a viscoelastic ground at toe and heel (Eqs. 10-15). A second drive swings the leg's
 frame about the crank centre O by phi = offset + sine coefficient * sin(theta) + cosine coefficient *
 cos(theta). The policy commands crank speed and swing parameters; filters with bounded rate and acceleration
-turn commands into motion. The trunk moves by what friction gives it and feels every link swing. Lengths are
-*identified* from the paper's results, not published.
+turn commands into motion. ${trunk}Lengths are *identified* from the paper's results, not published.
 
 $about
 
@@ -94,6 +93,10 @@ Terminated when$leaves the simulation stops being finite; `info["failure"]` says
 `episode_seconds`, $seconds s. The last `info` has these under `episode_summary`:
 
 $figures
+
+`env.unwrapped.episode_summary()` has them at any time. Ask it where a wrapper ends episodes, as that of
+`gym.make(..., max_episode_steps=...)` does: the environment cannot know, so `info` lacks them. The vector
+environment takes that limit itself and has them.
 
 ## Vector Environment
 

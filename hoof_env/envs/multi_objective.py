@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NoReturn
 
+import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
@@ -27,6 +28,18 @@ def vector_reward(terms: Mapping[str, Any]) -> NDArray[np.float32]:
     return np.array([progress, peak, energy], np.float32) + np.float32(terms["reward_failure"] / 3)
 
 
+def refuse_many(**kwargs: Any) -> NoReturn:
+    """The id's vector entry point: without one Gymnasium would make many, and the first step would break.
+
+    Raises:
+        gymnasium.error.Error: always.
+    """
+    raise gym.error.Error(
+        "hoof_env/HorseLegMO-v0: Gymnasium's vector environments keep one number for a reward, this one gives"
+        " three: use mo_gymnasium.wrappers.vector.MOSyncVectorEnv([lambda: mo_gymnasium.make(id)] * n)"
+    )
+
+
 class HorseLegMOEnv(HorseLegEnv):
     """A horse's leg that must carry and move its trunk, judged by three objectives.
 
@@ -34,6 +47,10 @@ class HorseLegMOEnv(HorseLegEnv):
 
     `hoof_env/HorseLeg-v0` with a vector for a reward, in the form of MO-Gymnasium. Make it with
     `mo_gymnasium.make`, or with `gymnasium.make(..., disable_env_checker=True)`: the checker wants a number.
+
+    Many at once, rewards of shape (num_envs, 3), come from MO-Gymnasium:
+    `mo_gymnasium.wrappers.vector.MOSyncVectorEnv([lambda: mo_gymnasium.make("hoof_env/HorseLegMO-v0")] * 4)`.
+    `gymnasium.make_vec` refuses, for Gymnasium's own keep one number for a reward.
 
     ## Action space
 

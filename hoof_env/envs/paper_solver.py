@@ -149,11 +149,6 @@ class PaperSolver:
             leg.state, self.traces[env] = leg_state, last[env : env + 1]
             self._put(env, memory)
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        vars(self).update(state)
-        for leg in self.legs:
-            leg.state = _state_like(leg.state, vars(leg.state))
-
     def _memory(self) -> Memory:
         data, _, _, _, constants, reactions = self.engine.arrays
         return memory_of(data, self.engine.num_envs, constants, reactions)
@@ -174,6 +169,6 @@ class PaperSolver:
 
 def _state_like(own: ConstrainedState, given: Mapping[str, Any]) -> ConstrainedState:
     """A copy of a given state with the types and shapes of one's own: kernels take NumPy's records and write
-    to them, but `np.array` makes arrays of them, and after a pickle nothing can be written."""
+    to them, but `np.array` makes arrays of them, and to those of a pickle nothing can be written."""
     parts = {name: np.array(given[name], v.dtype).reshape(v.shape)[()] for name, v in vars(own).items()}
     return ConstrainedState(**parts)

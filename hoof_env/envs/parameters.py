@@ -15,6 +15,9 @@ from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.preset import load_ground
 
+MOST_SUBSTEPS = 100_000
+"""Of a control step."""
+
 
 def resolved(settings: Settings) -> Settings:
     """The settings with values for None: the ground of the preset, the solver's own scheme and step.
@@ -33,6 +36,36 @@ def resolved(settings: Settings) -> Settings:
         s = replace(s, sim_dt=1e-3 if is_paper else 1e-4)
     done: Settings = s
     return done
+
+
+def pair(name: str, value: Any, low: float) -> tuple[float, float]:
+    """A range, or one number as one, from `low` on.
+
+    Raises:
+        ParameterError: not two numbers, or not in this order.
+    """
+    two = value if isinstance(value, (list, tuple)) else (value, value)
+    if len(two) != 2:
+        raise ParameterError(f"{name}: expected two numbers, got {value!r}")
+    first = check_number(f"{name}[0]", two[0], low=low, high=1e6)
+    return first, check_number(f"{name}[1]", two[1], low=first, high=1e6)
+
+
+def substeps_of(dt: float, sim_dt: float) -> int:
+    """How many substeps [s] make a control step [s].
+
+    Raises:
+        ParameterError: no whole number, or more than `MOST_SUBSTEPS`.
+    """
+    check_number("sim_dt", sim_dt, low=0, exclusive_low=True)
+    check_number("dt", dt, low=0, exclusive_low=True)
+    ratio = dt / sim_dt
+    if not 0.5 < ratio <= MOST_SUBSTEPS or abs(ratio - round(ratio)) > 1e-6:
+        raise ParameterError(
+            f"dt: expected a whole multiple of sim_dt = {sim_dt:g} s, got {dt:g} s "
+            f"(ratio {ratio:g}; at most {MOST_SUBSTEPS})"
+        )
+    return round(ratio)
 
 
 def physics(settings: Settings, height: float, changes: Mapping[str, float]) -> tuple[Trunk, Ground, Drive]:

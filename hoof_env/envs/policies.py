@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.envs.start import extreme_posture
-from hoof_env.errors import DataFileError, check_choice
-from hoof_env.gait.parameters import GaitParameters, paper_gaits
+from hoof_env.errors import DataFileError, ParameterError, check_choice
+from hoof_env.gait.parameters import paper_gaits
 from hoof_env.leg.profile import leg_profile
 
 Action = NDArray[np.float32]
@@ -81,10 +81,12 @@ def make_policy(name: str, env: Any, seed: int = 0) -> Scripted:
     A gait name commands that gait. "idle" stops the crank and holds the swing; "random" draws a new action
     every step; "bang-bang" flips all four actions between their limits every quarter of a second; "drag"
     turns the hoof to the ground, stops there and rubs it to and fro with the swing; "airborne" turns it to
-    its highest place and stops there.
+    its highest place and stops there. Where actions are offsets to a gait (`gait=`) and do not reach
+    everything, a gait is the nearest one, the highest place the highest in reach, and a swing stops at its
+    limits.
 
     Raises:
-        ParameterError: unknown name.
+        ParameterError: unknown name, or a policy that stops the crank where no action stops it.
     """
     leg = env.unwrapped
     check_choice("policy", name, policy_names(env))
@@ -99,21 +101,32 @@ def make_policy(name: str, env: Any, seed: int = 0) -> Scripted:
         return Scripted(lambda observation, time: np.where(high(time), np.ones(4), -np.ones(4)), leg.dt)
     offsets = [gait.swing_offset for gait in paper_gaits(leg.gaits).values()]
     middle = sum(offsets) / len(offsets)
-    rest = leg.action_for(GaitParameters(0.0, middle, 0.0, 0.0))
+    offsets = np.linspace(0.0, 1.4, 15).tolist() if name == "airborne" else [middle]
+    rests = _in_reach(leg, np.array([(0.0, offset, 0.0, 0.0) for offset in offsets]))
+    if rests[0, 0] > 0.0:
+        raise ParameterError(
+            f"policy {name!r}: expected an environment whose actions can stop the crank; with "
+            f"gait={leg.settings.gait!r} it turns at {rests[0, 0]:.3g} rad/s at least"
+        )
     if name == "idle":
+        rest = leg.action_for(rests[0])
         return Scripted(lambda observation, time: rest, leg.dt)
-    offsets = [middle] if name == "drag" else np.linspace(0.0, 1.4, 15).tolist()
-    offset, target = extreme_posture(leg_profile(leg.geometry), offsets, name == "drag")
+    posture, target = extreme_posture(leg_profile(leg.geometry), rests, name == "drag")
 
     def hold(observation: Any, time: Any) -> Action:
         """Turn the crank (it turns one way only) to `target` and stop; "drag" then swings to and fro."""
         ahead = (target - np.arctan2(*np.asarray(observation, float)[..., :2].T)) % (2 * np.pi)
         speed = np.where((ahead > 0.05) & (ahead < np.pi * 1.5), np.minimum(2 * ahead, 2 * np.pi), 0.0)
         swing = 0.15 * np.sin(np.pi * np.asarray(time)) if name == "drag" else 0.0
-        gaits = np.stack(np.broadcast_arrays(speed, offset + swing, 0.0, 0.0), -1)
-        return leg.action_for(gaits if gaits.ndim > 1 else GaitParameters.from_array(gaits))
+        return leg.action_for(np.stack(np.broadcast_arrays(speed, posture[1] + swing, *posture[2:]), -1))
 
     return Scripted(hold, leg.dt)
+
+
+def _in_reach(leg: Any, gaits: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The nearest gaits that actions command, shape (n, 4)."""
+    reached = leg.command_of(leg.action_for(gaits))
+    return np.where(np.abs(reached - gaits) < 1e-6, gaits, reached)  # an action is rounded to float32
 
 
 def open_loop(parameters: Mapping[str, Any], dt: float) -> Scripted:

@@ -18,8 +18,11 @@ LINK, PLATE = (64, 78, 92), (186, 195, 205)
 TRUNK_M = (1.05, 0.42, 0.16)
 """The trunk about O: half its length, its height above and below [m]."""
 
-WHEEL_M = 0.05
-"""Radius of the wheels between trunk and rail [m]."""
+HOLD_M = {"suspended": 0.0, "rail": 0.1, "fixed": 0.16}
+"""Height above the trunk of what holds it and is painted with it: nothing, wheels, a bolted plate [m]."""
+
+PLATE_M, BRACKET_M = 0.09, 0.2
+"""Height of the plate's hatching, and length of each bracket between plate and trunk [m]."""
 
 FLESH_M = (("O", "C", 0.13, 0.15), ("C", "F", 0.15, 0.095), ("F", "G", 0.085, 0.055))
 """Flesh around the rigid links where a horse's leg has its bones: from, to, radius at both ends [m]."""
@@ -35,23 +38,27 @@ class Body:
         brush: the paint box.
         geometry: the leg.
         scale: pixels per metre.
-        suspended: the trunk hangs from a spring; else a rail holds it.
+        trunk: its kind: on a spring, on wheels under a rail, or bolted to a plate.
     """
 
-    def __init__(self, brush: Brush, geometry: Geometry, scale: float, suspended: bool) -> None:
-        self._brush, self._scale, self._suspended = brush, scale, suspended
+    def __init__(self, brush: Brush, geometry: Geometry, scale: float, trunk: str) -> None:
+        self._brush, self._scale, self._kind = brush, scale, trunk
+        self._hold = HOLD_M[trunk] * scale
         self._crank = geometry.lengths["OP"]
         self._trunk = self._paint_trunk()
 
     def _paint_trunk(self) -> Any:
         half, above, below = (self._scale * length for length in TRUNK_M)
-        wheel = 0.0 if self._suspended else self._scale * WHEEL_M
-        image = pygame.Surface((round(2 * half), round(2 * wheel + above + below)), pygame.SRCALPHA, 32)
+        hold, ends = self._hold, (half / 2, 3 * half / 2)
+        image = pygame.Surface((round(2 * half), round(hold + above + below)), pygame.SRCALPHA, 32)
 
         def paint(fine: Any, place: Any) -> None:
-            for x in (half / 2, 3 * half / 2):
-                pygame.draw.circle(fine, GREY, place(complex(x, wheel)), wheel * FINE)
-            hollow = round(2 * wheel * FINE)  # between trunk and rail
+            if self._kind == "rail":
+                for x in ends:
+                    pygame.draw.circle(fine, GREY, place(complex(x, hold / 2)), hold / 2 * FINE)
+            elif self._kind == "fixed":
+                self._paint_mount(fine, place, ends)
+            hollow = round(hold * FINE)
             barrel = pygame.Rect(0, hollow, fine.get_width(), fine.get_height() - hollow)
             for colour, inset in ((COAT_EDGE, 0), (COAT, round(1.5 * FINE))):
                 radius = round(0.25 * self._scale * FINE) - inset
@@ -60,10 +67,22 @@ class Body:
         self._brush.smooth(image, [0j, complex(*image.get_size())], 0, paint)
         return image
 
+    def _paint_mount(self, fine: Any, place: Any, ends: tuple[float, float]) -> None:
+        """The plate that holds a fixed trunk, hatched as drawings have it, and its brackets."""
+        plate, line = PLATE_M * self._scale, round(2 * self._brush.unit * FINE)
+        for x in np.arange(-plate, fine.get_width() / FINE, plate).tolist():
+            pygame.draw.line(fine, GREY, place(complex(x, plate)), place(complex(x + plate, 0)), line)
+        left, top = place(complex(0, plate))
+        pygame.draw.rect(fine, GREY, (left, top - line, fine.get_width(), 2 * line))
+        for x in ends:
+            long = BRACKET_M * self._scale
+            corner = place(complex(x - long / 2, plate))
+            pygame.draw.rect(fine, GREY, (*corner, long * FINE, (self._hold - plate + 1) * FINE))
+
     def draw_support(self, canvas: Any, hip: complex) -> None:
         """Draw the spring or the rail that holds a trunk around O at pixel `hip`."""
         top = hip - 1j * self._scale * TRUNK_M[1]
-        if self._suspended:
+        if self._kind == "suspended":
             coil = np.linspace(complex(hip.real, 0), top, 17)
             coil[2:-2] += 0.06 * self._scale * np.resize([1, -1], 13)
 
@@ -72,15 +91,15 @@ class Body:
                 pygame.draw.lines(fine, GREY, False, [place(z) for z in coil.tolist()], width)
 
             self._brush.smooth(canvas, coil, 3, paint)
-        else:
-            rail = top.imag - 2 * self._scale * WHEEL_M
+        elif self._kind == "rail":
+            rail = top.imag - self._hold
             thick = max(2, round(4 * self._brush.unit))
             canvas.fill(GREY, (0, round(rail) - thick, canvas.get_width(), thick))
 
     def draw_trunk(self, canvas: Any, hip: complex, pitch: float = 0.0) -> None:
         """Draw the trunk around O at pixel `hip`, turned by `pitch` [rad]."""
         half, above, below = (self._scale * length for length in TRUNK_M)
-        high = above + (0.0 if self._suspended else 2 * self._scale * WHEEL_M)
+        high = above + self._hold
         image = self._trunk
         corner = hip - complex(half, high)
         if pitch:

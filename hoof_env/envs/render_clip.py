@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hoof_env._arguments import parse_pairs
 from hoof_env._output import staged
 from hoof_env.envs.render_instant import Columns, Instant, instants
 from hoof_env.errors import HoofEnvError, ParameterError, check_number
@@ -148,7 +149,7 @@ def render_episode(
     check_film(path, check_number("fps", fps, low=0, high=1000, exclusive_low=True))
     check_number("slow", slow, low=1e-3, high=1e3)
     check_number("seed", seed, low=0)
-    with records.make_env(env_id, records.parse_arguments("--args", arguments)) as env:
+    with records.make_env(env_id, parse_pairs("--args", arguments)) as env:
         found = records.find_policy(policy, env, env_id, seed)
         renderer = new_renderer(records.setting(env), fps, size)
         pictures = frames(renderer, records.episode(env, found, seed, seconds), fps, slow)

@@ -1,7 +1,7 @@
-"""What a picture, or a record of forces, needs of one instant, whichever engine simulated it.
+"""What a picture, or a record of forces, needs of one instant.
 
-Two functions give columns by name, one from rows of `dynamics.trace.TRACE` and one from what `TrunkEngine`
-says; `instants` turns columns into records for the renderer. Nothing behind this boundary knows an engine.
+`columns_of_engine` gives columns by name from what `TrunkEngine` says; `instants` turns them into records for
+the renderer. Nothing behind this boundary knows an engine.
 """
 
 from __future__ import annotations
@@ -94,44 +94,6 @@ UNITS = {
 def instants(columns: Mapping[str, NDArray[np.float64]]) -> list[Instant]:
     """Records of the rows of `columns`."""
     return list(map(Instant._make, zip(*(columns[name].tolist() for name in Instant._fields), strict=True)))
-
-
-def columns_of_trace(
-    trace: NDArray[np.void], command: ArrayLike | None = None, gait: ArrayLike | None = None
-) -> Columns:
-    """Columns from rows of dtype `TRACE`: level ground at height 0 and a trunk that does not pitch.
-
-    Args:
-        trace: shape (n,).
-        command: gait parameters commanded during these rows, shape (4,); None if not known.
-        gait: the filters' values at the last row, shape (4,); None if not known.
-    """
-    n = len(trace)
-    unknown = np.full(4, np.nan)
-    wanted, now = (unknown if given is None else np.asarray(given, float) for given in (command, gait))
-    columns = {
-        "time": trace["t"].copy(),
-        **{name: trace[name].copy() for name in ("trunk_x", "trunk_y", "trunk_vx", "trunk_vy")},
-        "pitch": np.zeros(n),
-        **dict(zip(PARAMETERS, np.repeat(now, n).reshape(4, n), strict=True)),
-        **{
-            f"command_{name}": row
-            for name, row in zip(PARAMETERS, np.repeat(wanted, n).reshape(4, n), strict=True)
-        },
-        "crank_angle": trace["theta"].copy(),
-        "crank_speed": trace["theta_rate"].copy(),
-        "swing_angle": trace["phi"].copy(),
-    }
-    for point in POINTS:
-        depth, normal, friction = (
-            trace[f"{point}_{name}"].copy() for name in ("penetration", "normal", "friction")
-        )
-        columns |= {
-            f"{point}_x": trace[f"{point}_x"].copy(), f"{point}_y": -depth, f"{point}_depth": depth,
-            f"{point}_normal": normal, f"{point}_friction": friction,
-            f"{point}_force_x": friction, f"{point}_force_y": normal,
-        }  # fmt: skip
-    return columns | _together(columns)
 
 
 def columns_of_engine(

@@ -75,7 +75,7 @@ class Scene:
         terrain: the ground.
         size: of the picture [pixels].
         right: width on the right that the leg leaves free [pixels].
-        suspended: the trunk hangs from a spring; else a rail holds it.
+        trunk: its kind, which says what holds it.
     """
 
     def __init__(
@@ -85,7 +85,7 @@ class Scene:
         terrain: Terrain,
         size: tuple[int, int],
         right: int,
-        suspended: bool,
+        trunk: str,
     ) -> None:
         self._brush, self._geometry, self._size = brush, geometry, size
         out, up = _reach(geometry)
@@ -102,7 +102,7 @@ class Scene:
         )
         self._leg = tables(geometry)
         self._ground = GroundPainter(brush, terrain, size, self._scale, 2 * self._centre)
-        self._body = Body(brush, geometry, self._scale, suspended)
+        self._body = Body(brush, geometry, self._scale, trunk)
         self._sky = self._paint_sky()
         self._key = lru_cache(maxsize=8)(self._paint_key)
 

@@ -14,7 +14,8 @@ import numpy as np
 from gymnasium.error import DependencyNotInstalled, ResetNeeded
 from numpy.typing import NDArray
 
-from hoof_env.envs.render_instant import Instant, columns_of_trace, instants
+from hoof_env.dynamics.trunk import ONE_LEG
+from hoof_env.envs.render_instant import Instant
 from hoof_env.envs.render_stance import Stances
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.ground.terrain import Terrain
@@ -38,8 +39,8 @@ class Renderer:
         mode: one of `MODES`.
         fps: frames per second that a window is held to [Hz].
         size: width and height of the picture [pixels].
-        weight_n: weight of trunk and leg [N] if the trunk is suspended: it is drawn on a spring, and the
-            weight as a line beside the force. None if it is fixed or on a rail: it is drawn under a rail.
+        trunk: its kind: "suspended" is drawn on a spring, "rail" with wheels under a rail, "fixed" bolted.
+        weight_n: weight of trunk and leg [N], a line beside the force if the trunk is suspended; or None.
         lift_off_n: normal force that tells stance from swing [N].
         terrain: what it stands on; level if None.
 
@@ -54,6 +55,7 @@ class Renderer:
         mode: str,
         fps: float,
         size: tuple[int, int] = (960, 540),
+        trunk: str = "suspended",
         weight_n: float | None = None,
         lift_off_n: float = 0.0,
         terrain: Terrain | None = None,
@@ -61,6 +63,7 @@ class Renderer:
         self.mode = check_choice("render_mode", mode, MODES)
         self.fps = check_number("fps", fps, low=0, exclusive_low=True)
         self.size = _check_size(size)
+        check_choice("trunk", trunk, ONE_LEG)
         if weight_n is not None:
             check_number("weight_n", weight_n, low=0)
         try:
@@ -79,11 +82,9 @@ class Renderer:
         self.brush = brush = Brush(self.size)
         edge, column = round(16 * brush.unit), round(304 * brush.unit)
         ground = Terrain.flat() if terrain is None else terrain
-        self._scene = Scene(
-            brush, geometry, ground, self.size, column + 2 * edge, suspended=weight_n is not None
-        )
+        self._scene = Scene(brush, geometry, ground, self.size, column + 2 * edge, trunk)
         box = (self.size[0] - edge - column, edge, column, round(508 * brush.unit))
-        self._panel = Panel(brush, box, weight_n, lift_off_n)
+        self._panel = Panel(brush, box, weight_n if trunk == "suspended" else None, lift_off_n)
         self._window_open = False
         self._clock = pygame.time.Clock()
         self._closed = False
@@ -111,13 +112,9 @@ class Renderer:
         self._scene.reset()
         self._panel.reset()
 
-    def add(self, news: Sequence[Instant] | NDArray[np.void]) -> None:
-        """Take what happened since the last call, in the order of time: instants, or rows of dtype `TRACE`.
-
-        What is not finite is left out.
-        """
-        rows = instants(columns_of_trace(news)) if isinstance(news, np.ndarray) else news
-        seen = [now for now in rows if math.isfinite(sum(now[:9]) + now.force_x + now.force_y)]
+    def add(self, news: Sequence[Instant]) -> None:
+        """Take what happened since the last call, in the order of time; what is not finite is left out."""
+        seen = [now for now in news if math.isfinite(sum(now[:9]) + now.force_x + now.force_y)]
         if seen:
             self._now = seen[-1]
             self._scene.add(seen)
@@ -189,13 +186,13 @@ def new_renderer(here: Setting, fps: float, size: tuple[int, int] = (960, 540)) 
     Raises:
         ParameterError, DependencyNotInstalled: as `Renderer`.
     """
-    weight = here.weight_n if here.suspended else None
     return Renderer(
         here.geometry,
         "rgb_array",
         fps,
         size,
-        weight_n=weight,
+        trunk=here.trunk,
+        weight_n=here.weight_n,
         lift_off_n=here.lift_off_n,
         terrain=here.terrain,
     )

@@ -190,14 +190,12 @@ def _gait(value: Any, gaits: Mapping[str, GaitParameters]) -> GaitParameters:
         ) from None
 
 
-def extreme_posture(profile: LegProfile, offsets: Sequence[float], lowest: bool) -> tuple[float, float]:
-    """Swing offset and crank angle [rad] at which the lower hoof point is highest, or lowest."""
+def extreme_posture(profile: LegProfile, rests: Floats, lowest: bool) -> tuple[Floats, float]:
+    """Which of some gaits that let the crank stand, shape (n, 4), holds the lower hoof point highest, or
+    lowest, and at which crank angle [rad]."""
     sign = -1.0 if lowest else 1.0
-    postures = []
     theta = np.linspace(0, 2 * math.pi, 72, endpoint=False)
-    for offset in offsets:
-        gaits = np.tile([0.0, offset, 0.0, 0.0], (len(theta), 1))
-        heights = sign * hoof_height(profile, gaits, theta)
-        best = int(np.argmax(heights))
-        postures.append((float(heights[best]), float(offset), float(theta[best])))
-    return max(postures)[1:]
+    heights = sign * np.array([hoof_height(profile, np.tile(rest, (len(theta), 1)), theta) for rest in rests])
+    best = heights.max(1)
+    k = int(np.flatnonzero(best == best.max())[-1])
+    return rests[k], float(theta[int(np.argmax(heights[k]))])

@@ -24,9 +24,9 @@ from hoof_env.dynamics.trunk_model import LIFT_OFF
 from hoof_env.envs import episode as e
 from hoof_env.envs.batch import EpisodeBatch
 from hoof_env.envs.recording import Recording
-from hoof_env.envs.start import check_seed
 from hoof_env.envs.state import check_state, generator_of
 from hoof_env.envs.tasks import TASKS, to_json
+from hoof_env.envs.vector_arguments import actions_of, mask_of, mode_of, seeds_of
 from hoof_env.errors import ParameterError, check_choice
 from hoof_env.gait.parameters import PARAMETERS
 
@@ -69,7 +69,7 @@ class HorseLegVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
         **settings: Any,
     ) -> None:
         self.num_envs = count("num_envs", num_envs, most=MOST_ENVS)
-        self.autoreset_mode = _autoreset_mode(autoreset_mode)
+        self.autoreset_mode = mode_of(autoreset_mode)
         if render_mode is not None:
             check_choice("render_mode", render_mode, self.metadata["render_modes"])
         self.task = TASKS[check_choice("task", task, TASKS)]
@@ -113,7 +113,7 @@ class HorseLegVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
         """
         self._refuse_closed("reset")
         rest: Any = dict(options) if isinstance(options, Mapping) else options
-        mask = self._mask(rest.pop("reset_mask", None) if isinstance(rest, dict) else None)
+        mask = mask_of(rest.pop("reset_mask", None) if isinstance(rest, dict) else None, self.num_envs)
         checked = self.batch.check_options(rest)
         self._seed(seed, mask)
         start = self._start(np.flatnonzero(mask), checked)
@@ -141,7 +141,7 @@ class HorseLegVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
                 f"step() was called although episodes {np.flatnonzero(again).tolist()} ended: "
                 "expected reset(options={'reset_mask': ...})"
             )
-        self._take(actions)
+        batch.actions[:n] = actions_of(actions, n)
         for recording in self._recordings:
             recording.start()
         batch.step(self._generators, again)
@@ -194,8 +194,8 @@ class HorseLegVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
             self._renderers.append(
                 Renderer(
                     self.batch.geometry, "rgb_array", self.metadata["render_fps"],
-                    weight_n=weight if self.settings.trunk == "suspended" else None,
-                    lift_off_n=LIFT_OFF * weight, terrain=engine.terrain,
+                    trunk=self.settings.trunk, weight_n=weight, lift_off_n=LIFT_OFF * weight,
+                    terrain=engine.terrain,
                 )
             )  # fmt: skip
         for recording, renderer in zip(self._recordings, self._renderers, strict=True):
@@ -257,50 +257,9 @@ class HorseLegVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
     def _observed(self) -> NDArray[np.float32]:
         return self.batch.seen[: self.num_envs].copy()
 
-    def _take(self, actions: Any) -> None:
-        try:
-            given = np.asarray(actions)
-        except ValueError:
-            given = np.empty(0, object)
-        if given.dtype.kind not in "fiu" or given.shape != (self.num_envs, e.ACTIONS):
-            raise ParameterError(
-                f"actions: expected finite numbers in [-1, 1], shape {(self.num_envs, e.ACTIONS)}, "
-                f"got {given.dtype} of shape {given.shape}"
-            )
-        if not np.isfinite(given).all():
-            rows = np.flatnonzero(~np.isfinite(given).all(1)).tolist()
-            raise ParameterError(
-                f"actions: expected finite numbers in [-1, 1], got others in rows {rows[:8]}"
-            )
-        self.batch.actions[: self.num_envs] = given
-
-    def _mask(self, given: Any) -> NDArray[np.bool_]:
-        if given is None:
-            return np.ones(self.num_envs, bool)
-        if (
-            not isinstance(given, np.ndarray)
-            or given.dtype != bool
-            or given.shape != (self.num_envs,)
-            or not given.any()
-        ):
-            raise ParameterError(
-                f"options['reset_mask']: expected a bool array of shape ({self.num_envs},) with at least one "
-                f"True, got {given!r}"
-            )
-        return given
-
     def _seed(self, seed: Any, mask: NDArray[np.bool_]) -> None:
         """Give the environments of the mask their generators."""
-        n = self.num_envs
-        if isinstance(seed, (list, tuple, np.ndarray)):
-            if len(seed) != n:
-                raise ParameterError(f"seed: expected one number or {n}, got {len(seed)}")
-            seeds = [check_seed(value) for value in seed]
-        elif seed is None:
-            seeds = [None] * n
-        else:
-            first = count("seed", seed, low=0)
-            seeds = [first + env for env in range(n)]
+        seeds = seeds_of(seed, self.num_envs)
         if not self._generators:
             self._generators = [seeding.np_random(value)[0] for value in seeds]
             return
@@ -347,14 +306,3 @@ class HorseLegVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
 
     def __getstate__(self) -> dict[str, Any]:
         return {**vars(self), "_renderers": []}
-
-
-def _autoreset_mode(value: Any) -> AutoresetMode:
-    if isinstance(value, AutoresetMode):
-        return value
-    known = {mode.value: mode for mode in AutoresetMode} | {mode.name: mode for mode in AutoresetMode}
-    try:
-        return known[value]
-    except (KeyError, TypeError):
-        names = ", ".join(mode.name for mode in AutoresetMode)
-        raise ParameterError(f"autoreset_mode: expected one of {names}, got {value!r}") from None

@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hoof_env._arguments import parse_pairs
 from hoof_env._output import staged
 from hoof_env.errors import HoofEnvError, check_number
-from hoof_env.records import check_place, describe, find_policy, make_env, parse_arguments, record_episode
+from hoof_env.records import check_place, describe, find_policy, make_env, record_episode
 
 Record = Mapping[str, NDArray[np.float64]]
 
@@ -126,7 +127,7 @@ def export_episode(
     """
     check_export(path)
     check_number("seed", seed, low=0)
-    with make_env(env_id, given := parse_arguments("--args", arguments)) as env:
+    with make_env(env_id, given := parse_pairs("--args", arguments)) as env:
         record = record_episode(env, find_policy(policy, env, env_id, seed), seed, seconds)
         about = describe(env, environment=env_id, arguments=given, policy=policy, seed=seed)
     write(record, about, path)

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from hoof_env.dynamics.constrained import ConstrainedLeg
 from hoof_env.dynamics.engine import LegEngine
 from hoof_env.dynamics.result import Result
 from hoof_env.dynamics.trace import TRACE, new_trace
@@ -165,14 +166,20 @@ def test_a_restored_state_goes_on_bit_for_bit(kind, substeps):
 
 
 @pytest.mark.parametrize("copied", [copy.deepcopy, lambda e: pickle.loads(pickle.dumps(e))])
-def test_a_copied_engine_goes_on_bit_for_bit(copied):
-    engine = engine_at()
-    other = copied(engine)
-    traces = []
+@pytest.mark.parametrize("kind", [LegEngine, ConstrainedLeg])
+def test_a_copied_engine_goes_on_bit_for_bit(kind, copied):
+    engine = engine_at() if kind is LegEngine else ConstrainedLeg(LEG, Ground())
+    if kind is ConstrainedLeg:
+        engine.reset(RUN, theta=0.2)
+    other, runs = copied(engine), []
     for runner in (engine, other):
-        traces.append(new_trace(50))
-        runner.advance(COMMANDS[1], traces[-1])
-    assert traces[0].tobytes() == traces[1].tobytes()
+        first, second = new_trace(30), new_trace(30)
+        runner.advance(COMMANDS[1], first)
+        before = bits(runner.state)
+        start = runner.reset(GAITS["walk"], theta=2.0, x=0.5)  # which writes to the records by name
+        runner.advance(COMMANDS[1], second)
+        runs.append([first.tobytes(), before, start.tobytes(), second.tobytes(), bits(runner.state)])
+    assert runs[0] == runs[1]
 
 
 def test_reset_forgets_everything():

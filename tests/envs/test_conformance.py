@@ -10,6 +10,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from family import FALLS, IDS, actions, roll, same
+from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 from stable_baselines3.common.env_checker import check_env as sb3_check_env
 
@@ -150,6 +151,21 @@ def test_time_limit_truncates_in_seconds():
     env.reset(seed=0)
     flags = [env.step(np.zeros(4, np.float32))[2:4] for _ in range(10)]
     assert flags == [(False, False)] * 9 + [(False, True)]
+
+
+def test_an_episode_that_a_wrapper_ends_has_its_figures_on_demand():
+    """What the environment's own limit puts in `info` after as many steps."""
+    limited, own = gym.make(IDS[0], max_episode_steps=8), gym.make(IDS[0], episode_seconds=0.16)
+    with pytest.raises(ResetNeeded, match="episode_summary"):
+        limited.unwrapped.episode_summary()
+    ends = []
+    for env in (limited, own):
+        env.reset(seed=3)
+        ends.append([env.step(np.ones(4, np.float32)) for _ in range(8)][-1])
+    (*_, truncated, info), (*_, info_of_own) = ends
+    assert truncated
+    assert "episode_summary" not in info
+    assert limited.unwrapped.episode_summary() == info_of_own["episode_summary"]
 
 
 def test_ids_work_in_a_fresh_process_by_module_prefix():

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hoof_env.envs.policies import POLICIES, make_policy, open_loop, policy_names, read_open_loop
-from hoof_env.errors import DataFileError
+from hoof_env.errors import DataFileError, ParameterError
 
 ENV_ID = "hoof_env/HorseLeg-v0"
 CLOCKED = {
@@ -119,3 +119,45 @@ def test_an_environment_whose_actions_mean_something_else(env, tmp_path):
         read_open_loop(path, gym.make("hoof_env/HorseLegFixed-v0"))
     with pytest.raises(DataFileError, match="PendulumEnv"):
         read_open_loop(path, gym.make("Pendulum-v1"))
+
+
+FIXED = "hoof_env/HorseLegFixed-v0"
+
+
+def held(name, env, seconds=6.0):
+    """Commands and heights of the lower hoof point in the last second of a policy."""
+    leg, policy, commands, heights = env.unwrapped, make_policy(name, env), [], []
+    observation, _ = env.reset(seed=0)
+    for step in range(round(seconds / leg.dt)):
+        action, _ = policy.predict(observation)
+        observation, *_ = env.step(action)
+        if step * leg.dt > seconds - 1:
+            commands.append(leg.command_of(action))
+            heights.append(min(leg.record()["toe_y"][-1].item(), leg.record()["heel_y"][-1].item()))
+    return np.array(commands), np.array(heights)
+
+
+@pytest.mark.parametrize("gait", ["walk", "run"])
+def test_policies_hold_their_posture_where_actions_are_offsets(gait):
+    """The highest place and the lowest are in reach of offsets, too, and the crank stops there."""
+    env = gym.make(FIXED, gait=gait, episode_seconds=9.0)
+    heights = {}
+    for name in ("idle", "airborne", "drag"):
+        commands, heights[name] = held(name, env)
+        assert (commands[:, 0] < 0.02).all()
+    swing = env.unwrapped.command_of([0, 1, 0, 0])[1]  # the highest place is at the largest offset in reach
+    low, high = (heights[name].mean() for name in ("drag", "airborne"))
+    assert low < heights["idle"].mean() < high
+    for crank in np.linspace(0, 2 * np.pi, 24, endpoint=False):
+        start = {"crank_angle": crank, "gait": {"crank_speed": 0.0, "swing_offset": swing, "swing_sin": 0.0,
+                                                "swing_cos": 0.0}}  # fmt: skip
+        env.reset(options=start)
+        record = env.unwrapped.record()
+        assert min(record["toe_y"].item(), record["heel_y"].item()) < high + 0.01
+
+
+def test_a_crank_that_no_action_stops_is_refused():
+    env = gym.make(FIXED, gait="carrying_walk")
+    for name in ("idle", "drag", "airborne"):
+        with pytest.raises(ParameterError, match=r"stop the crank; with gait='carrying_walk'"):
+            make_policy(name, env)

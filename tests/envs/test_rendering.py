@@ -13,16 +13,16 @@ import numpy as np
 import pytest
 from gymnasium.error import DependencyNotInstalled, ResetNeeded
 
-from hoof_env.dynamics.engine import LegEngine
-from hoof_env.dynamics.trace import new_trace
+from hoof_env.dynamics.limb import Limb
 from hoof_env.dynamics.trunk import Trunk
+from hoof_env.dynamics.trunk_engine import TrunkEngine
 from hoof_env.envs.policies import make_policy
 from hoof_env.envs.render_ground import find_patches, footprint
-from hoof_env.envs.render_instant import columns_of_trace, instants
+from hoof_env.envs.render_instant import Instant, columns_of_engine, instants
 from hoof_env.envs.render_stance import Stances
 from hoof_env.envs.rendering import Renderer
 from hoof_env.errors import ParameterError
-from hoof_env.gait.parameters import LIMITS, load_gait
+from hoof_env.gait.parameters import LIMITS, PARAMETERS, load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import load_geometry
@@ -35,42 +35,42 @@ KEY = (slice(10, 31), slice(0, 64))  # of the key's arrow
 VERMILION, BLUE, PURPLE, LINE = (213, 94, 0), (0, 114, 178), (204, 121, 167), (112, 95, 66)
 
 
-def simulate(seconds: float, gait: str = "run", trunk: str = "suspended") -> list[np.ndarray]:
-    """Traces of one reset and of every control step of 20 ms after it."""
-    engine = LegEngine(GEOMETRY, Trunk(trunk, height=GEOMETRY.hip_height), Ground(), sim_dt=1e-3)
-    parameters = load_gait(gait)
-    traces = [engine.reset(parameters)]
-    for _ in range(round(seconds / 0.02)):
-        traces.append(new_trace(20))
-        engine.advance(parameters.to_array(), traces[-1])
-    return traces
+def simulate(seconds: float) -> list[list[Instant]]:
+    """Instants of the run's start and of every control step of 20 ms after it."""
+    engine = TrunkEngine(Limb(GEOMETRY), Trunk(height=GEOMETRY.hip_height), Ground())
+    gait = load_gait("run")
+    engine.reset(gait)
+    rows = instants(columns_of_engine(engine.run(gait.to_array(), round(seconds * 1000))))
+    return [rows[:1], *(rows[k : k + 20] for k in range(1, len(rows), 20))]
 
 
 @pytest.fixture(scope="module")
-def run() -> list[np.ndarray]:
+def run() -> list[list[Instant]]:
     return simulate(4.0)
 
 
-def renderer(mode: str = "rgb_array", **options) -> Renderer:
-    return Renderer(GEOMETRY, mode, 50, **options)
+def renderer(mode: str = "rgb_array", trunk: str = "rail", **options) -> Renderer:
+    return Renderer(GEOMETRY, mode, 50, trunk="suspended" if "weight_n" in options else trunk, **options)
 
 
-def draw(*traces: np.ndarray, **options) -> np.ndarray:
-    """A frame of a fresh renderer that has seen `traces`."""
+def draw(*steps: list[Instant], **options) -> np.ndarray:
+    """A frame of a fresh renderer that has seen `steps`."""
     picture = renderer(**options)
-    for trace in traces:
-        picture.add(trace)
+    for step in steps:
+        picture.add(step)
     return picture.frame()
 
 
-def loaded(run, normal: float, friction: float = 0.0) -> np.ndarray:
-    """The trace of a reset, in flight, with a made-up force on the toe, 5 cm inside the ground."""
-    trace = run[0].copy()
-    trace["toe_normal"] = trace["normal"] = normal
-    trace["toe_friction"] = trace["friction"] = friction
-    trace["grf"] = np.hypot(normal, friction)
-    trace["toe_penetration"], trace["cop_x"] = 0.05, trace["toe_x"]
-    return trace
+def loaded(run, toe: float, friction: float = 0.0, heel: float = 0.0, **changes) -> list[Instant]:
+    """The start, in flight, with made-up forces on toe and heel, the toe 5 cm inside the ground."""
+    now = run[0][0]
+    middle = (toe * now.toe_x + heel * now.heel_x) / max(toe + heel, 1.0)
+    made_up = {
+        "toe_normal": toe, "toe_friction": friction, "toe_force_x": friction, "toe_force_y": toe,
+        "heel_normal": heel, "heel_force_y": heel, "toe_y": -0.05, "toe_depth": 0.05,
+        "force_x": friction, "force_y": toe + heel, "cop_x": middle, "cop_y": -0.05,
+    }  # fmt: skip
+    return [now._replace(**made_up | changes)]
 
 
 def pixels(
@@ -95,12 +95,12 @@ def test_a_frame_is_a_fresh_array_of_the_asked_size(run):
 
 def test_the_same_rows_give_the_same_frame_and_reset_forgets(run):
     again = renderer(weight_n=856.0)
-    for trace in run[:60]:
-        again.add(trace)
+    for step in run[:60]:
+        again.add(step)
     again.frame()
     again.reset()
-    for trace in run[60:80]:
-        again.add(trace)
+    for step in run[60:80]:
+        again.add(step)
     np.testing.assert_array_equal(again.frame(), draw(*run[60:80], weight_n=856.0))
     assert (again.frame() != draw(*run[40:80], weight_n=856.0)).any()
 
@@ -110,9 +110,10 @@ def test_off_screen_frames_need_no_display(run):
     draw(*run[:2])
     assert pygame.display.get_init() == was_open
     code = (
-        "import pygame, hoof_env.envs.rendering as r; from hoof_env.dynamics.trace import new_trace\n"
+        "import pygame, hoof_env.envs.rendering as r; from hoof_env.envs.render_instant import Instant\n"
         "from hoof_env.leg.geometry import load_geometry\n"
-        "picture = r.Renderer(load_geometry(), 'rgb_array', 50); picture.add(new_trace(3))\n"
+        "picture = r.Renderer(load_geometry(), 'rgb_array', 50)\n"
+        "picture.add([Instant(*[0.0] * len(Instant._fields))])\n"
         "print(picture.frame().shape, pygame.display.get_init())"
     )
     hidden = ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER")
@@ -148,20 +149,18 @@ def test_the_arrow_leans_the_way_friction_acts(run):
 
 
 def test_each_point_has_its_arrow_where_it_is(run):
-    trace = loaded(run, 900.0)
-    trace["toe_normal"], trace["heel_normal"], trace["heel_penetration"] = 300.0, 600.0, 0.04
-    frame = draw(trace, weight_n=1000.0)
+    (now,) = loaded(run, 300.0, heel=600.0, heel_y=-0.04, heel_depth=0.04)
+    frame = draw([now], weight_n=1000.0)
     (toe_rows, toe_columns), (heel_rows, heel_columns) = pixels(frame, BLUE), pixels(frame, PURPLE)
     assert np.ptp(heel_rows) > 1.6 * np.ptp(toe_rows)
-    ahead = np.sign(trace["toe_x"][0] - trace["heel_x"][0])
+    ahead = np.sign(now.toe_x - now.heel_x)
     assert ahead * (np.median(toe_columns) - np.median(heel_columns)) > 5
 
 
 def test_the_ground_scrolls_under_the_trunk_by_its_ticks(run):
     def ticks(x: float) -> np.ndarray:
-        trace = run[0].copy()
-        trace["trunk_x"] += x
-        frame = draw(trace)
+        now = run[0][0]
+        frame = draw([now._replace(trunk_x=now.trunk_x + x)])
         line = np.nonzero((frame[:, 5] == LINE).all(axis=-1))[0].max()  # the ground at the left edge
         return frame[line + 4, :640]
 
@@ -177,13 +176,13 @@ def surface(frame: np.ndarray, column: int) -> int:
 
 def test_the_ground_is_as_high_as_the_terrain(run):
     """A rise of 0.2 m a metre ahead; the metre marks of level ground say how long a metre is."""
-    level, (trace, *_) = draw(run[0]), run
+    level = draw(run[0])
     metre = 146  # pixels between two ticks at this size and leg, seen below
     row = surface(level, 5) + 8
     ticks = np.flatnonzero((level[row, :640] == LINE).all(axis=-1))
     assert np.diff(ticks)[np.diff(ticks) > 2] == pytest.approx(metre, abs=2)
     terrain = Terrain.through([-50.0, 1.0, 1.1, 50.0], [0.0, 0.0, 0.2, 0.2])
-    frame = draw(trace, terrain=terrain)
+    frame = draw(run[0], terrain=terrain)
     assert surface(frame, 10) - surface(frame, 600) == pytest.approx(0.2 * metre, abs=2)
     assert surface(level, 10) == surface(level, 600)
 
@@ -206,28 +205,26 @@ def test_patches_are_found_where_they_are():
 
 
 def test_the_footprint_is_as_deep_as_the_sole_and_runs_out(run):
-    trace = loaded(run, 900.0)
-    trace["toe_x"], trace["heel_x"], trace["heel_penetration"] = 1.0, 0.8, 0.02
-    (now,) = instants(columns_of_trace(trace))
+    (now,) = loaded(run, 900.0, toe_x=1.0, heel_x=0.8, heel_y=-0.02, heel_depth=0.02)
     depth = footprint(now, np.array([0.0, 0.8, 0.9, 1.0, 1.5]))
     np.testing.assert_allclose(depth, [0.0, 0.02, 0.035, 0.05, 0.0], atol=1e-9)
 
 
 def test_the_ground_gives_way_under_the_hoof(run):
     """Where the leg is not in front of it: both points 0.8 m ahead of the trunk, 10 cm deep."""
-    trace = loaded(run, 900.0)
-    for point in ("toe", "heel"):
-        trace[f"{point}_x"], trace[f"{point}_penetration"] = trace["trunk_x"] + 1.2, 0.1
+    at = {"x": run[0][0].trunk_x + 1.2, "y": -0.1, "depth": 0.1}
+    both = {f"{point}_{name}": value for point in ("toe", "heel") for name, value in at.items()}
     column, metre = 312 + round(1.2 * 146), 146
     beside = column + round(0.06 * metre)
     deep = 0.1 * metre * np.exp(-((0.06 / 0.09) ** 2))
-    assert surface(draw(trace), beside) - surface(draw(run[0]), beside) == pytest.approx(deep, abs=2.5)
+    found = surface(draw(loaded(run, 900.0, **both)), beside) - surface(draw(run[0]), beside)
+    assert found == pytest.approx(deep, abs=2.5)
 
 
 def test_the_camera_follows_the_trunk_uphill(run):
     """Over ground that rises with the trunk, the leg stays where it is in the picture."""
     picture = renderer(terrain=Terrain.slope(0.2))
-    (now,) = instants(columns_of_trace(run[0]))
+    (now,) = run[0]
     places = [
         picture._scene.look_at(now._replace(trunk_x=x, trunk_y=now.trunk_y + x * np.tan(0.2)))["O"]
         for x in (0.0, 3.0, 40.0)
@@ -242,26 +239,26 @@ def test_the_gait_shows_what_is_commanded_and_what_is_made(run):
     def marks(*given) -> np.ndarray:
         """Columns of the commands' marks beside crank speed and swing offset."""
         picture = renderer()
-        picture.add(instants(columns_of_trace(run[0], *given)))
+        names = [*(f"command_{name}" for name in PARAMETERS), *PARAMETERS[1:]]
+        picture.add([run[0][0]._replace(**dict(zip(names, np.concatenate(given), strict=True)))])
         frame = picture.frame()
         return np.array([np.nonzero((frame[y, 760:880] == dark).all(-1))[0].mean() for y in (184, 208)])
 
     low, high = np.array(list(LIMITS.values()))[:2].T
     part = (command[:2] - low) / (high - low)
-    track = 760 + marks(command, gait)
+    track = 760 + marks(command, gait[1:])
     left, right = 770.0, 872.0
     np.testing.assert_allclose(track, left + part * (right - left), atol=1.5)
-    assert (marks(gait, gait) != marks(command, gait)).all()
+    assert (marks(gait, gait[1:]) != marks(command, gait[1:])).all()
 
 
+NOWHERE = Instant(*[0.0] * len(Instant._fields))
 PICTURES = [renderer(size=size) for size in ((600, 540), (960, 540), (1400, 540))]
 
 
 @pytest.mark.parametrize("height", [0.5, 0.88, 1.0, 1.12, 2.1])
 def test_the_leg_is_always_in_the_picture(height):
-    row = new_trace(1)
-    row["trunk_x"], row["trunk_y"] = -37.3, height * GEOMETRY.hip_height
-    (start,) = instants(columns_of_trace(row))
+    start = NOWHERE._replace(trunk_x=-37.3, trunk_y=height * GEOMETRY.hip_height)
     for theta in np.linspace(0, 2 * np.pi, 36, endpoint=False):
         for offset, a, b in product(*list(LIMITS.values())[1:]):
             phi = offset + a * np.sin(theta) + b * np.cos(theta)
@@ -289,7 +286,7 @@ def test_stances_and_peaks_are_those_of_the_reward(gait):
 
 
 def test_a_hoof_that_never_lifts_begins_a_stance_every_turn_of_the_crank(run):
-    (now,) = instants(columns_of_trace(loaded(run, 500.0)))
+    (now,) = loaded(run, 500.0)
     stances = Stances(40.0)
     for k in range(301):
         stances.add(now._replace(time=k / 100, crank_angle=2 * np.pi * k / 100, force_y=500.0 + k))
@@ -299,39 +296,43 @@ def test_a_hoof_that_never_lifts_begins_a_stance_every_turn_of_the_crank(run):
 
 
 def test_a_trunk_that_pitches_turns_its_leg(run):
-    (now,) = instants(columns_of_trace(run[0]))
+    (now,) = run[0]
     picture = renderer()
     arms = []
     for pitch in (0.0, 0.3):
         z = picture._scene.look_at(now._replace(pitch=pitch))
         arms.append(np.array([z[name] - z["O"] for name in ("C", "G", "J")]))
     np.testing.assert_allclose(arms[1], arms[0] * np.exp(-0.3j))  # the picture's y points down
-    level, pitched = (draw_instant(now._replace(pitch=pitch)) for pitch in (0.0, 0.3))
+    level, pitched = (draw([now._replace(pitch=pitch)]) for pitch in (0.0, 0.3))
     assert (level != pitched)[100:220, 160:300].any()  # and the trunk with it
 
 
-def draw_instant(now) -> np.ndarray:
-    picture = renderer()
-    picture.add([now])
-    return picture.frame()
+@pytest.mark.parametrize(
+    ("trunk", "held"),
+    [("suspended", [False, False, True]), ("rail", [True] * 3), ("fixed", [False, True, True])],
+)
+def test_a_trunk_is_drawn_as_it_is_held(run, trunk, held):
+    """Above it: a spring in its middle, a rail across the whole picture, a plate as long as the trunk."""
+    above = draw(run[0], trunk=trunk)[90:136]
+    sky = above[:, 2] if trunk != "rail" else draw(run[0], trunk="fixed")[90:136, 2]
+    assert [(above[:, column] != sky).any() for column in (5, 260, 312)] == held
 
 
 def test_the_running_peak_is_of_the_open_stance(run):
     picture = renderer(lift_off_n=40.0)
-    for trace in run:
-        picture.add(trace)
+    for step in run:
+        picture.add(step)
         stances = picture.stances
-        (*_, now) = instants(columns_of_trace(trace))
+        now = step[-1]
         assert (stances.opened is None) == (now.normal <= 40.0)
         assert stances.running_peak >= now.grf * (now.normal > 40.0)
-    assert picture._panel.full_scale == 5000  # of 1, 2, 5 the first above 4.4 kN
+    assert 1000 < stances.highest < 2000 == picture._panel.full_scale  # of 1, 2, 5 kN the first above it
 
 
 def test_rows_that_are_not_finite_are_left_out(run):
-    broken = run[1].copy()
-    broken["theta"][-1] = np.nan
-    broken["toe_normal"][-2] = np.inf
-    np.testing.assert_array_equal(draw(run[0], broken), draw(run[0], run[1][:-2]))
+    *good, one, other = run[1]
+    broken = [*good, one._replace(force_y=np.inf), other._replace(crank_angle=np.nan)]
+    np.testing.assert_array_equal(draw(run[0], broken), draw(run[0], good))
 
 
 def test_a_window_shows_the_frame_at_its_pace_and_closes(run, monkeypatch):
@@ -339,8 +340,8 @@ def test_a_window_shows_the_frame_at_its_pace_and_closes(run, monkeypatch):
     window = renderer("human")
     try:
         started = time.perf_counter()
-        for trace in run[:6]:
-            window.add(trace)
+        for step in run[:6]:
+            window.add(step)
             assert window.frame() is None
         assert time.perf_counter() - started > 5 / 50 * 0.9
         shown = pygame.surfarray.array3d(pygame.display.get_surface()).transpose(1, 0, 2)
@@ -358,8 +359,8 @@ def test_a_window_that_somebody_closed_stays_closed(run, monkeypatch):
     window.add(run[0])
     window.frame()
     pygame.event.post(pygame.event.Event(pygame.QUIT))
-    for trace in run[1:3]:
-        window.add(trace)
+    for step in run[1:3]:
+        window.add(step)
         assert window.frame() is None
         assert not pygame.display.get_init()
     window.close()

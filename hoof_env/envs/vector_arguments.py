@@ -1,0 +1,85 @@
+"""What callers give the vector environment: checks that name what was given and what was expected."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from gymnasium.vector import AutoresetMode
+from numpy.typing import NDArray
+
+from hoof_env.dynamics.arguments import count
+from hoof_env.envs import episode as e
+from hoof_env.envs.start import check_seed
+from hoof_env.errors import ParameterError
+
+
+def mode_of(value: Any) -> AutoresetMode:
+    """An `AutoresetMode`, given as such, by its name or by its value.
+
+    Raises:
+        ParameterError: none of these.
+    """
+    if isinstance(value, AutoresetMode):
+        return value
+    known = {mode.value: mode for mode in AutoresetMode} | {mode.name: mode for mode in AutoresetMode}
+    try:
+        return known[value]
+    except (KeyError, TypeError):
+        names = ", ".join(mode.name for mode in AutoresetMode)
+        raise ParameterError(f"autoreset_mode: expected one of {names}, got {value!r}") from None
+
+
+def actions_of(actions: Any, n: int) -> NDArray[Any]:
+    """Finite actions, shape (n, 4).
+
+    Raises:
+        ParameterError: of a wrong shape or type, or not finite.
+    """
+    try:
+        given = np.asarray(actions)
+    except ValueError:
+        given = np.empty(0, object)
+    if given.dtype.kind not in "fiu" or given.shape != (n, e.ACTIONS):
+        raise ParameterError(
+            f"actions: expected finite numbers in [-1, 1], shape {(n, e.ACTIONS)}, "
+            f"got {given.dtype} of shape {given.shape}"
+        )
+    if not np.isfinite(given).all():
+        rows = np.flatnonzero(~np.isfinite(given).all(1)).tolist()
+        raise ParameterError(f"actions: expected finite numbers in [-1, 1], got others in rows {rows[:8]}")
+    return given
+
+
+def mask_of(given: Any, n: int) -> NDArray[np.bool_]:
+    """The reset option "reset_mask", shape (n,); None is all.
+
+    Raises:
+        ParameterError: another shape or type, or nobody's.
+    """
+    if given is None:
+        return np.ones(n, bool)
+    good = isinstance(given, np.ndarray) and given.dtype == bool and given.shape == (n,)
+    if not (good and given.any()):
+        raise ParameterError(
+            f"options['reset_mask']: expected a bool array of shape ({n},) with at least one True, "
+            f"got {given!r}"
+        )
+    mask: NDArray[np.bool_] = given
+    return mask
+
+
+def seeds_of(seed: Any, n: int) -> list[int | None]:
+    """A seed for each of `n` environments: `seed` + i, or as given; None goes on with the generator there is.
+
+    Raises:
+        ParameterError: not whole numbers from 0, or too few.
+    """
+    if isinstance(seed, (list, tuple, np.ndarray)):
+        if len(seed) != n:
+            raise ParameterError(f"seed: expected one number or {n}, got {len(seed)}")
+        return [check_seed(value) for value in seed]
+    if seed is None:
+        return [None] * n
+    first = count("seed", seed, low=0)
+    return [first + env for env in range(n)]
