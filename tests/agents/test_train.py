@@ -31,7 +31,12 @@ def curve(folder: Path) -> list[tuple[str, str]]:
 
 def test_run_folder(trained):
     names = {path.name for path in trained.folder.iterdir()}
-    assert names == {*FILES, STATISTICS, "tensorboard", ".lock"}  # checkpoints are gone when a training is through
+    assert names == {
+        *FILES,
+        STATISTICS,
+        "tensorboard",
+        ".lock",
+    }  # checkpoints are gone when a training is through
     assert trained.steps == 256
     assert trained.stopped_by is None
     record = json.loads((trained.folder / "run.json").read_text())
