@@ -34,9 +34,9 @@ RATE_BAR, SHARE_BAR = 25_000.0, 0.6
 class Args:
     env_id: str = LEG
     """registered environment with a native vector environment"""
-    rounds: int = 15
+    rounds: int = 10
     """of both environments"""
-    rollouts: int = 10
+    rollouts: int = 5
     """of PPO in a round, each with its update"""
     torch_threads: int = 1
     """threads of torch"""
