@@ -210,7 +210,7 @@ def test_stored_gaits_get_their_scores(path):
     episodes = score_vector(policy, found["env_id"], range(1000, 1008), **found["env_kwargs"])
     for name in ("return", "speed_m_s", "stance_peak_n"):
         mean, (low, high) = found["score"]["mean"][name], found["score"]["interval95"][name]
-        # Three standard errors of 8 episodes, where the interval is of 512; the fixed trunk leaves nothing to chance
+        # Three standard errors of 8 episodes, where the interval is of 512; on a fixed trunk all are alike
         bound = 6 * (high - low) or 1e-6
         assert np.mean([one[name] for one in episodes]) == pytest.approx(mean, abs=bound)
 
