@@ -139,7 +139,7 @@ class EpisodeBatch:
         task["half"], task["low"], task["high"] = HALF_RANGE, LOW, HIGH
         task["rate_bound"] = self.engine.filters.to_array()[:, 1]
         w = self.weights
-        task["weights"] = w.progress, w.peak, w.energy, w.action, w.failure
+        task["weights"] = w.progress, w.peak, w.energy, w.action, w.failure, w.support
         task["failure_seconds"] = self.episode_seconds
         task["h"], task["substeps"] = self.engine.substep, self.substeps * self.engine.substeps
         task["dt"], task["episode_steps"] = self.dt, self.steps_per_episode

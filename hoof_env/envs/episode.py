@@ -39,15 +39,17 @@ ACTIONS = 4
     TARGET,  # commanded speed [m/s]; infinite if there is none
     WEIGHT,  # of trunk and leg [N]
     TIME, DISTANCE, WORK, IMPULSE, LOADED_TIME, STANCES, PEAK_SUM, HIGHEST,  # totals, see SUMS
-    TERM, _, _, _, _,  # of the last reward, see TERMS
+    TERM, _, _, _, _, _,  # of the last reward, see TERMS
     ENDED,  # 0, or how: FAILED, TRUNCATED
     SWITCH, NEXT_TARGET,  # the control step after which another speed is commanded, and which [m/s]
-) = range(24)  # fmt: skip
-EPISODE_ROWS = 24
+) = range(25)  # fmt: skip
+EPISODE_ROWS = 25
 """Rows of an environment's memory of its episode; a column is an environment."""
 
 SUMS = ("time", "distance", "work", "impulse", "loaded_time", "stances", "peak_sum", "highest")
-TERMS = ("reward_progress", "reward_peak", "reward_energy", "reward_action", "reward_failure")
+TERMS = (
+    "reward_progress", "reward_peak", "reward_energy", "reward_action", "reward_failure", "reward_support",
+)  # fmt: skip
 FAILED, TRUNCATED = 1, 2
 NOT_A_NUMBER, SWITCHED = -1, 2
 """What a step returns if an action is none, and nothing has happened then; 1 if an episode ended, and 2 more
@@ -68,7 +70,7 @@ TASK = np.dtype(
         ("base", "f8", (4,)), ("half", "f8", (4,)),  # command = base + half action
         ("low", "f8", (4,)), ("high", "f8", (4,)),  # within these
         ("middle", "f8", (4,)), ("rate_bound", "f8", (4,)),  # (value - middle) / half is observed
-        ("weights", "f8", (5,)), ("failure_seconds", "f8"),  # of the reward
+        ("weights", "f8", (6,)), ("failure_seconds", "f8"),  # of the reward
         ("h", "f8"), ("substeps", "i8"), ("dt", "f8"), ("episode_steps", "i8"),
         ("height", "f8"), ("lowest", "f8"), ("highest", "f8"),  # nominal and extreme heights of the trunk [m]
         ("stays", "?"), ("sees_ground", "?"),  # a fixed trunk; whether ground ahead is observed
@@ -152,8 +154,10 @@ def judge_step(mine, data, episode, task, n, columns):  # type: ignore[no-untype
     add_to(mine, episode, TIME, choose(good, task.dt, 0.0), n, columns)
     add_to(mine, episode, DISTANCE, distance, n, columns)
     add_to(mine, episode, WORK, work, n, columns)
-    impulse = read(mine, data, (limb + b.LOAD_IMPULSE) * columns + n, 1)
-    add_to(mine, episode, IMPULSE, choose(good, impulse, 0.0), n, columns)
+    impulse = choose(good, read(mine, data, (limb + b.LOAD_IMPULSE) * columns + n, 1), 0.0)
+    add_to(mine, episode, IMPULSE, impulse, n, columns)
+    borne = impulse / read(mine, episode, WEIGHT * columns + n, 1)
+    write(task.weights[5] * borne, episode, (TERM + 5) * columns + n, 1)
     loaded = read(mine, data, (limb + b.LOADED_TIME) * columns + n, 1)
     add_to(mine, episode, LOADED_TIME, choose(good, loaded, 0.0), n, columns)
     stances = read(mine, data, (limb + b.STANCES) * columns + n, 1)

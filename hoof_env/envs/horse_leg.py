@@ -202,13 +202,14 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             self._recording.start()
         said = self._step(self._desk)  # not through the batch: a call costs as much as a substep
         ended = bool(said) and self.batch.follow(said, (self.np_random,))
-        progress, peak, energy, change, failure = self._terms.tolist()
+        progress, peak, energy, change, failure, support = self._terms.tolist()
         info: dict[str, Any] = {
             "reward_progress": progress,
             "reward_peak": peak,
             "reward_energy": energy,
             "reward_action": change,
             "reward_failure": failure,
+            "reward_support": support,
         }
         failed = truncated = False
         if ended:
@@ -219,7 +220,8 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
                 info["failure"] = self.batch.failure(0)
         if self._recording is not None:
             self._show()
-        return self._seen.copy(), progress + peak + energy + change + failure, failed, truncated, info
+        reward = progress + peak + energy + change + failure + support
+        return self._seen.copy(), reward, failed, truncated, info
 
     def _take(self, action: Any) -> None:
         """Put an action where the kernel finds it."""

@@ -96,6 +96,7 @@ WEIGHTS: Rows = {
     "energy": ("1/kJ", "minus the positive work of crank and swing drive; braking is not recovered"),
     "action": ("-", "minus the mean squared change of the action"),
     "failure": ("1/s", "once, minus `episode_seconds`, when the episode fails"),
+    "support": ("1/s", "normal force over the weight of trunk and leg, integrated over the step"),
 }
 """Unit and meaning of each field of `reward.RewardWeights`."""
 

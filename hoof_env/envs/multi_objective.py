@@ -19,11 +19,12 @@ OBJECTIVES = ("progress", "peak force", "energy")
 def vector_reward(terms: Mapping[str, Any]) -> NDArray[np.float32]:
     """The reward of each objective, shape (3,), from the terms that `info` holds.
 
-    Energy takes the charge for changing the action, which is effort too. A failure is charged to all three in
-    equal parts: whoever weighs objectives by numbers that sum to 1 loses the same by a fall, whatever the
-    numbers, so that falling early to spare force or energy pays for nobody.
+    Energy takes the charge for changing the action, which is effort too, and progress what is paid for
+    bearing weight, nothing by default. A failure is charged to all three in equal parts: whoever weighs
+    objectives by numbers that sum to 1 loses the same by a fall, whatever the numbers, so that falling early
+    to spare force or energy pays for nobody.
     """
-    progress, peak = terms["reward_progress"], terms["reward_peak"]
+    progress, peak = terms["reward_progress"] + terms["reward_support"], terms["reward_peak"]
     energy = terms["reward_energy"] + terms["reward_action"]
     return np.array([progress, peak, energy], np.float32) + np.float32(terms["reward_failure"] / 3)
 
@@ -67,7 +68,7 @@ class HorseLegMOEnv(HorseLegEnv):
 
     | Num | Objective | Terms | Unit by default |
     |---|---|---|---|
-    | 0 | progress | `reward_progress` | m |
+    | 0 | progress | `reward_progress` + `reward_support` | m |
     | 1 | peak force | `reward_peak` | 0.3 per kN |
     | 2 | energy | `reward_energy` + `reward_action` | 0.1 per kJ, 0.03 per squared change |
 

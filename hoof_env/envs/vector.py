@@ -154,7 +154,7 @@ class HorseLegVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
         done = terminated | truncated
         if done.any():
             self._sum_up(infos, np.flatnonzero(done))
-        rewards = terms[0] + terms[1] + terms[2] + terms[3] + terms[4]
+        rewards = terms[0] + terms[1] + terms[2] + terms[3] + terms[4] + terms[5]
         infos |= dict(zip(e.TERMS, terms, strict=True))
         if again is not None:
             infos |= self._start(np.flatnonzero(again), {})

@@ -7,7 +7,13 @@ import pytest
 from hoof_env.envs.horse_leg import HorseLegEnv
 from hoof_env.envs.multi_objective import OBJECTIVES, HorseLegMOEnv, vector_reward
 
-TERMS = {"reward_progress": 0.5, "reward_peak": -0.2, "reward_energy": -0.1, "reward_action": -0.02}
+TERMS = {
+    "reward_progress": 0.5,
+    "reward_peak": -0.2,
+    "reward_energy": -0.1,
+    "reward_action": -0.02,
+    "reward_support": 0.0,
+}
 
 
 def test_each_objective_has_its_terms():

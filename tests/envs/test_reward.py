@@ -14,7 +14,9 @@ from hoof_env.envs.policies import make_policy
 from hoof_env.envs.reward import RewardWeights
 from hoof_env.envs.stance import new_account, take_account
 
-TERMS = ("reward_progress", "reward_peak", "reward_energy", "reward_action", "reward_failure")
+TERMS = (
+    "reward_progress", "reward_peak", "reward_energy", "reward_action", "reward_failure", "reward_support",
+)  # fmt: skip
 
 
 def rollout(env, policy, seed, recorded=False):
@@ -49,7 +51,8 @@ def stance_peaks(trace, threshold):
 @pytest.mark.parametrize("name", ["walk", "run", "drag", "random"])
 @pytest.mark.parametrize("trunk", ["suspended", "rail", "fixed"])
 def test_terms_add_up_and_each_stance_pays_its_peak(name, trunk):
-    env = gym.make("hoof_env/HorseLeg-v0", trunk=trunk, episode_seconds=4.0)
+    weights = {"support": 2.0}
+    env = gym.make("hoof_env/HorseLeg-v0", trunk=trunk, episode_seconds=4.0, reward_weights=weights)
     _, infos, trace = rollout(env, make_policy(name, env), 4, recorded=True)
     assert len(trace["time"]) == 4000
     paid = -sum(info["reward_peak"] for info in infos) * 1000 / RewardWeights().peak
@@ -58,6 +61,8 @@ def test_terms_add_up_and_each_stance_pays_its_peak(name, trunk):
     assert -sum(info["reward_energy"] for info in infos) == pytest.approx(
         RewardWeights().energy * work / 1000, rel=1e-9
     )
+    borne = np.sum(trace["normal"]) * 1e-3 / env.unwrapped.weight
+    assert sum(info["reward_support"] for info in infos) == pytest.approx(2.0 * borne, rel=1e-9)
     progress = sum(info["reward_progress"] for info in infos)
     if trunk == "fixed":
         slid = sum(trace[f"{point}_normal"] * trace[f"{point}_slide"] for point in ("toe", "heel"))
