@@ -86,7 +86,8 @@ def make_policy(name: str, env: Any, seed: int = 0) -> Scripted:
     limits.
 
     Raises:
-        ParameterError: unknown name, or a policy that stops the crank where no action stops it.
+        ParameterError: unknown name, a policy that stops the crank where no action stops it, or one that must
+            see the crank angle where it is not observed.
     """
     leg = env.unwrapped
     check_choice("policy", name, policy_names(env))
@@ -111,11 +112,18 @@ def make_policy(name: str, env: Any, seed: int = 0) -> Scripted:
     if name == "idle":
         rest = leg.action_for(rests[0])
         return Scripted(lambda observation, time: rest, leg.dt)
+    seen = [f"{function}(crank angle)" for function in ("sin", "cos")]
+    if not set(seen) <= set(leg.observation_names):
+        raise ParameterError(
+            f"policy {name!r}: expected 'crank' among the observed groups, got {leg.settings.observation!r}"
+        )
+    sine, cosine = map(leg.observation_names.index, seen)
     posture, target = extreme_posture(leg_profile(leg.geometry), rests, name == "drag")
 
     def hold(observation: Any, time: Any) -> Action:
         """Turn the crank (it turns one way only) to `target` and stop; "drag" then swings to and fro."""
-        ahead = (target - np.arctan2(*np.asarray(observation, float)[..., :2].T)) % (2 * np.pi)
+        here = np.asarray(observation, float)
+        ahead = (target - np.arctan2(here[..., sine], here[..., cosine])) % (2 * np.pi)
         speed = np.where((ahead > 0.05) & (ahead < np.pi * 1.5), np.minimum(2 * ahead, 2 * np.pi), 0.0)
         swing = 0.15 * np.sin(np.pi * np.asarray(time)) if name == "drag" else 0.0
         return leg.action_for(np.stack(np.broadcast_arrays(speed, posture[1] + swing, *posture[2:]), -1))

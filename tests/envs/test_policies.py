@@ -156,6 +156,24 @@ def test_policies_hold_their_posture_where_actions_are_offsets(gait):
         assert min(record["toe_y"].item(), record["heel_y"].item()) < high + 0.01
 
 
+def test_policies_that_see_the_crank_find_it_wherever_it_is():
+    one, other = gym.make(ENV_ID), gym.make(ENV_ID, observation=["hoof", "crank"])
+    for name in ("drag", "airborne"):
+        seen = [np.zeros((9, env.observation_space.shape[0]), np.float32) for env in (one, other)]
+        for rows, first in zip(seen, (0, 7), strict=True):
+            angle = np.linspace(0.0, 6.0, 9)
+            rows[:, first], rows[:, first + 1] = np.sin(angle), np.cos(angle)
+        commands = [
+            make_policy(name, env).predict(rows)[0] for env, rows in zip((one, other), seen, strict=True)
+        ]
+        assert len(np.unique(commands[0][:, 0])) > 1
+        np.testing.assert_array_equal(*commands)
+        with pytest.raises(
+            ParameterError, match=r"expected 'crank' among the observed groups, got \['hoof'\]"
+        ):
+            make_policy(name, gym.make(ENV_ID, observation=["hoof"]))
+
+
 def test_a_crank_that_no_action_stops_is_refused():
     env = gym.make(FIXED, gait="carrying_walk")
     for name in ("idle", "drag", "airborne"):
