@@ -8,6 +8,7 @@ from typing import Any
 import gymnasium as gym
 from gymnasium.utils import RecordConstructorArgs
 
+from hoof_env.dynamics.arguments import flag
 from hoof_env.envs.horse_leg import HorseLegEnv
 from hoof_env.errors import ParameterError
 
@@ -35,11 +36,12 @@ class RandomizeParameters(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         leg.batch.check_options({"parameters": ranges})
         RecordConstructorArgs.__init__(self, ranges=dict(ranges), enabled=enabled)
         gym.Wrapper.__init__(self, env)
-        self.ranges, self.enabled = dict(ranges), enabled
+        self.ranges, self.enabled = dict(ranges), flag("enabled", enabled)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, Any]:
         """Start an episode with parameters of its own."""
-        if self.enabled:
-            own = (options or {}).get("parameters", {})
-            options = {**(options or {}), "parameters": {**self.ranges, **own}}
+        given = {} if options is None else options
+        own = given.get("parameters", {}) if isinstance(given, Mapping) else None
+        if self.enabled and isinstance(own, Mapping):  # else the environment says what is wrong
+            options = {**given, "parameters": {**self.ranges, **own}}
         return self.env.reset(seed=seed, options=options)

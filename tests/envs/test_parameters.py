@@ -160,6 +160,15 @@ def test_the_wrapper_refuses_at_once():
             RandomizeParameters(gym.make(LEG), ranges)
 
 
+def test_the_wrapper_leaves_bad_options_to_the_environment():
+    env = RandomizeParameters(gym.make(LEG), {"friction": 0.3})
+    for options in ("fast", ["gait"], {"parameters": 5}, {"parameters": None}):
+        with pytest.raises(ParameterError, match=r"options.*: expected a mapping with some of .*, got"):
+            env.reset(options=options)
+    with pytest.raises(ParameterError, match="enabled: expected True or False, got 'no'"):
+        RandomizeParameters(gym.make(LEG), {}, enabled="no")
+
+
 STIFF = {"motor_gain": (100.0, 2000.0)}
 
 
