@@ -149,6 +149,7 @@ def render_episode(
     check_film(path, check_number("fps", fps, low=0, high=1000, exclusive_low=True))
     check_number("slow", slow, low=1e-3, high=1e3)
     check_number("seed", seed, low=0)
+    check_number("seconds", seconds, low=0, exclusive_low=True)
     with records.make_env(env_id, parse_pairs("--args", arguments)) as env:
         found = records.find_policy(policy, env, env_id, seed)
         renderer = new_renderer(records.setting(env), fps, size)

@@ -104,6 +104,7 @@ def test_an_interrupt_is_one_line_and_leaves_nothing_behind(tmp_path):
         (["--out", "{}/x.mp4", "--fps", "0"], "fps: expected"),
         (["--out", "{}/x.mp4", "--slow", "0"], "slow: expected"),
         (["--out", "{}/x.mp4", "--seconds", "-1"], "seconds: expected"),
+        (["--out", "{}/x.mp4", "--seconds", "nan"], "seconds: expected"),
         (["--out", "{}/x.mp4", "--size", "10", "10"], "size: expected"),
         (["--out", "{}/x.mp4", "--policy", "gallop"], "policy: expected"),
         (["--out", "{}/x.mp4", "--args", "render_mode=human"], "render_mode: expected"),
