@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.advance import LIMB, TRUNK, TRUNK_ROWS
-from hoof_env.dynamics.drive import Drive
+from hoof_env.dynamics.drive import LARGEST, Drive
 from hoof_env.dynamics.engine import GRAVITY
 from hoof_env.dynamics.integrators import INTEGRATORS
 from hoof_env.dynamics.limb import Limb
@@ -78,6 +78,10 @@ class EpisodeBatch:
         check_choice("drive", s.drive, ("prescribed", "motor"))
         for name in ("baumgarte_alpha", "baumgarte_beta"):
             check_number(name, getattr(s, name), low=0.0, high=MOST_BAUMGARTE)
+        for name in ("motor_gain", "motor_torque", "motor_inertia"):
+            check_number(name, getattr(s, name), low=0.0, high=LARGEST)
+        self.randomize = {} if s.randomize is None else check_parameters("randomize", s.randomize, s.drive)
+        self._terrain, self._found_good = make_terrain(s.terrain), ""
         if is_paper:
             check_paper(s)
         self.geometry = load_geometry(s.preset)
@@ -96,15 +100,14 @@ class EpisodeBatch:
         height = nominal if s.hip_height is None else s.hip_height
         self.height = check_number("hip_height", height, low=LOWEST * nominal, high=HIGHEST * nominal)
         self.groups = check_groups(s.observation, GROUPS)
-        self.randomize = check_parameters("randomize", s.randomize or {}, s.drive)
         self.target_speed = None if s.target_speed is None else pair("target_speed", s.target_speed, -20.0)
         self.target_seconds = pair("target_seconds", s.target_seconds, self.dt if self.target_speed else 0.0)
         for group, needed in (("target", "target_speed"), ("ground", "terrain")):
-            if group in self.groups and not getattr(s, needed):
+            given = getattr(s, needed)
+            if group in self.groups and given in (None, {}):
                 raise ParameterError(
-                    f"observation: {group!r} is constant without {needed}, got {needed}=None"
+                    f"observation: {group!r} is constant without {needed}, got {needed}={given!r}"
                 )
-        self._terrain, self._found_good = make_terrain(s.terrain), ""
         trunk, ground, drive = self._physics({})
         substeps = None
         if self.randomize:
@@ -353,6 +356,8 @@ class EpisodeBatch:
                 f"state['episode']: expected shape {expected} for {self.num_envs} environments, "
                 f"got {episode.shape}"
             )
+        if np.isnan(episode).any():
+            raise ParameterError(f"state['episode']: expected numbers, got {episode.tolist()!r:.60}")
         of_paper = self.paper.read_state(state.get("paper")) if self.paper else None
         self.engine.set_state(state["engine"])
         if self.paper and of_paper:

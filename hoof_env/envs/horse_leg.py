@@ -130,13 +130,19 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         Raises:
             ResetNeeded: there is no episode yet.
         """
-        if self._state == "new":
-            raise ResetNeeded("episode_summary() was called before reset(): expected reset() first")
+        self._refuse_closed("episode_summary")
+        self._refuse_new("episode_summary")
         return self.batch.summary(0)
 
     def record(self) -> dict[str, NDArray[np.float64]]:
         """State and report of the engine at every substep of the last control step, or at the start, by name,
-        time on the first axis. From the first call on substeps are kept."""
+        time on the first axis. From the first call on substeps are kept.
+
+        Raises:
+            ResetNeeded: there is no episode yet.
+        """
+        self._refuse_closed("record")
+        self._refuse_new("record")
         if self._recording is None:
             self._recording = Recording(self.batch)
         return self._recording.last()
@@ -193,12 +199,12 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         """
         if self._state != "running":
             self._refuse_closed("step")
-            raise ResetNeeded("step() was called before reset(): expected reset() first")
+            self._refuse_new("step")
         if type(action) is np.ndarray and action.dtype is _SINGLE and action.shape == _SHAPE:
             self._action[:] = action
         else:
             self._take(action)
-        if self._recording is not None:
+        if self._recording is not None and np.isfinite(self._action).all():  # else nothing will happen
             self._recording.start()
         said = self._step(self._desk)  # not through the batch: a call costs as much as a substep
         ended = bool(said) and self.batch.follow(said, (self.np_random,))
@@ -231,11 +237,16 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             given = np.empty(0)
         if given.shape != _SHAPE or given.dtype.kind not in "fiu":
             raise ParameterError(f"action: expected 4 finite numbers in [-1, 1], got {action!r}")
-        self._action[:] = given
+        with np.errstate(over="ignore"):  # to infinity, which is refused
+            self._action[:] = given
 
     def _refuse_closed(self, name: str) -> None:
         if self._state == "closed":
             raise gym.error.ClosedEnvironmentError(f"{name}() was called after close(): make a new one")
+
+    def _refuse_new(self, name: str) -> None:
+        if self._state == "new":
+            raise ResetNeeded(f"{name}() was called before reset(): expected reset() first")
 
     def render(self) -> NDArray[np.uint8] | None:
         """Draw the present state: an (H, W, 3) uint8 array for "rgb_array", a window for "human"; None
@@ -244,8 +255,7 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             gym.logger.warn("render() was called without a render_mode: pass 'rgb_array' or 'human'")
             return None
         self._refuse_closed("render")
-        if self._state == "new":
-            raise ResetNeeded("render() was called before reset(): expected reset() first")
+        self._refuse_new("render")
         frame: NDArray[np.uint8] | None = self._get_renderer().frame()
         return frame
 
@@ -291,8 +301,7 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             ResetNeeded: there is no episode yet.
         """
         self._refuse_closed("get_state")
-        if self._state != "running":
-            raise ResetNeeded("get_state() was called before reset(): expected reset() first")
+        self._refuse_new("get_state")
         about = {"id": self.task.id, "settings": to_json(self.settings)}
         return {**about, **self.batch.get_state(), "generator": self.np_random.bit_generator.state}
 

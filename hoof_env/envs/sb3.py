@@ -41,7 +41,9 @@ class Sb3VecEnv(VecEnv):
         try:
             many: dict[str, Any] = {"num_envs": num_envs, "vectorization_mode": "vector_entry_point"}
             envs = gym.make_vec(env_id, **many, **settings).unwrapped
-        except gym.error.Error:
+        except ParameterError:
+            raise
+        except (gym.error.Error, ModuleNotFoundError, TypeError):  # nobody's, or somebody else's
             envs = None
         if not isinstance(envs, HorseLegVectorEnv):
             raise ParameterError(f"env_id: expected an id of this package with many at once, got {env_id!r}")

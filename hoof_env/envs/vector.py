@@ -26,7 +26,7 @@ from hoof_env.envs.batch import EpisodeBatch
 from hoof_env.envs.recording import Recording
 from hoof_env.envs.state import check_state, generator_of
 from hoof_env.envs.tasks import TASKS, to_json
-from hoof_env.envs.vector_arguments import actions_of, mask_of, mode_of, seeds_of
+from hoof_env.envs.vector_arguments import actions_of, ended_of, mask_of, mode_of, seeds_of
 from hoof_env.errors import ParameterError, check_choice
 from hoof_env.gait.parameters import PARAMETERS
 
@@ -294,10 +294,11 @@ class HorseLegVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
         """
         self._refuse_closed("set_state")
         check_state(state, self.task.id, to_json(self.settings), ("ended",))
-        ended, n = np.array(state["ended"]), self.num_envs
-        if ended.dtype != bool or ended.shape != (n,) or len(state["generator"]) != n:
-            raise ParameterError(f"state: expected one of {n} environments, got one of {len(ended)}")
-        generators = [generator_of(values) for values in state["generator"]]
+        n, states = self.num_envs, state["generator"]
+        ended = ended_of(state["ended"], n)
+        if not isinstance(states, (list, tuple)) or len(states) != n:
+            raise ParameterError(f"state['generator']: expected a list of {n}, got {states!r:.60}")
+        generators = [generator_of(values) for values in states]
         self.batch.set_state(state)
         self._ended, self._started, self._generators = ended, np.ones(n, bool), generators
         for recording in self._recordings:

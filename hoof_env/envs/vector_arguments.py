@@ -30,7 +30,7 @@ def mode_of(value: Any) -> AutoresetMode:
         raise ParameterError(f"autoreset_mode: expected one of {names}, got {value!r}") from None
 
 
-def actions_of(actions: Any, n: int) -> NDArray[Any]:
+def actions_of(actions: Any, n: int) -> NDArray[np.float32]:
     """Finite actions, shape (n, 4).
 
     Raises:
@@ -45,6 +45,8 @@ def actions_of(actions: Any, n: int) -> NDArray[Any]:
             f"actions: expected finite numbers in [-1, 1], shape {(n, e.ACTIONS)}, "
             f"got {given.dtype} of shape {given.shape}"
         )
+    with np.errstate(over="ignore"):  # to infinity, which is refused
+        given = given.astype(np.float32, copy=False)
     if not np.isfinite(given).all():
         rows = np.flatnonzero(~np.isfinite(given).all(1)).tolist()
         raise ParameterError(f"actions: expected finite numbers in [-1, 1], got others in rows {rows[:8]}")
@@ -67,6 +69,23 @@ def mask_of(given: Any, n: int) -> NDArray[np.bool_]:
         )
     mask: NDArray[np.bool_] = given
     return mask
+
+
+def ended_of(given: Any, n: int) -> NDArray[np.bool_]:
+    """A copy of which episodes of a state had ended, shape (n,).
+
+    Raises:
+        ParameterError: another shape or type.
+    """
+    try:
+        ended = np.array(given)
+    except ValueError:
+        ended = np.empty(0, object)
+    if ended.dtype != bool or ended.ndim != 1:
+        raise ParameterError(f"state['ended']: expected a bool array of shape ({n},), got {given!r}")
+    if ended.size != n:
+        raise ParameterError(f"state: expected one of {n} environments, got one of {ended.size}")
+    return ended
 
 
 def seeds_of(seed: Any, n: int) -> list[int | None]:

@@ -56,7 +56,12 @@ ARGUMENTS = [
     ({"exponent": 1.51}, "exponent: .*multiples of 1/8, got 1.51"),
     ({"friction": -0.1}, "friction: expected.*got -0.1"),
     ({"friction_fast": 1e-4}, "friction_fast: expected more than friction_slow"),
-    ({"drive": "motor", "motor_gain": -1.0}, "motor.*gain: expected.*got -1.0"),
+    ({"drive": "motor", "motor_gain": -1.0}, "motor_gain: expected.*got -1.0"),
+    (
+        {"motor_torque": "strong"},
+        "motor_torque: expected.*got 'strong'",
+    ),  # also where no motor turns the crank
+    ({"approach_floor": 1e300}, "approach_floor: expected.*got 1e.300"),
     ({"episode_seconds": -1.0}, "episode_seconds: expected.*got -1.0"),
     ({"episode_seconds": 1e308}, "episode_seconds: expected.*got 1e.308"),
     ({"episode_seconds": 10.0, "dt": 20.0}, r"episode_seconds: expected.*\[20, .*got 10.0"),
@@ -79,7 +84,11 @@ ARGUMENTS = [
     ({"terrain": {"kind": "hills", "stiffness": 2}}, r"terrain\['stiffness'\]: expected two numbers, got 2"),
     ({"terrain": {"kind": "slope", "angle": 2}}, "angle.*: expected.*got 2"),
     ({"terrain": {"bumps": 1}}, "terrain.*"),
+    ({"terrain": np.zeros(2)}, "terrain: expected None or a mapping, got array"),
     ({"randomize": 3}, "randomize: expected a mapping with some of trunk_mass.*got 3"),
+    ({"randomize": []}, r"randomize: expected a mapping with some of trunk_mass.*got \[\]"),
+    ({"randomize": np.zeros(2)}, "randomize: expected a mapping with some of trunk_mass.*got array"),
+    ({"observation": ["ground"], "terrain": {}}, "'ground' is constant without terrain, got terrain={}"),
     ({"randomize": {"preset": "x"}}, "randomize: expected a mapping with some of trunk_mass"),
     ({"randomize": {"friction": (0.1, 0.2, 0.3)}}, r"randomize\['friction'\]: expected a number or two"),
     ({"randomize": {"friction": (0.3, 0.1)}}, r"randomize\['friction'\]: expected the lower one first"),
@@ -140,6 +149,7 @@ OPTIONS = [
     ({"parameters": {"trunk_mass": -5.0}}, "trunk_mass: expected.*got -5.0"),
     ({"parameters": {"trunk_mass": (-5.0, 90.0)}}, "trunk_mass: expected.*got -5.0"),
     ({"parameters": {"trunk_mass": None}}, r"options\['parameters'\]\['trunk_mass'\]: expected.*got None"),
+    ({"parameters": {"approach_floor": 1e300}}, "approach_floor: expected.*got 1e.300"),
     ({"parameters": {"friction_slow": 1.0}}, "friction_fast: expected more than friction_slow = 1"),
 ]
 RESETS = [(({"options": options}), message) for options, message in OPTIONS] + [
@@ -163,7 +173,8 @@ ACTIONS = [
     (np.full(4, np.inf), "expected"), ("go", "expected"), (None, "expected"), (1.0, "expected"),
     ([1, [2, 3], 4, 5], "expected"), (np.zeros(4, bool), "expected"), (np.zeros(4, complex), "expected"),
     ({"a": 1}, "expected"), (np.full((3, 4), NAN, np.float32), "rows|expected 4"),
-    (np.zeros((3, 3)), "expected"),
+    (np.zeros((3, 3)), "expected"), (np.full(4, 1e300), "expected"),
+    (np.full((3, 4), 1e300), r"others in rows \[0, 1, 2\]|expected 4"),
 ]  # fmt: skip
 
 
@@ -221,6 +232,17 @@ def test_one_bad_row_is_named():
     check_nothing_lost(env, twin, lambda e: e.step(given), ParameterError, message)
 
 
+def test_a_refused_action_leaves_the_record_of_the_last_step():
+    env, _ = going("single")
+    env.record()
+    env.step(np.zeros(4, np.float32))
+    before = env.record()
+    for action in (np.full(4, NAN, np.float32), np.zeros(3)):
+        with pytest.raises(ParameterError):
+            env.step(action)
+        same(env.record(), before)
+
+
 @pytest.mark.parametrize("given", [np.float64, np.float32, np.int64, np.uint8, list], ids=str)
 @pytest.mark.parametrize("kind", BOTH)
 def test_actions_of_any_number_type_are_taken(kind, given):
@@ -239,14 +261,16 @@ def test_actions_beyond_the_box_are_clipped(kind):
 def test_nothing_goes_before_reset_or_after_close(kind):
     env = BOTH[kind](render_mode="rgb_array")
     taken = env.action_space.sample()
-    for call in (lambda: env.step(taken), env.render, env.get_state):
+    figures = (env.record, env.episode_summary) if kind == "single" else ()
+    for call in (lambda: env.step(taken), env.render, env.get_state, *figures):
         with pytest.raises(ResetNeeded, match=r"\(\) was called before reset\(\): expected reset\(\)"):
             call()
     env.reset(seed=0)
     state = env.get_state()
     env.close()
     env.close()
-    for call in (lambda: env.step(taken), env.reset, env.render, env.get_state, lambda: env.set_state(state)):
+    others = (env.reset, env.render, env.get_state, *figures)
+    for call in (lambda: env.step(taken), lambda: env.set_state(state), *others):
         with pytest.raises(ClosedEnvironmentError, match=r"\(\) was called after close\(\): make a new one"):
             call()
 
@@ -297,6 +321,8 @@ STATES = {
     ),
     "a shape": (lambda state: {**state, "episode": state["episode"][:, :0]}, "episode.*expected shape"),
     "words": (lambda state: {**state, "episode": "long"}, "episode.*expected numbers, got 'long'"),
+    "no number": (lambda state: {**state, "episode": state["episode"] * NAN}, "episode.*expected numbers"),
+    "no generators": (lambda state: {**state, "generator": 5}, "generator.*expected.*got 5"),
     "a generator": (lambda state: {**state, "generator": [{"a": 1}] * 3}, "generator.*PCG64"),
 }  # fmt: skip
 
@@ -340,11 +366,22 @@ def test_states_of_other_numbers_of_environments():
         *going("vector"), lambda env: env.set_state(single), ParameterError, "ended is missing"
     )
     check_nothing_lost(*going("single"), lambda env: env.set_state(vector), ParameterError, "state")
+    for ended in (None, "yes", [[True], [True, False]], np.zeros(3)):
+        broken = {**vector, "ended": ended}
+        check_nothing_lost(
+            *going("vector"),
+            lambda env, state=broken: env.set_state(state),
+            ParameterError,
+            r"state\['ended'\]: expected a bool array of shape \(3,\), got",
+        )
 
 
 def test_adapter():
-    with pytest.raises(ParameterError, match="env_id: expected an id of this package with many at once, got"):
-        Sb3VecEnv("hoof_env/HorseLegMO-v0", 2)
+    for env_id in ("hoof_env/HorseLegMO-v0", "CartPole-v1", "Nobodys-v0", "no_such_module:Leg-v0"):
+        with pytest.raises(ParameterError, match="env_id: expected an id of this package with many at once"):
+            Sb3VecEnv(env_id, 2)
+    with pytest.raises(ParameterError, match="unexpected keyword argument 'trunck'; did you mean trunk"):
+        Sb3VecEnv(LEG, 2, trunck="rail")
     with pytest.raises(ParameterError, match="autoreset_mode: expected SAME_STEP, got 'NEXT_STEP'"):
         Sb3VecEnv(LEG, 2, autoreset_mode="NEXT_STEP")
     env = Sb3VecEnv(LEG, 2)
