@@ -53,7 +53,7 @@ not observed by default: $other_groups. `env.unwrapped.observation_names` has th
 
 ## Rewards
 
-The sum of five terms, each in `info` under its name.
+The sum of these terms, each in `info` under its name.
 
 $rewards
 

@@ -45,7 +45,7 @@ class HorseLegVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
         render_mode: "rgb_array"; `render` gives a frame of each of the first `rendered` environments.
         rendered: how many are drawn.
 
-    Rewards are float64, shape (num_envs,). Infos hold the five reward terms; when an episode ends its
+    Rewards are float64, shape (num_envs,). Infos hold the reward terms; when an episode ends its
     figures, too, as "episode_summary", one array for each figure, with masks under "_episode_summary", and
     why it failed as "failure".
 
