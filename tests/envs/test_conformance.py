@@ -98,7 +98,7 @@ def test_types_and_infos_of_a_step(env_id, settings):
         _, reward, terminated, truncated, info = env.step(env.action_space.sample())
         assert (type(reward), type(terminated), type(truncated)) == (float, bool, bool)
         terms = [value for key, value in info.items() if key.startswith("reward_")]
-        assert [type(term) for term in terms] == [float] * 5
+        assert [type(term) for term in terms] == [float] * len(NAMES)
         assert reward == sum(terms)
         assert len(info) <= 8
         done = terminated or truncated
@@ -108,7 +108,7 @@ def test_types_and_infos_of_a_step(env_id, settings):
     assert all(type(value) is float for value in info["episode_summary"].values())
 
 
-NAMES = ("progress", "peak", "energy", "action", "failure")
+NAMES = ("progress", "peak", "energy", "action", "failure", "support")
 
 
 @pytest.mark.parametrize("env_id", IDS)
