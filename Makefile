@@ -43,6 +43,7 @@ kernels: setup
 
 test-slow: setup
 	@echo 'pytest -m slow' && $(PY) -m pytest -q -m slow
+	@echo 'a million random steps of each id' && HOOF_ENV_STEPS=1e6 $(PY) -m pytest -q tests/envs/test_never_breaks.py -k random_actions
 
 test-peers: setup
 	@echo 'pip install mujoco exudyn' && $(PY) -m pip install -q -c constraints.txt -e '.[peers]'

@@ -193,7 +193,7 @@ class Resumed:
         np.random.set_state(generators["numpy"])  # noqa: NPY002
         torch.set_rng_state(generators["torch"])
         self.model.action_space.np_random.bit_generator.state = generators["actions"]
-        for name, drawn in self._state["exploration"].items():
+        for name, drawn in self._state.get("exploration", {}).items():
             setattr(_explorer(self.model), name, drawn)
 
 

@@ -51,7 +51,7 @@ class HorseLegMOEnv(HorseLegEnv):
 
     Many at once, rewards of shape (num_envs, 3), come from MO-Gymnasium:
     `mo_gymnasium.wrappers.vector.MOSyncVectorEnv([lambda: mo_gymnasium.make("hoof_env/HorseLegMO-v0")] * 4)`.
-    `gymnasium.make_vec` refuses, for Gymnasium's own keep one number for a reward.
+    `gymnasium.make_vec` refuses by default, for Gymnasium's own keep one number for a reward.
 
     ## Action space
 

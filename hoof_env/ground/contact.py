@@ -82,7 +82,7 @@ class Ground:
         check_number("stiffness", self.stiffness, low=0, high=1e12, exclusive_low=True)
         check_number("exponent", self.exponent, low=1, high=3)
         check_choice("normal_law", self.normal_law, NORMAL_LAWS)
-        check_number("approach_floor", self.approach_floor, low=0, exclusive_low=True)
+        check_number("approach_floor", self.approach_floor, low=0, high=1e6, exclusive_low=True)
         check_choice("approach", self.approach, ("interpolated", "sampled"))
         check_choice("friction_law", self.friction_law, FRICTION_LAWS)
         check_number("friction", self.friction, low=0, high=10)
