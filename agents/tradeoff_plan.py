@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from agents.baselines_plan import CURVE_SEEDS, LEG, Entry
+from agents.baselines_plan import BEARING_WEIGHTS, CURVE_SEEDS, LEG, Entry
 
 SPEED = "hoof_env/HorseLegSpeed-v0"
 
@@ -26,9 +26,10 @@ at chosen speeds."""
 AT_SPEED: Mapping[str, Mapping[str, float]] = {
     "soft": {"progress": 3.0, "peak": 1.0},
     "cheap": {"progress": 3.0, "peak": 0.0, "energy": 1.0},
+    "bearing": BEARING_WEIGHTS,
 }
-"""Weights at a chosen speed: peaks cost more, or only work costs, and a metre pays enough that none is given
-up."""
+"""Weights at a chosen speed: peaks cost more, only work costs, or bearing weight pays, and a metre pays
+enough that none is given up."""
 
 DEFAULT, SLOW = "default", "soft-2"
 """Labels of the default reward, and of the one whose gaits are about as fast as the paper's run."""
