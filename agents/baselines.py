@@ -146,6 +146,11 @@ def main(argv: list[str] | None = None) -> int:
 
         page = baselines_report.report(baselines_report.Args(args.subset, args.out))
         print(f"written: {page}")
+    return exit_code(failed)
+
+
+def exit_code(failed: Sequence[Run]) -> int:
+    """Name the trainings that failed; 1 if there are any."""
     for one in failed:
         print(f"failed: {one.name}", file=sys.stderr)
     return 1 if failed else 0

@@ -13,7 +13,6 @@ from __future__ import annotations
 import csv
 import io
 import signal
-import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -22,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from agents import runs, tradeoff_front, tradeoff_gait, tradeoff_impact
-from agents.baselines import work_off
+from agents.baselines import exit_code, work_off
 from agents.baselines_plan import LEG, Run, runs_of
 from agents.baselines_results import Row, read_results, versions_of
 from agents.command import parse_pairs, run
@@ -211,9 +210,7 @@ def main(argv: list[str] | None = None) -> int:
     plan = plan_of(args)
     failed = train_all(plan, args.workers) if args.train else []
     print(f"written: {report(plan)}")
-    for one in failed:
-        print(f"failed: {one.name}", file=sys.stderr)
-    return 1 if failed else 0
+    return exit_code(failed)
 
 
 if __name__ == "__main__":

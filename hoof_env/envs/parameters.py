@@ -18,9 +18,6 @@ from hoof_env.ground.preset import load_ground
 MOST_SUBSTEPS = 100_000
 """Of a control step."""
 
-MOST_FLOOR = 1e6
-"""Largest floor of an approach speed [m/s], whose square is a number still."""
-
 
 def resolved(settings: Settings) -> Settings:
     """The settings with values for None: the ground of the preset, the solver's own scheme and step.
@@ -74,7 +71,6 @@ def substeps_of(dt: float, sim_dt: float) -> int:
 def physics(settings: Settings, height: float, changes: Mapping[str, float]) -> tuple[Trunk, Ground, Drive]:
     """Trunk at a height [m], ground and drive of some `resolved` settings with others changed."""
     s = replace(settings, **dict(changes))  # type: ignore[arg-type]
-    check_number("approach_floor", s.approach_floor, low=0.0, high=MOST_FLOOR, exclusive_low=True)
     trunk = Trunk(
         s.trunk, s.trunk_mass, s.trunk_share, s.trunk_stiffness, s.trunk_damping, s.trunk_drag, height
     )  # fmt: skip

@@ -145,7 +145,7 @@ def stopped(tmp_path_factory):
     [
         ({"seed": 1}, "seed: 0 there, 1 here"),
         ({"steps": 200}, "n_timesteps: 160 there, 200 here"),
-        ({"params": (*TINY_OFF, "tau=0.5")}, r"tau: \S+ there, 0.5 here"),
+        ({"params": (*TINY_OFF, "gamma=0.5")}, "gamma: 0.9 there, 0.5 here"),
         ({"env_kwargs": (*SHORT, "trunk=rail")}, "trunk"),
         ({"env_id": "hoof_env/HorseLegRail-v0"}, "HorseLegRail"),
         ({"out": None}, "--out"),
