@@ -101,26 +101,25 @@ def train(args: Args, *also: Any) -> Trained:
     name = args.env_id.rpartition("/")[2]
     folder = args.out or Path("runs", f"{args.algo}-{name}-s{args.seed}-{datetime.now():%Y%m%d-%H%M%S}")
     record = make_record(args, env_kwargs)
-    earlier = find_earlier(args, folder, record, settings)
-    if finished := earlier.get("finished"):
-        checkpoints.tidy(folder, keep=0)  # of a process that was killed before it did so
-        return Trained(folder, finished["steps"], finished["seconds"], None)
     check_folder(folder)
     with runs.alone(folder):
-        return _train(args, folder, record, earlier, env_kwargs, settings, also)
+        return _train(args, folder, record, env_kwargs, settings, also)
 
 
 def _train(
     args: Args,
     folder: Path,
     record: dict[str, Any],
-    earlier: dict[str, Any],
     env_kwargs: dict[str, Any],
     settings: dict[str, Any],
     also: tuple[Any, ...],
 ) -> Trained:
     """`train` in a folder that nobody else works in."""
     n_envs, steps = settings["n_envs"], settings["n_timesteps"]
+    earlier = find_earlier(args, folder, record, settings)
+    if finished := earlier.get("finished"):
+        checkpoints.tidy(folder, keep=0)  # of a process that was killed before it did so
+        return Trained(folder, finished["steps"], finished["seconds"], None)
     checkpoints.tidy(folder)
     found = checkpoints.checkpoints(folder) if earlier else []
     if found:
