@@ -42,6 +42,9 @@ QUICK_SECONDS, QUICK_SHARE = 120.0, 0.9
 
 MARKS = ("bars", "table", "figures", "matched", "made")
 
+README = Path("README.md")
+"""Its table of baselines is written together with the page."""
+
 
 @dataclass(frozen=True)
 class Args:
@@ -87,6 +90,18 @@ def row_cells(row: Row, known: dict[str, Reference]) -> list[str]:
         f"{returns.min():.1f} to {returns.max():.1f}", above("run"), above(OPEN_LOOP),
         f"{len(seconds)}/{count}" + (f": {np.median(seconds):.0f} ({max(seconds):.0f})" if seconds else ""),
     ]  # fmt: skip
+
+
+def short_table(rows: Sequence[Row], known: Mapping[str, Reference]) -> str:
+    """Returns on HorseLeg-v0 for the README."""
+    lines = ["| policy | seeds | environment steps | wall s | return: IQM [95 %] |", "|---|---|---|---|---|"]
+    lines += [f"| {one.name} | | | | {one.intervals['return'].text()} |" for one in known.values()]
+    lines += [
+        f"| {row.title} | {' | '.join(row_cells(row, dict(known))[:4])} |"
+        for row in rows
+        if row.entry.env_id == LEG and not row.entry.label
+    ]
+    return "\n".join(lines)
 
 
 def times_to_beat(row: Row, known: dict[str, Reference]) -> list[float]:
@@ -218,6 +233,10 @@ def report(args: Args) -> Path:
     for mark, content in zip(MARKS, tables, strict=True):
         text = put(text, mark, content)
     runs.write_text(page, text)
+    if page == PAGES["full"]:
+        runs.write_text(
+            README, put(README.read_text(encoding="utf-8"), "baselines", short_table(rows, known))
+        )
     return page
 
 
