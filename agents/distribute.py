@@ -33,7 +33,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 SHIPPED = {
     "working_dir": str(ROOT),
-    "excludes": ["/.*", "/runs", "/docs", "/dist", "/build", "__pycache__", "*.pyc"],
+    "excludes": ["/.?*", "/runs", "/docs", "/dist", "/build", "__pycache__", "*.pyc"],
 }
 """Runtime environment of trials on a cluster: the checkout, without what no training needs."""
 
