@@ -173,7 +173,7 @@ def start(args: Cluster) -> None:
     """Join the cluster at `args.address`, or make one of this machine's cores.
 
     Raises:
-        ParameterError: Ray is not installed, or there is no cluster at that address.
+        ParameterError: Ray is not installed, or no cluster at that address lets us in.
     """
     kind = "rllib" if isinstance(args, Rllib) else "tune"
     needed = {"tune": ("ray", "pandas"), "rllib": ("ray", "pandas", "torch", "dm_tree")}[kind]
@@ -187,6 +187,7 @@ def start(args: Cluster) -> None:
     check_number("retries", args.retries, low=0)
     os.environ.setdefault("RAY_AIR_NEW_OUTPUT", "0")
     import ray
+    from ray.exceptions import AuthenticationError
 
     asked: dict[str, Any] = {"address": args.address or "local", "log_to_driver": False}
     if args.address:
@@ -199,7 +200,7 @@ def start(args: Cluster) -> None:
     logging.getLogger("ray.tune.execution.tune_controller").setLevel(logging.CRITICAL)
     try:
         ray.init(logging_level=logging.ERROR, **asked)
-    except (ConnectionError, OSError, RuntimeError, ValueError) as error:
+    except (AuthenticationError, ConnectionError, OSError, RuntimeError, ValueError) as error:
         said = str(error).strip().splitlines() or [type(error).__name__]
         where = f"a Ray cluster at {args.address!r}" if args.address else "a Ray cluster on this machine"
         raise ParameterError(f"address: expected {where}, cannot reach it: {said[0]}") from None

@@ -1,5 +1,5 @@
-"""`python -m agents.distribute` on a Ray cluster of two cores, one node or two: what dies or is stopped is not
-lost."""
+"""`python -m agents.distribute` on a Ray cluster of two cores, of one node or two: what dies or is stopped is
+not lost."""
 
 from __future__ import annotations
 
