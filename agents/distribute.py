@@ -191,7 +191,10 @@ def start(args: Cluster) -> None:
 
     asked: dict[str, Any] = {"address": args.address or "local", "log_to_driver": False}
     if args.address:
-        asked["runtime_env"] = SHIPPED | parse_pairs("--runtime-env", args.runtime_env)
+        # Ray refuses a second working_dir in a job that was submitted with one
+        job = json.loads(os.environ.get("RAY_JOB_CONFIG_JSON_ENV_VAR", "{}")).get("runtime_env", {})
+        sent = {} if "working_dir" in job else SHIPPED
+        asked["runtime_env"] = sent | parse_pairs("--runtime-env", args.runtime_env)
     else:
         asked |= {"num_cpus": args.cpus, "include_dashboard": False}
         if args.cpus is not None:
