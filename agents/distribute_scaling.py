@@ -16,6 +16,7 @@ import csv
 import io
 import json
 import os
+import shlex
 import subprocess
 import sys
 import tempfile
@@ -27,6 +28,7 @@ import numpy as np
 
 from agents import runs
 from agents.command import run
+from hoof_env.errors import HoofEnvError
 
 COLUMNS = ("what", "workers", "round", "steps", "seconds", "load")
 """Of scaling.csv; `load` is the number of processes that wanted a core when the measurement began."""
@@ -95,7 +97,7 @@ def plain(args: Args, workers: int, folder: Path) -> Found:
     going: list[subprocess.Popen[bytes]] = []
     for seed in range(args.trainings):
         if len(going) == workers:
-            going.pop(0).wait()
+            finish(going.pop(0))
         options = (
             "--steps",
             args.steps,
@@ -108,7 +110,7 @@ def plain(args: Args, workers: int, folder: Path) -> Found:
         )
         going.append(command("agents.train", *options))
     for process in going:
-        process.wait()
+        finish(process)
     return [("", time.monotonic() - started, 0)]
 
 
@@ -116,7 +118,7 @@ def trials(args: Args, workers: int, folder: Path) -> Found:
     """The same as trials."""
     started = time.monotonic()
     options = ("--seeds", args.trainings, "--steps", args.steps, "--report-every", args.steps)
-    command("agents.distribute", "trials", *options, "--cpus", workers, "--out", folder).wait()
+    finish(command("agents.distribute", "trials", *options, "--cpus", workers, "--out", folder))
     return [("", time.monotonic() - started, 0)]
 
 
@@ -133,7 +135,7 @@ def rllib(args: Args, workers: int, folder: Path) -> Found:
         folder,
     )
     options += ("--params", "n_envs=128", "n_steps=32", "batch_size=1024", "n_epochs=4")  # short iterations
-    command("agents.distribute", "rllib", *options).wait()
+    finish(command("agents.distribute", "rllib", *options))
     (path,) = folder.glob("*/*/result.json")
     told = [json.loads(line) for line in path.read_text().splitlines()][2:]
     steps = sum(one["env_runners"]["num_env_steps_sampled"] for one in told)
@@ -146,6 +148,12 @@ def command(module: str, *options: object) -> subprocess.Popen[bytes]:
         [sys.executable, "-m", module, *map(str, options)],
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
     )  # fmt: skip
+
+
+def finish(process: subprocess.Popen[bytes]) -> None:
+    """Wait; what failed is no measurement."""
+    if code := process.wait():
+        raise HoofEnvError(f"ended with code {code}: {shlex.join(process.args)}")  # type: ignore[arg-type]
 
 
 def rates(rows: list[dict[str, float | str]], what: str, workers: int) -> np.ndarray:
@@ -170,15 +178,20 @@ def draw(rows: list[dict[str, float | str]], path: Path) -> None:
 
     figure = Figure((6.0, 2.6), layout="constrained")
     axes = figure.subplots()
+    widest = 2.0
     for place, what in enumerate(TITLES):
         ratio = rates(rows, what, 2) / rates(rows, what, 1)
-        axes.barh(place, ratio.mean(), color="tab:blue", alpha=0.6)
-        axes.plot(ratio, np.full(len(ratio), place), "k.", markersize=6)
-    axes.axvline(2.0, color="0.4", linestyle="--", linewidth=1)
-    axes.axvline(1.0, color="0.4", linestyle=":", linewidth=1)
-    axes.set(yticks=range(len(TITLES)), yticklabels=list(TITLES.values()), xlim=(0, 2.2))
-    axes.set_xlabel("rate with 2 workers / rate with 1 [-]; dots: rounds, dashed: ideal")
+        widest = max(widest, *ratio)
+        axes.barh(place, ratio.mean(), color="tab:blue", alpha=0.6, label="" if place else "mean")
+        axes.plot(ratio, np.full(len(ratio), place), "k.", markersize=6, label="" if place else "one round")
+    for ratio, name in (1.0, "no gain"), (2.0, "ideal"):
+        axes.axvline(ratio, color="0.4", linestyle="--", linewidth=1)
+        axes.text(ratio, 1.02, name, transform=axes.get_xaxis_transform(), ha="center", color="0.4")
+    axes.set(yticks=range(len(TITLES)), yticklabels=list(TITLES.values()), xlim=(0, 1.1 * widest))
+    axes.set_xlabel("rate with 2 workers / rate with 1 [-]")
     axes.invert_yaxis()
+    axes.spines[["top", "right"]].set_visible(False)
+    figure.legend(loc="outside lower right", ncols=2, frameon=False)
     figure.savefig(path, dpi=130)
 
 
