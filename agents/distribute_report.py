@@ -58,7 +58,8 @@ class Progress(tune.Callback):
         self._tell(trial, f"{last_failure(trial)} No retry is left")
 
     def on_trial_complete(self, iteration: int, trials: list[Any], trial: Any, **info: Any) -> None:
-        self._tell(trial, f"done, return {figures(trial.last_result)['return']:.2f}")
+        found = figures(trial.last_result)["return"]  # none where no episode of RLlib's ended
+        self._tell(trial, "done" if found is None else f"done, return {found:.2f}")
 
     def on_experiment_end(self, trials: list[Any], **info: Any) -> None:
         if self.bar is not None:

@@ -28,7 +28,7 @@ import numpy as np
 
 from agents import runs
 from agents.command import run
-from hoof_env.errors import HoofEnvError
+from hoof_env.errors import HoofEnvError, check_number
 
 COLUMNS = ("what", "workers", "round", "steps", "seconds", "load")
 """Of scaling.csv; `load` is the number of processes that wanted a core when the measurement began."""
@@ -56,7 +56,14 @@ class Args:
 
 
 def measure(args: Args) -> list[dict[str, float | str]]:
-    """All rounds; writes the table after each."""
+    """All rounds; writes the table after each.
+
+    Raises:
+        ParameterError: too few rounds or steps.
+        HoofEnvError: a command failed.
+    """
+    check_number("rounds", args.rounds, low=1)
+    check_number("rllib_steps", args.rllib_steps, low=4 * 4096)  # iterations, of which two are not counted
     rows: list[dict[str, float | str]] = []
     for number in range(args.rounds):
         for workers in (1, 2) if number % 2 == 0 else (2, 1):
