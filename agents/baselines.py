@@ -33,11 +33,11 @@ class Args:
     subset: Literal["full", "nightly"] = "full"
     """which plan; the nightly one is written beside its runs and never over the full table"""
     only: tuple[str, ...] = ()
-    """only trainings with one of these in their names, which are ALGO-ENV-sSEED"""
+    """only trainings with one of these in their names, which are ALGO-ENV-sSEED or ALGO-ENV-LABEL-sSEED"""
     workers: int = 2
     """trainings at a time, one thread each"""
     out: Path | None = None
-    """folder; otherwise runs/baselines or runs/baselines-nightly"""
+    """folder of trainings and page; otherwise runs/baselines-nightly, or runs/baselines and docs/"""
     report: bool = True
     """write the page when nothing is left"""
 

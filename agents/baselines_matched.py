@@ -71,10 +71,12 @@ SLOWER = 0.05
 
 @dataclass(frozen=True)
 class Compared:
-    """A line of the comparison: figures with their intervals, over seeds or, without learning, episodes."""
+    """A line of the comparison: figures with their intervals, over seeds or, without learning, episodes; and
+    those of each seed."""
 
     name: str
     intervals: Mapping[str, Interval]
+    seeds: Sequence[Mapping[str, float]] = ()
 
     def cells(self) -> list[str]:
         """Of a table."""
@@ -83,7 +85,7 @@ class Compared:
 
 def of_row(name: str, row: Row) -> Compared:
     """An entry as it was scored."""
-    return Compared(name, row.intervals)
+    return Compared(name, row.intervals, [one.figures for one in row.results])
 
 
 def of_reference(name: str, found: Reference) -> Compared:
@@ -100,7 +102,7 @@ def told_speed(row: Row, speed: float) -> Compared:
         )  # that they were trained with other speeds, which is meant
         each = [figures(score_vector(str(one.folder), SPEED, FINAL_SEEDS, **kwargs)) for one in row.results]
     name = f"{row.title} of HorseLegSpeed-v0, told {speed:g} m/s"
-    return Compared(name, over_seeds(each))
+    return Compared(name, over_seeds(each), each)
 
 
 def scaled_runs() -> tuple[list[tuple[float, float]], np.ndarray]:
@@ -155,6 +157,16 @@ def dominates(agent: Compared, other: Compared) -> bool:
     return fast and all(other.intervals[key].above(agent.intervals[key]) for key in LOWER)
 
 
+def seeds_that_dominate(agent: Compared, other: Compared) -> str:
+    """How many seeds are at least as fast and lower in all of `LOWER`, each by its own mean; no interval."""
+    means = {key: interval.mean for key, interval in other.intervals.items()}
+    count = sum(
+        one["speed_m_s"] >= means["speed_m_s"] and all(one[key] < means[key] for key in LOWER)
+        for one in agent.seeds
+    )
+    return f"{count}/{len(agent.seeds)}" if agent.seeds else ""
+
+
 def told(agent: Compared, other: Compared) -> str:
     """Whether the agent dominates, and whether it bears less of the weight then, in words."""
     if not dominates(agent, other):
@@ -194,7 +206,8 @@ def compare(
             said = told(slowed, paper)
             met = said == "yes" or (said != "no" and row.entry.label == MATCHED)
             word = "not met" if not met else "met" if said == "yes" else "met, bearing less of the weight"
-            bars[ASKED[row.entry.label]] = f"{word}: {versus(slowed, paper)}"
+            count = seeds_that_dominate(slowed, paper)
+            bars[ASKED[row.entry.label]] = f"{word}: {versus(slowed, paper)}; seed by seed in {count}"
         elif row.entry.env_id == SPEED:
             groups[0][1].append(told_speed(row, MATCHED_SPEED))
     for path in sorted(GAITS.glob("HorseLeg-v0-*-2.json")):  # found for 2 m/s or more
@@ -202,11 +215,11 @@ def compare(
     if best is not None:
         fast = of_row(f"{best.title} of HorseLeg-v0, as fast as it likes", best)
         groups += [(one, [fast]) for one in sped_up(fast.intervals["speed_m_s"].mean)]
-    lines = [
-        f"| | {' | '.join(title for title, *_ in COLUMNS.values())} | dominates |",
-        "|---|" + "---|" * (len(COLUMNS) + 1),
-    ]
+    titles = [*(title for title, *_ in COLUMNS.values()), "dominates", "seeds that do, by their means"]
+    lines = [f"| | {' | '.join(titles)} |", "|---|" + "---|" * len(titles)]
     for other, agents in groups:
-        lines.append(f"| {other.name} | {' | '.join(other.cells())} | |")
-        lines += [f"| {one.name} | {' | '.join(one.cells())} | {told(one, other)} |" for one in agents]
+        lines.append(f"| {other.name} | {' | '.join(other.cells())} | | |")
+        for one in agents:
+            said = f"{told(one, other)} | {seeds_that_dominate(one, other)}"
+            lines.append(f"| {one.name} | {' | '.join(one.cells())} | {said} |")
     return "\n".join(lines), bars

@@ -53,8 +53,8 @@ class Args:
     runs: Path | None = None
     """folder of the trainings; otherwise runs/baselines or runs/baselines-nightly"""
     page: Path | None = None
-    """the page; pictures and CSV go into the folder beside it of the same name; otherwise docs/baselines.md,
-    or one beside the nightly runs"""
+    """the page; pictures and CSV go into the folder beside it of the same name; otherwise baselines.md in the
+    folder of the trainings that is given, or docs/baselines.md, or beside the nightly runs"""
 
 
 def results_table(rows: Sequence[Row], gaits: dict[str, dict[str, Reference]]) -> str:
@@ -187,12 +187,13 @@ def write_csv(rows: Sequence[Row], folder: Path) -> None:
     runs.write_text(folder / "runs.csv", ends.getvalue())
 
 
-def blank_page(pictures: Sequence[str]) -> str:
+def blank_page(subset: str, pictures: Sequence[str]) -> str:
     """A page with all marks, for a table that has no prose of its own."""
+    small = "Fewer seeds and far fewer steps than docs/baselines.md has: all works, and this is no result."
     return "\n\n".join(
         (
-            "# A small part of the baselines",
-            "Fewer seeds and far fewer steps than docs/baselines.md has: all works, and this is no result.",
+            "# Baselines" if subset == "full" else "# A small part of the baselines",
+            "docs/baselines.md tells what the tables show." if subset == "full" else small,
             *(f"<!-- {mark} -->\n<!-- /{mark} -->" for mark in MARKS),
             *(f"![{name}](baselines/{name}.png)" for name in pictures),
         )
@@ -210,14 +211,14 @@ def report(args: Args) -> Path:
     from hoof_env.paper.figure_style import STYLE
 
     rows = read_results(PLANS[args.subset], args.runs or FOLDERS[args.subset])
-    page = args.page or PAGES[args.subset]
+    page = args.page or (args.runs / "baselines.md" if args.runs else PAGES[args.subset])
     beside = page.with_suffix("")
     beside.mkdir(parents=True, exist_ok=True)
     ids = list(dict.fromkeys(row.entry.env_id for row in rows))
     gaits = {env_id: references(env_id) for env_id in ids}
-    names = {env_id: env_id.rpartition("/")[2] for env_id in ids}
+    names = {env_id.rpartition("/")[2]: env_id for env_id in ids}
     with matplotlib.rc_context(STYLE):
-        for env_id, name in names.items():
+        for name, env_id in names.items():
             shown = [row for row in rows if row.entry.env_id == env_id and not row.entry.label]
             if shown:
                 draw_curves(shown, gaits[env_id], beside / f"{name}.png")
@@ -228,12 +229,12 @@ def report(args: Args) -> Path:
         bars_table(rows, known, bars), results_table(rows, gaits), figures_table(rows, gaits), table,
         made_table(rows),
     )  # fmt: skip
-    blank = args.subset == "nightly" or not page.is_file()
-    text = blank_page(list(names.values())) if blank else page.read_text(encoding="utf-8")
+    published = page == PAGES["full"]
+    text = page.read_text(encoding="utf-8") if published else blank_page(args.subset, list(names))
     for mark, content in zip(MARKS, tables, strict=True):
         text = put(text, mark, content)
     runs.write_text(page, text)
-    if page == PAGES["full"]:
+    if published:
         runs.write_text(
             README, put(README.read_text(encoding="utf-8"), "baselines", short_table(rows, known))
         )

@@ -16,8 +16,10 @@ import yaml
 from agents.baselines_plan import CURVE_SEEDS, FINAL_SEEDS, TRANSPORT, Entry, Run, figures
 from agents.baselines_run import CURVE, FINAL, read_curve
 from agents.baselines_stats import Interval, over_seeds
+from agents.command import parse_pairs
 from agents.evaluate import estimate
 from agents.score import score_vector
+from agents.settings import FOLDER, load_settings
 from hoof_env.errors import DataFileError, HoofEnvError
 
 GAITS = ("run", "walk")
@@ -87,8 +89,7 @@ def read_results(plan: Sequence[Entry], folder: Path) -> list[Row]:
     """What is done of a plan; entries without a training that is done are left out.
 
     Raises:
-        DataFileError: nothing is done, a result cannot be read, or seeds of one entry were trained with
-            different settings.
+        DataFileError: nothing is done, or a result cannot be read or is not what the plan asks for.
     """
     rows = []
     for entry in plan:
@@ -101,17 +102,31 @@ def read_results(plan: Sequence[Entry], folder: Path) -> list[Row]:
                     raise DataFileError(
                         f"{one / FINAL}: expected what agents.baselines_run wrote: {error}"
                     ) from None
-        settings = {(one.folder / "config.yml").read_text(encoding="utf-8"): one.folder for one in found}
-        if len(settings) > 1:
-            raise DataFileError(
-                f"{entry.name}: expected seeds of the same settings, got different config.yml in "
-                f"{' and '.join(map(str, settings.values()))}; remove what is outdated"
-            )
+                check(entry, found[-1])
         if found:
             rows.append(Row(entry, tuple(found)))
     if not rows:
         raise DataFileError(f"{folder}: expected trainings of agents.baselines, found none that is done")
     return rows
+
+
+def wanted(entry: Entry) -> dict[str, Any]:
+    """The hyperparameters that an entry asks for, with its steps."""
+    settings = load_settings(FOLDER / f"{entry.algo}.yml", entry.env_id)
+    return settings if entry.steps is None else settings | {"n_timesteps": entry.steps}
+
+
+def check(entry: Entry, one: Result) -> None:
+    """Raise `DataFileError` for a training with other arguments or hyperparameters than its entry has now."""
+    config = load_settings(one.folder / "config.yml", entry.env_id)
+    kwargs = parse_pairs("env_kwargs", entry.env_kwargs)
+    for got, asked in ((one.final["env_kwargs"], kwargs), (config, wanted(entry))):
+        keys = sorted(key for key in {**got, **asked} if got.get(key) != asked.get(key))
+        if keys:
+            here, there = ({key: some.get(key) for key in keys} for some in (asked, got))
+            raise DataFileError(
+                f"{one.folder}: expected a training with {here}, got {there}; remove what is outdated"
+            )
 
 
 def settings_of(row: Row) -> dict[str, Any]:

@@ -24,7 +24,7 @@ from agents import runs, tradeoff_front, tradeoff_gait, tradeoff_impact
 from agents.baselines import exit_code, work_off
 from agents.baselines_plan import LEG, Run, runs_of
 from agents.baselines_results import Row, read_results, versions_of
-from agents.command import parse_pairs, run
+from agents.command import run
 from agents.impact import GAIT
 from agents.learning_report import put
 from agents.tradeoff_front import Point
@@ -82,7 +82,6 @@ def report(plan: Plan) -> Path:
     from hoof_env.paper.figure_style import STYLE
 
     rows = read_results((*plan.entries, plan.commanded), plan.folder)
-    check_rewards(rows)
     default, slow, commanded = (
         folders_of(rows, entry.name) for entry in (plan.entry(DEFAULT), plan.entry(SLOW), plan.commanded)
     )
@@ -121,18 +120,6 @@ def report(plan: Plan) -> Path:
         text = put(text, mark, table)
     runs.write_text(plan.page, text)
     return plan.page
-
-
-def check_rewards(rows: Sequence[Row]) -> None:
-    """Raise `DataFileError` for a training of another reward than the plan has now under its name."""
-    for row in rows:
-        wanted = parse_pairs("env_kwargs", row.entry.env_kwargs)
-        for one in row.results:
-            if one.final["env_kwargs"] != wanted:
-                raise DataFileError(
-                    f"{one.folder}: expected a training with {wanted}, got {one.final['env_kwargs']}; remove "
-                    "what is outdated"
-                )
 
 
 def folders_of(rows: Sequence[Row], name: str) -> list[Path]:

@@ -12,10 +12,11 @@ from itertools import pairwise
 import gymnasium as gym
 import numpy as np
 import pytest
+import yaml
 
 import hoof_env  # noqa: F401  registers the ids
 from agents import baselines, baselines_matched, baselines_report, baselines_run, baselines_stats
-from agents.baselines_matched import Compared, dominates, scaled_runs, told
+from agents.baselines_matched import Compared, dominates, scaled_runs, seeds_that_dominate, told
 from agents.baselines_plan import (
     CURVE_SEEDS,
     FINAL_SEEDS,
@@ -28,7 +29,7 @@ from agents.baselines_plan import (
     figures,
     runs_of,
 )
-from agents.baselines_results import Reference, over_episodes, read_results, references
+from agents.baselines_results import Reference, over_episodes, read_results, references, wanted
 from agents.baselines_run import CURVE, FINAL, Args, read_curve, train_one
 from agents.baselines_stats import Interval, iqm
 from agents.settings import FOLDER, load_settings
@@ -221,6 +222,13 @@ def test_the_interval_of_the_cost_of_transport_is_around_the_whole():
     assert over_episodes("return", 1.0, episodes).low == 1.0
 
 
+def test_seeds_are_counted_one_by_one():
+    slow, soft, hard = ({"speed_m_s": v, "peak_grf_n": f, "stance_peak_n": f, "cost_of_transport": f}
+                        for v, f in ((1.0, 1.0), (3.0, 1.0), (3.0, 5.0)))  # fmt: skip
+    agent = replace(compared(2.0, 1.0, 1.0, 1.0), seeds=(slow, soft, hard))
+    assert seeds_that_dominate(agent, compared(2.0, 2.0, 2.0, 2.0)) == "1/3"
+
+
 @pytest.mark.parametrize(
     ("agent", "is_better"),
     [
@@ -270,11 +278,14 @@ def pretend_results(folder, done):
     for one in runs_of(SMALL):
         here = folder / one.name
         here.mkdir(parents=True)
-        for name in ("config.yml", "run.json", CURVE):
+        for name in ("run.json", CURVE):
             (here / name).write_text((done / name).read_text())
+        (here / "config.yml").write_text(yaml.safe_dump({one.entry.env_id: wanted(one.entry)}))
         level = 40.0 + one.seed if one.entry.algo == "ppo" else 1.0
         episodes = [{**episode, "return": level} for episode in final["episodes"]]
-        (here / FINAL).write_text(json.dumps({**final, "seed": one.seed, "episodes": episodes}))
+        (here / FINAL).write_text(
+            json.dumps({**final, "env_kwargs": {}, "seed": one.seed, "episodes": episodes})
+        )
 
 
 @pytest.fixture
@@ -299,16 +310,31 @@ def test_the_page_says_what_the_runs_say(page):
     assert "| 41.0 [40" in line  # the IQM of 40, 41 and 42
     assert "| 40.0 to 42.0 | 3/3 | 3/3 |" in line
     assert "| SAC | 2 |" in text
-    assert "met: PPO 41.0" in text
+    assert "apart | met: PPO 41.0" in text
     assert "is no result" in text.splitlines()[2]
     with (page.with_suffix("") / "curves.csv").open() as file:
         assert len(list(csv.DictReader(file))) == 5 * 7
     assert (page.with_suffix("") / "HorseLeg-v0.png").stat().st_size > 10_000
 
 
-def test_seeds_of_other_settings_are_not_mixed(page, tmp_path):
-    (tmp_path / "runs" / "ppo-HorseLeg-v0-s1" / "config.yml").write_text("x: {gamma: 0.5}\n")
-    with pytest.raises(DataFileError, match=r"same settings.*-s2 and .*-s1"):
+def test_a_bar_that_is_missed_says_so(page, tmp_path, monkeypatch):
+    for final in (tmp_path / "runs").glob("ppo*/" + FINAL):
+        final.write_text(final.read_text().replace('"return": 4', '"return": -4'))
+    args = baselines_report.Args("nightly", tmp_path / "runs")
+    assert "apart | not met: SAC 1.0" in baselines_report.report(args).read_text()
+    assert (tmp_path / "runs" / "baselines.md").is_file()  # beside the trainings that were given
+
+
+def test_what_the_plan_does_not_ask_for_is_not_shown(page, tmp_path):
+    folder = tmp_path / "runs" / "ppo-HorseLeg-v0-s1"
+    asked = (folder / "config.yml").read_text()
+    (folder / "config.yml").write_text(asked.replace("n_timesteps: 5000000", "n_timesteps: 64000"))
+    with pytest.raises(DataFileError, match=r"-s1: expected .*'n_timesteps': 5000000.*got .*64000"):
+        read_results(SMALL, tmp_path / "runs")
+    (folder / "config.yml").write_text(asked)
+    final = json.loads((folder / FINAL).read_text())
+    (folder / FINAL).write_text(json.dumps({**final, "env_kwargs": {"friction": 0.1}}))
+    with pytest.raises(DataFileError, match=r"-s1: expected .*'friction': None.*got .*0.1"):
         read_results(SMALL, tmp_path / "runs")
 
 

@@ -9,9 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from agents import impact, runs, tradeoff, tradeoff_front, tradeoff_gait, tradeoff_impact
 from agents.baselines_plan import LEG, Run, runs_of
+from agents.baselines_results import wanted
 from agents.baselines_run import FINAL
 from agents.command import parse_pairs
 from agents.impact import Episode, steepest, watch
@@ -145,6 +147,7 @@ def plan(tmp_path):
     for entry in (*made.entries, made.commanded):
         folder = made.folder / Run(entry, 0).name
         shutil.copytree(SHIPPED / entry.env_id.rpartition("/")[2], folder)
+        (folder / "config.yml").write_text(yaml.safe_dump({entry.env_id: wanted(entry)}))
         final = {"seed": 0, "steps": 5, "cpu_s": 1.0, "episodes": [one],
                  "env_kwargs": parse_pairs("", entry.env_kwargs)}  # fmt: skip
         (folder / FINAL).write_text(json.dumps(final))
