@@ -32,7 +32,7 @@ from agents.command import run
 from agents.policy_module import module_of
 from hoof_env._output import check_folder, staged
 from hoof_env.errors import DataFileError, HoofEnvError, OutputError, ParameterError
-from hoof_env.onnx_policy import INPUT, LISTS, OUTPUT, OnnxPolicy, describe
+from hoof_env.onnx_policy import INPUT, LISTS, OUTPUT, OnnxPolicy, describe, settings_of
 
 SUFFIXES = (".onnx", ".pt")
 OPSET = 18
@@ -91,7 +91,9 @@ def check_place(out: Path) -> None:
 def about(env: Any, env_id: str, env_kwargs: dict[str, Any], record: dict[str, Any]) -> dict[str, Any]:
     """The metadata of a policy for an environment; `record` is the run.json of its training, or empty."""
     known = {key: str(record[key]) for key in ("algo", "seed") if key in record}
-    here = {"env_id": env_id, "env_kwargs": env_kwargs, "hoof_env": hoof_env.__version__}
+    settings = record.get("settings") or settings_of(env)
+    made_with = record.get("versions", {}).get("hoof-env", hoof_env.__version__)
+    here = {"env_id": env_id, "env_kwargs": env_kwargs, "settings": settings, "hoof_env": made_with}
     return here | describe(env) | known
 
 

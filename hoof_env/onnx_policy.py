@@ -1,18 +1,22 @@
 """A policy in an ONNX file, played by onnxruntime: no learning library, and no code in the file.
 
 `agents.export` writes such files. What they say of themselves stands in their metadata: env_id, env_kwargs,
-observation_space, action_space, observation_names, action_names, algo, and the version of hoof_env.
+settings, observation_space, action_space, observation_names, action_names, algo, and the version of hoof_env
+that trained.
 """
 
 from __future__ import annotations
 
 import json
+import warnings
+from dataclasses import asdict, is_dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hoof_env._version import __version__
 from hoof_env.errors import DataFileError, HoofEnvError
 
 FILE = "policy.onnx"
@@ -21,7 +25,8 @@ FILE = "policy.onnx"
 INPUT, OUTPUT = "observation", "action"
 """Names of the graph's input, shape (batch, k), and output, shape (batch, n), float32 both."""
 
-LISTS = ("env_kwargs", "observation_names", "action_names")
+OBJECTS = ("env_kwargs", "settings")
+LISTS = (*OBJECTS, "observation_names", "action_names")
 """Metadata that is JSON; all other is text."""
 
 
@@ -57,7 +62,8 @@ class OnnxPolicy:
             found = self._session.get_modelmeta().custom_metadata_map
             self.record = {key: json.loads(text) if key in LISTS else text for key, text in found.items()}
             names = [node.name for node in (*self._session.get_inputs(), *self._session.get_outputs())]
-            if names != [INPUT, OUTPUT] or "env_id" not in self.record:
+            objects = all(isinstance(self.record.get(key, {}), dict) for key in OBJECTS)
+            if names != [INPUT, OUTPUT] or "env_id" not in self.record or not objects:
                 raise ValueError(f"tensors {names}, metadata {self.record}")
         except Exception as error:  # onnxruntime has an exception for everything, with no common base
             said = (getattr(error, "strerror", None) or str(error) or type(error).__name__).splitlines()[0]
@@ -71,7 +77,7 @@ class OnnxPolicy:
         return path.suffix == ".onnx" or (path / FILE).is_file()
 
     def load(self, env: Any, env_id: str) -> OnnxPolicy:
-        """This policy, if it fits an environment.
+        """This policy, if it fits an environment. Warns of other settings or another hoof-env.
 
         Raises:
             DataFileError: it is for another environment, other spaces, or observes other things.
@@ -82,6 +88,16 @@ class OnnxPolicy:
                 raise DataFileError(
                     f"policy {self.path}: made for {key} {self.record[key]}, expected {value}"
                 )
+        there, here = self.record.get("settings", self.record.get("env_kwargs", {})), settings_of(env)
+        unlike = [
+            f"{key}={there[key]!r}, here {here[key]!r}"
+            for key in sorted(there.keys() & here.keys())
+            if there[key] != here[key]
+        ]
+        if (made_with := self.record.get("hoof_env", __version__)) != __version__:
+            unlike.append(f"hoof-env {made_with}, here {__version__}")
+        if unlike:
+            warnings.warn(f"policy {self.path}: trained with {'; '.join(unlike)}", stacklevel=2)
         return self
 
     def predict(
@@ -102,3 +118,12 @@ def describe(env: Any) -> dict[str, Any]:
     return found | (
         {"observation_names": list(names), "action_names": list(PARAMETERS)} if names is not None else {}
     )
+
+
+def settings_of(env: Any) -> dict[str, Any]:
+    """All settings of an environment of this package, as JSON gives them back; none of somebody else's."""
+    settings = getattr(env.unwrapped, "settings", None)
+    if not is_dataclass(settings) or isinstance(settings, type):
+        return {}
+    plain: dict[str, Any] = json.loads(json.dumps(asdict(settings), default=str))
+    return plain

@@ -1,8 +1,11 @@
 """Exported policies act as their models do, fit what they are for, and play without a learning library."""
 
+import json
+import os
 import re
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
 import gymnasium as gym
@@ -12,8 +15,9 @@ from sb3_contrib import TQC
 from stable_baselines3 import PPO, SAC, TD3
 from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
-pytest.importorskip("onnxruntime", reason='needs pip install "hoof-env[onnx]"')
-pytest.importorskip("onnxscript", reason='needs pip install "hoof-env[onnx]"')
+if not os.environ.get("CI"):  # which installs them, so that nothing may be left out there
+    pytest.importorskip("onnxruntime", reason='needs pip install "hoof-env[onnx]"')
+    pytest.importorskip("onnxscript", reason='needs pip install "hoof-env[onnx]"')
 
 from agents import export
 from agents.export import main, write_policy
@@ -95,6 +99,45 @@ def test_metadata(exported):
     assert (record["algo"], record["seed"]) == ("ppo", "0")
     assert record["action_names"] == ["crank_speed", "swing_offset", "swing_sin", "swing_cos"]
     assert str(ROOT).encode() not in exported.read_bytes()
+
+
+def test_other_settings_and_another_version_are_told(exported, trained, tmp_path, monkeypatch):
+    import onnx
+
+    old = tmp_path / "old.onnx"  # of before the settings were kept
+    graph = onnx.load(exported)
+    kept = [entry for entry in graph.metadata_props if entry.key != "settings"]
+    del graph.metadata_props[:]
+    graph.metadata_props.extend(kept)
+    onnx.save(graph, old)
+    record = OnnxPolicy(exported).record
+    monkeypatch.setattr("hoof_env.onnx_policy.__version__", record["hoof_env"])
+    assert record["settings"] == json.loads((trained.folder / "run.json").read_text())["settings"]
+    with make_env(ENV_ID, **LEG) as env, warnings.catch_warnings():
+        warnings.simplefilter("error", UserWarning)
+        for path in (exported, old):
+            find_policy(str(path), env, ENV_ID)
+    with (
+        make_env(ENV_ID, **LEG, target_speed=[1, 1]) as env,
+        pytest.warns(UserWarning, match=r"trained with target_speed=None, here \[1, 1\]$"),
+    ):
+        find_policy(str(exported), env, ENV_ID)
+    with make_env(ENV_ID) as env, pytest.warns(UserWarning, match=r"episode_seconds=0\.4, here 10\.0$"):
+        find_policy(str(old), env, ENV_ID)
+    monkeypatch.setattr("hoof_env.onnx_policy.__version__", "9.9.9")
+    with (
+        make_env(ENV_ID, **LEG) as env,
+        pytest.warns(UserWarning, match=r"trained with hoof-env \d\S*, here 9\.9\.9$"),
+    ):
+        find_policy(str(exported), env, ENV_ID)
+
+
+def test_a_file_names_the_version_that_trained(trained):
+    with make_env(ENV_ID, **LEG) as env:
+        there = {"versions": {"hoof-env": "0.0.1"}, "settings": {"dt": 0.5}}
+        assert export.about(env, ENV_ID, LEG, there)["hoof_env"] == "0.0.1"
+        assert export.about(env, ENV_ID, LEG, there)["settings"] == {"dt": 0.5}
+        assert export.about(env, ENV_ID, LEG, {})["settings"]["episode_seconds"] == 0.4
 
 
 def test_a_file_that_acts_otherwise_is_not_kept(tmp_path, monkeypatch):
