@@ -3,8 +3,9 @@
     python -m agents.evaluate --policy walk run idle random
     python -m agents.evaluate --policy run runs/ppo-HorseLeg-v0-s0 --json scores.json --video gait.mp4
 
-A policy is a name (a gait of the preset, idle, random, bang-bang, drag, airborne) or a trained model: its
-.zip or its run folder. Brackets hold the bootstrap's 95 % interval of the mean over episodes.
+A policy is a name (a gait of the preset, idle, random, bang-bang, drag, airborne; open-loop, the best stored
+gait of the id), the .json of a gait, or a trained model: its .zip, .onnx or run folder. Brackets hold the
+bootstrap's 95 % interval of the mean over episodes.
 
 A model file is a pickle and can run any code when it is loaded: give only files that you trust.
 """
@@ -26,7 +27,7 @@ import numpy as np
 from agents import runs
 from agents.command import parse_pairs, run
 from hoof_env._output import check_folder
-from hoof_env.envs.policies import make_policy, policy_names
+from hoof_env.envs.policies import make_policy, open_loop_record, policy_names, read_open_loop
 from hoof_env.errors import OutputError, ParameterError, check_number
 from hoof_env.onnx_policy import OnnxPolicy
 
@@ -117,7 +118,9 @@ def play(
 
 
 def is_model(name: str) -> bool:
-    """Whether a policy's name is the path of a model rather than that of a scripted policy."""
+    """Whether a policy's name is the path of a model rather than that of a scripted policy or of a gait."""
+    if name.endswith(".json"):
+        return False
     return name.endswith((".zip", ".onnx")) or Path(name).name != name or Path(name, "model.zip").is_file()
 
 
@@ -130,24 +133,37 @@ def saved(path: Path) -> OnnxPolicy | runs.SavedModel:
     return OnnxPolicy(path) if OnnxPolicy.stands_at(path) else runs.SavedModel.find(path)
 
 
+def recorded(name: str) -> dict[str, Any]:
+    """What a policy's file says of itself, env_id and env_kwargs among it; empty for a scripted policy.
+
+    Raises:
+        DataFileError: no such model or gait.
+    """
+    if name.endswith(".json"):
+        return open_loop_record(Path(name))
+    return saved(Path(name)).record if is_model(name) else {}
+
+
 def find_policy(name: str, env: gym.Env[Any, Any], env_id: str) -> Any:
     """A scripted policy by its name, or a trained one or an open-loop gait by its path.
 
     Raises:
         ParameterError: unknown name. DataFileError: no such model or gait, or one that does not fit.
     """
-    if name == "open-loop" or name.endswith(".json"):
-        from agents.open_loop import load_open_loop
-
-        return load_open_loop(env_id if name == "open-loop" else name, env)
+    if name.endswith(".json"):
+        return read_open_loop(Path(name), env)
     if is_model(name):
         return saved(Path(name)).load(env, env_id)
-    names = policy_names(env) if hasattr(env.unwrapped, "gaits") else []
+    names = [*policy_names(env), "open-loop"] if hasattr(env.unwrapped, "gaits") else []
     if name not in names:
         known = ", ".join(names) or f"none is scripted for {env_id}"
         raise ParameterError(
-            f"policy: expected a name ({known}) or the path of a trained model, got {name!r}"
+            f"policy: expected a name ({known}), the path of a trained model or a gait's .json, got {name!r}"
         )
+    if name == "open-loop":
+        from agents.open_loop import load_open_loop
+
+        return load_open_loop(env_id, env)
     return make_policy(name, env)
 
 
@@ -171,15 +187,15 @@ def film_paths(video: Path, names: Sequence[str]) -> dict[str, Path]:
 @dataclass(frozen=True)
 class Args:
     policy: tuple[str, ...] = ("walk", "run", "idle", "random")
-    """names of scripted policies and paths of trained models (trusted ones only: a model is code)"""
+    """names of scripted policies, paths of gaits and trained models (trusted ones only: a model is code)"""
     episodes: int = 20
     """of each policy"""
     seed: int = 1000
     """of the first episode; the others follow it"""
     env_id: str | None = None
-    """environment; otherwise that of the first trained model, or hoof_env/HorseLeg-v0"""
+    """environment; otherwise that of the first model or gait file, or hoof_env/HorseLeg-v0"""
     env_kwargs: tuple[str, ...] = ()
-    """its arguments: key=value ..., or one JSON object; otherwise those of the first trained model"""
+    """its arguments: key=value ..., or one JSON object; otherwise those of the first model or gait file"""
     json: Path | None = None
     """write all figures of all episodes to this file"""
     video: Path | None = None
@@ -203,12 +219,11 @@ def evaluate(args: Args) -> tuple[list[Score], dict[str, Any]]:
         if path.is_dir():
             raise OutputError(f"cannot write to {str(path)!r}: expected a file, got a folder")
         check_folder(path.parent)
-    records = [saved(Path(name)).record for name in args.policy if is_model(name)]
-    record = next(filter(None, records), {})
+    record = next(filter(None, [recorded(name) for name in args.policy]), {})
     films = film_paths(args.video, args.policy) if args.video else {}
     env_id = args.env_id or record.get("env_id", DEFAULT_ENV)
-    recorded = record.get("env_kwargs", {}) if env_id == record.get("env_id") else {}
-    kwargs = parse_pairs("--env-kwargs", args.env_kwargs) or recorded
+    own = record.get("env_kwargs", {}) if env_id == record.get("env_id") else {}
+    kwargs = parse_pairs("--env-kwargs", args.env_kwargs) or own
     scores = []
     with runs.make_env(env_id, **kwargs) as env:
         runs.warm_up(env)

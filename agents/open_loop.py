@@ -32,7 +32,7 @@ from agents.command import parse_pairs, run
 from agents.evaluate import estimate
 from agents.open_loop_search import ROWS, TEST_SEED, Court, Episodes, decode, search
 from hoof_env._output import check_folder
-from hoof_env.envs.policies import Scripted, read_open_loop
+from hoof_env.envs.policies import STANDS_FOR, Scripted, open_loop_record, read_open_loop
 from hoof_env.errors import DataFileError, HoofEnvError, ParameterError, check_number
 from hoof_env.gait.parameters import PARAMETERS
 
@@ -215,7 +215,7 @@ def load_open_loop(path_or_env_id: str | Path, env: Any = None) -> Scripted:
     """
     path = Path(path_or_env_id)
     if path.suffix != ".json":
-        name = str(path_or_env_id).rpartition("/")[2]
+        name = STANDS_FOR.get(str(path_or_env_id), str(path_or_env_id)).rpartition("/")[2]
         files = [file for family in EPISODES if (file := GAITS / f"{name}-{family}.json").is_file()]
         if not files:
             known = ", ".join(sorted(file.name for file in GAITS.glob("*.json"))) or "none"
@@ -230,8 +230,7 @@ def stored(path: Path) -> dict[str, Any]:
     Raises:
         DataFileError: it is none.
     """
-    read_open_loop(path)
-    found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    found = open_loop_record(path)
     if "score" not in found:
         raise DataFileError(f"{path}: expected the JSON object of agents.open_loop with its score")
     return found

@@ -20,7 +20,8 @@ from __future__ import annotations
 import json
 import shlex
 import shutil
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -37,6 +38,7 @@ from agents.export import about, write_policy
 from agents.score import score_vector
 from agents.ship_card import write_card, write_curve, write_index
 from hoof_env._output import check_folder, staged
+from hoof_env.envs.policies import STANDS_FOR
 from hoof_env.errors import DataFileError, OutputError, ParameterError, check_choice, check_number
 from hoof_env.onnx_policy import FILE, OnnxPolicy
 
@@ -49,9 +51,6 @@ CHECKED = 20
 
 GAITS = ("run", "walk", "carrying_walk", "open-loop")
 """Scored beside the policy, where an id has them."""
-
-STANDS_FOR = {"hoof_env/HorseLegMO-v0": "hoof_env/HorseLeg-v0"}
-"""An id without a run gets the policy of another: the same leg, and the sum of its rewards is the other's."""
 
 LIMIT, FILM_LIMIT = 1_000_000, 750_000
 """Bytes of a folder and of the film in it, which is made shorter where it is larger."""
@@ -86,7 +85,7 @@ def find_runs(folder: Path) -> dict[str, list[runs.SavedModel]]:
     """The trained models in or beneath a folder by environment, those with arguments of it left out.
 
     Raises:
-        DataFileError: there is none.
+        DataFileError: there is none, or one lacks a file.
     """
     found: dict[str, list[runs.SavedModel]] = {}
     for record in (
@@ -95,6 +94,10 @@ def find_runs(folder: Path) -> dict[str, list[runs.SavedModel]]:
         if not any((record.parent / name).is_file() for name in ("model.zip", "policy.json")):
             print(f"passed over {record.parent}: it is not through")
             continue
+        needed = ["config.yml", "monitor.csv"]
+        needed += ["policy.safetensors"] if (record.parent / "policy.json").is_file() else []
+        if missing := [name for name in needed if not (record.parent / name).is_file()]:
+            raise DataFileError(f"run {record.parent}: expected all of a training, found no {missing[-1]}")
         saved = runs.SavedModel.find(record.parent)
         if not saved.record.get("env_kwargs"):
             found.setdefault(saved.record["env_id"], []).append(saved)
@@ -116,6 +119,18 @@ def choose(saved: Sequence[runs.SavedModel], env_id: str) -> Choice:
             values.append(float(np.mean([episode["return"] for episode in episodes])))
     best = int(np.argmax(values))
     return Choice(saved[best], len(saved), values[best])
+
+
+@contextmanager
+def whole(folder: Path) -> Iterator[Path]:
+    """As `staged`; where nothing was written, no empty folder stays behind."""
+    try:
+        with staged(folder) as stage:
+            yield stage
+    finally:
+        with suppress(OSError):  # one that holds something
+            folder.rmdir()
+            folder.parent.rmdir()
 
 
 def ship(choice: Choice, env_id: str, out: Path, seconds: float = 4.0) -> dict[str, Any]:
@@ -141,7 +156,7 @@ def ship(choice: Choice, env_id: str, out: Path, seconds: float = 4.0) -> dict[s
     with runs.make_env(env_id) as env:
         metadata = about(env, env_id, {}, record)
     folder = out / env_id.rpartition("/")[2]
-    with staged(folder) as stage:
+    with whole(folder) as stage:
         write_policy(trained, stage / FILE, metadata)
         policy = OnnxPolicy(stage / FILE)  # what is shipped is what is scored
         scores = [Score("policy", score_vector(policy, trained_on, SCORE_SEEDS)), *gaits(trained_on)]
@@ -253,13 +268,14 @@ def main(argv: list[str] | None = None) -> None:
 
     args = tyro.cli(Args, args=argv, prog="python -m agents.ship", description=__doc__)
     check_number("seconds", args.seconds, low=0, exclusive_low=True)
-    check_folder(args.out)
     found = find_runs(args.runs)
     sources = {env_id: env_id for env_id in found}
     sources |= {one: other for one, other in STANDS_FOR.items() if one not in found and other in found}
+    wanted = [check_choice("ids", env_id, sources) for env_id in args.ids]
+    check_folder(args.out)
     choices: dict[str, Choice] = {}
-    for env_id in args.ids or sources:
-        source = sources[check_choice("ids", env_id, sources)]
+    for env_id in wanted or sources:
+        source = sources[env_id]
         if source not in choices:
             choices[source] = choose(found[source], source)
         score = ship(choices[source], env_id, args.out, args.seconds)

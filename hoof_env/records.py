@@ -112,12 +112,13 @@ def make_env(env_id: str, arguments: Mapping[str, Any] | None = None) -> gym.Env
 
 
 def find_policy(name: str, env: gym.Env[Any, Any], env_id: str, seed: int = 0) -> Any:
-    """A policy by its name: a gait or another scripted one, four gait parameters, or a trained model's path.
+    """A policy by its name: a gait or another scripted one, four gait parameters, or the path of one.
 
     Args:
         name: as "run", as "6.28,0.7,-0.2,-0.3" (crank speed [rad/s], swing offset, sine and cosine
             coefficient [rad]), or the .zip or run folder of a model. A model is a pickle: it can run code.
-            A policy's .onnx file, the folder of one that is shipped, or a gait's .json are data.
+            A policy's .onnx file, the folder of one that is shipped, or a gait's .json are data. "open-loop"
+            is the best gait that this project's repository stores for the id.
         env, env_id: what it is for.
         seed: of "random".
 
@@ -132,8 +133,8 @@ def find_policy(name: str, env: gym.Env[Any, Any], env_id: str, seed: int = 0) -
         return read_open_loop(Path(name), env)
     if OnnxPolicy.stands_at(Path(name)):
         return OnnxPolicy(Path(name)).load(env, env_id)
-    if name.endswith(".zip") or Path(name, "model.zip").is_file():
-        return _trained(Path(name), env, env_id)
+    if name == "open-loop" or name.endswith(".zip") or Path(name, "model.zip").is_file():
+        return _of_agents(name, env, env_id)
     if len(numbers := name.split(",")) == len(PARAMETERS):
         try:
             gait = GaitParameters(*(float(number) for number in numbers))
@@ -145,19 +146,24 @@ def find_policy(name: str, env: gym.Env[Any, Any], env_id: str, seed: int = 0) -
             action = env.unwrapped.action_for(gait)  # type: ignore[attr-defined]
             return Scripted(lambda observation, time: action, setting(env).dt)
     raise ParameterError(
-        f"policy: expected a name ({', '.join(names)}), four gait parameters as 6.28,0.7,-0.2,-0.3, or the "
-        f"path of a trained model, got {name!r}"
+        f"policy: expected a name ({', '.join(names)}, open-loop), four gait parameters as "
+        f"6.28,0.7,-0.2,-0.3, or the path of a trained model or a gait's .json, got {name!r}"
     )
 
 
-def _trained(path: Path, env: Any, env_id: str) -> Any:
+def _of_agents(name: str, env: Any, env_id: str) -> Any:
+    """What only the repository can read: the best of its gaits for an id, or a trained model."""
     try:
+        if name == "open-loop":
+            from agents.open_loop import load_open_loop
+
+            return load_open_loop(env_id, env)
         from agents.runs import SavedModel
 
-        return SavedModel.find(path).load(env, env_id)
+        return SavedModel.find(Path(name)).load(env, env_id)
     except ImportError as error:
         raise DataFileError(
-            f"model {path}: reading it needs the agents of this project's repository and "
+            f"policy {name}: reading it needs the agents of this project's repository and "
             f'pip install "hoof-env[train]" ({error})'
         ) from None
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import sys
+from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
@@ -204,6 +205,23 @@ def test_policies_by_name_and_by_four_numbers():
         action, _ = constant.predict(None)
         np.testing.assert_allclose(env.unwrapped.command_of(action), [6.0, 0.7, -0.2, -0.3], atol=1e-6)
         assert find_policy("idle", env, LEG).predict(None)[0].shape == (4,)
+
+
+def test_the_commands_play_the_gait_of_a_file_and_the_best_of_the_repository(tmp_path):
+    gait = "agents/gaits/HorseLeg-v0-clocked.json"
+    for name, policy in (("file", str(Path(__file__).parents[1] / gait)), ("name", "open-loop")):
+        out = str(tmp_path / f"{name}.csv")
+        assert cli.main(["export", "--out", out, "--policy", policy, "--seconds", "0.1"]) == 0
+    assert (tmp_path / "file.csv").read_bytes() == (tmp_path / "name.csv").read_bytes()
+
+
+def test_open_loop_without_the_repository_is_one_line(tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "agents.open_loop", None)
+    assert cli.main(["export", "--out", str(tmp_path / "x.csv"), "--policy", "open-loop"]) == 2
+    said = capsys.readouterr().err
+    assert "policy open-loop: reading it needs the agents of this project's repository" in said
+    assert cli.main(["export", "--out", str(tmp_path / "x.csv"), "--policy", "gallop"]) == 2
+    assert ", open-loop)" in capsys.readouterr().err
 
 
 def test_arguments_are_pairs_or_objects():

@@ -6,6 +6,7 @@ All have Stable-Baselines3's `predict`, so that scripted and trained policies ar
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Protocol
@@ -160,24 +161,23 @@ def open_loop(parameters: Mapping[str, Any], dt: float) -> Scripted:
     return Scripted(act, dt)
 
 
-def read_open_loop(path: Path, env: Any = None) -> Scripted:
-    """The open-loop gait of a file, which `agents.open_loop` writes.
+STANDS_FOR = {"hoof_env/HorseLegMO-v0": "hoof_env/HorseLeg-v0"}
+"""A policy of the second id is one of the first: the same leg, and the sum of its rewards is the other's."""
+
+
+def open_loop_record(path: Path) -> dict[str, Any]:
+    """What the file of an open-loop gait holds, which `agents.open_loop` writes.
 
     Args:
         path: a JSON object with "parameters" as `open_loop` takes them, of one environment; "dt", control
             step [s]; and "gait", the four gait parameters that the constant commands.
-        env: what it is for, whose control step the clock then has; None for that of the file.
 
     Raises:
-        DataFileError: it cannot be read, lacks a part, or the environment's actions command other gaits.
+        DataFileError: it cannot be read or lacks a part.
     """
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-        given, dt, gait = (
-            found["parameters"],
-            float(found["dt"]),
-            np.array(list(found["gait"].values()), float),
-        )
+        found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        given, _, _ = found["parameters"], float(found["dt"]), np.array(list(found["gait"].values()), float)
         shapes = {"constant": (4,), "sin": (4,), "cos": (4,), "frequency_hz": ()}
         clocked = "frequency_hz" in given
         if set(given) != (set(shapes) if clocked else {"constant"}):
@@ -190,6 +190,21 @@ def read_open_loop(path: Path, env: Any = None) -> Scripted:
             f"open-loop gait {path}: expected the JSON object of agents.open_loop with parameters, dt and "
             f"gait: {error!r}"
         ) from None
+    return found
+
+
+def read_open_loop(path: Path, env: Any = None) -> Scripted:
+    """The open-loop gait of a file; warns if it was found for another id.
+
+    Args:
+        path: as `open_loop_record` takes it.
+        env: what it is for, whose control step the clock then has; None for that of the file.
+
+    Raises:
+        DataFileError: as `open_loop_record`, or the environment's actions command other gaits.
+    """
+    found = open_loop_record(path)
+    given, dt, gait = found["parameters"], float(found["dt"]), np.array(list(found["gait"].values()), float)
     if env is not None:
         leg, dt = env.unwrapped, getattr(env.unwrapped, "dt", dt)
         meant = getattr(leg, "command_of", lambda action: np.full(4, np.nan))(np.array(given["constant"]))
@@ -198,4 +213,7 @@ def read_open_loop(path: Path, env: Any = None) -> Scripted:
                 f"open-loop gait {path}: expected an environment whose actions command gaits as those of "
                 f"{found.get('env_id')} do, got {type(leg).__name__}, where this one is {meant.tolist()}"
             )
+        here = leg.spec and leg.spec.id
+        if here and (there := found.get("env_id") or here) not in (here, STANDS_FOR.get(here)):
+            warnings.warn(f"open-loop gait {path}: found for {there}, here {here}", stacklevel=2)
     return open_loop(given, dt)

@@ -21,6 +21,7 @@ from agents.evaluate import (
     table,
     to_json,
 )
+from agents.open_loop import GAITS
 from agents.runs import SavedModel, make_env
 from hoof_env.errors import DataFileError, OutputError, ParameterError
 from tests.agents.conftest import SHORT, train_tiny
@@ -128,8 +129,19 @@ def test_json_has_no_infinity():
 
 
 def test_unknown_policy_lists_the_known(env):
-    with pytest.raises(ParameterError, match=r"walk.*idle.*airborne.*'gallop'"):
+    with pytest.raises(ParameterError, match=r"walk.*idle.*airborne.*open-loop.*\.json.*'gallop'"):
         find_policy("gallop", env, ENV_ID)
+
+
+def test_the_file_of_a_gait_names_the_environment():
+    _, setting = evaluate(Args(policy=("run", str(GAITS / "HorseLegRail-v0-constant.json")), episodes=1))
+    assert setting["env_id"] == "hoof_env/HorseLegRail-v0"
+
+
+@pytest.mark.parametrize("env_id", [ENV_ID, "hoof_env/HorseLegMO-v0"])
+def test_open_loop_by_its_name(env_id):
+    (score,), _ = evaluate(Args(policy=("open-loop",), env_id=env_id, env_kwargs=SHORT, episodes=1))
+    assert math.isfinite(score.estimates["return"].mean)
 
 
 def test_missing_model(env, tmp_path):

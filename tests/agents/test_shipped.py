@@ -1,17 +1,20 @@
 """Every shipped policy fits its id, still returns what its card says, and is what the command makes."""
 
 import json
+import os
 import re
+import shutil
 from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
 import pytest
 
-pytest.importorskip("onnxruntime", reason='needs pip install "hoof-env[onnx]"')
+if not os.environ.get("CI"):  # which installs it, so that nothing may be left out there
+    pytest.importorskip("onnxruntime", reason='needs pip install "hoof-env[onnx]"')
 
 from agents import ship
-from agents.runs import make_env
+from agents.runs import SavedModel, make_env
 from agents.score import score_vector
 from hoof_env.errors import DataFileError
 from hoof_env.onnx_policy import OnnxPolicy
@@ -51,6 +54,20 @@ def test_score(folder):
     assert recorded > max(
         score["policies"].get(name, {"mean": {"return": 0.0}})["mean"]["return"] for name in ("run", "walk")
     )
+
+
+@SHIPPED
+def test_weights_act_as_the_exported_policy(folder):
+    saved = SavedModel.find(folder)
+    assert saved.is_plain
+    env_id = read(folder / "score.json")["env_id"]
+    with make_env(env_id) as env:
+        weights, onnx = saved.load(env, env_id), OnnxPolicy(folder).load(env, env_id)
+        env.observation_space.seed(1)
+        seen = np.stack([env.observation_space.sample() for _ in range(50)])
+    actions = onnx.predict(seen)[0]
+    assert np.ptp(actions, axis=0).max() > 0.1
+    np.testing.assert_allclose(weights.predict(seen)[0], actions, atol=1e-5)
 
 
 @SHIPPED
@@ -118,6 +135,31 @@ def test_a_run_is_shipped_by_one_command(tmp_path, monkeypatch, capsys):
 def test_nothing_to_ship(tmp_path):
     with pytest.raises(DataFileError, match="got none"):
         ship.main([str(tmp_path), "--out", str(tmp_path / "out")])
+    assert not [*tmp_path.iterdir()]
+
+
+@pytest.mark.parametrize("missing", ["policy.safetensors", "config.yml", "monitor.csv"])
+def test_half_a_run_is_refused_in_one_line_and_leaves_nothing(tmp_path, trained, missing):
+    run = tmp_path / "run"
+    shutil.copytree(trained.folder, run)
+    (run / "model.zip").unlink()
+    (run / missing).unlink()
+    with pytest.raises(DataFileError, match=rf"run {run}: expected .* found no {missing}$"):
+        ship.main([str(run), "--out", str(tmp_path / "out")])
+    assert [*tmp_path.iterdir()] == [run]
+
+
+def test_a_refusal_on_the_way_leaves_nothing(tmp_path, trained, monkeypatch):
+    def refuse(*_):
+        raise DataFileError("no")
+
+    monkeypatch.setattr(ship, "write_policy", refuse)
+    choice = ship.Choice(SavedModel.find(trained.folder))
+    choice.saved.record["env_kwargs"] = {}
+    monkeypatch.setattr(SavedModel, "load", lambda *_: None)
+    with pytest.raises(DataFileError, match="no"):
+        ship.ship(choice, "hoof_env/HorseLeg-v0", tmp_path / "out")
+    assert not [*tmp_path.iterdir()]
 
 
 @pytest.mark.parametrize(

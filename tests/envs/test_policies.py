@@ -1,6 +1,7 @@
 """Scripted policies: many at once as one by one, clocks that restart, open-loop gaits and their files."""
 
 import json
+import warnings
 
 import gymnasium as gym
 import numpy as np
@@ -119,6 +120,17 @@ def test_an_environment_whose_actions_mean_something_else(env, tmp_path):
         read_open_loop(path, gym.make("hoof_env/HorseLegFixed-v0"))
     with pytest.raises(DataFileError, match="PendulumEnv"):
         read_open_loop(path, gym.make("Pendulum-v1"))
+
+
+def test_a_gait_of_another_id_is_told(env, tmp_path):
+    path = write(tmp_path / "gait.json", env)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", UserWarning)
+        for same in (env, gym.make("hoof_env/HorseLegMO-v0", disable_env_checker=True)):
+            read_open_loop(path, same)
+        read_open_loop(write(tmp_path / "bare.json", env, env_id=None), env)
+    with pytest.warns(UserWarning, match=r"found for hoof_env/HorseLeg-v0, here hoof_env/HorseLegRail-v0"):
+        read_open_loop(path, gym.make("hoof_env/HorseLegRail-v0"))
 
 
 FIXED = "hoof_env/HorseLegFixed-v0"
