@@ -60,14 +60,14 @@ class Args:
 def results_table(rows: Sequence[Row], gaits: dict[str, dict[str, Reference]]) -> str:
     """Returns of agents and of what learns nothing, id by id."""
     titles = (
-        "id", "policy", "seeds", "steps", "wall s", "return: IQM [95 %]", "mean", "worst to best seed",
+        "id", "policy", "seeds", "steps", "wall s", "processor s", "return: IQM [95 %]", "mean", "worst to best seed",
         "seeds above run", "above open-loop", "seeds that beat both gaits: after s, median (slowest)",
     )  # fmt: skip
     lines = [f"| {' | '.join(titles)} |", "|---|---|" + "---|" * (len(titles) - 2)]
     for env_id, known in gaits.items():
         for one in known.values():
             told = one.intervals["return"].text()
-            lines.append(f"| `{env_id}` | {one.name} | | | | {told} | | | | | |")
+            lines.append(f"| `{env_id}` | {one.name} | | | | | {told} | | | | | |")
         for row in (row for row in rows if row.entry.env_id == env_id and not row.entry.label):
             cells = [f"`{env_id}`", row.title, *row_cells(row, known)]
             lines.append(f"| {' | '.join(cells)} |")
@@ -77,7 +77,7 @@ def results_table(rows: Sequence[Row], gaits: dict[str, dict[str, Reference]]) -
 def row_cells(row: Row, known: dict[str, Reference]) -> list[str]:
     """The cells of an entry from its seeds on."""
     count, returns = len(row.results), np.array([one.figures["return"] for one in row.results])
-    wall = np.median([one.final["wall_s"] for one in row.results])
+    wall, cpu = (np.median([one.final[key] for one in row.results]) for key in ("wall_s", "cpu_s"))
 
     def above(name: str) -> str:
         return f"{np.sum(returns > known[name].figures['return'])}/{count}" if name in known else ""
@@ -85,7 +85,7 @@ def row_cells(row: Row, known: dict[str, Reference]) -> list[str]:
     seconds = times_to_beat(row, known)
     return [
         str(count) if count == row.entry.seeds else f"{count} of {row.entry.seeds}",
-        f"{np.median([one.final['steps'] for one in row.results]):,.0f}", f"{wall:,.0f}",
+        f"{np.median([one.final['steps'] for one in row.results]):,.0f}", f"{wall:,.0f}", f"{cpu:,.0f}",
         row.intervals["return"].text(), f"{returns.mean():.1f}",
         f"{returns.min():.1f} to {returns.max():.1f}", above("run"), above(OPEN_LOOP),
         f"{len(seconds)}/{count}" + (f": {np.median(seconds):.0f} ({max(seconds):.0f})" if seconds else ""),
@@ -94,10 +94,11 @@ def row_cells(row: Row, known: dict[str, Reference]) -> list[str]:
 
 def short_table(rows: Sequence[Row], known: Mapping[str, Reference]) -> str:
     """Returns on HorseLeg-v0 for the README."""
-    lines = ["| policy | seeds | environment steps | wall s | return: IQM [95 %] |", "|---|---|---|---|---|"]
-    lines += [f"| {one.name} | | | | {one.intervals['return'].text()} |" for one in known.values()]
+    titles = "policy", "seeds", "environment steps", "wall s", "processor s", "return: IQM [95 %]"
+    lines = [f"| {' | '.join(titles)} |", "|---" * len(titles) + "|"]
+    lines += [f"| {one.name} | | | | | {one.intervals['return'].text()} |" for one in known.values()]
     lines += [
-        f"| {row.title} | {' | '.join(row_cells(row, dict(known))[:4])} |"
+        f"| {row.title} | {' | '.join(row_cells(row, dict(known))[:5])} |"
         for row in rows
         if row.entry.env_id == LEG and not row.entry.label
     ]

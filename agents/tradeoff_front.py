@@ -204,8 +204,10 @@ def draw_front(points: Sequence[Point], weight: float, path: Path) -> None:
             )  # fmt: skip
             for one, here in zip(some, zip(x, factor * y, strict=True), strict=True):
                 if kind == SCRIPTED or (one.kind, one.name, one.seed) == (LEARNED, DEFAULT, 0):
-                    text = f"paper's {one.name}" if kind == SCRIPTED else "default reward"
-                    axes.annotate(text, here, (5, 5), textcoords="offset points", fontsize=7.5)
+                    text, offset, side = "default reward", (-6, 4), "right"
+                    if kind == SCRIPTED:
+                        text, offset, side = f"paper's {one.name}", (6, 6), "left"
+                    axes.annotate(text, here, offset, textcoords="offset points", ha=side, fontsize=7.5)
         axes.set_xlabel("mean speed [m/s]")
         axes.set_ylabel(label)
         axes.set_ylim(bottom=0)

@@ -42,8 +42,8 @@ class Frozen:
         return np.where(self.held, self.action, action).astype(np.float32), state
 
 
-FAST, SLOW, RUN, OPEN_LOOP = "learned, default reward", "learned for 2 m/s", "paper's run", "open loop"
-"""Who is looked at; the second one is about as fast as the paper's run."""
+FAST, SLOW, RUN, OPEN_LOOP = "learned, default reward", "learned to bear at 2 m/s", "paper's run", "open loop"
+"""Who is looked at; the second one is about as fast as the paper's run and bears as much."""
 
 Played = Mapping[str, tuple[Any, list[Episode]]]
 """Policy and episodes by name."""
