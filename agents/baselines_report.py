@@ -61,7 +61,8 @@ def results_table(rows: Sequence[Row], gaits: dict[str, dict[str, Reference]]) -
     """Returns of agents and of what learns nothing, id by id."""
     titles = (
         "id", "policy", "seeds", "steps", "wall s", "processor s", "return: IQM [95 %]", "mean",
-        "worst to best seed", "seeds above run", "above open-loop", "seeds that beat both gaits: after s, median (slowest)",
+        "worst to best seed", "seeds above run", "above open-loop",
+        "seeds that beat both gaits: after s, median (slowest)",
     )  # fmt: skip
     lines = [f"| {' | '.join(titles)} |", "|---|---|" + "---|" * (len(titles) - 2)]
     for env_id, known in gaits.items():
