@@ -44,12 +44,17 @@ def divergence(model: Any) -> str:
 def check_divergence(model: Any, folder: Path) -> None:
     """Raise `DivergedError`, which says where and names what is left, if losses or policy diverged."""
     if reason := divergence(model):
-        kept = checkpoints.checkpoints(folder)[:1]
-        left = f"the last good checkpoint is {kept[0]}" if kept else "there is no checkpoint yet"
-        raise DivergedError(
-            f"the training diverged before step {model.num_timesteps:,}: {reason}; {left}; try a lower "
-            "learning rate or smaller updates"
-        )
+        raise diverged(model, folder, reason)
+
+
+def diverged(model: Any, folder: Path, reason: str) -> DivergedError:
+    """The error that says where a training diverged, why, and what is left of it."""
+    kept = checkpoints.checkpoints(folder)[:1]
+    left = f"the last good checkpoint is {kept[0]}" if kept else "there is no checkpoint yet"
+    return DivergedError(
+        f"the training diverged before step {model.num_timesteps:,}: {reason}; {left}; try a lower "
+        "learning rate or smaller updates"
+    )
 
 
 def make_watch(
