@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+import threading
+import warnings
 from collections.abc import Callable
 from typing import NoReturn
 
@@ -13,10 +15,14 @@ __all__ = ["parse_pairs", "run"]
 
 
 def run(command: Callable[[], int | None]) -> NoReturn:
-    """Exit with what `command` returns: one line and 2 for an error of ours, one line and 130 for Ctrl-C."""
+    """Exit with what `command` returns: one line and 2 for an error of ours or of the system, as a full disk,
+    one line and 130 for Ctrl-C; a warning is one line, too."""
+    hook = threading.excepthook  # TensorBoard's thread fails on a full disk; its caller tells that, too
+    threading.excepthook = lambda told: None if isinstance(told.exc_value, OSError) else hook(told)
+    warnings.formatwarning = lambda message, *_, **__: f"warning: {message}\n"
     try:
         code = command() or 0
-    except HoofEnvError as error:
+    except (HoofEnvError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         code = 2
     except KeyboardInterrupt:
