@@ -35,7 +35,7 @@ import numpy as np
 import hoof_env  # also registers the environments
 from agents.safe import ABOUT, WEIGHTS, load_policy, save_policy
 from agents.settings import algorithm_class
-from hoof_env._output import staged
+from hoof_env._output import check_folder, staged
 from hoof_env.errors import DataFileError, OutputError, ParameterError
 
 FILES = ("model.zip", WEIGHTS, ABOUT, "config.yml", "run.json", "monitor.csv")
@@ -44,18 +44,31 @@ FILES = ("model.zip", WEIGHTS, ABOUT, "config.yml", "run.json", "monitor.csv")
 STATISTICS = "vecnormalize.pkl"
 CHECKPOINTS = "checkpoints"
 
+RECORD = {
+    "env_kwargs": dict,
+    "settings": dict,
+    "args": dict,
+    "versions": dict,
+    "finished": dict,
+    "resumed": list,
+}
+"""What run.json may hold besides env_id and algo, where its kind matters."""
+
 PACKAGES = ("hoof-env", "numpy", "gymnasium", "numba", "stable-baselines3", "sb3-contrib", "torch")
 
 
 @contextmanager
 def alone(folder: Path) -> Iterator[None]:
-    """Nobody else works in the folder meanwhile; a process that is killed leaves it free.
+    """The folder is there and nobody else works in it meanwhile; a process that is killed leaves it free.
+    A block that fails before it has written anything leaves nothing behind.
 
     Raises:
-        OutputError: another process is at work there.
+        OutputError: another process is at work there, or it cannot be written.
     """
     from filelock import FileLock, Timeout
 
+    made = [path for path in (folder / ".lock", folder, *folder.parents) if not path.exists()]
+    check_folder(folder)
     lock = FileLock(folder / ".lock")
     try:
         lock.acquire(timeout=0)
@@ -63,6 +76,11 @@ def alone(folder: Path) -> Iterator[None]:
         raise OutputError(f"{folder}: another process is at work there; choose another folder") from None
     try:
         yield
+    except BaseException:
+        with suppress(OSError):  # a folder that holds something stays
+            for path in made:
+                path.rmdir() if path.is_dir() else path.unlink()
+        raise
     finally:
         lock.release()
 
@@ -165,14 +183,20 @@ def read_record(folder: Path) -> dict[str, Any]:
     """The content of run.json in `folder`; empty if there is none.
 
     Raises:
-        DataFileError: it cannot be read.
+        DataFileError: it cannot be read, or is not what agents.train writes.
     """
     path = folder / "run.json"
     if not path.is_file():
         return {}
     try:
         record = json.loads(path.read_text(encoding="utf-8"))
-        return {**record, "env_id": record["env_id"], "algo": record["algo"]}
+        kinds = {"env_id": str, "algo": str} | {key: kind for key, kind in RECORD.items() if key in record}
+        if unlike := [key for key, kind in kinds.items() if not isinstance(record[key], kind)]:
+            raise TypeError(f"{unlike[0]}: {record[unlike[0]]!r}")
+        if "finished" in record:
+            steps, seconds = record["finished"]["steps"], record["finished"]["seconds"]
+            record["finished"] |= {"steps": int(steps), "seconds": float(seconds)}
+        return dict(record)
     except (OSError, ValueError, TypeError, KeyError) as error:
         raise DataFileError(
             f"{path}: expected the JSON object of agents.train with env_id and algo: {error!r}"

@@ -64,6 +64,30 @@ def test_plain_data_act_as_the_zip(algo, env, tmp_path):
     assert env.action_space.contains(plain.predict(observation)[0])
 
 
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"env_id": 3},
+        {"env_kwargs": 3},
+        {"versions": None},
+        {"finished": {"steps": 5}},
+        {"finished": {"steps": "x", "seconds": 1}},
+    ],
+    ids=str,
+)
+def test_a_record_of_other_kinds(env, tmp_path, values):
+    save(tmp_path, env)
+    change(tmp_path / "run.json", **values)
+    with pytest.raises(DataFileError, match=r"run\.json: expected"):
+        SavedModel.find(tmp_path)
+
+
+def test_all_files_have_the_same_mode(env, tmp_path):
+    save(tmp_path, env)
+    (tmp_path / "usual").touch()
+    assert len({path.stat().st_mode for path in tmp_path.iterdir()}) == 1
+
+
 def test_nothing_is_unpickled(env, tmp_path):
     class Bomb:
         def __reduce__(self):
