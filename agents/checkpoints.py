@@ -112,6 +112,16 @@ def save(model: Any, run: Path, seconds: float) -> None:
     tidy(run)
 
 
+def write_episodes(envs: Any, path: Path, go_on: bool = False) -> None:
+    """Have the `VecMonitor` in `envs` write its episodes at `path`, behind those that are there or anew."""
+    from stable_baselines3.common.monitor import ResultsWriter
+    from stable_baselines3.common.vec_env import VecMonitor
+
+    monitor = _layer(envs, VecMonitor)
+    header = {"t_start": monitor.t_start, "env_id": "None"}
+    monitor.results_writer = ResultsWriter(str(path), header=header, override_existing=not go_on)
+
+
 class Resumed:
     """A model that goes on from a checkpoint, its environments too.
 
@@ -170,14 +180,11 @@ class Resumed:
 
     def _continue_monitor(self, monitor: Any, path: Path) -> None:
         """Episodes after the checkpoint are played again: their rows go, and time goes on from there."""
-        from stable_baselines3.common.monitor import ResultsWriter
-
         monitor.t_start = time.time() - self.seconds
         there = path.exists()
         if there:
             os.truncate(path, min(path.stat().st_size, self._state["monitor_bytes"]))
-        header = {"t_start": monitor.t_start, "env_id": "None"}
-        monitor.results_writer = ResultsWriter(str(path), header=header, override_existing=not there)
+        write_episodes(monitor, path, go_on=there)
 
     def start(self) -> None:
         """Put back what setting up a training resets; call it when the training starts."""

@@ -21,6 +21,12 @@ ALGORITHMS = {
 }
 """Where each algorithm lives; each has its file in `FOLDER`."""
 FOLDER = Path(__file__).parent / "hyperparams"
+COUNTED = ("n_epochs", "n_steps", "batch_size", "buffer_size", "policy_delay")
+"""Keys that hold whole numbers of 1 or more; not all are looked at before they are used."""
+NORMALIZE = {"training": bool, "norm_obs": bool, "norm_reward": bool} | dict.fromkeys(
+    ("clip_obs", "clip_reward", "gamma", "epsilon"), (int, float)
+)
+"""What the key `normalize` may hold: arguments of `VecNormalize` and their kinds."""
 SCHEDULED = ("learning_rate", "clip_range", "clip_range_vf")
 """Keys that may hold `lin_<x>`: falling linearly from x to zero over the training."""
 
@@ -68,13 +74,17 @@ def model_arguments(settings: Mapping[str, Any], actions: int = 1) -> dict[str, 
     and network arguments are built.
 
     Raises:
-        DataFileError: a schedule, the noise or `policy_kwargs` is not in the zoo's form.
+        DataFileError: a count, a schedule, the noise or `policy_kwargs` is not in the zoo's form.
     """
     from stable_baselines3.common.utils import LinearSchedule
 
     arguments = {
         key: value for key, value in settings.items() if key not in ("n_envs", "n_timesteps", "normalize")
     }
+    for key in COUNTED:
+        value = arguments.get(key, 1)
+        if not (isinstance(value, int) and not isinstance(value, bool) and value >= 1):
+            raise DataFileError(f"hyperparameter {key}: expected a whole number of 1 or more, got {value!r}")
     if isinstance(arguments.get("train_freq"), list):  # [1, episode]: YAML knows no tuple
         arguments["train_freq"] = tuple(arguments["train_freq"])
     kind, spread = arguments.pop("noise_type", None), arguments.pop("noise_std", 0.1)
@@ -95,6 +105,24 @@ def model_arguments(settings: Mapping[str, Any], actions: int = 1) -> dict[str, 
     if isinstance(arguments.get("policy_kwargs"), str):
         arguments["policy_kwargs"] = _dict_call(arguments["policy_kwargs"])
     return arguments
+
+
+def normalize_arguments(settings: Mapping[str, Any]) -> dict[str, Any] | None:
+    """Arguments of `VecNormalize` as the key `normalize` of `settings` has them; None where it is false.
+
+    Raises:
+        DataFileError: it is neither true or false nor a mapping of such arguments.
+    """
+    given = settings.get("normalize") or False
+    arguments = {} if isinstance(given, bool) else given
+    if not isinstance(arguments, Mapping) or not all(
+        isinstance(value, NORMALIZE.get(key, ())) for key, value in arguments.items()
+    ):
+        raise DataFileError(
+            f"hyperparameter normalize: expected true, false or a mapping of {', '.join(NORMALIZE)}, "
+            f"got {given!r}"
+        )
+    return {"gamma": settings.get("gamma", 0.99), **arguments} if given else None
 
 
 def _action_noise(kind: Any, spread: Any, actions: int) -> Any:

@@ -13,6 +13,8 @@ machine and versions give the same run, resumed or not (agents/checkpoints.py sa
 from __future__ import annotations
 
 import json
+import os
+import warnings
 from contextlib import closing
 from dataclasses import asdict, dataclass
 from datetime import datetime
@@ -24,10 +26,10 @@ import yaml
 
 from agents import checkpoints, runs
 from agents.command import parse_pairs, run
-from agents.settings import FOLDER, algorithm_class, load_settings, model_arguments
-from agents.watch import EndedError, check_divergence, make_watch, stop_on_signals
-from hoof_env._output import check_folder
-from hoof_env.errors import OutputError, ParameterError, check_number
+from agents.safe import WEIGHTS
+from agents.settings import FOLDER, algorithm_class, load_settings, model_arguments, normalize_arguments
+from agents.watch import EndedError, check_divergence, diverged, make_watch, stop_on_signals
+from hoof_env.errors import HoofEnvError, OutputError, ParameterError, check_number
 
 
 @dataclass(frozen=True)
@@ -98,12 +100,17 @@ def train(args: Args, *also: Any) -> Trained:
         DivergedError: a loss or the policy is not finite any more; the checkpoints before that stay.
     """
     env_kwargs, settings = checked(args)
+    check_number("torch_threads", args.torch_threads, low=1, high=os.cpu_count() or 1)  # more only wait
     name = args.env_id.rpartition("/")[2]
     folder = args.out or Path("runs", f"{args.algo}-{name}-s{args.seed}-{datetime.now():%Y%m%d-%H%M%S}")
     record = make_record(args, env_kwargs)
-    check_folder(folder)
-    with runs.alone(folder):
-        return _train(args, folder, record, env_kwargs, settings, also)
+    try:
+        with runs.alone(folder):
+            return _train(args, folder, record, env_kwargs, settings, also)
+    except HoofEnvError:
+        raise
+    except OSError as error:  # as of monitor.csv on a full disk
+        raise OutputError(f"cannot write to {str(folder)!r}: {error.strerror or error}") from None
 
 
 def _train(
@@ -123,21 +130,28 @@ def _train(
     checkpoints.tidy(folder)
     found = checkpoints.checkpoints(folder) if earlier else []
     if found:
+        warn_of_bits(folder, earlier, record)
         record = {**earlier, "resumed": [*earlier.get("resumed", []), int(found[0].name)]}
 
     # Importing torch takes seconds: only now
     import torch
     from stable_baselines3.common.callbacks import CallbackList
 
-    runs.write_text(folder / "run.json", json.dumps(record, indent=2) + "\n")
-    runs.write_text(folder / "config.yml", yaml.safe_dump({args.env_id: settings}, sort_keys=False))
+    if args.device.startswith("cuda") and not torch.cuda.is_available():  # the library would take the CPU
+        raise ParameterError(f"device: expected one that torch finds here, got {args.device!r}")
     torch.set_num_threads(args.torch_threads)
+    config = yaml.safe_dump({args.env_id: settings}, sort_keys=False)  # the library adds to policy_kwargs
     envs = many = runs.make_vec_env(args.env_id, n_envs, **env_kwargs)
     try:
         algorithm = algorithm_class(args.algo)
         resumed = checkpoints.Resumed(found[0], algorithm, many, args.device) if found else None
-        model = resumed.model if resumed else make_model(args, settings, many, folder)
+        model = resumed.model if resumed else make_model(args, settings, many)
         envs = model.env
+        # Nothing is refused any more
+        runs.write_text(folder / "run.json", json.dumps(record, indent=2) + "\n")
+        runs.write_text(folder / "config.yml", config)
+        if not resumed:
+            checkpoints.write_episodes(envs, folder / "monitor.csv")
         model.set_logger(make_logger(folder / "tensorboard", model.num_timesteps + 1 if resumed else 0))
         watch = make_watch(folder, steps, args.checkpoint_every, args.max_minutes, resumed)
         callbacks = CallbackList([watch, *also])
@@ -148,8 +162,12 @@ def _train(
                 through = True
             except EndedError:
                 callbacks.on_training_end()
-            except ValueError:  # torch's distributions and the environment refuse what is not finite
+            except (ValueError, RuntimeError) as error:  # of torch or the environment: not finite
                 check_divergence(model, folder)
+                if "of distribution" in str(error):
+                    raise diverged(model, folder, "the policy's actions have no distribution") from None
+                if "without overflow" in str(error):
+                    raise diverged(model, folder, str(error)) from None
                 raise
             seconds = watch.seconds
             check_divergence(model, folder)
@@ -176,6 +194,7 @@ def checked(args: Args) -> tuple[dict[str, Any], dict[str, Any]]:
         raise ParameterError(f"seed: expected 0 or more, got {args.seed}")
     check_number("checkpoint_every", args.checkpoint_every, low=0)
     check_number("torch_threads", args.torch_threads, low=1)
+    normalize_arguments(settings)
     if args.max_minutes is not None:
         check_number("max_minutes", args.max_minutes, low=0.0, exclusive_low=True)
     if args.resume and args.out is None:
@@ -218,8 +237,14 @@ def find_earlier(
         OutputError: there is a run, but none to go on with. ParameterError: it was begun otherwise.
     """
     earlier = runs.read_record(folder)
-    held = (folder / "model.zip").exists() or (folder / runs.CHECKPOINTS).exists()
-    if held and not (args.resume and earlier):
+    there = [name for name in (*runs.FILES, runs.STATISTICS, runs.CHECKPOINTS) if (folder / name).exists()]
+    if there and not earlier:
+        raise OutputError(
+            f"{folder}: expected a new folder or one of a run, found {', '.join(there)} and no run.json; "
+            "choose another folder"
+        )
+    held = {"model.zip", WEIGHTS, runs.CHECKPOINTS} & {*there}
+    if held and not args.resume:
         raise OutputError(
             f"{folder} already holds a trained model; choose another folder, remove that one, or go on with "
             "its run by --resume"
@@ -240,16 +265,25 @@ def find_earlier(
     return earlier
 
 
-def make_model(args: Args, settings: dict[str, Any], many: Any, folder: Path) -> Any:
-    """The algorithm as `settings` build it, on environments whose episodes go into monitor.csv."""
+def warn_of_bits(folder: Path, earlier: dict[str, Any], record: dict[str, Any]) -> None:
+    """Warn of what does not forbid to go on with a run, but the same bits."""
+    keys = ("python", "platform", *runs.PACKAGES, "torch_threads", "device")
+    there, here = ({**one.get("versions", {}), **one.get("args", {})} for one in (earlier, record))
+    pairs = {key: (there[key], here.get(key)) for key in keys if key in there}
+    unlike = [f"{key} {then} there, {now} here" for key, (then, now) in pairs.items() if then != now]
+    if unlike:
+        warnings.warn(f"--resume: {folder} goes on, but with other bits: {'; '.join(unlike)}", stacklevel=2)
+
+
+def make_model(args: Args, settings: dict[str, Any], many: Any) -> Any:
+    """The algorithm as `settings` build it, on environments with a `VecMonitor` that writes nothing yet."""
     from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
 
-    envs: VecEnv = VecMonitor(many, str(folder / "monitor.csv"))
-    if normalize := settings.get("normalize", False):
-        given = normalize if isinstance(normalize, dict) else {}
-        envs = VecNormalize(envs, **{"gamma": settings.get("gamma", 0.99)} | given)
+    envs: VecEnv = VecMonitor(many)
+    normalize = normalize_arguments(settings)
     arguments = model_arguments(settings, int(np.prod(envs.action_space.shape or 1)))
     try:
+        envs = envs if normalize is None else VecNormalize(envs, **normalize)
         if "buffer_size" in arguments:  # more would stand empty in every checkpoint
             most = settings["n_timesteps"] + settings["n_envs"]
             arguments["buffer_size"] = min(arguments["buffer_size"], most)

@@ -157,6 +157,40 @@ def test_another_command_does_not_resume(stopped, changes, said):
         train(arguments("sac", **{"out": stopped, "resume": True, **changes}))
 
 
+def test_other_versions_and_threads_are_told_on_a_resume(tmp_path):
+    train(arguments("ppo", tmp_path), At(90, interrupt))
+    record = json.loads((tmp_path / "run.json").read_text())
+    record["versions"] |= {"torch": "0.1", "commit": "another"}
+    record["args"]["torch_threads"] = 64
+    (tmp_path / "run.json").write_text(json.dumps(record))
+    said = r"other bits: torch 0\.1 there, [^;]* here; torch_threads 64 there, 1 here$"
+    with pytest.warns(UserWarning, match=said) as told:
+        train(arguments("ppo", tmp_path, resume=True))
+    assert len([one for one in told if "--resume" in str(one.message)]) == 1
+
+
+def test_a_checkpoint_without_its_record_is_not_said_to_be_resumed(tmp_path):
+    (tmp_path / CHECKPOINTS / "100").mkdir(parents=True)
+    with pytest.raises(OutputError, match=r"found checkpoints and no run\.json; choose another folder$"):
+        train(arguments("ppo", tmp_path, resume=True))
+
+
+def test_a_full_disk_is_told_and_the_last_checkpoint_stays(tmp_path):
+    full = Path("/dev/full")
+    if not full.exists():
+        pytest.skip("no device that is always full")
+
+    def fill(model):
+        model.env.venv.results_writer.file_handler = file = full.open("w")
+        file.write("what does not fit")
+
+    params = (*TINY, "normalize=true")
+    with pytest.raises(OutputError, match=rf"^cannot write to '{tmp_path}/run': No space left on device$"):
+        train(arguments("ppo", tmp_path / "run", params=params, checkpoint_every=ALWAYS), At(260, fill))
+    assert [one.name for one in checkpoints(tmp_path / "run")] == ["256", "128"]
+    assert train(arguments("ppo", tmp_path / "run", params=params, resume=True)).steps == 512
+
+
 def test_a_run_is_gone_on_with_only_when_asked(stopped):
     with pytest.raises(OutputError, match="--resume"):
         train(arguments("sac", stopped))
@@ -195,9 +229,13 @@ def test_environments_without_a_state_start_new_episodes(tmp_path):
     assert {length for _, length in episodes(tmp_path / "run")} == {"200"}
 
 
-@pytest.mark.parametrize("algo", ["ppo", "sac"])
-def test_divergence_stops_the_training(algo, tmp_path):
-    params = (*CASES[algo]["params"], "learning_rate=1e30")
+@pytest.mark.parametrize(
+    ("algo", "rate"),
+    [(algo, rate) for algo in ("ppo", "sac", "tqc") for rate in ("1e3", "1e6", "1e30", "1e38")]
+    + [("td3", "1e30"), ("td3", "1e38")],
+)
+def test_divergence_stops_the_training(algo, rate, tmp_path):
+    params = (*CASES[algo]["params"], f"learning_rate={rate}")
     with pytest.raises(DivergedError, match=r"diverged before step .* learning rate"):
         train(arguments(algo, tmp_path / "run", params=params))
     assert not (tmp_path / "run" / "model.zip").exists()

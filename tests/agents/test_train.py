@@ -1,25 +1,31 @@
 """Training on tiny numbers: what it writes, that it repeats, ends in good order and refuses what misfits."""
 
 import csv
+import errno
 import json
+import os
 import signal
 import subprocess
 import sys
+import threading
 import time
+import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 import yaml
 from stable_baselines3 import PPO
 
-from agents.command import parse_pairs
+from agents.command import parse_pairs, run
 from agents.runs import FILES, STATISTICS, SavedModel, make_env
 from agents.train import Args, train
 from hoof_env.errors import DataFileError, OutputError, ParameterError
 from tests.agents.conftest import SHORT, TINY, train_tiny
 
 ROOT = Path(__file__).parents[2]
+GPU = torch.cuda.is_available()
 
 
 def curve(folder: Path) -> list[tuple[str, str]]:
@@ -133,14 +139,55 @@ def test_unwritable_folder(tmp_path):
         ({"checkpoint_every": -1}, "checkpoint_every"),
         ({"env_id": "hoof_env/HorseLegMO-v0"}, "reward"),
         ({"torch_threads": 0}, "torch_threads"),
+        ({"torch_threads": (os.cpu_count() or 1) + 1}, "torch_threads"),
         ({"device": "abacus"}, "abacus"),
+        pytest.param({"device": "cuda"}, "'cuda'", marks=pytest.mark.skipif(GPU, reason="there is a GPU")),
+        ({"params": (*TINY, "n_epochs=0")}, "n_epochs: expected a whole number of 1 or more, got 0"),
+        ({"params": (*TINY, "batch_size=2.5")}, "batch_size"),
+        ({"params": (*TINY, 'normalize={"foo": 1}')}, "normalize: expected .*'foo'"),
+        ({"params": (*TINY, "normalize=7")}, "normalize: expected true, false or a mapping .* got 7"),
+        ({"params": (*TINY, 'normalize={"clip_obs": "x"}')}, "normalize"),
+        ({"resume": True, "out": None}, "--out"),
     ],
     ids=str,
 )
 def test_bad_input(tmp_path, changes, said):
     with pytest.raises((ParameterError, DataFileError), match=said):
-        train_tiny(tmp_path / "run", **changes)
-    assert not (tmp_path / "run" / "model.zip").exists()
+        train_tiny(**{"out": tmp_path / "runs" / "run", **changes})
+    assert not list(tmp_path.iterdir())  # nothing is left of a start that is refused
+
+
+@pytest.mark.parametrize("name", ["config.yml", "monitor.csv"])
+def test_a_folder_of_other_files_is_not_written_over(tmp_path, name):
+    (tmp_path / name).write_text("mine")
+    with pytest.raises(OutputError, match=rf"found {name} and no run\.json"):
+        train_tiny(tmp_path)
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [(name, "mine")]
+
+
+def test_a_log_beside_a_run(tmp_path):
+    (tmp_path / "log.txt").write_text("mine")
+    assert train_tiny(tmp_path, steps=1).steps == 128
+    assert (tmp_path / "log.txt").read_text() == "mine"
+
+
+def test_an_error_of_the_system_is_one_line(capsys, monkeypatch):
+    def fail():
+        thread = threading.Thread(target=full)
+        thread.start()
+        thread.join()
+        full()
+
+    def full():
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(warnings, "formatwarning", None)
+    monkeypatch.setattr(threading, "excepthook", None)
+    with pytest.raises(SystemExit) as ended:
+        run(fail)
+    assert ended.value.code == 2
+    assert capsys.readouterr().err == "error: [Errno 28] No space left on device\n"
+    assert warnings.formatwarning("nearly", UserWarning, "file", 1, "code") == "warning: nearly\n"
 
 
 def test_an_error_is_one_line():
