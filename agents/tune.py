@@ -18,6 +18,7 @@ import io
 import json
 import shutil
 from collections.abc import Mapping
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -29,8 +30,8 @@ from agents import runs
 from agents.command import parse_pairs, run
 from agents.settings import FOLDER, load_settings
 from agents.train import Args as TrainArgs
-from agents.train import train
-from hoof_env._output import check_folder
+from agents.train import checked, make_model, make_record, train
+from agents.watch import DivergedError
 from hoof_env.errors import DataFileError, ParameterError, check_number
 
 SPACES = Path(__file__).parent / "studies" / "spaces.yml"
@@ -167,10 +168,8 @@ def tune(args: Args) -> Any:
     space = {
         key: how for key, how in load_space(args.space, args.algo).items() if key.split(".")[0] not in held
     }
-    with runs.make_env(args.env_id, **kwargs) as env:
-        runs.warm_up(env)
+    make_record(TrainArgs(env_id=args.env_id), kwargs)  # refuses what cannot be trained on
     folder = args.out or Path("runs/tune", f"{args.algo}-{args.env_id.rpartition('/')[2]}")
-    check_folder(folder)
     with runs.alone(folder):
         return _tune(args, folder, kwargs, base, space)
 
@@ -200,7 +199,7 @@ def _tune(
         )  # fmt: skip
         try:
             trained = train(training, scorer)
-        except ArithmeticError:  # diverged: no settings to go on with
+        except DivergedError:  # no settings to go on with
             raise optuna.TrialPruned from None
         trial.set_user_attr("curve", scorer.curve)
         trial.set_user_attr("seconds", round(trained.seconds, 1))
@@ -230,30 +229,43 @@ def open_study(args: Args, folder: Path, about: dict[str, Any]) -> Any:
     """The study in `folder`, made if need be.
 
     Raises:
-        ParameterError: Optuna is missing, or the study was begun with other settings.
+        ParameterError: Optuna is missing, the settings do not fit the algorithm, or the study was begun with
+            others.
+        DataFileError: study.db is not a study.
     """
     try:
         import optuna
+        from sqlalchemy.exc import SQLAlchemyError
     except ModuleNotFoundError:
         raise ParameterError("agents.tune needs Optuna: pip install 'hoof-env[tune]'") from None
-    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    optuna.logging.set_verbosity(optuna.logging.ERROR)  # what ends a trial is raised, too
+    drawn = about["base"] | draw(optuna.create_study().ask(), about["space"], about["base"])
+    training = TrainArgs(env_id=args.env_id, algo=args.algo, params=(json.dumps(drawn),))
+    _, settings = checked(training)
+    with closing(runs.make_vec_env(args.env_id, settings["n_envs"], **about["env_kwargs"])) as many:
+        make_model(training, settings, many)  # refuses a key that is none
+    steps = about["base"]["n_timesteps"]
     pruners = {
         # By the median of five whole trials at the least, and not before a third of a training
-        "median": optuna.pruners.MedianPruner(5, n_warmup_steps=about["base"]["n_timesteps"] // 3),
-        "hyperband": optuna.pruners.HyperbandPruner(
-            about["base"]["n_timesteps"] // 10, about["base"]["n_timesteps"]
-        ),
+        "median": optuna.pruners.MedianPruner(5, n_warmup_steps=steps // 3),
+        "hyperband": optuna.pruners.HyperbandPruner(max(1, steps // 10), steps),
         "none": optuna.pruners.NopPruner(),
     }
-    study = optuna.create_study(
-        storage=f"sqlite:///{folder / 'study.db'}",
-        study_name="study",
-        pruner=pruners[args.pruner],
-        direction="maximize",
-        load_if_exists=True,
-    )
+    path = folder / "study.db"
+    try:
+        study = optuna.create_study(
+            storage=f"sqlite:///{path}",
+            study_name="study",
+            pruner=pruners[args.pruner],
+            direction="maximize",
+            load_if_exists=True,
+        )
+        begun_trials = len(study.trials)
+    except (SQLAlchemyError, optuna.exceptions.OptunaError, RuntimeError) as error:
+        reason = str(error).partition("\n")[0]
+        raise DataFileError(f"{path}: expected the database of a study, cannot read it: {reason}") from None
     # Of the same seed a study that goes on would draw again what it has drawn
-    seed = args.seed + len(study.trials)
+    seed = args.seed + begun_trials
     study.sampler = optuna.samplers.TPESampler(seed=seed, multivariate=True, n_startup_trials=8)
     about = {"algo": args.algo, "env_id": args.env_id, **about}
     begun = study.user_attrs.get("about", about)

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import logging
 from pathlib import Path
 
 import numpy as np
@@ -164,3 +165,45 @@ def test_a_trial_that_diverges_counts_as_pruned(tmp_path, monkeypatch):
     study = tune(tiny(tmp_path))
     assert [trial.state.name for trial in study.trials] == ["PRUNED", "PRUNED"]
     assert not (tmp_path / "best.yml").exists()
+
+
+def test_hyperband_prunes_trials_of_few_steps(tmp_path):
+    study = tune(tiny(tmp_path, trials=1, steps=5, pruner="hyperband"))
+    assert study.trials[0].user_attrs["curve"]
+
+
+@pytest.mark.parametrize("error", [ZeroDivisionError("of a pruner"), ParameterError("of a setting")])
+def test_an_error_is_no_divergence_and_told_once(tmp_path, monkeypatch, caplog, error):
+    def fail(args, scorer):
+        raise error
+
+    monkeypatch.setattr("agents.tune.train", fail)
+    monkeypatch.setattr(logging.getLogger("optuna"), "propagate", True)
+    with pytest.raises(type(error), match=str(error)):
+        tune(tiny(tmp_path))
+    assert not caplog.records
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"env_id": "hoof_env/HorseLegMO-v0"}, "one number for a reward"),
+        ({"params": ("gama=1",)}, "'gama'"),
+        ({"params": ("n_envs=0",)}, "n_envs: expected"),
+        ({"space": "ppo: {gama: {uniform: [0.9, 1]}}"}, "'gama'"),
+        ({"space": "ppo: {policy_kwargs.net_arc: [1]}"}, "'net_arc'"),
+    ],
+)
+def test_what_no_trial_can_train_with_is_refused_before_there_is_a_study(tmp_path, changes, said):
+    if "space" in changes:
+        (tmp_path / "space.yml").write_text(changes["space"])
+        changes = {"space": tmp_path / "space.yml", "params": HELD[:-1]}
+    with pytest.raises(ParameterError, match=said):
+        tune(tiny(tmp_path / "study", **changes))
+    assert not (tmp_path / "study").exists()
+
+
+def test_a_damaged_study_is_refused(tmp_path):
+    (tmp_path / "study.db").write_text("no database")
+    with pytest.raises(DataFileError, match=r"study\.db: expected the database of a study.* not a database$"):
+        tune(tiny(tmp_path))
