@@ -14,6 +14,7 @@ the task; only a termination has no future. The steps that restart are no experi
 from __future__ import annotations
 
 import csv
+import io
 import time
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -28,8 +29,8 @@ from torch.distributions import Normal
 
 import hoof_env  # noqa: F401  (registers the environments)
 from agents.command import parse_pairs, run
-from hoof_env._output import check_folder
-from hoof_env.errors import ParameterError, check_number
+from hoof_env._output import check_folder, staged
+from hoof_env.errors import HoofEnvError, ParameterError, check_number
 
 
 @dataclass(frozen=True)
@@ -78,6 +79,19 @@ class Args:
     """threads of torch"""
 
 
+LIMITS = {
+    **dict.fromkeys(("steps", "n_envs", "n_steps", "n_epochs"), (1, np.inf)),
+    **dict.fromkeys(("learning_rate", "gamma", "gae_lambda"), (0, 1)),
+    **dict.fromkeys(("clip_range", "ent_coef", "vf_coef", "max_grad_norm"), (0, np.inf)),
+    "batch_size": (2, np.inf),  # advantages are normalised over a batch
+    "seed": (0, 2**63),
+    "log_std_init": (-20, 20),
+    "torch_threads": (1, 1024),
+}
+"""Lowest and highest of what a number of `Args` may be."""
+DIVERGED = "the training diverged: policy or gradient is not finite any more; try a lower learning_rate"
+
+
 @dataclass
 class Learned:
     """What a training leaves: the agent, and a row per rollout as in progress.csv."""
@@ -96,8 +110,11 @@ class Agent(nn.Module):
         self.log_std = nn.Parameter(torch.full((n_actions,), log_std_init))
 
     def policy(self, observation: Tensor) -> Normal:
-        """The distribution of actions, shape (..., n_actions)."""
-        return Normal(self.actor(observation), self.log_std.exp())
+        """The distribution of actions, shape (..., n_actions); `HoofEnvError` after a divergence."""
+        try:
+            return Normal(self.actor(observation), self.log_std.exp())
+        except ValueError:  # not a number, or a deviation of zero
+            raise HoofEnvError(DIVERGED) from None
 
     def value(self, observation: Tensor) -> Tensor:
         """Expected discounted return, shape (...)."""
@@ -164,19 +181,24 @@ def learn(args: Args) -> Learned:
 
     Raises:
         ParameterError: the arguments or the environment do not fit.
-        OutputError: the folder cannot be written.
+        OutputError: the folder cannot be written. HoofEnvError: the training diverged.
     """
-    for name in ("steps", "n_envs", "n_steps", "n_epochs", "torch_threads"):
-        check_number(name, getattr(args, name), low=1)
-    check_number("batch_size", args.batch_size, low=2)  # advantages are normalised over a batch
-    check_number("seed", args.seed, low=0)
+    for name, (low, high) in LIMITS.items():
+        check_number(name, getattr(args, name), low=low, high=high)
+    for units in args.net_arch:
+        check_number("net_arch", units, low=1)
     if args.out:
         check_folder(args.out)
 
     torch.set_num_threads(args.torch_threads)
     torch.manual_seed(args.seed)
     shuffle = np.random.default_rng(args.seed)
-    device = torch.device(args.device)
+    try:
+        device = torch.device(args.device)
+        torch.zeros(1, device=device).item()
+    except Exception as error:  # each kind of device raises its own
+        reason = str(error).partition("\n")[0]
+        raise ParameterError(f"device: expected one that torch has, got {args.device!r}: {reason}") from None
 
     envs = make_envs(args)
     box: Any = envs.single_action_space
@@ -243,7 +265,9 @@ def learn(args: Args) -> Learned:
                         loss = _loss(agent, {key: values[chosen] for key, values in batch.items()}, args)
                         optimizer.zero_grad()
                         loss.backward()
-                        nn.utils.clip_grad_norm_(agent.parameters(), args.max_grad_norm)
+                        norm = nn.utils.clip_grad_norm_(agent.parameters(), args.max_grad_norm)
+                        if not norm.isfinite():  # as of a loss that is none
+                            raise HoofEnvError(DIVERGED)
                         optimizer.step()
 
             # Report
@@ -264,11 +288,14 @@ def learn(args: Args) -> Learned:
     finally:
         envs.close()
     if args.out:
-        torch.save(agent.state_dict(), args.out / "model.pt")
-        with (args.out / "progress.csv").open("w", newline="") as file:
-            writer = csv.DictWriter(file, list(learned.progress[0]))
-            writer.writeheader()
-            writer.writerows(learned.progress)
+        weights = io.BytesIO()
+        torch.save(agent.state_dict(), weights)
+        with staged(args.out) as stage:
+            (stage / "model.pt").write_bytes(weights.getvalue())
+            with (stage / "progress.csv").open("w", newline="") as file:
+                writer = csv.DictWriter(file, list(learned.progress[0]))
+                writer.writeheader()
+                writer.writerows(learned.progress)
     return learned
 
 

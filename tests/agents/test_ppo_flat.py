@@ -1,6 +1,8 @@
 """The flat PPO: its arithmetic over time limits, that it learns, repeats and refuses what misfits."""
 
 import csv
+import errno
+from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
@@ -9,7 +11,7 @@ import torch
 
 from agents import ppo_flat
 from agents.ppo_flat import Args, estimate_advantages, learn
-from hoof_env.errors import OutputError, ParameterError
+from hoof_env.errors import HoofEnvError, OutputError, ParameterError
 
 GAMMA, LAMBDA = 0.9, 0.8
 
@@ -135,11 +137,20 @@ def test_leg_writes_its_folder_and_says_how_it_goes(tmp_path, capsys):
         ({"steps": 0}, "steps"),
         ({"batch_size": 1}, "batch_size"),
         ({"seed": -1}, "seed"),
+        ({"seed": 10**20}, "seed"),
+        ({"torch_threads": 10**10}, "torch_threads"),
+        ({"learning_rate": np.nan}, "learning_rate"),
+        ({"learning_rate": 1e6}, "learning_rate"),
+        ({"learning_rate": -1.0}, "learning_rate"),
+        ({"gamma": 5.0}, "gamma"),
+        ({"net_arch": (8, 0)}, "net_arch"),
+        ({"device": "foo"}, "device: expected one that torch has, got 'foo'"),
+        ({"device": "meta"}, "device: expected one that torch has, got 'meta'"),
     ],
 )
 def test_refuses(changes, said):
     with pytest.raises(ParameterError, match=said):
-        learn(guessing(**changes))
+        learn(guessing(**{"steps": 256, **changes}))
 
 
 def test_refuses_environments_that_restart_at_once(monkeypatch):
@@ -149,6 +160,38 @@ def test_refuses_environments_that_restart_at_once(monkeypatch):
     monkeypatch.setitem(gym.registry, "Hasty-v0", spec)
     with pytest.raises(ParameterError, match="next step"):
         learn(guessing(env_id="Hasty-v0"))
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"steps": 1_000}, {"steps": 1, "n_steps": 1, "n_epochs": 1}],
+    ids=["at once", "at the last"],
+)
+def test_a_training_that_diverges_leaves_nothing(tmp_path, changes):
+    with pytest.raises(HoofEnvError, match="diverged"):
+        learn(guessing(vf_coef=1e38, out=tmp_path, **changes))
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("log_std", [np.nan, -1e6])
+def test_a_policy_that_diverged_says_so(log_std):
+    with pytest.raises(HoofEnvError, match="diverged"):
+        ppo_flat.Agent(2, 1, (8,), log_std).policy(torch.ones(2))
+
+
+def test_a_model_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
+    learn(guessing(steps=1, n_steps=1, out=tmp_path))
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    write = Path.write_bytes
+
+    def half(path, data):
+        write(path, data[:100])
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", half)
+    with pytest.raises(OutputError, match="No space left"):
+        learn(guessing(steps=1, n_steps=1, seed=1, out=tmp_path))
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
 def test_refuses_a_file_for_a_folder(tmp_path):
