@@ -171,8 +171,10 @@ def film_paths(video: Path, names: Sequence[str]) -> dict[str, Path]:
     """Where the film of each policy goes: `video`, with the policy's name added if there are several.
 
     Raises:
-        ParameterError: two films would have one name.
+        ParameterError: two films would have one name, or it is not that of an MP4.
     """
+    if video.suffix.lower() not in ("", ".mp4"):
+        raise ParameterError(f"--video: expected a file that ends in .mp4, got {str(video)!r}")
     paths: dict[str, Path] = {}
     for name in dict.fromkeys(names):
         short = Path(name).parent.name if name.endswith("model.zip") else Path(name).stem

@@ -12,6 +12,8 @@ import numpy as np
 
 from hoof_env._output import staged
 
+NOT_WHOLE = "ffmpeg could not write the whole film; is the disk full?"
+
 
 def film(
     env: gym.Env[Any, Any],
@@ -34,7 +36,7 @@ def film(
         speed: of the film over that of life.
 
     Raises:
-        OutputError: the folder cannot be written.
+        OutputError: the folder cannot be written, or the disk is full.
     """
     import imageio_ffmpeg
 
@@ -50,14 +52,14 @@ def film(
             codec="libx264",
             pix_fmt_out="yuv420p",
             macro_block_size=2,
-            ffmpeg_log_level="error",
+            ffmpeg_log_level="quiet",
             output_params=["-crf", str(crf), "-preset", "slow", "-movflags", "+faststart", *scale],
         )
         writer.send(None)
         try:
             start = np.ones(1, bool)
             for shown in count(1):
-                writer.send(np.ascontiguousarray(frame))
+                _send(writer, frame)
                 action, _ = policy.predict(observation, episode_start=start, deterministic=True)
                 observation, _, terminated, truncated, _ = env.step(action)
                 start = np.zeros(1, bool)
@@ -66,4 +68,24 @@ def film(
                     break
         finally:
             writer.close()
+        _check(stage / path.name, shown)
     return path
+
+
+def _send(writer: Any, frame: Any) -> None:
+    try:
+        writer.send(np.ascontiguousarray(frame))
+    except OSError:  # in many lines
+        raise OSError(NOT_WHOLE) from None
+
+
+def _check(path: Path, frames: int) -> None:
+    """Raise `OSError` if fewer frames were written: ffmpeg may fail after it took the last one."""
+    import imageio_ffmpeg
+
+    try:
+        written, _ = imageio_ffmpeg.count_frames_and_secs(str(path))
+    except RuntimeError:
+        written = 0
+    if written < frames:
+        raise OSError(NOT_WHOLE)

@@ -209,6 +209,32 @@ def test_an_environment_without_summaries(tmp_path):
     assert set(score.estimates) == {"return"}
 
 
+def test_a_film_that_is_no_mp4_is_refused_before_the_first_episode(tmp_path, monkeypatch):
+    monkeypatch.setattr("agents.evaluate.play", lambda *_: pytest.fail("was played"))
+    with pytest.raises(ParameterError, match=r"ends in \.mp4, got .*film\.xyz"):
+        evaluate(Args(policy=("run",), video=tmp_path / "film.xyz"))
+
+
+@pytest.mark.parametrize("name", ["film.xyz", "film.mp4"], ids=["at its start", "at its end"])
+def test_a_film_that_cannot_be_written_is_refused_in_one_line(tmp_path, name, capfd):
+    """ffmpeg alone meets the limit of a file's size: it leaves half a file, as on a full disk."""
+    resource = pytest.importorskip("resource")
+
+    from agents.video import film
+
+    with make_env(ENV_ID, episode_seconds=0.4, render_mode="rgb_array") as env:
+        policy = find_policy("run", env, ENV_ID)
+        old = resource.getrlimit(resource.RLIMIT_FSIZE)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, old[1]))
+        try:
+            with pytest.raises(OutputError, match=r"^cannot write to .*: ffmpeg could not [^\n]*$"):
+                film(env, policy, tmp_path / name, seed=0)
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, old)
+    assert not list(tmp_path.iterdir())
+    assert not capfd.readouterr().err
+
+
 def test_films_of_two_policies_never_share_a_file():
     paths = film_paths(Path("gait.mp4"), ["run", "a/ppo", "b/sac/model.zip"])
     assert [str(path) for path in paths.values()] == ["gait-run.mp4", "gait-ppo.mp4", "gait-sac.mp4"]
