@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -77,9 +78,10 @@ def last_failure(trial: Any) -> str:
 
 def reason(error: str) -> str:
     """The last failure in one line: Ray puts the news first, but behind a traceback that of Python last."""
+    error = re.sub(r"\x1b\[[\d;]*m", "", error)
     lines = [line.strip() for line in error.rpartition("Failure #")[2].strip().splitlines()]
     lines = [line for line in lines if "(occurred at" not in line] or ["unknown."]
-    return lines[-1 if any(line.startswith("Traceback") for line in lines) else 0]
+    return lines[-1 if any(line.startswith(("Traceback", "ray::")) for line in lines) else 0]
 
 
 def is_done(trial: Any) -> bool:

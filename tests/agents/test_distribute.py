@@ -1,12 +1,18 @@
 """Distributed trainings, as far as they go without Ray; tests/ecosystem/check_distribute.py has the rest."""
 
 import importlib.util
+import runpy
+import sys
+from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from agents.distribute import Rllib, Trials, main, prepare, start
 from agents.distribute_space import Axis, parse_space
 from hoof_env.errors import HoofEnvError, ParameterError
+
+ROOT = Path(__file__).parents[2]
 
 
 def test_space():
@@ -82,3 +88,22 @@ def test_help_names_both(capsys):
     with pytest.raises(SystemExit):
         main(["--help"])
     assert {"trials", "rllib"} <= set(capsys.readouterr().out.split())
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (
+            "\x1b[36mray::ImplicitFunc.train()\x1b[39m (pid=7, ip=10.0.0.1)\n"
+            '  File "trial.py", line 1, in run\n    raise error\n\x1b[31mValueError: bad\x1b[0m',
+            "ValueError: bad",
+        ),
+        ('Traceback (most recent call last):\n  File "x.py", line 1\nKeyError: 3', "KeyError: 3"),
+        ("The actor died unexpectedly.\n\tclass_name: ImplicitFunc", "The actor died unexpectedly."),
+    ],
+)
+def test_reason(monkeypatch, error, said):
+    monkeypatch.setitem(sys.modules, "ray", SimpleNamespace(tune=SimpleNamespace(Callback=object)))
+    report = runpy.run_path(str(ROOT / "agents" / "distribute_report.py"))
+    told = f"Failure # 1 (occurred at noon)\nold\nFailure # 2 (occurred at one)\n{error}\n"
+    assert report["reason"](told) == said
