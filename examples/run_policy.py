@@ -9,6 +9,8 @@ import onnxruntime
 
 import hoof_env  # noqa: F401  (registers the environments)
 
+if len(sys.argv) != 2:
+    sys.exit(__doc__)
 policy = onnxruntime.InferenceSession(sys.argv[1])
 about = policy.get_modelmeta().custom_metadata_map
 env = gymnasium.make(about["env_id"], **json.loads(about["env_kwargs"]))

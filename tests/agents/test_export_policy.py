@@ -234,3 +234,6 @@ def test_the_example_plays_a_policy_without_a_learning_library(trained, exported
 
         episodes = play(env, SavedModel.find(trained.folder).load(env, ENV_ID), range(1000, 1003))
     assert found == pytest.approx([one["return"] for one in episodes], abs=0.01)
+    bare = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, cwd=ROOT)
+    assert bare.returncode == 1
+    assert re.fullmatch(r".*python examples/run_policy\.py POLICY\.onnx\n", bare.stderr)
