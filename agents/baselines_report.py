@@ -231,12 +231,12 @@ def report(args: Args) -> Path:
         bars_table(rows, known, bars), results_table(rows, gaits), figures_table(rows, gaits), table,
         made_table(rows),
     )  # fmt: skip
-    published = page == PAGES["full"]
-    text = page.read_text(encoding="utf-8") if published else blank_page(args.subset, list(names))
+    blank = args.subset == "nightly" or not page.is_file()
+    text = blank_page(args.subset, list(names)) if blank else page.read_text(encoding="utf-8")
     for mark, content in zip(MARKS, tables, strict=True):
         text = put(text, mark, content)
     runs.write_text(page, text)
-    if published:
+    if page == PAGES["full"]:
         runs.write_text(
             README, put(README.read_text(encoding="utf-8"), "baselines", short_table(rows, known))
         )
