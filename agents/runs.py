@@ -24,7 +24,7 @@ import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass, is_dataclass
+from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -37,6 +37,7 @@ from agents.safe import ABOUT, WEIGHTS, load_policy, save_policy
 from agents.settings import algorithm_class
 from hoof_env._output import check_folder, staged
 from hoof_env.errors import DataFileError, OutputError, ParameterError
+from hoof_env.onnx_policy import settings_of
 
 FILES = ("model.zip", WEIGHTS, ABOUT, "config.yml", "run.json", "monitor.csv")
 """What a run without normalisation leaves, TensorBoard's files aside."""
@@ -171,12 +172,8 @@ def write_model(model: Any, folder: Path, name: str = "model.zip") -> None:
 
 def describe_env(env: gym.Env[Any, Any]) -> dict[str, Any]:
     """What a policy for an environment depends on, as JSON gives it back: spaces and all settings."""
-    settings = getattr(env.unwrapped, "settings", None)
-    found = (
-        {"settings": asdict(settings)} if is_dataclass(settings) and not isinstance(settings, type) else {}
-    )
-    plain: dict[str, Any] = json.loads(json.dumps({**describe_spaces(env), **found}, default=str))
-    return plain
+    settings = settings_of(env)
+    return describe_spaces(env) | ({"settings": settings} if settings else {})
 
 
 def read_record(folder: Path) -> dict[str, Any]:
