@@ -60,7 +60,6 @@ bench: setup
 	@$(PY) -m benchmarks.env_speed
 
 baselines: setup
-	@echo 'pip install rliable' && $(PY) -m pip install -q -c constraints.txt -e '.[baselines]'
 	@$(PY) -m agents.baselines $(ARGS)
 
 lint: setup
