@@ -1,10 +1,11 @@
 # One target per habit. Each makes .venv first if it is missing or out of date.
 #
 #   PYTHON=python3.12   the interpreter to make .venv with; otherwise the first that is found to run
+#   INSTALLER=pip       set-up by pip where uv does not get on with your index or proxy
 #   TORCH_INDEX=URL     where Linux takes PyTorch from; empty for pip's own index, which has the CUDA build
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test kernels test-slow test-peers test-ecosystem bench baselines lint clean
+.PHONY: help setup setup-demo demo test kernels test-slow test-peers test-ecosystem bench baselines lint clean
 
 PY := .venv/bin/python
 PYTHONS := $(or $(PYTHON),$(PY) python3 python3.13 python3.12 python3.11)
@@ -19,17 +20,17 @@ help:
 	@echo 'make bench       how fast engine and environments are beside MuJoCo, Exudyn and EnvPool'
 	@echo 'make baselines   the agents of docs/baselines.md, hours; ARGS="--subset nightly": a small part, minutes'
 	@echo 'make lint        lint and types alone'
-	@echo 'make setup       make .venv and nothing more'
+	@echo 'make setup       make .venv with all that the commands of the README need, and nothing more'
 	@echo 'make clean       remove .venv and the caches; runs/ stays'
 
-setup:
+setup setup-demo:
 	@for python in $(PYTHONS); do \
-	  if $$python -c '$(IS_SUPPORTED)' 2>/dev/null; then exec $$python scripts/setup_venv.py; fi; \
+	  if $$python -c '$(IS_SUPPORTED)' 2>/dev/null; then exec $$python scripts/setup_venv.py $(subst setup-,,$(filter-out setup,$@)); fi; \
 	done; \
 	echo 'set-up stopped: no Python 3.11 to 3.13 here ($(PYTHONS)); name one: make PYTHON=/path/to/python' >&2; \
 	exit 1
 
-demo: setup
+demo: setup-demo
 	@$(PY) -m agents.demo
 
 # Compiling and mypy take one processor each, so both go on at once. A file's tests stay in one process: the
@@ -60,7 +61,6 @@ bench: setup
 	@$(PY) -m benchmarks.env_speed
 
 baselines: setup
-	@echo 'pip install rliable' && $(PY) -m pip install -q -c constraints.txt -e '.[baselines]'
 	@$(PY) -m agents.baselines $(ARGS)
 
 lint: setup

@@ -20,7 +20,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from agents import baselines_stats
 from agents.baselines_plan import FOLDERS, PLANS, Run, runs_of
 from agents.baselines_run import CURVE, FINAL, read_curve
 from agents.command import run
@@ -138,8 +137,6 @@ def main(argv: list[str] | None = None) -> int:
 
     signal.signal(signal.SIGTERM, interrupt)
     args = tyro.cli(Args, args=argv, prog="python -m agents.baselines", description=__doc__)
-    if args.report:
-        baselines_stats.library()  # what is missing is told before hours are spent
     failed = train_all(args)
     if args.report:
         from agents import baselines_report

@@ -1,4 +1,4 @@
-"""Interquartile means over seeds with stratified bootstrap 95 % intervals, by rliable.
+"""Interquartile means over seeds with bootstrap 95 % intervals.
 
 Agarwal et al. 2021, Deep reinforcement learning at the edge of the statistical precipice.
 """
@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -42,52 +41,28 @@ REPS = 5000
 """Of a bootstrap."""
 
 
-def library() -> Any:
-    """rliable's bootstrap.
-
-    Raises:
-        ParameterError: it is not installed.
-    """
-    try:
-        from rliable.library import get_interval_estimates  # type: ignore[import-untyped]
-    except ImportError as error:
-        raise ParameterError(
-            f"intervals: expected rliable (pip install 'hoof-env[baselines]'): {error}"
-        ) from None
-    return get_interval_estimates
-
-
 def iqm(scores: ArrayLike) -> Floats:
-    """Interquartile mean over seeds and its interval.
+    """Interquartile mean over seeds and the percentile bootstrap's interval of it, which draws whole seeds.
 
     Args:
-        scores: of each seed, shape (seeds,), or several numbers of each, shape (seeds, n), that are
-            resampled apart.
+        scores: of each seed, shape (seeds,), or several numbers of each, shape (seeds, n).
 
     Returns:
         Mean, low and high, shape (3,) or (3, n); low and high are NaN for one seed. The bootstrap draws the
-        same numbers each time.
-
-    Raises:
-        ParameterError: rliable is not installed.
+        same seeds each time.
     """
-    from scipy.stats import trim_mean
+    from scipy.stats import bootstrap, trim_mean
 
-    get_interval_estimates = library()
+    def middle(some: Floats, axis: int) -> Floats:
+        return np.asarray(trim_mean(some, 0.25, axis=axis))
+
     values = np.asarray(scores, np.float64)
-    curve = values.reshape(len(values), 1, -1)  # rliable's runs, tasks, points
-
-    def over_seeds(some: Floats) -> Floats:
-        """rliable's `aggregate_iqm` of every point at once."""
-        return np.asarray(trim_mean(some[:, 0], 0.25, axis=0))
-
+    mean = middle(values, axis=0)
     if len(values) < 2:
-        found = np.stack([over_seeds(curve), *[np.full(curve.shape[2], np.nan)] * 2])
-    else:
-        np.random.seed(0)  # noqa: NPY002  rliable draws from here whatever generator it is given
-        means, bounds = get_interval_estimates({"": curve}, over_seeds, reps=REPS)
-        found = np.stack([means[""], *bounds[""]])
-    return found.reshape(3, *values.shape[1:])
+        return np.stack([mean, *[np.full_like(mean, np.nan)] * 2])
+    options = {"axis": 0, "n_resamples": REPS, "method": "percentile", "rng": np.random.default_rng(0)}
+    bounds = bootstrap((values,), middle, **options).confidence_interval
+    return np.stack([mean, bounds.low, bounds.high])
 
 
 def over_seeds(each: Sequence[Mapping[str, float]]) -> dict[str, Interval]:

@@ -1,12 +1,17 @@
-"""Make .venv and install into it what `make demo` and `make test` need; `make` runs this before either.
+"""Make .venv and install into it what `make demo` or `make test` needs; `make` runs this before either.
+
+    python scripts/setup_venv.py demo     what the demo needs
+    python scripts/setup_venv.py          all that a checkout can use
 
 One line for each step, and one line that says why when something is missing. Nothing is done when nothing
 has changed. An interrupted set-up is mended by the next one: the stamp is written last, and a .venv without
-a stamp is made anew.
+a stamp is made anew. uv installs where it can be had, and otherwise pip, which takes longer; INSTALLER=pip
+asks for pip. All packages are wheels of the versions in constraints.txt.
 
 Standard library only, in a syntax that a Python too old for the project can still read.
 """
 
+import ast
 import fcntl
 import hashlib
 import importlib.util
@@ -16,18 +21,26 @@ import subprocess
 import sys
 import time
 from contextlib import contextmanager, suppress
+from functools import lru_cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 OLDEST, NEWEST = (3, 11), (3, 13)
-EXTRAS = "train,render,video,plot,export,identify,baselines,tune,onnx,dev"
+EXTRAS = {"demo": ("train", "render", "video", "plot")}
+EXTRAS["all"] = (*EXTRAS["demo"], "export", "identify", "tune", "onnx", "dev")
+TOOLS = {
+    "pip": ("pip", "install", "--disable-pip-version-check", "--no-input"),
+    "uv": ("uv", "pip", "install", "--python", ".venv/bin/python"),
+}
+ONLY_WHEELS = ("--only-binary", ":all:")
 NEEDED_GB = 3.0  # .venv itself takes 1.8 GB on Linux
 
 # On Linux the usual index gives PyTorch with CUDA, which is gigabytes; this one gives 0.2 GB.
 TORCH_INDEX = os.environ.get("TORCH_INDEX", "https://download.pytorch.org/whl/cpu")
 
 UNREACHABLE = "the package index cannot be reached; check the network, or name another with PIP_INDEX_URL"
-REASONS = {  # a sign in what pip or venv says: what it means. The first sign that is found is told.
+LACKING = "the package index lacks a wheel of a version that constraints.txt names"
+REASONS = {  # a sign in what pip, uv or venv says: what it means. The first sign that is found is told.
     "No space left on device": "the disk is full",
     "Read-only file system": "this folder cannot be written to",
     "Permission denied": "this folder cannot be written to",
@@ -37,7 +50,22 @@ REASONS = {  # a sign in what pip or venv says: what it means. The first sign th
     "ConnectTimeoutError": UNREACHABLE,
     "ProxyError": UNREACHABLE,
     "ReadTimeoutError": "the package index stopped answering; run the same command again",
-    "ResolutionImpossible": "the package index lacks a version that constraints.txt names",
+    "ResolutionImpossible": LACKING,
+    "invalid peer certificate": "the package index shows an unknown certificate; name yours with PIP_CERT",
+    "client error (Connect)": UNREACHABLE,
+    "operation timed out": "the package index stopped answering; run the same command again",
+    "No solution found": LACKING,
+}
+
+UV_FROM_PIP = {  # what pip is told by variables and files: uv's variable for it, and what parts a list there
+    "index-url": ("UV_DEFAULT_INDEX", " "),
+    "extra-index-url": ("UV_INDEX", " "),
+    "find-links": ("UV_FIND_LINKS", ","),
+    "no-index": ("UV_NO_INDEX", " "),
+    "trusted-host": ("UV_INSECURE_HOST", " "),
+    "cert": ("SSL_CERT_FILE", " "),
+    "client-cert": ("SSL_CLIENT_CERT", " "),
+    "proxy": ("ALL_PROXY", " "),
 }
 
 
@@ -45,18 +73,18 @@ class Missing(Exception):
     """Something is missing that set-up cannot do without."""
 
 
-def main() -> int:
+def main(purpose: str = "all") -> int:
     started = time.monotonic()
     try:
         check_python()
         with one_at_a_time():
             place, pins = wanted_stamp()
             found = read_stamp()
-            if found == [place, pins]:
+            if found in ([place, pins, purpose], [place, pins, "all"]):
                 return 0
             check_machine()
-            install(anew=found[:1] != [place])
-            stamp_path().write_text(f"{place}\n{pins}\n")
+            install(purpose, anew=found[:1] != [place])
+            stamp_path().write_text(f"{place}\n{pins}\n{purpose}\n")
     except Missing as missing:
         print(f"set-up stopped: {missing}", file=sys.stderr)
         return 1
@@ -120,7 +148,8 @@ def stamp_path() -> Path:
 
 
 def wanted_stamp():
-    """Two lines: a change in the first asks for a new .venv, a change in the second for an update."""
+    """Two lines: a change in the first asks for a new .venv, a change in the second for an update. A third
+    line has the purpose."""
     inputs = (ROOT / "pyproject.toml").read_bytes() + (ROOT / "constraints.txt").read_bytes()
     return f"Python {dotted(sys.version_info)} in {ROOT}", hashlib.sha256(inputs).hexdigest()
 
@@ -135,7 +164,7 @@ def read_stamp():
 # The steps
 
 
-def install(anew: bool) -> None:
+def install(purpose: str, anew: bool) -> None:
     print(f"{'Making' if anew else 'Updating'} .venv with Python {sys.version.split()[0]}", flush=True)
     with suppress(OSError):
         stamp_path().unlink()
@@ -143,36 +172,104 @@ def install(anew: bool) -> None:
         shutil.rmtree(str(venv("")), ignore_errors=True)
         # Run by .venv's own Python, this script has just removed it: the one behind it makes the new one.
         python = getattr(sys, "_base_executable", sys.executable)
-        step("virtual environment", python, "-I", "-m", "venv", ".venv")
-    if sys.platform == "linux" and TORCH_INDEX:
-        try:
-            source = ("--index-url", TORCH_INDEX, "--retries", "1", "--timeout", "10")
-            pip("PyTorch for the CPU", "--no-deps", "torch", *source)
-        except Missing:
-            print(f"  not from {TORCH_INDEX}; the usual index may send the CUDA build, some gigabytes")
-    pip("build tool", "hatchling")
-    pip("all other packages", "--no-build-isolation", "--editable", f".[{EXTRAS}]")
+        step("virtual environment", (python, "-I", "-m", "venv", ".venv"))
+    tool = installer()
+    install_torch(tool)
+    packages(tool, "all other packages", *ONLY_WHEELS, "hatchling", *requirements(purpose))
+    packages(tool, "this checkout", "--no-deps", "--no-build-isolation", "--editable", ".")
 
 
-def pip(title: str, *arguments: str) -> None:
-    options = ["--constraint", "constraints.txt", "--disable-pip-version-check", "--no-input"]
-    if not os.environ.get("PYTHONDONTWRITEBYTECODE"):
-        options.append("--no-compile")  # a third of the time; the first import compiles what is used
-    step(title, str(venv("bin/python")), "-I", "-m", "pip", "install", *options, *arguments)
+def installer() -> str:
+    """A key of `TOOLS`: uv, which is put into .venv, or pip where it cannot be had or is asked for."""
+    if os.environ.get("INSTALLER") == "pip":
+        return "pip"
+    try:
+        packages("pip", "uv", *ONLY_WHEELS, "uv")
+    except Missing as missing:
+        print(f"  no uv here: {missing}; pip installs the same, and takes longer", flush=True)
+        return "pip"
+    return "uv"
 
 
-def step(title: str, *command: str) -> None:
+def install_torch(tool: str) -> None:
+    """On Linux the build for the CPU: from where pip finds links, or from TORCH_INDEX. Elsewhere the usual
+    index has that one, and it comes with the rest."""
+    if sys.platform != "linux":
+        return
+    places = [("where pip finds links", "--no-index")] if "find-links" in pip_settings() else []
+    if TORCH_INDEX:
+        places.append((TORCH_INDEX, "--index-url", TORCH_INDEX))
+    patience = () if tool == "uv" else ("--retries", "1", "--timeout", "10")
+    for place, *source in places:
+        with suppress(Missing):
+            title = f"PyTorch from {place}"
+            packages(tool, title, *ONLY_WHEELS, "--no-deps", "torch", *source, *patience, UV_HTTP_RETRIES="1")
+            return
+    print(
+        "  what is left is the usual index: PyTorch with CUDA, some gigabytes (TORCH_INDEX=URL names another)"
+    )
+    try:
+        packages(tool, "PyTorch with CUDA", *ONLY_WHEELS, "torch")
+    except Missing as missing:
+        raise Missing(f"PyTorch cannot be had for Python {dotted(sys.version_info)}: {missing}") from None
+
+
+def requirements(purpose: str):
+    """What pyproject.toml asks for."""
+    import tomllib
+
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extras = [project["optional-dependencies"][extra] for extra in EXTRAS[purpose]]
+    return sum(extras, project["dependencies"])
+
+
+def packages(tool: str, title: str, *arguments: str, **environment: str) -> None:
+    """Install into .venv within constraints.txt. The first import compiles what is used."""
+    options = ["--constraint", "constraints.txt"]
+    if os.environ.get("PYTHONDONTWRITEBYTECODE"):  # then no import will
+        options += ["--compile-bytecode"] if tool == "uv" else []
+    else:
+        options += ["--no-compile"] if tool == "pip" else []
+    command = (str(venv("bin/python")), "-I", "-m", *TOOLS[tool], *options, *arguments)
+    step(title, command, {**uv_settings(), **environment} if tool == "uv" else environment)
+
+
+@lru_cache(maxsize=None)  # noqa: UP033  functools.cache is too young
+def pip_settings():
+    """What pip is told by variables and files, by name; the nearest counts where several say so."""
+    command = (str(venv("bin/python")), "-I", "-m", "pip", "config", "list")
+    told = subprocess.run(command, stdout=subprocess.PIPE, text=True).stdout.splitlines()
+    settings = {}
+    for scope in ("global.", "install.", ":env:."):
+        for name, _, value in (line[len(scope) :].partition("=") for line in told if line.startswith(scope)):
+            settings[name] = ast.literal_eval(value)
+    return settings
+
+
+def uv_settings():
+    """The same in uv's variables."""
+    settings = {"UV_INDEX_STRATEGY": "unsafe-best-match"}  # as pip: the best that any of the indexes has
+    for name, value in pip_settings().items():
+        if name in UV_FROM_PIP:
+            variable, separator = UV_FROM_PIP[name]
+            settings[variable] = separator.join(value.split())
+    return {name: value for name, value in settings.items() if name not in os.environ}
+
+
+def step(title: str, command, environment=()) -> None:
     """Run one command and keep its output aside; a dot for each package shows that it is alive."""
     started = time.monotonic()
     print(f"  {title} ", end="", flush=True)
-    environment = {"PIP_RETRIES": "3", **os.environ, "PIP_USER": "0", "LC_ALL": "C.UTF-8"}
+    usual = {"PIP_RETRIES": "3", **os.environ, "PIP_USER": "0", "LC_ALL": "C.UTF-8"}
     streams = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
-    process = subprocess.Popen(command, cwd=str(ROOT), env=environment, universal_newlines=True, **streams)
+    process = subprocess.Popen(
+        command, cwd=str(ROOT), env={**usual, **dict(environment)}, universal_newlines=True, **streams
+    )
     said = []
     try:
         for line in process.stdout:
             said.append(line)
-            if line.startswith("Collecting"):
+            if line.startswith(("Collecting", " Downloaded")):  # pip's word, and uv's
                 print(".", end="", flush=True)
     except BaseException:
         process.terminate()
@@ -195,4 +292,4 @@ def why(said) -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(*sys.argv[1:]))
