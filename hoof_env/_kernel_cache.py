@@ -15,9 +15,10 @@ from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
-from numba.core import caching, config
+import numba.core.caching
+import numba.core.config
 from numba.core.compiler_lock import global_compiler_lock
 
 from hoof_env.errors import OutputError
@@ -31,10 +32,17 @@ LONGEST_WAIT = 600.0
 COMPILED: list[str] = []
 """Names of the kernels that this process has compiled."""
 
-_Given: Any = getattr(caching, "UserProvidedCacheLocator", None) or caching._UserProvidedCacheLocator
+_caching: Any = numba.core.caching
+_config: Any = numba.core.config
+_Given: Any = getattr(_caching, "UserProvidedCacheLocator", None) or _caching._UserProvidedCacheLocator
 
 
-class _GivenFolder(_Given):  # type: ignore[misc]
+def given_folder() -> str:
+    """What NUMBA_CACHE_DIR was when numba was imported, or nothing."""
+    return str(_config.CACHE_DIR)
+
+
+class _GivenFolder(_Given):
     """The folder named by NUMBA_CACHE_DIR, from which kernels are loaded even where nothing can be written,
     as in an image of a container. numba would pass over such a folder in silence."""
 
@@ -42,11 +50,11 @@ class _GivenFolder(_Given):  # type: ignore[misc]
         pass
 
 
-class _FilesInGivenFolder(caching.CompileResultCacheImpl):  # type: ignore[misc]
-    _locator_classes = (_GivenFolder,)
+class _FilesInGivenFolder(_caching.CompileResultCacheImpl):
+    _locator_classes: ClassVar[list[Any]] = [_GivenFolder]
 
 
-class KernelCache(caching.FunctionCache):  # type: ignore[misc]
+class KernelCache(_caching.FunctionCache):
     """The files of one kernel.
 
     Args:
@@ -58,7 +66,7 @@ class KernelCache(caching.FunctionCache):  # type: ignore[misc]
     """
 
     def __init__(self, function: Callable[..., Any], say: Callable[[str], None]) -> None:
-        if config.CACHE_DIR:
+        if given_folder():
             self._impl_class = _FilesInGivenFolder
         try:
             super().__init__(function)
@@ -81,7 +89,7 @@ class KernelCache(caching.FunctionCache):  # type: ignore[misc]
                 os.makedirs(self.cache_path, exist_ok=True)
                 tempfile.TemporaryFile(dir=self.cache_path).close()
             except OSError as error:
-                raise _no_folder(config.CACHE_DIR or self.cache_path, error) from None
+                raise _no_folder(given_folder() or self.cache_path, error) from None
             if self._take_lock():
                 found = self._load(sig, target_context)
         return found

@@ -5,9 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from numba.core import config
-
-from hoof_env._kernel_cache import COMPILED
+from hoof_env._kernel_cache import COMPILED, given_folder
 from hoof_env.dynamics.advance import LANES
 from hoof_env.envs.horse_leg import HorseLegEnv
 from hoof_env.envs.vector import HorseLegVectorEnv
@@ -32,7 +30,7 @@ def compile_kernels(say: Callable[[str], None]) -> list[str]:
         make()
         if found := COMPILED[count:]:
             say(f"{name}: {time.monotonic() - begun:.1f} s for {', '.join(found)}")
-    folder = config.CACHE_DIR or "numba's own folders; NUMBA_CACHE_DIR names another"
+    folder = given_folder() or "numba's own folders; NUMBA_CACHE_DIR names another"
     compiled = COMPILED[first:]
     say(f"{f'{len(compiled)} kernels compiled' if compiled else 'nothing to compile'}; they are in {folder}")
     return compiled
