@@ -6,55 +6,41 @@ that a result does not depend on how the compiler arranged a loop.
 
 from __future__ import annotations
 
-import hashlib
 import os
 import sys
-import tempfile
 import time
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
-from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from hoof_env.errors import HoofEnvError, OutputError
+from hoof_env.errors import HoofEnvError
 
 F = TypeVar("F", bound=Callable[..., Any])
-
-MECHANICS = ("_lanes", "leg", "ground", "gait", "dynamics", "identify")
-"""The rooms whose sources end up in kernels."""
 
 QUIET = "HOOF_ENV_QUIET"
 """Environment variable; set to 1 it silences what is said while kernels compile."""
 
 
 def kernel(function: F) -> F:
-    """Compile `function` with numba at its first call and keep the result in numba's cache folder.
+    """Compile `function` with numba at its first call, and keep the result in numba's cache folder, which the
+    environment variable NUMBA_CACHE_DIR names.
+
+    Of several processes that need it at once one compiles. The first call raises OutputError if the kernel
+    has to be compiled and the folder is not writable.
 
     Raises:
-        OutputError: the folder named by NUMBA_CACHE_DIR, or without it every folder that numba tries, is not
-            writable.
         HoofEnvError: numba is told not to compile.
     """
     import numba
 
+    from hoof_env._kernel_cache import keep
+
     _announce_compiling()
-    given = os.environ.get("NUMBA_CACHE_DIR")
-    try:
-        if given:
-            _check_writable(given)  # numba would pass it over in silence
-        compiled: Any = numba.njit(cache=True, error_model="numpy")(function)
-    except (RuntimeError, OSError) as error:
-        folder = given or os.path.dirname(function.__code__.co_filename)
-        raise OutputError(
-            f"cannot keep compiled kernels in {folder!r} ({error}); expected a writable folder: "
-            "set the environment variable NUMBA_CACHE_DIR to one"
-        ) from None
+    compiled: Any = numba.njit(error_model="numpy")(function)
     if not hasattr(compiled, "_cache"):  # records have no attributes outside compiled code
         raise HoofEnvError("NUMBA_DISABLE_JIT is set, but kernels run compiled only: unset it")
-    # numba looks for changes in the file of a kernel alone, but a kernel contains those that it calls
-    stored = compiled._cache._cache_file
-    stored._source_stamp = (stored._source_stamp, _sources())
+    keep(compiled, _say)
     return cast(F, compiled)
 
 
@@ -113,20 +99,3 @@ def _say(text: str) -> None:
     if os.environ.get(QUIET, "") in ("", "0"):
         with suppress(OSError, ValueError):  # nobody listens
             print(f"hoof-env: {text}", file=sys.stderr, flush=True)
-
-
-@cache
-def _check_writable(folder: str) -> None:
-    os.makedirs(folder, exist_ok=True)
-    tempfile.TemporaryFile(dir=folder).close()
-
-
-@cache
-def _sources() -> str:
-    """Digest of everything that kernels are made from."""
-    here = Path(__file__).parent
-    digest = hashlib.sha256()
-    rooms = (path for room in MECHANICS for path in (here / room).glob("*.py"))
-    for path in sorted((*rooms, *here.glob("_*.py"))):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()

@@ -257,6 +257,17 @@ def manual(id: str = "hoof_env/HorseLeg-v0", out: Path | None = None) -> None:
         _say(f"{len(write_pages(out))} files written; read {out / 'README.md'} first")
 
 
+def compile() -> None:
+    """Compile the kernels of all environments now, for an image of a container or before workers begin.
+
+    They are kept in the folder NUMBA_CACHE_DIR. An engine with four legs, `identify` and `reproduce` have
+    more of their own.
+    """
+    from hoof_env.envs.kernels import compile_kernels
+
+    compile_kernels(_say)
+
+
 COMMANDS: dict[str, Callable[..., None]] = {
     "reproduce": reproduce,
     "identify": identify,
@@ -267,6 +278,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "play": play,
     "export": export,
     "manual": manual,
+    "compile": compile,
 }
 
 

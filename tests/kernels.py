@@ -4,11 +4,10 @@ Otherwise each of the tests' processes, which begin together, compiles them for 
 is compiled by the first test that wants it.
 """
 
-import gymnasium as gym
 import numpy as np
 
-import hoof_env  # noqa: F401  (registers the environments)
 from benchmarks.speed_cases import engine, scenes
+from hoof_env.envs.kernels import compile_kernels
 from hoof_env.gait.parameters import load_gait
 from hoof_env.identify.candidate import encode
 from hoof_env.identify.objective import Objective
@@ -16,19 +15,6 @@ from hoof_env.leg.geometry import load_geometry
 from hoof_env.paper.reproduce import run_cycle
 
 PRESET = "first_fit"
-
-
-def environments():
-    """One and a batch, stepping and recording."""
-    for env_id in ("hoof_env/HorseLeg-v0", "hoof_env/HorseLegFixed-v0"):
-        env = gym.make(env_id).unwrapped
-        env.reset(seed=0)
-        for _ in range(2):
-            env.step(np.zeros(4, np.float32))
-            env.record()  # from the second step on
-    envs = gym.make_vec("hoof_env/HorseLeg-v0", num_envs=9)
-    envs.reset(seed=0)
-    envs.step(np.zeros((9, 4), np.float32))
 
 
 def horse():
@@ -44,7 +30,7 @@ def search():
 
 
 if __name__ == "__main__":
-    environments()
+    compile_kernels(print)
     search()
     run_cycle("run", "paper")
     horse()

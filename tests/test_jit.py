@@ -13,10 +13,12 @@ import hoof_env
 
 PACKAGE = Path(hoof_env.__file__).parent
 
-IMPORT = """
+CALL = """
 from hoof_env.errors import OutputError
+import hoof_env.envs.manual  # no folder is needed before something is compiled
+from hoof_env.ground.contact import Ground, new_contacts, touch
 try:
-    import hoof_env.leg.kinematics
+    touch(new_contacts()[0], -0.04j, 0j, Ground().to_record())
 except OutputError as error:
     print(error)
 """
@@ -53,7 +55,7 @@ def python(code, cwd, **environment):
 def test_a_cache_folder_that_cannot_be_is_named_with_the_remedy(tmp_path):
     (tmp_path / "file").write_text("")
     folder = str(tmp_path / "file" / "cache")
-    result = python(IMPORT, PACKAGE.parent, NUMBA_CACHE_DIR=folder)
+    result = python(CALL, PACKAGE.parent, NUMBA_CACHE_DIR=folder)
     assert result.returncode == 0, result.stderr
     assert result.stdout.startswith(f"cannot keep compiled kernels in {folder!r} (")
     assert "expected a writable folder: set the environment variable NUMBA_CACHE_DIR to one" in result.stdout
@@ -69,8 +71,8 @@ def test_without_compilation_the_reason_is_named():
 )
 def test_a_cache_folder_without_permission(tmp_path):
     tmp_path.chmod(0o500)
-    result = python("import hoof_env.leg.kinematics", PACKAGE.parent, NUMBA_CACHE_DIR=str(tmp_path))
-    assert "OutputError: cannot keep compiled kernels in" in result.stderr
+    result = python(CALL, PACKAGE.parent, NUMBA_CACHE_DIR=str(tmp_path))
+    assert "cannot keep compiled kernels in" in result.stdout
 
 
 def test_kernels_are_kept_and_made_anew_when_a_kernel_they_call_changes(tmp_path):

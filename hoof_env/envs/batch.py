@@ -130,6 +130,7 @@ class EpisodeBatch:
         self.seen = np.zeros((columns, len(self.names)), np.float32)
         self._task = self._task_record()
         self._open()
+        self._compile()
 
     def _physics(self, changes: Mapping[str, float]) -> tuple[Trunk, Ground, Drive]:
         """Trunk, ground and drive with some settings changed."""
@@ -161,6 +162,18 @@ class EpisodeBatch:
         arrays = (*self.engine.arrays, self.episode, self._task, self.actions, self.seen)
         slots = [[a.ctypes.data, *a.shape, *[0] * (3 - a.ndim)] for a in arrays]
         self.desk = np.array(slots, np.int64).ravel()
+
+    def _compile(self) -> None:
+        """Have every kernel of a step compiled, or loaded, by running it on no environment: what a parent
+        makes warms the cache for its workers."""
+        nobody, gait = self.desk.copy(), GaitParameters.from_array(MIDDLE)
+        nobody[2] = 0  # columns
+        for run in (e.take_one, e.judge_one) if self.paper else (self.kernel,):
+            run(nobody)
+        if self.paper:
+            self.paper.compile(gait)
+        self._look(nobody)
+        self.engine.reset(gait, envs=[])
 
     def _step_paper(self, desk: NDArray[np.int64]) -> int:
         """As `episode.step_one`, with the paper's solver."""

@@ -6,6 +6,7 @@ the same for both. One environment after the other, some ten thousand times slow
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -75,6 +76,14 @@ class PaperSolver:
         self._accounts: Records = np.zeros(len(self.legs), ACCOUNT)
         self._accounts["threshold"] = LIFT_OFF * engine.weight
 
+    def compile(self, gait: GaitParameters) -> None:
+        """Have all kernels compiled, or loaded, by a step of a leg that is thrown away."""
+        leg = copy.deepcopy(self.legs[0])
+        trace = leg.reset(gait)
+        leg.advance(gait.to_array(), trace)
+        take_account(self._accounts[0].copy(), trace, leg.sim_dt, 0.0, True)
+        record_of(trace, leg.state.filters)
+
     def start(self, envs: Sequence[int], gaits: Floats, crank_angle: Floats, x: Floats) -> None:
         """Start some environments; arguments as of `Starts`."""
         for k, env in enumerate(envs):
@@ -91,7 +100,7 @@ class PaperSolver:
         for env, leg in enumerate(self.legs):
             trace = new_trace(self.substeps)
             kept, self.traces[env] = leg.state.copy(), self.traces[env][-1:]
-            result = leg.advance(memory.command[0, :, env], trace)
+            result = leg.advance(memory.command[0, :, env].copy(), trace)  # not strided, as alone
             self.apart[env] = result is Result.OK and np.abs(leg.closure().error).max() > APART
             if self.apart[env]:
                 result, leg.state = Result.NOT_FINITE, kept

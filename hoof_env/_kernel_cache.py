@@ -1,0 +1,169 @@
+"""Where a compiled kernel is kept, and how processes that need the same one share the work.
+
+numba keeps what it compiles in files, but processes that begin together, as the workers of a learner do, each
+compile it for themselves. Here one compiles, under a lock beside the kernel's files, and the others wait and
+then load. Everything that leans on numba's private names is in this module.
+"""
+
+from __future__ import annotations
+
+import gc
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numba.core.caching
+import numba.core.config
+from numba.core.compiler_lock import global_compiler_lock
+
+from hoof_env.errors import OutputError
+
+MECHANICS = ("_lanes", "leg", "ground", "gait", "dynamics", "identify")
+"""The rooms whose sources end up in kernels."""
+
+LONGEST_WAIT = 600.0
+"""Seconds to wait for another process, which may be stopped; then the kernel is compiled here."""
+
+COMPILED: list[str] = []
+"""Names of the kernels that this process has compiled."""
+
+_caching: Any = numba.core.caching
+_config: Any = numba.core.config
+_Given: Any = getattr(_caching, "UserProvidedCacheLocator", None) or _caching._UserProvidedCacheLocator
+
+
+def given_folder() -> str:
+    """What NUMBA_CACHE_DIR was when numba was imported, or nothing."""
+    return str(_config.CACHE_DIR)
+
+
+class _GivenFolder(_Given):
+    """The folder named by NUMBA_CACHE_DIR, from which kernels are loaded even where nothing can be written,
+    as in an image of a container. numba would pass over such a folder in silence."""
+
+    def ensure_cache_path(self) -> None:
+        pass
+
+
+class _FilesInGivenFolder(_caching.CompileResultCacheImpl):
+    _locator_classes: ClassVar[list[Any]] = [_GivenFolder]
+
+
+class KernelCache(_caching.FunctionCache):
+    """The files of one kernel.
+
+    Args:
+        function: the kernel.
+        say: takes a line about what is waited for.
+
+    Raises:
+        OutputError: NUMBA_CACHE_DIR is not set, and no folder that numba tries is writable.
+    """
+
+    def __init__(self, function: Callable[..., Any], say: Callable[[str], None]) -> None:
+        if given_folder():
+            self._impl_class = _FilesInGivenFolder
+        try:
+            super().__init__(function)
+        except (RuntimeError, OSError) as error:
+            raise _no_folder(os.path.dirname(function.__code__.co_filename), error) from None
+        # numba looks for changes in the file of a kernel alone, but a kernel contains those that it calls
+        self._cache_file._source_stamp = (self._cache_file._source_stamp, _sources())
+        self._say, self._kernel = say, function.__name__
+        self._lock: Any = None
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """As numba's; where there is nothing to load, it returns once this process may compile.
+
+        Raises:
+            OutputError: nothing can be written to the cache folder.
+        """
+        found = self._load(sig, target_context)
+        if found is None:
+            try:
+                os.makedirs(self.cache_path, exist_ok=True)
+                tempfile.TemporaryFile(dir=self.cache_path).close()
+            except OSError as error:
+                raise _no_folder(given_folder() or self.cache_path, error) from None
+            if self._take_lock():
+                found = self._load(sig, target_context)
+        return found
+
+    def _load(self, sig: Any, target_context: Any) -> Any:
+        with suppress(OSError):  # no such folder
+            return super().load_overload(sig, target_context)
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """As numba's."""
+        COMPILED.append(self._kernel)
+        super().save_overload(sig, data)
+
+    def _take_lock(self) -> bool:
+        """Wait until no other process compiles this kernel; False where files cannot be locked."""
+        from filelock import FileLock, Timeout
+
+        lock = FileLock(os.path.join(self.cache_path, f"{self._impl.filename_base}.lock"))
+        try:
+            try:
+                lock.acquire(timeout=1.0)
+            except Timeout:
+                self._say(f"waiting for another process, which compiles {self._kernel} ...")
+                lock.acquire(timeout=LONGEST_WAIT)
+        except Timeout:
+            self._say(f"waited {LONGEST_WAIT:.0f} s for {self._kernel}: compiling it here, too")
+            return False
+        except (OSError, NotImplementedError):
+            return False
+        self._lock = lock
+        return True
+
+    def release(self) -> None:
+        """Let other processes have the kernel, whether or not it could be compiled."""
+        if self._lock is not None:
+            self._lock.release()
+            self._lock = None
+
+
+def keep(dispatcher: Any, say: Callable[[str], None]) -> None:
+    """Have numba's `dispatcher` keep what it compiles in files, one process at a time compiling a kernel; no
+    folder is looked for before it compiles."""
+    compile_now, files = dispatcher.compile, None
+
+    def compile_once(signature: Any) -> Any:
+        nonlocal files
+        with global_compiler_lock:  # numba's, of threads; a kernel compiles those that it calls
+            if files is None:
+                files = dispatcher._cache = KernelCache(dispatcher.py_func, say)
+            collects = gc.isenabled()
+            gc.disable()  # it would take a seventh of the time to find nothing
+            try:
+                return compile_now(signature)
+            finally:
+                files.release()
+                if collects:
+                    gc.enable()
+
+    dispatcher.compile = compile_once
+
+
+def _no_folder(folder: str, error: Exception) -> OutputError:
+    return OutputError(
+        f"cannot keep compiled kernels in {folder!r} ({error}); expected a writable folder: "
+        "set the environment variable NUMBA_CACHE_DIR to one"
+    )
+
+
+@cache
+def _sources() -> str:
+    """Digest of everything that kernels are made from."""
+    here = Path(__file__).parent
+    digest = hashlib.sha256()
+    rooms = (path for room in MECHANICS for path in (here / room).glob("*.py"))
+    for path in sorted((*rooms, *here.glob("_*.py"))):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()

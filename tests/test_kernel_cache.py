@@ -1,0 +1,263 @@
+"""Compiled kernels among processes: one compiles, others wait; folders without write access or locks."""
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+from pathlib import Path
+
+import pytest
+
+import hoof_env
+
+ROOT = Path(hoof_env.__file__).parents[1]
+
+MODULE = """
+import os, sys, time
+from hoof_env._jit import kernel
+from hoof_env._kernel_cache import COMPILED
+from hoof_env._memory import intrinsic
+from pathlib import Path
+
+HERE = Path(__file__).parent
+
+@intrinsic
+def same(context, x):
+    (HERE / "began").touch()
+    while not (HERE / "go").exists():
+        time.sleep(0.05)
+    return x(x), lambda context, builder, signature, values: values[0]
+
+@kernel
+def inner(x):
+    return same(x) + 1.0
+
+@kernel
+def tiny(x):
+    return 2.0 * inner(x)
+
+@kernel
+def wrong(x):
+    return x.nothing
+"""
+
+CALL = "import tiny; print(tiny.tiny(3.0), tiny.COMPILED)"
+
+
+@pytest.fixture
+def start(tmp_path):
+    """Starts a process that has tiny kernels, whose compilation ends once the file `go` is there."""
+    (tmp_path / "tiny.py").write_text(MODULE)
+    processes = []
+
+    def begin(code=CALL, **environment):
+        settings = {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": f"{ROOT}{os.pathsep}{tmp_path}"}
+        process = subprocess.Popen(
+            [sys.executable, "-c", textwrap.dedent(code)],
+            env={**os.environ, "HOOF_ENV_QUIET": "0", **settings, **environment},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        processes.append(process)
+        return process
+
+    yield begin
+    for process in processes:
+        process.kill()
+        process.communicate()
+
+
+def ended(process):
+    out, said = process.communicate(timeout=120)
+    assert process.returncode == 0, said
+    return out.strip(), said
+
+
+def until(condition, process):
+    limit = time.monotonic() + 120
+    while not condition():
+        assert process.poll() is None, process.stderr.read()
+        assert time.monotonic() < limit
+        time.sleep(0.05)
+
+
+def holder_and_waiter(start, tmp_path):
+    """A process that compiles and one that waits for it."""
+    first = start()
+    until((tmp_path / "began").exists, first)
+    second = start()
+    assert second.stderr.readline() == "hoof-env: waiting for another process, which compiles tiny ...\n"
+    (tmp_path / "go").touch()
+    return first, second
+
+
+def test_one_process_compiles_while_another_waits_and_loads(start, tmp_path):
+    first, second = holder_and_waiter(start, tmp_path)
+    assert ended(first)[0] == "8.0 ['inner', 'tiny']"
+    assert ended(second)[0] == "8.0 []"
+    assert ended(start())[0] == "8.0 []"
+
+
+def test_four_at_once_compile_each_kernel_once(start, tmp_path):
+    (tmp_path / "go").touch()
+    found = sorted(ended(process)[0] for process in [start(HOOF_ENV_QUIET="1") for _ in range(4)])
+    assert sum(line.count("tiny") for line in found) == sum(line.count("inner") for line in found) == 1
+    assert len(list((tmp_path / "cache").rglob("*.nbc"))) == 2
+
+
+@pytest.mark.skipif(os.name != "posix", reason="kills with SIGKILL")
+def test_a_process_that_is_killed_while_it_compiles_lets_go(start, tmp_path):
+    first = start()
+    until((tmp_path / "began").exists, first)
+    second = start()
+    assert "waiting for another process" in second.stderr.readline()
+    first.send_signal(signal.SIGKILL)
+    first.wait()
+    (tmp_path / "go").touch()
+    assert ended(second)[0] == "8.0 ['inner', 'tiny']"
+
+
+def test_what_cannot_be_compiled_lets_go(start, tmp_path):
+    (tmp_path / "go").touch()
+    out, _ = ended(
+        start("""
+            import tiny
+            from filelock import FileLock
+            from numba import TypingError
+            try:
+                tiny.wrong(1.0)
+            except TypingError:
+                for path in (tiny.HERE / "cache").rglob("*.lock"):
+                    FileLock(path).acquire(timeout=0)
+                    print(path.name.split("-")[0], "is free", tiny.COMPILED)
+        """)
+    )
+    assert out == "tiny.wrong is free []"
+
+
+def test_who_waits_too_long_compiles_too(start, tmp_path):
+    first = start()
+    until((tmp_path / "began").exists, first)
+    second = start("from hoof_env import _kernel_cache; _kernel_cache.LONGEST_WAIT = 0.2;" + CALL)
+    said = [second.stderr.readline() for _ in range(2)]
+    assert said[1] == "hoof-env: waited 0 s for tiny: compiling it here, too\n"
+    (tmp_path / "go").touch()
+    assert ended(first)[0] == "8.0 ['inner', 'tiny']"
+    assert ended(second)[0].startswith("8.0")
+
+
+def test_without_locks_it_compiles_all_the_same(start, tmp_path):
+    (tmp_path / "go").touch()
+    no_locks = """
+        import errno, filelock
+        def acquire(*args, **kwargs):
+            raise OSError(errno.ENOLCK, "no locks available")
+        filelock.FileLock.acquire = acquire
+    """
+    code = textwrap.dedent(no_locks) + CALL
+    assert ended(start(code))[0] == "8.0 ['inner', 'tiny']"
+    assert ended(start(code))[0] == "8.0 []"
+
+
+def test_threads_and_forked_children_do_not_lock_each_other_out(start, tmp_path):
+    (tmp_path / "go").touch()
+    code = """
+        import os, threading
+        import tiny
+        threads = [threading.Thread(target=tiny.tiny, args=(x,)) for x in (1.0, 2.0, 3)]
+        [thread.start() for thread in threads]
+        [thread.join() for thread in threads]
+        if hasattr(os, "fork"):
+            child = os.fork()
+            if child == 0:
+                os._exit(int(tiny.tiny(True) != 4.0))
+            assert os.waitpid(child, 0)[1] == 0
+        print(sorted(tiny.COMPILED))
+    """
+    assert ended(start(code))[0] == "['inner', 'inner', 'tiny', 'tiny']"
+
+
+READ_ONLY = """
+import tempfile
+def refuse(*args, **kwargs):
+    raise PermissionError("read-only")
+tempfile.TemporaryFile = refuse
+"""
+
+
+def test_kernels_are_loaded_from_a_folder_that_is_not_writable_and_nothing_else(start, tmp_path):
+    (tmp_path / "go").touch()
+    code = f"""
+from hoof_env.errors import OutputError
+import tiny
+{READ_ONLY}
+try:
+    print(tiny.tiny(3.0), tiny.COMPILED)
+except OutputError as error:
+    print(error)
+"""
+    cache = tmp_path / "cache"
+    assert ended(start(code))[0] == (
+        f"cannot keep compiled kernels in {str(cache)!r} (read-only); expected a writable folder: "
+        "set the environment variable NUMBA_CACHE_DIR to one"
+    )
+    ended(start())
+    assert ended(start(code))[0] == "8.0 []"
+
+
+def test_all_kernels_are_told_once_and_then_there_is_nothing_to_compile(start, tmp_path):
+    (tmp_path / "go").touch()
+    code = """
+        from hoof_env.envs import kernels
+        import tiny
+        kernels.CASES = {"two kernels": lambda: tiny.tiny(3.0)}
+        kernels.compile_kernels(print)
+    """
+    out, _ = ended(start(code))
+    first, second = out.splitlines()
+    assert first.startswith("two kernels: ")
+    assert first.endswith(" s for inner, tiny")
+    assert second == f"2 kernels compiled; they are in {tmp_path / 'cache'}"
+    assert ended(start(code))[0] == f"nothing to compile; they are in {tmp_path / 'cache'}"
+
+
+def test_an_environment_has_all_its_kernels_once_it_is_made(start):
+    """So that one in a parent process warms the cache for workers; what is compiled ahead is all there is."""
+    code = """
+        import numpy as np
+        from hoof_env._kernel_cache import KernelCache
+        from hoof_env.envs import kernels
+        from hoof_env.envs.horse_leg import HorseLegEnv
+        from hoof_env.envs.vector import HorseLegVectorEnv
+        wanted, load = [], KernelCache.load_overload
+        def watch(self, *args):
+            wanted.append(self._kernel)
+            return load(self, *args)
+        KernelCache.load_overload = watch
+        for make in kernels.CASES.values():
+            env = make()
+            print(len(wanted) > 0, end=" ")
+            wanted.clear()
+            env.reset(seed=0)
+            for _ in range(2):
+                env.step(env.action_space.sample())
+            env.set_state(env.get_state())
+            if isinstance(env, HorseLegEnv):
+                env.record()
+            print(wanted, end=" ")
+            wanted.clear()
+        for task in ("leg", "rail", "speed", "terrain", "fixed"):
+            for env in (HorseLegEnv(task=task, drive="motor"), HorseLegVectorEnv(9, task=task)):
+                env.reset(seed=0)
+                env.step(env.action_space.sample())
+        env = HorseLegVectorEnv(3, task="fixed", solver="paper")
+        env.reset(seed=0)
+        env.step(env.action_space.sample())
+        print(wanted)
+    """
+    # the folder of all tests: these kernels are large
+    shared = os.environ.get("NUMBA_CACHE_DIR", "")
+    assert ended(start(code, NUMBA_CACHE_DIR=shared))[0] == "True [] True [] True [] []"
