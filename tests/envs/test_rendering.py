@@ -22,7 +22,7 @@ from hoof_env.envs.render_instant import Instant, columns_of_engine, instants
 from hoof_env.envs.render_paint import Brush
 from hoof_env.envs.render_stance import Stances
 from hoof_env.envs.rendering import Renderer
-from hoof_env.errors import ParameterError
+from hoof_env.errors import HoofEnvError, ParameterError
 from hoof_env.gait.parameters import LIMITS, PARAMETERS, load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
@@ -378,6 +378,25 @@ def test_another_environment_may_quit_pygame(run, monkeypatch):
         one.add(run[1])
         one.frame()
     np.testing.assert_array_equal(picture.frame(), draw(*run[:2]))
+    window.close()
+
+
+def test_a_window_without_a_display_is_refused_not_drawn_unseen(run, monkeypatch):
+    """SDL falls back to a driver that shows nothing; only who asks for it gets it."""
+    monkeypatch.delenv("SDL_VIDEODRIVER", raising=False)
+    monkeypatch.setattr(pygame.display, "get_driver", lambda: "offscreen")
+    monkeypatch.setattr(pygame.display, "init", lambda: None)
+    window = renderer("human")
+    window.add(run[0])
+    with pytest.raises(HoofEnvError, match=r'a window needs a display.*render_mode="rgb_array".*xvfb-run'):
+        window.frame()
+    window.close()
+    monkeypatch.undo()
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    window = renderer("human")
+    window.add(run[0])
+    window.frame()
+    assert pygame.display.get_driver() == "dummy"
     window.close()
 
 
