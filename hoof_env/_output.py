@@ -6,7 +6,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from hoof_env.errors import OutputError
@@ -41,3 +41,25 @@ def check_folder(folder: Path) -> None:
     """Make `folder` if need be and raise `OutputError` unless files can be written there."""
     with staged(folder):
         pass
+
+
+@contextmanager
+def new_file(path: Path, overwrite: bool) -> Iterator[str]:
+    """Guards the making of a file; if the block fails, the folders that were made for it go again.
+
+    Yields:
+        What to add to a report: the folder that is made, or nothing.
+
+    Raises:
+        OutputError: there is a file already and `overwrite` is False.
+    """
+    if path.is_file() and not overwrite:
+        raise OutputError(f"{str(path)!r} exists already; name another file, or add --overwrite")
+    missing = [folder for folder in path.parents if not folder.exists()]
+    try:
+        yield f"; made the folder {path.parent}" if missing else ""
+    except BaseException:
+        for folder in missing:
+            with suppress(OSError):
+                folder.rmdir()
+        raise

@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Literal
 
+from hoof_env._version import __version__
 from hoof_env.errors import HoofEnvError
 
 
@@ -168,11 +169,12 @@ def render(
     slow: float = 1.0,
     fps: float = 50.0,
     size: tuple[int, int] = (960, 540),
+    overwrite: bool = False,
 ) -> None:
     """Film an episode of a policy (needs 'render' and 'video').
 
     Args:
-        out: the film; ends in .mp4 or .gif.
+        out: the film; ends in .mp4 or .gif. Its folder is made if need be.
         policy: a gait of the preset, idle, random, bang-bang, drag or airborne; four gait parameters as
             6.28,0.7,-0.2,-0.3; the .json of an open-loop gait, or open-loop for the best that the repository
             stores; or a trained model (a trusted one only: a model is code).
@@ -183,11 +185,14 @@ def render(
         slow: how many times slower than life the film plays.
         fps: frames a second.
         size: width and height [pixels].
+        overwrite: replace the file if there is one.
     """
+    from hoof_env._output import new_file
     from hoof_env.envs.render_clip import render_episode
 
-    count = render_episode(out, policy, id, args, seed, seconds, slow, fps, size)
-    _say(f"{out}: {count} frames, {count / fps:.1f} s")
+    with new_file(out, overwrite) as made:
+        count = render_episode(out, policy, id, args, seed, seconds, slow, fps, size)
+    _say(f"{out}: {count} frames, {count / fps:.1f} s, {_size(out)}{made}")
 
 
 def play(
@@ -218,21 +223,26 @@ def export(
     args: tuple[str, ...] = (),
     seed: int = 0,
     seconds: float | None = None,
+    overwrite: bool = False,
 ) -> None:
     """Write the ground reaction force of an episode at every substep, with its point of application.
 
     Args:
-        out: the file; ends in .csv, .parquet (needs 'export') or .mot, OpenSim's.
+        out: the file; ends in .csv, .parquet (needs 'export') or .mot, OpenSim's. Its folder is made if need
+            be.
         policy: as in `hoof-env render`.
         id: the environment.
         args: its arguments: key=value ..., or one JSON object.
         seed: of the episode and of "random".
         seconds: of the episode at most; its own end otherwise.
+        overwrite: replace the file if there is one.
     """
+    from hoof_env._output import new_file
     from hoof_env.export.files import export_episode
 
-    rows = export_episode(out, policy, id, args, seed, seconds)
-    _say(f"{out}: {rows} rows")
+    with new_file(out, overwrite) as made:
+        rows = export_episode(out, policy, id, args, seed, seconds)
+    _say(f"{out}: {rows} rows, {_size(out)}{made}")
 
 
 def trunks() -> None:
@@ -286,13 +296,25 @@ def _say(line: str) -> None:
     print(line, flush=True)
 
 
+def _size(path: Path) -> str:
+    size = path.stat().st_size
+    return f"{size / 1e6:.1f} MB" if size >= 1e5 else f"{size / 1e3:.1f} kB"
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one sub-command, by default the one on the command line; returns the exit code."""
+    given = sys.argv[1:] if arguments is None else list(arguments)
+    if given == ["--version"]:
+        _say(f"hoof-env {__version__}")
+        return 0
     try:
         import tyro
 
         tyro.extras.subcommand_cli_from_dict(
-            COMMANDS, prog="hoof-env", description="A horse's leg on the ground.", args=arguments
+            COMMANDS,
+            prog="hoof-env",
+            description="A horse's leg on the ground. --version prints the version.",
+            args=given,
         )
     except HoofEnvError as error:
         print(f"hoof-env: error: {error}", file=sys.stderr)

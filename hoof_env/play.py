@@ -6,7 +6,6 @@ it from pygame's event loop and shows what the renderer draws, with the keys and
 
 from __future__ import annotations
 
-import os
 from collections.abc import Collection, Sequence
 from typing import Any
 
@@ -137,7 +136,7 @@ def play(
 
     Raises:
         ParameterError: as `records.make_env`, or a value out of range.
-        HoofEnvError: no pygame, or no display.
+        HoofEnvError: no pygame, or no display (`rendering.open_window`).
     """
     check_number("slow", slow, low=0.1, high=100)
     check_number("seed", seed, low=0)
@@ -145,12 +144,12 @@ def play(
         import pygame
     except ImportError:
         raise HoofEnvError('playing needs pygame-ce: pip install "hoof-env[render]"') from None
-    from hoof_env.envs.rendering import new_renderer
+    from hoof_env.envs.rendering import new_renderer, open_window
 
     with records.make_env(env_id, parse_pairs("--args", arguments)) as env:
         game = Game(env, seed)
         renderer = new_renderer(records.setting(env), 1 / game.dt, size)
-        window = _open_window(pygame, (size[0], size[1] + _strip(size)), env_id)
+        window = open_window((size[0], size[1] + _strip(size)), f"hoof-env play: {env_id}")
         try:
             clock = pygame.time.Clock()
             ticks = 0
@@ -180,23 +179,6 @@ def play(
 
 def _strip(size: tuple[int, int]) -> int:
     return round(STRIP * min(size[0] / 960, size[1] / 540))
-
-
-def _open_window(pygame: Any, size: tuple[int, int], title: str) -> Any:
-    """A window, or one error: SDL falls back to a driver that shows nothing where there is no display."""
-    try:
-        pygame.display.init()
-        driver = pygame.display.get_driver()
-        if driver in ("dummy", "offscreen") and os.environ.get("SDL_VIDEODRIVER") != driver:
-            pygame.display.quit()
-            raise pygame.error("there is no display")
-        window = pygame.display.set_mode(size)
-    except pygame.error as error:
-        raise HoofEnvError(
-            f"playing needs a display, and none can be opened ({error}); `hoof-env render` films without one"
-        ) from None
-    pygame.display.set_caption(f"hoof-env play: {title}")
-    return window
 
 
 def _draw_strip(window: Any, renderer: Any, game: Game, size: tuple[int, int]) -> None:

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from hoof_env import cli
+from hoof_env import __version__, cli
 
 HOOF_ENV = [sys.executable, "-m", "hoof_env.cli"]
 
@@ -20,6 +20,18 @@ def test_help_lists_the_sub_commands():
     done = hoof_env("--help")
     assert done.returncode == 0
     assert all(name in done.stdout for name in cli.COMMANDS)
+
+
+@pytest.mark.parametrize("module", ["hoof_env", "hoof_env.cli"])
+def test_the_package_runs_as_the_command(module):
+    done = subprocess.run(
+        [sys.executable, "-m", module, "--version"], capture_output=True, text=True, timeout=300, check=False
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (
+        0,
+        f"hoof-env {__version__}\n",
+        "",
+    )
 
 
 def test_help_of_a_sub_command_explains_its_options(capsys):

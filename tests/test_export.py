@@ -215,6 +215,21 @@ def test_the_commands_play_the_gait_of_a_file_and_the_best_of_the_repository(tmp
     assert (tmp_path / "file.csv").read_bytes() == (tmp_path / "name.csv").read_bytes()
 
 
+def test_a_record_is_replaced_on_demand_only_and_its_folder_is_told(tmp_path, capsys):
+    out = tmp_path / "new" / "x.csv"
+    command = ["export", "--out", str(out), "--seconds", "0.1"]
+    assert cli.main(command) == 0
+    said = capsys.readouterr().out
+    assert said.startswith(f"{out}: 101 rows, ")
+    assert said.endswith(f" kB; made the folder {out.parent}\n")
+    first = out.read_bytes()
+    assert cli.main([*command, "--seed", "1"]) == 2
+    assert f"{str(out)!r} exists already" in capsys.readouterr().err
+    assert out.read_bytes() == first
+    assert cli.main([*command, "--seed", "1", "--overwrite"]) == 0
+    assert out.read_bytes() != first
+
+
 def test_open_loop_without_the_repository_is_one_line(tmp_path, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, "agents.open_loop", None)
     assert cli.main(["export", "--out", str(tmp_path / "x.csv"), "--policy", "open-loop"]) == 2

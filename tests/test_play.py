@@ -163,7 +163,7 @@ def test_a_machine_without_a_display_gets_one_line():
     assert done.returncode == 2
     errors = [line for line in done.stderr.splitlines() if line.startswith("hoof-env: error")]
     assert len(errors) == 1
-    assert "playing needs a display" in errors[0]
+    assert "a window needs a display" in errors[0]
     assert "Traceback" not in done.stderr
 
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import sys
+import time
 from collections.abc import Iterable, Iterator, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,6 +40,9 @@ FFMPEG: dict[str, dict[str, Any]] = {
 }  # fmt: skip
 """How ffmpeg writes each kind of film."""
 
+TELL_SECONDS = 5.0
+"""Time between two lines about how far a film is, where there is no bar [s]."""
+
 
 def check_film(path: Path, fps: float) -> None:
     """Raise unless a film of this kind and pace can be written here.
@@ -45,8 +51,6 @@ def check_film(path: Path, fps: float) -> None:
         ParameterError: a GIF whose frames are not whole hundredths of a second apart.
         HoofEnvError: a package is missing.
     """
-    from importlib.util import find_spec
-
     for name, package, extra in (
         ("pygame", "pygame-ce", "render"),
         ("imageio_ffmpeg", "imageio-ffmpeg", "video"),
@@ -154,17 +158,21 @@ def render_episode(
         found = records.find_policy(policy, env, env_id, seed)
         renderer = new_renderer(records.setting(env), fps, size)
         pictures = frames(renderer, records.episode(env, found, seed, seconds), fps, slow)
-        count = write_film(_with_progress(pictures, seconds * slow * fps + 1), path, fps)
+        count = write_film(_with_progress(pictures, round(seconds * slow * fps) + 1), path, fps)
     return count
 
 
-def _with_progress(pictures: Iterable[NDArray[np.uint8]], expected: float) -> Iterable[NDArray[np.uint8]]:
-    """The same, with a bar where there is a terminal and tqdm."""
-    try:
+def _with_progress(pictures: Iterable[NDArray[np.uint8]], most: int) -> Iterator[NDArray[np.uint8]]:
+    """The same, and how far it is, on stderr: a bar on a terminal that has tqdm, else a line now and then."""
+    if sys.stderr.isatty() and find_spec("tqdm"):
         from tqdm import tqdm
-    except ImportError:
-        return pictures
-    bar: Iterable[NDArray[np.uint8]] = tqdm(
-        pictures, total=round(expected), unit=" frames", leave=False, disable=None
-    )
-    return bar
+
+        yield from tqdm(pictures, total=most, unit=" frames", leave=False)
+        print("all frames are drawn; ffmpeg ends the file ...", file=sys.stderr)  # of a GIF it begins now
+        return
+    told = time.monotonic()
+    for count, picture in enumerate(pictures, 1):
+        yield picture
+        if time.monotonic() - told >= TELL_SECONDS:
+            told = time.monotonic()
+            print(f"{count} of {most} frames", file=sys.stderr, flush=True)

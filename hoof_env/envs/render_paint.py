@@ -21,6 +21,21 @@ Colour = tuple[int, int, int]
 Position = tuple[float, float]
 
 
+_fonts: dict[int, Any] = {}
+
+
+def _font(size: int) -> Any:
+    """The font that pygame brings along, the same everywhere; made anew after anybody's `pygame.quit()`."""
+    if not pygame.font.get_init():  # a font of before crashes pygame; pygame-ce refuses it
+        _fonts.clear()
+        pygame.font.init()
+    if not _fonts:
+        pygame.register_quit(_fonts.clear)
+    if size not in _fonts:
+        _fonts[size] = pygame.font.Font(None, size)
+    return _fonts[size]
+
+
 class Brush:
     """Lettering and smooth shapes for a picture of `size` pixels.
 
@@ -32,7 +47,6 @@ class Brush:
         self.unit = min(size[0] / 960, size[1] / 540)
         self._letters = lru_cache(maxsize=1024)(self._paint_letters)
         self._frame = pygame.Rect((0, 0), size)
-        self._fonts: dict[int, Any] = {}
 
     def write(
         self, canvas: Any, text: str, at: Position, size: int, colour: Colour, side: str = "midleft"
@@ -43,14 +57,8 @@ class Brush:
         canvas.blit(image, place, special_flags=pygame.BLEND_PREMULTIPLIED)
 
     def _paint_letters(self, text: str, size: int, colour: Colour) -> Any:
-        try:
-            image = self._fonts[size].render(text, True, colour)
-        except (KeyError, pygame.error):  # first use, or another environment has called pygame.quit()
-            pygame.font.init()
-            # pygame brings this font along, so it is the same everywhere; scaled down it is evenly spaced
-            self._fonts[size] = pygame.font.Font(None, round(size * self.unit * FINE))
-            image = self._fonts[size].render(text, True, colour)
-        image = image.premul_alpha()
+        image = _font(round(size * self.unit * FINE)).render(text, True, colour)
+        image = image.copy().premul_alpha()  # the copy: pygame (not pygame-ce) misreads rows with padding
         return pygame.transform.smoothscale(image, (image.get_width() // FINE, image.get_height() // FINE))
 
     def smooth(
@@ -79,6 +87,14 @@ class Brush:
         # opaque paint on transparent black is premultiplied by its alpha, and so is an average of it
         small = pygame.transform.smoothscale(fine, box.size)
         canvas.blit(small, box, special_flags=pygame.BLEND_PREMULTIPLIED)
+
+    def disc(self, canvas: Any, colour: Colour, at: Position, radius: float) -> None:
+        """Paint a smooth disc around a pixel."""
+
+        def paint(fine: Any, place: Callable[[complex], Position]) -> None:
+            pygame.draw.circle(fine, colour, place(complex(*at)), radius * FINE)
+
+        self.smooth(canvas, [complex(*at)], radius + 1, paint)
 
 
 def mix(one: Colour, two: Colour, part: float) -> Colour:

@@ -178,7 +178,7 @@ class Panel:
             self._brush.write(canvas, text, (self._inside.right, y), 20, INK, "midright")
 
     def _mark_actual(self, canvas: Any, x: float, y: float) -> None:
-        pygame.draw.aacircle(canvas, CRANK, (x, y), 5 * self._brush.unit)
+        self._brush.disc(canvas, CRANK, (x, y), 5 * self._brush.unit)
 
     def _mark_command(self, canvas: Any, x: float, y: float) -> None:
         unit = self._brush.unit
@@ -205,7 +205,7 @@ class Panel:
         if not seen:
             return
         for peak in seen:
-            pygame.draw.aacircle(canvas, FORCE, place(*peak), 4 * unit)
+            self._brush.disc(canvas, FORCE, place(*peak), 4 * unit)
         x, y = place(*seen[-1])
         if self.stances.opened is not None:  # the running peak, from touch-down on
             start, _ = place(max(self.stances.opened, now - SECONDS), 0.0)

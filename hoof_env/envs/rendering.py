@@ -7,6 +7,7 @@ number in the picture is read from `render_instant.Instant`s; it computes no mec
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from hoof_env.dynamics.trunk import ONE_LEG
 from hoof_env.envs.render_instant import Instant
 from hoof_env.envs.render_stance import Stances
-from hoof_env.errors import ParameterError, check_choice, check_number
+from hoof_env.errors import HoofEnvError, ParameterError, check_choice, check_number
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
 
@@ -128,7 +129,7 @@ class Renderer:
             picture and the call waits so that frames come at `fps`. A window that was closed stays closed.
 
         Raises:
-            ResetNeeded: there is none yet.
+            ResetNeeded: there is none yet. HoofEnvError: "human" where there is no display.
         """
         self._check_seen()
         if self.mode == "human":
@@ -165,11 +166,8 @@ class Renderer:
         if self._closed:
             return
         display = self._pygame.display
-        if not display.get_init():  # at the first frame, or after somebody else's pygame.quit()
-            display.init()
-        if display.get_surface() is None:
-            display.set_mode(self.size)
-            display.set_caption("hoof-env")
+        if display.get_surface() is None:  # at the first frame, or after somebody else's pygame.quit()
+            open_window(self.size, "hoof-env")
             self._window_open = True
         if any(event.type == self._pygame.QUIT for event in self._pygame.event.get()):
             self.close()
@@ -178,6 +176,33 @@ class Renderer:
         display.get_surface().blit(self._canvas, (0, 0))
         display.flip()
         self._clock.tick(self.fps)
+
+
+def open_window(size: tuple[int, int], title: str) -> Any:
+    """Open pygame's window; returns its surface.
+
+    Raises:
+        HoofEnvError: there is no display. SDL then draws where nobody sees it, which counts as a window only
+            if SDL_VIDEODRIVER asks for it.
+    """
+    import pygame
+
+    try:
+        pygame.display.init()
+        driver = pygame.display.get_driver()
+        if driver in ("dummy", "offscreen") and driver not in os.environ.get("SDL_VIDEODRIVER", "").split(
+            ","
+        ):
+            pygame.display.quit()
+            raise pygame.error("neither DISPLAY nor WAYLAND_DISPLAY leads to one")
+        window = pygame.display.set_mode(size)
+    except pygame.error as error:
+        raise HoofEnvError(
+            f"a window needs a display, and none can be opened ({error}); without one `hoof-env render` "
+            'films, render_mode="rgb_array" gives pictures, xvfb-run or SDL_VIDEODRIVER=dummy draw unseen'
+        ) from None
+    pygame.display.set_caption(title)
+    return window
 
 
 def new_renderer(here: Setting, fps: float, size: tuple[int, int] = (960, 540)) -> Renderer:

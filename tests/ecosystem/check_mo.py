@@ -66,3 +66,14 @@ def test_vector(mo_id):
             break
     assert rewards.shape == (2, 3)
     assert infos["episode"]["r"] == pytest.approx(total * (terminated | truncated)[:, None], rel=1e-4)
+
+
+def test_picture(mo_id):
+    """`render`, drawn by pygame, which MO-Gymnasium brings and which differs from pygame-ce: the letters of
+    "time" have gaps between them."""
+    env = mo_gymnasium.make(mo_id, render_mode="rgb_array")
+    env.reset(seed=0)
+    word = env.render()[28:52, 654:700]
+    inked = (word < 200).all(axis=2).any(axis=0).astype(int)
+    assert (np.diff(inked, prepend=0, append=0) > 0).sum() == 4
+    env.close()

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from hoof_env import cli
+from hoof_env.envs import render_clip
 from hoof_env.envs.render_clip import frames, write_film
 from hoof_env.envs.rendering import new_renderer
 from hoof_env.records import episode, find_policy, make_env, setting
@@ -40,7 +41,9 @@ def test_a_film_has_its_frames(name, options, count, tmp_path, capsys):
     film = iio.imread(out)
     assert film.shape == (count, 270, 480, 3)
     assert (film[0] != film[-1]).any()
-    assert f"{count} frames" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert f"{count} frames" in said
+    assert f"B; made the folder {out.parent}\n" in said
     assert [file.name for file in out.parent.iterdir()] == [name]
 
 
@@ -70,6 +73,38 @@ def test_a_failure_leaves_the_old_film_as_it_was(tmp_path):
         write_film(broken(), out, 50)
     assert out.read_bytes() == b"old"
     assert [file.name for file in tmp_path.iterdir()] == ["run.mp4"]
+
+
+def test_a_film_is_replaced_on_demand_only(tmp_path, capsys):
+    out = tmp_path / "run.mp4"
+    out.write_bytes(b"mine")
+    command = ["render", "--out", str(out), *SMALL, "--seconds", "0.1"]
+    assert cli.main(command) == 2
+    assert capsys.readouterr().err == (
+        f"hoof-env: error: {str(out)!r} exists already; name another file, or add --overwrite\n"
+    )
+    assert out.read_bytes() == b"mine"
+    assert cli.main([*command, "--overwrite"]) == 0
+    assert len(iio.imread(out)) == 6
+    assert "folder" not in capsys.readouterr().out
+
+
+def test_a_folder_made_for_a_film_that_fails_goes_again(tmp_path, capsys):
+    assert cli.main(["render", "--out", str(tmp_path / "a" / "b" / "x.mp4"), "--policy", "gallop"]) == 2
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("is_terminal", [False, True])
+def test_a_film_in_the_making_says_how_far_it_is(is_terminal, tmp_path, capsys, monkeypatch):
+    if is_terminal:
+        pytest.importorskip("tqdm")
+    monkeypatch.setattr(render_clip, "TELL_SECONDS", 0.0)
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: is_terminal)
+    command = ["render", "--out", str(tmp_path / "x.mp4"), *SMALL, "--seconds", "0.1"]
+    assert cli.main(command) == 0
+    said = capsys.readouterr()
+    assert ("/6 [" if is_terminal else "6 of 6 frames\n") in said.err
+    assert said.out.count("\n") == 1
 
 
 def _is_begun(folder):

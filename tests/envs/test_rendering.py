@@ -19,9 +19,10 @@ from hoof_env.dynamics.trunk_engine import TrunkEngine
 from hoof_env.envs.policies import make_policy
 from hoof_env.envs.render_ground import find_patches, footprint
 from hoof_env.envs.render_instant import Instant, columns_of_engine, instants
+from hoof_env.envs.render_paint import Brush
 from hoof_env.envs.render_stance import Stances
 from hoof_env.envs.rendering import Renderer
-from hoof_env.errors import ParameterError
+from hoof_env.errors import HoofEnvError, ParameterError
 from hoof_env.gait.parameters import LIMITS, PARAMETERS, load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
@@ -378,6 +379,66 @@ def test_another_environment_may_quit_pygame(run, monkeypatch):
         one.frame()
     np.testing.assert_array_equal(picture.frame(), draw(*run[:2]))
     window.close()
+
+
+def test_a_window_without_a_display_is_refused_not_drawn_unseen(run, monkeypatch):
+    """SDL falls back to a driver that shows nothing; only who asks for it gets it."""
+    monkeypatch.delenv("SDL_VIDEODRIVER", raising=False)
+    monkeypatch.setattr(pygame.display, "get_driver", lambda: "offscreen")
+    monkeypatch.setattr(pygame.display, "init", lambda: None)
+    window = renderer("human")
+    window.add(run[0])
+    with pytest.raises(HoofEnvError, match=r'a window needs a display.*render_mode="rgb_array".*xvfb-run'):
+        window.frame()
+    window.close()
+    monkeypatch.undo()
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    window = renderer("human")
+    window.add(run[0])
+    window.frame()
+    assert pygame.display.get_driver() == "dummy"
+    window.close()
+
+
+ONLY_CE = {
+    "": ("FRect", "Window", "Font", "Clock", "Event"),
+    "draw": ("aacircle", "flood_fill"),
+    "transform": ("box_blur", "gaussian_blur", "hsl", "invert", "pixelate", "solid_overlay"),
+    "display": ("get_desktop_refresh_rates", "is_vsync", "message_box", "set_window_position"),
+}
+"""What pygame-ce has and pygame, which `gymnasium[classic-control]` installs, lacks."""
+
+
+def test_nothing_is_drawn_with_what_only_pygame_ce_has(run, monkeypatch):
+    expected = draw(*run[:80], weight_n=856.0)
+    for module, names in ONLY_CE.items():
+        for name in names:
+            monkeypatch.delattr(getattr(pygame, module) if module else pygame, name, raising=False)
+    np.testing.assert_array_equal(draw(*run[:80], weight_n=856.0), expected)
+
+
+@pytest.mark.parametrize("text", ["forward speed", "1.23", "O"])
+def test_letters_are_finer_ones_scaled_down(text):
+    """`premul_alpha` of pygame, not of pygame-ce, takes the padding of a row of letters for pixels."""
+    letters = Brush((960, 540))._paint_letters(text, 21, VERMILION)
+    fine = pygame.font.Font(None, 42).render(text, True, VERMILION)
+    expected = pygame.Surface(fine.get_size(), pygame.SRCALPHA, 32)
+    alpha = pygame.surfarray.array_alpha(fine)
+    pygame.surfarray.pixels_alpha(expected)[:] = alpha
+    pygame.surfarray.pixels3d(expected)[:] = np.round(alpha[..., None] / 255 * VERMILION)
+    expected = pygame.transform.smoothscale(expected, letters.get_size())
+    for read in (pygame.surfarray.array3d, pygame.surfarray.array_alpha):
+        np.testing.assert_allclose(read(letters).astype(int), read(expected).astype(int), atol=2)
+
+
+@pytest.mark.parametrize("quit", [pygame.quit, pygame.font.quit, lambda: (pygame.quit(), pygame.font.init())])
+def test_letters_survive_whoever_quits_pygame(quit):
+    """A font of before crashes the whole process in pygame, and pygame-ce refuses it."""
+    canvas = pygame.Surface((200, 50), 0, 32)
+    brush = Brush((960, 540))
+    for text in ("one", "two"):
+        brush.write(canvas, text, (10, 10), 21, VERMILION, "topleft")
+        quit()
 
 
 def test_bad_input_is_named():
