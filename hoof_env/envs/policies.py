@@ -90,7 +90,11 @@ def make_policy(name: str, env: Any, seed: int = 0) -> Scripted:
         ParameterError: unknown name, a policy that stops the crank where no action stops it, or one that must
             see the crank angle where it is not observed.
     """
-    leg = env.unwrapped
+    leg: Any = getattr(env, "unwrapped", None)
+    if not hasattr(leg, "gaits"):
+        raise ParameterError(
+            f"env: expected an environment of this package, make_policy(name, env), got {env!r}"
+        )
     check_choice("policy", name, policy_names(env))
     if name in leg.gaits:
         action = leg.action_for(leg.gaits[name])

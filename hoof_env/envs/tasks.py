@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass, field, fields, replace
 from types import MappingProxyType
 from typing import Any
 
-from hoof_env.errors import UnknownArgumentError
+from hoof_env.errors import ParameterError, UnknownArgumentError
 from hoof_env.leg.geometry import DEFAULT_PRESET
 
 PRINTED_BETA = math.sqrt(2 * 15.0)
@@ -73,6 +73,37 @@ PER_EPISODE = (
 """Settings that `reset(options={"parameters": ...})` and `randomize` can change for an episode."""
 
 
+NEEDED: Mapping[str, tuple[str, tuple[str, ...]]] = MappingProxyType(
+    dict.fromkeys(("trunk_share", "trunk_stiffness", "trunk_damping"), ("trunk", ("suspended",)))
+    | {"trunk_drag": ("trunk", ("suspended", "rail")), "friction_slow": ("friction_law", ("ambrosio",))}
+    | dict.fromkeys(("motor_gain", "motor_torque", "motor_inertia"), ("drive", ("motor",)))
+    | dict.fromkeys(("baumgarte_alpha", "baumgarte_beta"), ("solver", ("paper",)))
+    | {"target_seconds": ("target_speed", ())}
+)
+"""Settings that have an effect only beside certain values of another one; () stands for any but None."""
+
+
+def check_effect(name: str, settings: Settings, within: str = "") -> None:
+    """Raise where a setting that somebody names has no effect beside the others.
+
+    Args:
+        name: of the setting.
+        settings: all of them.
+        within: the argument or option that names it, if it is no argument itself.
+
+    Raises:
+        ParameterError: it has none.
+    """
+    needed, values = NEEDED.get(name, ("", ()))
+    given = getattr(settings, needed, None)
+    if needed and (given not in values if values else given is None):
+        good = " or ".join(f"{needed}={value!r}" for value in values) or f"a {needed}"
+        named = f"{within}: {name!r}" if within else name
+        raise ParameterError(
+            f"{named}: expected {good} beside it, without which it has no effect, got {needed}={given!r}"
+        )
+
+
 @dataclass(frozen=True)
 class Task:
     """A task: `defaults` are its settings where they differ from those of `Settings`.
@@ -99,10 +130,11 @@ class Task:
         return f"hoof_env/{self.name}-v0"
 
     def settings(self, changes: Mapping[str, Any]) -> Settings:
-        """Its settings with some changed.
+        """Its settings with some changed; reward weights that are not named keep the task's values.
 
         Raises:
             UnknownArgumentError: an unknown setting.
+            ParameterError: one that has no effect beside the others.
         """
         known = [item.name for item in fields(Settings)]
         for name in changes:
@@ -110,7 +142,13 @@ class Task:
                 near = difflib.get_close_matches(name, known, 1)
                 hint = f"; did you mean {near[0]}?" if near else f" (known: {', '.join(known)})"
                 raise UnknownArgumentError(f"{self.id}: unexpected keyword argument {name!r}{hint}")
-        return replace(Settings(), **{**self.defaults, **changes})
+        weights, own = changes.get("reward_weights"), self.defaults.get("reward_weights", {})
+        if own and (weights is None or isinstance(weights, Mapping)):
+            changes = {**changes, "reward_weights": {**own, **(weights or {})}}
+        settings = replace(Settings(), **{**self.defaults, **changes})
+        for name in changes:
+            check_effect(name, settings)
+        return settings
 
 
 _SUSPENDED = (

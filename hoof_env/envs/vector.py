@@ -23,6 +23,7 @@ from hoof_env.dynamics.arguments import count
 from hoof_env.dynamics.trunk_model import LIFT_OFF
 from hoof_env.envs import episode as e
 from hoof_env.envs.batch import EpisodeBatch
+from hoof_env.envs.made import Made
 from hoof_env.envs.recording import Recording
 from hoof_env.envs.state import check_state, generator_of
 from hoof_env.envs.tasks import TASKS, to_json
@@ -33,7 +34,7 @@ from hoof_env.gait.parameters import PARAMETERS
 MOST_ENVS = 1_000_000
 
 
-class HorseLegVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]):
+class HorseLegVectorEnv(Made, VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]):
     """`num_envs` environments of a task, stepped together.
 
     Args:
