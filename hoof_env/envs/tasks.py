@@ -10,11 +10,14 @@ import difflib
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+
 from hoof_env.errors import ParameterError, UnknownArgumentError
-from hoof_env.leg.geometry import DEFAULT_PRESET
+from hoof_env.leg.geometry import DEFAULT_PRESET, Preset
 
 PRINTED_BETA = math.sqrt(2 * 15.0)
 """Baumgarte's beta as the paper's Table 1 prints it, sqrt(2 alpha) [1/s]; sqrt(2) alpha = 21.2 is probably
@@ -28,7 +31,7 @@ SOLVERS = ("exact", "paper")
 class Settings:
     """Everything that can be set, plain values that JSON can hold; `HorseLegEnv` says what they mean."""
 
-    preset: str = "first_fit"
+    preset: Preset = "first_fit"
     gait: str | None = None
     trunk: str = "suspended"
     hip_height: float | None = None
@@ -134,7 +137,7 @@ class Task:
 
         Raises:
             UnknownArgumentError: an unknown setting.
-            ParameterError: one that has no effect beside the others.
+            ParameterError: one is not the task's own and has no effect beside the others.
         """
         known = [item.name for item in fields(Settings)]
         for name in changes:
@@ -145,9 +148,14 @@ class Task:
         weights, own = changes.get("reward_weights"), self.defaults.get("reward_weights", {})
         if own and (weights is None or isinstance(weights, Mapping)):
             changes = {**changes, "reward_weights": {**own, **(weights or {})}}
-        settings = replace(Settings(), **{**self.defaults, **changes})
-        for name in changes:
-            check_effect(name, settings)
+        if isinstance(changes.get("preset"), (Path, Mapping)):  # as JSON holds it, and a copy
+            preset = changes["preset"]
+            changes = {**changes, "preset": str(preset) if isinstance(preset, Path) else _plain(preset)}
+        plain = replace(Settings(), **self.defaults)
+        settings = replace(plain, **changes)
+        for name, value in changes.items():
+            if not np.array_equal(_plain(value), _plain(getattr(plain, name))):  # else it asks for nothing
+                check_effect(name, settings)
         return settings
 
 
