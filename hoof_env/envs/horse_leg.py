@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Unpack
 
 import gymnasium as gym
 import numpy as np
@@ -15,6 +15,7 @@ from hoof_env.dynamics.trunk_engine import TrunkEngine
 from hoof_env.dynamics.trunk_model import LIFT_OFF
 from hoof_env.envs import episode as e
 from hoof_env.envs.batch import EpisodeBatch
+from hoof_env.envs.keywords import Keywords
 from hoof_env.envs.made import Made
 from hoof_env.envs.recording import Recording
 from hoof_env.envs.start import check_seed
@@ -52,7 +53,9 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": list(RENDER_MODES), "render_fps": 50}  # type: ignore[misc]
 
-    def __init__(self, *, task: str = "leg", render_mode: str | None = None, **settings: Any) -> None:
+    def __init__(
+        self, *, task: str = "leg", render_mode: str | None = None, **settings: Unpack[Keywords]
+    ) -> None:
         if render_mode is not None:
             check_choice("render_mode", render_mode, RENDER_MODES)
         self.task = TASKS[check_choice("task", task, TASKS)]
