@@ -32,12 +32,11 @@ from agents.command import parse_pairs, run
 from agents.evaluate import estimate
 from agents.open_loop_search import ROWS, TEST_SEED, Court, Episodes, decode, search
 from hoof_env._output import check_folder
-from hoof_env.envs.policies import STANDS_FOR, Scripted, open_loop_record, read_open_loop
+from hoof_env.envs.policies import GAITS as GAITS
+from hoof_env.envs.policies import load_open_loop as load_open_loop
+from hoof_env.envs.policies import stored as stored
 from hoof_env.errors import DataFileError, HoofEnvError, ParameterError, check_number
 from hoof_env.gait.parameters import PARAMETERS
-
-GAITS = Path(__file__).with_name("gaits")
-"""Gaits that come with the repository."""
 
 EPISODES = {"constant": 10_240, "clocked": 30_720}
 """Of a search, by family."""
@@ -201,39 +200,6 @@ def file_name(args: Args) -> str:
     asked = "" if args.objective == "return" else f"-{args.objective}-{args.speed:g}"
     asked += "" if args.weight_share is None else f"-share-{args.weight_share:g}"
     return f"{args.env_id.rpartition('/')[2]}-{args.family}{asked}.json"
-
-
-def load_open_loop(path_or_env_id: str | Path, env: Any = None) -> Scripted:
-    """The policy of a gait file; or, for the id of an environment, of the best gait that is stored.
-
-    Args:
-        path_or_env_id: path of a .json, or a registered id.
-        env: what it is for, whose control step the clock then has; None for that of the file.
-
-    Raises:
-        DataFileError: there is none, it cannot be read, or it does not fit `env`.
-    """
-    path = Path(path_or_env_id)
-    if path.suffix != ".json":
-        name = STANDS_FOR.get(str(path_or_env_id), str(path_or_env_id)).rpartition("/")[2]
-        files = [file for family in EPISODES if (file := GAITS / f"{name}-{family}.json").is_file()]
-        if not files:
-            known = ", ".join(sorted(file.name for file in GAITS.glob("*.json"))) or "none"
-            raise DataFileError(f"open-loop gait of {name}: expected one of those in {GAITS.name}/: {known}")
-        path = max(files, key=lambda file: stored(file)["score"]["mean"]["return"])
-    return read_open_loop(path, env)
-
-
-def stored(path: Path) -> dict[str, Any]:
-    """What a gait file holds.
-
-    Raises:
-        DataFileError: it is none.
-    """
-    found = open_loop_record(path)
-    if "score" not in found:
-        raise DataFileError(f"{path}: expected the JSON object of agents.open_loop with its score")
-    return found
 
 
 def main(argv: list[str] | None = None) -> None:

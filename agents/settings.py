@@ -4,22 +4,16 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Mapping
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import yaml
 
-from hoof_env.errors import DataFileError, ParameterError, check_choice
+from hoof_env.errors import DataFileError
+from hoof_env.plain_policy import ALGORITHMS as ALGORITHMS
+from hoof_env.plain_policy import algorithm_class as algorithm_class
 
-ALGORITHMS = {
-    "ppo": "stable_baselines3",
-    "sac": "stable_baselines3",
-    "td3": "stable_baselines3",
-    "tqc": "sb3_contrib",
-}
-"""Where each algorithm lives; each has its file in `FOLDER`."""
 FOLDER = Path(__file__).parent / "hyperparams"
 COUNTED = ("n_epochs", "n_steps", "batch_size", "buffer_size", "policy_delay")
 """Keys that hold whole numbers of 1 or more; not all are looked at before they are used."""
@@ -29,21 +23,6 @@ NORMALIZE = {"training": bool, "norm_obs": bool, "norm_reward": bool} | dict.fro
 """What the key `normalize` may hold: arguments of `VecNormalize` and their kinds."""
 SCHEDULED = ("learning_rate", "clip_range", "clip_range_vf")
 """Keys that may hold `lin_<x>`: falling linearly from x to zero over the training."""
-
-
-def algorithm_class(name: str) -> Any:
-    """The class of an algorithm of `ALGORITHMS`.
-
-    Raises:
-        ParameterError: another name, or its library is not installed.
-    """
-    module = ALGORITHMS[check_choice("algo", name, ALGORITHMS)]
-    try:
-        return getattr(import_module(module), name.upper())
-    except ModuleNotFoundError as error:
-        raise ParameterError(
-            f"algo {name}: expected {module} to be installed (pip install 'hoof-env[train]'): {error}"
-        ) from None
 
 
 def load_settings(path: Path, env_id: str) -> dict[str, Any]:

@@ -7,7 +7,7 @@ The best of an id is that with the highest mean return in episodes on which noth
 agents/policies/NAME is written whole or not at all:
 
     policy.onnx         the policy, as agents.export writes it; agents.evaluate and hoof-env render play it
-    policy.safetensors  the weights, with policy.json, for Stable-Baselines3 (agents/safe.py)
+    policy.safetensors  the weights, with policy.json, for Stable-Baselines3 (hoof_env/plain_policy.py)
     run.json, config.yml   how it was trained
     score.json          returns in fixed episodes beside those of gaits, and how far other machines may be off
     card.md, curve.png, film.gif   the model card and its pictures

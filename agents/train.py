@@ -26,10 +26,10 @@ import yaml
 
 from agents import checkpoints, runs
 from agents.command import parse_pairs, run
-from agents.safe import WEIGHTS
 from agents.settings import FOLDER, algorithm_class, load_settings, model_arguments, normalize_arguments
 from agents.watch import EndedError, check_divergence, diverged, make_watch, stop_on_signals
 from hoof_env.errors import HoofEnvError, OutputError, ParameterError, check_number
+from hoof_env.plain_policy import WEIGHTS
 
 
 @dataclass(frozen=True)

@@ -6,11 +6,41 @@ needed.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium as _gym
 
 from hoof_env._version import __version__
+
+if TYPE_CHECKING:
+    from hoof_env.dynamics.constrained import ConstrainedLeg as ConstrainedLeg
+    from hoof_env.dynamics.drive import Motor as Motor
+    from hoof_env.dynamics.drive import Prescribed as Prescribed
+    from hoof_env.dynamics.engine import LegEngine as LegEngine
+    from hoof_env.dynamics.limb import Limb as Limb
+    from hoof_env.dynamics.result import Result as Result
+    from hoof_env.dynamics.step_length import StepWarning as StepWarning
+    from hoof_env.dynamics.trunk import Trunk as Trunk
+    from hoof_env.dynamics.trunk_engine import TrunkEngine as TrunkEngine
+    from hoof_env.envs.horse_leg import HorseLegEnv as HorseLegEnv
+    from hoof_env.envs.multi_objective import HorseLegMOEnv as HorseLegMOEnv
+    from hoof_env.envs.policies import make_policy as make_policy
+    from hoof_env.envs.randomize import RandomizeParameters as RandomizeParameters
+    from hoof_env.envs.sb3 import Sb3VecEnv as Sb3VecEnv
+    from hoof_env.envs.vector import HorseLegVectorEnv as HorseLegVectorEnv
+    from hoof_env.errors import DataFileError as DataFileError
+    from hoof_env.errors import GeometryError as GeometryError
+    from hoof_env.errors import HoofEnvError as HoofEnvError
+    from hoof_env.errors import MissingExtraError as MissingExtraError
+    from hoof_env.errors import OutputError as OutputError
+    from hoof_env.errors import ParameterError as ParameterError
+    from hoof_env.gait.parameters import GaitParameters as GaitParameters
+    from hoof_env.gait.parameters import load_gait as load_gait
+    from hoof_env.ground.contact import Ground as Ground
+    from hoof_env.ground.terrain import Terrain as Terrain
+    from hoof_env.leg.geometry import Geometry as Geometry
+    from hoof_env.leg.geometry import load_geometry as load_geometry
+    from hoof_env.leg.geometry import read_preset as read_preset
 
 _PUBLIC = {
     "Geometry": "hoof_env.leg.geometry",
@@ -39,6 +69,8 @@ _PUBLIC = {
     "GeometryError": "hoof_env.errors",
     "DataFileError": "hoof_env.errors",
     "OutputError": "hoof_env.errors",
+    "MissingExtraError": "hoof_env.errors",
+    "read_preset": "hoof_env.leg.geometry",
 }
 
 __all__ = ["__version__", *_PUBLIC]
@@ -52,12 +84,35 @@ _TASKS = {
 }
 
 
-def __getattr__(name: str) -> Any:
-    if name in _PUBLIC:
+if not TYPE_CHECKING:  # else a type checker would believe in any name
+
+    def __getattr__(name: str) -> Any:
+        if name not in _PUBLIC:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         from importlib import import_module
 
-        return getattr(import_module(_PUBLIC[name]), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        try:
+            return getattr(import_module(_PUBLIC[name]), name)
+        except ModuleNotFoundError as error:
+            if name not in _EXTRAS:
+                raise
+            return _stand_in(name, _EXTRAS[name], error)
+
+
+_EXTRAS = {"Sb3VecEnv": "train"}
+
+
+def _stand_in(name: str, extra: str, error: ModuleNotFoundError) -> type:
+    """A class in the place of one whose library is missing: it can be listed and asked for, and its use says
+    what to install."""
+    from hoof_env.errors import MissingExtraError
+
+    message = f'hoof_env.{name} needs pip install "hoof-env[{extra}]" ({error})'
+
+    def refuse(*args: Any, **kwargs: Any) -> None:
+        raise MissingExtraError(message)
+
+    return type(name, (), {"__init__": refuse, "__doc__": message, "__module__": __name__})
 
 
 def __dir__() -> list[str]:

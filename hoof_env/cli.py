@@ -176,8 +176,8 @@ def render(
     Args:
         out: the film; ends in .mp4 or .gif. Its folder is made if need be.
         policy: a gait of the preset, idle, random, bang-bang, drag or airborne; four gait parameters as
-            6.28,0.7,-0.2,-0.3; the .json of an open-loop gait, or open-loop for the best that the repository
-            stores; or a trained model (a trusted one only: a model is code).
+            6.28,0.7,-0.2,-0.3; the .json of an open-loop gait, or open-loop for the best that the package
+            holds; or a trained model (a trusted one only: a model is code).
         id: the environment.
         args: its arguments: key=value ..., or one JSON object.
         seed: of the episode and of "random".

@@ -20,6 +20,14 @@ class UnknownArgumentError(ParameterError, TypeError):
     """A keyword that an environment does not take: a TypeError too, as of any Python function."""
 
 
+class FixedSettingError(ParameterError, AttributeError):
+    """An attribute that cannot be assigned: an AttributeError too, as of any read-only property."""
+
+
+class MissingExtraError(HoofEnvError, ImportError):
+    """A library that an extra of this package installs is not there."""
+
+
 class GeometryError(ParameterError):
     """The linkage cannot be assembled or cannot turn through a full revolution."""
 

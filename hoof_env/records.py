@@ -16,13 +16,14 @@ from numpy.typing import NDArray
 
 import hoof_env
 from hoof_env._output import check_folder
-from hoof_env.envs.policies import Scripted, make_policy, policy_names, read_open_loop
+from hoof_env.envs.policies import Scripted, load_open_loop, make_policy, policy_names, read_open_loop
 from hoof_env.envs.render_instant import UNITS, Columns, columns_of_engine
-from hoof_env.errors import DataFileError, OutputError, ParameterError, check_number
+from hoof_env.errors import MissingExtraError, OutputError, ParameterError, check_number
 from hoof_env.gait.parameters import PARAMETERS, GaitParameters
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
 from hoof_env.onnx_policy import OnnxPolicy
+from hoof_env.saved_policy import SavedModel
 
 NOT_RECORDED = ("swing_offset", "swing_sin", "swing_cos")
 """Fields of `Instant` that a record lacks: they are known at the end of a control step only."""
@@ -118,13 +119,14 @@ def find_policy(name: str, env: gym.Env[Any, Any], env_id: str, seed: int = 0) -
         name: as "run", as "6.28,0.7,-0.2,-0.3" (crank speed [rad/s], swing offset, sine and cosine
             coefficient [rad]), or the .zip or run folder of a model. A model is a pickle: it can run code.
             A policy's .onnx file, the folder of one that is shipped, or a gait's .json are data. "open-loop"
-            is the best gait that this project's repository stores for the id.
+            is the best gait that comes with this package for the id.
         env, env_id: what it is for.
         seed: of "random".
 
     Raises:
         ParameterError: unknown name, or gait parameters out of range.
-        DataFileError: a model that cannot be read or does not fit, or nothing here that reads it.
+        DataFileError: a model that cannot be read or does not fit.
+        MissingExtraError, HoofEnvError: the library that plays it is missing.
     """
     names = policy_names(env)
     if name in names:
@@ -133,8 +135,16 @@ def find_policy(name: str, env: gym.Env[Any, Any], env_id: str, seed: int = 0) -
         return read_open_loop(Path(name), env)
     if OnnxPolicy.stands_at(Path(name)):
         return OnnxPolicy(Path(name)).load(env, env_id)
-    if name == "open-loop" or name.endswith(".zip") or Path(name, "model.zip").is_file():
-        return _of_agents(name, env, env_id)
+    if name == "open-loop":
+        return load_open_loop(env_id, env)
+    if name.endswith(".zip") or Path(name, "model.zip").is_file():
+        saved = SavedModel.find(Path(name))
+        try:
+            return saved.load(env, env_id)
+        except ModuleNotFoundError as error:
+            raise MissingExtraError(
+                f'policy {name}: reading it needs pip install "hoof-env[train]" ({error})'
+            ) from None
     if len(numbers := name.split(",")) == len(PARAMETERS):
         try:
             gait = GaitParameters(*(float(number) for number in numbers))
@@ -149,23 +159,6 @@ def find_policy(name: str, env: gym.Env[Any, Any], env_id: str, seed: int = 0) -
         f"policy: expected a name ({', '.join(names)}, open-loop), four gait parameters as "
         f"6.28,0.7,-0.2,-0.3, or the path of a trained model or a gait's .json, got {name!r}"
     )
-
-
-def _of_agents(name: str, env: Any, env_id: str) -> Any:
-    """What only the repository can read: the best of its gaits for an id, or a trained model."""
-    try:
-        if name == "open-loop":
-            from agents.open_loop import load_open_loop
-
-            return load_open_loop(env_id, env)
-        from agents.runs import SavedModel
-
-        return SavedModel.find(Path(name)).load(env, env_id)
-    except ImportError as error:
-        raise DataFileError(
-            f"policy {name}: reading it needs the agents of this project's repository and "
-            f'pip install "hoof-env[train]" ({error})'
-        ) from None
 
 
 def episode(

@@ -208,7 +208,7 @@ def test_policies_by_name_and_by_four_numbers():
 
 
 def test_the_commands_play_the_gait_of_a_file_and_the_best_of_the_repository(tmp_path):
-    gait = "agents/gaits/HorseLeg-v0-clocked.json"
+    gait = "hoof_env/data/gaits/HorseLeg-v0-clocked.json"
     for name, policy in (("file", str(Path(__file__).parents[1] / gait)), ("name", "open-loop")):
         out = str(tmp_path / f"{name}.csv")
         assert cli.main(["export", "--out", out, "--policy", policy, "--seconds", "0.1"]) == 0
@@ -230,13 +230,24 @@ def test_a_record_is_replaced_on_demand_only_and_its_folder_is_told(tmp_path, ca
     assert out.read_bytes() != first
 
 
-def test_open_loop_without_the_repository_is_one_line(tmp_path, capsys, monkeypatch):
-    monkeypatch.setitem(sys.modules, "agents.open_loop", None)
-    assert cli.main(["export", "--out", str(tmp_path / "x.csv"), "--policy", "open-loop"]) == 2
-    said = capsys.readouterr().err
-    assert "policy open-loop: reading it needs the agents of this project's repository" in said
-    assert cli.main(["export", "--out", str(tmp_path / "x.csv"), "--policy", "gallop"]) == 2
-    assert ", open-loop)" in capsys.readouterr().err
+def test_a_trained_model_without_its_library_is_one_line(tmp_path, capsys, monkeypatch):
+    shipped = Path(__file__).parents[1] / "agents" / "policies" / "HorseLeg-v0"
+    run = tmp_path / "run"
+    run.mkdir()
+    for name in ("policy.json", "policy.safetensors", "run.json"):
+        (run / name).write_bytes((shipped / name).read_bytes())
+    (run / "model.zip").touch()  # beside which the plain data are read
+    command = ["export", "--out", str(tmp_path / "x.csv"), "--seconds", "0.1", "--policy"]
+    with monkeypatch.context() as without:
+        for library in ("stable_baselines3", "safetensors", "safetensors.torch"):
+            without.setitem(sys.modules, library, None)
+        assert cli.main([*command, str(run)]) == 2
+        said = capsys.readouterr().err
+        assert 'reading it needs pip install "hoof-env[train]"' in said
+        assert said.count("\n") == 1
+        assert cli.main([*command, "gallop"]) == 2
+        assert ", open-loop)" in capsys.readouterr().err
+    assert cli.main([*command, str(run)]) == 0
 
 
 def test_arguments_are_pairs_or_objects():

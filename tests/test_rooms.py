@@ -45,6 +45,28 @@ def test_a_room_imports_from_its_left(room):
     assert not wrong
 
 
+def everything_imported(path):
+    """Top-level modules that a module imports anywhere, also within functions, with the line."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from ((alias.name.split(".")[0], node.lineno) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            yield node.module.split(".")[0], node.lineno
+
+
+def test_nothing_imports_what_only_the_repository_has(tmp_path):
+    """Under those names a user has modules of somebody else."""
+    wrong = [
+        f"{path.relative_to(PACKAGE)}:{line} imports {name}"
+        for path in PACKAGE.rglob("*.py")
+        for name, line in everything_imported(path)
+        if name in {"agents", "benchmarks", "scripts", "tests"}
+    ]
+    assert not wrong
+    (tmp_path / "module.py").write_text("def f():\n    import agents.runs\n    from agents import runs\n")
+    assert list(everything_imported(tmp_path / "module.py")) == [("agents", 2), ("agents", 3)]
+
+
 def test_every_room_has_its_place():
     rooms = {path.name for path in PACKAGE.iterdir() if path.is_dir() and any(path.glob("*.py"))}
     assert rooms == set(RANK)

@@ -80,7 +80,7 @@ class EpisodeBatch:
             check_number(name, getattr(s, name), low=0.0, high=MOST_BAUMGARTE)
         for name in ("motor_gain", "motor_torque", "motor_inertia"):
             check_number(name, getattr(s, name), low=0.0, high=LARGEST)
-        self.randomize = {} if s.randomize is None else check_parameters("randomize", s.randomize, s.drive)
+        self.randomize = {} if s.randomize is None else check_parameters("randomize", s.randomize, s)
         self._terrain, self._found_good = make_terrain(s.terrain), ""
         if is_paper:
             check_paper(s)
@@ -199,7 +199,7 @@ class EpisodeBatch:
             ParameterError: an unknown option, or a value out of range.
         """
         s = self.settings
-        checked = check_options(options, self.gaits, self.engine.trunk, s.drive)
+        checked = check_options(options, self.gaits, self.engine.trunk, s)
         if self.paper and checked.get("parameters"):
             raise ParameterError(
                 f"options['parameters']: expected none with solver=\"paper\", got {checked['parameters']!r}"
@@ -323,7 +323,7 @@ class EpisodeBatch:
 
     def summary(self, env: int) -> dict[str, float]:
         """Figures of an episode, see `summary.summary_of`."""
-        return summary_of(self.episode[:, env].tolist())
+        return summary_of(self.episode[:, env].tolist(), self.dt)
 
     def failure(self, env: int) -> str:
         """Why an episode failed, for people."""
@@ -340,10 +340,24 @@ class EpisodeBatch:
         wanted = self._base + HALF_RANGE * np.clip(np.asarray(action, np.float64), -1.0, 1.0)
         return np.clip(wanted, LOW, HIGH)
 
-    def action_for(self, gaits: GaitParameters | Floats) -> NDArray[np.float32]:
+    def action_for(self, gaits: str | GaitParameters | Floats) -> NDArray[np.float32]:
         """The action that commands a gait, or gaits of shape (n, 4), to float32 precision; the nearest one if
-        it is out of reach."""
-        values = gaits.to_array() if isinstance(gaits, GaitParameters) else gaits
+        it is out of reach.
+
+        Raises:
+            ParameterError: neither a gait of the preset nor four parameters each.
+        """
+        if isinstance(gaits, str):
+            gaits = self.gaits[check_choice("gait", gaits, self.gaits)]
+        try:
+            values = gaits.to_array() if isinstance(gaits, GaitParameters) else np.asarray(gaits, np.float64)
+        except (TypeError, ValueError):
+            values = np.empty(0)
+        if values.shape[-1:] != (e.ACTIONS,) or not np.isfinite(values).all():
+            raise ParameterError(
+                f"gait: expected one of {', '.join(self.gaits)}, GaitParameters or an array of shape (4,) or "
+                f"(n, 4), got {gaits!r}"
+            )
         return np.clip((values - self._base) / HALF_RANGE, -1, 1).astype(np.float32)
 
     # State

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Unpack
 
 import gymnasium as gym
 import numpy as np
@@ -11,21 +11,26 @@ from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
+from hoof_env.dynamics.trunk_engine import TrunkEngine
 from hoof_env.dynamics.trunk_model import LIFT_OFF
 from hoof_env.envs import episode as e
 from hoof_env.envs.batch import EpisodeBatch
+from hoof_env.envs.keywords import Keywords
+from hoof_env.envs.made import Made
 from hoof_env.envs.recording import Recording
 from hoof_env.envs.start import check_seed
 from hoof_env.envs.state import check_state, generator_of
 from hoof_env.envs.tasks import TASKS, to_json
 from hoof_env.errors import ParameterError, check_choice
 from hoof_env.gait.parameters import PARAMETERS, GaitParameters
+from hoof_env.ground.terrain import Terrain
+from hoof_env.leg.geometry import Geometry
 
 RENDER_MODES = ("human", "rgb_array")
 _SHAPE, _SINGLE = (e.ACTIONS,), np.dtype(np.float32)
 
 
-class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
+class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     """A horse's leg: commands of its gait in, a trunk that moves, a ground reaction force that costs.
 
     Args:
@@ -48,7 +53,9 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": list(RENDER_MODES), "render_fps": 50}  # type: ignore[misc]
 
-    def __init__(self, *, task: str = "leg", render_mode: str | None = None, **settings: Any) -> None:
+    def __init__(
+        self, *, task: str = "leg", render_mode: str | None = None, **settings: Unpack[Keywords]
+    ) -> None:
         if render_mode is not None:
             check_choice("render_mode", render_mode, RENDER_MODES)
         self.task = TASKS[check_choice("task", task, TASKS)]
@@ -80,7 +87,7 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         return page_of(self.task.id)
 
     @property
-    def geometry(self) -> Any:
+    def geometry(self) -> Geometry:
         """The leg."""
         return self.batch.geometry
 
@@ -90,12 +97,12 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         return self.batch.gaits
 
     @property
-    def engine(self) -> Any:
-        """The mechanics, a `TrunkEngine`."""
+    def engine(self) -> TrunkEngine:
+        """The mechanics."""
         return self.batch.engine
 
     @property
-    def terrain(self) -> Any:
+    def terrain(self) -> Terrain:
         """What it stands on."""
         return self.batch.engine.terrain
 
@@ -118,9 +125,15 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         """Gait parameters that an action commands, shape (4,); the action is clipped to [-1, 1]."""
         return self.batch.command_of(action)
 
-    def action_for(self, gait: GaitParameters) -> NDArray[np.float32]:
-        """The action that commands the given gait, to float32 precision; the nearest one if it is out of
-        reach."""
+    def action_for(self, gait: str | GaitParameters | NDArray[np.float64]) -> NDArray[np.float32]:
+        """The action that commands a gait, to float32 precision; the nearest one if it is out of reach.
+
+        Args:
+            gait: the name of one of `gaits`, or its four parameters; as an array also many, shape (n, 4).
+
+        Raises:
+            ParameterError: an unknown name, or not four parameters.
+        """
         return self.batch.action_for(gait)
 
     def episode_summary(self) -> dict[str, float]:
@@ -192,7 +205,7 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
         Returns:
             Observation (float32), reward, terminated, truncated, and the reward's terms by name; at the end
-            of an episode also "episode_summary", and "failure" if it failed.
+            of an episode also "episode_summary", and "failure" if it failed. A step after the end warns.
 
         Raises:
             ParameterError: the action has a wrong shape or is not finite; nothing has happened then.
@@ -200,6 +213,7 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self._state != "running":
             self._refuse_closed("step")
             self._refuse_new("step")
+            self._warn_ended()
         if type(action) is np.ndarray and action.dtype is _SINGLE and action.shape == _SHAPE:
             self._action[:] = action
         else:
@@ -221,6 +235,8 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         if ended:
             failed = bool(self.batch.episode[e.ENDED, 0] == e.FAILED)
             truncated = not failed
+            if self._state == "running":
+                self._state = "ended"
             info["episode_summary"] = self.batch.summary(0)
             if failed:
                 info["failure"] = self.batch.failure(0)
@@ -228,6 +244,16 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             self._show()
         reward = progress + peak + energy + change + failure + support
         return self._seen.copy(), reward, failed, truncated, info
+
+    def _warn_ended(self) -> None:
+        """As Gymnasium's own environments do, once after each end."""
+        if self._state == "ended":
+            self._state = "warned"
+            gym.logger.warn(
+                "You are calling 'step()' even though this environment has already returned terminated = True"
+                " or truncated = True. You should always call 'reset()' once you receive either -- any"
+                " further steps are undefined behavior."
+            )
 
     def _take(self, action: Any) -> None:
         """Put an action where the kernel finds it."""
@@ -315,7 +341,8 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         check_state(state, self.task.id, to_json(self.settings))
         generator = generator_of(state["generator"])
         self.batch.set_state(state)
-        self.np_random, self._state = generator, "running"
+        self.np_random = generator
+        self._state = "ended" if self.batch.episode[e.ENDED, 0] else "running"
         if self._recording is not None:
             self._recording.forget()
         return self._seen.copy()

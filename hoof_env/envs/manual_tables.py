@@ -22,7 +22,10 @@ def _one_of(names: object) -> str:
 
 
 SETTINGS: Rows = {
-    "preset": ("", f"leg and gaits: {_one_of(preset_names())}, or a JSON file"),
+    "preset": (
+        "",
+        f"leg and gaits: {_one_of(preset_names())}, or [one's own](../own_leg.md): a mapping or a JSON file",
+    ),
     "gait": (
         "",
         "gait that actions are offsets to and episodes start in; None for neither",

@@ -37,8 +37,8 @@ Why the defaults are what they are: [environment.md](../environment.md).
 
 $actions
 
-${offsets}`env.unwrapped.action_for(gait)` is the action of a `GaitParameters`; `command_of(action)` are the
-four parameters of an action.
+${offsets}`env.unwrapped.action_for(gait)` is the action of a gait, by name or as `GaitParameters`;
+`command_of(action)` are the four parameters of an action.
 
 ## Observation Space
 
@@ -94,9 +94,10 @@ Terminated when$leaves the simulation stops being finite; `info["failure"]` says
 
 $figures
 
-`env.unwrapped.episode_summary()` has them at any time. Ask it where a wrapper ends episodes, as that of
-`gym.make(..., max_episode_steps=...)` does: the environment cannot know, so `info` lacks them. The vector
-environment takes that limit itself and has them.
+The limit in steps is `env.spec.max_episode_steps`. `env.unwrapped.episode_summary()` has the figures at any
+time. Ask it where a wrapper ends episodes, as that of `gym.make(..., max_episode_steps=...)` does, which can
+only shorten them: the environment cannot know, so `info` lacks the figures. The vector environment takes that
+limit itself and has them. A step after the end warns, once an episode; what it returns means nothing.
 
 ## Vector Environment
 
@@ -149,7 +150,9 @@ assert (one[0] == other[0]).all() and one[1] == other[1]
 
 ## Arguments
 
-Plain values that JSON can hold$bold.
+Plain values that JSON can hold$bold. One that has no effect beside the others, as `motor_gain` where no
+motor turns the crank, is refused unless it has its default. Nothing is set by assignment:
+`env.unwrapped.trunk_mass = 60` raises. An assignment to a wrapper goes no further than the wrapper.
 
 $settings
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NoReturn
+from typing import Any, NoReturn, Unpack
 
 import gymnasium as gym
 import numpy as np
@@ -11,6 +11,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from hoof_env.envs.horse_leg import HorseLegEnv
+from hoof_env.envs.keywords import Keywords
 
 OBJECTIVES = ("progress", "peak force", "energy")
 """What the entries of the vector reward stand for; more is better in each."""
@@ -83,8 +84,10 @@ class HorseLegMOEnv(HorseLegEnv):
     * v0: first version.
     """
 
-    def __init__(self, **kwargs: Any) -> None:
-        super().__init__(**kwargs)
+    def __init__(
+        self, *, task: str = "leg", render_mode: str | None = None, **settings: Unpack[Keywords]
+    ) -> None:
+        super().__init__(task=task, render_mode=render_mode, **settings)
         self.reward_space = spaces.Box(
             np.full(3, -np.inf, np.float32), np.array([np.inf, 0.0, 0.0], np.float32), (3,), np.float32
         )

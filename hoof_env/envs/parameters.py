@@ -10,7 +10,7 @@ import numpy as np
 
 from hoof_env.dynamics.drive import Drive, Motor, Prescribed
 from hoof_env.dynamics.trunk import Trunk
-from hoof_env.envs.tasks import PER_EPISODE, SOLVERS, Settings
+from hoof_env.envs.tasks import PER_EPISODE, SOLVERS, Settings, check_effect
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.preset import load_ground
@@ -84,20 +84,19 @@ def physics(settings: Settings, height: float, changes: Mapping[str, float]) -> 
     return trunk, ground, Motor(s.motor_gain, s.motor_torque, s.motor_inertia, 1.0)
 
 
-def check_parameters(name: str, given: Any, drive: str) -> dict[str, float | tuple[float, float]]:
+def check_parameters(name: str, given: Any, settings: Settings) -> dict[str, float | tuple[float, float]]:
     """Physical parameters of an episode: a number each, or two to draw between.
 
     Raises:
-        ParameterError: not a mapping, a parameter that cannot change or that the drive has not, or values
-            that are none.
+        ParameterError: not a mapping, a parameter that cannot change or has no effect beside the settings, or
+            values that are none.
     """
     if not isinstance(given, Mapping) or not set(given) <= set(PER_EPISODE):
         raise ParameterError(
             f"{name}: expected a mapping with some of {', '.join(PER_EPISODE)}, got {given!r}"
         )
     for key in given:
-        if key.startswith("motor_") and drive != "motor":
-            raise ParameterError(f"{name}: {key!r} is of drive='motor', got drive={drive!r}")
+        check_effect(key, settings, name)
     found: dict[str, float | tuple[float, float]] = {}
     for key, value in given.items():
         if isinstance(value, (list, tuple)):

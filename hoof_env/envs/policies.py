@@ -90,7 +90,11 @@ def make_policy(name: str, env: Any, seed: int = 0) -> Scripted:
         ParameterError: unknown name, a policy that stops the crank where no action stops it, or one that must
             see the crank angle where it is not observed.
     """
-    leg = env.unwrapped
+    leg: Any = getattr(env, "unwrapped", None)
+    if not hasattr(leg, "gaits"):
+        raise ParameterError(
+            f"env: expected an environment of this package, make_policy(name, env), got {env!r}"
+        )
     check_choice("policy", name, policy_names(env))
     if name in leg.gaits:
         action = leg.action_for(leg.gaits[name])
@@ -217,3 +221,42 @@ def read_open_loop(path: Path, env: Any = None) -> Scripted:
         if here and (there := found.get("env_id") or here) not in (here, STANDS_FOR.get(here)):
             warnings.warn(f"open-loop gait {path}: found for {there}, here {here}", stacklevel=2)
     return open_loop(given, dt)
+
+
+GAITS = Path(__file__).parents[1] / "data" / "gaits"
+"""Open-loop gaits that come with the package, as `agents.open_loop` found them."""
+
+FAMILIES = ("constant", "clocked")
+
+
+def load_open_loop(path_or_env_id: str | Path, env: Any = None) -> Scripted:
+    """The policy of a gait file; or, for the id of an environment, of the best gait that is stored.
+
+    Args:
+        path_or_env_id: path of a .json, or a registered id.
+        env: what it is for, whose control step the clock then has; None for that of the file.
+
+    Raises:
+        DataFileError: there is none, it cannot be read, or it does not fit `env`.
+    """
+    path = Path(path_or_env_id)
+    if path.suffix != ".json":
+        name = STANDS_FOR.get(str(path_or_env_id), str(path_or_env_id)).rpartition("/")[2]
+        files = [file for family in FAMILIES if (file := GAITS / f"{name}-{family}.json").is_file()]
+        if not files:
+            known = ", ".join(sorted(file.name for file in GAITS.glob("*.json"))) or "none"
+            raise DataFileError(f"open-loop gait of {name}: expected one of those in {GAITS.name}/: {known}")
+        path = max(files, key=lambda file: stored(file)["score"]["mean"]["return"])
+    return read_open_loop(path, env)
+
+
+def stored(path: Path) -> dict[str, Any]:
+    """What a gait file holds.
+
+    Raises:
+        DataFileError: it is none.
+    """
+    found = open_loop_record(path)
+    if "score" not in found:
+        raise DataFileError(f"{path}: expected the JSON object of agents.open_loop with its score")
+    return found

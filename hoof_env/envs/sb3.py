@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Unpack
 
 import gymnasium as gym
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
 from hoof_env.envs import episode as e
+from hoof_env.envs.keywords import VectorKeywords
 from hoof_env.envs.vector import HorseLegVectorEnv
 from hoof_env.errors import ParameterError
 
@@ -36,11 +37,13 @@ class Sb3VecEnv(VecEnv):
             bad argument.
     """
 
-    def __init__(self, env_id: str = "hoof_env/HorseLeg-v0", num_envs: int = 64, **settings: Any) -> None:
+    def __init__(
+        self, env_id: str = "hoof_env/HorseLeg-v0", num_envs: int = 64, **settings: Unpack[VectorKeywords]
+    ) -> None:
         settings.setdefault("autoreset_mode", AutoresetMode.SAME_STEP)
         try:
-            many: dict[str, Any] = {"num_envs": num_envs, "vectorization_mode": "vector_entry_point"}
-            envs = gym.make_vec(env_id, **many, **settings).unwrapped
+            many: dict[str, Any] = {"vectorization_mode": "vector_entry_point", **settings}
+            envs = gym.make_vec(env_id, num_envs, **many).unwrapped
         except ParameterError:
             raise
         except (gym.error.Error, ModuleNotFoundError, TypeError):  # nobody's, or somebody else's

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from hoof_env.dynamics.arguments import count
 from hoof_env.dynamics.trunk import Trunk
 from hoof_env.envs.parameters import check_parameters
+from hoof_env.envs.tasks import Settings
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait.parameters import GaitParameters, paper_gaits
 from hoof_env.ground.terrain import Terrain
@@ -126,7 +127,7 @@ def check_seed(seed: Any) -> int | None:
 
 
 def check_options(
-    options: Any, gaits: Mapping[str, GaitParameters], trunk: Trunk, drive: str
+    options: Any, gaits: Mapping[str, GaitParameters], trunk: Trunk, settings: Settings
 ) -> dict[str, Any]:
     """Reset options with their values checked and the gait as `GaitParameters`.
 
@@ -148,7 +149,7 @@ def check_options(
     if checked.get("gait") is not None:
         checked["gait"] = _gait(checked["gait"], gaits)
     if "parameters" in checked:
-        checked["parameters"] = check_parameters("options['parameters']", checked["parameters"], drive)
+        checked["parameters"] = check_parameters("options['parameters']", checked["parameters"], settings)
     return checked
 
 

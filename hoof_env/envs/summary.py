@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from hoof_env.envs import episode as e
 
 
-def summary_of(column: Sequence[float]) -> dict[str, float]:
-    """Figures of an episode from its column of `EpisodeBatch.episode`.
+def summary_of(column: Sequence[float], dt: float) -> dict[str, float]:
+    """Figures of an episode from its column of `EpisodeBatch.episode` and the control step [s].
 
     seconds, distance_m, speed_m_s, peak_grf_n (highest of the episode), mean_grf_n (normal force over the
     whole time), stance_peak_sum_n, stances, duty_factor, drive_work_j (braking is not recovered),
@@ -20,7 +20,7 @@ def summary_of(column: Sequence[float]) -> dict[str, float]:
     weight, time = column[e.WEIGHT], max(seconds, 1e-12)
     mean = impulse / time
     return {
-        "seconds": seconds,
+        "seconds": round(round(seconds / dt) * dt, 12),  # a sum of steps, each rounded, is 9.99..., not 10
         "distance_m": distance,
         "speed_m_s": distance / time,
         "peak_grf_n": highest,

@@ -10,11 +10,14 @@ import difflib
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from hoof_env.errors import UnknownArgumentError
-from hoof_env.leg.geometry import DEFAULT_PRESET
+import numpy as np
+
+from hoof_env.errors import ParameterError, UnknownArgumentError
+from hoof_env.leg.geometry import DEFAULT_PRESET, Preset
 
 PRINTED_BETA = math.sqrt(2 * 15.0)
 """Baumgarte's beta as the paper's Table 1 prints it, sqrt(2 alpha) [1/s]; sqrt(2) alpha = 21.2 is probably
@@ -28,7 +31,7 @@ SOLVERS = ("exact", "paper")
 class Settings:
     """Everything that can be set, plain values that JSON can hold; `HorseLegEnv` says what they mean."""
 
-    preset: str = "first_fit"
+    preset: Preset = "first_fit"
     gait: str | None = None
     trunk: str = "suspended"
     hip_height: float | None = None
@@ -73,6 +76,37 @@ PER_EPISODE = (
 """Settings that `reset(options={"parameters": ...})` and `randomize` can change for an episode."""
 
 
+NEEDED: Mapping[str, tuple[str, tuple[str, ...]]] = MappingProxyType(
+    dict.fromkeys(("trunk_share", "trunk_stiffness", "trunk_damping"), ("trunk", ("suspended",)))
+    | {"trunk_drag": ("trunk", ("suspended", "rail")), "friction_slow": ("friction_law", ("ambrosio",))}
+    | dict.fromkeys(("motor_gain", "motor_torque", "motor_inertia"), ("drive", ("motor",)))
+    | dict.fromkeys(("baumgarte_alpha", "baumgarte_beta"), ("solver", ("paper",)))
+    | {"target_seconds": ("target_speed", ())}
+)
+"""Settings that have an effect only beside certain values of another one; () stands for any but None."""
+
+
+def check_effect(name: str, settings: Settings, within: str = "") -> None:
+    """Raise where a setting that somebody names has no effect beside the others.
+
+    Args:
+        name: of the setting.
+        settings: all of them.
+        within: the argument or option that names it, if it is no argument itself.
+
+    Raises:
+        ParameterError: it has none.
+    """
+    needed, values = NEEDED.get(name, ("", ()))
+    given = getattr(settings, needed, None)
+    if needed and (given not in values if values else given is None):
+        good = " or ".join(f"{needed}={value!r}" for value in values) or f"a {needed}"
+        named = f"{within}: {name!r}" if within else name
+        raise ParameterError(
+            f"{named}: expected {good} beside it, without which it has no effect, got {needed}={given!r}"
+        )
+
+
 @dataclass(frozen=True)
 class Task:
     """A task: `defaults` are its settings where they differ from those of `Settings`.
@@ -99,10 +133,11 @@ class Task:
         return f"hoof_env/{self.name}-v0"
 
     def settings(self, changes: Mapping[str, Any]) -> Settings:
-        """Its settings with some changed.
+        """Its settings with some changed; reward weights that are not named keep the task's values.
 
         Raises:
             UnknownArgumentError: an unknown setting.
+            ParameterError: one is not the task's own and has no effect beside the others.
         """
         known = [item.name for item in fields(Settings)]
         for name in changes:
@@ -110,7 +145,18 @@ class Task:
                 near = difflib.get_close_matches(name, known, 1)
                 hint = f"; did you mean {near[0]}?" if near else f" (known: {', '.join(known)})"
                 raise UnknownArgumentError(f"{self.id}: unexpected keyword argument {name!r}{hint}")
-        return replace(Settings(), **{**self.defaults, **changes})
+        weights, own = changes.get("reward_weights"), self.defaults.get("reward_weights", {})
+        if own and (weights is None or isinstance(weights, Mapping)):
+            changes = {**changes, "reward_weights": {**own, **(weights or {})}}
+        if isinstance(changes.get("preset"), (Path, Mapping)):  # as JSON holds it, and a copy
+            preset = changes["preset"]
+            changes = {**changes, "preset": str(preset) if isinstance(preset, Path) else _plain(preset)}
+        plain = replace(Settings(), **self.defaults)
+        settings = replace(plain, **changes)
+        for name, value in changes.items():
+            if not np.array_equal(_plain(value), _plain(getattr(plain, name))):  # else it asks for nothing
+                check_effect(name, settings)
+        return settings
 
 
 _SUSPENDED = (

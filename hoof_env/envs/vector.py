@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Unpack
 
 import gymnasium as gym
 import numpy as np
@@ -23,6 +23,8 @@ from hoof_env.dynamics.arguments import count
 from hoof_env.dynamics.trunk_model import LIFT_OFF
 from hoof_env.envs import episode as e
 from hoof_env.envs.batch import EpisodeBatch
+from hoof_env.envs.keywords import Keywords
+from hoof_env.envs.made import Made
 from hoof_env.envs.recording import Recording
 from hoof_env.envs.state import check_state, generator_of
 from hoof_env.envs.tasks import TASKS, to_json
@@ -33,7 +35,7 @@ from hoof_env.gait.parameters import PARAMETERS
 MOST_ENVS = 1_000_000
 
 
-class HorseLegVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]):
+class HorseLegVectorEnv(Made, VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]):
     """`num_envs` environments of a task, stepped together.
 
     Args:
@@ -66,7 +68,7 @@ class HorseLegVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
         max_episode_steps: int | None = None,
         render_mode: str | None = None,
         rendered: int = 1,
-        **settings: Any,
+        **settings: Unpack[Keywords],
     ) -> None:
         self.num_envs = count("num_envs", num_envs, most=MOST_ENVS)
         self.autoreset_mode = mode_of(autoreset_mode)

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.errors import DataFileError, ParameterError, check_choice, check_number
-from hoof_env.leg.geometry import DEFAULT_PRESET, read_preset
+from hoof_env.errors import ParameterError, check_choice, check_number
+from hoof_env.leg.geometry import DEFAULT_PRESET, Preset, named, read_preset, wrong
 
 Gait = TypeVar("Gait")
 
@@ -76,30 +75,30 @@ PARAMETERS = tuple(item.name for item in fields(GaitParameters))
 """Names of the gait parameters, in the order used by actions and filters."""
 
 
-def gait_names(preset: str | Path = DEFAULT_PRESET) -> list[str]:
+def gait_names(preset: Preset = DEFAULT_PRESET) -> list[str]:
     """Names of the gaits in a preset: the paper's walk and run, and what was found for that leg beside them.
 
     Raises:
-        ParameterError: unknown preset name.
-        DataFileError: the file lacks the part.
+        ParameterError: unknown preset name, or content that lacks the part.
+        DataFileError: a file lacks it.
     """
     return sorted(_read_gaits(preset))
 
 
-def load_gait(name: str, preset: str | Path = DEFAULT_PRESET) -> GaitParameters:
-    """A gait of a preset file.
+def load_gait(name: str, preset: Preset = DEFAULT_PRESET) -> GaitParameters:
+    """A gait of a preset by name, of a file by path, or of such a file's content.
 
     Raises:
-        ParameterError: unknown preset or gait name, or a value outside its limits.
-        DataFileError: the file lacks the part.
+        ParameterError: unknown preset or gait name, a value outside its limits, or content that lacks a part.
+        DataFileError: a file lacks it.
     """
     gaits = _read_gaits(preset)
     check_choice("gait", name, gaits)
     try:
         return GaitParameters(**gaits[name])
     except TypeError as error:
-        raise DataFileError(
-            f"preset {preset}, gait {name!r}: expected {', '.join(PARAMETERS)}: {error}"
+        raise wrong(preset)(
+            f"{named(preset)}, gait {name!r}: expected {', '.join(PARAMETERS)}: {error}"
         ) from None
 
 
@@ -112,10 +111,10 @@ def paper_gaits(gaits: Mapping[str, Gait]) -> dict[str, Gait]:
     return {name: gaits[name] for name in names}
 
 
-def _read_gaits(preset: str | Path) -> dict[str, Any]:
+def _read_gaits(preset: Preset) -> dict[str, Any]:
     gaits = read_preset(preset).get("gaits")
-    if not isinstance(gaits, dict) or not gaits:
-        raise DataFileError(
-            f"preset {preset}: expected an object 'gaits' with at least one gait, got {gaits!r}"
+    if not isinstance(gaits, Mapping) or not gaits:
+        raise wrong(preset)(
+            f"{named(preset)}: expected an object 'gaits' with at least one gait, got {gaits!r}"
         )
-    return gaits
+    return dict(gaits)

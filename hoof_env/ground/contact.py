@@ -59,7 +59,8 @@ class Ground:
             sample inside, as a loop with a fixed step does.
         friction_law: one of `FRICTION_LAWS`.
         friction: mu_k [-]; the paper's 0.4.
-        friction_slow, friction_fast: threshold speeds of the friction law [m/s], assumed (not in the paper).
+        friction_slow, friction_fast: threshold speeds of the friction law [m/s], assumed (not in the paper);
+            the first is "ambrosio"'s alone.
         reference_mass: used by "kelvin-voigt" only [kg].
 
     Raises:
@@ -89,7 +90,7 @@ class Ground:
         check_number("friction_slow", self.friction_slow, low=0)
         check_number("friction_fast", self.friction_fast, low=0, exclusive_low=True)
         check_number("reference_mass", self.reference_mass, low=0, exclusive_low=True)
-        if self.friction_fast <= self.friction_slow:
+        if self.friction_law == "ambrosio" and self.friction_fast <= self.friction_slow:
             raise ParameterError(
                 f"friction_fast: expected more than friction_slow = {self.friction_slow:g} m/s, "
                 f"got {self.friction_fast:g}"

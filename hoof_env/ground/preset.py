@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.ground.contact import Ground
-from hoof_env.leg.geometry import DEFAULT_PRESET, read_preset
+from hoof_env.leg.geometry import DEFAULT_PRESET, Preset, named, read_preset, wrong
 
 HERTZ = 1.5
 """Exponent n of Hertz's contact and of Lankarani and Nikravesh's law [-]."""
@@ -19,18 +18,21 @@ SETTINGS = ("stiffness", "exponent")
 of the other."""
 
 
-def load_ground(preset: str | Path = DEFAULT_PRESET, **overrides: Any) -> Ground:
-    """The ground of a preset (by name) or of a preset file (by path).
+def load_ground(preset: Preset = DEFAULT_PRESET, **overrides: Any) -> Ground:
+    """The ground of a preset by name, of a file by path, or of such a file's content.
 
     Args:
         preset: whose ground; what its file does not say is as in `Ground`.
         overrides: attributes of `Ground` that replace the preset's; None keeps them.
 
     Raises:
-        ParameterError: unknown preset name, or an override out of range.
+        ParameterError: unknown preset name, an override out of range, or content that is wrong as below.
         DataFileError: the file is unreadable, or its ground has unknown entries or bad values.
     """
-    ground = read_ground(read_preset(preset), f"preset {preset}")
+    try:
+        ground = read_ground(read_preset(preset), named(preset))
+    except DataFileError as error:
+        raise wrong(preset)(error) from None
     return replace(ground, **{name: value for name, value in overrides.items() if value is not None})
 
 
@@ -41,7 +43,7 @@ def read_ground(data: Mapping[str, Any], source: str) -> Ground:
         DataFileError: unknown entries or bad values.
     """
     section = data.get("ground", {})
-    if not isinstance(section, dict) or set(section) - set(SETTINGS):
+    if not isinstance(section, Mapping) or set(section) - set(SETTINGS):
         raise DataFileError(
             f"{source}: ground: expected an object with no other entries than {', '.join(SETTINGS)}, "
             f"got {section!r}"

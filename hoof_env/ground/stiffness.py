@@ -135,11 +135,8 @@ def contact_rates(
     depth = ((n + 1) * mass * speed**2 / (2 * stiffness)) ** (1 / (n + 1))
     depth += ((n + 1) * load / stiffness) ** (1 / n)
     force = stiffness * depth**n
-    steepest = {
-        "ambrosio": 1 / (ground.friction_fast - ground.friction_slow),
-        "threlfall": 3 / ground.friction_fast,
-        "tanh": 1 / ground.friction_fast,
-    }[ground.friction_law]
+    slow = ground.friction_slow if ground.friction_law == "ambrosio" else 0.0
+    steepest = (3 if ground.friction_law == "threlfall" else 1) / (ground.friction_fast - slow)
     return ContactRates(
         elastic=math.sqrt(n * force / depth / mass),
         damping=(chi * force / speed + dashpot) / mass,

@@ -15,8 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from hoof_env.errors import HoofEnvError, check_choice, check_number
+from hoof_env.errors import HoofEnvError, ParameterError, check_choice, check_number
 from hoof_env.gait.parameters import load_gait
+from hoof_env.ground.exact_math import EXPONENT_UNIT
 from hoof_env.ground.preset import load_ground
 from hoof_env.identify.candidate import Choice, encode, to_preset
 from hoof_env.identify.confirm import GIVEN_UP, JUDGED, confirm
@@ -98,6 +99,11 @@ def identify(
     check_choice("walk", walk, GIVEN_UP)
     check_choice("beta", beta, JUDGED)
     exponent = check_number("exponent", exponent, low=1, high=3)
+    if exponent * EXPONENT_UNIT % 1:
+        raise ParameterError(
+            f"exponent: expected a multiple of 1/{EXPONENT_UNIT}, for no environment takes another, "
+            f"got {exponent!r}"
+        )
     seed = int(check_number("seed", seed, low=0, high=2**53))
     workers = int(check_number("workers", workers, low=1, high=1024))
     budget = int(check_number("budget", BUDGET if budget is None else budget, low=1, high=1e15))

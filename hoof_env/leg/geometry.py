@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass, replace
 from functools import cached_property
 from importlib import resources
 from pathlib import Path
@@ -20,13 +20,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hoof_env._output import staged
 from hoof_env.errors import DataFileError, GeometryError, ParameterError, check_choice, check_number
 from hoof_env.leg.linkage import BODIES, BODY_LENGTHS, CONSTRUCTION, DYADS, LENGTHS, POINTS, Dyad
 
 DEFAULT_PRESET = "identified"
 """The leg of the paper's reproduction."""
 
+Preset = str | Path | Mapping[str, Any]
+"""What names a leg: a preset by name, a file of that form by path, or the content of such a file."""
+
+PARTS = ("provenance", "units", "geometry", "ground", "gaits", "gait_provenance")
+"""What a preset holds; docs/own_leg.md says what stands in each."""
+
 INERTIA_RULES = ("uniform_rod", "paper")
+
+UNITS = "m, kg, kg/m, rad, rad/s"
+"""Of a preset, for people."""
 
 LINEAR_DENSITY = 1.0
 """Default mass per length of a link [kg/m]. The paper prints no masses. One kilogram a metre gives the
@@ -112,7 +122,7 @@ class Geometry:
         return hash((tuple(self.lengths.items()), self.pivot, tuple(self.assembly.items()), self.name))
 
     def __reduce__(self) -> tuple[Any, ...]:  # mapping proxies do not pickle
-        return (_from_dict, (self.to_dict(),))
+        return (Geometry.from_dict, (self.to_dict(),))
 
     @property
     def body_lengths(self) -> NDArray[np.float64]:
@@ -159,6 +169,53 @@ class Geometry:
             **({} if self.full_turn else {"full_turn": False}),
         }
 
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Geometry:
+        """The leg that `to_dict` gave, or the section "geometry" of a preset.
+
+        Raises:
+            ParameterError: an entry is missing, unknown, not finite or out of range.
+            GeometryError: as of the class.
+        """
+        _check_entries(data)
+        return cls(**data)
+
+    def save(
+        self,
+        path: str | Path,
+        gaits: Mapping[str, Any] | None = None,
+        ground: Mapping[str, float] | None = None,
+    ) -> None:
+        """Write a preset file, which `preset=` and `load_geometry` take; `provenance` goes with it.
+
+        Args:
+            path: of the file; ends in .json.
+            gaits: `GaitParameters`, or mappings of the same, by name; an environment needs at least one.
+            ground: K "stiffness" [N/m^n] and n "exponent" [-] of the contact law, or one of them.
+
+        Raises:
+            ParameterError: another suffix.
+            OutputError: the file cannot be written.
+        """
+        path = Path(path)
+        if path.suffix != ".json":
+            raise ParameterError(f"path: expected a file that ends in .json, got {str(path)!r}")
+        geometry = self.to_dict()
+        content: dict[str, Any] = {
+            "provenance": geometry.pop("provenance"),
+            "units": UNITS,
+            "geometry": geometry,
+        }
+        if ground is not None:
+            content["ground"] = dict(ground)
+        if gaits is not None:
+            content["gaits"] = {
+                name: asdict(gait) if is_dataclass(gait) and not isinstance(gait, type) else dict(gait)
+                for name, gait in gaits.items()
+            }
+        with staged(path.parent) as stage:
+            (stage / path.name).write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+
     def replace(self, **changes: Any) -> Geometry:
         """A copy with some attributes changed; `lengths` and `assembly` may be partial mappings."""
         for name in ("lengths", "assembly"):
@@ -167,26 +224,27 @@ class Geometry:
         return replace(self, **changes)
 
 
-def _check_keys(what: str, given: Any, expected: Any) -> None:
+def _check_keys(what: str, given: Any, expected: Sequence[str], optional: Sequence[str] = ()) -> None:
     if not isinstance(given, Mapping):
         raise ParameterError(f"{what}: expected a mapping with {', '.join(expected)}, got {given!r}")
-    missing, unknown = set(expected) - set(given), set(given) - set(expected)
+    missing, unknown = set(expected) - set(given), set(given) - {*expected, *optional}
     if missing or unknown:
         parts = [f"missing {', '.join(sorted(missing))}"] if missing else []
         parts += [f"unknown {', '.join(sorted(map(str, unknown)))}"] if unknown else []
-        raise ParameterError(f"{what}: expected exactly {', '.join(expected)}; {'; '.join(parts)}")
+        wanted = (
+            f"{', '.join(expected)}, and perhaps {', '.join(optional)}" if optional else ", ".join(expected)
+        )
+        raise ParameterError(f"{what}: expected exactly {wanted}; {'; '.join(parts)}")
+
+
+def _check_entries(data: Any) -> None:
+    required = [item.name for item in fields(Geometry) if item.default is MISSING]
+    optional = [item.name for item in fields(Geometry) if item.default is not MISSING]
+    _check_keys("geometry", data, required, optional)
 
 
 def _count(values: Any) -> int:
     return len(values) if isinstance(values, (Sequence, np.ndarray)) else 0
-
-
-def _from_dict(data: Mapping[str, Any]) -> Geometry:
-    values = dict(data)
-    values["pivot"] = tuple(values["pivot"])
-    if values.get("masses") is not None:
-        values["masses"] = tuple(values["masses"])
-    return Geometry(**values)
 
 
 def _solve(geometry: Geometry, theta: NDArray[np.floating[Any]]) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -253,13 +311,32 @@ def preset_names() -> list[str]:
     return sorted(f.name.removesuffix(".json") for f in files if f.name.endswith(".json"))
 
 
-def read_preset(source: str | Path) -> dict[str, Any]:
-    """The JSON content of a preset by name, or of a file by path (ends in .json).
+def named(preset: Preset) -> str:
+    """How an error calls a preset."""
+    return "preset" if isinstance(preset, Mapping) else f"preset {preset}"
+
+
+def wrong(preset: Preset) -> type[ParameterError] | type[DataFileError]:
+    """Of which kind an error in a preset is: an argument's, or a file's."""
+    return ParameterError if isinstance(preset, Mapping) else DataFileError
+
+
+def read_preset(source: Preset) -> dict[str, Any]:
+    """The content of a preset by name, or of a file by path (ends in .json); content comes back as it is.
 
     Raises:
-        ParameterError: unknown preset name.
-        DataFileError: the file is missing or is not a JSON object.
+        ParameterError: unknown preset name, or content with unknown entries.
+        DataFileError: the file is missing, is not a JSON object or has unknown entries.
     """
+    data = source if isinstance(source, Mapping) else _read_file(source)
+    if unknown := sorted(str(name) for name in data if name not in PARTS):
+        raise wrong(source)(
+            f"{named(source)}: unknown entries {', '.join(unknown)}; expected some of {', '.join(PARTS)}"
+        )
+    return dict(data)
+
+
+def _read_file(source: str | Path) -> dict[str, Any]:
     if isinstance(source, Path) or str(source).endswith(".json"):
         path: Any = Path(source)
     else:
@@ -278,22 +355,31 @@ def read_preset(source: str | Path) -> dict[str, Any]:
     return data
 
 
-def load_geometry(source: str | Path = DEFAULT_PRESET) -> Geometry:
-    """The geometry of a preset (by name) or of a preset file (by path).
+def load_geometry(source: Preset = DEFAULT_PRESET) -> Geometry:
+    """The geometry of a preset by name, of a file by path, or of such a file's content.
 
     Raises:
-        ParameterError: unknown preset name, or a value out of range.
-        DataFileError: the file is unreadable or lacks a part.
-        GeometryError: the leg in the file cannot turn.
+        ParameterError: unknown preset name, a value out of range, or content that lacks a part.
+        DataFileError: the file is unreadable, lacks a part or has unknown entries.
+        GeometryError: the leg cannot turn.
     """
     data = read_preset(source)
+    for part, kind, what in (
+        ("provenance", str, "a text that says where the numbers come from"),
+        ("geometry", Mapping, "an object"),
+    ):
+        if not isinstance(data.get(part), kind):
+            got = f"got {data[part]!r:.60}" if part in data else f"found {', '.join(data) or 'nothing'}"
+            raise wrong(source)(
+                f"{named(source)}: expected an entry {part!r} beside the others, {what}; {got}"
+            )
+    name = {} if isinstance(source, Mapping) else {"name": str(source)}
+    values = {**name, "provenance": data["provenance"], **data["geometry"]}
     try:
-        values = {"name": str(source), "provenance": data["provenance"], **data["geometry"]}
-        return _from_dict(values)
-    except (KeyError, TypeError) as error:
-        raise DataFileError(
-            f"preset {source}: its 'geometry' is incomplete or has unknown entries: {error}"
-        ) from None
+        _check_entries(values)
+    except ParameterError as error:
+        raise wrong(source)(f"{named(source)}: {error}") from None
+    return Geometry.from_dict(values)
 
 
 def tables(geometry: Geometry) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

@@ -17,10 +17,10 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 from agents.checkpoints import REPLAY, STATE, checkpoints, whole
 from agents.runs import CHECKPOINTS, SavedModel, make_env
-from agents.safe import ABOUT, WEIGHTS
 from agents.train import Args, main, train
 from agents.watch import DivergedError
 from hoof_env.errors import DataFileError, OutputError, ParameterError
+from hoof_env.plain_policy import ABOUT, WEIGHTS
 from tests.agents.conftest import SHORT, TINY, train_tiny
 
 KILLS = 2

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import gymnasium as gym
 import numpy as np
 
-import hoof_env  # noqa: F401
+from hoof_env.envs.tasks import TASKS, Settings, check_effect
+from hoof_env.errors import ParameterError
 
 IDS = sorted(
     name for name, spec in gym.registry.items() if str(spec.entry_point).endswith("horse_leg:HorseLegEnv")
@@ -14,6 +17,21 @@ IDS = sorted(
 
 FALLS = {"trunk_share": 1.0, "trunk_stiffness": 0.0, "trunk_damping": 0.0}
 """A suspended trunk that nothing else holds up: episodes end by failure."""
+
+
+def effective(given, env_id: str = "hoof_env/HorseLeg-v0", **settings):
+    """Those of some settings that have an effect beside others on an id."""
+    task = TASKS[gym.spec(env_id).kwargs["task"]]
+    found = replace(Settings(), **{**task.defaults, **settings})
+
+    def has_effect(name):
+        try:
+            check_effect(name, found)
+        except ParameterError:
+            return False
+        return True
+
+    return {name: value for name, value in given.items() if has_effect(name)}
 
 
 def actions(seed: int, *shape: int) -> np.ndarray:

@@ -10,7 +10,7 @@ import pytest
 from family import IDS, actions, same
 from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 
-from hoof_env import Sb3VecEnv
+from hoof_env import Sb3VecEnv, make_policy
 from hoof_env.errors import ParameterError
 from hoof_env.gait.parameters import load_gait
 
@@ -30,7 +30,7 @@ ARGUMENTS = [
     ({"observation": ["crank", "ground"]}, "observation: 'ground' is constant without terrain"),
     (
         {"randomize": {"motor_gain": 3.0}},
-        "randomize: 'motor_gain' is of drive='motor', got drive='prescribed'",
+        "randomize: 'motor_gain': expected drive='motor' beside it, .* no effect, got drive='prescribed'",
     ),
     ({"drive": "belt"}, "drive: expected one of motor, prescribed, got 'belt'"),
     ({"normal_law": "hertz"}, "normal_law: expected one of .*lankarani-nikravesh.*got 'hertz'"),
@@ -57,10 +57,7 @@ ARGUMENTS = [
     ({"friction": -0.1}, "friction: expected.*got -0.1"),
     ({"friction_fast": 1e-4}, "friction_fast: expected more than friction_slow"),
     ({"drive": "motor", "motor_gain": -1.0}, "motor_gain: expected.*got -1.0"),
-    (
-        {"motor_torque": "strong"},
-        "motor_torque: expected.*got 'strong'",
-    ),  # also where no motor turns the crank
+    ({"drive": "motor", "motor_torque": "strong"}, "motor_torque: expected.*got 'strong'"),
     ({"approach_floor": 1e300}, "approach_floor: expected.*got 1e.300"),
     ({"episode_seconds": -1.0}, "episode_seconds: expected.*got -1.0"),
     ({"episode_seconds": 1e308}, "episode_seconds: expected.*got 1e.308"),
@@ -374,6 +371,23 @@ def test_states_of_other_numbers_of_environments():
             ParameterError,
             r"state\['ended'\]: expected a bool array of shape \(3,\), got",
         )
+
+
+def test_gaits_and_policies_by_name_or_refused_in_words():
+    env = gym.make(LEG)
+    leg, run = env.unwrapped, load_gait("run", "first_fit")
+    for gait in ("run", run.to_array(), run.to_array().tolist()):
+        same(leg.action_for(gait), leg.action_for(run))
+    for gait in ("trot", None, 3, [1.0, 2.0], {"crank_speed": 1.0}, [1.0, 2.0, 3.0, NAN]):
+        with pytest.raises(ParameterError, match=r"gait: expected one of run, walk.*got"):
+            leg.action_for(gait)
+    for arguments in ((env, "run"), ("run", "walk"), ("run", gym.make("CartPole-v1"))):
+        with pytest.raises(
+            ParameterError, match=r"env: expected an environment of this package, make_policy\("
+        ):
+            make_policy(*arguments)
+    with pytest.raises(ParameterError, match=r"policy: expected one of .*got 3"):
+        make_policy(3, env)
 
 
 def test_adapter():

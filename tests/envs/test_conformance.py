@@ -9,7 +9,7 @@ import warnings
 import gymnasium as gym
 import numpy as np
 import pytest
-from family import FALLS, IDS, actions, roll, same
+from family import FALLS, IDS, actions, effective, roll, same
 from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 from stable_baselines3.common.env_checker import check_env as sb3_check_env
@@ -91,7 +91,7 @@ def test_every_call_returns_fresh_data():
 @pytest.mark.parametrize("settings", [{}, FALLS], ids=["", "falls"])
 def test_types_and_infos_of_a_step(env_id, settings):
     """Plain Python numbers, and few keys, which vector environments of others copy one by one."""
-    env = gym.make(env_id, episode_seconds=2.0, **settings)
+    env = gym.make(env_id, episode_seconds=2.0, **effective(settings, env_id))
     env.reset(seed=0)
     done = False
     while not done:

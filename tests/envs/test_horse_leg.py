@@ -238,7 +238,7 @@ def test_the_papers_solver_can_be_made_exact():
     [
         ({"integrator": "leapfrog", "solver": "paper"}, "integrator: expected one of euler.*got 'leapfrog'"),
         ({"integrator": "euler"}, "integrator: expected one of .*midpoint.*got 'euler'"),
-        ({"baumgarte_beta": -1.0}, "baumgarte_beta: expected.*got -1.0"),
+        ({"baumgarte_beta": -1.0, "solver": "paper"}, "baumgarte_beta: expected.*got -1.0"),
         ({"baumgarte_alpha": "a", "solver": "paper"}, "baumgarte_alpha: expected.*got 'a'"),
         ({"trunk": "rail", "solver": "paper"}, "trunk: expected 'fixed' with solver=\"paper\", got 'rail'"),
         ({"drive": "motor", "solver": "paper"}, "drive: expected 'prescribed' with"),

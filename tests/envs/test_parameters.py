@@ -7,7 +7,7 @@ import warnings
 import gymnasium as gym
 import numpy as np
 import pytest
-from family import IDS, actions, roll, same, substeps
+from family import IDS, actions, effective, roll, same, substeps
 
 from hoof_env import RandomizeParameters
 from hoof_env.dynamics.engine import GRAVITY
@@ -55,7 +55,7 @@ def test_what_was_set_for_one_episode_is_not_for_the_next(env_id, seed):
     env, fresh = make(env_id), make(env_id)
     for one in (env, fresh):
         one.reset(seed=3)
-    env.reset(seed=3, options={"parameters": OTHER})
+    env.reset(seed=3, options={"parameters": effective(OTHER, env_id, drive="motor")})
     roll(env, 20)
     weight = fresh.weight
     assert env.weight == pytest.approx(weight + 40.0 * GRAVITY)

@@ -105,6 +105,10 @@ def test_a_leg_found_alone_is_not_written_over(tmp_path, capsys):
         (["--start", "SLOW"], "run.crank_speed: expected the paper's 6.283185 rad/s, got 3.0"),
         (["--workers", "0"], "workers: expected a finite number in [1, 1024], got 0"),
         (["--budget", "0"], "budget: expected"),
+        (
+            ["--exponent", "1.4142"],
+            "exponent: expected a multiple of 1/8, for no environment takes another, got",
+        ),
         (["--seed", "-1"], "seed: expected"),
         (["--resume"], "holds no search to resume"),
     ],

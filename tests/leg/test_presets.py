@@ -4,8 +4,11 @@ import json
 
 import pytest
 
-from hoof_env.errors import DataFileError, GeometryError, ParameterError
-from hoof_env.leg.geometry import load_geometry, preset_names, read_preset
+from hoof_env.errors import DataFileError, GeometryError, OutputError, ParameterError
+from hoof_env.gait.parameters import load_gait
+from hoof_env.ground.contact import Ground
+from hoof_env.ground.preset import load_ground
+from hoof_env.leg.geometry import Geometry, load_geometry, preset_names, read_preset
 
 LEG = load_geometry("first_fit")
 
@@ -47,10 +50,16 @@ def test_a_missing_file_and_an_unknown_name(tmp_path):
         ("{", "does not parse"),
         ("[" * 100_000, "does not parse"),
         ("[]", "expected a JSON object with 'geometry' and 'gaits', got list"),
-        ("{}", "its 'geometry' is incomplete or has unknown entries: 'provenance'"),
-        ('{"provenance": "", "geometry": 3}', "its 'geometry' is incomplete"),
-        ('{"provenance": "", "geometry": {"pivot": [0, 0]}}', "its 'geometry' is incomplete"),
-        ('{"provenance": "", "geometry": {"pivot": 3}}', "its 'geometry' is incomplete"),
+        ("{}", r"leg\.json: expected an entry 'provenance' .*; found nothing"),
+        ('{"geometry": {}, "gaits": {}}', "expected an entry 'provenance' .*; found geometry, gaits"),
+        ('{"geometry": {}, "provenance": 3}', "expected an entry 'provenance' .*; got 3"),
+        ('{"provenance": ""}', "expected an entry 'geometry' .*, an object; found provenance"),
+        ('{"provenance": "", "geometry": 3}', "expected an entry 'geometry' .*, an object; got 3"),
+        (
+            '{"provenance": "", "geometry": {"pivot": 3}}',
+            r"leg\.json: geometry: .*; missing assembly, heel, hip",
+        ),
+        ('{"provenance": "", "colour": "bay"}', r"leg\.json: unknown entries colour; expected some of prov"),
     ],
 )
 def test_a_corrupt_file_is_named(tmp_path, text, message):
@@ -66,9 +75,47 @@ def test_a_file_that_is_not_text(tmp_path):
 
 
 def test_a_file_with_an_unknown_entry_or_a_bad_value(tmp_path):
-    with pytest.raises(DataFileError, match=r"unknown entries.*colour"):
+    with pytest.raises(DataFileError, match=r"leg\.json: geometry: expected exactly .*; unknown colour$"):
         load_geometry(preset_file(tmp_path, lambda data: data["geometry"].update(colour="bay")))
     with pytest.raises(ParameterError, match=r"lengths\['FG'\]"):
         load_geometry(preset_file(tmp_path, lambda data: data["geometry"]["lengths"].update(FG=float("nan"))))
     with pytest.raises(GeometryError, match="dyad 1"):
         load_geometry(preset_file(tmp_path, lambda data: data["geometry"]["lengths"].update(CB=0.1)))
+
+
+def test_content_is_taken_as_a_file_is_and_its_errors_are_those_of_an_argument():
+    content = read_preset("first_fit")
+    leg = load_geometry(content)
+    assert leg.replace(name="first_fit") == LEG
+    assert (leg.name, leg.provenance) == ("custom", LEG.provenance)
+    with pytest.raises(ParameterError, match="preset: unknown entries colour; expected some of provenance, "):
+        load_geometry({**content, "colour": "bay"})
+    with pytest.raises(
+        ParameterError, match=r"preset: expected an entry 'provenance' .* found geometry, gaits$"
+    ):
+        load_geometry({"geometry": content["geometry"], "gaits": content["gaits"]})
+    geometry = {name: value for name, value in content["geometry"].items() if name != "pivot"}
+    with pytest.raises(ParameterError, match=r"preset: geometry: .*; missing pivot; unknown colour$"):
+        load_geometry({**content, "geometry": {**geometry, "colour": "bay"}})
+
+
+def test_a_geometry_goes_through_a_dictionary_and_a_file(tmp_path):
+    own = LEG.replace(masses=tuple(range(1, 15)), travel=1, name="mine", provenance="drawn by hand")
+    assert Geometry.from_dict(json.loads(json.dumps(own.to_dict()))) == own
+    gaits = {"trot": load_gait("run", "first_fit"), "walk": vars(load_gait("walk", "first_fit"))}
+    path = tmp_path / "new" / "mine.json"
+    own.save(path, gaits, {"exponent": 1.25})
+    again = load_geometry(path)
+    assert (again, again.provenance) == (own, own.provenance)
+    assert [load_gait(name, path) for name in gaits] == [gaits["trot"], load_gait("walk", "first_fit")]
+    assert load_ground(path) == Ground(exponent=1.25)
+    own.save(path)
+    assert set(read_preset(path)) == {"provenance", "units", "geometry"}
+    with pytest.raises(ParameterError, match=r"path: expected a file that ends in \.json, got .*mine\.txt"):
+        own.save(tmp_path / "mine.txt")
+    with pytest.raises(OutputError, match="cannot write to"):
+        own.save(path / "under" / "mine.json")
+    with pytest.raises(
+        ParameterError, match=r"geometry: expected exactly lengths, .* and perhaps .*; missing toe"
+    ):
+        Geometry.from_dict({name: value for name, value in own.to_dict().items() if name != "toe"})

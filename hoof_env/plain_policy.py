@@ -11,16 +11,39 @@ from __future__ import annotations
 
 import json
 import math
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from agents.settings import algorithm_class
-from hoof_env.errors import DataFileError, ParameterError
+from hoof_env.errors import DataFileError, ParameterError, check_choice
 
 WEIGHTS, ABOUT = "policy.safetensors", "policy.json"
 FORMAT = 1
+
+ALGORITHMS = {
+    "ppo": "stable_baselines3",
+    "sac": "stable_baselines3",
+    "td3": "stable_baselines3",
+    "tqc": "sb3_contrib",
+}
+"""Where each algorithm lives; each has its file in agents/hyperparams."""
+
+
+def algorithm_class(name: str) -> Any:
+    """The class of an algorithm of `ALGORITHMS`.
+
+    Raises:
+        ParameterError: another name, or its library is not installed.
+    """
+    module = ALGORITHMS[check_choice("algo", name, ALGORITHMS)]
+    try:
+        return getattr(import_module(module), name.upper())
+    except ModuleNotFoundError as error:
+        raise ParameterError(
+            f"algo {name}: expected {module} to be installed (pip install 'hoof-env[train]'): {error}"
+        ) from None
 
 
 def save_policy(model: Any, folder: Path) -> bool:

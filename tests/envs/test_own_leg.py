@@ -1,0 +1,117 @@
+"""A leg of one's own as `docs/own_leg.md` says: the example runs, the tables are whole, errors exact."""
+
+from __future__ import annotations
+
+import copy
+import json
+import re
+from dataclasses import MISSING, fields
+from pathlib import Path
+
+import gymnasium as gym
+import pytest
+from family import roll, same
+from gymnasium.envs.registration import EnvSpec
+
+from hoof_env import Geometry, read_preset
+from hoof_env.errors import DataFileError, ParameterError
+from hoof_env.gait.parameters import LIMITS
+from hoof_env.ground import preset as ground
+from hoof_env.leg.geometry import PARTS
+from hoof_env.leg.linkage import DYADS, LENGTHS
+
+PAGE = (Path(__file__).parents[2] / "docs" / "own_leg.md").read_text(encoding="utf-8")
+LEG = "hoof_env/HorseLeg-v0"
+CONTENT = read_preset("identified")
+
+
+def test_the_example_runs(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (block,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    exec(compile(block, "own_leg.md", "exec"), {})
+    assert json.loads((tmp_path / "pony.json").read_text())["provenance"] == "first_fit at half its size"
+
+
+def entries(heading: str) -> dict[str, list[str]]:
+    """Rows of the table under a heading, by the names in the first cell."""
+    part = PAGE.split(heading, 1)[1].split("\n#", 1)[0]
+    rows = [
+        [cell.strip() for cell in line.strip("|").split("|")]
+        for line in part.splitlines()
+        if line.startswith("| `")
+    ]
+    return {name: row[1:] for row in rows for name in re.findall(r"`(\w+)`", row[0])}
+
+
+def test_the_page_has_every_entry():
+    assert set(entries("## The form")) == set(PARTS)
+    geometry = entries("### geometry")
+    needed = {item.name: "yes" if item.default is MISSING else "no" for item in fields(Geometry)}
+    assert {name: row[0] for name, row in geometry.items()} == needed
+    assert re.findall(r"`(\w+)`", geometry["lengths"][2]) == list(LENGTHS)
+    assert re.findall(r"`(\w+)`", geometry["assembly"][2]) == [dyad.point for dyad in DYADS]
+    assert set(entries("### gaits")) == set(LIMITS)
+    assert set(entries("### ground")) == set(ground.SETTINGS)
+
+
+@pytest.mark.parametrize("make", [gym.make, gym.make_vec], ids=["single", "vector"])
+def test_a_mapping_is_the_preset_of_that_content(make):
+    given = copy.deepcopy(CONTENT)
+    env = make(LEG, preset=given, stiffness=None, exponent=None).unwrapped
+    named = make(LEG, preset="identified", stiffness=None, exponent=None).unwrapped
+    given["geometry"]["hip_height"] = 9.0  # not shared
+    assert env.settings.preset == CONTENT
+    same(env.reset(seed=0), named.reset(seed=0))
+    if make is gym.make:
+        for one, two in zip(roll(env, 50), roll(named, 50), strict=True):
+            same(one, two)
+        assert env.engine.ground == named.engine.ground
+
+
+def test_a_spec_and_a_state_hold_the_leg_itself():
+    env = gym.make(LEG, preset=CONTENT)
+    env.reset(seed=0)
+    state = env.unwrapped.get_state()
+    assert json.loads(json.dumps(state["settings"]))["preset"] == CONTENT
+    again = gym.make(EnvSpec.from_json(env.spec.to_json()))
+    assert again.unwrapped.geometry == env.unwrapped.geometry
+    same(again.unwrapped.set_state(state), env.unwrapped.batch.seen[0])
+
+
+def test_a_path_stays_a_path(tmp_path):
+    path = tmp_path / "mine.json"
+    path.write_text(json.dumps(CONTENT), encoding="utf-8")
+    for given in (path, str(path)):
+        env = gym.make(LEG, preset=given).unwrapped
+        assert env.settings.preset == str(path)
+        assert env.geometry.name == str(path)
+
+
+def without(name):
+    return {key: value for key, value in CONTENT.items() if key != name}
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (without("provenance"), "expected an entry 'provenance' beside the others, a text that says where"),
+        (
+            without("geometry"),
+            "expected an entry 'geometry' beside the others, an object; found provenance, ",
+        ),
+        (without("gaits"), "expected an object 'gaits' with at least one gait, got None"),
+        ({**CONTENT, "gait": {}}, "unknown entries gait; expected some of provenance, units, geometry"),
+        ({**CONTENT, "geometry": {**CONTENT["geometry"], "colour": "bay"}}, "geometry: .*; unknown colour"),
+        ({**CONTENT, "gaits": {"trot": {"speed": 1.0}}}, "gait 'trot': expected crank_speed.*'speed'"),
+        ({**CONTENT, "ground": {"softness": 1.0}}, "ground: .* no other entries than stiffness, exponent"),
+        ({**CONTENT, "geometry": {**CONTENT["geometry"], "lengths": {"OP": 1.0}}}, "lengths: .*missing AJ, "),
+    ],
+)
+def test_errors_are_of_the_argument_or_of_the_file(tmp_path, content, message):
+    with pytest.raises(ParameterError, match=message):
+        gym.make(LEG, preset=content, stiffness=None)
+    path = tmp_path / "mine.json"
+    path.write_text(json.dumps(content), encoding="utf-8")
+    with pytest.raises((DataFileError, ParameterError), match=message) as caught:
+        gym.make(LEG, preset=path, stiffness=None)
+    assert "mine.json" in str(caught.value) or "lengths" in message

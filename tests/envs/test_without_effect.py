@@ -1,0 +1,184 @@
+"""Arguments, options and assignments without effect are refused, those with one are not."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from family import IDS, actions, same
+from stable_baselines3.common.vec_env import DummyVecEnv
+
+from hoof_env import RandomizeParameters, Sb3VecEnv
+from hoof_env.dynamics.trunk import ONE_LEG
+from hoof_env.envs.batch import EpisodeBatch
+from hoof_env.envs.tasks import NEEDED, PER_EPISODE, TASKS, Settings, check_effect
+from hoof_env.errors import FixedSettingError, ParameterError
+from hoof_env.ground.friction import FRICTION_LAWS
+from hoof_env.ground.normal_force import NORMAL_LAWS
+
+LEG, RAIL, FIXED = (f"hoof_env/{name}-v0" for name in ("HorseLeg", "HorseLegRail", "HorseLegFixed"))
+OTHER = {
+    "trunk_mass": 120.0, "trunk_share": 0.5, "trunk_stiffness": 6000.0, "trunk_damping": 900.0,
+    "trunk_drag": 60.0, "stiffness": 4e4, "restitution": 0.9, "approach_floor": 2.0, "friction": 0.1,
+    "friction_slow": 0.04, "friction_fast": 0.2, "motor_gain": 30.0, "motor_torque": 100.0,
+    "motor_inertia": 2.0, "target_seconds": (0.02, 0.1), "exponent": 1.25,
+}  # fmt: skip
+"""Values that are not the defaults."""
+
+
+def episode(settings, steps=150):
+    """Observations and memory of random actions."""
+    batch = EpisodeBatch(TASKS["leg"], settings, 1)
+    generator = np.random.default_rng(1)
+    batch.reset([0], [generator], {"crank_angle": 0.0})
+    seen = [batch.seen[0].copy()]
+    for action in actions(3, steps):
+        batch.actions[0] = action
+        batch.step([generator])
+        seen += [batch.seen[0].copy(), batch.episode[:, 0].copy()]
+    return np.concatenate(seen).tobytes()
+
+
+CONTEXTS = [
+    *itertools.product(ONE_LEG, ("ambrosio",), NORMAL_LAWS[:1], ("prescribed", "motor"), (None, (0.5, 3.0))),
+    *(
+        ("suspended", friction, normal, "prescribed", None)
+        for friction, normal in itertools.product(FRICTION_LAWS, NORMAL_LAWS)
+    ),
+]
+
+
+@pytest.mark.parametrize("context", CONTEXTS, ids=str)
+def test_refused_is_what_changes_no_bit(context):
+    """Each setting in each set-up: `check_effect` refuses it if and only if a run with it is the same."""
+    trunk, friction, normal, drive, target = context
+    settings = replace(
+        Settings(), trunk=trunk, friction_law=friction, normal_law=normal, drive=drive, target_speed=target
+    )
+    plain = episode(settings)
+    for name, value in OTHER.items():
+        changes = episode(replace(settings, **{name: value})) != plain
+        if changes:
+            check_effect(name, settings)
+        else:
+            with pytest.raises(
+                ParameterError, match=f"{name}: expected .* beside it, without which it has no"
+            ):
+                check_effect(name, settings)
+
+
+def test_all_are_tried():
+    papers_own = {"baumgarte_alpha", "baumgarte_beta"}
+    assert set(PER_EPISODE) | set(NEEDED) <= set(OTHER) | papers_own
+
+
+@pytest.mark.parametrize(
+    ("env_id", "kwargs", "message"),
+    [
+        (LEG, {"motor_gain": 30.0}, "motor_gain: expected drive='motor' beside it.*got drive='prescribed'"),
+        (LEG, {"motor_torque": "strong"}, "motor_torque: expected drive='motor'"),
+        (LEG, {"motor_inertia": 1.0, "drive": "prescribed"}, "motor_inertia: expected drive='motor'"),
+        (RAIL, {"trunk_share": 0.5}, "trunk_share: expected trunk='suspended' beside it.*got trunk='rail'"),
+        (LEG, {"trunk": "fixed", "trunk_drag": 1.0}, "trunk_drag: .* or trunk='rail' beside"),
+        (FIXED, {"trunk_stiffness": 1.0}, "trunk_stiffness: expected.*got trunk='fixed'"),
+        (LEG, {"target_seconds": (1.0, 2.0)}, "target_seconds: expected a target_speed beside.*=None"),
+        (LEG, {"friction_slow": 1e-4, "friction_law": "tanh"}, "friction_slow: .* friction_law='ambrosio'"),
+        (FIXED, {"baumgarte_alpha": 5.0}, "baumgarte_alpha: expected solver='paper'.*got solver='exact'"),
+        (RAIL, {"randomize": {"trunk_share": 0.5}}, "randomize: 'trunk_share': expected trunk='suspended'"),
+    ],
+    ids=str,
+)  # fmt: skip
+@pytest.mark.parametrize("make", [gym.make, gym.make_vec], ids=["single", "vector"])
+def test_arguments(make, env_id, kwargs, message):
+    with pytest.raises(ParameterError, match=message):
+        make(env_id, **kwargs)
+
+
+@pytest.mark.parametrize("env_id", IDS)
+def test_what_an_environment_says_of_itself_makes_it_again(env_id):
+    """All its settings, those without effect with the values that they have anyway."""
+    env = gym.make(env_id, restitution=0.7).unwrapped
+    env.reset(seed=0)
+    again = gym.make(env_id, **env.get_state()["settings"]).unwrapped
+    same(again.set_state(env.get_state()), env.batch.seen[0])
+
+
+def test_options_and_ranges():
+    env = gym.make(RAIL)
+    message = r"options\['parameters'\]: 'trunk_damping': expected trunk='suspended' beside it"
+    with pytest.raises(ParameterError, match=message):
+        env.reset(seed=0, options={"parameters": {"trunk_damping": 1.0}})
+    with pytest.raises(ParameterError, match=message):
+        RandomizeParameters(env, {"trunk_damping": (1.0, 2.0)})
+
+
+def test_a_friction_law_without_a_lower_threshold_does_not_compare_with_one():
+    for law in ("tanh", "threlfall"):
+        assert (
+            gym.make(LEG, friction_law=law, friction_fast=5e-4).unwrapped.engine.ground.friction_fast == 5e-4
+        )
+
+
+@pytest.mark.parametrize("env_id", IDS)
+def test_reward_weights_that_are_not_named_keep_the_values_of_the_task(env_id):
+    plain = gym.make(env_id).unwrapped.batch.weights
+    for given in ({"peak": 1.0}, {}, None, {"progress": 3.0, "support": 1.0}):
+        for env in (gym.make(env_id, reward_weights=given), gym.make_vec(env_id, reward_weights=given)):
+            leg = env.unwrapped
+            assert leg.batch.weights == replace(plain, **(given or {}))
+            shown = leg.settings.reward_weights or {}
+            assert replace(type(plain)(), **shown) == leg.batch.weights
+            leg.reset(seed=0)
+            assert (leg.get_state()["settings"]["reward_weights"] or {}) == shown
+
+
+def test_the_weight_that_is_not_named_is_paid():
+    """What found it: `HorseLegSpeed-v0` pays 2 a metre, also beside another charge for peaks."""
+    paid = []
+    for weights in (None, {"peak": 1.0}):
+        env = gym.make("hoof_env/HorseLegSpeed-v0", reward_weights=weights)
+        env.reset(seed=0)
+        paid.append([env.step(action)[4]["reward_progress"] for action in actions(0, 20)])
+    same(*paid)
+
+
+@pytest.mark.parametrize("kind", ["single", "vector"])
+def test_settings_and_what_follows_from_them_are_not_assigned(kind):
+    env = (gym.make(LEG) if kind == "single" else gym.make_vec(LEG, num_envs=2)).unwrapped
+    for name, how in (
+        (
+            "trunk_mass",
+            r"set it by gymnasium.make\(id, \.\.\.\), or reset\(options={'parameters': {'trunk_mass'",
+        ),
+        ("reward_weights", r"set it by gymnasium.make\(id, \.\.\.\)$"),
+        *(
+            ((("terrain", "")), ("weight", "set it by the arguments of gymnasium.make$"))
+            if kind == "single"
+            else ()
+        ),
+    ):
+        with pytest.raises(FixedSettingError, match=f"{name}: expected no assignment.*{how}"):
+            setattr(env, name, 5)
+        with pytest.raises(AttributeError):  # as of any property
+            setattr(env, name, 5)
+    env.note = "mine"
+    assert env.note == "mine"
+
+
+@pytest.mark.parametrize(
+    "many",
+    [
+        lambda: DummyVecEnv([lambda: gym.make(LEG).unwrapped]),
+        lambda: Sb3VecEnv(LEG, 2),
+        lambda: gym.make_vec(LEG, num_envs=2, vectorization_mode="sync"),  # through Gymnasium's wrappers
+    ],
+    ids=["DummyVecEnv", "Sb3VecEnv", "SyncVectorEnv"],
+)
+def test_neither_by_the_libraries_that_set_attributes(many):
+    env = many()
+    with pytest.raises(FixedSettingError, match="trunk_mass: expected no assignment"):
+        env.set_attr("trunk_mass", 5)
+    env.set_attr("note", 5)
