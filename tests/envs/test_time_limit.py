@@ -80,7 +80,8 @@ def test_a_spec_makes_the_same_again():
         assert again.spec == env.spec
         same(ends(again, 20), ends(env, 20))
         assert "episode_summary" in ends(again, 20)[1]
-    env.spec.max_episode_steps = 7  # a copy
+    env.unwrapped.spec = gym.spec(LEG)  # the registered one is not written to
+    assert env.unwrapped.spec.max_episode_steps == 20
     assert gym.spec(LEG).max_episode_steps is None
     assert gym.make(LEG).spec.max_episode_steps == 500
 
