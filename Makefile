@@ -9,6 +9,7 @@
 
 PY := .venv/bin/python
 PYTHONS := $(or $(PYTHON),$(PY) python3 python3.13 python3.12 python3.11)
+LONG := -o faulthandler_timeout=3600
 IS_SUPPORTED := import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))
 
 help:
@@ -34,21 +35,22 @@ demo: setup-demo
 	@$(PY) -m agents.demo
 
 # Compiling and mypy take one processor each, so both go on at once. A file's tests stay in one process: the
-# others would make its fixtures again.
+# others would make its fixtures again. A process that is lost stays lost: a new one would begin with the test
+# that killed the last.
 test: setup
 	@$(MAKE) --no-print-directory -j2 lint kernels
-	@echo 'pytest' && $(PY) -m pytest -q -n auto --dist loadfile
+	@echo 'pytest' && $(PY) -m pytest -q -n auto --dist loadfile --max-worker-restart=0
 
 kernels: setup
 	@echo 'kernels' && $(PY) -m tests.kernels
 
 test-slow: setup
-	@echo 'pytest -m slow' && $(PY) -m pytest -q -m slow
-	@echo 'a million random steps of each id' && HOOF_ENV_STEPS=1e6 $(PY) -m pytest -q tests/envs/test_never_breaks.py -k random_actions
+	@echo 'pytest -m slow' && $(PY) -m pytest -q $(LONG) -m slow
+	@echo 'a million random steps of each id' && HOOF_ENV_STEPS=1e6 $(PY) -m pytest -q $(LONG) tests/envs/test_never_breaks.py -k random_actions
 
 test-peers: setup
 	@echo 'pip install mujoco exudyn' && $(PY) -m pip install -q -c constraints.txt -e '.[peers]'
-	@echo 'pytest tests/peers' && $(PY) -m pytest -q -m '' tests/peers
+	@echo 'pytest tests/peers' && $(PY) -m pytest -q $(LONG) -m '' tests/peers
 
 test-ecosystem: setup
 	@$(PY) -m tests.ecosystem.run $(ARGS)

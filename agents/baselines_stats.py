@@ -12,8 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hoof_env.errors import ParameterError
-
 Floats = NDArray[np.float64]
 
 

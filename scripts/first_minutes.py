@@ -2,7 +2,8 @@
 
     python scripts/first_minutes.py          prints seconds of each step; everything is in a temporary folder
 
-It installs the tested versions (constraints.txt), PyTorch for the CPU, and runs examples/first_curve.py.
+It installs the tested versions (constraints.txt), PyTorch for the CPU (TORCH_INDEX), and runs
+examples/first_curve.py.
 """
 
 from __future__ import annotations
@@ -13,6 +14,8 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+
+from setup_venv import TORCH_INDEX
 
 ROOT = Path(__file__).resolve().parents[1]
 MAKE = (
@@ -26,6 +29,8 @@ def main() -> int:
         folder = Path(name)
         python = folder / "venv" / "bin" / "python"
         install = [str(python), "-m", "pip", "install", "-q", "-c", str(ROOT / "constraints.txt")]
+        if TORCH_INDEX:
+            install += ["--extra-index-url", TORCH_INDEX, "--retries", "1"]
         steps: dict[str, list[str]] = {
             "virtual environment": [sys.executable, "-m", "venv", str(folder / "venv")],
             "build of the wheel": [

@@ -1,4 +1,4 @@
-"""Set-up: what it says when something is missing, and that it does nothing twice."""
+"""Set-up: what it says when something is missing, where packages come from, that it does nothing twice."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parent.parent
 @pytest.fixture
 def checkout(tmp_path: Path) -> Path:
     """As much of a fresh clone as set-up looks at."""
-    for name in "Makefile", "pyproject.toml", "constraints.txt", "scripts/setup_venv.py":
+    for name in "Makefile", "pyproject.toml", "constraints.txt", "scripts/setup_venv.py", "scripts/lock.py":
         (tmp_path / name).parent.mkdir(exist_ok=True)
         shutil.copy(ROOT / name, tmp_path / name)
     return tmp_path
@@ -41,8 +41,8 @@ def installs(setup: ModuleType, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Set-up with the installing itself replaced by a note of what was asked for."""
     done: list[str] = []
 
-    def install(anew: bool) -> None:
-        done.append("anew" if anew else "update")
+    def install(purpose: str, anew: bool) -> None:
+        done.append(f"{purpose} anew" if anew else f"{purpose} more")
         setup.venv("").mkdir(exist_ok=True)
 
     monkeypatch.setattr(setup, "install", install)
@@ -124,7 +124,7 @@ def test_unreachable_package_index(checkout: Path) -> None:
     with socket.socket() as unused:
         unused.bind(("127.0.0.1", 0))
         nowhere = f"http://127.0.0.1:{unused.getsockname()[1]}/simple"
-    ours = {name: value for name, value in os.environ.items() if not name.startswith("PIP_")}
+    ours = {name: value for name, value in os.environ.items() if not name.startswith(("PIP_", "UV_"))}
     ours |= {
         "PIP_CONFIG_FILE": os.devnull,
         "PIP_INDEX_URL": nowhere,
@@ -136,6 +136,7 @@ def test_unreachable_package_index(checkout: Path) -> None:
     assert ended.returncode == 1
     assert len(ended.stderr.splitlines()) == 1
     assert "the package index cannot be reached" in ended.stderr
+    assert "no uv here: the package index cannot be reached" in ended.stdout
     assert not (checkout / ".venv" / "set-up.stamp").exists()
 
 
@@ -154,12 +155,141 @@ def test_makefile_and_script_agree_on_the_pythons(setup: ModuleType) -> None:
     assert f"{setup.OLDEST} <= sys.version_info[:2] <= {setup.NEWEST}" in (ROOT / "Makefile").read_text()
 
 
+# Where packages come from
+
+
+@pytest.fixture
+def asked(setup: ModuleType, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """What is asked of pip and uv, which have nothing."""
+    words: list[str] = []
+
+    def packages(tool: str, title: str, *arguments: str, **environment: str) -> None:
+        words.append(" ".join((tool, *(word for word in arguments if word not in setup.ONLY_WHEELS))))
+        raise setup.Missing("nothing here")
+
+    monkeypatch.setattr(setup, "packages", packages)
+    return words
+
+
+def test_pip_installs_where_uv_cannot_be_had(
+    setup: ModuleType, asked: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert setup.installer() == "pip"
+    assert asked == ["pip uv"]
+    assert "no uv here: nothing here; pip installs the same" in capsys.readouterr().out
+
+
+def test_pip_installs_where_it_is_asked_for(
+    setup: ModuleType, asked: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("INSTALLER", "pip")
+    assert setup.installer() == "pip"
+    assert not asked
+
+
+def test_places_of_pytorch_in_their_order(
+    setup: ModuleType,
+    asked: list[str],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(setup.sys, "platform", "linux")
+    monkeypatch.setattr(setup, "TORCH_INDEX", "https://nowhere.example/cpu")
+    monkeypatch.setattr(setup, "pip_settings", lambda: {"find-links": "wheels"})
+    with pytest.raises(setup.Missing, match=r"PyTorch cannot be had for Python 3\.\d+: nothing here"):
+        setup.install_torch("uv")
+    first, second, last = asked
+    assert first == "uv --no-deps torch --no-index"
+    assert second == "uv --no-deps torch --index-url https://nowhere.example/cpu"
+    assert last == "uv torch"
+    assert "PyTorch with CUDA, some gigabytes" in capsys.readouterr().out
+
+
+def test_uv_is_told_what_pip_is_told(
+    setup: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in [name for name in os.environ if name.startswith(("PIP_", "UV_"))]:
+        monkeypatch.delenv(name)
+    monkeypatch.delenv("SSL_CERT_FILE", raising=False)
+    config = tmp_path / "pip.conf"
+    config.write_text(
+        "[global]\nindex-url = https://one.example/simple\nfind-links = far\ncert = mine.pem\n"
+        "[install]\nextra-index-url =\n  https://two.example/simple\n  https://three.example/simple\n"
+        "[list]\nindex-url = https://other.example/simple\n"
+    )
+    monkeypatch.setenv("PIP_CONFIG_FILE", str(config))
+    monkeypatch.setenv("PIP_FIND_LINKS", "near nearer")
+    monkeypatch.setattr(setup, "venv", lambda path: Path(sys.executable))
+    monkeypatch.setenv("UV_DEFAULT_INDEX", "https://uvs.own.example/simple")
+    told = setup.uv_settings()
+    assert told["UV_FIND_LINKS"] == "near,nearer"
+    assert told["UV_INDEX"] == "https://two.example/simple https://three.example/simple"
+    assert told["SSL_CERT_FILE"] == "mine.pem"
+    assert "UV_DEFAULT_INDEX" not in told
+
+
+def uv_pip_compile(setup: ModuleType, *options: str, stdin: str) -> None:
+    """Fail where what is asked for cannot be had as wheels; skip where no index can be reached."""
+    command = [sys.executable, "-m", "uv", "pip", "compile", "--only-binary", ":all:", *options, "-"]
+    environment = {
+        **os.environ,
+        **setup.uv_settings(),
+        "MACOSX_DEPLOYMENT_TARGET": "14.0",
+    }  # PyTorch's oldest
+    ended = subprocess.run(
+        command, input=stdin, env=environment, capture_output=True, text=True, cwd=setup.ROOT
+    )
+    if ended.returncode != 0:
+        reason = setup.why(ended.stderr.splitlines(keepends=True))
+        if setup.UNREACHABLE in reason:
+            pytest.skip(reason)
+        pytest.fail(ended.stderr)
+
+
+@pytest.fixture
+def ours(setup: ModuleType, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    """Set-up that asks the pip of the tests' own environment for its settings."""
+    monkeypatch.setattr(
+        setup, "venv", lambda path: Path(sys.executable) if path == "bin/python" else setup.ROOT / path
+    )
+    return setup
+
+
+@pytest.mark.parametrize(
+    "platform", ["x86_64-manylinux_2_28", "aarch64-manylinux_2_28", "aarch64-apple-darwin"]
+)
+@pytest.mark.parametrize("minor", [11, 12, 13])
+def test_everything_that_is_locked_has_a_wheel(ours: ModuleType, minor: int, platform: str) -> None:
+    assert ours.OLDEST <= (3, minor) <= ours.NEWEST
+    place = ("--python-version", f"3.{minor}", "--python-platform", platform)
+    asked = "\n".join(["hatchling", *ours.requirements("all")])
+    uv_pip_compile(ours, *place, "--constraints", "constraints.txt", stdin=asked)
+
+
+def test_what_has_no_wheel_is_refused(ours: ModuleType) -> None:
+    with pytest.raises(pytest.fail.Exception, match="rliable"):
+        uv_pip_compile(ours, "--python-version", "3.12", stdin="rliable==1.2.0\n")
+
+
+def test_the_lock_is_what_its_command_writes(ours: ModuleType) -> None:
+    uv_pip_compile(ours, stdin="hatchling\n")  # whether there is an index
+    command = [sys.executable, "scripts/lock.py"]
+    subprocess.run(command, cwd=ours.ROOT, check=True, env={**os.environ, **ours.uv_settings()})
+    assert (ours.ROOT / "constraints.txt").read_text() == (ROOT / "constraints.txt").read_text()
+
+
 # Nothing twice
 
 
 def test_second_run_does_nothing(setup: ModuleType, installs: list[str]) -> None:
     assert [setup.main(), setup.main()] == [0, 0]
-    assert installs == ["anew"]
+    assert installs == ["all anew"]
+
+
+def test_what_the_tests_need_is_added_to_the_demos(setup: ModuleType, installs: list[str]) -> None:
+    assert [setup.main(purpose) for purpose in ("demo", "demo", "all", "demo", "all")] == [0] * 5
+    assert installs == ["demo anew", "all more"]
+    assert set(setup.requirements("demo")) < set(setup.requirements("all"))
 
 
 def test_changed_pins_update_what_is_there(setup: ModuleType, installs: list[str]) -> None:
@@ -167,14 +297,14 @@ def test_changed_pins_update_what_is_there(setup: ModuleType, installs: list[str
     with (setup.ROOT / "constraints.txt").open("a") as pins:
         pins.write("another==1.0\n")
     assert setup.main() == 0
-    assert installs == ["anew", "update"]
+    assert installs == ["all anew", "all more"]
 
 
 def test_moved_checkout_is_set_up_anew(setup: ModuleType, installs: list[str]) -> None:
     setup.main()
     setup.ROOT = setup.ROOT.rename(setup.ROOT.with_name("moved"))
     assert setup.main() == 0
-    assert installs == ["anew", "anew"]
+    assert installs == ["all anew", "all anew"]
 
 
 def test_interrupted_setup_is_made_anew(
@@ -183,7 +313,7 @@ def test_interrupted_setup_is_made_anew(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    def interrupted(anew: bool) -> None:
+    def interrupted(purpose: str, anew: bool) -> None:
         setup.venv("").mkdir()
         raise KeyboardInterrupt
 
@@ -191,4 +321,4 @@ def test_interrupted_setup_is_made_anew(
         patch.setattr(setup, "install", interrupted)
         assert setup.main() == 130
     assert setup.main() == 0
-    assert installs == ["anew"]
+    assert installs == ["all anew"]

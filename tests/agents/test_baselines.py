@@ -182,8 +182,8 @@ RLIABLE = {
     "TD3": (32.0399, 29.2091, 36.9014),
     "TQC": (31.0671, 24.7334, 34.1725),
 }
-"""IQM, low and high of the returns of HorseLeg-v0 in docs/baselines/runs.csv, by rliable 1.2.0 (arch 7.2.0): its
-`get_interval_estimates` with 50,000 draws of NumPy's global generator after `seed(0)`, rounded."""
+"""IQM, low and high of the returns of HorseLeg-v0 in docs/baselines/runs.csv, by rliable 1.2.0 (arch 7.2.0):
+its `get_interval_estimates` with 50,000 draws of NumPy's global generator after `seed(0)`, rounded."""
 
 
 @pytest.mark.parametrize("algo", RLIABLE)

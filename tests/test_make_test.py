@@ -1,0 +1,54 @@
+"""`make test` ends whatever a test does: one that kills its process or never ends is named, the run fails."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+TESTS = {
+    "aborts": "import os\ndef test_it(): os.abort()",
+    "leaves": "import ctypes\ndef test_it(): ctypes.CDLL(None).exit(1)",
+    "sleeps": "import time\ndef test_it(): time.sleep(600)",
+    "holds the interpreter's lock": "import ctypes\ndef test_it(): ctypes.PyDLL(None).sleep(600)",
+}
+
+
+def options() -> list[str]:
+    """Those of pytest in `make test`, with two processes."""
+    (line,) = re.findall(r"-m pytest (-q -n auto .*)", (ROOT / "Makefile").read_text())
+    return str(line).replace("-n auto", "-n 2").split()
+
+
+@pytest.mark.parametrize("what", TESTS)
+def test_a_lost_worker_ends_the_run(what: str, tmp_path: Path) -> None:
+    (tmp_path / "pyproject.toml").write_text((ROOT / "pyproject.toml").read_text())
+    (tmp_path / "tests").mkdir()
+    (tmp_path / "tests" / "test_bad.py").write_text(TESTS[what] + "\n")
+    (tmp_path / "tests" / "test_good.py").write_text("def test_it(): pass\n")
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        *options(),
+        "-p",
+        "no:cacheprovider",
+        "-o",
+        "faulthandler_timeout=3",
+    ]
+    started = time.monotonic()
+    ended = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=200)
+    assert ended.returncode == 1, ended.stdout + ended.stderr
+    assert "crashed while running 'tests/test_bad.py::test_it'" in ended.stdout
+    assert "1 failed, 1 passed" in ended.stdout
+    assert time.monotonic() - started < 100
+
+
+def test_a_test_has_a_limit_of_time(pytestconfig: pytest.Config) -> None:
+    assert float(pytestconfig.getini("faulthandler_timeout")) > 0
+    assert pytestconfig.getini("faulthandler_exit_on_timeout")
