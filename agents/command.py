@@ -1,7 +1,9 @@
-"""What the commands of this folder share: key=value arguments, one line for an error, 130 for Ctrl-C."""
+"""What the commands of this folder share: key=value arguments, threads, one line for an error, 130 for
+Ctrl-C."""
 
 from __future__ import annotations
 
+import os
 import sys
 import threading
 import warnings
@@ -9,9 +11,15 @@ from collections.abc import Callable
 from typing import NoReturn
 
 from hoof_env._arguments import parse_pairs
-from hoof_env.errors import HoofEnvError
+from hoof_env.errors import HoofEnvError, check_number
 
-__all__ = ["parse_pairs", "run"]
+__all__ = ["check_threads", "parse_pairs", "run"]
+
+
+def check_threads(threads: int) -> None:
+    """`ParameterError` unless there are as many cores for the threads of torch; more only wait."""
+    usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    check_number("torch_threads", threads, low=1, high=usable)
 
 
 def run(command: Callable[[], int | None]) -> NoReturn:

@@ -28,7 +28,7 @@ from torch import Tensor, nn
 from torch.distributions import Normal
 
 import hoof_env  # noqa: F401  (registers the environments)
-from agents.command import parse_pairs, run
+from agents.command import check_threads, parse_pairs, run
 from hoof_env._output import check_folder, staged
 from hoof_env.errors import HoofEnvError, ParameterError, check_number
 
@@ -76,7 +76,7 @@ class Args:
     device: str = "cpu"
     """torch device; small networks are fastest on the CPU"""
     torch_threads: int = 1
-    """threads of torch"""
+    """threads of torch; on a busy machine more than one are slower"""
 
 
 LIMITS = {
@@ -86,7 +86,6 @@ LIMITS = {
     "batch_size": (2, np.inf),  # advantages are normalised over a batch
     "seed": (0, 2**63),
     "log_std_init": (-20, 20),
-    "torch_threads": (1, 1024),
 }
 """Lowest and highest of what a number of `Args` may be."""
 DIVERGED = "the training diverged: policy or gradient is not finite any more; try a lower learning_rate"
@@ -185,6 +184,7 @@ def learn(args: Args) -> Learned:
     """
     for name, (low, high) in LIMITS.items():
         check_number(name, getattr(args, name), low=low, high=high)
+    check_threads(args.torch_threads)
     for units in args.net_arch:
         check_number("net_arch", units, low=1)
     if args.out:

@@ -21,7 +21,7 @@ import numpy as np
 
 from agents import runs
 from agents.baselines_plan import LEG
-from agents.command import run
+from agents.command import check_threads, run
 from agents.settings import FOLDER, load_settings, model_arguments
 from hoof_env.errors import check_number
 
@@ -108,6 +108,7 @@ def measure(args: Args) -> dict[str, Any]:
 
     check_number("rounds", args.rounds, low=1)
     check_number("rollouts", args.rollouts, low=1)
+    check_threads(args.torch_threads)
     torch.set_num_threads(args.torch_threads)
     settings = load_settings(FOLDER / "ppo.yml", args.env_id)
     native = runs.make_vec_env(args.env_id, settings["n_envs"])

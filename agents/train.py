@@ -13,7 +13,6 @@ machine and versions give the same run, resumed or not (agents/checkpoints.py sa
 from __future__ import annotations
 
 import json
-import os
 import warnings
 from contextlib import closing
 from dataclasses import asdict, dataclass
@@ -25,7 +24,7 @@ import numpy as np
 import yaml
 
 from agents import checkpoints, runs
-from agents.command import parse_pairs, run
+from agents.command import check_threads, parse_pairs, run
 from agents.settings import FOLDER, algorithm_class, load_settings, model_arguments, normalize_arguments
 from agents.watch import EndedError, check_divergence, diverged, make_watch, stop_on_signals
 from hoof_env.errors import HoofEnvError, OutputError, ParameterError, check_number
@@ -62,7 +61,7 @@ class Args:
     device: str = "cpu"
     """torch device; small networks are fastest on the CPU"""
     torch_threads: int = 1
-    """threads of torch"""
+    """threads of torch; on a busy machine more than one are slower"""
 
 
 @dataclass(frozen=True)
@@ -100,7 +99,7 @@ def train(args: Args, *also: Any) -> Trained:
         DivergedError: a loss or the policy is not finite any more; the checkpoints before that stay.
     """
     env_kwargs, settings = checked(args)
-    check_number("torch_threads", args.torch_threads, low=1, high=os.cpu_count() or 1)  # more only wait
+    check_threads(args.torch_threads)
     name = args.env_id.rpartition("/")[2]
     folder = args.out or Path("runs", f"{args.algo}-{name}-s{args.seed}-{datetime.now():%Y%m%d-%H%M%S}")
     record = make_record(args, env_kwargs)

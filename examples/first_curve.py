@@ -5,11 +5,13 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
 
 from hoof_env import Sb3VecEnv
 
+torch.set_num_threads(1)  # more are slower with small networks, many times on a busy machine
 envs = VecMonitor(Sb3VecEnv("hoof_env/HorseLeg-v0", num_envs=64), "first_curve")
 scaled = VecNormalize(envs, norm_obs=False, gamma=0.998)
 settings = {"n_steps": 500, "batch_size": 2000, "n_epochs": 4, "gamma": 0.998, "gae_lambda": 0.995}

@@ -139,6 +139,7 @@ def test_leg_writes_its_folder_and_says_how_it_goes(tmp_path, capsys):
         ({"seed": -1}, "seed"),
         ({"seed": 10**20}, "seed"),
         ({"torch_threads": 10**10}, "torch_threads"),
+        ({"torch_threads": 0}, "torch_threads"),
         ({"learning_rate": np.nan}, "learning_rate"),
         ({"learning_rate": 1e6}, "learning_rate"),
         ({"learning_rate": -1.0}, "learning_rate"),

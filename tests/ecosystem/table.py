@@ -13,6 +13,10 @@ Written by `make test-ecosystem` ({system}, hoof-env {version}, commit {commits}
 of `tests/ecosystem`, through the library's own front door, on all ids that it applies to. Libraries that
 do not fit together have virtual environments of their own (`tests/ecosystem/suite.toml`).
 
+In a training script of yours call `torch.set_num_threads(1)` first, or set `OMP_NUM_THREADS=1`: torch takes
+every core, and its threads spin while they wait for each other, which makes a busy machine ten to thirty
+times as slow ([decisions.md](decisions.md)).
+
 | library | version | what was run | result | s |
 |---|---|---|---|---|
 """

@@ -1,0 +1,48 @@
+"""Torch's threads: one unless more are asked for, none that spin, no more than there are cores."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from agents import command, distribute, ppo_flat, throughput, train
+from hoof_env.errors import ParameterError
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ({}, "1 1 PASSIVE"),
+        ({"OMP_NUM_THREADS": "2", "OMP_WAIT_POLICY": "ACTIVE"}, "2 2 ACTIVE"),
+    ],
+)
+def test_commands_take_one_thread_and_let_others_work_unless_the_user_says_so(given, expected):
+    code = (
+        "import os, agents, torch\n"
+        "print(torch.get_num_threads(), os.environ['OMP_NUM_THREADS'], os.environ['OMP_WAIT_POLICY'])"
+    )
+    ours = {k: v for k, v in os.environ.items() if not k.startswith(("OMP_", "MKL_", "KMP_", "GOMP_"))}
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env=ours | given,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+    )
+    assert done.stdout.strip() == expected
+
+
+def test_no_default_asks_for_more_than_one_thread():
+    for args in (train.Args, ppo_flat.Args, throughput.Args):
+        assert args().torch_threads == 1
+    assert distribute.Trials().cpus_per_trial == 1
+
+
+def test_more_threads_than_this_process_has_cores_are_refused(monkeypatch):
+    monkeypatch.setattr(os, "sched_getaffinity", lambda pid: {3, 5}, raising=False)
+    command.check_threads(2)
+    for threads in (0, 3):
+        with pytest.raises(ParameterError, match=rf"torch_threads: expected .* \[1, 2\], got {threads}"):
+            command.check_threads(threads)
