@@ -20,6 +20,10 @@ class UnknownArgumentError(ParameterError, TypeError):
     """A keyword that an environment does not take: a TypeError too, as of any Python function."""
 
 
+class NotStartedError(HoofEnvError, RuntimeError):
+    """An engine was asked to move before anything was started in it."""
+
+
 class GeometryError(ParameterError):
     """The linkage cannot be assembled or cannot turn through a full revolution."""
 
