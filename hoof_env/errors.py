@@ -28,6 +28,10 @@ class MissingExtraError(HoofEnvError, ImportError):
     """A library that an extra of this package installs is not there."""
 
 
+class NotStartedError(HoofEnvError, RuntimeError):
+    """An engine was asked to move before anything was started in it."""
+
+
 class GeometryError(ParameterError):
     """The linkage cannot be assembled or cannot turn through a full revolution."""
 

@@ -48,7 +48,7 @@ from hoof_env.dynamics.trunk_model import (
 )
 from hoof_env.dynamics.trunk_start import gaits_of, start, which
 from hoof_env.dynamics.trunk_state import STATE, layout, read_state
-from hoof_env.errors import ParameterError, check_choice, check_number
+from hoof_env.errors import NotStartedError, ParameterError, check_choice, check_number
 from hoof_env.gait.motion_law import FilterSettings
 from hoof_env.gait.parameters import GaitParameters
 from hoof_env.ground.contact import Ground
@@ -318,13 +318,17 @@ class TrunkEngine:
 
         Raises:
             ParameterError: the command has a wrong shape or is not finite.
+            NotStartedError: no environment was ever reset.
         """
         steps = count("steps", steps, 0, MOST_STEPS // self.substeps)
         if command is not None:
             self._command(command)
         self._go(steps, account)
-        if steps and self._memory.result.any():
-            self._look()
+        if self._memory.result.any():
+            if np.isnan(self._memory.trunk).all():
+                raise NotStartedError("the engine was asked to move before reset(): expected reset() first")
+            if steps:
+                self._look()
         return self._memory.result.astype(np.int64)
 
     def run(
@@ -337,7 +341,7 @@ class TrunkEngine:
             (num_envs,). Once one does not end OK all stop, and the record is that up to there.
 
         Raises:
-            ParameterError: as `advance`.
+            ParameterError, NotStartedError: as `advance`.
         """
         steps, every = count("steps", steps, low=0), count("every", every)
         self.advance(command, 0)

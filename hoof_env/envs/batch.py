@@ -25,6 +25,7 @@ from hoof_env.dynamics.trunk import ONE_LEG, Trunk
 from hoof_env.dynamics.trunk_engine import TrunkEngine
 from hoof_env.envs import episode as e
 from hoof_env.envs.grounds import make_terrain
+from hoof_env.envs.infos import AT_MEASURED, BEGUN, GAIT, MEASUREMENTS, START, SUMS, named
 from hoof_env.envs.observation import GROUPS, HALF_RANGE, HIGH, LOW, MIDDLE, check_groups, entries, places
 from hoof_env.envs.paper_solver import PaperSolver, check_paper
 from hoof_env.envs.parameters import (
@@ -64,6 +65,8 @@ class EpisodeBatch:
         names: of the observation's entries.
         kernel, desk: one control step of all is `kernel(desk)`; then comes `follow`.
         episode: memory of the episodes, rows as in `episode`, shape (EPISODE_ROWS, columns).
+        begun: what they started with: rows `infos.START`, the gait and what `randomize` drew, a column an
+            environment; not a number where a state does not say.
 
     Raises:
         ParameterError: a setting is out of range or of the wrong type.
@@ -119,6 +122,7 @@ class EpisodeBatch:
         )  # fmt: skip
         self.paper = PaperSolver(s, self.engine, self.substeps) if is_paper else None
         self._varied = np.zeros(num_envs, bool)
+        self.begun = np.full((BEGUN + len(self.randomize), num_envs), np.nan)
         self.names = [entry[0] for entry in entries(self.groups, s.trunk)]
         if not self.names:
             raise ParameterError(f"observation: nothing of {s.observation!r} is observed on a fixed trunk")
@@ -264,6 +268,8 @@ class EpisodeBatch:
             vx=start.speed,
             envs=which,
         )
+        begun = [*(getattr(start, name) for name in START), *start.gaits.T]
+        self.begun[:, which] = [*begun, *(drawn[name] for name in self.randomize)]
         columns[e.ACTION : e.ACTION + 4, which] = self.action_for(start.gaits).T
         columns[e.STEPS, which], columns[e.BEFORE, which], columns[e.ENDED, which] = 0.0, start.x, 0.0
         columns[e.TIME : e.HIGHEST + 1, which] = 0.0
@@ -321,6 +327,23 @@ class EpisodeBatch:
         data[:] = kept
         self._look(self.desk)
 
+    def infos(self, ended: bool = True) -> dict[str, NDArray[Any]]:
+        """What all started with, what is measured of them, and the terms of the last reward, by name: shape
+        (num_envs,), but for "gait", "measured" and "parameters", which are `Named`. `ended` says whether
+        there may be environments that could not be simulated."""
+        n, begun, memory = self.num_envs, self.begun.copy(), self.engine.arrays[0]
+        measured = memory[AT_MEASURED, :n].copy()
+        if ended:
+            broken = self.engine.results != 0
+            measured[-SUMS:, broken] = 0.0  # nothing happened there
+        found: dict[str, NDArray[Any]] = dict(zip(START, begun, strict=False))
+        found["gait"] = begun[len(START) : BEGUN].T.view(GAIT)
+        if self.randomize:
+            found["parameters"] = named(begun[BEGUN:].T, tuple(self.randomize))
+        found["measured"] = measured.T.view(MEASUREMENTS)
+        found.update(zip(e.TERMS, self.episode[e.TERM : e.TERM + len(e.TERMS), :n].copy(), strict=True))
+        return found
+
     def summary(self, env: int) -> dict[str, float]:
         """Figures of an episode, see `summary.summary_of`."""
         return summary_of(self.episode[:, env].tolist(), self.dt)
@@ -365,6 +388,7 @@ class EpisodeBatch:
     def get_state(self) -> dict[str, Any]:
         """Everything that changes, but for the generators."""
         found = {"engine": self.engine.get_state(), "episode": self.episode[:, : self.num_envs].copy()}
+        found["begun"] = self.begun.copy()
         return found | ({"paper": self.paper.get_state()} if self.paper else {})
 
     def set_state(self, state: Mapping[str, Any]) -> None:
@@ -385,11 +409,16 @@ class EpisodeBatch:
             )
         if np.isnan(episode).any():
             raise ParameterError(f"state['episode']: expected numbers, got {episode.tolist()!r:.60}")
+        begun = np.asarray(state.get("begun", np.nan))  # older states do not say
+        if begun.dtype.kind != "f" or begun.shape not in ((), self.begun.shape):
+            raise ParameterError(
+                f"state['begun']: expected numbers, shape {self.begun.shape}, got {state['begun']!r:.60}"
+            )
         of_paper = self.paper.read_state(state.get("paper")) if self.paper else None
         self.engine.set_state(state["engine"])
         if self.paper and of_paper:
             self.paper.set_state(*of_paper)
-        self.episode[:, : self.num_envs] = episode
+        self.episode[:, : self.num_envs], self.begun[:] = episode, begun
         self._varied[:] = True
         self._look(self.desk)
 

@@ -15,8 +15,10 @@ from hoof_env.dynamics.trunk_engine import TrunkEngine
 from hoof_env.dynamics.trunk_model import LIFT_OFF
 from hoof_env.envs import episode as e
 from hoof_env.envs.batch import EpisodeBatch
+from hoof_env.envs.infos import AT_MEASURED, BEGUN, MEASURED, START, SUMS, named
 from hoof_env.envs.keywords import Keywords
 from hoof_env.envs.made import Made
+from hoof_env.envs.raw_observation import UNITS, raw_observation
 from hoof_env.envs.recording import Recording
 from hoof_env.envs.start import check_seed
 from hoof_env.envs.state import check_state, generator_of
@@ -27,7 +29,7 @@ from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
 
 RENDER_MODES = ("human", "rgb_array")
-_SHAPE, _SINGLE = (e.ACTIONS,), np.dtype(np.float32)
+_SHAPE = (e.ACTIONS,)
 
 
 class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
@@ -75,6 +77,8 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         """Views of the batch that every step reads or writes."""
         self._terms = self.batch.episode[e.TERM : e.TERM + len(e.TERMS), 0]
         self._action, self._seen = self.batch.actions[0], self.batch.seen[0]
+        self._taken = memoryview(self._action)
+        self._measured = named(self.batch.engine.arrays[0][AT_MEASURED, 0], MEASURED)
         self._step, self._desk = self.batch.kernel, self.batch.desk
 
     # What pictures, records and policies read
@@ -147,6 +151,21 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._refuse_new("episode_summary")
         return self.batch.summary(0)
 
+    @property
+    def observation_units(self) -> tuple[str, ...]:
+        """Of what `raw_observation` gives, in the observation's order."""
+        return tuple(UNITS[name] for name in self.batch.names)
+
+    def raw_observation(self) -> dict[str, np.float64]:
+        """What is observed now, before it is scaled: by name, in `observation_units`.
+
+        Raises:
+            ResetNeeded: there is no episode yet.
+        """
+        self._refuse_closed("raw_observation")
+        self._refuse_new("raw_observation")
+        return {name: values[0] for name, values in raw_observation(self.batch).items()}
+
     def record(self) -> dict[str, NDArray[np.float64]]:
         """State and report of the engine at every substep of the last control step, or at the start, by name,
         time on the first axis. From the first call on substeps are kept.
@@ -187,12 +206,10 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._state = "running"
         if self._recording is not None:
             self._show(restart=True)
-        info: dict[str, Any] = {
-            name: float(start[name][0]) for name in ("crank_angle", "speed", "height", "x")
-        }
-        info["gait"] = dict(zip(PARAMETERS, start["gaits"][0].tolist(), strict=True))
+        self._begin()
+        info = {**self._begun, "measured": self._measured.copy()}
         if start["parameters"]:
-            info["parameters"] = {name: float(values[0]) for name, values in start["parameters"].items()}
+            info["parameters"] = named([v[0] for v in start["parameters"].values()], [*start["parameters"]])
         return self._seen.copy(), info
 
     def step(
@@ -214,23 +231,26 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             self._refuse_closed("step")
             self._refuse_new("step")
             self._warn_ended()
-        if type(action) is np.ndarray and action.dtype is _SINGLE and action.shape == _SHAPE:
-            self._action[:] = action
-        else:
+        try:
+            self._taken[:] = action  # four float32, the cheapest way
+        except (TypeError, ValueError, BufferError):
             self._take(action)
         if self._recording is not None and np.isfinite(self._action).all():  # else nothing will happen
             self._recording.start()
         said = self._step(self._desk)  # not through the batch: a call costs as much as a substep
-        ended = bool(said) and self.batch.follow(said, (self.np_random,))
-        progress, peak, energy, change, failure, support = self._terms.tolist()
-        info: dict[str, Any] = {
-            "reward_progress": progress,
-            "reward_peak": peak,
-            "reward_energy": energy,
-            "reward_action": change,
-            "reward_failure": failure,
-            "reward_support": support,
-        }
+        ended = said != 0 and self.batch.follow(said, (self.np_random,))
+        terms = self._terms
+        progress, peak, energy, change, failure, support = terms.tolist()
+        info = self._begun.copy()  # all keys are there, and stay in their places
+        info["gait"], info["measured"] = info["gait"].copy(), self._measured.copy()
+        info["reward_progress"] = terms[0]
+        info["reward_peak"] = terms[1]
+        info["reward_energy"] = terms[2]
+        info["reward_action"] = terms[3]
+        if failure:
+            info["reward_failure"] = terms[4]
+        if support:
+            info["reward_support"] = terms[5]
         failed = truncated = False
         if ended:
             failed = bool(self.batch.episode[e.ENDED, 0] == e.FAILED)
@@ -240,6 +260,8 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             info["episode_summary"] = self.batch.summary(0)
             if failed:
                 info["failure"] = self.batch.failure(0)
+            if self.batch.engine.results[0]:  # nothing happened
+                info["measured"][-SUMS:] = 0.0
         if self._recording is not None:
             self._show()
         reward = progress + peak + energy + change + failure + support
@@ -254,6 +276,15 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
                 " or truncated = True. You should always call 'reset()' once you receive either -- any"
                 " further steps are undefined behavior."
             )
+
+    def _begin(self) -> None:
+        """What each info of this episode says of its start, and the keys of what a step fills in."""
+        row, n = self.batch.begun[:, 0].copy(), len(START)
+        self._begun: dict[str, Any] = dict(zip(START, row, strict=False))
+        self._begun["gait"] = named(row[n:BEGUN], PARAMETERS)
+        if self.batch.randomize:
+            self._begun["parameters"] = named(row[BEGUN:], [*self.batch.randomize])
+        self._begun |= {"measured": None, **dict.fromkeys(e.TERMS, np.float64(0.0))}
 
     def _take(self, action: Any) -> None:
         """Put an action where the kernel finds it."""
@@ -343,13 +374,14 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.batch.set_state(state)
         self.np_random = generator
         self._state = "ended" if self.batch.episode[e.ENDED, 0] else "running"
+        self._begin()
         if self._recording is not None:
             self._recording.forget()
         return self._seen.copy()
 
     def __getstate__(self) -> dict[str, Any]:
         """Copies and pickles leave the window behind; it belongs to this process and this environment."""
-        views = ("_terms", "_action", "_seen", "_step", "_desk")
+        views = ("_terms", "_action", "_seen", "_taken", "_measured", "_step", "_desk")
         return {**{k: v for k, v in vars(self).items() if k not in views}, "_renderer": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:

@@ -23,19 +23,23 @@ from hoof_env.dynamics.arguments import count
 from hoof_env.dynamics.trunk_model import LIFT_OFF
 from hoof_env.envs import episode as e
 from hoof_env.envs.batch import EpisodeBatch
+from hoof_env.envs.infos import named
 from hoof_env.envs.keywords import Keywords
 from hoof_env.envs.made import Made
 from hoof_env.envs.recording import Recording
+from hoof_env.envs.rows import Rows
 from hoof_env.envs.state import check_state, generator_of
 from hoof_env.envs.tasks import TASKS, to_json
-from hoof_env.envs.vector_arguments import actions_of, ended_of, mask_of, mode_of, seeds_of
+from hoof_env.envs.vector_arguments import actions_of, drawn_of, ended_of, mask_of, mode_of, seeds_of
 from hoof_env.errors import ParameterError, check_choice
-from hoof_env.gait.parameters import PARAMETERS
 
 MOST_ENVS = 1_000_000
 
+MOST_DRAWN = 16
+"""So many are drawn by default; a picture takes as long as some hundred steps."""
 
-class HorseLegVectorEnv(Made, VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]):
+
+class HorseLegVectorEnv(Made, Rows, VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]):
     """`num_envs` environments of a task, stepped together.
 
     Args:
@@ -44,12 +48,13 @@ class HorseLegVectorEnv(Made, VectorEnv[NDArray[np.float32], NDArray[np.float32]
         autoreset_mode: an `AutoresetMode`, its name or its value: NEXT_STEP, SAME_STEP or DISABLED.
         max_episode_steps: episodes are no longer than so many control steps, as under Gymnasium's TimeLimit;
             else `episode_seconds` alone ends them.
-        render_mode: "rgb_array"; `render` gives a frame of each of the first `rendered` environments.
-        rendered: how many are drawn.
+        render_mode: "rgb_array"; `render` gives a frame of each environment.
+        rendered: how many are drawn, the first ones; frames of the others are black. None is all, of at most
+            `MOST_DRAWN`.
 
-    Rewards are float64, shape (num_envs,). Infos hold the reward terms; when an episode ends its
-    figures, too, as "episode_summary", one array for each figure, with masks under "_episode_summary", and
-    why it failed as "failure".
+    Rewards are float64, shape (num_envs,). Infos are those of the single environment as arrays; when an
+    episode ends they have its figures, too, as "episode_summary", one array for each figure, with masks under
+    "_episode_summary", and why it failed as "failure".
 
     Raises:
         ParameterError: a bad argument, option or action.
@@ -67,7 +72,7 @@ class HorseLegVectorEnv(Made, VectorEnv[NDArray[np.float32], NDArray[np.float32]
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         max_episode_steps: int | None = None,
         render_mode: str | None = None,
-        rendered: int = 1,
+        rendered: int | None = None,
         **settings: Unpack[Keywords],
     ) -> None:
         self.num_envs = count("num_envs", num_envs, most=MOST_ENVS)
@@ -89,9 +94,10 @@ class HorseLegVectorEnv(Made, VectorEnv[NDArray[np.float32], NDArray[np.float32]
             "autoreset_mode": self.autoreset_mode,
         }
         self.render_mode, self.spec = render_mode, None
-        drawn = min(count("rendered", rendered), self.num_envs) if render_mode else 0
+        drawn = drawn_of(rendered, self.num_envs, MOST_DRAWN) if render_mode else 0
         self._recordings = [Recording(self.batch, env) for env in range(drawn)]
         self._renderers: list[Any] = []
+        Rows.__init__(self)
         self._generators: list[np.random.Generator] = []
         self._ended = np.zeros(self.num_envs, bool)
         self._started = np.zeros(self.num_envs, bool)
@@ -118,11 +124,15 @@ class HorseLegVectorEnv(Made, VectorEnv[NDArray[np.float32], NDArray[np.float32]
         mask = mask_of(rest.pop("reset_mask", None) if isinstance(rest, dict) else None, self.num_envs)
         checked = self.batch.check_options(rest)
         self._seed(seed, mask)
-        start = self._start(np.flatnonzero(mask), checked)
+        parameters = self._start(np.flatnonzero(mask), checked)
         self._ended[mask] = False
         observations = self._observed()
         observations[~self._started] = 0.0
-        return observations, start
+        infos: dict[str, Any] = self.batch.infos()
+        if parameters:
+            infos["parameters"] = named(np.zeros((self.num_envs, len(parameters))), [*parameters])
+            infos["parameters"][mask] = np.transpose([*parameters.values()])
+        return observations, infos | {f"_{key}": mask.copy() for key in infos}
 
     def step(
         self, actions: NDArray[np.float32]
@@ -144,45 +154,44 @@ class HorseLegVectorEnv(Made, VectorEnv[NDArray[np.float32], NDArray[np.float32]
                 "expected reset(options={'reset_mask': ...})"
             )
         batch.actions[:n] = actions_of(actions, n)
-        for recording in self._recordings:
+        for recording in (*self._recordings, *self._watched.values()):
             recording.start()
-        batch.step(self._generators, again)
+        said = batch.step(self._generators, again)
         ended = batch.episode[e.ENDED, :n]
         terminated, truncated = ended == e.FAILED, ended == e.TRUNCATED
-        terms = batch.episode[e.TERM : e.TERM + len(e.TERMS), :n].copy()
-        infos: dict[str, Any] = {}
         if again is not None:  # NEXT_STEP: these were not stepped, they start
-            terms[:, again], terminated[again], truncated[again] = 0.0, False, False
-        done = terminated | truncated
+            terminated[again], truncated[again] = False, False
+            self._start(np.flatnonzero(again), {})
+        done, infos = terminated | truncated, batch.infos(said)
+        progress, *others = (infos[name] for name in e.TERMS)
+        rewards = sum(others, start=progress)
         if done.any():
             self._sum_up(infos, np.flatnonzero(done))
-        rewards = terms[0] + terms[1] + terms[2] + terms[3] + terms[4] + terms[5]
-        infos |= dict(zip(e.TERMS, terms, strict=True))
-        if again is not None:
-            infos |= self._start(np.flatnonzero(again), {})
         if done.any() and self.autoreset_mode == AutoresetMode.SAME_STEP:
-            self._same_step(infos, done)
+            infos = self._same_step(infos, done)
             done = np.zeros(n, bool)
         else:
             self._show()
         self._ended = done
         return self._observed(), rewards, terminated, truncated, infos
 
-    def _same_step(self, infos: dict[str, Any], done: NDArray[np.bool_]) -> None:
-        """Start again at once what ended; what it ended with goes into the infos."""
+    def _same_step(self, final: dict[str, Any], done: NDArray[np.bool_]) -> dict[str, Any]:
+        """Start again at once what ended; the infos then, with what it ended with."""
         last = np.full(self.num_envs, None, dtype=object)
         for env in np.flatnonzero(done):
             last[env] = self.batch.seen[env].copy()
-        final = {key: copy.deepcopy(value) for key, value in infos.items() if not key.startswith("_")}
-        masks = {f"_{key}": infos.get(f"_{key}", done).copy() for key in final}
         self._show()
-        start = self._start(np.flatnonzero(done), {})
+        self._start(np.flatnonzero(done), {})
+        infos: dict[str, Any] = self.batch.infos()
+        infos |= {key: copy.deepcopy(value) for key, value in final.items() if key not in infos}
+        final |= {
+            f"_{key}": done.copy() for key in final if not key.startswith("_") and f"_{key}" not in final
+        }
         infos |= {"final_obs": last, "_final_obs": done.copy()}
-        infos |= {"final_info": final | masks, "_final_info": done.copy()}
-        infos |= start
+        return infos | {"final_info": final, "_final_info": done.copy()}
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
-        """Frames of the first environments, (H, W, 3) uint8 each."""
+        """A frame of each environment, (H, W, 3) uint8: those that are drawn, then black ones."""
         if self.render_mode is None:
             gym.logger.warn("render() was called without a render_mode: pass render_mode='rgb_array'")
             return None
@@ -202,7 +211,9 @@ class HorseLegVectorEnv(Made, VectorEnv[NDArray[np.float32], NDArray[np.float32]
             )  # fmt: skip
         for recording, renderer in zip(self._recordings, self._renderers, strict=True):
             recording.draw(renderer)
-        return tuple(renderer.frame() for renderer in self._renderers)
+        frames = [renderer.frame() for renderer in self._renderers]
+        black = np.broadcast_to(np.uint8(0), frames[0].shape)
+        return (*frames, *[black] * (self.num_envs - len(frames)))
 
     def close_extras(self, **kwargs: Any) -> None:
         """Give the renderers back."""
@@ -213,20 +224,16 @@ class HorseLegVectorEnv(Made, VectorEnv[NDArray[np.float32], NDArray[np.float32]
     # Parts of it
 
     def _start(self, envs: NDArray[np.int64], options: Mapping[str, Any]) -> dict[str, Any]:
-        """Start episodes; what was drawn, as infos."""
-        for recording in self._recordings:
+        """Start episodes; the parameters that were set or drawn for them, by name."""
+        drawn = [recording for recording in self._recordings if recording.env in envs]
+        for recording in (*drawn, *(self._watched[env] for env in self._watched if env in envs)):
             recording.start()
         start = self.batch.reset(envs, [self._generators[env] for env in envs], options)
         self._started[envs] = True
-        for recording in self._recordings:
-            if recording.env in envs:
-                recording.keep(True)
-        infos = self._rows({name: start[name] for name in ("crank_angle", "speed", "height", "x")}, envs)
-        gaits = dict(zip(PARAMETERS, start["gaits"].T, strict=True))
-        infos |= {"gait": self._rows(gaits, envs), "_gait": self._of(envs)}
-        if start["parameters"]:
-            infos |= {"parameters": self._rows(start["parameters"], envs), "_parameters": self._of(envs)}
-        return infos
+        for recording in drawn:
+            recording.keep(True)
+        found: dict[str, Any] = start["parameters"]
+        return found
 
     def _of(self, envs: NDArray[np.int64]) -> NDArray[np.bool_]:
         """A mask of some environments."""
@@ -303,7 +310,7 @@ class HorseLegVectorEnv(Made, VectorEnv[NDArray[np.float32], NDArray[np.float32]
         generators = [generator_of(values) for values in states]
         self.batch.set_state(state)
         self._ended, self._started, self._generators = ended, np.ones(n, bool), generators
-        for recording in self._recordings:
+        for recording in (*self._recordings, *self._watched.values()):
             recording.forget()
         return self._observed()
 

@@ -30,6 +30,23 @@ def mode_of(value: Any) -> AutoresetMode:
         raise ParameterError(f"autoreset_mode: expected one of {names}, got {value!r}") from None
 
 
+def drawn_of(rendered: Any, n: int, most: int) -> int:
+    """How many of `n` environments are drawn; None is all, if they are at most `most`.
+
+    Raises:
+        ParameterError: more than there are, or nobody said how many of more than `most`.
+    """
+    if rendered is None and n > most:
+        raise ParameterError(
+            f"rendered: expected how many of the {n} environments to draw, as they are more than {most}; for"
+            " Gymnasium's RecordVideo rendered=1 goes with record_first_only=True"
+        )
+    drawn = n if rendered is None else count("rendered", rendered)
+    if drawn > n:
+        raise ParameterError(f"rendered: expected at most num_envs={n}, got {drawn}")
+    return drawn
+
+
 def actions_of(actions: Any, n: int) -> NDArray[np.float32]:
     """Finite actions, shape (n, 4).
 

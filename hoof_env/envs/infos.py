@@ -1,0 +1,110 @@
+"""What infos say besides the reward: where a leg is, what acts on it, and rows of numbers that have names.
+
+The single environment's infos hold NumPy's scalars and rows, those of many hold arrays of them, under the
+same keys at a reset and at a step: libraries that stack infos ask for that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import ItemsView, KeysView, Mapping, Sequence, ValuesView
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hoof_env.dynamics import limb_rows as b
+from hoof_env.dynamics.advance import AT_REPORT, LIMB, TRUNK_ROWS
+from hoof_env.dynamics.lanes_report import TRUNK_REPORT
+from hoof_env.gait.parameters import PARAMETERS
+
+START = ("crank_angle", "speed", "height", "x")
+"""What an episode starts with, besides its gait and the parameters that are drawn."""
+
+BEGUN = len(START) + len(PARAMETERS)
+"""How many numbers these are; those drawn follow."""
+
+MEASURED = (*TRUNK_REPORT, "result", *b.STATE, *b.STRIDES, *b.STRIDE_SUMS)
+"""What an info measures, neighbours in the engine's memory: one copy, whoever looks at it."""
+
+AT_MEASURED = slice(AT_REPORT, TRUNK_ROWS + LIMB["stride_sums"].stop)
+SUMS = len(b.STRIDE_SUMS)
+"""The rows of the engine's memory; the last so many are of the last control step, the others of its end."""
+
+
+class Named(np.ndarray[Any, np.dtype[np.float64]]):
+    """Numbers that have names along the last axis: `row["crank_speed"]` is `row[..., 0]`.
+
+    An array to libraries, and to people also a mapping; made by `named`. Equality is that of mappings where
+    the other one has names, too.
+    """
+
+    __slots__ = ()  # no dictionary, which would take as long to make as the array
+    names: tuple[str, ...] = ()
+
+    def __getitem__(self, key: Any) -> Any:
+        """By name or by position."""
+        if isinstance(key, str):
+            if key not in self.names:
+                raise KeyError(key)
+            key = (..., self.names.index(key))
+        return np.asarray(self)[key][()]
+
+    def _mapping(self) -> dict[str, Any]:
+        return {name: self[name] for name in self.names}
+
+    def keys(self) -> KeysView[str]:
+        """The names."""
+        return self._mapping().keys()
+
+    def values(self) -> ValuesView[Any]:
+        """The numbers of each name."""
+        return self._mapping().values()
+
+    def items(self) -> ItemsView[str, Any]:
+        """Both."""
+        return self._mapping().items()
+
+    def __contains__(self, key: Any) -> bool:
+        return key in self.names if isinstance(key, str) else super().__contains__(key)
+
+    def __bool__(self) -> bool:
+        return bool(self.names)
+
+    def __eq__(self, other: Any) -> Any:
+        if isinstance(other, Named | Mapping):
+            return self._mapping() == dict(other.items())
+        return super().__eq__(other)
+
+    def __ne__(self, other: Any) -> Any:
+        return not self == other if isinstance(other, Named | Mapping) else super().__ne__(other)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __reduce__(self) -> Any:
+        return named, (np.array(self), self.names)
+
+
+@cache
+def _kind(names: tuple[str, ...]) -> type[Named]:
+    """A class for each set of names: views and copies of a row have them without another thought."""
+    return type("Named", (Named,), {"names": names, "__slots__": (), "__doc__": Named.__doc__})
+
+
+def named(values: ArrayLike, names: Sequence[str]) -> Named:
+    """A view of some numbers, shape (..., len(names)), that has names."""
+    return np.asarray(values, np.float64).view(_kind(tuple(names)))
+
+
+GAIT, MEASUREMENTS = _kind(PARAMETERS), _kind(MEASURED)
+"""Kinds of `Named`, to view arrays as."""
+
+
+def row_of(infos: Mapping[str, Any], env: int) -> dict[str, Any]:
+    """The info of one environment from those of many, where they are about it."""
+    found = {}
+    for key, values in infos.items():
+        if not key.startswith("_") and infos.get(f"_{key}", np.ones(env + 1, bool))[env]:
+            is_named = isinstance(values, Named)
+            found[key] = named(values[env].copy(), values.names) if is_named else values[env]
+    return found
