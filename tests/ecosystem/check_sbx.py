@@ -1,4 +1,4 @@
-"""SBX, Stable-Baselines3's algorithms in JAX: on its vector environments and on the native one, on every id."""
+"""SBX, Stable-Baselines3's algorithms in JAX, on every id."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ def env(request, env_id):
 
 
 def test_wrap_env(env_id, env):
-    """`wrap_env`, single, sync and native: the environment's own data, the last observations of episodes too."""
+    """`wrap_env`, single, sync and native: the environment's own data over the ends of episodes."""
     observations, _ = env.reset()
     assert observations.shape == (env.num_envs, *env.observation_space.shape)
     alone = [gym.make(env_id, episode_seconds=SECONDS) for _ in range(env.num_envs)]

@@ -1,4 +1,4 @@
-"""CleanRL's scripts as they are ported to Gymnasium 1: their stack of wrappers, and what they read of `infos`."""
+"""CleanRL's scripts ported to Gymnasium 1: their stack of wrappers, and what they read of `infos`."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def alone(env_id, row, actions):
 
 
 def test_ppo(env_id):
-    """`ppo_continuous_action.py`: its wrappers in a `SyncVectorEnv`, its update, returns from `final_info`."""
+    """`ppo_continuous_action.py`: wrappers in a `SyncVectorEnv`, the update, returns from `final_info`."""
     torch = pytest.importorskip("torch")
     torch.manual_seed(0)
     envs = gym.vector.SyncVectorEnv([partial(make_env, env_id)] * ROWS, autoreset_mode=MODE)

@@ -1,5 +1,5 @@
-"""Gymnasium's wrappers, single and vector, on every id: each makes what it should of what the environment does
-alone with the same seeds and actions."""
+"""Gymnasium's wrappers, single and vector, on every id: each makes what it should of what the environment
+alone does with the same seeds and actions."""
 
 from __future__ import annotations
 
@@ -217,7 +217,7 @@ def test_single(env_id, case):
 @pytest.mark.parametrize("mode", ["NEXT_STEP", "SAME_STEP"])
 @pytest.mark.parametrize("case", VECTOR, ids=name_of)
 def test_vector(env_id, case, mode):
-    """Native vector, restarting on the next or the same step: each of 11 wrappers against the environment alone."""
+    """Native vector, restarting on the next or the same step: each of 11 wrappers, likewise."""
     wrapper, arguments, actions, change = case
     envs = native(env_id, autoreset_mode=mode, **SHORT)
     if mode == "SAME_STEP" and "Observation" in name_of(case):
@@ -304,7 +304,7 @@ def test_human_rendering(env_id, monkeypatch):
 
 
 def test_dict_info_to_list(env_id):
-    """`DictInfoToList` of a native vector environment: infos row by row, the keys of the environment alone."""
+    """`DictInfoToList` of a native vector environment: row by row the infos of the environment alone."""
     envs, alone = vector.DictInfoToList(native(env_id, **SHORT)), gym.make(env_id, **SHORT)
     told, (_, wanted) = envs.reset(seed=0)[1], alone.reset(seed=0)
     assert told[0].keys() == wanted.keys()

@@ -18,7 +18,7 @@ from scripts.setup_venv import TORCH_INDEX
 ROOT = Path(__file__).resolve().parents[2]
 CACHE = ROOT / ".ecosystem"
 UV = shutil.which("uv", path=os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")]))
-"""Installs in place of pip, several times as fast, where there is one."""
+"""It installs in place of pip, several times as fast, where it is found."""
 
 
 class Failed(Exception):
@@ -85,7 +85,7 @@ class Venv:
             self._pip("--no-binary", "hoof-env", "--no-build-isolation", "--editable", f".{extras}")
 
     def _torch(self) -> None:
-        """PyTorch for the CPU, from find-links or TORCH_INDEX; else it comes with the rest, perhaps with CUDA."""
+        """PyTorch for the CPU. Where neither has it, it comes with the rest, perhaps with CUDA."""
         for source in ("--no-index",), ("--index-url", TORCH_INDEX):
             with suppress(Failed):
                 return self._pip("--no-deps", "torch", *source)
