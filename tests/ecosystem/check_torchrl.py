@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gymnasium as gym
+import numpy as np
 import pytest
 import torch
 from torchrl.collectors import Collector
@@ -11,15 +12,68 @@ from torchrl.envs.utils import RandomPolicy
 
 torch.set_num_threads(1)
 
+SHORT = {"episode_seconds": 0.2}
+"""Episodes of ten steps."""
+
 
 def test_gym_env(env_id):
     """`GymEnv` and `check_env_specs`."""
     check_env_specs(GymEnv(env_id, device="cpu"), seed=0)
 
 
+def test_gym_env_of_several(env_id):
+    """`GymEnv` with `num_envs=2`, spawned, `hoof_env:` before the id: the environment's own data."""
+    env = GymEnv(f"hoof_env:{env_id}", num_envs=2, device="cpu", **SHORT)
+    try:
+        check_env_specs(env)
+        steps = rollout(env)
+    finally:
+        env.close()
+    # Of Gymnasium's own environments, too, TorchRL loses the last observations in such a one
+    assert_plays_again(env_id, steps, last=torch.zeros_like)
+
+
+def rollout(env):
+    """Random steps over the ends of episodes."""
+    return env.rollout(25, auto_reset=False, tensordict=env.reset(seed=3), break_when_any_done=False)
+
+
+def assert_plays_again(env_id, steps, last=lambda observation: observation, episodes=2):
+    """What a rollout holds is what the environment does, a last observation what `last` makes of it."""
+    for row, played in enumerate(steps.unbind(0)):
+        alone = gym.make(env_id, **SHORT)
+        observation, _ = alone.reset(seed=3 + row)
+        ends = 0
+        for step in played.unbind(0):
+            np.testing.assert_array_equal(step["observation"], observation)
+            observation, reward, terminated, truncated, _ = alone.step(step["action"].numpy())
+            assert step["next", "reward"].item() == np.float32(reward)
+            assert step["next", "done"].item() == (terminated or truncated)
+            ended = terminated or truncated
+            wanted = last(torch.tensor(observation)) if ended else observation
+            np.testing.assert_array_equal(step["next", "observation"], wanted)
+            if ended:
+                observation, _ = alone.reset()
+                ends += 1
+            if ends == episodes:
+                break
+        assert ends == episodes
+
+
+def test_info(env_id):
+    """`auto_register_info_dict`: every number of `infos` in the rollout, over the end of an episode."""
+    env = GymEnv(env_id, device="cpu", **SHORT).auto_register_info_dict()
+    check_env_specs(env, seed=0)
+    steps = env.rollout(25, break_when_any_done=False)["next"]
+    assert steps["done"].sum() >= 2
+    terms = [term for key, term in steps.items() if key.startswith("reward_")]
+    assert terms
+    torch.testing.assert_close(sum(terms).squeeze(), steps["reward"].double().squeeze(), rtol=0, atol=1e-6)
+
+
 def test_gym_wrapper(env_id):
     """`GymWrapper`, `check_env_specs` and a rollout."""
-    env = GymWrapper(gym.make(env_id, episode_seconds=0.2), device="cpu")
+    env = GymWrapper(gym.make(env_id, **SHORT), device="cpu")
     check_env_specs(env, seed=0)
     steps = env.rollout(50)
     assert len(steps) <= 10
@@ -29,17 +83,19 @@ def test_gym_wrapper(env_id):
 
 @pytest.mark.parametrize("mode", ["same_step", "disabled"])
 def test_native_vector(env_id, mode):
-    """`GymWrapper` of the native vector environment, restarting on the same step or not at all."""
+    """`GymWrapper` of the native vector environment, restarting on the same step or not: its own data."""
     if gym.spec(env_id).vector_entry_point is None:
         pytest.skip("no native vector environment")
-    mode = gym.vector.AutoresetMode[mode.upper()]
-    envs = gym.make_vec(env_id, num_envs=4, vectorization_mode="vector_entry_point", autoreset_mode=mode)
-    check_env_specs(GymWrapper(envs, device="cpu"), seed=0)
+    settings = {"vectorization_mode": "vector_entry_point", "autoreset_mode": mode.upper(), **SHORT}
+    env = GymWrapper(gym.make_vec(env_id, num_envs=4, **settings), device="cpu")
+    check_env_specs(env, seed=0)
+    # One that has restarted by itself TorchRL restarts again, which skips a start
+    assert_plays_again(env_id, rollout(env), episodes=1 if mode == "same_step" else 2)
 
 
 def test_collector(env_id):
     """`Collector`: 200 random steps over the ends of episodes."""
-    env = GymWrapper(gym.make(env_id, episode_seconds=0.2), device="cpu")
+    env = GymWrapper(gym.make(env_id, **SHORT), device="cpu")
     collector = Collector(env, RandomPolicy(env.action_spec), frames_per_batch=100, total_frames=200)
     batches = list(collector)
     assert sum(batch.numel() for batch in batches) == 200

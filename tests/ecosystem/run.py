@@ -76,9 +76,12 @@ def main() -> int:
     return 1 if failed else 0
 
 
-def check(name: str, libraries: list[str], seconds: float, venv: str | None = None) -> dict[str, Any]:
+def check(
+    name: str, libraries: list[str], seconds: float, venv: str | None = None, note: str = ""
+) -> dict[str, Any]:
     """Run one check and return its versions, the rows of its tests, and what ended it early, if anything."""
     result: dict[str, Any] = {"name": name, "libraries": libraries, "commit": _commit(), "rows": []}
+    result["note"] = note.strip()
     place = VENVS[venv] if venv else None
     try:
         if place:

@@ -21,6 +21,11 @@ times as slow ([decisions.md](decisions.md)).
 |---|---|---|---|---|
 """
 
+NOTES = """
+## What to know
+
+"""
+
 
 def verdict(result: dict[str, Any]) -> tuple[bool, str]:
     """Whether a check is good, and its result in a line."""
@@ -34,11 +39,13 @@ def verdict(result: dict[str, Any]) -> tuple[bool, str]:
 
 
 def markdown(results: list[dict[str, Any]]) -> str:
-    """The page: `HEAD` and one row for each test function of each check."""
+    """The page: `HEAD`, one row for each test function of each check, and the notes."""
     commits = ", ".join(sorted({result["commit"] for result in results}))
     system = f"Python {platform.python_version()}, {platform.system()} {platform.machine()}"
     page = HEAD.format(system=system, version=hoof_env.__version__, commits=commits)
-    return page + "".join(row + "\n" for result in results for row in _rows(result))
+    page += "".join(row + "\n" for result in results for row in _rows(result))
+    notes = [f"* **{', '.join(r['libraries'])}**: {r['note']}\n" for r in results if r.get("note")]
+    return page + (NOTES + "".join(notes) if notes else "")
 
 
 def _rows(result: dict[str, Any]) -> list[str]:

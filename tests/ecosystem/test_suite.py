@@ -42,7 +42,7 @@ def result(tmp_path, monkeypatch, request):
     (tmp_path / "check_sample.py").write_text(PROGRAM.replace("WAIT", str(sleeps)))
     (tmp_path / "pytest.ini").touch()
     monkeypatch.setattr(run, "CHECKOUT_FOLDER", tmp_path)
-    return run.check("check_sample", libraries=["gymnasium"], seconds=seconds)
+    return run.check("check_sample", libraries=["gymnasium"], seconds=seconds, note="Mind the gap.")
 
 
 @pytest.mark.parametrize("result", [(0, 300)], indirect=True)
@@ -59,6 +59,7 @@ def test_a_failure_is_told_and_does_not_stop_the_rest(result):
         f"| gymnasium | {version} | Skips | 1 skipped (not yet)",
         f"| gymnasium | {version} | Never ends | 1 passed",
     ]
+    assert page[-1] == "* **gymnasium**: Mind the gap."
 
 
 @pytest.mark.parametrize("result", [(600, 12)], indirect=True)
