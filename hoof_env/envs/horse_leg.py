@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
@@ -194,7 +195,7 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self._recording is not None:
             self._show(restart=True)
         self._begin()
-        info = {**self._begun, "measured": self._measured.copy()}
+        info = copy.deepcopy(self._begun) | {"measured": self._measured.copy()}
         if start["parameters"]:
             info["parameters"] = named([v[0] for v in start["parameters"].values()], [*start["parameters"]])
         return self._seen.copy(), info
@@ -229,6 +230,8 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         progress, peak, energy, change, failure, support = terms.tolist()
         info = self._begun.copy()  # all keys are there, and stay in their places
         info["gait"], info["measured"] = info["gait"].copy(), self._measured.copy()
+        if self.batch.randomize:
+            info["parameters"] = info["parameters"].copy()
         info["reward_progress"] = terms[0]
         info["reward_peak"] = terms[1]
         info["reward_energy"] = terms[2]
