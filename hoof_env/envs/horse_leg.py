@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
 from typing import Any, ClassVar, Unpack
 
@@ -77,7 +78,7 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         """Views of the batch that every step reads or writes."""
         self._terms = self.batch.episode[e.TERM : e.TERM + len(e.TERMS), 0]
         self._action, self._seen = self.batch.actions[0], self.batch.seen[0]
-        self._taken = memoryview(self._action)
+        self._taken: Any = memoryview(self._action)
         self._measured = named(self.batch.engine.arrays[0][AT_MEASURED, 0], MEASURED)
         self._step, self._desk = self.batch.kernel, self.batch.desk
 
@@ -207,7 +208,7 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self._recording is not None:
             self._show(restart=True)
         self._begin()
-        info = {**self._begun, "measured": self._measured.copy()}
+        info = copy.deepcopy(self._begun) | {"measured": self._measured.copy()}
         if start["parameters"]:
             info["parameters"] = named([v[0] for v in start["parameters"].values()], [*start["parameters"]])
         return self._seen.copy(), info
@@ -243,6 +244,8 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         progress, peak, energy, change, failure, support = terms.tolist()
         info = self._begun.copy()  # all keys are there, and stay in their places
         info["gait"], info["measured"] = info["gait"].copy(), self._measured.copy()
+        if self.batch.randomize:
+            info["parameters"] = info["parameters"].copy()
         info["reward_progress"] = terms[0]
         info["reward_peak"] = terms[1]
         info["reward_energy"] = terms[2]

@@ -18,6 +18,9 @@ from hoof_env.envs.tasks import PER_EPISODE
 from hoof_env.errors import ParameterError
 
 Floats = NDArray[np.float64]
+OWN = ("weight", "render", "episode_summary", "raw_observation", "record", "np_random")
+"""What each environment has of its own; the rest is of all."""
+
 SINGLE = {"action_space": "single_action_space", "observation_space": "single_observation_space"}
 
 
@@ -53,6 +56,11 @@ class Rows:
     def observation_units(self) -> tuple[str, ...]:
         """Of what `raw_observation` gives, in the observation's order."""
         return tuple(UNITS[name] for name in self.batch.names)
+
+    @property
+    def drawn(self) -> int:
+        """How many are drawn, the first ones."""
+        return len(self._recordings)
 
     @property
     def weight(self) -> Floats:
@@ -148,11 +156,11 @@ class Rows:
             raise AttributeError(f"{type(self).__name__}: the environments have no attribute {name!r}")
         found = getattr(owner, name)
         found = found(*args, **kwargs) if callable(found) else found
-        if name in ("weight", "render") and found is not None:
-            return [found[env] for env in chosen]
-        if name in ("episode_summary", "raw_observation"):
+        if name not in OWN or found is None:
+            return [found] * len(chosen)
+        if isinstance(found, dict):
             return [{key: values[env] for key, values in found.items()} for env in chosen]
-        return [found] * len(chosen)
+        return [found[env] for env in chosen]
 
     def _refuse(self, name: str) -> None:
         if not self._started.all():

@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
 from hoof_env.envs import episode as e
+from hoof_env.envs.infos import row_of
 from hoof_env.envs.keywords import VectorKeywords
+from hoof_env.envs.rows import OWN
 from hoof_env.envs.vector import HorseLegVectorEnv
 from hoof_env.errors import ParameterError
 
@@ -21,8 +23,9 @@ class Sb3VecEnv(VecEnv):
     """`num_envs` environments of an id for Stable-Baselines3, all stepped in one call.
 
     Wrap it in `VecMonitor` for episode returns. When an episode ends its info has "terminal_observation",
-    "TimeLimit.truncated" and "episode_summary"; the reward's terms are not in the infos, for a dictionary an
-    environment and step costs more than the simulation: `terms` has those of the last step.
+    "TimeLimit.truncated" and "episode_summary"; nothing else is in the infos, for a dictionary an environment
+    and step costs more than the simulation: `terms` and `measured` are of the last step. `reset_infos` has
+    what `reset` says of each environment's present episode, drawn parameters too.
 
     Args:
         env_id: registered id of the family.
@@ -31,6 +34,8 @@ class Sb3VecEnv(VecEnv):
 
     Attributes:
         terms: of the last rewards by name, shape (num_envs,) each.
+        measured: what the last step's infos measure, shape (num_envs, ...), by position or by name; where an
+            episode ended, at the start of the next one.
 
     Raises:
         ParameterError: an id without a native vector environment, another autoreset mode than SAME_STEP, or a
@@ -63,8 +68,9 @@ class Sb3VecEnv(VecEnv):
         options = self._options[0] or None
         if any((other or None) != options for other in self._options):
             raise ParameterError(f"options: expected the same for all environments, got {self._options!r}")
-        observations, _ = self.envs.reset(seed=None if None in seeds else seeds, options=options)
-        self.reset_infos = [{} for _ in range(self.num_envs)]
+        observations, infos = self.envs.reset(seed=None if None in seeds else seeds, options=options)
+        self.reset_infos = [row_of(infos, env) for env in range(self.num_envs)]
+        self.measured = infos["measured"]
         self._reset_seeds()
         self._reset_options()
         return observations
@@ -76,13 +82,17 @@ class Sb3VecEnv(VecEnv):
     def step_wait(self) -> Any:
         """Take the step."""
         observations, rewards, terminated, truncated, infos = self.envs.step(self._actions)  # type: ignore[arg-type]
-        self.terms = {name: infos[name] for name in e.TERMS}
+        self.terms, self.measured = {name: infos[name] for name in e.TERMS}, infos["measured"]
         dones = terminated | truncated
         each: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         if dones.any():
-            figures = infos["final_info"]["episode_summary"]
+            final, figures = infos["final_info"], infos["final_info"]["episode_summary"]
             names = [name for name in figures if not name.startswith("_")]
+            for name in e.TERMS:
+                self.terms[name] = np.where(dones, final[name], infos[name])
+            started = {key: values for key, values in infos.items() if key in self.reset_infos[0]}
             for env in np.flatnonzero(dones):
+                self.reset_infos[env] = row_of(started, int(env))
                 each[env] = {
                     "terminal_observation": infos["final_obs"][env],
                     "TimeLimit.truncated": bool(truncated[env]),
@@ -96,30 +106,36 @@ class Sb3VecEnv(VecEnv):
 
     def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
         """Frames of the environments that are drawn."""
-        return list(self.envs.render() or ())
+        return list(self.envs.render() or ())[: self.envs.drawn]
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """The attribute of the whole, once for each index."""
-        return [getattr(self.envs, attr_name) for _ in self._get_indices(indices)]
+        """An attribute of each environment, as `HorseLegVectorEnv.get_attr`.
+
+        Raises:
+            AttributeError: they have none of that name.
+        """
+        return self.envs.ask(attr_name, self._get_indices(indices))
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Set an attribute of the whole.
+        """Remember something for `get_attr`, as `HorseLegVectorEnv.set_attr`.
 
         Raises:
-            ParameterError: only some of the environments are meant.
+            ParameterError: a setting or another attribute, or only some of the environments are meant.
         """
         self._whole("set_attr", indices)
-        setattr(self.envs, attr_name, value)
+        self.envs.set_attr(attr_name, [value] * self.num_envs)
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
-        """Call a method of the whole; its result once for each index.
+        """Call a method of each environment, as `HorseLegVectorEnv.call`.
 
         Raises:
-            ParameterError: only some of the environments are meant.
+            AttributeError: they have none of that name.
+            ParameterError: "reset" or "step", or only some of the environments are meant by a method that is
+                of all together.
         """
-        self._whole("env_method", indices)
-        result = getattr(self.envs, method_name)(*args, **kwargs)
-        return [result] * self.num_envs
+        if method_name not in OWN:
+            self._whole("env_method", indices)
+        return self.envs.ask(method_name, self._get_indices(indices), *args, **kwargs)
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
         """Nothing is wrapped."""

@@ -1,0 +1,152 @@
+"""Infos: the same keys at a reset and at a step, and numbers that say what they promise."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from family import FALLS, IDS, actions, same, together
+from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
+
+from hoof_env.envs.episode import TERMS
+from hoof_env.envs.infos import MEASURED, START, Named, named, row_of
+from hoof_env.errors import ParameterError
+from hoof_env.gait.parameters import PARAMETERS
+
+LEG = "hoof_env/HorseLeg-v0"
+DRAWN = {"randomize": {"friction": (0.2, 0.8), "trunk_mass": 70.0}}
+
+
+@pytest.mark.parametrize("settings", [{}, DRAWN], ids=["plain", "randomized"])
+@pytest.mark.parametrize("env_id", IDS)
+def test_reset_and_step_have_the_same_keys_of_numpys_numbers(env_id, settings):
+    env = gym.make(env_id, episode_seconds=0.06, **settings)
+    _, first = env.reset(seed=0)
+    infos = [first, *(env.step(taken)[4] for taken in actions(0, 2))]
+    for info in infos:
+        assert set(info) == {*START, "gait", "measured", *TERMS} | ({"parameters"} if settings else set())
+        for key, value in info.items():
+            assert isinstance(value, np.float64 | np.ndarray), key
+            assert value.dtype == np.float64
+        for key in (*START, "gait", *(["parameters"] if settings else [])):
+            same(info[key], first[key])
+    assert {*env.step(actions(0))[4]} - {*first} == {"episode_summary"}
+
+
+@pytest.mark.parametrize("kind", [SyncVectorEnv, AsyncVectorEnv])
+def test_gymnasiums_vector_environments_stack_them(kind):
+    settings = {"episode_seconds": 0.06, **DRAWN}
+    theirs, ours = kind([lambda: gym.make(LEG, **settings)] * 2), gym.make_vec(LEG, num_envs=2, **settings)
+    theirs.reset(seed=0), ours.reset(seed=0)
+    for taken in actions(0, 6, 2):
+        one, two = theirs.step(taken)[4], ours.step(taken)[4]
+        for key in ("gait", "measured", "parameters", *START, *TERMS):
+            assert one[f"_{key}"].all()
+            same(one[key], two[key])
+    theirs.close()
+
+
+def test_what_is_measured_is_what_the_record_says():
+    env = gym.make(LEG).unwrapped
+    env.reset(seed=3)
+    env.record()
+    loaded = 0
+    for taken in actions(1, 60):
+        measured, record = env.step(taken)[4]["measured"], env.record()
+        last, trace = {name: values[-1].item() for name, values in record.items()}, together([record])
+        for name in set(last) & set(MEASURED):
+            assert measured[name] == last[name], name
+        assert measured["highest"] == pytest.approx(trace["grf"].max(), rel=1e-12)
+        assert measured["load_impulse"] == pytest.approx(env.sim_dt * trace["normal"].sum(), rel=1e-9)
+        assert measured["loaded_time"] == pytest.approx(env.sim_dt * (trace["normal"] > 0).sum(), abs=1e-12)
+        assert measured["result"] == 0
+        loaded += measured["highest"] > 100
+    assert loaded > 5
+
+
+def test_nothing_is_measured_of_a_step_that_did_not_happen():
+    for n in (1, 9):
+        env = gym.make_vec(LEG, num_envs=n, autoreset_mode="DISABLED", episode_seconds=60.0).unwrapped
+        single = gym.make(LEG, episode_seconds=60.0).unwrapped
+        env.reset(seed=0, options={"gait": "run"}), single.reset(seed=0, options={"gait": "run"})
+        for leg in (env, single):  # a rate that no step survives
+            state = leg.get_state()
+            state["engine"]["limbs"][0, 6, 0] = 1e300
+            leg.set_state(state)
+            leg.engine._memory.stride_sums[:] = 1.0  # of some step before
+        infos, info = env.step(np.zeros((n, 4), np.float32))[4], single.step(np.zeros(4, np.float32))[4]
+        same(np.asarray(infos["measured"][0]), np.asarray(info["measured"]))
+        assert info["measured"]["result"] == 1
+        assert info["measured"]["highest"] == info["measured"]["load_impulse"] == 0.0
+        assert np.isfinite(info["measured"]).all()
+
+
+def test_infos_are_nobody_elses():
+    env = gym.make(LEG, **DRAWN)
+    infos = [env.reset(seed=0)[1], *(env.step(taken)[4] for taken in actions(0, 5))]
+    kept = copy.deepcopy(infos)
+    for k in (0, 2):
+        for key in ("gait", "measured", "parameters"):
+            infos[k][key][:] = -1.0
+        env.step(actions(0))
+        same(env.step(actions(0))[4]["gait"], kept[1]["gait"])
+    same(infos[1:2] + infos[3:], kept[1:2] + kept[3:])
+
+
+@pytest.mark.parametrize("n", [0, 3])
+def test_a_state_says_what_the_episode_started_with(n):
+    def make():
+        env = gym.make_vec(LEG, num_envs=n, **DRAWN) if n else gym.make(LEG, **DRAWN)
+        return env.unwrapped
+
+    env, other, taken = make(), make(), actions(0, *([n] if n else []))
+    env.reset(seed=0, options={"gait": "walk"})
+    state = pickle.loads(pickle.dumps(env.get_state()))
+    other.set_state(state)
+    info = env.step(taken)[4]
+    same(info, other.step(taken)[4])
+    del state["begun"]  # as those of older versions
+    other.set_state(state)
+    old = other.step(taken)[4]
+    assert np.isnan(old["crank_angle"]).all()
+    assert np.isnan(old["gait"]).all()
+    same(np.asarray(old["measured"]), np.asarray(info["measured"]))
+    for wrong in ("fast", np.zeros((2, 2))):
+        with pytest.raises(ParameterError, match=r"state\['begun'\]: expected numbers, shape \(10, "):
+            other.set_state(state | {"begun": wrong})
+
+
+def test_named_rows():
+    row = named([1.0, 2.0, 3.0, 4.0], PARAMETERS)
+    many = named(np.arange(8.0).reshape(2, 4), PARAMETERS)
+    assert (row["swing_cos"], row[3], type(row["swing_cos"])) == (4.0, 4.0, np.float64)
+    same(many["swing_offset"], np.array([1.0, 5.0]))
+    assert row == dict(row) == {"crank_speed": 1, "swing_offset": 2, "swing_sin": 3, "swing_cos": 4}
+    assert row != {**row, "swing_cos": 0}
+    assert row != named([1.0, 2.0, 3.0, 5.0], PARAMETERS)
+    assert ((row == np.array([1, 0, 3, 4])) == [True, False, True, True]).all()
+    assert ((row != np.array([1, 0, 3, 4])) == [False, True, False, False]).all()
+    assert list(row.values()) == [*row]
+    assert "swing_sin" in row
+    assert "fast" not in row
+    assert bool(row)
+    for twin in (copy.copy(row), copy.deepcopy(row), row.copy(), pickle.loads(pickle.dumps(row))):
+        assert isinstance(twin, Named)
+        assert twin == row
+        assert not np.shares_memory(twin, row)
+    with pytest.raises(KeyError, match="fast"):
+        row["fast"]
+    gait = named([5.0, 0.5, -0.1, 0.1], PARAMETERS)
+    assert gym.make(LEG).reset(seed=0, options={"gait": gait})[1]["gait"] == gait
+
+
+def test_the_row_of_an_environment():
+    env, single = gym.make_vec(LEG, num_envs=4, **DRAWN, **FALLS), gym.make(LEG, **DRAWN, **FALLS)
+    _, infos = env.reset(seed=0)
+    _, info = single.reset(seed=2)
+    same(row_of(infos, 2), info)
+    _, infos = env.reset(options={"reset_mask": np.array([True, False, True, False])})
+    assert row_of(infos, 1) == {}
