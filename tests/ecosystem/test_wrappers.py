@@ -325,10 +325,10 @@ def test_record_video_vector(env_id, tmp_path):
     films.reset(seed=0)
     for action in [*HELD[0, 0], *HELD[0, 1]]:
         films.step(np.array([action, action]))
+    height, width, _ = envs.render()[0].shape
     films.close()
     (file,) = tmp_path.glob("videos/*.mp4")
     frames = imageio.imread(file)
     assert len(frames) in (10, 11)  # ten steps and the start; moviepy may round one away
-    height, width, _ = envs.render()[0].shape
     assert frames.shape[1] * frames.shape[2] == pytest.approx(ROWS * height * width, rel=0.05)
     assert np.ptp(frames[..., 0].astype(float), axis=0).max() > 50

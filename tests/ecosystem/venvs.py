@@ -17,8 +17,9 @@ from scripts.setup_venv import TORCH_INDEX
 
 ROOT = Path(__file__).resolve().parents[2]
 CACHE = ROOT / ".ecosystem"
-UV = shutil.which("uv", path=os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")]))
-"""It installs in place of pip, several times as fast, where it is found."""
+BESIDE = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
+UV = None if os.environ.get("INSTALLER") == "pip" else shutil.which("uv", path=BESIDE)
+"""It installs in place of pip, several times as fast, where it is found and INSTALLER does not say pip."""
 
 
 class Failed(Exception):
