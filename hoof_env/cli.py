@@ -14,14 +14,12 @@ from typing import Literal
 from hoof_env.errors import HoofEnvError
 
 
-def reproduce(out: Path, figures: bool = True, study: bool = False, preset: str | None = None) -> None:
+def reproduce(out: Path, figures: bool = True, preset: str | None = None) -> None:
     """Run the paper's four conditions with every solver and compare every published number with them.
 
     Args:
         out: folder for reproduction.json, reproduction.md and the figures; made if need be.
         figures: draw figures 1 and 3 to 6 too (needs the extra 'plot').
-        study: re-examine the paper too: its method, its print and its claims. Writes the page paper.md, and
-            everything else into the folder paper beside it.
         preset: geometry and gaits, a name or a JSON file; the package's default if left out.
     """
     from hoof_env._output import check_folder
@@ -31,23 +29,16 @@ def reproduce(out: Path, figures: bool = True, study: bool = False, preset: str 
         "--out",
         str(out),
         *([] if figures else ["--no-figures"]),
-        *(["--study"] if study else []),
         *(["--preset", preset] if preset else []),
     ]
     command = shlex.join(["hoof-env", "reproduce", *options])
     check_folder(out)
     if figures:
         check_matplotlib()
-    if study:
-        from hoof_env.paper.study import page
+    from hoof_env.paper.reproduce import reproduce, write_reproduction
 
-        page.check_place(out)
-        paths = page.write_study(page.study(_say, preset=preset), out, figures=figures, command=command)
-    else:
-        from hoof_env.paper.reproduce import reproduce, write_reproduction
-
-        paths = write_reproduction(reproduce(_say, preset=preset), out, figures=figures, command=command)
-    _say(f"{len(paths)} files written; read {out / ('paper.md' if study else 'reproduction.md')} first")
+    paths = write_reproduction(reproduce(_say, preset=preset), out, figures=figures, command=command)
+    _say(f"{len(paths)} files written; read {out / 'reproduction.md'} first")
 
 
 def identify(
