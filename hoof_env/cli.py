@@ -80,34 +80,6 @@ def identify(
     _say(f"{len(paths)} files written; read {out / 'identify.md'} first")
 
 
-def carry(
-    preset: str,
-    out: Path,
-    seed: int = 0,
-    evaluations: int | None = None,
-    workers: int = 2,
-    free_crank: bool = False,
-) -> None:
-    """Search for an open-loop walk that carries the suspended trunk on a preset's leg (needs 'identify').
-
-    Prints how the paper's gaits and the one found carry, and writes the preset with that gait added.
-
-    Args:
-        preset: leg and walk, a name or a JSON file.
-        out: folder for the preset with the gait carrying_walk, and carry.md; made if need be.
-        seed: the same seed and options find the same gait, with any number of workers.
-        evaluations: gaits to try.
-        workers: processes.
-        free_crank: search the crank's speed too; it is that of the preset's walk otherwise.
-    """
-    from hoof_env.identify.carry_report import carry
-
-    paths = carry(
-        preset, out, _say, seed=seed, evaluations=evaluations, workers=workers, free_crank=free_crank
-    )
-    _say(f"{len(paths)} files written: {', '.join(map(str, paths))}")
-
-
 def ensemble(
     out: Path,
     preset: str,
@@ -226,13 +198,6 @@ def export(
     _say(f"{out}: {rows} rows")
 
 
-def trunks() -> None:
-    """Measure how the scripted walk and run move a rail and differently suspended trunks; prints a table."""
-    from hoof_env.envs.trunk_study import study
-
-    study(_say)
-
-
 def manual(id: str = "hoof_env/HorseLeg-v0", out: Path | None = None) -> None:
     """Print the manual page of an environment, or write those of all.
 
@@ -252,8 +217,6 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "reproduce": reproduce,
     "identify": identify,
     "ensemble": ensemble,
-    "carry": carry,
-    "trunks": trunks,
     "render": render,
     "play": play,
     "export": export,
