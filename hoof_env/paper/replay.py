@@ -1,4 +1,4 @@
-"""One motion, many ground levels: on a fixed trunk the ground changes forces only, so a cycle moves only once."""
+"""One motion, many ground levels: on a fixed trunk the ground changes forces only, so the leg moves once."""
 
 from __future__ import annotations
 

@@ -31,7 +31,9 @@ def steady(preset, gait):
     return env, {name: np.concatenate([row[name].ravel() for row in rows])[-last:] for name in rows[0]}
 
 
-@pytest.mark.parametrize(("preset", "gait"), [("first_fit", "walk"), ("first_fit", "run"), ("identified", FOUND)])
+@pytest.mark.parametrize(
+    ("preset", "gait"), [("first_fit", "walk"), ("first_fit", "run"), ("identified", FOUND)]
+)
 def test_impulse_balance_of_a_steady_gait(preset, gait):
     """Momentum is the same after whole strides, so the ground gives what weight, support and spring leave."""
     env, record = steady(preset, gait)
