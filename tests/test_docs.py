@@ -1,4 +1,4 @@
-"""What pages say of the repository is true: their links lead somewhere, their commands exist."""
+"""What pages say of the repository is true: their links lead somewhere, their commands and files exist."""
 
 import re
 from pathlib import Path
@@ -44,12 +44,16 @@ def test_links_lead_somewhere(page):
 
 
 @pytest.mark.parametrize("page", LIVE, ids=name)
-def test_commands_exist(page):
+def test_commands_and_files_exist(page):
     text = page.read_text(encoding="utf-8")
     modules = set(re.findall(r"python -m ((?:agents|benchmarks|hoof_env|tests)[\w.]*\w)", text))
     assert not {one for one in modules if not (ROOT / one.replace(".", "/")).with_suffix(".py").is_file()}
     commands = set(re.findall(r"(?:`|bin/)hoof-env ([a-z]+)\b(?![^.:]{0,60}\sof commit)", text))
     assert not commands - set(COMMANDS)
+    files = set(
+        re.findall(r"`((?:agents|benchmarks|docs|examples|hoof_env|scripts|tests)/[\w./-]+\.\w+)`", text)
+    )
+    assert not {file for file in files if not (ROOT / file).is_file()}
 
 
 def test_every_frozen_page_says_of_which_commit_it_is():
