@@ -49,16 +49,16 @@ METRICS = {
     "distance_m": Metric("progress\nm", digits=1),
     "peak_grf_n": Metric("peak GRF\nkN", 1e-3),
     "stance_peak_n": Metric("stance peak\nkN", 1e-3),
-    "loading_rate_n_s": Metric("loading rate\nkN/s", 1e-3, 1),
     "mean_grf_n": Metric("mean GRF\nkN", 1e-3),
     "weight_share": Metric("weight\nshare"),
     "duty_factor": Metric("duty\nfactor"),
     "cost_of_transport": Metric("cost of\ntransport"),
     "failed": Metric("failed"),
+    "loading_rate_n_s": Metric("loading rate\nkN/s", 1e-3, 1),
 }
 """The columns: "return", figures of the episode summary (`hoof_env.envs.summary.summary_of`), and two means
 over the stances of an episode, 0 without a stance: "stance_peak_n", of their highest force, and
-"loading_rate_n_s" (`agents.impact`), of the steepest rise of the force at impact."""
+"loading_rate_n_s" (`agents.impact`), of the steepest rise of the force at impact, where it is asked for."""
 
 
 @dataclass(frozen=True)
@@ -212,6 +212,8 @@ class Args:
     """environment; otherwise that of the first model or gait file, or hoof_env/HorseLeg-v0"""
     env_kwargs: tuple[str, ...] = ()
     """its arguments: key=value ..., or one JSON object; otherwise those of the first model or gait file"""
+    loading_rate: bool = False
+    """also how steeply the force rises at impact; every substep is recorded, which takes 0.2 s an episode"""
     json: Path | None = None
     """write all figures of all episodes to this file"""
     video: Path | None = None
@@ -242,6 +244,8 @@ def evaluate(args: Args) -> tuple[list[Score], dict[str, Any]]:
     kwargs = parse_pairs("--env-kwargs", args.env_kwargs) or own
     scores = []
     with runs.make_env(env_id, **kwargs) as env:
+        if args.loading_rate and not hasattr(env.unwrapped, "record"):
+            raise ParameterError(f"--loading-rate: expected an environment of hoof_env, got {env_id}")
         runs.warm_up(env)
         # All are found before the first is played
         policies = {name: find_policy(name, env, env_id) for name in args.policy}
@@ -249,8 +253,8 @@ def evaluate(args: Args) -> tuple[list[Score], dict[str, Any]]:
             for name, policy in policies.items():
                 bar.set_description(name)
                 seeds = range(args.seed, args.seed + args.episodes)
-                records = hasattr(env.unwrapped, "record")
-                scores.append(Score(name, play(env, policy, seeds, bar.update, loading_rate=records)))
+                played = play(env, policy, seeds, bar.update, loading_rate=args.loading_rate)
+                scores.append(Score(name, played))
     if args.video:
         from agents.video import film
 

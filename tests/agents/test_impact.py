@@ -6,6 +6,7 @@ import pytest
 from agents.evaluate import Args, evaluate, find_policy, play
 from agents.impact import loading_rates, stances, steepest
 from agents.runs import make_env
+from hoof_env.errors import ParameterError
 
 LEG = "hoof_env/HorseLeg-v0"
 KEY = "loading_rate_n_s"
@@ -34,7 +35,7 @@ def test_whole_stances_alone_count():
 
 def rate_of(policy, **env_kwargs):
     kwargs = tuple(f"{name}={value}" for name, value in env_kwargs.items())
-    (score,), _ = evaluate(Args(policy=(policy,), episodes=1, env_kwargs=kwargs))
+    (score,), _ = evaluate(Args(policy=(policy,), episodes=1, env_kwargs=kwargs, loading_rate=True))
     return score.episodes[0][KEY]
 
 
@@ -48,8 +49,16 @@ def test_without_a_stance_it_is_zero():
 
 
 def test_one_cycle_of_the_paper_is_not_left_out():
-    (score,), _ = evaluate(Args(policy=("run",), episodes=1, env_id="hoof_env/HorseLegFixed-v0"))
-    assert score.episodes[0][KEY] > 0
+    fixed = "hoof_env/HorseLegFixed-v0"
+    (score,), _ = evaluate(Args(policy=("run",), episodes=1, env_id=fixed, loading_rate=True))
+    assert score.estimates[KEY].mean > 0
+
+
+def test_an_environment_without_records_is_refused():
+    with pytest.raises(
+        ParameterError, match="--loading-rate: expected an environment of hoof_env, got Pendulum-v1"
+    ):
+        evaluate(Args(policy=("random",), env_id="Pendulum-v1", loading_rate=True))
 
 
 def test_to_measure_it_changes_nothing_else():
