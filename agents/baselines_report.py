@@ -34,8 +34,7 @@ from agents.baselines_results import (
 from agents.baselines_run import COLUMNS
 from agents.baselines_stats import Interval
 from agents.command import run
-from agents.learning_report import put
-from agents.throughput import RESULT as THROUGHPUT
+from agents.markdown import put
 
 QUICK_SECONDS, QUICK_SHARE = 120.0, 0.9
 """PPO is to beat both gaits so soon in so large a share of its seeds."""
@@ -158,8 +157,6 @@ def bars_table(rows: Sequence[Row], known: dict[str, Reference], matched: Mappin
             found[f"PPO beats both gaits within {QUICK_SECONDS:.0f} s in {QUICK_SHARE:.0%} of its seeds"] = (
                 f"{word}: {quick} of {row.entry.seeds}"
             )
-    if THROUGHPUT.is_file():
-        found |= json.loads(THROUGHPUT.read_text(encoding="utf-8"))["bars"]
     return "\n".join(["| bar | |", "|---|---|", *(f"| {bar} | {said} |" for bar, said in found.items())])
 
 

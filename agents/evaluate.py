@@ -26,6 +26,7 @@ import numpy as np
 
 from agents import runs
 from agents.command import parse_pairs, run
+from agents.impact import LoadingRate
 from hoof_env._output import check_folder
 from hoof_env.envs.policies import make_policy, open_loop_record, policy_names, read_open_loop
 from hoof_env.errors import OutputError, ParameterError, check_number
@@ -53,9 +54,11 @@ METRICS = {
     "duty_factor": Metric("duty\nfactor"),
     "cost_of_transport": Metric("cost of\ntransport"),
     "failed": Metric("failed"),
+    "loading_rate_n_s": Metric("loading rate\nkN/s", 1e-3, 1),
 }
-"""The columns: "return", figures of the episode summary (`hoof_env.envs.stance.summarize`), and
-"stance_peak_n", the mean over the stances of an episode of their highest force, 0 without a stance."""
+"""The columns: "return", figures of the episode summary (`hoof_env.envs.summary.summary_of`), and two means
+over the stances of an episode, 0 without a stance: "stance_peak_n", of their highest force, and
+"loading_rate_n_s" (`agents.impact`), of the steepest rise of the force at impact, where it is asked for."""
 
 
 @dataclass(frozen=True)
@@ -97,21 +100,32 @@ def estimate(values: Sequence[float]) -> Estimate:
 
 
 def play(
-    env: gym.Env[Any, Any], policy: Any, seeds: Sequence[int], tick: Any = lambda: None
+    env: gym.Env[Any, Any],
+    policy: Any,
+    seeds: Sequence[int],
+    tick: Any = lambda: None,
+    *,
+    loading_rate: bool = False,
 ) -> list[dict[str, float]]:
-    """One episode per seed; its return and its summary. `tick` is called after each."""
+    """One episode per seed; its return and its summary. `tick` is called after each. The loading rate needs
+    an environment of this package, whose substeps it records."""
     episodes = []
     for seed in seeds:
         observation, info = env.reset(seed=seed)
+        rate = LoadingRate(env) if loading_rate else None
         total, start, done = 0.0, np.ones(1, bool), False
         while not done:
             action, _ = policy.predict(observation, episode_start=start, deterministic=True)
             observation, reward, terminated, truncated, info = env.step(action)
             total += float(np.asarray(reward).sum())  # of a vector, all objectives
+            if rate:
+                rate.add()
             start, done = np.zeros(1, bool), terminated or truncated
         summary = info.get("episode_summary", {})
         if "stances" in summary:
             summary["stance_peak_n"] = summary["stance_peak_sum_n"] / max(summary["stances"], 1.0)
+        if rate:
+            summary["loading_rate_n_s"] = rate.mean()
         episodes.append({"return": total, **summary})
         tick()
     return episodes
@@ -198,6 +212,8 @@ class Args:
     """environment; otherwise that of the first model or gait file, or hoof_env/HorseLeg-v0"""
     env_kwargs: tuple[str, ...] = ()
     """its arguments: key=value ..., or one JSON object; otherwise those of the first model or gait file"""
+    loading_rate: bool = False
+    """also how steeply the force rises at impact; every substep is recorded, which takes 0.2 s an episode"""
     json: Path | None = None
     """write all figures of all episodes to this file"""
     video: Path | None = None
@@ -228,6 +244,8 @@ def evaluate(args: Args) -> tuple[list[Score], dict[str, Any]]:
     kwargs = parse_pairs("--env-kwargs", args.env_kwargs) or own
     scores = []
     with runs.make_env(env_id, **kwargs) as env:
+        if args.loading_rate and not hasattr(env.unwrapped, "record"):
+            raise ParameterError(f"--loading-rate: expected an environment of hoof_env, got {env_id}")
         runs.warm_up(env)
         # All are found before the first is played
         policies = {name: find_policy(name, env, env_id) for name in args.policy}
@@ -235,7 +253,8 @@ def evaluate(args: Args) -> tuple[list[Score], dict[str, Any]]:
             for name, policy in policies.items():
                 bar.set_description(name)
                 seeds = range(args.seed, args.seed + args.episodes)
-                scores.append(Score(name, play(env, policy, seeds, bar.update)))
+                played = play(env, policy, seeds, bar.update, loading_rate=args.loading_rate)
+                scores.append(Score(name, played))
     if args.video:
         from agents.video import film
 

@@ -14,7 +14,7 @@ from typing import Any
 from agents import runs
 from agents.command import run
 from agents.evaluate import estimate
-from agents.learning_report import put
+from agents.markdown import put
 from agents.open_loop import GAITS, stored
 from agents.open_loop_search import TEST_SEED
 from agents.score import score_vector

@@ -15,14 +15,12 @@ from hoof_env._version import __version__
 from hoof_env.errors import HoofEnvError
 
 
-def reproduce(out: Path, figures: bool = True, study: bool = False, preset: str | None = None) -> None:
+def reproduce(out: Path, figures: bool = True, preset: str | None = None) -> None:
     """Run the paper's four conditions with every solver and compare every published number with them.
 
     Args:
         out: folder for reproduction.json, reproduction.md and the figures; made if need be.
         figures: draw figures 1 and 3 to 6 too (needs the extra 'plot').
-        study: re-examine the paper too: its method, its print and its claims. Writes the page paper.md, and
-            everything else into the folder paper beside it.
         preset: geometry and gaits, a name or a JSON file; the package's default if left out.
     """
     from hoof_env._output import check_folder
@@ -32,23 +30,16 @@ def reproduce(out: Path, figures: bool = True, study: bool = False, preset: str 
         "--out",
         str(out),
         *([] if figures else ["--no-figures"]),
-        *(["--study"] if study else []),
         *(["--preset", preset] if preset else []),
     ]
     command = shlex.join(["hoof-env", "reproduce", *options])
     check_folder(out)
     if figures:
         check_matplotlib()
-    if study:
-        from hoof_env.paper.study import page
+    from hoof_env.paper.reproduce import reproduce, write_reproduction
 
-        page.check_place(out)
-        paths = page.write_study(page.study(_say, preset=preset), out, figures=figures, command=command)
-    else:
-        from hoof_env.paper.reproduce import reproduce, write_reproduction
-
-        paths = write_reproduction(reproduce(_say, preset=preset), out, figures=figures, command=command)
-    _say(f"{len(paths)} files written; read {out / ('paper.md' if study else 'reproduction.md')} first")
+    paths = write_reproduction(reproduce(_say, preset=preset), out, figures=figures, command=command)
+    _say(f"{len(paths)} files written; read {out / 'reproduction.md'} first")
 
 
 def identify(
@@ -88,34 +79,6 @@ def identify(
         workers=workers, budget=budget, resume=resume, keep_going=keep_going,
     )  # fmt: skip
     _say(f"{len(paths)} files written; read {out / 'identify.md'} first")
-
-
-def carry(
-    preset: str,
-    out: Path,
-    seed: int = 0,
-    evaluations: int | None = None,
-    workers: int = 2,
-    free_crank: bool = False,
-) -> None:
-    """Search for an open-loop walk that carries the suspended trunk on a preset's leg (needs 'identify').
-
-    Prints how the paper's gaits and the one found carry, and writes the preset with that gait added.
-
-    Args:
-        preset: leg and walk, a name or a JSON file.
-        out: folder for the preset with the gait carrying_walk, and carry.md; made if need be.
-        seed: the same seed and options find the same gait, with any number of workers.
-        evaluations: gaits to try.
-        workers: processes.
-        free_crank: search the crank's speed too; it is that of the preset's walk otherwise.
-    """
-    from hoof_env.identify.carry_report import carry
-
-    paths = carry(
-        preset, out, _say, seed=seed, evaluations=evaluations, workers=workers, free_crank=free_crank
-    )
-    _say(f"{len(paths)} files written: {', '.join(map(str, paths))}")
 
 
 def ensemble(
@@ -245,13 +208,6 @@ def export(
     _say(f"{out}: {rows} rows, {_size(out)}{made}")
 
 
-def trunks() -> None:
-    """Measure how the scripted walk and run move a rail and differently suspended trunks; prints a table."""
-    from hoof_env.envs.trunk_study import study
-
-    study(_say)
-
-
 def manual(id: str = "hoof_env/HorseLeg-v0", out: Path | None = None) -> None:
     """Print the manual page of an environment, or write those of all.
 
@@ -282,8 +238,6 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "reproduce": reproduce,
     "identify": identify,
     "ensemble": ensemble,
-    "carry": carry,
-    "trunks": trunks,
     "render": render,
     "play": play,
     "export": export,

@@ -58,7 +58,6 @@ def test_reproduce_writes_its_results(tmp_path):
     assert {file.name for file in (tmp_path / "new" / "folder").iterdir()} == {
         "reproduction.json",
         "reproduction.md",
-        "spread.json",
     }
     assert (
         len(json.loads((tmp_path / "new" / "folder" / "reproduction.json").read_text(encoding="utf-8"))) == 99
@@ -112,52 +111,3 @@ def test_an_interrupt_while_kernels_compile_is_one_line(tmp_path, monkeypatch, c
     monkeypatch.setattr("hoof_env.paper.reproduce.reproduce", compiling)
     assert cli.main(["reproduce", "--out", str(tmp_path), "--no-figures"]) == 130
     assert capsys.readouterr().err == "interrupted\n"
-
-
-@pytest.fixture
-def small_study(monkeypatch):
-    """`--study` without its minute of work: one part, no rows."""
-    from hoof_env.leg.geometry import load_geometry
-    from hoof_env.paper.published import load_published
-    from hoof_env.paper.reproduce import Reproduction
-    from hoof_env.paper.study import page
-    from hoof_env.paper.study.section import Section
-
-    def study(tell, preset):
-        tell("the part is done")
-        nothing = Reproduction([], [], {}, load_geometry(), load_published())
-        return page.Study(nothing, {"part": Section("The part", "Its text.", {})})
-
-    monkeypatch.setattr(page, "study", study)
-    monkeypatch.setattr(page, "findings", lambda *_: ["found"])
-    monkeypatch.setattr("hoof_env.paper.report.markdown", lambda *_, **__: "rows")
-
-
-def test_a_study_is_a_page_with_its_folder(tmp_path, capsys, small_study):
-    out = tmp_path / "docs"
-    assert cli.main(["reproduce", "--study", "--no-figures", "--out", str(out)]) == 0
-    assert {file.name for file in out.iterdir()} == {"paper.md", "paper"}
-    assert f"hoof-env reproduce --out {out} --no-figures --study" in (out / "paper.md").read_text("utf-8")
-    said = capsys.readouterr().out
-    assert "the part is done" in said
-    assert f"read {out / 'paper.md'} first" in said
-
-
-def test_a_file_where_the_study_puts_its_folder_is_one_line_before_anything_runs(
-    tmp_path, capsys, small_study
-):
-    (tmp_path / "paper").write_text("mine", encoding="utf-8")
-    assert cli.main(["reproduce", "--study", "--no-figures", "--out", str(tmp_path)]) == 2
-    said = capsys.readouterr()
-    assert said.out == ""
-    assert said.err.startswith("hoof-env: error: cannot write to")
-
-
-def test_an_interrupted_study_leaves_nothing_behind(tmp_path, capsys, monkeypatch):
-    def interrupted(*_, **__):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("hoof_env.paper.study.page.reproduce", interrupted)
-    assert cli.main(["reproduce", "--study", "--no-figures", "--out", str(tmp_path)]) == 130
-    assert capsys.readouterr().err == "interrupted\n"
-    assert list(tmp_path.iterdir()) == []

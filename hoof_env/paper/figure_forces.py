@@ -31,7 +31,6 @@ from hoof_env.paper.measure import Stance, measure_stance
 from hoof_env.paper.shapes import find_peaks
 
 if TYPE_CHECKING:
-    from hoof_env.paper.figure_ensemble import EnsembleCurves
     from hoof_env.paper.reproduce import Reproduction
 
 MEAN, FORCE, CONTACT = 12.0, 56.0, 7.0
@@ -40,7 +39,7 @@ MEAN, FORCE, CONTACT = 12.0, 56.0, 7.0
 DASHED = (0, (3, 2))
 
 
-def draw_forces(figure: Any, reproduction: Reproduction, ensemble: EnsembleCurves | None = None) -> None:
+def draw_forces(figure: Any, reproduction: Reproduction) -> None:
     """Figure 5: force of the ground over time in the four conditions, with sub-phases, simulated peaks,
     published peaks at the times of the simulated ones, published instants of contact on the time axis; means
     over the cycle at the side; below, when toe and heel are in the ground."""
@@ -60,8 +59,8 @@ def draw_forces(figure: Any, reproduction: Reproduction, ensemble: EnsembleCurve
         top = HEAD + 8 + STRIP
         ax = panel(figure, left, top, wide, FORCE, xlim=limits)
         shade(ax, phases)
-        _draw_curves(ax, reproduction, gait, ensemble)
-        _explain(ax, ensemble)
+        _draw_curves(ax, reproduction, gait)
+        _explain(ax)
         mark_contacts(ax, reproduction, gait, 0)
         ax.set_ylim(0, None)
         ax.tick_params(labelbottom=False)
@@ -75,14 +74,10 @@ def draw_forces(figure: Any, reproduction: Reproduction, ensemble: EnsembleCurve
     legend_below(figure, *axes, columns=4)
 
 
-def _draw_curves(ax: Any, reproduction: Reproduction, gait: str, ensemble: EnsembleCurves | None) -> None:
+def _draw_curves(ax: Any, reproduction: Reproduction, gait: str) -> None:
     for condition, colour in CONDITION_COLOURS.items():
         trace = reproduction.traces[gait, condition, SOLVER]
         t, force = trace["t"], trace["normal"]
-        if ensemble:
-            ax.fill_between(
-                ensemble.time, *ensemble.range(gait, condition), color=colour, alpha=0.25, lw=0, zorder=2,
-            )  # fmt: skip
         ax.plot(t, force, color=colour, lw=1.4, label=f"{condition}, normal force", zorder=4)
         ax.plot(t, trace["grf"], color=colour, lw=0.7, ls=DASHED, zorder=3)
         peaks = find_peaks(force)
@@ -91,13 +86,11 @@ def _draw_curves(ax: Any, reproduction: Reproduction, gait: str, ensemble: Ensem
         mark_published(ax, measure_stance(trace).peak_time, row.value, yerr=half_bar(row))
 
 
-def _explain(ax: Any, ensemble: EnsembleCurves | None) -> None:
+def _explain(ax: Any) -> None:
     """Entries of the legend for what has the colour of its condition."""
     ax.plot([], [], color=GREY, lw=0.7, ls=DASHED, label="resultant")
     ax.plot([], [], "o", color=GREY, ms=2.8, label="simulated peak")
     ax.plot([], [], color=GREY, lw=2, label="simulated mean")
-    if ensemble:
-        ax.fill_between([], [], color=GREY, alpha=0.25, lw=0, label=f"range, {ensemble.label}")
 
 
 def _draw_means(ax: Any, reproduction: Reproduction, gait: str) -> None:

@@ -37,7 +37,6 @@ from hoof_env.paper.figure_style import (
 from hoof_env.paper.measure import Stance
 
 if TYPE_CHECKING:
-    from hoof_env.paper.figure_ensemble import EnsembleCurves
     from hoof_env.paper.reproduce import Reproduction
 
 HOOVES = 8
@@ -49,14 +48,14 @@ TALLEST, NEAR = 110.0, 26.0
 Trace = NDArray[np.void]
 
 
-def draw_paths(figure: Any, reproduction: Reproduction, ensemble: EnsembleCurves | None = None) -> None:
+def draw_paths(figure: Any, reproduction: Reproduction) -> None:
     """Figure 3: paths of toe and heel over the cycle, their parts in the ground heavy, with the published
     instants of contact, the leg at mid-stance and the hoof around the cycle; below, the same near the ground.
 
     Both gaits have the same scale. Above each other are the true shape and a stretched height.
     """
     cycles = elastic_cycles(reproduction)
-    boxes = {gait: _extent(reproduction, *cycle, gait, ensemble) for gait, cycle in cycles.items()}
+    boxes = {gait: _extent(reproduction, *cycle) for gait, cycle in cycles.items()}
     low = min(box[0, 1] for box in boxes.values())
     rise = max(box[1, 1] for box in boxes.values()) - low
     spans = {gait: float(np.ptp(box[:, 0])) for gait, box in boxes.items()}
@@ -92,12 +91,9 @@ def draw_paths(figure: Any, reproduction: Reproduction, ensemble: EnsembleCurves
         near.set_ylim(-1.15 * deepest, max(0.6 * deepest, 1.15 * contacts[:, 1].max()))
         near.locator_params(axis="y", nbins=4)
         _draw_leg(whole, points_at(reproduction.geometry, row_at(trace, stance.middle)))
-        if not ensemble:
-            _draw_hooves(whole, reproduction, trace, stance)
+        _draw_hooves(whole, reproduction, trace, stance)
         for ax in (whole, near):
             draw_ground(ax, -2)
-            if ensemble:
-                _draw_ensemble(ax, ensemble, gait, trace)
             _draw_hoof_paths(ax, trace)
             mark_published(ax, *contacts.T)
         if gait == "walk":
@@ -108,17 +104,12 @@ def draw_paths(figure: Any, reproduction: Reproduction, ensemble: EnsembleCurves
     legend_below(figure, *axes, columns=4)
 
 
-def _extent(
-    reproduction: Reproduction, trace: Trace, stance: Stance, gait: str, ensemble: EnsembleCurves | None
-) -> NDArray[np.float64]:
+def _extent(reproduction: Reproduction, trace: Trace, stance: Stance) -> NDArray[np.float64]:
     """Lower left and upper right corner [m] of what is drawn of a gait, with a margin."""
     leg = points_at(reproduction.geometry, row_at(trace, stance.middle)).values()
     hooves = [points_at(reproduction.geometry, row_at(trace, t))["G"] for t in _instants(stance)]
     paths = [np.stack([trace[f"{name}_x"], -trace[f"{name}_penetration"]], 1) for name in ("toe", "heel")]
     shown = np.concatenate([*paths, np.array([*leg, *hooves])])
-    if ensemble:
-        x, y = ensemble.height_paths(gait, float(trace["trunk_y"][0]))
-        shown = np.concatenate([shown, np.stack([x.ravel(), y.ravel()], 1)])
     return np.array([shown.min(axis=0) - 0.1, shown.max(axis=0) + 0.1])
 
 
@@ -166,11 +157,3 @@ def _published_contacts(
             x, depth = (np.interp(t, trace["t"], trace[f"{name}_{part}"]) for part in ("x", "penetration"))
             places.append((x, -depth))
     return np.array(places)
-
-
-def _draw_ensemble(ax: Any, ensemble: EnsembleCurves, gait: str, trace: Trace) -> None:
-    x, y = ensemble.height_paths(gait, float(trace["trunk_y"][0]))
-    for one in range(ensemble.members):
-        ax.plot(x[one], y[one], color="black", alpha=0.3, lw=0.4, label=f"sole, {ensemble.label}", zorder=2)
-    sole = (trace["toe_x"] + trace["heel_x"]) / 2, -(trace["toe_penetration"] + trace["heel_penetration"]) / 2
-    ax.plot(*sole, color="black", lw=0.9, ls=(0, (3, 2)), label="path of the sole's middle", zorder=4)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,12 +12,10 @@ from hoof_env.paper.figure_angles import draw_angles
 from hoof_env.paper.figure_forces import draw_forces
 from hoof_env.paper.figure_mechanism import draw_mechanism
 from hoof_env.paper.figure_paths import draw_paths
-from hoof_env.paper.figure_spread import draw_spread
 from hoof_env.paper.figure_style import PRINT
 from hoof_env.paper.figure_vectors import draw_vectors
 
 if TYPE_CHECKING:
-    from hoof_env.paper.figure_ensemble import EnsembleCurves
     from hoof_env.paper.reproduce import Reproduction
 
 
@@ -32,16 +29,12 @@ def check_matplotlib() -> None:
         ) from None
 
 
-def draw_all(
-    reproduction: Reproduction, folder: Path | str, ensemble: EnsembleCurves | None = None
-) -> list[Path]:
+def draw_all(reproduction: Reproduction, folder: Path | str) -> list[Path]:
     """Draw figures 1 and 3 to 6 as PNG and SVG, the same bytes for the same reproduction.
 
     Args:
         reproduction: what to draw.
         folder: made if need be.
-        ensemble: figures 3 and 5 show the range of its members too, and if it has their lengths, "spread"
-            shows what they leave open.
 
     Returns:
         The paths of the files.
@@ -56,13 +49,11 @@ def draw_all(
     folder = Path(folder)
     drawings: dict[str, Callable[[Any, Reproduction], None]] = {
         "figure1": draw_mechanism,
-        "figure3": partial(draw_paths, ensemble=ensemble),
+        "figure3": draw_paths,
         "figure4": draw_angles,
-        "figure5": partial(draw_forces, ensemble=ensemble),
+        "figure5": draw_forces,
         "figure6": draw_vectors,
     }
-    if ensemble and ensemble.lengths:
-        drawings["spread"] = partial(draw_spread, ensemble=ensemble)
     paths = []
     with staged(folder) as stage, style.context(["default", PRINT]):
         for name, draw in drawings.items():

@@ -8,10 +8,9 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from hoof_env import __version__
-from hoof_env.paper import spread_text
 from hoof_env.paper.rows import ILL, counted, severity
 from hoof_env.paper.solvers import EULER
-from hoof_env.paper.solvers_text import ground_text, solvers_text, which_beta
+from hoof_env.paper.solvers_text import ground_text, listed, solvers_text, which_beta
 
 if TYPE_CHECKING:
     from hoof_env.paper.reproduce import Reproduction
@@ -23,20 +22,11 @@ _DIGITS = {"s": 4, "deg": 2, "N": 1, "%": 2, "-": 3, "point": 2, "": 3}
 _PACKAGES = ("gymnasium", "numpy", "numba")
 
 
-def markdown(
-    reproduction: Reproduction,
-    conditions: Mapping[str, Any],
-    spread: Mapping[str, Any] | None = None,
-    *,
-    command: str,
-    figures: bool,
-) -> str:
+def markdown(reproduction: Reproduction, *, command: str, figures: bool) -> str:
     """The whole page.
 
     Args:
-        conditions: how the rows answer to step, beta and ground level, see `Reproduction.conditions`; empty
-            if that was not measured.
-        spread: of the preset's ensemble, the data of a `hoof_env.paper.spread.Spread`.
+        reproduction: what the page shows.
         command: named as what wrote the page.
         figures: whether pictures lie beside it.
     """
@@ -50,11 +40,6 @@ def markdown(
         f"{reproduction.published.source}.",
         f"**The leg's geometry and its gaits are identified, not published** (preset `{geometry.name}`). "
         f"{geometry.provenance}",
-        *(
-            [f"What the printed numbers leave open of it stands under '{spread_text.TITLE}'."]
-            if spread
-            else []
-        ),
         "Each condition is one cycle of 1 s on a fixed trunk under the zero action. "
         f"{ground_text(reproduction)} {solvers_text(reproduction.published)}",
         f"Written by `{command}` with hoof-env {__version__}, {versions}.",
@@ -65,13 +50,12 @@ def markdown(
         "Counted are the rows that have a bar with the solver: not those whose bar is 'reported', and not "
         "the ill-conditioned ones, marked †.",
         _rows_table(reproduction, solvers),
-        *_conditioning(reproduction, conditions, solvers),
+        *_ill_conditioned(reproduction),
         "## Other readings of the same rows",
         _resultants(reproduction, solvers),
         _beside_table(reproduction, solvers),
         "## Claims about shape",
         *(_shape(reproduction, claim.id, figures) for claim in reproduction.published.claims),
-        *([spread_text.markdown(spread, "spread" if figures else None)] if spread else []),
         "## How each row is measured",
         _definitions(reproduction, solvers[0]),
     ]
@@ -142,46 +126,19 @@ def _rows_table(reproduction: Reproduction, solvers: list[str]) -> str:
     return _table(head + [text for solver in solvers for text in (f"solver {solver}", "error")], lines)
 
 
-def _conditioning(reproduction: Reproduction, conditions: Mapping[str, Any], solvers: list[str]) -> list[str]:
-    """Section on the rows that a solver is spared for being ill-conditioned."""
-    spared = list(dict.fromkeys(row["id"] for row in _of(reproduction.rows, spared=ILL)))
-    if not (spared and conditions):
+def _ill_conditioned(reproduction: Reproduction) -> list[str]:
+    """Section on the rows that a solver is spared for being ill-conditioned, if there are any."""
+    spared = dict.fromkeys(row["id"] for row in _of(reproduction.rows, spared=ILL))
+    if not spared:
         return []
-    from hoof_env.paper.study.conditions import LEVEL_WINDOW
-    from hoof_env.paper.study.conditions_text import conditions_text, number  # import this module
-
-    lines = []
-    for name in spared:
-        published = reproduction.published.row(name)
-        for solver in solvers:
-            (row,) = _of(reproduction.rows, id=name, solver=solver)
-            line = [
-                f"`{name}`",
-                format_number(published.value, published.unit),
-                published.unit,
-                f"`{solver}`",
-            ]
-            line += [format_number(row["simulated"], row["unit"]), format_error(row, reproduction)]
-            answers = conditions[name][solver]
-            line += [
-                number(answers[parameter]["relative"], "+.3g") if parameter in answers else ""
-                for parameter in ("step", "beta", "ground")
-            ]
-            ends = (format_number(answers["ground"][end], published.unit) for end in ("low", "high"))
-            lines.append([*line, " to ".join(ends)])
-    window = f"±{1e3 * LEVEL_WINDOW:g} mm"
-    head = ["row", "published", "unit", "solver", "simulated", "error", "step", "β", "hip height", window]
-    spare = " or ".join(f"`{solver}`" for solver in EULER)
     return [
         "## Ill-conditioned rows",
-        "Inelastic walking hangs on the approach speed at a touch-down that grazes, and the paper's loop "
-        "takes it at the first step inside the ground. So these rows are shown with every solver and have no "
-        f"bar with {spare}. Their condition is the relative change of the row per relative change of the "
-        "time step, of β and of the hip's height above the ground, whose level is identified; the last "
-        f"column is where the solver puts the row within {window} of that level.",
-        _table(head, lines),
-        "The same for every row, to compare:",
-        conditions_text(reproduction.published, conditions),
+        f"These rows, marked †, have no bar with {listed((f'`{solver}`' for solver in EULER), 'or')}: "
+        f"{listed(f'`{name}`' for name in spared)}. Inelastic walking depends on the approach speed at a "
+        "touch-down that grazes the ground. The paper's loop takes that speed at its first step inside the "
+        "ground, so a small change of the time step, of β or of the identified ground level moves these rows "
+        "by many bars. How far each row moves is measured in the repository's "
+        "[docs/evidence/conditions.md](../evidence/conditions.md).",
     ]
 
 

@@ -9,9 +9,8 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
-from functools import cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -26,13 +25,11 @@ from hoof_env.leg.geometry import Geometry
 from hoof_env.paper import report
 from hoof_env.paper.measure import measure_stance
 from hoof_env.paper.published import CONDITIONS, Published, load_published
+from hoof_env.paper.replay import replay
 from hoof_env.paper.rows import compare, counted
 from hoof_env.paper.shapes import DEPTHS, judge, sole_velocity, walk_brakes
 from hoof_env.paper.solvers import EXACT, settings_of
 from hoof_env.paper.solvers import SOLVERS as SOLVERS
-
-if TYPE_CHECKING:
-    from hoof_env.paper.spread import Spread
 
 ENVIRONMENT = "hoof_env/HorseLegFixed-v0"
 GAITS = ("walk", "run")
@@ -66,11 +63,6 @@ class Reproduction:
             condition, solver).
         geometry: the leg, identified and not published.
         published: what was compared with.
-        conditions: measures how every row answers to step, beta and ground level, as
-            `hoof_env.paper.study.conditions.conditions` returns it. Some seconds, at the first call only, and
-            only a report spends them; without it the result is empty.
-        spread: measures how far the ensemble of the preset leaves the leg open; None if it has none. Some
-            seconds too.
         ground: the preset's, elastic, the approach speed interpolated.
     """
 
@@ -79,8 +71,6 @@ class Reproduction:
     traces: dict[tuple[str, str, str], Trace]
     geometry: Geometry
     published: Published
-    conditions: Callable[[], Mapping[str, Any]] = dict
-    spread: Callable[[], Spread | None] = lambda: None
     ground: Ground = field(default_factory=Ground)
 
 
@@ -147,8 +137,7 @@ def reproduce(progress: Callable[[str], None] | None = None, *, preset: str | No
     shapes = _judge_all(traces, medians, published)
     for solver in SOLVERS:
         tell(f"{solver}: {counted(rows, shapes, solver)}")
-    later = cache(partial(_conditions, preset, tell)), cache(partial(_spread, geometry.name, progress))
-    return Reproduction(rows, shapes, traces, geometry, published, *later, ground)
+    return Reproduction(rows, shapes, traces, geometry, published, ground)
 
 
 def _silent(line: str) -> None:
@@ -184,22 +173,7 @@ def _judge_all(
 
 def _sole_velocities(trace: Trace, ground: Ground) -> dict[float, float]:
     """`sole_velocity` [m/s] by depth [m]: on a fixed trunk the motion is the same on every ground."""
-    from hoof_env.paper.study.replay import replay  # imports this module
-
     return {depth: sole_velocity(replay(trace, ground, depth)) for depth in DEPTHS}
-
-
-def _conditions(preset: str | None, tell: Callable[[str], None]) -> Mapping[str, Any]:
-    from hoof_env.paper.study.conditions import conditions  # imports this module
-
-    return conditions(preset, tell)
-
-
-def _spread(preset: str, progress: Callable[[str], None] | None) -> Spread | None:
-    from hoof_env.identify.ensemble import has_ensemble
-    from hoof_env.paper.spread import measure_spread  # imports this module
-
-    return measure_spread(preset, progress=progress) if has_ensemble(preset) else None
 
 
 def write_reproduction(
@@ -211,8 +185,7 @@ def write_reproduction(
 ) -> list[Path]:
     """Write `reproduction.json`, `reproduction.md` and the figures; returns their paths.
 
-    A preset with an ensemble gets its spread too: a section of the page, `spread.json` and a figure. Nothing
-    replaces an older result unless everything could be written.
+    Nothing replaces an older result unless everything could be written.
 
     Args:
         reproduction: what to write.
@@ -225,28 +198,14 @@ def write_reproduction(
     """
     out_dir = Path(out_dir)
     with staged(out_dir) as stage:
-        conditions = reproduction.conditions()
-        rows = [{**row, "answers": _answers(conditions, row)} for row in reproduction.rows]
-        entries = [*rows, *reproduction.shapes]
+        entries = [*reproduction.rows, *reproduction.shapes]
         text = json.dumps(entries, indent=1, ensure_ascii=False, allow_nan=False)
         (stage / "reproduction.json").write_text(text + "\n", encoding="utf-8")
-        spread = reproduction.spread()
-        if spread:
-            text = json.dumps(spread.data, indent=1, ensure_ascii=False, allow_nan=False)
-            (stage / "spread.json").write_text(text + "\n", encoding="utf-8")
         if figures:
             from hoof_env.paper.figures import draw_all
 
-            draw_all(reproduction, stage, spread.curves if spread else None)
-        markdown = report.markdown(
-            reproduction, conditions, spread.data if spread else None, command=command, figures=figures
-        )
+            draw_all(reproduction, stage)
+        markdown = report.markdown(reproduction, command=command, figures=figures)
         (stage / "reproduction.md").write_text(markdown, encoding="utf-8")
         names = sorted(file.name for file in stage.iterdir())
     return [out_dir / name for name in names]
-
-
-def _answers(conditions: Mapping[str, Any], row: Mapping[str, Any]) -> dict[str, Any]:
-    """How a row answers to step, beta and ground level with its solver, by the solver's name."""
-    by_solver = conditions.get(row["id"], {}).items()
-    return {name: answer for name, answer in by_solver if name == row["solver"]}

@@ -18,8 +18,8 @@ Stances = Mapping[tuple[str, str], Stance]
 """Measured cycles by (gait, condition)."""
 
 ILL_CONDITIONED = ("walk.peak_inelastic", "walk.mean_inelastic", "walk.reduction")
-"""Rows without a bar for the paper's solver, with either beta: the walk grazes, and they hang on how its loop
-samples touch-down (`hoof_env.paper.study.conditions` measures it)."""
+"""Rows without a bar for the paper's solver, with either beta: the walk grazes, and they depend on how its
+loop samples touch-down (docs/evidence/conditions.md has how far they move)."""
 
 REPORTED, ILL = "reported", "ill-conditioned"
 """Why a row is spared."""

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from hoof_env.ground.preset import HERTZ
 from hoof_env.paper.measure import hoof_error, measure_stance
 from hoof_env.paper.published import Published
 from hoof_env.paper.solvers import EULER, EXACT, PRINTED, PROBABLE, betas, slowest_root
-from hoof_env.paper.study.section import listed
 
 if TYPE_CHECKING:
     from hoof_env.paper.reproduce import Reproduction
+
+
+def listed(items: Iterable[str], last: str = "and") -> str:
+    """'a', 'a and b', 'a, b and c'; 'none' without items."""
+    *first, end = list(items) or ["none"]
+    return f"{', '.join(first)} {last} {end}" if first else end
 
 
 def ground_text(reproduction: Reproduction) -> str:

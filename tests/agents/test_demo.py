@@ -113,8 +113,8 @@ def test_scores_on_the_page_are_those_of_the_file(folder, report):
     rows = {row[0].strip(): row[1:] for row in report.tables["scores"][1:]}
     assert set(rows) == set(data["policies"]) == {*demo.SCRIPTED, demo.TRAINED}
     for name, policy in data["policies"].items():
-        for (key, metric), cell in zip(METRICS.items(), rows[name], strict=True):
-            mean = policy["mean"][key]
+        for (key, mean), cell in zip(policy["mean"].items(), rows[name], strict=True):
+            metric = METRICS[key]
             expected = "∞" if mean is None else f"{mean * metric.factor:.{metric.digits}f}"
             assert cell.split()[0] == expected
 

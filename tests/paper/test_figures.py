@@ -5,11 +5,10 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from hoof_env.errors import HoofEnvError, ParameterError
+from hoof_env.errors import HoofEnvError
 from hoof_env.leg.linkage import BODIES, POINTS
 from hoof_env.paper import figures
 from hoof_env.paper.figure_angles import draw_angles
-from hoof_env.paper.figure_ensemble import EnsembleCurves
 from hoof_env.paper.figure_forces import draw_forces
 from hoof_env.paper.figure_labels import spread
 from hoof_env.paper.figure_mechanism import draw_mechanism
@@ -38,25 +37,6 @@ def draw(reproduction):
         return figure
 
     return draw
-
-
-@pytest.fixture(scope="module")
-def ensemble(reproduction):
-    """Three members: the leg itself, one stronger and ahead of it, one weaker, behind and higher."""
-    time = np.linspace(0, 1, 501)
-
-    def sampled(trace, values):
-        return np.interp(time, trace["t"], values)
-
-    normal, path = {}, {}
-    for (gait, condition, solver), trace in reproduction.traces.items():
-        if solver == SOLVER:
-            force = sampled(trace, trace["normal"])
-            normal[gait, condition] = np.array([force, 1.1 * force, 0.8 * force])
-            x = sampled(trace, (trace["toe_x"] + trace["heel_x"]) / 2)
-            y = sampled(trace, -(trace["toe_penetration"] + trace["heel_penetration"]) / 2 - trace["trunk_y"])
-            path[gait] = x + 1j * y + np.array([[0], [0.03], [-0.02 + 0.01j]])
-    return EnsembleCurves(time, normal, path)
 
 
 def marks(ax):
@@ -212,41 +192,6 @@ def test_figure_6_draws_the_simulated_forces_where_they_act(draw, reproduction):
             match = (trace["cop_x"] == x) & (trace["friction"] == across) & (trace["normal"] == up)
             assert match.any()
         assert arrows.V.max() > 0.98 * trace["normal"].max()
-
-
-def test_the_ensembles_band_covers_its_members(draw, ensemble):
-    axes = [ax for ax in draw(draw_forces, ensemble=ensemble).axes if marks(ax)][::2]
-    for gait, ax in zip(("walk", "run"), axes, strict=True):
-        bands = [c for c in ax.collections if len(c.get_paths()) and len(c.get_paths()[0].vertices) > 500]
-        for condition, band in zip(("elastic", "inelastic"), bands, strict=True):
-            x, y = band.get_paths()[0].vertices.T
-            for k in range(0, len(ensemble.time), 25):
-                here = y[np.isclose(x, ensemble.time[k])]
-                members = ensemble.normal[gait, condition][:, k]
-                assert (here.min(), here.max()) == pytest.approx((members.min(), members.max()))
-    labels = {text.get_text() for text in draw(draw_forces, ensemble=ensemble).legends[0].get_texts()}
-    assert any("ensemble of 3 identified legs" in label for label in labels)
-
-
-def test_the_ensembles_paths_are_drawn_above_their_own_ground(draw, reproduction, ensemble):
-    own = dataclasses.replace(ensemble, hip_height=np.array([1.5, 1.6, 1.7]))
-    for curves, heights in ((own, own.hip_height), (ensemble, [reproduction.geometry.hip_height] * 3)):
-        axes = draw(draw_paths, ensemble=curves).axes
-        for gait, ax in (("walk", axes[0]), ("run", axes[2])):
-            lines = [line for line in ax.lines if curves.label in str(line.get_label())]
-            for line, path, height in zip(lines, curves.path[gait], heights, strict=True):
-                np.testing.assert_allclose(line.get_xdata(), path.real)
-                np.testing.assert_allclose(line.get_ydata(), path.imag + height)
-
-
-def test_an_ensemble_that_does_not_fit_together_is_refused(ensemble):
-    short = {"walk": ensemble.path["walk"][:, :-1]}
-    with pytest.raises(ParameterError, match=r"path\['walk'\].*\(3, 501\).*\(3, 500\)"):
-        dataclasses.replace(ensemble, path=short)
-    with pytest.raises(ParameterError, match=r"hip_height.*\(3,\).*\(2,\)"):
-        dataclasses.replace(ensemble, hip_height=np.ones(2))
-    with pytest.raises(ParameterError, match="at least one member"):
-        EnsembleCurves(ensemble.time, {}, {})
 
 
 @pytest.fixture(scope="module", params=[0.0, 0.02, -0.08])

@@ -1,0 +1,11 @@
+import pytest
+
+from agents.markdown import put
+from hoof_env.errors import DataFileError
+
+
+def test_a_table_goes_between_its_marks():
+    text = "a\n<!-- bar -->\nold\n<!-- /bar -->\nb\n"
+    assert put(text, "bar", r"new \1") == "a\n<!-- bar -->\nnew \\1\n<!-- /bar -->\nb\n"
+    with pytest.raises(DataFileError, match="<!-- audit -->"):
+        put(text, "audit", "")

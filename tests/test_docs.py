@@ -1,0 +1,76 @@
+"""What pages say of the repository is true: their links lead somewhere, their commands and files exist."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from hoof_env.cli import COMMANDS
+
+ROOT = Path(__file__).resolve().parent.parent
+FOLDERS = ("agents", "benchmarks", "docs", "examples", "hoof_env", "scripts", "tests")
+PAGES = sorted([*ROOT.glob("*.md"), *(page for folder in FOLDERS for page in (ROOT / folder).rglob("*.md"))])
+LIVE = [page for page in PAGES if "evidence" not in page.parts]
+"""Frozen pages name the commands of their commits."""
+
+LINK = re.compile(r"\]\(([^)\s]+)\)")
+CODE = re.compile(r"^( {4}|```).*?$|`[^`\n]*`", re.MULTILINE)
+
+
+def name(page):
+    return page.relative_to(ROOT).as_posix()
+
+
+def anchors(text):
+    """What GitHub calls the headings of a page."""
+    heads = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", head.lower()).replace(" ", "-") for head in heads}
+
+
+def broken(page):
+    """Relative links and images of a page whose file or heading is not there."""
+    for link in LINK.findall(CODE.sub("", page.read_text(encoding="utf-8"))):
+        place, _, anchor = link.partition("#")
+        target = page.parent / place if place else page
+        if re.match(r"[a-z]+:", link):
+            continue
+        if not target.exists() or (anchor and anchor not in anchors(target.read_text(encoding="utf-8"))):
+            yield link
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_links_lead_somewhere(page):
+    assert not list(broken(page))
+
+
+@pytest.mark.parametrize("page", LIVE, ids=name)
+def test_commands_and_files_exist(page):
+    text = page.read_text(encoding="utf-8")
+    modules = set(re.findall(r"python -m ((?:agents|benchmarks|hoof_env|tests)[\w.]*\w)", text))
+    assert not {one for one in modules if not (ROOT / one.replace(".", "/")).with_suffix(".py").is_file()}
+    commands = set(re.findall(r"(?:`|bin/)hoof-env ([a-z]+)\b(?![^.:]{0,60}\sof commit)", text))
+    assert not commands - set(COMMANDS)
+    files = set(
+        re.findall(r"`((?:agents|benchmarks|docs|examples|hoof_env|scripts|tests)/[\w./-]+\.\w+)`", text)
+    )
+    assert not {file for file in files if not (ROOT / file).is_file()}
+
+
+def test_every_frozen_page_says_of_which_commit_it_is():
+    table = (ROOT / "docs/evidence/README.md").read_text(encoding="utf-8")
+    for page in sorted((ROOT / "docs/evidence").glob("*.md")):
+        if page.name != "README.md":
+            stamp = page.read_text(encoding="utf-8").split("\n")[2]
+            commit = re.match(
+                r"> \*\*Frozen evidence, not regenerated\.\*\* Data of commit `(\w{7})`, about .", stamp
+            )
+            assert commit, page
+            assert f"`{commit[1]}`" in next(row for row in table.split("\n") if f"]({page.name})" in row)
+
+
+def test_it_can_fail(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text(
+        "# One head\n[a](none.md) [b](page.md#one-head) [c](#two) `[d](no.md)` [e](https://x.org)\n"
+    )
+    assert list(broken(page)) == ["none.md", "#two"]
