@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from gymnasium import logger
 from gymnasium.error import DependencyNotInstalled, ResetNeeded
 from numpy.typing import NDArray
 
@@ -167,7 +168,7 @@ class Renderer:
             return
         display = self._pygame.display
         if display.get_surface() is None:  # at the first frame, or after somebody else's pygame.quit()
-            open_window(self.size, "hoof-env")
+            open_window(self.size, "hoof-env", may_be_unseen=True)
             self._window_open = True
         if any(event.type == self._pygame.QUIT for event in self._pygame.event.get()):
             self.close()
@@ -178,29 +179,34 @@ class Renderer:
         self._clock.tick(self.fps)
 
 
-def open_window(size: tuple[int, int], title: str) -> Any:
+def open_window(size: tuple[int, int], title: str, *, may_be_unseen: bool = False) -> Any:
     """Open pygame's window; returns its surface.
 
+    Without a display SDL falls back to a driver that draws where nobody sees it. That counts as a window if
+    SDL_VIDEODRIVER asks for it; otherwise it is warned of where the window `may_be_unseen`, and refused
+    elsewhere.
+
     Raises:
-        HoofEnvError: there is no display. SDL then draws where nobody sees it, which counts as a window only
-            if SDL_VIDEODRIVER asks for it.
+        HoofEnvError: there is no display.
     """
     import pygame
 
+    advice = (
+        "without one `hoof-env render` films, "
+        'render_mode="rgb_array" gives pictures, xvfb-run or SDL_VIDEODRIVER=dummy draw unseen'
+    )
     try:
         pygame.display.init()
         driver = pygame.display.get_driver()
-        if driver in ("dummy", "offscreen") and driver not in os.environ.get("SDL_VIDEODRIVER", "").split(
-            ","
-        ):
-            pygame.display.quit()
-            raise pygame.error("neither DISPLAY nor WAYLAND_DISPLAY leads to one")
+        asked_for = os.environ.get("SDL_VIDEODRIVER", "").split(",")
+        if driver in ("dummy", "offscreen") and driver not in asked_for:
+            if not may_be_unseen:
+                pygame.display.quit()
+                raise pygame.error("neither DISPLAY nor WAYLAND_DISPLAY leads to one")
+            logger.warn(f"a window needs a display, and there is none: nobody sees this one; {advice}")
         window = pygame.display.set_mode(size)
     except pygame.error as error:
-        raise HoofEnvError(
-            f"a window needs a display, and none can be opened ({error}); without one `hoof-env render` "
-            'films, render_mode="rgb_array" gives pictures, xvfb-run or SDL_VIDEODRIVER=dummy draw unseen'
-        ) from None
+        raise HoofEnvError(f"a window needs a display, and none can be opened ({error}); {advice}") from None
     pygame.display.set_caption(title)
     return window
 
