@@ -135,17 +135,23 @@ def _scaling(curves: dict[str, dict[str, Any]]) -> str:
 
 
 def _limits(limits: dict[str, Any]) -> list[str]:
-    ceilings, widths = limits["ceilings_per_ns"], [str(w) for w in WIDTHS]
-    rows = [[kind, *(f"{ceilings[w][kind]['median']:.3g}" for w in WIDTHS)] for kind in KINDS]
+    ceilings = limits["ceilings_per_ns"]
+    rows = [[kind, *(f"{found[kind]['median']:.3g}" for found in ceilings.values())] for kind in KINDS]
+    clock = f"; the clock has {told(limits['clock_GHz'])} GHz" if limits["clock_GHz"] else ""
     parts = [
         "### The machine's ceilings",
-        f"Instructions a nanosecond by width in bits; the clock has {told(limits['clock_GHz'])} GHz.",
-        table(["kind", *widths], rows),
+        f"Instructions a nanosecond by width in bits{clock}.",
+        table(["kind", *map(str, ceilings)], rows),
+        *limits["left_out"],
     ]
     if limits["widths"]:
-        rows = [[kind, *map(str, found.values())] for kind, found in limits["widths"].items()]
-        parts += ["### Vector width", "Instructions in the code of the batch kernel by width in bits."]
-        parts.append(table(["kind", *widths], rows))
+        rows = [
+            [kernel, kind, *map(str, found.values())]
+            for kernel, kinds in limits["widths"].items()
+            for kind, found in kinds.items()
+        ]
+        parts += ["### Vector width", "Instructions in the code of the kernels by width in bits."]
+        parts.append(table(["kernel", "kind", *map(str, WIDTHS)], rows))
     if limits["passes"]:
         parts += ["### Stages of a step", PASSES]
     for name, found in limits["passes"].items():
