@@ -29,8 +29,8 @@ def target() -> tuple[str, str, list[str]]:
     """What numba compiles for, which need not be the processor that this runs on (`NUMBA_CPU_NAME`): LLVM's
     names of architecture and processor, and of the vector features if numba lists any."""
     triple, name, features = cpu_target.target_context.codegen().magic_tuple()
-    listed = [feature[1:] for feature in features.split(",") if feature.startswith("+")]
-    return triple.split("-")[0], name, [f for f in listed if f.startswith(("avx", "sse4", "fma", "neon", "sve"))]
+    listed = re.findall(r"\+((?:avx|sse4|fma|neon|sve)[^,]*)", features)
+    return triple.split("-")[0], name, listed
 
 
 def is_counted() -> bool:

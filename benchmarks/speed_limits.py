@@ -17,7 +17,16 @@ import numpy as np
 
 from benchmarks.speed_cases import BATCH, DT, STEPS, Scene, engine, scenes, worked
 from benchmarks.speed_ceilings import ceilings, clock
-from benchmarks.speed_code import KINDS, WIDTHS, assembly, by_kind, instructions, is_counted, target, vector_bits
+from benchmarks.speed_code import (
+    KINDS,
+    WIDTHS,
+    assembly,
+    by_kind,
+    instructions,
+    is_counted,
+    target,
+    vector_bits,
+)
 from benchmarks.speed_rounds import Floats, interleave, spread
 from benchmarks.speed_stages import STAGES, STEP, Pass, jit
 from hoof_env.dynamics.advance import LANES, advance_batch, advance_four, advance_leg, run
