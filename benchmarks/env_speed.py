@@ -1,6 +1,6 @@
 """How fast the environments are, beside Gymnasium's HalfCheetah-v5 and EnvPool's, on one thread.
 
-    python -m benchmarks.env_speed          writes benchmarks/results/env_speed.json and .md
+    python -m benchmarks.env_speed          writes env_speed.json and .md, where `benchmarks.speed` does
 
 An environment step is 20 substeps of 1 ms here and 5 of 10 ms there; `HorseLegFixed` takes 200 of 0.1 ms and
 has no bars. One process, random actions, observations, rewards and resets included, rounds interleaved; a
@@ -21,9 +21,12 @@ import gymnasium as gym
 import numpy as np
 
 import hoof_env  # noqa: F401  registers the ids
-from benchmarks.speed import machine
+from benchmarks.speed import RESULTS, machine
+from benchmarks.speed_code import vector_bits
+from benchmarks.speed_history import keep
 from benchmarks.speed_peers import has
 from benchmarks.speed_rounds import interleave, spread, told
+from hoof_env._output import staged
 
 BARRED = ("HorseLeg", "HorseLegRail", "HorseLegSpeed", "HorseLegTerrain")
 IDS = (*BARRED, "HorseLegFixed")
@@ -110,12 +113,13 @@ def measure(rounds: int, steps: int) -> dict[str, Any]:
         alone = name.endswith("single")
         beside = "HalfCheetah-v5, single" if alone else reference
         bars = [SINGLE_BAR] if alone else list(VECTOR_BARS)
+        bits = vector_bits() if name.startswith(IDS) else None
         rows.append(
-            {"case": name, "rate": spread(rate[name]), "beside": beside,
+            {"case": name, "bits": bits, "rate": spread(rate[name]), "beside": beside,
              "ratio": spread(rate[name] / rate[beside]),
              "bars": bars if name.split(",")[0] in BARRED else None}
         )  # fmt: skip
-    return {"machine": machine(), "rounds": rounds, "rows": rows}
+    return {"machine": machine(), "bits": vector_bits(), "rounds": rounds, "rows": rows}
 
 
 def page(found: dict[str, Any]) -> str:
@@ -124,10 +128,11 @@ def page(found: dict[str, Any]) -> str:
         "# How fast the environments are", "",
         "Written by `python -m benchmarks.env_speed`, part of `make bench`. One process, one thread,"
         f" {found['rounds']} interleaved rounds of wall time: median (quartiles; extremes)."
-        " A step is 20 substeps; HorseLegFixed takes 200, so it has no bars.", "",
+        " A step is 20 substeps; HorseLegFixed takes 200, so it has no bars. Bits: of the widest vectors in"
+        " the code that numba compiles; the others are as they come.", "",
         "| | |", "|---|---|",
         *[f"| {key} | {value} |" for key, value in found["machine"].items()], "",
-        "| case | environment steps/s | beside | ratio | bars |", "|---|---|---|---|---|",
+        "| case | bits | environment steps/s | beside | ratio | bars |", "|---|---|---|---|---|---|",
     ]  # fmt: skip
     for row in found["rows"]:
         bars = "".join(
@@ -135,6 +140,7 @@ def page(found: dict[str, Any]) -> str:
         )
         cells = (
             row["case"],
+            str(row["bits"] or ""),
             f"{row['rate']['median']:,.0f}",
             row["beside"],
             told(row["ratio"]),
@@ -149,14 +155,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rounds", type=int, default=25)
     parser.add_argument("--steps", type=int, default=2000, help="of a single environment in a round")
-    parser.add_argument("--out", type=Path, default=Path("benchmarks/results"))
+    parser.add_argument("--out", type=Path, default=RESULTS, help="folder for those of all vector widths")
     given = parser.parse_args()
     found = measure(given.rounds, given.steps)
     text = page(found)
     print(text)
-    given.out.mkdir(parents=True, exist_ok=True)
-    (given.out / "env_speed.json").write_text(json.dumps(found, indent=1) + "\n")
-    (given.out / "env_speed.md").write_text(text)
+    with staged(given.out / f"{found['bits']}-bits") as folder:
+        (folder / "env_speed.json").write_text(json.dumps(found, indent=1) + "\n")
+        (folder / "env_speed.md").write_text(text)
+    rows = [(row["case"], row["beside"], row["ratio"], (row["bars"] or [None])[0]) for row in found["rows"]]
+    keep(given.out, found["machine"], found["bits"], rows)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,8 @@
 """How fast the engine is, beside MuJoCo and Exudyn on the same leg: `make bench`.
 
 Everything runs interleaved in one process on one thread. `speed_cases` and `speed_peers` say what is timed,
-`speed_rounds` how, `speed_limits` what limits it. Writes speed.json, speed.md, scaling.svg and scaling.png.
+`speed_rounds` how, `speed_limits` what limits it. Writes speed.json, speed.md, scaling.svg and scaling.png
+into a folder for the vector width, and a row for each barred case into speed.csv and speed.md beside it.
 """
 
 from __future__ import annotations
@@ -20,10 +21,11 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-import llvmlite.binding as llvm
 import numpy as np
 
 from benchmarks import speed_cases as cases
+from benchmarks.speed_code import target, vector_bits
+from benchmarks.speed_history import keep
 from benchmarks.speed_limits import limits
 from benchmarks.speed_peers import ASSEMBLIES, exudyn_cases, has, mujoco_cases, walking
 from benchmarks.speed_report import markdown, speed_table
@@ -36,12 +38,8 @@ ROUNDS = 40
 
 
 def machine() -> dict[str, str]:
-    """What it ran on: processor, cores, vector features, versions, date and commit."""
-    features = [
-        f
-        for f, there in llvm.get_host_cpu_features().items()
-        if there and f.startswith(("avx", "sse4", "fma"))
-    ]
+    """What it ran on and was compiled for: processor, vectors, versions, date and commit."""
+    _, name, features = target()
     versions = []
     for name in ("hoof-env", "numba", "llvmlite", "numpy", "mujoco", "exudyn"):
         try:
@@ -49,8 +47,9 @@ def machine() -> dict[str, str]:
         except metadata.PackageNotFoundError:
             versions.append(f"{name} not installed")
     return {
-        "processor": f"{_processor()} ({llvm.get_host_cpu_name()}), {os.cpu_count()} cores, one used",
-        "vector features": " ".join(sorted(features)),
+        "processor": f"{_processor()}, {os.cpu_count()} cores, one used",
+        "compiled for": f"{name}, vectors of {vector_bits()} bits",
+        "vector features": " ".join(sorted(features)) or f"those of {name}",
         "system": f"{platform.system()} {platform.machine()}, Python {platform.python_version()}",
         "versions": ", ".join(versions),
         "date": datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M UTC"),
@@ -114,7 +113,7 @@ def measure(preset: str, quick: bool, peers: bool, rounds: int) -> dict[str, Any
     for curve in curves.values():
         curve["line_error"] = line_error(curve)
     return {
-        "machine": machine(), "preset": preset, "quick": quick, "clock": cases.CLOCK,
+        "machine": machine(), "bits": vector_bits(), "preset": preset, "quick": quick, "clock": cases.CLOCK,
         "rounds": rounds, "dt_s": cases.DT,
         "cases": rows, "notes": notes, "walking": walks, "walking_steps": walk_steps,
         "limits": limited, "scaling": curves, "startup": start,
@@ -133,6 +132,7 @@ def compare(found: list[cases.Case], rounds: int) -> list[dict[str, Any]]:
                 "name": case.name,
                 "group": case.group,
                 "note": case.note,
+                "bits": case.bits,
                 "rate": spread(rate[case.name]),
                 "ratios": {
                     a: spread(rate[case.name] / rate[peer])
@@ -153,7 +153,7 @@ def _say(what: str) -> None:
 def main(arguments: list[str] | None = None) -> None:
     """The command; see `--help`."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.speed", description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=RESULTS, help="folder for the results")
+    parser.add_argument("--out", type=Path, default=RESULTS, help="folder for those of all vector widths")
     parser.add_argument("--preset", default=PRESET, help="whose leg and ground")
     parser.add_argument("--rounds", type=int, help=f"how many; {ROUNDS} if not given")
     parser.add_argument("--clock", choices=cases.CLOCKS, default="wall", help="processor: on a busy machine")
@@ -163,12 +163,15 @@ def main(arguments: list[str] | None = None) -> None:
     cases.CLOCK = given.clock
     rounds = given.rounds or (2 if given.quick else ROUNDS)
     result = measure(given.preset, given.quick, not given.no_peers, rounds)
-    with staged(given.out) as folder:
-        draw(result["scaling"], folder)
+    own = given.out / f"{result['bits']}-bits"
+    with staged(own) as folder:
+        draw(result["scaling"], folder, result["bits"])
         (folder / "speed.json").write_text(json.dumps(result, indent=1, default=_plain) + "\n")
         (folder / "speed.md").write_text(markdown(result))
+    rows = [(row["name"], "MuJoCo ALL", row["ratios"].get("ALL"), row["required"]) for row in result["cases"]]
+    keep(given.out, result["machine"], result["bits"], rows)
     print(speed_table(result["cases"]))
-    print(f"written to {given.out}")
+    print(f"written to {own}")
 
 
 def _plain(value: Any) -> Any:

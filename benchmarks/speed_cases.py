@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.common import Start
+from benchmarks.speed_code import vector_bits
 from hoof_env.dynamics.drive import Motor
 from hoof_env.dynamics.limb import Limb
 from hoof_env.dynamics.schemes import SCHEMES
@@ -112,6 +113,7 @@ class Case:
         units: steps of the whole animal that this is.
         note: for the table.
         required, aimed: bars of the ratio to the reference.
+        bits: of the widest vectors in code that numba compiled.
     """
 
     name: str
@@ -121,6 +123,7 @@ class Case:
     note: str = ""
     required: float | None = None
     aimed: float | None = None
+    bits: int | None = None
 
 
 CLOCKS = {"wall": time.perf_counter, "processor": time.thread_time}
@@ -178,6 +181,6 @@ def our_cases(preset: str, quick: bool) -> list[Case]:
         for what, options, account, (required, aimed) in variants:
             made = engine(scene, preset, n, **options)
             run = _ours(made, steps, account)
-            judged = NO_BARS if quick else (required, aimed)
-            cases.append(Case(title + what, name, run, n * steps, "", *judged))
+            required, aimed = NO_BARS if quick else (required, aimed)
+            cases.append(Case(title + what, name, run, n * steps, "", required, aimed, vector_bits()))
     return cases

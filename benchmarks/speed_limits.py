@@ -17,10 +17,19 @@ import numpy as np
 
 from benchmarks.speed_cases import BATCH, DT, STEPS, Scene, engine, scenes, worked
 from benchmarks.speed_ceilings import ceilings, clock
-from benchmarks.speed_code import KINDS, WIDTHS, assembly, by_kind, instructions
+from benchmarks.speed_code import (
+    KINDS,
+    WIDTHS,
+    assembly,
+    by_kind,
+    instructions,
+    is_counted,
+    target,
+    vector_bits,
+)
 from benchmarks.speed_rounds import Floats, interleave, spread
 from benchmarks.speed_stages import STAGES, STEP, Pass, jit
-from hoof_env.dynamics.advance import LANES, advance_batch, run
+from hoof_env.dynamics.advance import LANES, advance_batch, advance_four, advance_leg, run
 from hoof_env.dynamics.trunk_engine import TrunkEngine
 from hoof_env.dynamics.trunk_model import new_memory
 
@@ -46,13 +55,15 @@ Counts = Counter[tuple[str, int]]
 
 
 def limits(preset: str, quick: bool, rounds: int) -> dict[str, Any]:
-    """Clock, ceilings, the stages of a pass, widths of the batch kernel's instructions, and experiments."""
+    """Clock, ceilings, the stages of a pass, widths of the kernels' instructions, experiments, and what is
+    left out because this machine does not have it."""
     turns, at = 200 if quick else 100000, scenes(preset)
-    runs: dict[Any, Timed] = {"clock": clock(10 * turns)}
-    for width in WIDTHS:
+    widths = [width for width in WIDTHS if width <= vector_bits()]
+    runs: dict[Any, Timed] = {"clock": clock(10 * turns)} if is_counted() else {}
+    for width in widths:
         runs |= {(kind, width): timed for kind, timed in ceilings(width // 64, turns).items()}
     counts: dict[str, dict[str, Counts]] = {}
-    for name, (scene, lanes, number) in {} if quick else PASSES.items():
+    for name, (scene, lanes, number) in {} if quick or not is_counted() else PASSES.items():
         made = engine(at[scene], preset, number)
         one, counts[name] = Pass(made, lanes, together=number == 1 < lanes), {}
         runs[name, "step"] = _advance(made, number // lanes if number > 1 else 1, STEPS[scene, number])
@@ -63,19 +74,34 @@ def limits(preset: str, quick: bool, rounds: int) -> dict[str, Any]:
                 runs[name, title] = partial(worked, _nothing, work), TURNS / stage.calls
     seconds = _each(runs, rounds)
     return {
-        "clock_GHz": spread(1e-9 / seconds["clock"]),
-        "ceilings_per_ns": {w: {k: spread(1e-9 / seconds[k, w]) for k in KINDS} for w in WIDTHS},
+        "clock_GHz": spread(1e-9 / seconds["clock"]) if "clock" in seconds else None,
+        "ceilings_per_ns": {w: {k: spread(1e-9 / seconds[k, w]) for k in KINDS} for w in widths},
+        "left_out": left_out(),
         "passes": {name: _pass(name, found, seconds) for name, found in counts.items()},
-        "widths": {} if quick else _widths(engine(at["leg"], preset, LANES)),
+        "widths": {} if quick or not is_counted() else _widths(at, preset),
         "experiments": {} if quick else experiments(preset, rounds),
     }
+
+
+def left_out() -> list[str]:
+    """A line for each thing that is not measured here, and why."""
+    bits, (architecture, name, _) = vector_bits(), target()
+    lines = [
+        f"Vectors of {width} bits are left out: the code that numba makes for {name} has none."
+        for width in WIDTHS
+        if width > bits
+    ]
+    if not is_counted():
+        lines.append(f"Clock and counts of instructions are left out: they know x86_64, not {architecture}.")
+    return lines
 
 
 def _pass(name: str, counts: dict[str, Counts], seconds: dict[Any, Floats]) -> dict[str, Any]:
     """Of one pass: what its stages do and take in a step, and how near the step comes to the ceilings."""
 
     def needed(count: Counts, bound: str) -> Any:
-        return sum(count[k, w] * seconds[k, w] for k in BOUNDS[bound] for w in WIDTHS)
+        timed = ((k, w) for k in BOUNDS[bound] for w in WIDTHS if (k, w) in seconds)
+        return sum(count[key] * seconds[key] for key in timed)
 
     def row(count: Counts, spent: Floats) -> dict[str, Any]:
         return by_kind(count) | {
@@ -88,13 +114,18 @@ def _pass(name: str, counts: dict[str, Counts], seconds: dict[Any, Floats]) -> d
     return {"rows": rows, "step": row(counts[PIECE], seconds[name, "step"])}
 
 
-def _widths(made: TrunkEngine) -> dict[str, dict[int, int]]:
-    """Floating-point instructions of the batch kernel by kind and width."""
-    kernel: Any = advance_batch
-    fresh = jit(kernel.py_func)
-    fresh(*made.arrays, DT, 1, False)
-    found = instructions(assembly(fresh))
-    return {kind: {width: found[kind, width] for width in WIDTHS} for kind in KINDS[:3]}
+def _widths(at: dict[str, Scene], preset: str) -> dict[str, dict[str, dict[int, int]]]:
+    """Floating-point instructions of each kernel by kind and width."""
+    kernels: tuple[tuple[Any, str, int], ...] = (
+        (advance_leg, "leg", 1), (advance_four, "horse", 1), (advance_batch, "leg", LANES)
+    )  # fmt: skip
+    widths = {}
+    for kernel, scene, number in kernels:
+        fresh = jit(kernel.py_func)
+        fresh(*engine(at[scene], preset, number).arrays, DT, 1, False)
+        found = instructions(assembly(fresh))
+        widths[kernel.__name__] = {k: {w: found[k, w] for w in WIDTHS} for k in KINDS[:3]}
+    return widths
 
 
 def _nothing() -> None:

@@ -133,8 +133,8 @@ def line_error(curve: dict[str, Any]) -> float:
     return float(np.abs(fit / y - 1).max())
 
 
-def draw(curves: dict[str, dict[str, Any]], folder: Path) -> None:
-    """Three panels, `scaling.svg` and `scaling.png`."""
+def draw(curves: dict[str, dict[str, Any]], folder: Path, bits: int) -> None:
+    """Three panels for vectors of so many bits, `scaling.svg` and `scaling.png`."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -171,6 +171,7 @@ def draw(curves: dict[str, dict[str, Any]], folder: Path) -> None:
         axis.set_ylabel(f"ns per {unit}")
         axis.legend(frameon=False)
         axis.spines[["top", "right"]].set_visible(False)
+    figure.suptitle(f"vectors of {bits} bits", fontsize="medium")
     for kind in ("svg", "png"):
         figure.savefig(folder / f"scaling.{kind}", dpi=150)
     plt.close(figure)

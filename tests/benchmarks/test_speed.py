@@ -11,7 +11,8 @@ pytest.importorskip("matplotlib")
 
 from benchmarks import speed
 from benchmarks.speed_cases import Case, engine, scenes
-from benchmarks.speed_code import by_kind, instructions
+from benchmarks.speed_code import WIDTHS, by_kind, instructions, vector_bits
+from benchmarks.speed_history import keep, read
 from benchmarks.speed_report import speed_table
 from benchmarks.speed_rounds import interleave, spread
 from benchmarks.speed_scaling import line_error
@@ -22,19 +23,28 @@ def test_quick_mode_runs_without_peers_and_writes_its_files(tmp_path, monkeypatc
     monkeypatch.setitem(sys.modules, "mujoco", None)  # as if they were not installed
     monkeypatch.setitem(sys.modules, "exudyn", None)
     speed.main(["--quick", "--rounds", "2", "--out", str(tmp_path)])
-    assert {path.name for path in tmp_path.iterdir()} == {
+    bits = vector_bits()
+    own = tmp_path / f"{bits}-bits"
+    assert {path.name for path in own.iterdir()} == {
         "speed.json",
         "speed.md",
         "scaling.png",
         "scaling.svg",
     }
-    result = json.loads((tmp_path / "speed.json").read_text())
+    result = json.loads((own / "speed.json").read_text())
     assert result["machine"]["processor"]
     assert {case["group"] for case in result["cases"]} == {"leg", "suspended leg", "horse"}
     assert all(case["rate"]["min"] > 0 and not case["ratios"] for case in result["cases"])
     assert "MuJoCo is left out" in " ".join(result["notes"])
-    page = (tmp_path / "speed.md").read_text()
+    assert {case["bits"] for case in result["cases"]} == {bits}
+    assert list(result["limits"]["ceilings_per_ns"]) == [str(w) for w in WIDTHS if w <= bits]
+    page = (own / "speed.md").read_text()
     assert "leg, one" in page
+    assert f"vectors of {bits} bits" in page
+    for width in WIDTHS:
+        assert (f"Vectors of {width} bits are left out" in page) == (width > bits)
+    assert f"[{bits}-bits, speed]({bits}-bits/speed.md)" in (tmp_path / "speed.md").read_text()
+    assert read(tmp_path) == []  # numbers of a smoke test mean nothing
     assert "scaling.svg" in page
     assert "leg, one" in capsys.readouterr().out
 
@@ -51,6 +61,26 @@ def test_ratios_are_taken_within_a_round():
     table = speed_table(list(rows.values()))
     assert "2: met" in table
     assert "30: not met" in table
+
+
+def test_a_run_leaves_the_figures_of_others(tmp_path):
+    ratio = {"median": 66.666, "q1": 65.0, "q3": 70.0}
+    for bits, name, date in ((512, "znver5", "2026-11-22"), (256, "haswell", "2026-11-23")):
+        machine = {
+            "date": date,
+            "commit": "abc",
+            "compiled for": name,
+            "processor": "EPYC",
+            "system": "Linux",
+        }
+        rows = [("leg, one", "MuJoCo ALL", ratio, 35), ("no bar", "", ratio, None), ("no ratio", "", None, 1)]
+        keep(tmp_path, machine, bits, rows)
+    assert [row["bits"] for row in read(tmp_path)] == ["512", "256"]
+    table = [line for line in (tmp_path / "speed.md").read_text().splitlines() if line.startswith("| leg")]
+    assert [line.split(" | ")[2:7] for line in table] == [
+        ["512", "66.7 (65 to 70)", "35: met", "2026-11-22", "abc"],
+        ["256", "66.7 (65 to 70)", "35: met", "2026-11-23", "abc"],
+    ]
 
 
 def test_every_case_runs_once_a_round_in_changing_order():
@@ -77,15 +107,18 @@ def test_machine_code_is_counted_by_width():
             "\tmovq\t8(%rsp), %rax  # 8-byte Reload",
             "\tleaq\t8(%rsp), %rax",
             "\tretq",
+            "\tmulpd\t%xmm0, %xmm1",
+            "\tsqrtsd\t%xmm0, %xmm1",
+            "\tmovhpd\t8(%rax), %xmm1",
         ]
     )
     found = instructions(code)
     assert +found == {
-        ("all", 0): 9, ("arithmetic", 512): 1, ("divisions", 256): 1, ("square roots", 64): 1,
-        ("arithmetic", 128): 1, ("loads", 512): 1, ("stores", 512): 1, ("loads", 64): 1,
+        ("all", 0): 12, ("arithmetic", 512): 1, ("divisions", 256): 1, ("square roots", 64): 2,
+        ("arithmetic", 128): 2, ("loads", 512): 1, ("stores", 512): 1, ("loads", 64): 2,
     }  # fmt: skip
     assert by_kind(found) == {
-        "instructions": 9, "divisions": 1, "square roots": 1, "arithmetic": 2, "loads": 2, "stores": 1,
+        "instructions": 12, "divisions": 1, "square roots": 2, "arithmetic": 3, "loads": 3, "stores": 1,
     }  # fmt: skip
 
 

@@ -1,0 +1,76 @@
+"""Every run's barred ratios with date, processor and vector width: a new run does not replace an old one.
+
+A run adds rows to `speed.csv`; `speed.md` shows them all.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from benchmarks.speed_report import table
+from hoof_env._output import staged
+
+RUN = ("date", "commit", "compiled for", "processor")
+COLUMNS = ("case", "beside", "bits", "ratio", "q1", "q3", "required", *RUN)
+
+INTRO = """\
+# How fast it was, run by run
+
+Written by `make bench`, which adds rows and replaces none. A ratio is the median of interleaved rounds with
+its quartiles; bits are of the widest vectors that numba compiled. The last run of each width in full:"""
+
+Row = tuple[str, str, Mapping[str, float] | None, float | None]
+"""Case, what it is beside, the ratio's spread if it was measured, and the bar if there is one."""
+
+
+def keep(folder: Path, machine: Mapping[str, str], bits: int, rows: Iterable[Row]) -> None:
+    """Add those of `rows` that have a bar and a ratio to the files in `folder`.
+
+    Args:
+        folder: of all results; that of each width is inside.
+        machine: `benchmarks.speed.machine()`.
+        bits: of the widest vectors.
+        rows: of one run.
+    """
+    known = {"bits": str(bits)} | {name: machine[name] for name in RUN}
+    kept = read(folder)
+    for case, beside, ratio, required in rows:
+        if ratio is not None and required is not None:
+            found = {"ratio": ratio["median"], "q1": ratio["q1"], "q3": ratio["q3"], "required": required}
+            told = {name: f"{value:.3g}" for name, value in found.items()}
+            kept.append({"case": case, "beside": beside} | told | known)
+    with staged(folder) as stage:
+        with (stage / "speed.csv").open("w", newline="") as file:
+            writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+            writer.writeheader()
+            writer.writerows(kept)
+        (stage / "speed.md").write_text(page(kept, folder))
+
+
+def read(folder: Path) -> list[dict[str, str]]:
+    """The rows of all runs so far."""
+    path = folder / "speed.csv"
+    if not path.exists():
+        return []
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def page(rows: list[dict[str, str]], folder: Path) -> str:
+    """All runs as Markdown, case by case and each in order of time."""
+    links = sorted(path.relative_to(folder) for path in folder.glob("*-bits/*.md"))
+    listed = [f"* [{link.parent.name}, {link.stem}]({link.as_posix()})" for link in links]
+    cases = list(dict.fromkeys(row["case"] for row in rows))
+    ordered = sorted(rows, key=lambda row: (cases.index(row["case"]), row["date"]))
+    head = ["case", "beside", "bits", "ratio", "required", *RUN]
+    lines = []
+    for row in ordered:
+        is_met = float(row["ratio"]) >= float(row["required"])
+        shown = row | {
+            "ratio": f"{row['ratio']} ({row['q1']} to {row['q3']})",
+            "required": f"{row['required']}: {'met' if is_met else 'not met'}",
+        }
+        lines.append([shown[name] for name in head])
+    return "\n\n".join([INTRO, "\n".join(listed), table(head, lines)]) + "\n"
