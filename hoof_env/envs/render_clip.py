@@ -101,8 +101,8 @@ def write_film(pictures: Iterable[NDArray[np.uint8]], path: Path, fps: float) ->
         fps: frames a second.
 
     Raises:
-        ParameterError, HoofEnvError: as `check_film`. OutputError: the folder cannot be written or the disk is
-            full.
+        ParameterError, HoofEnvError: as `check_film`.
+        OutputError: the folder cannot be written, or the disk is full.
     """
     check_film(path, check_number("fps", fps, low=0, high=1000, exclusive_low=True))
     with staged(path.parent) as stage:
