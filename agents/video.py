@@ -11,8 +11,7 @@ import gymnasium as gym
 import numpy as np
 
 from hoof_env._output import staged
-
-NOT_WHOLE = "ffmpeg could not write the whole film; is the disk full?"
+from hoof_env.envs.render_clip import check_whole, send
 
 
 def film(
@@ -59,7 +58,7 @@ def film(
         try:
             start = np.ones(1, bool)
             for shown in count(1):
-                _send(writer, frame)
+                send(writer, frame)
                 action, _ = policy.predict(observation, episode_start=start, deterministic=True)
                 observation, _, terminated, truncated, _ = env.step(action)
                 start = np.zeros(1, bool)
@@ -68,24 +67,5 @@ def film(
                     break
         finally:
             writer.close()
-        _check(stage / path.name, shown)
+        check_whole(stage / path.name, shown)
     return path
-
-
-def _send(writer: Any, frame: Any) -> None:
-    try:
-        writer.send(np.ascontiguousarray(frame))
-    except OSError:  # in many lines
-        raise OSError(NOT_WHOLE) from None
-
-
-def _check(path: Path, frames: int) -> None:
-    """Raise `OSError` if fewer frames were written: ffmpeg may fail after it took the last one."""
-    import imageio_ffmpeg
-
-    try:
-        written, _ = imageio_ffmpeg.count_frames_and_secs(str(path))
-    except RuntimeError:
-        written = 0
-    if written < frames:
-        raise OSError(NOT_WHOLE)

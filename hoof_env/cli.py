@@ -1,10 +1,12 @@
 """The command line `hoof-env`: one function a sub-command, its signature the options, its docstring the help.
 
-Exit codes: 0 done, 2 a wrong argument or an error that is explained in one line, 130 interrupted.
+Exit codes: 0 done, 2 a wrong argument or an error that is explained in one line, 130 interrupted, 141
+the reader of its output has left.
 """
 
 from __future__ import annotations
 
+import os
 import shlex
 import sys
 from collections.abc import Callable, Sequence
@@ -273,6 +275,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except HoofEnvError as error:
         print(f"hoof-env: error: {error}", file=sys.stderr)
         return 2
+    except BrokenPipeError:  # who read our output, as `head`, has left
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # of what is still to be flushed
+        return 141
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         return 130

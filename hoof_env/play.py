@@ -45,7 +45,7 @@ class Game:
     Attributes:
         action: what is commanded, shape (4,), in [-1, 1].
         news: what happened since the last tick or restart.
-        score: sum of the rewards of the episode.
+        score: sum of the rewards of the episode, of all objectives alike.
         paused, ended, quit: whether it waits, the episode is over, or the player has left.
         why: how the episode ended, for people.
     """
@@ -95,7 +95,7 @@ class Game:
                 entry, way = HELD[key]
                 self.action[entry] = np.clip(self.action[entry] + way * RATE * self.dt, -1.0, 1.0)
         _, reward, failed, truncated, info = self._env.step(self.action.copy())
-        self.score += float(reward)
+        self.score += float(np.sum(reward))
         self.news = instants(records.substeps(self._env, self._command()))
         self.ended = failed or truncated
         if self.ended:

@@ -1,4 +1,5 @@
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -102,6 +103,16 @@ def test_an_interrupt_is_one_line_and_leaves_nothing_behind(tmp_path):
     assert process.returncode == 130
     assert errors == "interrupted\n"
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGPIPE")
+def test_a_reader_that_leaves_is_no_error():
+    read, write = os.pipe()
+    os.close(read)
+    command = [*HOOF_ENV, "manual"]
+    done = subprocess.run(command, stdout=write, stderr=subprocess.PIPE, text=True, timeout=300, check=False)
+    os.close(write)
+    assert (done.returncode, done.stderr) == (141, "")
 
 
 def test_an_interrupt_while_kernels_compile_is_one_line(tmp_path, monkeypatch, capsys):

@@ -112,6 +112,18 @@ def test_the_fixed_leg_is_played_by_offsets():
         assert game.news[-1].command_crank_speed > game.news[0].crank_speed
 
 
+def test_a_vector_reward_scores_by_its_sum():
+    with make_env("hoof_env/HorseLegMO-v0", {"episode_seconds": 0.1}) as env:
+        game = Game(env)
+        rewards = []
+        step = env.unwrapped.step
+        env.unwrapped.step = lambda action: rewards.append((result := step(action))[1]) or result
+        for _ in range(5):
+            game.tick()
+        assert game.score == pytest.approx(np.sum(rewards))
+        assert game.ended
+
+
 def test_every_key_is_explained():
     words = ", ".join(keys for column in HELP for keys, _ in column)
     assert all(key in words.split(", ") for key in HELD)

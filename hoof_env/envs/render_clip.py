@@ -40,6 +40,8 @@ FFMPEG: dict[str, dict[str, Any]] = {
 }  # fmt: skip
 """How ffmpeg writes each kind of film."""
 
+NOT_WHOLE = "ffmpeg could not write the whole film; is the disk full?"
+
 TELL_SECONDS = 5.0
 """Time between two lines about how far a film is, where there is no bar [s]."""
 
@@ -99,7 +101,8 @@ def write_film(pictures: Iterable[NDArray[np.uint8]], path: Path, fps: float) ->
         fps: frames a second.
 
     Raises:
-        ParameterError, HoofEnvError: as `check_film`. OutputError: the folder cannot be written.
+        ParameterError, HoofEnvError: as `check_film`.
+        OutputError: the folder cannot be written, or the disk is full.
     """
     check_film(path, check_number("fps", fps, low=0, high=1000, exclusive_low=True))
     with staged(path.parent) as stage:
@@ -109,12 +112,34 @@ def write_film(pictures: Iterable[NDArray[np.uint8]], path: Path, fps: float) ->
             for picture in pictures:
                 if writer is None:
                     writer = _writer(stage / path.name, picture.shape, fps)
-                writer.send(np.ascontiguousarray(picture))
+                send(writer, picture)
                 count += 1
         finally:
             if writer is not None:
                 writer.close()
+        if count:
+            check_whole(stage / path.name, count)
     return count
+
+
+def send(writer: Any, picture: NDArray[np.uint8]) -> None:
+    """Hand a picture to ffmpeg; `OSError` in one line if it has given up."""
+    try:
+        writer.send(np.ascontiguousarray(picture))
+    except OSError:  # in many lines
+        raise OSError(NOT_WHOLE) from None
+
+
+def check_whole(path: Path, count: int) -> None:
+    """Raise `OSError` if fewer frames were written: ffmpeg may fail after it took the last one."""
+    import imageio_ffmpeg
+
+    try:
+        written, _ = imageio_ffmpeg.count_frames_and_secs(str(path))
+    except RuntimeError:
+        written = 0
+    if written < count:
+        raise OSError(NOT_WHOLE)
 
 
 def _writer(path: Path, shape: tuple[int, ...], fps: float) -> Any:

@@ -32,6 +32,9 @@ MODES = ("rgb_array", "human")
 SMALLEST_SIZE = (480, 270)
 """Below this the lettering is not readable [pixels]."""
 
+LARGEST_SIDE = 8192
+"""Largest width and height [pixels]; a canvas of both takes 270 MB."""
+
 
 class Renderer:
     """Draws the leg, the ground, the forces on the hoof and a panel with numbers, gait and force curve.
@@ -230,14 +233,14 @@ def new_renderer(here: Setting, fps: float, size: tuple[int, int] = (960, 540)) 
 
 
 def _check_size(size: Any) -> tuple[int, int]:
-    low_w, low_h = SMALLEST_SIZE
+    (low_w, low_h), high = SMALLEST_SIZE, LARGEST_SIDE
     try:
         width, height = size
-        good = width == int(width) >= low_w and height == int(height) >= low_h
+        good = high >= width == int(width) >= low_w and high >= height == int(height) >= low_h
     except (TypeError, ValueError):
         good = False
     if not good:
         raise ParameterError(
-            f"size: expected (width, height) of at least {low_w} x {low_h} pixels, got {size!r}"
+            f"size: expected (width, height) from {low_w} x {low_h} to {high} x {high} pixels, got {size!r}"
         )
     return int(width), int(height)

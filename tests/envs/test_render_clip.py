@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import signal
 import subprocess
 import sys
@@ -105,6 +106,18 @@ def test_a_film_in_the_making_says_how_far_it_is(is_terminal, tmp_path, capsys, 
     said = capsys.readouterr()
     assert ("/6 [" if is_terminal else "6 of 6 frames\n") in said.err
     assert said.out.count("\n") == 1
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="no RLIMIT_FSIZE")
+@pytest.mark.parametrize("name", ["x.mp4", "x.gif"])
+def test_a_film_that_ffmpeg_could_not_end_is_an_error_not_a_film(name, tmp_path):
+    """A limit on the size of files stands for a full disk: ffmpeg fails after it took the last picture."""
+    command = [sys.executable, "-m", "hoof_env", "render", "--out", str(tmp_path / name), *SMALL]
+    limited = f"ulimit -f 4; exec {shlex.join([*command, '--seconds', '0.5'])}"
+    done = subprocess.run(["bash", "-c", limited], capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 2, done.stderr
+    assert "ffmpeg could not write the whole film; is the disk full?" in done.stderr.splitlines()[-1]
+    assert list(tmp_path.iterdir()) == []
 
 
 def _is_begun(folder):
