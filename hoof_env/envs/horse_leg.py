@@ -71,7 +71,7 @@ class HorseLegEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         """Views of the batch that every step reads or writes."""
         self._terms = self.batch.episode[e.TERM : e.TERM + len(e.TERMS), 0]
         self._action, self._seen = self.batch.actions[0], self.batch.seen[0]
-        self._taken = memoryview(self._action)
+        self._taken: Any = memoryview(self._action)
         self._measured = named(self.batch.engine.arrays[0][AT_MEASURED, 0], MEASURED)
         self._step, self._desk = self.batch.kernel, self.batch.desk
 

@@ -79,7 +79,7 @@ class Named(np.ndarray[Any, np.dtype[np.float64]]):
     def __ne__(self, other: Any) -> Any:
         return not self == other if isinstance(other, Named | Mapping) else super().__ne__(other)
 
-    __hash__ = None  # type: ignore[assignment]
+    __hash__ = None
 
     def __reduce__(self) -> Any:
         return named, (np.array(self), self.names)
