@@ -17,6 +17,7 @@ from hoof_env.envs import manual_tables as tables
 from hoof_env.envs import start
 from hoof_env.envs.episode import TERMS
 from hoof_env.envs.grounds import HILLS
+from hoof_env.envs.infos import MEASURED
 from hoof_env.envs.manual_text import PAGE
 from hoof_env.envs.multi_objective import HorseLegMOEnv
 from hoof_env.envs.observation import GROUPS, entries
@@ -68,6 +69,9 @@ def page(task: str) -> str:
         start=_start(settings, what.start),
         options=_table(("Option", "Unit", "Range", "Meaning"), _options()),
         parameters=", ".join(f"`{name}`" for name in PER_EPISODE),
+        infos=_table(("Key", "Unit", "Meaning"), _quoted(tables.INFO)),
+        measured=str(len(MEASURED)),
+        quantities=_table(("Name", "In", "Unit", "Meaning"), _quantities()),
         leaves=_leaves(settings),
         seconds=literal(settings.episode_seconds),
         figures=_table(("Figure", "Unit", "Meaning"), _quoted(tables.SUMMARY)),
@@ -209,6 +213,11 @@ def _options() -> Iterable[tuple[str, ...]]:
         low, high = start.OPTIONS.get(name, (0.0, 0.0))
         within = "" if low == high else f"{low:.7g} to {high:.7g}" if math.isfinite(high) else f"from {low:g}"
         yield f"`{name}`", unit, within, meaning
+
+
+def _quantities() -> Iterable[tuple[str, ...]]:
+    for names, (within, unit, meaning) in tables.QUANTITIES.items():
+        yield ", ".join(f"`{name}`" for name in names), within, unit, meaning
 
 
 def _vector_arguments() -> Iterable[tuple[str, ...]]:

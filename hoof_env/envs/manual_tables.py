@@ -131,7 +131,11 @@ VECTOR: Rows = {
     "autoreset_mode": ("", "a `gymnasium.vector.AutoresetMode` or its name; also SAME_STEP and DISABLED"),
     "max_episode_steps": ("", "control steps that an episode lasts at most, besides `episode_seconds`"),
     "render_mode": ("", '"rgb_array"'),
-    "rendered": ("", "how many are drawn, the first ones: `render` gives a frame of each, (H, W, 3) uint8"),
+    "rendered": (
+        "",
+        "how many are drawn, the first ones; None: all, of at most 16. `render` gives a frame of each"
+        " environment, (H, W, 3) uint8, black where it is not drawn",
+    ),
 }
 """Meaning of what the vector environment takes besides."""
 
@@ -151,3 +155,60 @@ SUMMARY: Rows = {
     "failed": ("-", "0 or 1"),
 }
 """Unit and meaning of the figures of an episode."""
+
+INFO: Rows = {
+    "crank_angle": ("rad", "at the start of the episode"),
+    "speed": ("m/s", "forward, at its start"),
+    "height": ("m", "of O above y = 0, at its start"),
+    "x": ("m", "of O, at its start"),
+    "gait": ("", "the gait at its start: the four gait parameters, by position or by name"),
+    "parameters": ("", "those that were set or drawn for it, likewise; only where there are some"),
+    "measured": ("", "what is measured now, see [below](#what-is-measured); by position or by name"),
+}
+"""Unit and meaning of what infos hold beside the reward's terms."""
+
+_BOTH, _RECORD, _MEASURED = "both", "record", "measured"
+
+QUANTITIES: dict[tuple[str, ...], tuple[str, str, str]] = {
+    ("time",): (_RECORD, "s", "since the reset"),
+    ("x", "y"): (_BOTH, "m", "place of O, the crank centre"),
+    ("vx", "vy"): (_BOTH, "m/s", "its velocity: forward and upward speed"),
+    ("ax", "ay"): (_BOTH, "m/s^2", "its acceleration"),
+    ("pitch",): (_RECORD, "rad", "of the trunk; 0, for one leg cannot pitch it"),
+    ("pitch_rate", "pitch_acc"): (_BOTH, "rad/s, rad/s^2", "of the trunk; 0"),
+    ("centre_x", "centre_y"): (_RECORD, "m", "centre of mass of trunk and leg"),
+    ("momentum_x", "momentum_y"): (_RECORD, "kg m/s", "of trunk and leg"),
+    ("spin",): (_RECORD, "kg m^2/s", "angular momentum about the centre; 0 on these trunks"),
+    ("result",): (_MEASURED, "-", "0, or why the step could not be simulated: it did not happen then"),
+    ("theta", "theta_rate"): (_BOTH, "rad, rad/s", "crank angle, which goes on after a turn, and its rate"),
+    ("theta_acc",): (_RECORD, "rad/s^2", "crank acceleration"),
+    ("phi", "phi_rate", "phi_acc"): (_RECORD, "rad, rad/s, rad/s^2", "swing of the leg's frame"),
+    ("crank_speed", "swing_offset", "swing_sin", "swing_cos"): (
+        _BOTH, "rad/s, rad", "the gait parameters now, after the filters",
+    ),
+    ("crank_speed_rate", "swing_offset_rate", "swing_sin_rate", "swing_cos_rate"): (
+        _BOTH, "rad/s^2, rad/s", "how they change",
+    ),
+    ("toe_penetration", "heel_penetration"): (_BOTH, "m", "depth in the ground; contact where above 0"),
+    ("toe_rate", "heel_rate"): (_BOTH, "m/s", "its rate"),
+    ("toe_slowness", "heel_slowness"): (_BOTH, "s/m", "1 / approach speed; 0 in the air"),
+    ("toe_x", "toe_y", "heel_x", "heel_y"): (_RECORD, "m", "places of the hoof points"),
+    ("toe_slide", "heel_slide"): (_RECORD, "m/s", "their speeds along the ground"),
+    ("toe_normal", "heel_normal"): (_RECORD, "N", "ground reaction force along the ground's normal"),
+    ("toe_friction", "heel_friction"): (_RECORD, "N", "and along the ground"),
+    ("crank_torque", "hip_torque"): (_RECORD, "N m", "of crank and swing drive, along theta and phi"),
+    ("crank_power", "hip_power"): (_RECORD, "W", "of the two drives"),
+    ("stance_open",): (_MEASURED, "-", "1 in a stance, else 0"),
+    ("stance_began",): (_MEASURED, "rad", "crank angle where the last stance began"),
+    ("stance_peak",): (_MEASURED, "N", "highest resultant force of the stance so far"),
+    ("highest",): (_MEASURED, "N", "highest resultant force of any substep of the control step"),
+    ("load_impulse",): (
+        _MEASURED, "N s", "normal force integrated over the control step; over `dt` its mean [N]",
+    ),
+    ("loaded_time",): (_MEASURED, "s", "part of the control step with load on the hoof"),
+    ("stances",): (_MEASURED, "-", "stances that began in it"),
+    ("peak_increase",): (_MEASURED, "N", "increase of the stances' running peaks in it"),
+    ("positive_work",): (_MEASURED, "J", "of both drives in it"),
+    ("travel",): (_MEASURED, "m", "load-weighted backward travel of the hoof along the ground in it"),
+}  # fmt: skip
+"""Where to find them, unit and meaning of what an engine tells, by its names."""

@@ -51,6 +51,9 @@ the point came down, 0 in the air. The height is that of O above y = 0, heights 
 ground under O. A rail lacks vertical speed and height, a fixed trunk forward speed, too. Groups that are
 not observed by default: $other_groups. `env.unwrapped.observation_names` has the names.
 
+`env.unwrapped.raw_observation()` has the same before scaling: numbers by name, of the units above, which
+`env.unwrapped.observation_units` has, too.
+
 ## Rewards
 
 The sum of these terms, each in `info` under its name.
@@ -71,8 +74,7 @@ $start.
 
 $options
 
-The `info` of `reset` has `gait`, `crank_angle`, `speed`, `height` and `x` as they were used, and
-`parameters` where some were set or drawn. These last one episode; there are:
+Every `info` of the episode has what was used. Parameters last one episode; there are:
 $parameters.
 
 The argument `randomize` draws physical parameters at each reset. So does the wrapper
@@ -86,6 +88,27 @@ env = gym.make("$id", randomize={"friction": [0.2, 0.6]})
 env.reset(seed=0)  # with a friction drawn between these
 env.reset(options={"gait": "run", "crank_angle": 0.0, "parameters": {"friction": 0.3}})
 ```
+
+## Infos
+
+Those of `reset` and `step` have the same keys, and NumPy's numbers and arrays for values (float64). They are
+the terms of the reward, 0 at a reset, and:
+
+$infos
+
+`info["gait"]` and `info["measured"]` are arrays that also take names: `info["measured"]["vx"]`. At the end of
+an episode there are `episode_summary` and, if it failed, `failure`, too. A step's info of an environment that
+was made with `randomize` has what that drew; the info of `reset` also what the option set.
+
+### What is Measured
+
+`env.unwrapped.record()` has state and report of the engine at every substep of the last control step, by
+name, shape (n, 1) with n = `dt` / `sim_dt`, and (n, 1, 1) for what is the leg's. `info["measured"]`, shape
+(${measured},), has some of them at the end of the step, and sums over it.
+
+$quantities
+
+A stance counts as for the reward.
 
 ## Episode End
 
@@ -107,11 +130,13 @@ arguments below, and:
 
 $vector_arguments
 
-`infos` has the reward terms, shape (num_envs,), and at the end of episodes `episode_summary`, a mapping of
-such arrays; a mask under the same name with `_` before it says which environments it is about. With
-`SAME_STEP` the last observations are in `final_obs`, the last infos in `final_info`. With `DISABLED` what
-ended must be reset before the next step. The reset option `reset_mask`, bool of shape (num_envs,), restarts
-some and leaves the others alone.
+`infos` are those of the single environment as arrays, shape (num_envs,), or (num_envs, n) for `gait`,
+`measured` and `parameters`: `infos["measured"]["highest"]` is the highest force on each in this step [N].
+At the end of episodes there is `episode_summary`, a mapping of such arrays; a mask under the same name with
+`_` before it says which environments it is about, as for all keys at a reset. With `SAME_STEP` the last
+observations are in `final_obs`, the last infos in `final_info`. With `DISABLED` what ended must be reset
+before the next step. The reset option `reset_mask`, bool of shape (num_envs,), restarts some and leaves the
+others alone.
 
 ```python
 import gymnasium as gym
@@ -127,13 +152,20 @@ distances = infos["episode_summary"]["distance_m"]
 envs.reset(options={"reset_mask": terminated | truncated})
 ```
 
+As Gymnasium's own it has `call`, `get_attr` and `set_attr`. `dt`, `sim_dt`, `observation_names` and
+`observation_units` are as of the single one. `weight`, `episode_summary()` and `raw_observation()` have
+arrays of shape (num_envs,); `record(env)` has the substeps of one of them, kept from the first call on. What
+it was made with does not change: settings are arguments of `gym.make_vec`, those of an episode reset options.
+
+With `render_mode="rgb_array"` `gymnasium.wrappers.vector.RecordVideo` films all. Of more than 16 it wants to
+know how many to draw: `rendered=1` goes with `RecordVideo(..., record_first_only=True)`.
+
 Stable-Baselines3 takes `hoof_env.Sb3VecEnv("$id", num_envs=64)`.
 
 ## State
 
 `env.unwrapped.get_state()` has everything that changes, generator included; `set_state(state)` puts it back
 and returns the observation. What follows has the same bits. Environments pickle and deep-copy.
-`env.unwrapped.record()` has force, motion and energy at every substep of the last control step, by name.
 
 ```python
 import gymnasium as gym

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -32,6 +32,7 @@ class Rows:
     _recordings: list[Recording]
     _generators: list[np.random.Generator]
     _started: NDArray[np.bool_]
+    _refuse_closed: Callable[[str], None]
 
     def __init__(self) -> None:
         self._watched: dict[int, Recording] = {}
@@ -163,5 +164,6 @@ class Rows:
         return [found[env] for env in chosen]
 
     def _refuse(self, name: str) -> None:
+        self._refuse_closed(name)
         if not self._started.all():
             raise ResetNeeded(f"{name}() was called before reset(): expected reset() first")

@@ -12,7 +12,7 @@ from hoof_env.dynamics.schemes import SCHEMES
 from hoof_env.dynamics.step_length import StepWarning
 from hoof_env.dynamics.trunk import Trunk
 from hoof_env.dynamics.trunk_engine import TrunkEngine
-from hoof_env.errors import ParameterError
+from hoof_env.errors import NotStartedError, ParameterError
 from hoof_env.gait.parameters import GaitParameters, load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
@@ -135,7 +135,9 @@ def test_an_advance_that_cannot_be(arguments, message):
 
 def test_before_a_reset_it_is_nowhere():
     e = TrunkEngine(LIMBS, FREE, num_envs=2)
-    assert e.advance().tolist() == [Result.NOT_FINITE] * 2
+    for move in (e.advance, e.run, lambda: e.advance(steps=0)):
+        with pytest.raises(NotStartedError, match=r"before reset\(\): expected reset\(\) first"):
+            move()
     assert e.messages() == ["this environment was never reset"] * 2
     e.reset([RUN, WALK], envs=[])
     assert np.isnan(e.state["theta"]).all()

@@ -71,6 +71,35 @@ def test_info(env_id):
     torch.testing.assert_close(sum(terms).squeeze(), steps["reward"].double().squeeze(), rtol=0, atol=1e-6)
 
 
+def test_infos(env_id):
+    """`auto_register_info_dict`: infos in the tensordicts, with and without drawn parameters."""
+    for settings in ({}, {"randomize": {"friction": (0.2, 0.8)}}):
+        if settings and gym.make(env_id).unwrapped.settings.solver == "paper":
+            continue  # nothing can be drawn
+        env = GymEnv(env_id, episode_seconds=0.1, device="cpu", **settings).auto_register_info_dict()
+        steps = env.rollout(20, break_when_any_done=False)
+        assert steps["next", "done"].any()
+        assert steps["next", "reward_peak"].dtype == torch.float64
+        assert steps["next", "measured"].shape[1] == len(env.reset()["measured"])
+        assert ("parameters" in steps) == bool(settings)
+
+
+FALLS = {"trunk_share": 1.0, "trunk_stiffness": 0.0, "trunk_damping": 0.0, "episode_seconds": 2.0}
+
+
+@pytest.mark.parametrize("settings", [{"episode_seconds": 0.1}, FALLS], ids=["truncated", "failed"])
+def test_many_of_its_own(env_id, settings):
+    """`GymEnv(id, num_envs=2)` over the ends of episodes, infos included."""
+    if settings is FALLS and gym.make(env_id).unwrapped.settings.trunk != "suspended":
+        pytest.skip("nothing falls")
+    env = GymEnv(f"hoof_env:{env_id}", num_envs=2, device="cpu", **settings)  # for workers that are new
+    steps = env.rollout(300, break_when_any_done=False)
+    assert steps["next", "terminated" if settings is FALLS else "truncated"].sum() >= 2
+    assert torch.isfinite(steps["measured"]).all()
+    assert steps["gait"].shape == (2, 300, 4)
+    env.close()
+
+
 def test_gym_wrapper(env_id):
     """`GymWrapper`, `check_env_specs` and a rollout."""
     env = GymWrapper(gym.make(env_id, **SHORT), device="cpu")

@@ -117,6 +117,11 @@ def test_arguments(make, kwargs, message):
         ({"max_episode_steps": 2.5}, "max_episode_steps: expected a whole number, 1 or more, got 2.5"),
         ({"render_mode": "human"}, "render_mode: expected one of rgb_array, got 'human'"),
         ({"render_mode": "rgb_array", "rendered": 0}, "rendered: expected a whole number, 1 or more, got 0"),
+        ({"render_mode": "rgb_array", "rendered": 3}, "rendered: expected at most num_envs=2, got 3"),
+        (
+            {"render_mode": "rgb_array", "num_envs": 17},
+            "rendered: expected how many of the 17 environments to draw, .* record_first_only=True",
+        ),
     ],
     ids=str,
 )
@@ -258,7 +263,7 @@ def test_actions_beyond_the_box_are_clipped(kind):
 def test_nothing_goes_before_reset_or_after_close(kind):
     env = BOTH[kind](render_mode="rgb_array")
     taken = env.action_space.sample()
-    figures = (env.record, env.episode_summary) if kind == "single" else ()
+    figures = (env.record, env.episode_summary, env.raw_observation)
     for call in (lambda: env.step(taken), env.render, env.get_state, *figures):
         with pytest.raises(ResetNeeded, match=r"\(\) was called before reset\(\): expected reset\(\)"):
             call()

@@ -76,7 +76,7 @@ def test_nothing_is_measured_of_a_step_that_did_not_happen():
             state = leg.get_state()
             state["engine"]["limbs"][0, 6, 0] = 1e300
             leg.set_state(state)
-            leg.engine._memory.stride_sums[:] = 1.0  # of some step before
+            leg.batch.engine._memory.stride_sums[:] = 1.0  # of some step before
         infos, info = env.step(np.zeros((n, 4), np.float32))[4], single.step(np.zeros(4, np.float32))[4]
         same(np.asarray(infos["measured"][0]), np.asarray(info["measured"]))
         assert info["measured"]["result"] == 1

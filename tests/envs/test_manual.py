@@ -188,9 +188,11 @@ def test_rewards_options_and_figures_are_those_of_the_environment(page):
     assert [float(row[2]) for row in table] == [getattr(weights, row[1].strip("`")) for row in table]
     figures = [row[0].strip("`") for row in rows(section(text, "Episode End"))]
     assert figures == list(info["episode_summary"])
-    assert set(info) == {row[0].strip("`") for row in table} | {"episode_summary"}
+    told = {row[0].strip("`") for row in [*table, *rows(section(text, "Infos"))]}
+    assert set(started) == told
+    assert set(info) == told - {"parameters"} | {"episode_summary"}
     start = section(text, "Starting State")
-    assert {row[0].strip("`") for row in rows(start)} == set(started)
+    assert {row[0].strip("`") for row in rows(start)} == {*OPTIONS, "gait", "parameters"}
     assert all(f"`{name}`" in start for name in PER_EPISODE)
 
 
@@ -221,3 +223,21 @@ def test_links_lead_somewhere():
             assert there.exists(), f"{file.name}: {target}"
             headings = [line.lstrip("# ").lower() for line in there.read_text("utf-8").splitlines()]
             assert not anchor or anchor in headings, f"{file.name}: {target}#{anchor}"
+
+
+@pytest.mark.parametrize("page", list(TASKS))
+def test_every_key_of_infos_and_every_quantity_is_there(page):
+    text, env = manual.page(page), gym.make(IDS[page], randomize=None)
+    infos, measured = section(text, "Infos").split("### What is Measured")
+    _, info = env.reset(seed=0)
+    told = [cells[0].strip("`") for cells in rows(infos)]
+    assert [key for key in told if key != "parameters"] == [key for key in info if "reward" not in key]
+    found = {"both": [], "record": [], "measured": []}
+    for names, within, unit, _ in rows(measured):
+        found[within] += re.findall(r"`(\w+)`", names)
+        assert unit
+    record = env.unwrapped.record()
+    assert sorted(found["both"] + found["record"]) == sorted(record)
+    assert sorted(found["both"] + found["measured"]) == sorted(info["measured"].keys())
+    assert f"shape\n({len(info['measured'])},)" in measured
+    assert {array.shape for array in record.values()} == {(1, 1), (1, 1, 1)}

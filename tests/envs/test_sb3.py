@@ -13,6 +13,7 @@ from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor, VecNormalize
 
 from hoof_env import Sb3VecEnv
+from hoof_env.errors import ParameterError
 
 
 def both(env_id, n, **settings):
@@ -22,12 +23,18 @@ def both(env_id, n, **settings):
 SHORT = {"episode_seconds": 0.3}
 
 
-@pytest.mark.parametrize(("env_id", "settings"), [*((env_id, SHORT) for env_id in IDS), (IDS[0], FALLS)])
+DRAWN = {**SHORT, "randomize": {"friction": (0.2, 0.8)}}
+
+
+@pytest.mark.parametrize(
+    ("env_id", "settings"), [*((env_id, SHORT) for env_id in IDS), (IDS[0], FALLS), (IDS[0], DRAWN)]
+)
 def test_it_says_what_theirs_says(env_id, settings):
     ours, theirs = both(env_id, 8, **settings)
     assert (ours.observation_space, ours.action_space) == (theirs.observation_space, theirs.action_space)
     ours.seed(3), theirs.seed(3)
     same(ours.reset(), theirs.reset())
+    same(ours.reset_infos, theirs.reset_infos)
     ends = []
     for k, taken in enumerate(actions(0, 120, 8)):
         one, two = ours.step(taken), theirs.step(taken)
@@ -40,6 +47,7 @@ def test_it_says_what_theirs_says(env_id, settings):
                 same(info[name], there[name])
             ends.append(info["TimeLimit.truncated"])
         assert all(info == {} for info, done in zip(one[3], one[2], strict=True) if not done)
+        same(ours.reset_infos, theirs.reset_infos)
         if k == 60:  # only seeds and options given since the last reset count
             ours.seed(9), theirs.seed(9)
             ours.set_options({"gait": "walk"}), theirs.set_options({"gait": "walk"})
@@ -58,6 +66,16 @@ def test_methods_of_a_vec_env():
     assert env.get_attr("mark") == [5] * 3
     env.reset()
     assert env.env_method("get_state")[0]["id"] == IDS[0]
+    assert env.get_attr("weight") == env.envs.weight.tolist()
+    assert [figures["seconds"] for figures in env.env_method("episode_summary", indices=[0, 2])] == [0.0] * 2
+    with pytest.raises(ParameterError, match="env_method: expected all environments, which are one"):
+        env.env_method("get_state", indices=[0, 2])
+    with pytest.raises(ParameterError, match=r"set_attr: 'trunk_mass' does not change .*'parameters'"):
+        env.set_attr("trunk_mass", 5.0)
+    with pytest.raises(AttributeError, match="no attribute 'trunk'"):
+        env.get_attr("trunk")
+    env.step(actions(0, 3))
+    assert env.measured["vx"].shape == (3,)
     env.close()
     env.close()
 
@@ -66,7 +84,7 @@ def test_pictures():
     pytest.importorskip("pygame")
     env = Sb3VecEnv(IDS[0], 2, render_mode="rgb_array")
     env.reset()
-    assert env.get_images()[0].shape == (540, 960, 3)
+    assert [image.shape for image in env.get_images()] == [(540, 960, 3)] * 2
     assert env.render().ndim == 3
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from family import FALLS, IDS, actions, same
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
-from gymnasium.wrappers.vector import NormalizeReward, RecordEpisodeStatistics
+from gymnasium.wrappers.vector import NormalizeReward, RecordEpisodeStatistics, RecordVideo
 
 MODES = list(AutoresetMode)
 SHORT = {"episode_seconds": 0.3}
@@ -237,7 +237,8 @@ def test_frames_of_the_first_environments_and_two_closes():
     env.reset(seed=0)
     finals(env, 17)
     frames = env.render()
-    assert [frame.shape for frame in frames] == [(540, 960, 3)] * 2
+    assert [frame.shape for frame in frames] == [(540, 960, 3)] * 8
+    assert [bool(frame.any()) for frame in frames] == [True] * 2 + [False] * 6
     single = gym.make(IDS[0], render_mode="rgb_array", **SHORT)
     twin = copy.deepcopy(env)
     finals(twin, 3)
@@ -270,3 +271,32 @@ def test_gymnasiums_wrappers_see_what_they_see_of_their_own(mode):
                 same(one[4]["episode"][name], two[4]["episode"][name])
     assert ends >= 16
     assert set(pair[0].length_queue) == {15}
+
+
+def film(envs, folder, **arguments):
+    """Width, height and frames of what Gymnasium's wrapper films of two episodes."""
+    envs = RecordVideo(envs, str(folder), episode_trigger=lambda k: k == 0, **arguments)
+    envs.reset(seed=0)
+    for taken in actions(0, 6, envs.num_envs):
+        envs.step(taken)
+    envs.close()
+    reader = pytest.importorskip("imageio").get_reader(folder / "rl-video-episode-0.mp4")
+    width, height = reader.get_meta_data()["size"]
+    return width, height, reader.count_frames()
+
+
+@pytest.mark.filterwarnings("ignore:.*Overwriting existing videos")
+@pytest.mark.parametrize(
+    ("n", "made", "wrapped", "size"),
+    [
+        (3, {}, {}, (2880, 540)),
+        (3, {"rendered": 1}, {}, (2880, 540)),
+        (20, {"rendered": 1}, {"record_first_only": True}, (960, 540)),
+    ],
+    ids=["by default", "fewer", "the first of many"],
+)
+def test_gymnasiums_wrapper_films_them(tmp_path, n, made, wrapped, size):
+    pytest.importorskip("pygame")
+    pytest.importorskip("moviepy")
+    envs = gym.make_vec(IDS[0], num_envs=n, render_mode="rgb_array", episode_seconds=0.06, **made)
+    assert film(envs, tmp_path / "videos", **wrapped) == (*size, 4)  # of the start and of three steps

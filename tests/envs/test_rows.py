@@ -1,0 +1,150 @@
+"""What one may ask of each environment of a vector, as of Gymnasium's own over single environments."""
+
+from __future__ import annotations
+
+import copy
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from family import IDS, actions, same
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+
+from hoof_env.errors import ParameterError
+
+LEG = "hoof_env/HorseLeg-v0"
+MODES = list(AutoresetMode)
+EVERYTHING = {
+    "observation": ["crank", "gait", "trunk", "hoof", "action", "target", "ground"],
+    "target_speed": (0.5, 3.0),
+    "terrain": {"kind": "hills"},
+    "randomize": {"trunk_mass": (60.0, 90.0)},
+    "episode_seconds": 0.3,
+}
+
+
+def both(mode=AutoresetMode.NEXT_STEP, n=4, env_id=LEG, **settings):
+    """Ours, and Gymnasium's over single environments."""
+    ours = gym.make_vec(env_id, num_envs=n, autoreset_mode=mode, **settings)
+    theirs = SyncVectorEnv([lambda: gym.make(env_id, **settings)] * n, autoreset_mode=mode)
+    return ours.unwrapped, theirs
+
+
+@pytest.mark.parametrize("mode", MODES[:2], ids=lambda mode: mode.name)
+@pytest.mark.parametrize("env_id", IDS)
+def test_each_answers_as_the_single_environment(env_id, mode):
+    settings = EVERYTHING if env_id == LEG else {"episode_seconds": 0.3}
+    ours, theirs = both(mode, env_id=env_id, **settings)
+    ours.reset(seed=0), theirs.reset(seed=0)
+    for name in (
+        "dt",
+        "sim_dt",
+        "observation_names",
+        "observation_units",
+        "action_space",
+        "observation_space",
+    ):
+        assert ours.get_attr(name) == theirs.get_attr(name), name
+    for k, taken in enumerate(actions(1, 40, 4)):
+        ours.step(taken), theirs.step(taken)
+        if k in (3, 14, 15, 39):
+            for name in ("weight", "episode_summary", "raw_observation"):
+                same(ours.call(name), theirs.call(name))
+    assert (
+        ours.call("command_of", np.ones(4))[3].tolist() == theirs.call("command_of", np.ones(4))[3].tolist()
+    )
+    assert ours.dt == theirs.get_attr("dt")[0]
+    assert ours.observation_names == theirs.get_attr("observation_names")[0]
+    assert [ours.weight[env] for env in range(4)] == list(theirs.get_attr("weight"))
+    assert ours.episode_summary()["distance_m"].shape == (4,)
+
+
+@pytest.mark.parametrize("mode", MODES, ids=lambda mode: mode.name)
+def test_the_record_of_a_row(mode):
+    ours, theirs = both(mode, n=9, episode_seconds=0.3, randomize={"friction": (0.2, 0.8)})
+    ours.reset(seed=0), theirs.reset(seed=0)
+    same(ours.record(5), theirs.call("record")[5])
+    same(ours.record(2), theirs.call("record")[2])
+    for k, taken in enumerate(actions(1, 40, 9)):
+        done = np.any(ours.step(taken)[2:4], axis=0)
+        theirs.step(taken)
+        same(ours.record(5), theirs.call("record")[5])
+        if mode == AutoresetMode.DISABLED and (done.any() or k in (7, 20)):
+            mask = done if done.any() else np.arange(9) < 3
+            for envs in (ours, theirs):
+                envs.reset(options={"reset_mask": mask})
+            same(ours.record(2), theirs.call("record")[2])
+            same(ours.record(5), theirs.call("record")[5])  # of a row that went on
+    twin = copy.deepcopy(ours)
+    same(twin.record(5), ours.record(5))
+    for env in (9, -1, 1.5):
+        with pytest.raises(ParameterError, match="env: expected"):
+            ours.record(env)
+
+
+def test_a_mark_on_each():
+    ours, theirs = both()
+    for envs in (ours, theirs):
+        envs.set_attr("mark", 5)
+        assert envs.get_attr("mark") == (5,) * 4
+        envs.set_attr("mark", [1, 2, 3, 4])
+        assert envs.get_attr("mark") == envs.call("mark") == (1, 2, 3, 4)
+        with pytest.raises(AttributeError, match="nothing"):
+            envs.get_attr("nothing")
+    for name in ("trunk_mass", "dt", "weight", "gaits", "step"):
+        with pytest.raises(
+            ParameterError, match=f"set_attr: '{name}' does not change once it is made; .*make_vec"
+        ):
+            ours.set_attr(name, 5)
+    with pytest.raises(ParameterError, match=r"reset\(options=\{'parameters': \{'trunk_mass': \.\.\.\}\}\)"):
+        ours.set_attr("trunk_mass", 5)
+    with pytest.raises(ParameterError, match="values: expected one or 4, got 3"):
+        ours.set_attr("mark", [1, 2, 3])
+    for name in ("reset", "step"):
+        with pytest.raises(ParameterError, match=rf"call: '{name}' is of all together; expected envs.{name}"):
+            ours.call(name)
+
+
+def test_raw_observations_are_those_before_scaling():
+    envs = gym.make_vec(LEG, num_envs=9, **EVERYTHING).unwrapped
+    assert len(envs.observation_units) == len(envs.observation_names) == 29
+    seen, _ = envs.reset(seed=0)
+    for taken in actions(2, 25, 9):
+        raw = envs.raw_observation()
+        assert tuple(raw) == envs.observation_names
+        loads = 3 * envs.weight
+        for k, (name, values) in enumerate(raw.items()):
+            assert values.shape == (9,)
+            same(SCALED[name](values, loads, envs).astype(np.float32), seen[:, k]) if name in EXACT else None
+            np.testing.assert_allclose(SCALED[name](values, loads, envs), seen[:, k], atol=2e-7)
+        seen = envs.step(taken)[0]
+
+
+def scaled_parameter(k):
+    return lambda x, loads, envs: (x - envs.batch._task["middle"][0, k]) / envs.batch._task["half"][0, k]
+
+
+def tanh(scale):
+    return lambda x, loads, envs: np.tanh(x / scale)
+
+
+def as_it_is(x, loads, envs):
+    return x
+
+
+PARAMETERS = ("crank speed", "swing offset", "swing sine coefficient", "swing cosine coefficient")
+EXACT = ("toe contact", "heel contact", *(f"previous action: {name}" for name in PARAMETERS))
+SCALED = (
+    dict.fromkeys(("sin(crank angle)", "cos(crank angle)", *EXACT), as_it_is)
+    | {name: scaled_parameter(k) for k, name in enumerate(PARAMETERS)}
+    | {f"rate of {name}": lambda x, loads, envs: x / 6 for name in PARAMETERS}
+    | {"rate of crank speed": lambda x, loads, envs: x / 20}
+    | {"forward speed": tanh(5.0), "vertical speed": tanh(2.0), "commanded speed": tanh(5.0)}
+    | {"height": lambda x, loads, envs: np.tanh((x - envs.batch.height) / 0.3)}
+    | dict.fromkeys(
+        ("toe load", "heel load", "running peak force"), lambda x, loads, envs: np.tanh(x / loads)
+    )
+    | dict.fromkeys(("toe approach speed", "heel approach speed"), tanh(2.0))
+    | {f"height of the ground {x:g} m ahead": tanh(0.5) for x in (0.25, 0.5, 0.75, 1.0)}
+)
+"""What docs/environments says of each."""
