@@ -16,6 +16,14 @@ from hoof_env.errors import FixedSettingError
 SETTINGS = frozenset(item.name for item in fields(Settings))
 
 
+def fixed_setting(name: str) -> FixedSettingError:
+    """The error of an assignment to a setting, or to what follows from the settings."""
+    how = "gymnasium.make(id, ...)" if name in SETTINGS else "the arguments of gymnasium.make"
+    if name in PER_EPISODE:
+        how += f", or reset(options={{'parameters': {{{name!r}: ...}}}}) for an episode"
+    return FixedSettingError(f"{name}: expected no assignment, which would change nothing; set it by {how}")
+
+
 class Made:
     """Refuses assignments that would look like a setting and change nothing; completes the spec.
 
@@ -36,12 +44,7 @@ class Made:
         """
         fixed = getattr(type(self), name, None)
         if name in SETTINGS or (isinstance(fixed, property) and fixed.fset is None):
-            how = "gymnasium.make(id, ...)" if name in SETTINGS else "the arguments of gymnasium.make"
-            if name in PER_EPISODE:
-                how += f", or reset(options={{'parameters': {{{name!r}: ...}}}}) for an episode"
-            raise FixedSettingError(
-                f"{name}: expected no assignment, which would change nothing; set it by {how}"
-            )
+            raise fixed_setting(name)
         super().__setattr__(name, value)
 
     def set_wrapper_attr(self, name: str, value: Any, *, force: bool = True) -> bool:

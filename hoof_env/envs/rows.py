@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from hoof_env.dynamics.arguments import count
 from hoof_env.envs import episode as e
 from hoof_env.envs.batch import EpisodeBatch
+from hoof_env.envs.made import fixed_setting
 from hoof_env.envs.raw_observation import UNITS, raw_observation
 from hoof_env.envs.recording import Recording
-from hoof_env.envs.tasks import PER_EPISODE
 from hoof_env.errors import ParameterError
 
 Floats = NDArray[np.float64]
@@ -128,16 +128,14 @@ class Rows:
         """Remember something for `get_attr`: a list or tuple has a value for each, anything else is for all.
 
         Raises:
-            ParameterError: a setting or another attribute that the environments have, or not one value each.
+            FixedSettingError: a setting or another attribute that the environments have.
+            ParameterError: not one value each.
         """
         each = list(values) if isinstance(values, (list, tuple)) else [values] * self.num_envs
         if len(each) != self.num_envs:
             raise ParameterError(f"values: expected one or {self.num_envs}, got {len(each)}")
         if hasattr(self.batch.settings, name) or hasattr(self, name) or hasattr(self.batch, name):
-            how = "gymnasium.make_vec(id, num_envs, ...) takes the settings"
-            if name in PER_EPISODE:
-                how += f", reset(options={{'parameters': {{{name!r}: ...}}}}) those of an episode"
-            raise ParameterError(f"set_attr: {name!r} does not change once it is made; {how}")
+            raise fixed_setting(name)
         self._marks[name] = each
 
     def ask(self, name: str, envs: Iterable[int], *args: Any, **kwargs: Any) -> list[Any]:

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from agents import command, distribute, ppo_flat, throughput, train
+from agents import command, distribute, ppo_flat, train
 from hoof_env.errors import ParameterError
 
 
@@ -35,7 +35,7 @@ def test_commands_take_one_thread_and_let_others_work_unless_the_user_says_so(gi
 
 
 def test_no_default_asks_for_more_than_one_thread():
-    for args in (train.Args, ppo_flat.Args, throughput.Args):
+    for args in (train.Args, ppo_flat.Args):
         assert args().torch_threads == 1
     assert distribute.Trials().cpus_per_trial == 1
 
