@@ -54,7 +54,16 @@ def compiled(extras: list[str], *options: str, more: str = "") -> list[str]:
             "--only-binary",
             ":all:",
         ]
-        command += ["--python-version", dotted(OLDEST), "--no-annotate", "--no-header", "-o", str(out)]
+        command += [
+            "--python",
+            sys.executable,
+            "--python-version",
+            dotted(OLDEST),
+            "--no-annotate",
+            "--no-header",
+            "-o",
+            str(out),
+        ]
         command += [word for extra in extras for word in ("--extra", extra)]
         subprocess.run(
             [*command, *options, "pyproject.toml", "-"], input=more, text=True, check=True, cwd=ROOT
