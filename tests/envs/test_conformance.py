@@ -90,19 +90,20 @@ def test_every_call_returns_fresh_data():
 @pytest.mark.parametrize("env_id", IDS)
 @pytest.mark.parametrize("settings", [{}, FALLS], ids=["", "falls"])
 def test_types_and_infos_of_a_step(env_id, settings):
-    """Plain Python numbers, and few keys, which vector environments of others copy one by one."""
+    """Plain Python numbers, and NumPy's in the infos, which libraries stack."""
     env = gym.make(env_id, episode_seconds=2.0, **settings)
-    env.reset(seed=0)
+    _, started = env.reset(seed=0)
     done = False
     while not done:
         _, reward, terminated, truncated, info = env.step(env.action_space.sample())
         assert (type(reward), type(terminated), type(truncated)) == (float, bool, bool)
         terms = [value for key, value in info.items() if key.startswith("reward_")]
-        assert [type(term) for term in terms] == [float] * len(NAMES)
+        assert [type(term) for term in terms] == [np.float64] * len(NAMES)
         assert reward == sum(terms)
-        assert len(info) <= 8
+        assert len(info) <= 14
         done = terminated or truncated
-        assert set(info) - {f"reward_{name}" for name in NAMES} == (
+        assert set(started) <= set(info)
+        assert set(info) - set(started) == (
             ({"episode_summary", "failure"} if terminated else {"episode_summary"}) if done else set()
         )
     assert all(type(value) is float for value in info["episode_summary"].values())
