@@ -1,10 +1,11 @@
-"""For all tests: compiling says nothing, whose lines some tests would count, and nobody computes in threads:
-there is a process on each processor, and threads that wait for others spin."""
+"""For all tests: compiling says nothing, whose lines some tests would count, windows are drawn unseen, and
+nobody computes in threads: there is a process on each processor, and threads that wait for others spin."""
 
 import os
 
 from hoof_env._jit import QUIET
 
 os.environ.setdefault(QUIET, "1")
+os.environ["SDL_VIDEODRIVER"] = "dummy"
 for library in ("OMP", "OPENBLAS", "MKL"):
     os.environ.setdefault(f"{library}_NUM_THREADS", "1")
