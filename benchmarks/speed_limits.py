@@ -152,7 +152,7 @@ def _kernel(lanes: int, legs: int = 0) -> Any:
 
     def advance(data, model, tables, ground, constants, reactions, h, steps, account):  # type: ignore[no-untyped-def]
         number = legs if legs else model[0].legs
-        run(data, model, tables, ground, constants, reactions, h, steps, account, number, lanes, False)
+        run(data, model, tables, ground, constants, reactions, h, steps, account, number, lanes, False, False)
 
     return jit(advance)
 

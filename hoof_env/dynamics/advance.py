@@ -1,8 +1,9 @@
 """The engine's kernels: environments come from the engine's memory, go step after step, and go back.
 
 `advance_leg`, `advance_four` and `advance_batch` are one function, compiled for one leg alone, for four lanes
-that are the legs of one trunk, and for `LANES` environments side by side with any number of legs. What they
-work on lives on the stack, where the compiler keeps what it can in registers.
+that are the legs of one trunk, and for `LANES` environments side by side with any number of legs; `react_leg`
+and so on are the same with joint reactions, a fifth more to compile. What they work on lives on the stack,
+where the compiler keeps what it can in registers.
 
 An engine's memory is one matrix `data`, a column for each environment: the rows of the trunk, then those of
 each leg, as `TRUNK` and `LIMB` have them.
@@ -207,16 +208,18 @@ def run_steps(trunk, limbs, legs, model, account, constants, found, h, steps, ke
 
 
 @pasted
-def run(data, model, tables, ground, constants, reactions, h, steps, keeps_account, legs, lanes, together):  # type: ignore[no-untyped-def]
+def run(  # type: ignore[no-untyped-def]
+    data, model, tables, ground, constants, reactions, h, steps, keeps_account, legs, lanes, together, reacts
+):
     """Advance all environments: `lanes` at a time, or one whose legs the lanes are. With `steps` below 0
-    those start whose result is `STARTS`."""
+    those start whose result is `STARTS`. Unless `reacts`, a constant, no code for reactions is made."""
     trunk = rows(doubles(t.ROWS * lanes), lanes)
     limbs = rows(doubles(legs * b.ROWS * lanes), lanes)
     account = rows(doubles(ACCOUNTS * lanes), lanes)
     shape = rows(doubles(legs * CONSTANTS * lanes), lanes)
     found = rows(doubles(legs * OUTPUTS * lanes), lanes)
     inside = inner(model, tables, ground, doubles(20), together)
-    at, row, reacts = address(data), data.shape[1], reactions.size > 0
+    at, row = address(data), data.shape[1]
     # lanes are neighbours, but where they are legs, as far apart as legs are
     envs, near, far = lanes, 1, 1
     if together:
@@ -266,17 +269,36 @@ def run(data, model, tables, ground, constants, reactions, h, steps, keeps_accou
 @kernel
 def advance_leg(data, model, tables, ground, constants, reactions, h, steps, keeps_account):  # type: ignore[no-untyped-def]
     """Each environment by itself; they have one leg."""
-    run(data, model, tables, ground, constants, reactions, h, steps, keeps_account, 1, 1, False)
+    run(data, model, tables, ground, constants, reactions, h, steps, keeps_account, 1, 1, False, False)
 
 
 @kernel
 def advance_four(data, model, tables, ground, constants, reactions, h, steps, keeps_account):  # type: ignore[no-untyped-def]
     """Each environment by itself; they have four legs, side by side."""
-    run(data, model, tables, ground, constants, reactions, h, steps, keeps_account, 1, 4, True)
+    run(data, model, tables, ground, constants, reactions, h, steps, keeps_account, 1, 4, True, False)
 
 
 @kernel
 def advance_batch(data, model, tables, ground, constants, reactions, h, steps, keeps_account):  # type: ignore[no-untyped-def]
     """`LANES` environments at a time, with any number of legs."""
     legs = model[0].legs
-    run(data, model, tables, ground, constants, reactions, h, steps, keeps_account, legs, LANES, False)
+    run(data, model, tables, ground, constants, reactions, h, steps, keeps_account, legs, LANES, False, False)
+
+
+@kernel
+def react_leg(data, model, tables, ground, constants, reactions, h, steps, keeps_account):  # type: ignore[no-untyped-def]
+    """As `advance_leg`, with joint reactions."""
+    run(data, model, tables, ground, constants, reactions, h, steps, keeps_account, 1, 1, False, True)
+
+
+@kernel
+def react_four(data, model, tables, ground, constants, reactions, h, steps, keeps_account):  # type: ignore[no-untyped-def]
+    """As `advance_four`, with joint reactions."""
+    run(data, model, tables, ground, constants, reactions, h, steps, keeps_account, 1, 4, True, True)
+
+
+@kernel
+def react_batch(data, model, tables, ground, constants, reactions, h, steps, keeps_account):  # type: ignore[no-untyped-def]
+    """As `advance_batch`, with joint reactions."""
+    legs = model[0].legs
+    run(data, model, tables, ground, constants, reactions, h, steps, keeps_account, legs, LANES, False, True)

@@ -25,6 +25,9 @@ from hoof_env.dynamics.advance import (
     advance_batch,
     advance_four,
     advance_leg,
+    react_batch,
+    react_four,
+    react_leg,
 )
 from hoof_env.dynamics.arguments import Floats, all_of, count, finite, flag, one_of
 from hoof_env.dynamics.drive import Drive
@@ -145,9 +148,11 @@ class TrunkEngine:
         asked = None if substeps is None else count("substeps", substeps, most=MOST_STEPS)
         self.substeps = length.choose(self.sim_dt, asked)
         self.reacts, self.counts_strides = flag("reactions", reactions), flag("strides", strides)
-        alone = {1: advance_leg, 4: advance_four}.get(len(self.limbs))
+        plain, reacting = (advance_leg, advance_four, advance_batch), (react_leg, react_four, react_batch)
+        one, four, many = reacting if self.reacts else plain
+        alone = {1: one, 4: four}.get(len(self.limbs))
         self.is_few = alone is not None and self.num_envs <= FEW
-        self._run = (alone if self.is_few else None) or advance_batch
+        self._run = (alone if self.is_few else None) or many
         self._memory = new_memory(self, self.num_envs if self.is_few else columns_for(self.num_envs))
         self._model = new_model(self)
 
