@@ -41,11 +41,11 @@ def machine() -> dict[str, str]:
     """What it ran on and was compiled for: processor, vectors, versions, date and commit."""
     _, name, features = target()
     versions = []
-    for name in ("hoof-env", "numba", "llvmlite", "numpy", "mujoco", "exudyn"):
+    for package in ("hoof-env", "numba", "llvmlite", "numpy", "mujoco", "exudyn"):
         try:
-            versions.append(f"{name} {metadata.version(name)}")
+            versions.append(f"{package} {metadata.version(package)}")
         except metadata.PackageNotFoundError:
-            versions.append(f"{name} not installed")
+            versions.append(f"{package} not installed")
     return {
         "processor": f"{_processor()}, {os.cpu_count()} cores, one used",
         "compiled for": f"{name}, vectors of {vector_bits()} bits",

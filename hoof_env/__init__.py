@@ -96,7 +96,8 @@ if not TYPE_CHECKING:  # else a type checker would believe in any name
         except ModuleNotFoundError as error:
             if name not in _EXTRAS:
                 raise
-            return _stand_in(name, _EXTRAS[name], error)
+            globals()[name] = _stand_in(name, _EXTRAS[name], error)
+            return globals()[name]
 
 
 _EXTRAS = {"Sb3VecEnv": "train"}

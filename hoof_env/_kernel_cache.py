@@ -99,9 +99,16 @@ class KernelCache(_caching.FunctionCache):
             return super().load_overload(sig, target_context)
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """As numba's."""
+        """As numba's.
+
+        Raises:
+            OutputError: the cache folder cannot be written, or the disk is full.
+        """
         COMPILED.append(self._kernel)
-        super().save_overload(sig, data)
+        try:
+            super().save_overload(sig, data)
+        except OSError as error:
+            raise _no_folder(given_folder() or self.cache_path, error) from None
 
     def _take_lock(self) -> bool:
         """Wait until no other process compiles this kernel; False where files cannot be locked."""

@@ -51,11 +51,15 @@ def new_file(path: Path, overwrite: bool) -> Iterator[str]:
         What to add to a report: the folder that is made, or nothing.
 
     Raises:
-        OutputError: there is a file already and `overwrite` is False.
+        OutputError: there is a file already and `overwrite` is False, or there cannot be one.
     """
-    if path.is_file() and not overwrite:
+    try:
+        is_there = path.is_file()
+        missing = [folder for folder in path.parents if not folder.exists()]
+    except OSError as error:
+        raise OutputError(f"cannot write to {str(path)!r}: {error.strerror}") from None
+    if is_there and not overwrite:
         raise OutputError(f"{str(path)!r} exists already; name another file, or add --overwrite")
-    missing = [folder for folder in path.parents if not folder.exists()]
     try:
         yield f"; made the folder {path.parent}" if missing else ""
     except BaseException:

@@ -43,17 +43,8 @@ def compiled(extras: list[str], *options: str, more: str = "") -> list[str]:
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / LOCK.name
         out.write_text(LOCK.read_text(encoding="utf-8"), encoding="utf-8")  # uv keeps what stands there
-        command = [
-            sys.executable,
-            "-m",
-            "uv",
-            "pip",
-            "compile",
-            "--quiet",
-            "--universal",
-            "--only-binary",
-            ":all:",
-        ]
+        command = [sys.executable, "-m", "uv", "pip", "compile", "--quiet", "--universal"]
+        command += ["--only-binary", ":all:"]
         command += [
             "--python",
             sys.executable,

@@ -41,6 +41,7 @@ TORCH_INDEX = os.environ.get("TORCH_INDEX", "https://download.pytorch.org/whl/cp
 UNREACHABLE = "the package index cannot be reached; check the network, or name another with PIP_INDEX_URL"
 LACKING = "the package index lacks a wheel of a version that constraints.txt names"
 REASONS = {  # a sign in what pip, uv or venv says: what it means. The first sign that is found is told.
+    "Failed to initialize cache": "uv cannot write its cache; set UV_CACHE_DIR to a folder, or INSTALLER=pip",
     "No space left on device": "the disk is full",
     "Read-only file system": "this folder cannot be written to",
     "Permission denied": "this folder cannot be written to",
@@ -76,14 +77,16 @@ class Missing(Exception):
 def main(purpose: str = "all") -> int:
     started = time.monotonic()
     try:
+        check_purpose(purpose)
         check_python()
         with one_at_a_time():
             place, pins = wanted_stamp()
             found = read_stamp()
-            if found in ([place, pins, purpose], [place, pins, "all"]):
+            is_there = venv("bin/python").exists()  # not so once the Python behind it has gone
+            if is_there and found in ([place, pins, purpose], [place, pins, "all"]):
                 return 0
             check_machine()
-            install(purpose, anew=found[:1] != [place])
+            install(purpose, anew=not is_there or found[:1] != [place])
             stamp_path().write_text(f"{place}\n{pins}\n{purpose}\n")
     except Missing as missing:
         print(f"set-up stopped: {missing}", file=sys.stderr)
@@ -99,6 +102,13 @@ def main(purpose: str = "all") -> int:
 
 
 # What must be there
+
+
+def check_purpose(purpose: str) -> None:
+    if purpose not in EXTRAS:
+        raise Missing(f"expected {' or '.join(EXTRAS)}, got {purpose!r}")
+    if os.environ.get("INSTALLER", "uv") not in TOOLS:
+        raise Missing(f"INSTALLER: expected {' or '.join(TOOLS)}, got {os.environ['INSTALLER']!r}")
 
 
 def check_python() -> None:
@@ -198,7 +208,9 @@ def install_torch(tool: str) -> None:
         return
     places = [("where pip finds links", "--no-index")] if "find-links" in pip_settings() else []
     if TORCH_INDEX:
-        places.append((TORCH_INDEX, "--index-url", TORCH_INDEX))
+        # uv would rather take UV_DEFAULT_INDEX than an --index-url
+        instead = "--default-index" if tool == "uv" else "--index-url"
+        places.append((TORCH_INDEX, instead, TORCH_INDEX))
     patience = () if tool == "uv" else ("--retries", "1", "--timeout", "10")
     for place, *source in places:
         with suppress(Missing):

@@ -44,6 +44,7 @@ from hoof_env.envs.tasks import Settings, Task
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait.parameters import GaitParameters, gait_names, load_gait
 from hoof_env.ground.contact import Ground
+from hoof_env.ground.preset import load_ground
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.profile import leg_profile
 
@@ -88,6 +89,7 @@ class EpisodeBatch:
         if is_paper:
             check_paper(s)
         self.geometry = load_geometry(s.preset)
+        load_ground(s.preset)  # what is wrong with it is said, also where the settings replace it
         self.gaits = {name: load_gait(name, s.preset) for name in gait_names(s.preset)}
         self.gait = None if s.gait is None else self.gaits[check_choice("gait", s.gait, self.gaits)]
         self._base = MIDDLE if self.gait is None else self.gait.to_array()

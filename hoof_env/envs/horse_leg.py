@@ -293,7 +293,7 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         """Put an action where the kernel finds it."""
         try:
             given = np.asarray(action)
-        except ValueError:
+        except (ValueError, TypeError, RuntimeError):  # the last of a tensor that has a gradient
             given = np.empty(0)
         if given.shape != _SHAPE or given.dtype.kind not in "fiu":
             raise ParameterError(f"action: expected 4 finite numbers in [-1, 1], got {action!r}")

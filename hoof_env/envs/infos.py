@@ -50,6 +50,14 @@ class Named(np.ndarray[Any, np.dtype[np.float64]]):
             key = (..., self.names.index(key))
         return np.asarray(self)[key][()]
 
+    def __array_wrap__(self, array: Any, context: Any = None, return_scalar: bool = False) -> Any:
+        """What is computed from named numbers has no names."""
+        return array[()] if return_scalar else np.asarray(array)
+
+    def get(self, key: str, default: Any = None) -> Any:
+        """As of a mapping."""
+        return self[key] if key in self.names else default
+
     def _mapping(self) -> dict[str, Any]:
         return {name: self[name] for name in self.names}
 
@@ -73,7 +81,9 @@ class Named(np.ndarray[Any, np.dtype[np.float64]]):
 
     def __eq__(self, other: Any) -> Any:
         if isinstance(other, Named | Mapping):
-            return self._mapping() == dict(other.items())
+            return self.keys() == other.keys() and all(
+                np.array_equal(self[name], other[name]) for name in self.names
+            )
         return super().__eq__(other)
 
     def __ne__(self, other: Any) -> Any:

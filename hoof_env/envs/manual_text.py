@@ -117,10 +117,9 @@ Terminated when$leaves the simulation stops being finite; `info["failure"]` says
 
 $figures
 
-The limit in steps is `env.spec.max_episode_steps`. `env.unwrapped.episode_summary()` has the figures at any
-time. Ask it where a wrapper ends episodes, as that of `gym.make(..., max_episode_steps=...)` does, which can
-only shorten them: the environment cannot know, so `info` lacks the figures. The vector environment takes that
-limit itself and has them. A step after the end warns, once an episode; what it returns means nothing.
+The limit in steps is `env.unwrapped.spec.max_episode_steps`; the wrapper of `gym.make(..., max_episode_steps=...)`
+can only shorten episodes, and the environment cannot know where it ends them, so `info` lacks the figures then:
+`env.unwrapped.episode_summary()` has them at any time. The vector environment takes that limit itself. A step after the end warns, once an episode; what it returns means nothing.
 
 ## Vector Environment
 

@@ -16,6 +16,7 @@ from hoof_env.envs.made import fixed_setting
 from hoof_env.envs.raw_observation import UNITS, raw_observation
 from hoof_env.envs.recording import Recording
 from hoof_env.errors import ParameterError
+from hoof_env.ground.terrain import Terrain
 
 Floats = NDArray[np.float64]
 OWN = ("weight", "render", "episode_summary", "raw_observation", "record", "np_random")
@@ -104,6 +105,18 @@ class Rows:
             self._watched[env] = Recording(self.batch, env)
         return self._watched[env].last()
 
+    @property
+    def terrain(self) -> Terrain:
+        """What all stand on."""
+        return self.batch.engine.terrain
+
+    @property
+    def manual(self) -> str:
+        """The manual page of the id, Markdown."""
+        from hoof_env.envs.manual import page_of
+
+        return page_of(self.batch.task.id)
+
     # As Gymnasium's
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
@@ -148,6 +161,7 @@ class Rows:
         if name == "record":
             return [self.record(env) for env in chosen]
         if name == "np_random":
+            self._refuse(name)
             return [self._generators[env] for env in chosen]
         name = SINGLE.get(name, name)
         owner: Any = self if hasattr(self, name) else self.batch

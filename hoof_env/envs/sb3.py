@@ -14,6 +14,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from hoof_env.envs import episode as e
 from hoof_env.envs.infos import row_of
 from hoof_env.envs.keywords import VectorKeywords
+from hoof_env.envs.made import SETTINGS, fixed_setting
 from hoof_env.envs.rows import OWN
 from hoof_env.envs.vector import HorseLegVectorEnv
 from hoof_env.errors import ParameterError
@@ -45,6 +46,8 @@ class Sb3VecEnv(VecEnv):
     def __init__(
         self, env_id: str = "hoof_env/HorseLeg-v0", num_envs: int = 64, **settings: Unpack[VectorKeywords]
     ) -> None:
+        if "vectorization_mode" in settings:
+            raise ParameterError("vectorization_mode: expected none, for all are stepped in one call")
         settings.setdefault("autoreset_mode", AutoresetMode.SAME_STEP)
         try:
             many: dict[str, Any] = {"vectorization_mode": "vector_entry_point", **settings}
@@ -61,6 +64,12 @@ class Sb3VecEnv(VecEnv):
         self._actions: NDArray[Any] | None = None
         self.terms = {name: np.zeros(num_envs) for name in e.TERMS}
         super().__init__(num_envs, envs.single_observation_space, envs.single_action_space)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """As of any object, but for settings, which `HorseLegVectorEnv` refuses, too."""
+        if name in SETTINGS:
+            raise fixed_setting(name)
+        super().__setattr__(name, value)
 
     def reset(self) -> NDArray[np.float32]:
         """Observations at the start of all episodes."""

@@ -148,9 +148,9 @@ class Task:
         weights, own = changes.get("reward_weights"), self.defaults.get("reward_weights", {})
         if own and (weights is None or isinstance(weights, Mapping)):
             changes = {**changes, "reward_weights": {**own, **(weights or {})}}
-        if isinstance(changes.get("preset"), (Path, Mapping)):  # as JSON holds it, and a copy
-            preset = changes["preset"]
-            changes = {**changes, "preset": str(preset) if isinstance(preset, Path) else _plain(preset)}
+        for name, value in changes.items():  # as JSON holds it, and a copy
+            if isinstance(value, (Path, Mapping)):
+                changes = {**changes, name: str(value) if isinstance(value, Path) else _plain(value)}
         plain = replace(Settings(), **self.defaults)
         settings = replace(plain, **changes)
         for name, value in changes.items():

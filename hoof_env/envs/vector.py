@@ -94,6 +94,8 @@ class HorseLegVectorEnv(Made, Rows, VectorEnv[NDArray[np.float32], NDArray[np.fl
             "autoreset_mode": self.autoreset_mode,
         }
         self.render_mode, self.spec = render_mode, None
+        if rendered is not None and render_mode is None:
+            raise ParameterError(f"rendered: expected none without a render_mode, got {rendered!r}")
         drawn = drawn_of(rendered, self.num_envs, MOST_DRAWN) if render_mode else 0
         self._recordings = [Recording(self.batch, env) for env in range(drawn)]
         self._renderers: list[Any] = []

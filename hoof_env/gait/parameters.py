@@ -117,4 +117,6 @@ def _read_gaits(preset: Preset) -> dict[str, Any]:
         raise wrong(preset)(
             f"{named(preset)}: expected an object 'gaits' with at least one gait, got {gaits!r}"
         )
+    if not all(isinstance(name, str) for name in gaits):
+        raise wrong(preset)(f"{named(preset)}: gaits: expected names that are texts, got {[*gaits]!r}")
     return dict(gaits)

@@ -89,14 +89,17 @@ class Geometry:
         points = [dyad.point for dyad in DYADS]
         _check_keys("assembly", self.assembly, points)
         for point in points:
-            if self.assembly[point] not in (1, -1):
+            if not _is_sign(self.assembly[point]):
                 raise ParameterError(f"assembly[{point!r}]: expected +1 or -1, got {self.assembly[point]!r}")
-        if {self.toe, self.heel} != {"I", "J"}:
+        if (self.toe, self.heel) not in (("I", "J"), ("J", "I")):
             raise ParameterError(
                 f"toe and heel: expected I and J, one each, got {self.toe!r} and {self.heel!r}"
             )
-        if self.travel not in (1, -1):
+        if not _is_sign(self.travel):
             raise ParameterError(f"travel: expected +1 or -1, got {self.travel!r}")
+        for name, text in (("name", self.name), ("provenance", self.provenance)):
+            if not isinstance(text, str):
+                raise ParameterError(f"{name}: expected a text, got {text!r}")
         if _count(self.pivot) != 2:
             raise ParameterError(f"pivot: expected two numbers (C_x, C_y) in metres, got {self.pivot!r}")
         pivot = tuple(check_number(f"pivot[{i}]", c) for i, c in enumerate(self.pivot))
@@ -194,7 +197,7 @@ class Geometry:
             ground: K "stiffness" [N/m^n] and n "exponent" [-] of the contact law, or one of them.
 
         Raises:
-            ParameterError: another suffix.
+            ParameterError: another suffix, or gaits or a ground that are not numbers by name.
             OutputError: the file cannot be written.
         """
         path = Path(path)
@@ -207,12 +210,12 @@ class Geometry:
             "geometry": geometry,
         }
         if ground is not None:
-            content["ground"] = dict(ground)
+            _check_keys("ground", ground, (), ("stiffness", "exponent"))
+            content["ground"] = _numbers("ground", ground)
         if gaits is not None:
-            content["gaits"] = {
-                name: asdict(gait) if is_dataclass(gait) and not isinstance(gait, type) else dict(gait)
-                for name, gait in gaits.items()
-            }
+            if not isinstance(gaits, Mapping):
+                raise ParameterError(f"gaits: expected a mapping of gaits by name, got {gaits!r}")
+            content["gaits"] = {name: _numbers(f"gaits[{name!r}]", gait) for name, gait in gaits.items()}
         with staged(path.parent) as stage:
             (stage / path.name).write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
 
@@ -222,6 +225,18 @@ class Geometry:
             if name in changes:
                 changes[name] = {**getattr(self, name), **changes[name]}
         return replace(self, **changes)
+
+
+def _numbers(what: str, given: Any) -> dict[str, float]:
+    """The numbers of a dataclass or mapping by name, as JSON can hold them."""
+    found = asdict(given) if is_dataclass(given) and not isinstance(given, type) else given
+    if not isinstance(found, Mapping):
+        raise ParameterError(f"{what}: expected numbers by name, got {given!r}")
+    return {name: check_number(f"{what}[{name!r}]", value) for name, value in found.items()}
+
+
+def _is_sign(value: Any) -> bool:
+    return np.ndim(value) == 0 and value in (1, -1)
 
 
 def _check_keys(what: str, given: Any, expected: Sequence[str], optional: Sequence[str] = ()) -> None:

@@ -87,7 +87,7 @@ class Venv:
 
     def _torch(self) -> None:
         """PyTorch for the CPU. Where neither has it, it comes with the rest, perhaps with CUDA."""
-        for source in ("--no-index",), ("--index-url", TORCH_INDEX):
+        for source in ("--no-index",), ("--default-index" if UV else "--index-url", TORCH_INDEX):
             with suppress(Failed):
                 return self._pip("--no-deps", "torch", *source)
 

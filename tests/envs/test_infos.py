@@ -84,6 +84,22 @@ def test_nothing_is_measured_of_a_step_that_did_not_happen():
         assert np.isfinite(info["measured"]).all()
 
 
+def test_what_is_computed_from_named_numbers_has_no_names():
+    gait = gym.make(LEG).reset(seed=0)[1]["gait"]
+    assert gait
+    assert not (gait > 100.0).any()
+    assert not np.isnan(gait).any()
+    assert type(gait.max()) is type(gait.sum()) is np.float64
+    assert gait.get("crank_speed") == gait["crank_speed"] == gait[0]
+    assert gait.get("speed") is None
+    with pytest.raises(ValueError, match="more than one element is ambiguous"):
+        bool(gait > 3.0)
+    many = gym.make_vec(LEG, num_envs=3)
+    started = many.reset(seed=0)[1]["gait"]
+    assert started == many.step(actions(0, 3))[4]["gait"]
+    assert started != many.reset(seed=1)[1]["gait"]
+
+
 def test_infos_are_nobody_elses():
     env = gym.make(LEG, **DRAWN)
     infos = [env.reset(seed=0)[1], *(env.step(taken)[4] for taken in actions(0, 5))]
