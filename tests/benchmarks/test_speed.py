@@ -11,7 +11,7 @@ pytest.importorskip("matplotlib")
 
 from benchmarks import speed
 from benchmarks.speed_cases import Case, engine, scenes
-from benchmarks.speed_code import WIDTHS, by_kind, instructions, vector_bits
+from benchmarks.speed_code import WIDTHS, by_kind, instructions, target, vector_bits
 from benchmarks.speed_history import keep, read
 from benchmarks.speed_report import speed_table
 from benchmarks.speed_rounds import interleave, spread
@@ -33,6 +33,7 @@ def test_quick_mode_runs_without_peers_and_writes_its_files(tmp_path, monkeypatc
     }
     result = json.loads((own / "speed.json").read_text())
     assert result["machine"]["processor"]
+    assert result["machine"]["compiled for"] == f"{target()[1]}, vectors of {bits} bits"
     assert {case["group"] for case in result["cases"]} == {"leg", "suspended leg", "horse"}
     assert all(case["rate"]["min"] > 0 and not case["ratios"] for case in result["cases"])
     assert "MuJoCo is left out" in " ".join(result["notes"])
