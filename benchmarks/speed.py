@@ -39,7 +39,7 @@ ROUNDS = 40
 
 def machine() -> dict[str, str]:
     """What it ran on and was compiled for: processor, vectors, versions, date and commit."""
-    _, name, features = target()
+    _, processor, features = target()
     versions = []
     for package in ("hoof-env", "numba", "llvmlite", "numpy", "mujoco", "exudyn"):
         try:
@@ -48,8 +48,8 @@ def machine() -> dict[str, str]:
             versions.append(f"{package} not installed")
     return {
         "processor": f"{_processor()}, {os.cpu_count()} cores, one used",
-        "compiled for": f"{name}, vectors of {vector_bits()} bits",
-        "vector features": " ".join(sorted(features)) or f"those of {name}",
+        "compiled for": f"{processor}, vectors of {vector_bits()} bits",
+        "vector features": " ".join(sorted(features)) or f"those of {processor}",
         "system": f"{platform.system()} {platform.machine()}, Python {platform.python_version()}",
         "versions": ", ".join(versions),
         "date": datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M UTC"),

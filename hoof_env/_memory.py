@@ -8,10 +8,26 @@ and where every index is a constant it becomes registers.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
+import numpy as np
 from llvmlite import ir
 from numba.core import cgutils, extending, types
+from numpy.typing import NDArray
+
+LINE = 64
+"""Bytes of a line of the cache, and of the widest vector."""
+
+
+def aligned(*shape: int) -> NDArray[np.float64]:
+    """A new array of doubles, not filled, that begins with a line of the cache: a vector that lies across two
+    takes two loads."""
+    size, each = math.prod(shape), np.dtype(np.float64).itemsize
+    room = np.empty(size + LINE // each)
+    first = -room.ctypes.data % LINE // each
+    return room[first : first + size].reshape(shape)
+
 
 intrinsic: Any = extending.intrinsic
 """numba's decorator for functions that write their own instructions; it adds their first argument."""
@@ -24,7 +40,7 @@ def doubles(context: Any, count: Any) -> Any:
 
     def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         place = builder.alloca(ir.DoubleType(), size=values[0])
-        place.align = 64
+        place.align = LINE
         return place
 
     return types.CPointer(types.float64)(count), emit

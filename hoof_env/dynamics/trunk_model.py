@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hoof_env._memory import aligned
 from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
 from hoof_env.dynamics.advance import LANES, LIMB, LIMB_ROWS, MODEL, TRUNK, TRUNK_ROWS
@@ -138,7 +139,8 @@ def new_model(engine: TrunkEngine) -> tuple[NDArray[Any], Floats, Floats]:
     record["weights"][: len(scheme.weights)] = scheme.weights
     record["settings"] = engine.filters.to_array().ravel()
     record["ground_origin"], record["ground_per_metre"] = grid.origin, grid.per_metre
-    return model, np.concatenate(tables), grid.cells
+    whole = aligned(sum(map(len, tables)), tables[0].shape[1])
+    return model, np.concatenate(tables, out=whole), grid.cells
 
 
 def check_shared(engine: TrunkEngine, trunk: Trunk, ground: Ground, limbs: Sequence[Limb]) -> None:

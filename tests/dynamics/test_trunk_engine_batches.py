@@ -123,6 +123,12 @@ def test_a_state_goes_on_as_if_it_had_never_been_away(kind, n):
     np.testing.assert_array_equal(bits(first), bits(other))
 
 
+def test_tables_begin_with_a_line_of_the_cache():
+    for legs in range(1, 6):  # NumPy's own arrays do by chance
+        limbs = [Limb(load_geometry("first_fit").replace(linear_density=1.0 + i)) for i in range(legs)]
+        assert TrunkEngine(limbs, Trunk("free"), Ground())._model[1].ctypes.data % 64 == 0
+
+
 def test_a_state_can_be_read_before_it_is_advanced():
     first, other = run("free", np.arange(2)), engine("free", 2)
     other.set_state(first.get_state())
