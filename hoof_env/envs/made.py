@@ -7,7 +7,6 @@ import copy
 from dataclasses import fields
 from typing import Any
 
-from gymnasium import logger
 from gymnasium.envs.registration import EnvSpec
 
 from hoof_env.envs.batch import EpisodeBatch
@@ -65,9 +64,4 @@ class Made:
         if spec is not None and spec.max_episode_steps is None:
             spec = copy.copy(spec)  # it may be the registered one
             spec.max_episode_steps = self.batch.steps_per_episode
-        elif spec is not None and spec.max_episode_steps != self.batch.steps_per_episode:  # of a spec in hand
-            logger.warn(
-                f"the spec ends episodes after {spec.max_episode_steps} steps, the settings after "
-                f"{self.batch.steps_per_episode}: whichever comes first. Pass max_episode_steps, too"
-            )
         self._spec = spec

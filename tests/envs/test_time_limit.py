@@ -62,16 +62,6 @@ def test_truncated_once_at_the_step_that_the_spec_says(kwargs, limit):
         check_env(env.unwrapped)
 
 
-def test_a_spec_whose_limit_is_not_that_of_the_settings_warns():
-    spec = gym.make(LEG).spec
-    with pytest.warns(UserWarning, match="the spec ends episodes after 500 steps, the settings after 1000"):
-        gym.make(spec, episode_seconds=20.0)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        gym.make(spec)
-        gym.make(LEG, max_episode_steps=100)
-
-
 @pytest.mark.parametrize(("kwargs", "limit"), [({}, 500), ({"episode_seconds": 2.0}, 100)], ids=str)
 def test_time_is_observed(kwargs, limit):
     env = TimeAwareObservation(gym.make(LEG, **kwargs), normalize_time=True)

@@ -94,6 +94,8 @@ def test_content_is_taken_as_a_file_is_and_its_errors_are_those_of_an_argument()
         ParameterError, match=r"preset: expected an entry 'provenance' .* found geometry, gaits$"
     ):
         load_geometry({"geometry": content["geometry"], "gaits": content["gaits"]})
+    with pytest.raises(ParameterError, match="gaits: expected names that are texts"):
+        load_gait("walk", {**content, "gaits": {5: content["gaits"]["walk"]}})
     geometry = {name: value for name, value in content["geometry"].items() if name != "pivot"}
     with pytest.raises(ParameterError, match=r"preset: geometry: .*; missing pivot; unknown colour$"):
         load_geometry({**content, "geometry": {**geometry, "colour": "bay"}})
@@ -115,6 +117,15 @@ def test_a_geometry_goes_through_a_dictionary_and_a_file(tmp_path):
         own.save(tmp_path / "mine.txt")
     with pytest.raises(OutputError, match="cannot write to"):
         own.save(path / "under" / "mine.json")
+    with pytest.raises(ParameterError, match=r"ground: .*; unknown stifness"):
+        own.save(path, ground={"stifness": 1e4})
+    with pytest.raises(ParameterError, match=r"gaits\['trot'\]\['crank_speed'\]: expected .*fast"):
+        own.save(path, {"trot": {"crank_speed": "fast"}})
+    with pytest.raises(ParameterError, match="gaits: expected a mapping"):
+        own.save(path, ["walk"])
+    for name, value in (("toe", ["I"]), ("name", ["l"]), ("travel", [1, 1]), ("provenance", 3)):
+        with pytest.raises(ParameterError, match=f"{name}.*: expected"):
+            Geometry.from_dict({**own.to_dict(), name: value})
     with pytest.raises(
         ParameterError, match=r"geometry: expected exactly lengths, .* and perhaps .*; missing toe"
     ):
