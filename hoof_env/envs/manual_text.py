@@ -120,8 +120,8 @@ $figures
 The limit in steps is `env.unwrapped.spec.max_episode_steps`. A spec keeps it: whoever makes an environment
 from `env.spec` with another `episode_seconds` passes `max_episode_steps`, too. The wrapper of
 `gym.make(..., max_episode_steps=...)` can only shorten episodes, and the environment cannot know where it
-ends them, so `info` lacks the figures then: `env.unwrapped.episode_summary()` has them at any time. The vector
-environment takes that limit itself. A step after the end warns, once an episode, and means nothing.
+ends them, so `info` lacks the figures then: `env.unwrapped.episode_summary()` has them at any time. The
+vector environment takes that limit itself. A step after the end warns, once an episode, and means nothing.
 
 ## Vector Environment
 
