@@ -70,8 +70,8 @@ def start(tmp_path):
         process.communicate()
 
 
-def ended(process):
-    out, said = process.communicate(timeout=120)
+def ended(process, limit=120):
+    out, said = process.communicate(timeout=limit)
     assert process.returncode == 0, said
     return out.strip(), said
 
@@ -260,4 +260,4 @@ def test_an_environment_has_all_its_kernels_once_it_is_made(start):
     """
     # the folder of all tests: these kernels are large
     shared = os.environ.get("NUMBA_CACHE_DIR", "")
-    assert ended(start(code, NUMBA_CACHE_DIR=shared))[0] == "True [] True [] True [] []"
+    assert ended(start(code, NUMBA_CACHE_DIR=shared), limit=550)[0] == "True [] True [] True [] []"
