@@ -2,6 +2,7 @@
 nobody computes in threads: there is a process on each processor, and threads that wait for others spin."""
 
 import os
+import signal
 
 from hoof_env._jit import QUIET
 
@@ -9,3 +10,8 @@ os.environ.setdefault(QUIET, "1")
 os.environ["SDL_VIDEODRIVER"] = "dummy"
 for library in ("OMP", "OPENBLAS", "MKL"):
     os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+
+if (
+    signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+):  # in a shell's background; what tests start shall be interrupted
+    signal.signal(signal.SIGINT, signal.default_int_handler)
