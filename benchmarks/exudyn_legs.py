@@ -20,9 +20,8 @@ from numpy.typing import NDArray
 
 from benchmarks.common import ALL, Assembly, Outside, Record, Start
 from hoof_env.dynamics.drive import Motor
-from hoof_env.dynamics.engine import GRAVITY
 from hoof_env.dynamics.limb import Limb
-from hoof_env.dynamics.trunk import Trunk
+from hoof_env.dynamics.trunk import GRAVITY, Trunk
 from hoof_env.leg.linkage import BODIES, FRAME, JOINTS, LOCK
 
 eii: Any = exudyn.itemInterface  # its types ask for protocols that closures do not meet by name

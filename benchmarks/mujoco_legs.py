@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from benchmarks.common import RIGID, Assembly, Outside, Record, Start, corners
 from benchmarks.mujoco_model import FLYWHEEL, SLIDES, build_model
 from hoof_env.dynamics.drive import Motor
-from hoof_env.dynamics.engine import GRAVITY
 from hoof_env.dynamics.limb import Limb
-from hoof_env.dynamics.trunk import Trunk
+from hoof_env.dynamics.trunk import GRAVITY, Trunk
 from hoof_env.leg.kinematics import cross
 
 __all__ = ["MujocoLegs", "build_model"]

@@ -27,9 +27,8 @@ from numpy.typing import NDArray
 
 from benchmarks.common import ALL, LOCKED, RIGID, Assembly, Start, corners
 from hoof_env.dynamics.drive import Motor
-from hoof_env.dynamics.engine import GRAVITY
 from hoof_env.dynamics.limb import Limb
-from hoof_env.dynamics.trunk import Trunk
+from hoof_env.dynamics.trunk import GRAVITY, Trunk
 from hoof_env.leg.kinematics import Pose
 
 FLYWHEEL = 1e9

@@ -15,10 +15,10 @@ from numba.core import types
 
 from benchmarks.speed_cases import worked
 from benchmarks.speed_stages import fence, jit
-from hoof_env._jit import inlined
-from hoof_env._lanes import root, rows, write
-from hoof_env._lanes.kinds import DOUBLE, wide
-from hoof_env._memory import address, doubles, intrinsic
+from hoof_env.simd import root, rows, write
+from hoof_env.simd.compile import inlined
+from hoof_env.simd.memory import address, doubles, intrinsic
+from hoof_env.simd.types import DOUBLE, wide
 
 WIDE = 14
 """Rows that a turn of a loop works on: enough to fill every pipeline, and two of 16 registers stay free."""

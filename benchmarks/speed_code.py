@@ -11,8 +11,8 @@ import numba
 import numpy as np
 from numba.core.registry import cpu_target
 
-from hoof_env._lanes import read, rows, write
-from hoof_env._memory import address, doubles
+from hoof_env.simd import read, rows, write
+from hoof_env.simd.memory import address, doubles
 
 KINDS = ("divisions", "square roots", "arithmetic", "loads", "stores")
 WIDTHS = (64, 128, 256, 512)

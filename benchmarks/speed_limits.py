@@ -27,10 +27,10 @@ from benchmarks.speed_code import (
 )
 from benchmarks.speed_rounds import Floats, interleave, spread
 from benchmarks.speed_stages import STAGES, STEP, Pass, jit
-from hoof_env._memory import aligned
 from hoof_env.dynamics.advance import LANES, advance_batch, advance_four, advance_leg, run
 from hoof_env.dynamics.trunk_engine import TrunkEngine
 from hoof_env.dynamics.trunk_model import new_memory
+from hoof_env.simd.memory import aligned
 
 Timed = tuple[Callable[[], float], float]
 """A run, and how many of what is asked it does."""

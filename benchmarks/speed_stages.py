@@ -19,9 +19,6 @@ from numba.core import types
 from numpy.typing import NDArray
 
 from benchmarks.speed_code import assembly, instructions
-from hoof_env._jit import inlined, pasted
-from hoof_env._lanes import below, rows
-from hoof_env._memory import address, doubles, intrinsic
 from hoof_env.dynamics import lanes as m
 from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
@@ -29,6 +26,9 @@ from hoof_env.dynamics.advance import LIMB_ROWS, TRUNK_ROWS, Model, inner, load_
 from hoof_env.dynamics.lanes_ground import meet_ground, remember_contacts
 from hoof_env.dynamics.lanes_time import begin_step, end_step, next_stage, weigh_stage
 from hoof_env.dynamics.trunk_engine import TrunkEngine
+from hoof_env.simd import below, rows
+from hoof_env.simd.compile import inlined, pasted
+from hoof_env.simd.memory import address, doubles, intrinsic
 
 
 class Stage(NamedTuple):

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from hoof_env import records
 from hoof_env._arguments import parse_pairs
-from hoof_env.envs.render_instant import Instant, instants
 from hoof_env.errors import HoofEnvError, check_number
 from hoof_env.gait.parameters import GaitParameters
+from hoof_env.render.instant import Instant, instants
 
 HELD = {
     "up": (0, 1), "down": (0, -1), "right": (1, 1), "left": (1, -1),
@@ -144,7 +144,7 @@ def play(
         import pygame
     except ImportError:
         raise HoofEnvError('playing needs pygame-ce: pip install "hoof-env[render]"') from None
-    from hoof_env.envs.rendering import new_renderer, open_window
+    from hoof_env.render.renderer import new_renderer, open_window
 
     with records.make_env(env_id, parse_pairs("--args", arguments)) as env:
         game = Game(env, seed)
@@ -183,7 +183,7 @@ def _strip(size: tuple[int, int]) -> int:
 
 def _draw_strip(window: Any, renderer: Any, game: Game, size: tuple[int, int]) -> None:
     """Score, state and keys, below the picture."""
-    from hoof_env.envs.render_paint import CRANK, FORCE, GREY, INK, PAPER
+    from hoof_env.render.paint import CRANK, FORCE, GREY, INK, PAPER
 
     brush = renderer.brush
     unit, top = brush.unit, size[1]

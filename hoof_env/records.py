@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 import hoof_env
 from hoof_env._output import check_folder
 from hoof_env.envs.policies import Scripted, load_open_loop, make_policy, policy_names, read_open_loop
-from hoof_env.envs.render_instant import UNITS, Columns, columns_of_engine
 from hoof_env.errors import MissingExtraError, OutputError, ParameterError, check_number
 from hoof_env.gait.parameters import PARAMETERS, GaitParameters
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
 from hoof_env.onnx_policy import OnnxPolicy
+from hoof_env.render.instant import UNITS, Columns, columns_of_engine
 from hoof_env.saved_policy import SavedModel
 
 NOT_RECORDED = ("swing_offset", "swing_sin", "swing_cos")

@@ -4,7 +4,7 @@ nobody computes in threads: there is a process on each processor, and threads th
 import os
 import signal
 
-from hoof_env._jit import QUIET
+from hoof_env.simd.compile import QUIET
 
 os.environ.setdefault(QUIET, "1")
 os.environ["SDL_VIDEODRIVER"] = "dummy"

@@ -13,7 +13,7 @@ import pytest
 
 from hoof_env import __version__, cli
 from hoof_env._arguments import parse_pairs
-from hoof_env.dynamics.engine import GRAVITY
+from hoof_env.dynamics.trunk import GRAVITY
 from hoof_env.dynamics.trunk_rows import MOMENTUM
 from hoof_env.envs.policies import make_policy
 from hoof_env.errors import HoofEnvError, OutputError, ParameterError

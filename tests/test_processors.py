@@ -19,9 +19,9 @@ from numba import njit
 from benchmarks.speed_cases import engine, scenes
 from benchmarks.speed_ceilings import WIDE, ceilings, loops
 from benchmarks.speed_code import WIDTHS, assembly, instructions, is_counted, vector_bits
-from hoof_env._lanes import anywhere, choose, floor, read, rows, write
-from hoof_env._memory import address, doubles
-from hoof_env.ground import exact_math
+from hoof_env.simd import anywhere, choose, floor, read, rows, write
+from hoof_env.simd import math as exact_math
+from hoof_env.simd.memory import address, doubles
 
 LANES, OUTPUTS, NUMBERS = 8, 8, 64
 

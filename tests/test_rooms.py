@@ -9,7 +9,8 @@ import hoof_env
 
 PACKAGE = Path(hoof_env.__file__).parent
 ORDER = (
-    {"_lanes"}, {"leg", "ground"}, {"gait"}, {"dynamics"}, {"envs"}, {"export"}, {"paper"}, {"identify"},
+    {"simd"}, {"leg", "ground"}, {"gait"}, {"dynamics"}, {"render"}, {"envs"}, {"export"}, {"paper"},
+    {"identify"},
 )  # fmt: skip
 AT_THE_END = {"cli.py", "play.py", "records.py", "__init__.py", "__main__.py"}
 """Modules that use the public names as any user would."""

@@ -17,9 +17,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import carray  # type: ignore[attr-defined]
 
-from hoof_env._jit import inlined, kernel, pasted
-from hoof_env._lanes import anywhere, below, choose, fill, lane_sum, level, read, rows, write
-from hoof_env._memory import address, doubles, offset
 from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
 from hoof_env.dynamics.lanes import evaluate, keep_still, settle
@@ -38,6 +35,9 @@ from hoof_env.dynamics.lanes_time import begin_step, end_step, next_stage, weigh
 from hoof_env.dynamics.reactions import CONSTANTS, OUTPUTS
 from hoof_env.dynamics.trunk import FIXED
 from hoof_env.dynamics.vectors import put, vector
+from hoof_env.simd import anywhere, below, choose, fill, lane_sum, level, read, rows, write
+from hoof_env.simd.compile import inlined, kernel, pasted
+from hoof_env.simd.memory import address, doubles, offset
 
 LANES = 8
 """Environments side by side in a batch: one vector of 512 bits."""

@@ -31,11 +31,11 @@ from hoof_env.dynamics.constraints import (
     body_coordinate,
     closed_form,
 )
-from hoof_env.dynamics.engine import BODY, GRAVITY, State
+from hoof_env.dynamics.engine import BODY, State
 from hoof_env.dynamics.integrators import INTEGRATORS, Vector
 from hoof_env.dynamics.result import Result
 from hoof_env.dynamics.trace import new_trace, record
-from hoof_env.dynamics.trunk import Trunk
+from hoof_env.dynamics.trunk import GRAVITY, Trunk
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait.motion_law import (
     MOTION,

@@ -19,10 +19,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env._jit import kernel
 from hoof_env.dynamics.result import Result
 from hoof_env.dynamics.trace import new_trace, record
-from hoof_env.dynamics.trunk import FIXED, ONE_LEG, SUSPENDED, Trunk
+from hoof_env.dynamics.trunk import FIXED, GRAVITY, ONE_LEG, SUSPENDED, Trunk
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait.motion_law import (
     MOTION,
@@ -37,9 +36,7 @@ from hoof_env.ground.contact import HEEL, TOE, Ground, new_contacts, touch
 from hoof_env.leg.geometry import Geometry, check_full_revolution, tables
 from hoof_env.leg.kinematics import dot, place, solve_points
 from hoof_env.leg.linkage import BODIES, POINTS
-
-GRAVITY = 9.81
-"""[m/s^2], as in the paper's Table 1."""
+from hoof_env.simd.compile import kernel
 
 BODY = np.dtype([(name, "f8") for name in ("t", "px", "py", "cx", "cy", "fx", "fy")])
 """Time [s]; momentum [kg m/s], centre of mass [m] and outer force [N] of trunk and leg together, in the

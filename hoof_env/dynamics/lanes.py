@@ -17,17 +17,17 @@ all bodies together: in flight it is kept to round-off, whatever the scheme.
 
 from __future__ import annotations
 
-from hoof_env._jit import inlined, pasted
-from hoof_env._lanes import across, below, choose, cross, dot, level, plane, size
 from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
 from hoof_env.dynamics.lanes_ground import meet_ground
 from hoof_env.dynamics.trunk import FIXED, FREE, RAIL, SUSPENDED
 from hoof_env.dynamics.vectors import add, add_vector, put, vector
 from hoof_env.gait.motion_law import COS, OFFSET, SIN, SPEED
-from hoof_env.ground.exact_math import clip, cos_sin
 from hoof_env.leg import profile as f
 from hoof_env.leg.profile import look_up
+from hoof_env.simd import across, below, choose, cross, dot, level, plane, size
+from hoof_env.simd.compile import inlined, pasted
+from hoof_env.simd.math import clip, cos_sin
 
 
 @pasted

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from hoof_env._jit import inlined
-from hoof_env._lanes import across, anywhere, choose, cross, dot, larger, level, plane, size
 from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
 from hoof_env.dynamics.vectors import put, vector
-from hoof_env.ground.exact_math import root_power
 from hoof_env.ground.lane_friction import friction_part
 from hoof_env.ground.surface import surface
 from hoof_env.leg import profile as f
+from hoof_env.simd import across, anywhere, choose, cross, dot, larger, level, plane, size
+from hoof_env.simd.compile import inlined
+from hoof_env.simd.math import root_power
 
 TOE, HEEL = b.CONTACT, b.CONTACT + b.CONTACT_ROWS
 

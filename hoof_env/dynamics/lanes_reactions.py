@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from hoof_env._jit import inlined
-from hoof_env._lanes import across, level, plane
 from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
 from hoof_env.dynamics.lanes_ground import HEEL, TOE
 from hoof_env.dynamics.reactions import keep_reactions, leg_reactions
 from hoof_env.dynamics.vectors import vector
 from hoof_env.leg import profile as f
+from hoof_env.simd import across, level, plane
+from hoof_env.simd.compile import inlined
 
 
 @inlined

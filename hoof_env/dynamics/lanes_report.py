@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from hoof_env._jit import inlined
-from hoof_env._lanes import across, below, choose, dot, write
 from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
 from hoof_env.dynamics.lanes_ground import HEEL, TOE
 from hoof_env.dynamics.vectors import add, add_vector, vector
 from hoof_env.leg import profile as f
+from hoof_env.simd import across, below, choose, dot, write
+from hoof_env.simd.compile import inlined
 
 ACCOUNT = (
     "crank_work", "swing_work",  # by the drives [J]

@@ -10,12 +10,12 @@ from __future__ import annotations
 
 import math
 
-from hoof_env._jit import inlined
-from hoof_env._lanes import choose, dot, larger, root
 from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics.lanes_ground import HEEL, TOE
 from hoof_env.dynamics.lanes_report import feel_drives
 from hoof_env.dynamics.vectors import vector
+from hoof_env.simd import choose, dot, larger, root
+from hoof_env.simd.compile import inlined
 
 REVOLUTION = 2 * math.pi
 

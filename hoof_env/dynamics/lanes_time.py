@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from hoof_env._jit import inlined
-from hoof_env._lanes import below, choose
 from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
 from hoof_env.dynamics.trunk import FIXED, FREE
 from hoof_env.gait.motion_law import INNER, SPEED
-from hoof_env.ground.exact_math import clip
+from hoof_env.simd import below, choose
+from hoof_env.simd.compile import inlined
+from hoof_env.simd.math import clip
 
 
 @inlined

@@ -20,12 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.drive import Drive, Motor
-from hoof_env.dynamics.engine import GRAVITY
 from hoof_env.dynamics.jet import Jet
 from hoof_env.dynamics.limb import Limb
 from hoof_env.dynamics.plain_bodies import PlainBodies
 from hoof_env.dynamics.plain_ground import PlainGround
-from hoof_env.dynamics.trunk import TRUNKS, Trunk
+from hoof_env.dynamics.trunk import GRAVITY, TRUNKS, Trunk
 from hoof_env.gait.motion_law import SPEED
 from hoof_env.ground.contact import Ground
 

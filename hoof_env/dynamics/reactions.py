@@ -18,11 +18,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env._jit import inlined
-from hoof_env._lanes import choose, cross, dot, level, plane, root
 from hoof_env.dynamics.vectors import put, vector
 from hoof_env.leg.geometry import Geometry
 from hoof_env.leg.linkage import BODY_LENGTHS, CONSTRUCTION, JOINTS, Dyad
+from hoof_env.simd import choose, cross, dot, level, plane, root
+from hoof_env.simd.compile import inlined
 
 LOCK, DRIVER, HIP = 2 * len(JOINTS), 2 * len(JOINTS) + 1, 2 * len(JOINTS) + 2
 OUTPUTS = HIP + 1

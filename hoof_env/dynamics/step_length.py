@@ -23,9 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.drive import Motor
-from hoof_env.dynamics.engine import GRAVITY
 from hoof_env.dynamics.limb import Limb
-from hoof_env.dynamics.trunk import Trunk
+from hoof_env.dynamics.trunk import GRAVITY, Trunk
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.stiffness import LARGEST_ANGLE, SCHEMES, contact_rates
 from hoof_env.ground.terrain import Terrain

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.drive import Motor
-from hoof_env.dynamics.engine import GRAVITY
+from hoof_env.dynamics.trunk import GRAVITY
 from hoof_env.leg import profile as f
 
 if TYPE_CHECKING:

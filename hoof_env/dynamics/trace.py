@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env._jit import kernel
 from hoof_env.ground.contact import HEEL, TOE
+from hoof_env.simd.compile import kernel
 
 TRACE = np.dtype(
     [

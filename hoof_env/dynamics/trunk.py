@@ -9,6 +9,9 @@ import numpy as np
 
 from hoof_env.errors import ParameterError, check_choice, check_number
 
+GRAVITY = 9.81
+"""[m/s^2], as in the paper's Table 1."""
+
 TRUNKS = ("fixed", "rail", "suspended", "free")
 """Kinds of trunk; the kernels take the position in this tuple."""
 

@@ -31,7 +31,6 @@ from hoof_env.dynamics.advance import (
 )
 from hoof_env.dynamics.arguments import Floats, all_of, count, finite, flag, one_of
 from hoof_env.dynamics.drive import Drive
-from hoof_env.dynamics.engine import GRAVITY
 from hoof_env.dynamics.lanes_report import ACCOUNT, LIMB_REPORT, TRUNK_REPORT
 from hoof_env.dynamics.limb import Limb
 from hoof_env.dynamics.reactions import DRIVER, HIP, LOCK
@@ -39,7 +38,7 @@ from hoof_env.dynamics.result import Result
 from hoof_env.dynamics.schemes import SCHEMES
 from hoof_env.dynamics.step_length import StepLength
 from hoof_env.dynamics.tally import Tally, tally
-from hoof_env.dynamics.trunk import Trunk
+from hoof_env.dynamics.trunk import GRAVITY, Trunk
 from hoof_env.dynamics.trunk_model import (
     check_shared,
     columns_for,

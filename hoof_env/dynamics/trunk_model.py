@@ -8,22 +8,21 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env._memory import aligned
 from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
 from hoof_env.dynamics.advance import LANES, LIMB, LIMB_ROWS, MODEL, TRUNK, TRUNK_ROWS
 from hoof_env.dynamics.drive import Motor
-from hoof_env.dynamics.engine import GRAVITY
 from hoof_env.dynamics.lanes_report import LIMB_REPORT, TRUNK_REPORT
 from hoof_env.dynamics.limb import Limb
 from hoof_env.dynamics.reactions import OUTPUTS, leg_constants
 from hoof_env.dynamics.schemes import SCHEMES
-from hoof_env.dynamics.trunk import TRUNKS, Trunk
+from hoof_env.dynamics.trunk import GRAVITY, TRUNKS, Trunk
 from hoof_env.errors import ParameterError
 from hoof_env.ground.contact import Ground
-from hoof_env.ground.exact_math import EXPONENT_UNIT
 from hoof_env.ground.friction import FRICTION_LAWS
 from hoof_env.ground.terrain import Terrain
+from hoof_env.simd.math import EXPONENT_UNIT
+from hoof_env.simd.memory import aligned
 
 if TYPE_CHECKING:
     from hoof_env.dynamics.trunk_engine import TrunkEngine

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from hoof_env._jit import inlined
-from hoof_env._lanes import lane_sum, plane
+from hoof_env.simd import lane_sum, plane
+from hoof_env.simd.compile import inlined
 
 
 @inlined

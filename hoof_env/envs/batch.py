@@ -15,13 +15,12 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.advance import LIMB, TRUNK, TRUNK_ROWS
 from hoof_env.dynamics.drive import LARGEST, Drive
-from hoof_env.dynamics.engine import GRAVITY
 from hoof_env.dynamics.integrators import INTEGRATORS
 from hoof_env.dynamics.limb import Limb
 from hoof_env.dynamics.result import Result
 from hoof_env.dynamics.schemes import SCHEMES
 from hoof_env.dynamics.step_length import StepLength
-from hoof_env.dynamics.trunk import ONE_LEG, Trunk
+from hoof_env.dynamics.trunk import GRAVITY, ONE_LEG, Trunk
 from hoof_env.dynamics.trunk_engine import TrunkEngine
 from hoof_env.envs import episode as e
 from hoof_env.envs.grounds import make_terrain

@@ -11,9 +11,6 @@ import numpy as np
 from numba import carray, from_dtype  # type: ignore[attr-defined]
 from numba.core import types
 
-from hoof_env._jit import inlined, kernel, pasted
-from hoof_env._lanes import anywhere, choose, larger, level, read, rows, size, smaller, write
-from hoof_env._memory import doubles, pointer_to
 from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics.advance import (
     AT_COMMAND,
@@ -27,8 +24,11 @@ from hoof_env.dynamics.advance import (
     advance_leg,
 )
 from hoof_env.dynamics.lanes_report import LIMB_REPORT
-from hoof_env.ground.exact_math import clip, cos_sin, tanh
 from hoof_env.ground.surface import surface
+from hoof_env.simd import anywhere, choose, larger, level, read, rows, size, smaller, write
+from hoof_env.simd.compile import inlined, kernel, pasted
+from hoof_env.simd.math import clip, cos_sin, tanh
+from hoof_env.simd.memory import doubles, pointer_to
 
 ACTIONS = 4
 

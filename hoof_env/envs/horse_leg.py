@@ -336,7 +336,7 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             self.render()
 
     def _get_renderer(self) -> Any:
-        from hoof_env.envs.rendering import Renderer
+        from hoof_env.render.renderer import Renderer
 
         assert self._recording is not None
         if self._renderer is None:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from hoof_env._kernel_cache import COMPILED, given_folder
 from hoof_env.dynamics.advance import LANES
 from hoof_env.envs.horse_leg import HorseLegEnv
 from hoof_env.envs.vector import HorseLegVectorEnv
+from hoof_env.simd.cache import COMPILED, given_folder
 
 CASES: dict[str, Callable[[], object]] = {
     "one environment": HorseLegEnv,

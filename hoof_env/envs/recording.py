@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.result import Result
 from hoof_env.envs.batch import EpisodeBatch
-from hoof_env.envs.render_instant import columns_of_engine, instants
+from hoof_env.render.instant import columns_of_engine, instants
 
 SHOWN = 4.0
 """Seconds before a picture that it can show."""

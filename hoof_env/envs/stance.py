@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from hoof_env._jit import kernel
+from hoof_env.simd.compile import kernel
 
 ACCOUNT = np.dtype(
     [

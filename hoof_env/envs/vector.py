@@ -200,7 +200,7 @@ class HorseLegVectorEnv(Made, Rows, VectorEnv[NDArray[np.float32], NDArray[np.fl
         self._refuse_closed("render")
         if not self._started.all():
             raise ResetNeeded("render() was called before reset(): expected reset() first")
-        from hoof_env.envs.rendering import Renderer
+        from hoof_env.render.renderer import Renderer
 
         engine, weight = self.batch.engine, self.batch.engine.weight
         while len(self._renderers) < len(self._recordings):

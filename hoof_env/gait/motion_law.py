@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env._jit import kernel
 from hoof_env.errors import ParameterError, check_number
+from hoof_env.simd.compile import kernel
 
 FILTER = np.dtype([("value", "f8"), ("rate", "f8"), ("acc", "f8")])
 """State of one filter: a parameter, its rate and its acceleration (per s, per s^2)."""

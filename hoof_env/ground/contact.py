@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env._jit import kernel
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.ground.friction import FRICTION_LAWS, friction_force
 from hoof_env.ground.normal_force import NORMAL_LAWS, damping, normal_force
+from hoof_env.simd.compile import kernel
 
 CONTACT = np.dtype(
     [

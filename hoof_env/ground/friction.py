@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from hoof_env._jit import kernel
+from hoof_env.simd.compile import kernel
 
 FRICTION_LAWS = ("ambrosio", "threlfall", "tanh")
 """Names of the friction laws; the kernel takes the position in this tuple."""

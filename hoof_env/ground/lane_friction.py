@@ -1,10 +1,10 @@
-"""The laws of `friction` for lanes: without library functions or branches on the data (see `exact_math`)."""
+"""The laws of `friction` for lanes: without library functions or branches on the data (see `simd.math`)."""
 
 from __future__ import annotations
 
-from hoof_env._jit import inlined
-from hoof_env._lanes import larger, smaller
-from hoof_env.ground.exact_math import exp_of_negative
+from hoof_env.simd import larger, smaller
+from hoof_env.simd.compile import inlined
+from hoof_env.simd.math import exp_of_negative
 
 AMBROSIO, THRELFALL, TANH = range(3)  # positions in friction.FRICTION_LAWS
 

@@ -20,8 +20,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from hoof_env._jit import kernel
 from hoof_env.errors import ParameterError, check_choice, check_number
+from hoof_env.simd.compile import kernel
 
 
 def lankarani_nikravesh(cr: float) -> float:

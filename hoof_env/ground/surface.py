@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env._jit import inlined
-from hoof_env._lanes import floor, gather, larger, smaller
-from hoof_env._memory import address
+from hoof_env.simd import floor, gather, larger, smaller
+from hoof_env.simd.compile import inlined
+from hoof_env.simd.memory import address
 
 
 class TerrainGrid(NamedTuple):

@@ -17,7 +17,6 @@ import numpy as np
 
 from hoof_env.errors import HoofEnvError, ParameterError, check_choice, check_number
 from hoof_env.gait.parameters import load_gait
-from hoof_env.ground.exact_math import EXPONENT_UNIT
 from hoof_env.ground.preset import load_ground
 from hoof_env.identify.candidate import Choice, encode, to_preset
 from hoof_env.identify.confirm import GIVEN_UP, JUDGED, confirm
@@ -30,6 +29,7 @@ from hoof_env.identify.search import Outcome, search
 from hoof_env.identify.state import open_state
 from hoof_env.identify.targets import load_targets
 from hoof_env.leg.geometry import load_geometry
+from hoof_env.simd.math import EXPONENT_UNIT
 
 
 def check_extras() -> None:

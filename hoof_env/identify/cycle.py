@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from hoof_env._jit import kernel
 from hoof_env.leg.kinematics import cross, dot
 from hoof_env.leg.linkage import POINTS
+from hoof_env.simd.compile import kernel
 
 _NUMBER = {name: i for i, name in enumerate(POINTS)}
 _O, _C, _P, _G = (_NUMBER[name] for name in "OCPG")

@@ -17,7 +17,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env._jit import kernel
 from hoof_env.dynamics.constrained import SOLE
 from hoof_env.dynamics.constraints import Constraints
 from hoof_env.errors import check_number
@@ -26,6 +25,7 @@ from hoof_env.gait.parameters import GaitParameters
 from hoof_env.leg.geometry import Geometry, tables
 from hoof_env.leg.kinematics import cross, dot, mirror, solve_points
 from hoof_env.leg.linkage import BODIES, CONSTRUCTION, DRIVER, LOCK, POINTS, Dyad
+from hoof_env.simd.compile import kernel
 
 Array = NDArray[np.float64]
 

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env._jit import kernel
 from hoof_env.gait.parameters import LIMITS
 from hoof_env.identify.candidate import SIGNS, Choice, lengths_of
 from hoof_env.identify.cycle import DYAD, EXTENSION, TRIAD, leg_paths, swing_hoof
@@ -20,6 +19,7 @@ from hoof_env.identify.drift import euler_cycle
 from hoof_env.identify.features import cubic, measure_gait
 from hoof_env.identify.plausibility import LENGTH_RANGE, OVAL_LIMIT, PART_RANGE
 from hoof_env.leg.linkage import CONSTRUCTION, LENGTHS, POINTS, Dyad, Extension
+from hoof_env.simd.compile import kernel
 
 DEAD_ZONE = 0.6
 """An error below this costs nothing [bars], so that no row is pressed while another is outside its bar."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hoof_env._jit import kernel
+from hoof_env.simd.compile import kernel
 
 FEATURES = np.dtype(
     [

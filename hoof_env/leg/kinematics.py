@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env._jit import kernel
 from hoof_env.errors import check_number
 from hoof_env.leg.geometry import Geometry, tables
 from hoof_env.leg.linkage import BODIES, POINTS
+from hoof_env.simd.compile import kernel
 
 _NUMBER = {name: i for i, name in enumerate(POINTS)}
 _O, _C, _P = _NUMBER["O"], _NUMBER["C"], _NUMBER["P"]

@@ -20,15 +20,15 @@ from llvmlite import ir
 from numba.core import types
 from numpy.typing import NDArray
 
-from hoof_env._jit import kernel
-from hoof_env._lanes.kinds import DOUBLE, INDEX, pick, spread, wide
-from hoof_env._lanes.rows import store_row
-from hoof_env._memory import intrinsic
 from hoof_env.errors import GeometryError
-from hoof_env.ground.exact_math import ROUNDER
 from hoof_env.leg.geometry import Geometry, tables
 from hoof_env.leg.kinematics import solve_points
 from hoof_env.leg.linkage import BODIES, POINTS
+from hoof_env.simd.compile import kernel
+from hoof_env.simd.math import ROUNDER
+from hoof_env.simd.memory import intrinsic
+from hoof_env.simd.rows import store_row
+from hoof_env.simd.types import DOUBLE, INDEX, pick, spread, wide
 
 FUNCTIONS = (
     "toe_x", "toe_y", "heel_x", "heel_y",  # [m]

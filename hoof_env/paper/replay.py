@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env._jit import kernel
 from hoof_env.dynamics.trace import record
 from hoof_env.ground.contact import HEEL, TOE, Ground, new_contacts, touch
+from hoof_env.simd.compile import kernel
 
 
 def replay(trace: NDArray[np.void], ground: Ground, rise: float = 0.0) -> NDArray[np.void]:

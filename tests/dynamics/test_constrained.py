@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from hoof_env.dynamics.constrained import ConstrainedLeg
 from hoof_env.dynamics.constraints import closed_form
-from hoof_env.dynamics.engine import GRAVITY, LegEngine
+from hoof_env.dynamics.engine import LegEngine
 from hoof_env.dynamics.result import Result
 from hoof_env.dynamics.trace import TRACE, new_trace
-from hoof_env.dynamics.trunk import Trunk
+from hoof_env.dynamics.trunk import GRAVITY, Trunk
 from hoof_env.errors import ParameterError
 from hoof_env.gait.parameters import LIMITS, GaitParameters, load_gait
 from hoof_env.ground.contact import Ground

@@ -7,9 +7,9 @@ rates and differentiated numerically, and the trunk's acceleration follows from 
 import numpy as np
 import pytest
 
-from hoof_env.dynamics.engine import GRAVITY, LegEngine
+from hoof_env.dynamics.engine import LegEngine
 from hoof_env.dynamics.trace import new_trace
-from hoof_env.dynamics.trunk import Trunk
+from hoof_env.dynamics.trunk import GRAVITY, Trunk
 from hoof_env.gait.parameters import LIMITS, load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry

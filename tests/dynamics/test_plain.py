@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from hoof_env.dynamics.drive import Motor, Prescribed
-from hoof_env.dynamics.engine import GRAVITY, LegEngine
+from hoof_env.dynamics.engine import LegEngine
 from hoof_env.dynamics.limb import Limb
 from hoof_env.dynamics.plain import PlainHorse
 from hoof_env.dynamics.plain_crank import PlainCrank
 from hoof_env.dynamics.plain_ground import PlainGround
 from hoof_env.dynamics.plain_run import depths, follow, simulate
 from hoof_env.dynamics.trace import new_trace
-from hoof_env.dynamics.trunk import TRUNKS, Trunk
+from hoof_env.dynamics.trunk import GRAVITY, TRUNKS, Trunk
 from hoof_env.errors import ParameterError
 from hoof_env.gait.parameters import load_gait
 from hoof_env.ground.contact import Ground

@@ -6,11 +6,8 @@ import numpy as np
 import pytest
 from numba import njit
 
-from hoof_env._lanes import fill, rows, write
-from hoof_env._memory import address, doubles
 from hoof_env.dynamics.constrained import ConstrainedLeg
 from hoof_env.dynamics.constraints import closed_form
-from hoof_env.dynamics.engine import GRAVITY
 from hoof_env.dynamics.reactions import (
     CONSTANTS,
     DRIVER,
@@ -21,6 +18,7 @@ from hoof_env.dynamics.reactions import (
     leg_constants,
     leg_reactions,
 )
+from hoof_env.dynamics.trunk import GRAVITY
 from hoof_env.dynamics.vectors import vector
 from hoof_env.gait.motion_law import evaluate_motion
 from hoof_env.gait.parameters import load_gait
@@ -30,6 +28,8 @@ from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
 from hoof_env.leg.linkage import BODIES, CRANK, FRAME, JOINTS
 from hoof_env.leg.linkage import LOCK as LOCKED
+from hoof_env.simd import fill, rows, write
+from hoof_env.simd.memory import address, doubles
 
 PRESETS = {name: load_geometry(name) for name in ("first_fit", "identified")}
 LEGS = {

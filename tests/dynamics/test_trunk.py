@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from hoof_env.dynamics.engine import GRAVITY, LegEngine
+from hoof_env.dynamics.engine import LegEngine
 from hoof_env.dynamics.result import Result
 from hoof_env.dynamics.trace import new_trace
-from hoof_env.dynamics.trunk import TRUNK, Trunk
+from hoof_env.dynamics.trunk import GRAVITY, TRUNK, Trunk
 from hoof_env.errors import ParameterError
 from hoof_env.gait.parameters import GaitParameters
 from hoof_env.ground.contact import Ground

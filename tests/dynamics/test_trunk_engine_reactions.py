@@ -5,9 +5,8 @@ import pytest
 
 from hoof_env.dynamics.constrained import ConstrainedLeg
 from hoof_env.dynamics.drive import Prescribed
-from hoof_env.dynamics.engine import GRAVITY
 from hoof_env.dynamics.limb import Limb
-from hoof_env.dynamics.trunk import Trunk
+from hoof_env.dynamics.trunk import GRAVITY, Trunk
 from hoof_env.dynamics.trunk_engine import TrunkEngine
 from hoof_env.errors import ParameterError
 from hoof_env.gait.parameters import load_gait

@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import njit
 
-from hoof_env._lanes import read, rows, write
-from hoof_env._memory import address, doubles
 from hoof_env.ground import friction, lane_friction
 from hoof_env.ground.lane_friction import AMBROSIO, TANH, THRELFALL
+from hoof_env.simd import read, rows, write
+from hoof_env.simd.memory import address, doubles
 
 LAWS = (AMBROSIO, THRELFALL, TANH)
 

@@ -1,6 +1,6 @@
 """The one place where kernels are compiled: numba, serial, cached, without fast-math.
 
-Kernels are plain functions over NumPy records and arrays, or over lanes (`_lanes`). Fast-math stays off, so
+Kernels are plain functions over NumPy records and arrays, or over lanes (`simd`). Fast-math stays off, so
 that a result does not depend on how the compiler arranged a loop.
 """
 
@@ -34,7 +34,7 @@ def kernel(function: F) -> F:
     """
     import numba
 
-    from hoof_env._kernel_cache import keep
+    from hoof_env.simd.cache import keep
 
     _announce_compiling()
     compiled: Any = numba.njit(error_model="numpy")(function)

@@ -7,7 +7,8 @@ from typing import Any
 from llvmlite import ir
 from numba.core import cgutils, types
 
-from hoof_env._lanes.kinds import (
+from hoof_env.simd.memory import intrinsic
+from hoof_env.simd.types import (
     INDEX,
     Lanes,
     Plane,
@@ -20,7 +21,6 @@ from hoof_env._lanes.kinds import (
     spread,
     wide,
 )
-from hoof_env._memory import intrinsic
 
 
 def _result(*kinds: Any) -> Any:

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pygame
 
-from hoof_env.envs.render_instant import Instant
-from hoof_env.envs.render_paint import CRANK, FAINT, FINE, FORCE, GREY, INK, PAPER, Brush
-from hoof_env.envs.render_stance import Stances
 from hoof_env.gait.parameters import LIMITS
+from hoof_env.render.instant import Instant
+from hoof_env.render.paint import CRANK, FAINT, FINE, FORCE, GREY, INK, PAPER, Brush
+from hoof_env.render.stance import Stances
 
 SECONDS = 3
 """Time shown [s]."""

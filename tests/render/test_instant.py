@@ -7,7 +7,12 @@ from hoof_env.dynamics.drive import Prescribed
 from hoof_env.dynamics.limb import Limb
 from hoof_env.dynamics.trunk import Trunk
 from hoof_env.dynamics.trunk_engine import TrunkEngine
-from hoof_env.envs.render_instant import (
+from hoof_env.gait.parameters import load_gait
+from hoof_env.ground.contact import Ground
+from hoof_env.ground.terrain import Terrain
+from hoof_env.leg.geometry import load_geometry
+from hoof_env.leg.kinematics import FrameMotion, pose
+from hoof_env.render.instant import (
     POINTS,
     UNITS,
     Instant,
@@ -15,11 +20,6 @@ from hoof_env.envs.render_instant import (
     ground_at,
     instants,
 )
-from hoof_env.gait.parameters import load_gait
-from hoof_env.ground.contact import Ground
-from hoof_env.ground.terrain import Terrain
-from hoof_env.leg.geometry import load_geometry
-from hoof_env.leg.kinematics import FrameMotion, pose
 
 LEG, RUN = load_geometry("first_fit"), load_gait("run", "first_fit")
 HILLS = Terrain.through([-1.0, 0.4, 1.0, 2.0], [0.0, 0.0, 0.1, -0.05], friction=[1.0, 1.0, 0.5, 2.0])

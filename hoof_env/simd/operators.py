@@ -10,7 +10,7 @@ from numba.core import types
 from numba.core.extending import infer_getattr, lower_builtin, lower_getattr
 from numba.core.typing.templates import AbstractTemplate, AttributeTemplate, infer_global, signature
 
-from hoof_env._lanes.kinds import Lanes, Mask, Plane, count_of, is_real, join, number, split
+from hoof_env.simd.types import Lanes, Mask, Plane, count_of, is_real, join, number, split
 
 
 def _operation(function: Any, typed: Callable[..., Any], lowered: Callable[..., Any], arity: int) -> None:

@@ -23,7 +23,7 @@ from numba.core.compiler_lock import global_compiler_lock
 
 from hoof_env.errors import OutputError
 
-MECHANICS = ("_lanes", "leg", "ground", "gait", "dynamics", "identify")
+MECHANICS = ("simd", "leg", "ground", "gait", "dynamics", "identify")
 """The rooms whose sources end up in kernels."""
 
 LONGEST_WAIT = 600.0
@@ -168,9 +168,7 @@ def _no_folder(folder: str, error: Exception) -> OutputError:
 @cache
 def _sources() -> str:
     """Digest of everything that kernels are made from."""
-    here = Path(__file__).parent
-    digest = hashlib.sha256()
-    rooms = (path for room in MECHANICS for path in (here / room).glob("*.py"))
-    for path in sorted((*rooms, *here.glob("_*.py"))):
+    package, digest = Path(__file__).parents[1], hashlib.sha256()
+    for path in sorted(path for room in MECHANICS for path in (package / room).glob("*.py")):
         digest.update(path.read_bytes())
     return digest.hexdigest()

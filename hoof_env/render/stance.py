@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from hoof_env.envs.render_instant import Instant
+from hoof_env.render.instant import Instant
 
 
 class Peak(NamedTuple):

@@ -9,8 +9,8 @@ from numba.core import types
 from numba.core.extending import lower_builtin
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 
-from hoof_env._lanes.kinds import DOUBLE, INDEX, SINGLE, Lanes, Rows, gathered, is_real, number, pick, wide
-from hoof_env._memory import intrinsic
+from hoof_env.simd.memory import intrinsic
+from hoof_env.simd.types import DOUBLE, INDEX, SINGLE, Lanes, Rows, gathered, is_real, number, pick, wide
 
 
 @intrinsic(prefer_literal=True)

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pygame
 
-from hoof_env.envs.render_paint import CRANK, FINE, GREY, INK, PAPER, Brush, bar
 from hoof_env.leg.geometry import Geometry
 from hoof_env.leg.linkage import BODIES
 from hoof_env.leg.linkage import CRANK as CRANK_BODY
+from hoof_env.render.paint import CRANK, FINE, GREY, INK, PAPER, Brush, bar
 
 COAT, COAT_EDGE, PASTERN, HOOF = (226, 210, 194), (186, 163, 141), (196, 170, 146), (104, 74, 54)
 LINK, PLATE = (64, 78, 92), (186, 195, 205)

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from hoof_env import cli
-from hoof_env.envs import render_clip
-from hoof_env.envs.render_clip import frames, write_film
-from hoof_env.envs.rendering import new_renderer
 from hoof_env.records import episode, find_policy, make_env, setting
+from hoof_env.render import film as render_clip
+from hoof_env.render.film import frames, write_film
+from hoof_env.render.renderer import new_renderer
 
 pytest.importorskip("pygame")
 iio = pytest.importorskip("imageio.v3")

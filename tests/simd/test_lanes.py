@@ -5,7 +5,7 @@ import pytest
 from numba import njit
 from numba.core.errors import TypingError
 
-from hoof_env._lanes import (
+from hoof_env.simd import (
     across,
     anywhere,
     below,
@@ -27,7 +27,7 @@ from hoof_env._lanes import (
     smaller,
     write,
 )
-from hoof_env._memory import address, doubles
+from hoof_env.simd.memory import address, doubles
 
 INPUTS, OUTPUTS = 6, 40
 

@@ -9,8 +9,8 @@ each name. Floats mix with lanes and are the same in each.
 Lanes live inside kernels only: they come from `rows` and go back into them.
 """
 
-import hoof_env._lanes.operators  # noqa: F401  teaches numba the operators
-from hoof_env._lanes.functions import (
+import hoof_env.simd.operators  # noqa: F401  teaches numba the operators
+from hoof_env.simd.functions import (
     across,
     anywhere,
     choose,
@@ -26,7 +26,7 @@ from hoof_env._lanes.functions import (
     size,
     smaller,
 )
-from hoof_env._lanes.rows import below, fill, level, read, rows, write
+from hoof_env.simd.rows import below, fill, level, read, rows, write
 
 __all__ = [
     "across",

@@ -16,9 +16,9 @@ ROOT = Path(hoof_env.__file__).parents[1]
 
 MODULE = """
 import os, sys, time
-from hoof_env._jit import kernel
-from hoof_env._kernel_cache import COMPILED
-from hoof_env._memory import intrinsic
+from hoof_env.simd.compile import kernel
+from hoof_env.simd.cache import COMPILED
+from hoof_env.simd.memory import intrinsic
 from pathlib import Path
 
 HERE = Path(__file__).parent
@@ -229,7 +229,7 @@ def test_an_environment_has_all_its_kernels_once_it_is_made(start):
     """So that one in a parent process warms the cache for workers; what is compiled ahead is all there is."""
     code = """
         import numpy as np
-        from hoof_env._kernel_cache import KernelCache
+        from hoof_env.simd.cache import KernelCache
         from hoof_env.envs import kernels
         from hoof_env.envs.horse_leg import HorseLegEnv
         from hoof_env.envs.vector import HorseLegVectorEnv

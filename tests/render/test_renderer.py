@@ -18,16 +18,16 @@ from hoof_env.dynamics.limb import Limb
 from hoof_env.dynamics.trunk import Trunk
 from hoof_env.dynamics.trunk_engine import TrunkEngine
 from hoof_env.envs.policies import make_policy
-from hoof_env.envs.render_ground import find_patches, footprint
-from hoof_env.envs.render_instant import Instant, columns_of_engine, instants
-from hoof_env.envs.render_paint import Brush
-from hoof_env.envs.render_stance import Stances
-from hoof_env.envs.rendering import Renderer, open_window
 from hoof_env.errors import HoofEnvError, ParameterError
 from hoof_env.gait.parameters import LIMITS, PARAMETERS, load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import load_geometry
+from hoof_env.render.ground import find_patches, footprint
+from hoof_env.render.instant import Instant, columns_of_engine, instants
+from hoof_env.render.paint import Brush
+from hoof_env.render.renderer import Renderer, open_window
+from hoof_env.render.stance import Stances
 
 pygame = pytest.importorskip("pygame")
 
@@ -112,7 +112,7 @@ def test_off_screen_frames_need_no_display(run):
     draw(*run[:2])
     assert pygame.display.get_init() == was_open
     code = (
-        "import pygame, hoof_env.envs.rendering as r; from hoof_env.envs.render_instant import Instant\n"
+        "import pygame, hoof_env.render.renderer as r; from hoof_env.render.instant import Instant\n"
         "from hoof_env.leg.geometry import load_geometry\n"
         "picture = r.Renderer(load_geometry(), 'rgb_array', 50)\n"
         "picture.add([Instant(*[0.0] * len(Instant._fields))])\n"

@@ -13,8 +13,8 @@ from __future__ import annotations
 
 import math
 
-from hoof_env._jit import inlined
-from hoof_env._lanes import choose, larger, quarter_turns, root, size, smaller
+from hoof_env.simd import choose, larger, quarter_turns, root, size, smaller
+from hoof_env.simd.compile import inlined
 
 EXPONENT_UNIT = 8
 """`root_power` knows the exponents that are whole multiples of 1 / EXPONENT_UNIT."""

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from hoof_env._arguments import parse_pairs
 from hoof_env._output import staged
-from hoof_env.envs.render_instant import Columns, Instant, instants
 from hoof_env.errors import HoofEnvError, ParameterError, check_number
+from hoof_env.render.instant import Columns, Instant, instants
 
 if TYPE_CHECKING:
-    from hoof_env.envs.rendering import Renderer
+    from hoof_env.render.renderer import Renderer
 
 FFMPEG: dict[str, dict[str, Any]] = {
     ".mp4": {
@@ -172,7 +172,7 @@ def render_episode(
             range. OutputError, HoofEnvError: as `write_film`, and before the episode is played.
     """
     from hoof_env import records
-    from hoof_env.envs.rendering import new_renderer
+    from hoof_env.render.renderer import new_renderer
 
     records.check_place(path, FFMPEG)
     check_film(path, check_number("fps", fps, low=0, high=1000, exclusive_low=True))

@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import njit
 
-from hoof_env._lanes import read, rows, write
-from hoof_env._memory import address, doubles
-from hoof_env.ground import exact_math
-from hoof_env.ground.exact_math import LOWEST_EXPONENT
+from hoof_env.simd import math as exact_math
+from hoof_env.simd import read, rows, write
+from hoof_env.simd.math import LOWEST_EXPONENT
+from hoof_env.simd.memory import address, doubles
 
 EIGHTHS = range(8, 25)
 LANES = 8

@@ -1,7 +1,7 @@
 """Pictures of the leg at work: an off-screen RGB array, or a window for people.
 
 Drawing is done in software on an off-screen surface; only render mode "human" opens a display. Every
-number in the picture is read from `render_instant.Instant`s; it computes no mechanics of its own.
+number in the picture is read from `instant.Instant`s; it computes no mechanics of its own.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from gymnasium.error import DependencyNotInstalled, ResetNeeded
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.trunk import ONE_LEG
-from hoof_env.envs.render_instant import Instant
-from hoof_env.envs.render_stance import Stances
 from hoof_env.errors import HoofEnvError, ParameterError, check_choice, check_number
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
+from hoof_env.render.instant import Instant
+from hoof_env.render.stance import Stances
 
 if TYPE_CHECKING:
     from hoof_env.records import Setting
@@ -76,9 +76,9 @@ class Renderer:
         except ImportError:
             hint = 'pygame is not installed, run `pip install "hoof-env[render]"`'
             raise DependencyNotInstalled(hint) from None
-        from hoof_env.envs.render_paint import Brush
-        from hoof_env.envs.render_panel import Panel
-        from hoof_env.envs.render_scene import Scene
+        from hoof_env.render.paint import Brush
+        from hoof_env.render.panel import Panel
+        from hoof_env.render.scene import Scene
 
         self._pygame = pygame
         self._canvas = pygame.Surface(self.size, 0, 32)
