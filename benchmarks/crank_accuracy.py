@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.drive import Motor
 from hoof_env.dynamics.limb import Limb
-from hoof_env.dynamics.plain_crank import PlainCrank
 from hoof_env.dynamics.step_length import StepWarning
 from hoof_env.dynamics.trunk import Trunk
 from hoof_env.dynamics.trunk_engine import TrunkEngine
@@ -26,6 +25,7 @@ from hoof_env.errors import ParameterError
 from hoof_env.gait.parameters import GaitParameters, load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
+from tests.oracle.crank import PlainCrank
 
 Floats = NDArray[np.float64]
 

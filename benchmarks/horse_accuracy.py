@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from benchmarks.crank_accuracy import NATURAL, STRONG, quiet
 from hoof_env.dynamics.limb import Limb
-from hoof_env.dynamics.plain import PlainHorse
-from hoof_env.dynamics.plain_run import simulate
 from hoof_env.dynamics.step_length import StepWarning
 from hoof_env.dynamics.trunk import Trunk
 from hoof_env.dynamics.trunk_engine import TrunkEngine
@@ -19,6 +17,8 @@ from hoof_env.gait.parameters import load_gait
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import pose
 from hoof_env.leg.linkage import BODIES, POINTS
+from tests.oracle.horse import PlainHorse
+from tests.oracle.run import simulate
 
 Floats = NDArray[np.float64]
 

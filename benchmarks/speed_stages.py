@@ -13,6 +13,8 @@ from typing import Any, NamedTuple
 
 import numba
 import numpy as np
+from hoof_env.dynamics.lanes_ground import meet_ground, remember_contacts
+from hoof_env.dynamics.lanes_time import begin_step, end_step, next_stage, weigh_stage
 from llvmlite import ir
 from numba import carray  # type: ignore[attr-defined]
 from numba.core import types
@@ -23,8 +25,6 @@ from hoof_env.dynamics import lanes as m
 from hoof_env.dynamics import limb_rows as b
 from hoof_env.dynamics import trunk_rows as t
 from hoof_env.dynamics.advance import LIMB_ROWS, TRUNK_ROWS, Model, inner, load_limb_rows, load_trunk_rows
-from hoof_env.dynamics.lanes_ground import meet_ground, remember_contacts
-from hoof_env.dynamics.lanes_time import begin_step, end_step, next_stage, weigh_stage
 from hoof_env.dynamics.trunk_engine import TrunkEngine
 from hoof_env.simd import below, rows
 from hoof_env.simd.compile import inlined, pasted

@@ -32,7 +32,7 @@ needs_x86 = pytest.mark.skipif(
 
 @njit(error_model="numpy")
 def work(given, found):
-    row = rows(doubles(LANES), LANES)
+    row = rows(doubles(LANES), LANES, None)
     for n in range(0, NUMBERS, LANES):
         x = read(row, address(given), n, 1)
         c, s = exact_math.cos_sin(x)

@@ -11,31 +11,19 @@ each leg, as `TRUNK` and `LIMB` have them.
 
 from __future__ import annotations
 
-from itertools import accumulate, pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 from numba import carray  # type: ignore[attr-defined]
 
-from hoof_env.dynamics import limb_rows as b
-from hoof_env.dynamics import trunk_rows as t
-from hoof_env.dynamics.lanes import evaluate, keep_still, settle
-from hoof_env.dynamics.lanes_ground import level_ground, remember_contacts
-from hoof_env.dynamics.lanes_reactions import react
-from hoof_env.dynamics.lanes_report import (
-    ACCOUNT,
-    LIMB_REPORT,
-    TRUNK_REPORT,
-    keep_account,
-    report_leg,
-    report_trunk,
-)
-from hoof_env.dynamics.lanes_strides import count_stride, forget_sums
-from hoof_env.dynamics.lanes_time import begin_step, end_step, next_stage, weigh_stage
-from hoof_env.dynamics.reactions import CONSTANTS, OUTPUTS
+from hoof_env.dynamics.hoof import level_ground, remember_contacts
+from hoof_env.dynamics.layout import Account, LegMemory, LegRows, TrunkMemory, TrunkRows
+from hoof_env.dynamics.mechanics import evaluate, keep_still, settle
+from hoof_env.dynamics.observables import count_stride, keep_account, report_leg, report_trunk
+from hoof_env.dynamics.reactions import LegConstants, Reactions, react
+from hoof_env.dynamics.stepping import begin_step, end_step, next_stage, weigh_stage
 from hoof_env.dynamics.trunk import FIXED
-from hoof_env.dynamics.vectors import put, vector
-from hoof_env.simd import anywhere, below, choose, fill, lane_sum, level, read, rows, write
+from hoof_env.simd import anywhere, choose, columns, fill, lane_sum, level, nth, rows
 from hoof_env.simd.compile import inlined, kernel, pasted
 from hoof_env.simd.memory import address, doubles, offset
 
@@ -48,28 +36,13 @@ OK, NOT_FINITE, DEAD_POINT, FALLEN = 0, 1, 3, 4
 STARTS = -1.0
 """Stands in the place of a result where an environment is to start."""
 
+TRUNK_ROWS, LEG_ROWS = TrunkMemory.size, LegMemory.size
+"""Rows of an engine's memory: of the trunk, and of each leg behind it."""
 
-def _blocks(**sizes: int) -> dict[str, slice]:
-    """Consecutive rows by name."""
-    ends = accumulate(sizes.values(), initial=0)
-    return {name: slice(*pair) for name, pair in zip(sizes, pairwise(ends), strict=True)}
-
-
-TRUNK = _blocks(
-    state=len(t.STATE), settings=len(t.PARAMETERS), account=len(ACCOUNT), report=len(TRUNK_REPORT), result=1
-)
-LIMB = _blocks(
-    state=len(b.STATE), strides=len(b.STRIDES), stride_sums=len(b.STRIDE_SUMS), command=4,
-    settings=len(b.PARAMETERS), report=len(LIMB_REPORT),
-)  # fmt: skip
-"""Rows of `data`: the engine's state and settings, what it was told, and what it tells."""
-
-TRUNK_ROWS, LIMB_ROWS = TRUNK["result"].stop, LIMB["report"].stop
-TRUNK_STATES, TRUNK_SETTINGS, ACCOUNTS = len(t.STATE), len(t.PARAMETERS), len(ACCOUNT)
-LIMB_STATES, LIMB_KEPT, LIMB_SETTINGS = len(b.STATE), len(b.STATE + b.STRIDES), len(b.PARAMETERS)
-LIMB_STORED = LIMB_KEPT + len(b.STRIDE_SUMS)
-AT_SETTINGS, AT_ACCOUNT, AT_REPORT, AT_RESULT = (block.start for block in list(TRUNK.values())[1:])
-AT_COMMAND, AT_LIMB_SETTINGS, AT_LIMB_REPORT = (block.start for block in list(LIMB.values())[3:])
+TRUNK_SIZE, LEG_SIZE, ACCOUNT_SIZE = TrunkRows.size, LegRows.size, Account.size
+TRUNK_STATE_SIZE, LEG_STATE_SIZE = TrunkMemory.fields["state"].kind.size, LegMemory.fields["state"].kind.size
+STRIDES_SIZE, SUMS_SIZE = LegMemory.fields["strides"].kind.size, LegMemory.fields["sums"].kind.size
+CONSTANTS_SIZE, REACTIONS_SIZE = LegConstants.size, Reactions.size
 
 MODEL = np.dtype(
     [
@@ -132,138 +105,159 @@ def inner(model, tables, ground, small, together):  # type: ignore[no-untyped-de
 
 
 @inlined
-def load_trunk_rows(trunk, data, n, row, stride):  # type: ignore[no-untyped-def]
-    """State and settings of environments n, n + stride, ..."""
-    fill(trunk, 0, TRUNK_STATES, data, n, row, stride)
-    fill(trunk, t.TOTAL_MASS, TRUNK_SETTINGS, data, n + AT_SETTINGS * row, row, stride)
+def read_trunk(trunk, memory):  # type: ignore[no-untyped-def]
+    """State and settings from a `TrunkMemory`."""
+    fill(trunk.state, memory.state)
+    fill(trunk.settings, memory.settings)
     keep_still(trunk)
 
 
 @inlined
-def load_limb_rows(limb, data, start, row, stride):  # type: ignore[no-untyped-def]
-    """State, command and settings of a leg, whose rows begin at `start`."""
-    fill(limb, 0, LIMB_KEPT, data, start, row, stride)
-    forget_sums(limb)
-    fill(limb, b.COMMAND, 4, data, start + AT_COMMAND * row, row, stride)
-    fill(limb, b.HIP_ON_TRUNK, LIMB_SETTINGS, data, start + AT_LIMB_SETTINGS * row, row, stride)
-    put(limb, b.HIP, vector(limb, b.HIP_ON_TRUNK))  # stays so unless the trunk pitches
-    level_ground(limb)
+def read_leg(leg, memory):  # type: ignore[no-untyped-def]
+    """State, command and settings from a `LegMemory`; sums begin anew."""
+    fill(leg.state, memory.state)
+    fill(leg.strides, memory.strides)
+    for k in range(SUMS_SIZE):
+        leg.sums[k] = 0.0
+    for k in range(4):
+        leg.command[k] = memory.command[k]
+    fill(leg.settings, memory.settings)
+    leg.hip = leg.settings.hip_on_trunk  # stays so unless the trunk pitches
+    level_ground(leg)
 
 
 @inlined
-def judge(trunk, limbs, legs, together):  # type: ignore[no-untyped-def]
+def find_result(trunk, legs, leg_count, together):  # type: ignore[no-untyped-def]
     """How the environments ended, numbers of `result.Result`."""
-    total, stuck = level(trunk, 0.0), trunk[t.STUCK]
-    for k in range(TRUNK_STATES):
-        total = total + trunk[k]
-    for i in range(legs):
-        limb = below(limbs, i * b.ROWS)
-        total = total + limb[b.SPIN_RATE]
-        for k in range(LIMB_STATES):
-            total = total + limb[k]
+    total, stuck = level(trunk, 0.0), trunk.at_dead_point
+    for k in range(TRUNK_STATE_SIZE):
+        total = total + trunk.state[k]
+    for i in range(leg_count):
+        leg = nth(legs, i, LegRows)
+        total = total + leg.theta_acceleration
+        for k in range(LEG_STATE_SIZE):
+            total = total + leg.state[k]
     if together:
         total, stuck = lane_sum(level(trunk, 0.0), total), lane_sum(level(trunk, 0.0), stuck)
     lost = choose(stuck > 0.0, float(DEAD_POINT), float(NOT_FINITE))
-    fell = choose(trunk[t.FELL] > 0.0, float(FALLEN), float(OK))
+    fell = choose(trunk.fallen > 0.0, float(FALLEN), float(OK))
     return choose((total - total != 0.0) | (stuck > 0.0), lost, fell)
 
 
 @inlined
-def replace(old, new, count, data, start, row, stride, good):  # type: ignore[no-untyped-def]
+def store(memory, rows, count, good):  # type: ignore[no-untyped-def]
     """Put `count` rows into memory where they are good."""
     for k in range(count):
-        at = start + k * row
-        before = read(old, data, at, stride)
-        write(choose(good, new[k], before), data, at, stride)
+        memory[k] = choose(good, rows[k], memory[k])
 
 
 @pasted
-def run_steps(trunk, limbs, legs, model, account, constants, found, h, steps, keeps_account, reacts):  # type: ignore[no-untyped-def]
+def run_steps(  # type: ignore[no-untyped-def]
+    trunk, legs, leg_count, model, account, constants, reactions, h, steps, keeps_account, reacts
+):
     """Advance by `steps` of `h` [s] and evaluate there."""
     stage, elapsed = 0, 0.0
-    begin_step(trunk, limbs, legs, model)
+    begin_step(trunk, legs, leg_count, model)
     for turn in range(steps * model.stages + 1):
-        evaluate(trunk, limbs, legs, model, elapsed)
+        evaluate(trunk, legs, leg_count, model, elapsed)
         if stage == 0:
-            for i in range(legs):
-                limb = below(limbs, i * b.ROWS)
-                remember_contacts(limb)
+            for i in range(leg_count):
+                leg = nth(legs, i, LegRows)
+                remember_contacts(leg)
                 if model.strides and turn > 0:
-                    count_stride(trunk, limb, h)
+                    count_stride(trunk, leg, h)
                 if reacts and (turn > 0 or steps == 0):
-                    react(trunk, limb, below(constants, i * CONSTANTS), below(found, i * OUTPUTS))
+                    react(trunk, leg, nth(constants, i, LegConstants), nth(reactions, i, Reactions))
         if turn < steps * model.stages:
             weight = model.weights[stage]
             if keeps_account:
-                keep_account(trunk, limbs, legs, model, account, h * weight)
-            weigh_stage(trunk, limbs, legs, model, weight)
+                keep_account(trunk, legs, leg_count, model, account, h * weight)
+            weigh_stage(trunk, legs, leg_count, model, weight)
             elapsed = model.fractions[stage] * h
             stage += 1
             if stage < model.stages:
-                next_stage(trunk, limbs, legs, model, elapsed)
+                next_stage(trunk, legs, leg_count, model, elapsed)
             else:
-                end_step(trunk, limbs, legs, model, h)
-                begin_step(trunk, limbs, legs, model)
+                end_step(trunk, legs, leg_count, model, h)
+                begin_step(trunk, legs, leg_count, model)
                 stage, elapsed = 0, 0.0
 
 
 @pasted
 def run(  # type: ignore[no-untyped-def]
-    data, model, tables, ground, constants, reactions, h, steps, keeps_account, legs, lanes, together, reacts
+    data,
+    model,
+    tables,
+    ground,
+    constants,
+    reactions,
+    h,
+    steps,
+    keeps_account,
+    leg_count,
+    lanes,
+    together,
+    reacts,
 ):
     """Advance all environments: `lanes` at a time, or one whose legs the lanes are. With `steps` below 0
     those start whose result is `STARTS`. Unless `reacts`, a constant, no code for reactions is made."""
-    trunk = rows(doubles(t.ROWS * lanes), lanes)
-    limbs = rows(doubles(legs * b.ROWS * lanes), lanes)
-    account = rows(doubles(ACCOUNTS * lanes), lanes)
-    shape = rows(doubles(legs * CONSTANTS * lanes), lanes)
-    found = rows(doubles(legs * OUTPUTS * lanes), lanes)
+    trunk = rows(doubles(TRUNK_SIZE * lanes), lanes, TrunkRows)
+    legs = rows(doubles(leg_count * LEG_SIZE * lanes), lanes, None)
+    account = rows(doubles(ACCOUNT_SIZE * lanes), lanes, Account)
+    shapes = rows(doubles(leg_count * CONSTANTS_SIZE * lanes), lanes, None)
+    forces = rows(doubles(leg_count * REACTIONS_SIZE * lanes), lanes, None)
     inside = inner(model, tables, ground, doubles(20), together)
     at, row = address(data), data.shape[1]
     # lanes are neighbours, but where they are legs, as far apart as legs are
     envs, near, far = lanes, 1, 1
     if together:
-        envs, near, far = 1, 0, LIMB_ROWS * row
+        envs, near, far = 1, 0, LEG_ROWS * row
     if reacts:
-        for i in range(legs):
-            for k in range(CONSTANTS):
-                one = i * CONSTANTS + k
-                shape[one] = read(shape, address(constants), one, CONSTANTS if together else 0)
+        own = columns(address(constants), lanes, None, 0, 1, CONSTANTS_SIZE if together else 0)
+        for k in range(leg_count * CONSTANTS_SIZE):
+            shapes[k] = own[k]
     for n in range(0, row, envs):
-        load_trunk_rows(trunk, at, n, row, near)
-        for k in range(ACCOUNTS):
+        memory = columns(at, lanes, TrunkMemory, n, row, near)
+        read_trunk(trunk, memory)
+        for k in range(ACCOUNT_SIZE):
             account[k] = 0.0
-        for i in range(legs):
-            first = (TRUNK_ROWS + i * LIMB_ROWS) * row + n
-            load_limb_rows(below(limbs, i * b.ROWS), at, first, row, far)
-        before = read(trunk, at, AT_RESULT * row + n, near)
+        for i in range(leg_count):
+            first = (TRUNK_ROWS + i * LEG_ROWS) * row + n
+            read_leg(nth(legs, i, LegRows), columns(at, lanes, LegMemory, first, row, far))
+        before = memory.result
         starts = before == STARTS
         if steps < 0:
             if not anywhere(starts):
                 continue
-            begin_step(trunk, limbs, legs, inside)
+            begin_step(trunk, legs, leg_count, inside)
             if inside.kind != FIXED:
-                settle(trunk, limbs, legs, inside, starts)
-        run_steps(trunk, limbs, legs, inside, account, shape, found, h, max(steps, 0), keeps_account, reacts)
-        report_trunk(trunk, at, AT_REPORT * row + n, row, near)
-        result = judge(trunk, limbs, legs, together)
+                settle(trunk, legs, leg_count, inside, starts)
+        run_steps(
+            trunk, legs, leg_count, inside, account, shapes, forces, h, max(steps, 0), keeps_account, reacts
+        )
+        report_trunk(trunk, memory.report)
+        result = find_result(trunk, legs, leg_count, together)
         good = result == float(OK)
         if steps < 0:  # the others are as they were; a start that cannot be is kept as it is
             result, good = choose(starts, result, before), starts
-        write(result, at, AT_RESULT * row + n, near)
-        replace(trunk, trunk, TRUNK_STATES, at, n, row, near, good)
-        for k in range(ACCOUNTS):
-            place = (AT_ACCOUNT + k) * row + n
-            account[k] = account[k] + read(account, at, place, near)
-        replace(trunk, account, ACCOUNTS, at, AT_ACCOUNT * row + n, row, near, good)
-        for i in range(legs):
-            limb, first = below(limbs, i * b.ROWS), (TRUNK_ROWS + i * LIMB_ROWS) * row + n
-            report_leg(trunk, limb, at, first + AT_LIMB_REPORT * row, row, far)
-            replace(trunk, limb, LIMB_STORED, at, first, row, far, good)
+        memory.result = result
+        store(memory.state, trunk.state, TRUNK_STATE_SIZE, good)
+        for k in range(ACCOUNT_SIZE):
+            account[k] = account[k] + memory.account[k]
+        store(memory.account, account, ACCOUNT_SIZE, good)
+        for i in range(leg_count):
+            leg = nth(legs, i, LegRows)
+            own = columns(at, lanes, LegMemory, (TRUNK_ROWS + i * LEG_ROWS) * row + n, row, far)
+            report_leg(trunk, leg, own.report)
+            store(own.state, leg.state, LEG_STATE_SIZE, good)
+            store(own.strides, leg.strides, STRIDES_SIZE, good)
+            store(own.sums, leg.sums, SUMS_SIZE, good)
             if reacts:
-                for k in range(OUTPUTS):
-                    place = (i * OUTPUTS + k) * row + n
-                    write(found[i * OUTPUTS + k], address(reactions), place, OUTPUTS * row if together else 1)
+                kept = nth(forces, i, Reactions)
+                first, stride = i * REACTIONS_SIZE * row + n, REACTIONS_SIZE * row if together else 1
+                out = columns(address(reactions), lanes, Reactions, first, row, stride)
+                for k in range(REACTIONS_SIZE):
+                    out[k] = kept[k]
 
 
 @kernel
@@ -274,15 +268,17 @@ def advance_leg(data, model, tables, ground, constants, reactions, h, steps, kee
 
 @kernel
 def advance_four(data, model, tables, ground, constants, reactions, h, steps, keeps_account):  # type: ignore[no-untyped-def]
-    """Each environment by itself; they have four legs, side by side."""
+    """Each environment by itself; they have four leg_count, side by side."""
     run(data, model, tables, ground, constants, reactions, h, steps, keeps_account, 1, 4, True, False)
 
 
 @kernel
 def advance_batch(data, model, tables, ground, constants, reactions, h, steps, keeps_account):  # type: ignore[no-untyped-def]
     """`LANES` environments at a time, with any number of legs."""
-    legs = model[0].legs
-    run(data, model, tables, ground, constants, reactions, h, steps, keeps_account, legs, LANES, False, False)
+    count = model[0].legs
+    run(
+        data, model, tables, ground, constants, reactions, h, steps, keeps_account, count, LANES, False, False
+    )
 
 
 @kernel
@@ -300,5 +296,5 @@ def react_four(data, model, tables, ground, constants, reactions, h, steps, keep
 @kernel
 def react_batch(data, model, tables, ground, constants, reactions, h, steps, keeps_account):  # type: ignore[no-untyped-def]
     """As `advance_batch`, with joint reactions."""
-    legs = model[0].legs
-    run(data, model, tables, ground, constants, reactions, h, steps, keeps_account, legs, LANES, False, True)
+    count = model[0].legs
+    run(data, model, tables, ground, constants, reactions, h, steps, keeps_account, count, LANES, False, True)

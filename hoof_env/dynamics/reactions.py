@@ -18,31 +18,81 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.vectors import put, vector
 from hoof_env.leg.geometry import Geometry
-from hoof_env.leg.linkage import BODY_LENGTHS, CONSTRUCTION, JOINTS, Dyad
-from hoof_env.simd import choose, cross, dot, level, plane, root
+from hoof_env.leg.linkage import CONSTRUCTION, JOINTS, Dyad
+from hoof_env.simd import across, choose, cross, dot, level, plane, root, store_vectors
 from hoof_env.simd.compile import inlined
+from hoof_env.simd.layout import Layout, Row, Vector, block
 
-LOCK, DRIVER, HIP = 2 * len(JOINTS), 2 * len(JOINTS) + 1, 2 * len(JOINTS) + 2
-OUTPUTS = HIP + 1
-"""Rows of what is kept: x and y of each joint's force [N] as in `linkage.JOINTS`; then three moments
-[N m]: on body 10 by body 7, on the crank by the leg's frame, on the leg's frame by the trunk (about O)."""
+
+class Reactions(Layout):
+    """What is kept of a leg."""
+
+    joints: block(2 * len(JOINTS))  # x and y of each joint's force [N], in the order of `linkage.JOINTS`
+    lock: Row  # moment on body 10 by body 7 [N m]
+    driver: Row  # moment on the crank by the leg's frame [N m]
+    hip: Row  # moment on the leg's frame by the trunk, about O [N m]
+
+
+class HingeDyad(Layout):
+    """Two links that meet, over a span that varies."""
+
+    one2: Row  # square of the first link's length [m^2]
+    half: Row  # half the difference of both squares [m^2]
+    side: Row  # on which side of the span they meet, 1 or -1
+
+
+class TriangleDyad(Layout):
+    """Two links that meet, over a third link."""
+
+    place: Vector  # of the point, from the third link's tail, in its length
+    inverse: Row  # 1 / (twice the triangle's area) [1/m^2]
+
+
+class Link(Layout):
+    """A link's mass as it acts on its ends [kg]."""
+
+    near: Row  # on the end itself
+    far: Row  # on the other one
+
+
+class LegConstants(Layout):
+    """What reactions need to know of a leg; points and links have the linkage's names."""
+
+    crank: Row  # length [m]
+    pivot: Vector  # C from O [m]
+    travel: Row  # 1 or -1
+    toe_is_i: Row  # 1 if the toe is I, 0 if it is J
+    shank: Row  # FG / EF
+    rocker: Row  # CA / CF
+    B: HingeDyad
+    F: HingeDyad
+    E: HingeDyad
+    J: HingeDyad
+    D: TriangleDyad
+    I: TriangleDyad  # noqa: E741
+    OP: Link
+    PB: Link
+    CB: Link
+    BD: Link
+    CD: Link
+    DE: Link
+    EF: Link
+    CF: Link
+    PF: Link
+    FG: Link
+    GJ: Link
+    AJ: Link
+    GI: Link
+    IJ: Link
+
 
 _STEPS = {step.point: step for step in CONSTRUCTION}
-_HINGES, _TRIANGLES = ("B", "F", "E", "J"), ("D", "I")  # dyads with a varying and with a constant span
-_LAYOUT = {"crank": 1, "pivot": 2, "travel": 1, "toe": 1, "shank": 1, "rocker": 1}
-_LAYOUT |= dict.fromkeys(_HINGES + _TRIANGLES, 3) | dict.fromkeys(BODY_LENGTHS, 2)
-_ROWS = dict(zip(_LAYOUT, np.cumsum([0, *_LAYOUT.values()]).tolist(), strict=False))
-CONSTANTS = sum(_LAYOUT.values())
-"""Rows of `leg_constants`."""
-
-_CRANK, _PIVOT, _TRAVEL, _TOE, _SHANK, _ROCKER, _B, _F, _E, _J, _D, _I = list(_ROWS.values())[:12]
-_OP, _PB, _CB, _BD, _CD, _DE, _EF, _CF, _PF, _FG, _GJ, _AJ, _GI, _IJ = list(_ROWS.values())[12:]
+_HINGES, _TRIANGLES = ("B", "F", "E", "J"), ("D", "I")
 
 
 def leg_constants(geometry: Geometry) -> NDArray[np.float64]:
-    """What the kernels need of a leg, shape (CONSTANTS, 1)."""
+    """The rows of `LegConstants` of a leg, shape (LegConstants.size,)."""
     lengths = geometry.lengths
     values = [lengths["OP"], geometry.travel * geometry.pivot[0], geometry.pivot[1], float(geometry.travel)]
     values += [
@@ -67,7 +117,7 @@ def leg_constants(geometry: Geometry) -> NDArray[np.float64]:
         geometry.body_masses, geometry.body_inertias, geometry.body_lengths, strict=True
     ):
         values += [mass / 4 + inertia / length**2, mass / 4 - inertia / length**2]
-    return np.array(values)[:, None]
+    return np.array(values)
 
 
 # -- tools -------------------------------------------------------------------------------------
@@ -110,13 +160,12 @@ def swing(hinge, first, second):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def hinge_point(g, row, first, second):  # type: ignore[no-untyped-def]
+def hinge_point(dyad, first, second):  # type: ignore[no-untyped-def]
     """The hinge of two links of given lengths whose far ends are `first` and `second`."""
-    one2, half, side = g[row], g[row + 1], g[row + 2]
     span = second.at - first.at
     d2 = dot(span, span)
-    k = 0.5 * d2 + half
-    area = side * root(one2 * d2 - k * k)  # cross(one, two)
+    k = 0.5 * d2 + dyad.half
+    area = dyad.side * root(dyad.one2 * d2 - k * k)  # cross(one, two)
     inverse = 1.0 / (d2 * area)
     over_d2 = area * inverse
     one = span * plane(k * over_d2, area * over_d2)
@@ -125,12 +174,12 @@ def hinge_point(g, row, first, second):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def triangle_point(g, row, first, second):  # type: ignore[no-untyped-def]
+def triangle_point(dyad, first, second):  # type: ignore[no-untyped-def]
     """The same where `first` and `second` are the ends of a third link."""
-    place = vector(g, row)
+    place = dyad.place
     span = second.at - first.at
     one = span * place
-    hinge = Hinge(one, one - span, g[row + 2])
+    hinge = Hinge(one, one - span, dyad.inverse)
     return hinge, Point(
         first.at + one, first.v + (second.v - first.v) * place, first.a + (second.a - first.a) * place
     )
@@ -147,9 +196,9 @@ def beyond(first, second, origin, ratio):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def link_loads(g, row, tail, head):  # type: ignore[no-untyped-def]
+def link_loads(link, tail, head):  # type: ignore[no-untyped-def]
     """Forces at tail and head that move a link as it moves, against its weight."""
-    near, far = g[row], g[row + 1]
+    near, far = link.near, link.far
     return near * tail.a + far * head.a, near * head.a + far * tail.a
 
 
@@ -170,7 +219,7 @@ def leg_reactions(  # type: ignore[no-untyped-def]
     """Reactions of one leg.
 
     Args:
-        g: rows of `leg_constants`.
+        g: `LegConstants`.
         crank_turn, frame_turn: exp(i theta), exp(i beta).
         theta_rate, theta_acc, beta_rate, beta_acc: [rad/s, rad/s^2].
         lift: acceleration of O plus g upward [m/s^2].
@@ -182,29 +231,29 @@ def leg_reactions(  # type: ignore[no-untyped-def]
         feels the opposite.
     """
     # The crank turns clockwise before the mirror.
-    travel = g[_TRAVEL]
-    arm = g[_CRANK] * plane(travel * crank_turn.real, -crank_turn.imag)
+    travel = g.travel
+    arm = g.crank * plane(travel * crank_turn.real, -crank_turn.imag)
     still = plane(level(g, 0.0), 0.0)
     O = Point(still, still, lift)  # noqa: E741
-    C = turning(vector(g, _PIVOT) * frame_turn, beta_rate, beta_acc, lift)
+    C = turning(g.pivot * frame_turn, beta_rate, beta_acc, lift)
     P = turning(arm * frame_turn, beta_rate - travel * theta_rate, beta_acc - travel * theta_acc, lift)
 
     # Motion, from the crank to the hoof.
-    hinge_b, B = hinge_point(g, _B, C, P)
-    hinge_d, D = triangle_point(g, _D, C, B)
-    hinge_f, F = hinge_point(g, _F, C, P)
-    hinge_e, E = hinge_point(g, _E, D, F)
-    G = beyond(E, F, F, g[_SHANK])
-    A = beyond(C, F, C, g[_ROCKER])
-    hinge_j, J = hinge_point(g, _J, G, A)
-    hinge_i, I = triangle_point(g, _I, G, J)  # noqa: E741
+    hinge_b, B = hinge_point(g.B, C, P)
+    hinge_d, D = triangle_point(g.D, C, B)
+    hinge_f, F = hinge_point(g.F, C, P)
+    hinge_e, E = hinge_point(g.E, D, F)
+    G = beyond(E, F, F, g.shank)
+    A = beyond(C, F, C, g.rocker)
+    hinge_j, J = hinge_point(g.J, G, A)
+    hinge_i, I = triangle_point(g.I, G, J)  # noqa: E741
 
     # Hoof triangle and tie rod.
-    gj_g, gj_j = link_loads(g, _GJ, G, J)
-    ja_j, ja_a = link_loads(g, _AJ, J, A)
-    ig_i, ig_g = link_loads(g, _GI, I, G)
-    ij_i, ij_j = link_loads(g, _IJ, I, J)
-    toe_at_i = g[_TOE] > 0.5
+    gj_g, gj_j = link_loads(g.GJ, G, J)
+    ja_j, ja_a = link_loads(g.AJ, J, A)
+    ig_i, ig_g = link_loads(g.GI, I, G)
+    ij_i, ij_j = link_loads(g.IJ, I, J)
+    toe_at_i = g.toe_is_i > 0.5
     ij_i = ij_i - choose(toe_at_i, toe_force, heel_force)
     ij_j = ij_j - choose(toe_at_i, heel_force, toe_force)
     ij_ig = hinge_force(hinge_i, -ig_i, ij_i)
@@ -215,28 +264,28 @@ def leg_reactions(  # type: ignore[no-untyped-def]
     ja_fc = ja_j + ja_a - ja_gj + ij_ja
 
     # Shank, connecting rod, rocker and strut.
-    gf_g, gf_f = link_loads(g, _FG, G, F)
-    fe_f, fe_e = link_loads(g, _EF, F, E)
-    ed_e, ed_d = link_loads(g, _DE, E, D)
-    fc_f, fc_c = link_loads(g, _CF, F, C)
-    pf_p, pf_f = link_loads(g, _PF, P, F)
+    gf_g, gf_f = link_loads(g.FG, G, F)
+    fe_f, fe_e = link_loads(g.EF, F, E)
+    ed_e, ed_d = link_loads(g.DE, E, D)
+    fc_f, fc_c = link_loads(g.CF, F, C)
+    pf_p, pf_f = link_loads(g.PF, P, F)
     ankle = gf_g + gj_gf + ig_gf
     lock = cross(G.at - F.at, ankle)
     gf_fe = gf_f + ankle
-    fe_ed = hinge_force(hinge_e, -ed_e, fe_e - g[_SHANK] * ankle)
+    fe_ed = hinge_force(hinge_e, -ed_e, fe_e - g.shank * ankle)
     ed_db = ed_e + ed_d + fe_ed
     knee = fe_ed - gf_fe - fe_f - fe_e
-    fc_fe = hinge_force(hinge_f, fc_f + g[_ROCKER] * ja_fc, knee - pf_f)
+    fc_fe = hinge_force(hinge_f, fc_f + g.rocker * ja_fc, knee - pf_f)
     pf_fe = knee - fc_fe
     fc_frame = fc_f + fc_c - fc_fe + ja_fc
     pf_op = pf_p + pf_f - pf_fe
 
     # Upper triangle, coupler and crank.
-    cd_c, cd_d = link_loads(g, _CD, C, D)
-    db_d, db_b = link_loads(g, _BD, D, B)
-    cb_c, cb_b = link_loads(g, _CB, C, B)
-    pb_p, pb_b = link_loads(g, _PB, P, B)
-    op_o, op_p = link_loads(g, _OP, O, P)
+    cd_c, cd_d = link_loads(g.CD, C, D)
+    db_d, db_b = link_loads(g.BD, D, B)
+    cb_c, cb_b = link_loads(g.CB, C, B)
+    pb_p, pb_b = link_loads(g.PB, P, B)
+    op_o, op_p = link_loads(g.OP, O, P)
     cd_db = hinge_force(hinge_d, cd_d, -ed_db - db_d)
     cd_frame = cd_c + cd_d - cd_db
     db_pb = db_d + db_b + cd_db + ed_db
@@ -256,26 +305,17 @@ def leg_reactions(  # type: ignore[no-untyped-def]
 
 
 @inlined
-def keep_reactions(out, joints, lock, driver, hip):  # type: ignore[no-untyped-def]
-    """Write what `leg_reactions` returns into the first OUTPUTS rows of `out`."""
-    put(out, 0, joints[0])
-    put(out, 2, joints[1])
-    put(out, 4, joints[2])
-    put(out, 6, joints[3])
-    put(out, 8, joints[4])
-    put(out, 10, joints[5])
-    put(out, 12, joints[6])
-    put(out, 14, joints[7])
-    put(out, 16, joints[8])
-    put(out, 18, joints[9])
-    put(out, 20, joints[10])
-    put(out, 22, joints[11])
-    put(out, 24, joints[12])
-    put(out, 26, joints[13])
-    put(out, 28, joints[14])
-    put(out, 30, joints[15])
-    put(out, 32, joints[16])
-    put(out, 34, joints[17])
-    put(out, 36, joints[18])
-    put(out, 38, joints[19])
-    out[LOCK], out[DRIVER], out[HIP] = lock, driver, hip
+def react(trunk, leg, constants, reactions):  # type: ignore[no-untyped-def]
+    """Keep the `Reactions` of one leg with these `LegConstants`."""
+    hip, pitch_rate, pitch_acc = leg.hip, trunk.rates.pitch_rate, trunk.pitch_acceleration
+    weight = plane(level(trunk, 0.0), trunk.settings.gravity)
+    lift = trunk.acceleration + weight + pitch_acc * across(hip) - pitch_rate * pitch_rate * hip
+    joints, lock, driver, by_trunk = leg_reactions(
+        constants,
+        plane(leg.functions.cosine, leg.functions.sine), leg.theta_rate, leg.theta_acceleration,
+        leg.turn, leg.beta_rate,
+        pitch_acc + leg.beta_by_theta * leg.theta_acceleration + leg.swing_acceleration,
+        lift, leg.toe.force, leg.heel.force,
+    )  # fmt: skip
+    store_vectors(reactions.joints, joints)
+    reactions.lock, reactions.driver, reactions.hip = lock, driver, by_trunk

@@ -28,8 +28,7 @@ from hoof_env.dynamics.trunk import GRAVITY, Trunk
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.stiffness import LARGEST_ANGLE, SCHEMES, contact_rates
 from hoof_env.ground.terrain import Terrain
-from hoof_env.leg import profile as f
-from hoof_env.leg.profile import LegProfile
+from hoof_env.leg.profile import LegProfile, by_name
 
 ANGLES = 48
 """Crank angles at which masses and inertias are looked at."""
@@ -38,6 +37,7 @@ FAST = 0.1
 """Speed of a fast touch-down [m/s], which goes deep."""
 
 Floats = NDArray[np.float64]
+Functions = dict[str, Floats]
 
 CAUSES = {
     "elastic": "the stiffness of this ground under these masses",
@@ -136,27 +136,28 @@ class StepLength:
         found = []
         is_level = len(set(self.terrain.height)) == 1
         for limb, profile in zip(self.limbs, self.profiles, strict=True):
-            value, slope = _samples(profile)
-            lower = np.min(value[:, [f.TOE_Y, f.HEEL_Y]], axis=1)
+            value, slope = map(by_name, _samples(profile))
+            lower = np.minimum(value["toe_y"], value["heel_y"])
             low = lower <= np.median(lower)
-            x, y = (float(np.max(self._mobility(limb, value, slope, axis)[low])) for axis in range(2))
+            x, y = (float(np.max(self._mobility(limb, value, slope, axis)[low])) for axis in "xy")
             slides, sinks = (x, y) if is_level else (max(x, y), max(x, y))
             found.append((_over(1.0, slides), _over(1.0, sinks)))
         return found
 
-    def _mobility(self, limb: Limb, value: Floats, slope: Floats, axis: int) -> Floats:
-        """Larger acceleration of toe and heel per force along x (0) or y (1) [1/kg], for each crank angle."""
-        trunk = self.trunk
-        mobility = np.zeros((len(value), 2))
-        if axis in {"fixed": (), "rail": (0,), "suspended": (0, 1), "free": (0, 1)}[trunk.kind]:
+    def _mobility(self, limb: Limb, value: Functions, slope: Functions, axis: str) -> Floats:
+        """Larger acceleration of toe and heel per force along x or y [1/kg], for each crank angle."""
+        trunk, across = self.trunk, "y" if axis == "x" else "x"
+        mobility = np.zeros((2, len(value["toe_x"])))
+        if axis in {"fixed": "", "rail": "x", "suspended": "xy", "free": "xy"}[trunk.kind]:
             mobility += 1 / trunk.mass
-        if trunk.kind == "free":
-            lever = limb.hip[1 - axis] + value[:, [f.TOE_X + 1 - axis, f.HEEL_X + 1 - axis]]
-            mobility += lever**2 / trunk.pitch_inertia
-        if isinstance(limb.drive, Motor):
-            inertia = value[:, f.A] + limb.drive.reflected_inertia
-            mobility += slope[:, [f.TOE_X + axis, f.HEEL_X + axis]] ** 2 / inertia[:, None]
-        return mobility.max(1)
+        for k, point in enumerate(("toe", "heel")):
+            if trunk.kind == "free":
+                lever = limb.hip["xy".index(across)] + value[f"{point}_{across}"]
+                mobility[k] += lever**2 / trunk.pitch_inertia
+            if isinstance(limb.drive, Motor):
+                inertia = value["crank_inertia"] + limb.drive.reflected_inertia
+                mobility[k] += slope[f"{point}_{axis}"] ** 2 / inertia
+        return mobility.max(0)
 
     def _servo_rate(self) -> float:
         """Largest rate [1/s] of a motor's servo: its gain over the crank's inertia where trunk and frame of
@@ -164,14 +165,14 @@ class StepLength:
         rates = [0.0]
         for limb, profile in zip(self.limbs, self.profiles, strict=True):
             if isinstance(limb.drive, Motor):
-                value, _ = _samples(profile)
+                f = by_name(_samples(profile)[0])
                 motor, side = limb.drive, limb.geometry.travel
-                matrix = np.zeros((len(value), 4, 4))  # of crank, frame, x and y
-                matrix[:, 0, 0] = value[:, f.A] + motor.reflected_inertia
-                matrix[:, 0, 1] = value[:, f.B] - side * motor.gear_ratio * motor.rotor_inertia
-                matrix[:, 1, 1] = value[:, f.C] + motor.rotor_inertia
-                matrix[:, 0, 2:], matrix[:, 1, 2] = value[:, [f.DS_X, f.DS_Y]], -value[:, f.S_Y]
-                matrix[:, 1, 3] = value[:, f.S_X]
+                matrix = np.zeros((len(f["toe_x"]), 4, 4))  # of crank, frame, x and y
+                matrix[:, 0, 0] = f["crank_inertia"] + motor.reflected_inertia
+                matrix[:, 0, 1] = f["coupling"] - side * motor.gear_ratio * motor.rotor_inertia
+                matrix[:, 1, 1] = f["frame_inertia"] + motor.rotor_inertia
+                matrix[:, 0, 2], matrix[:, 0, 3] = f["moment_slope_x"], f["moment_slope_y"]
+                matrix[:, 1, 2], matrix[:, 1, 3] = -f["first_moment_y"], f["first_moment_x"]
                 matrix[:, [2, 3], [2, 3]] = self.trunk.mass + limb.geometry.mass
                 matrix = np.triu(matrix) + np.triu(matrix, 1).transpose(0, 2, 1)
                 rates.append(motor.speed_gain * float(np.linalg.inv(matrix)[:, 0, 0].max()))

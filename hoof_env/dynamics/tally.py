@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.drive import Motor
 from hoof_env.dynamics.trunk import GRAVITY
-from hoof_env.leg import profile as f
+from hoof_env.leg.profile import by_name
 
 if TYPE_CHECKING:
     from hoof_env.dynamics.trunk_engine import TrunkEngine
@@ -59,16 +59,17 @@ def tally(
     spin = own.pitch_inertia * pitch_rate + own.mass * _cross(place, velocity)  # about the origin
     kinetic = 0.5 * own.mass * np.abs(velocity) ** 2 + 0.5 * own.pitch_inertia * pitch_rate**2
     for i, limb in enumerate(engine.limbs):
-        value, _ = engine.profiles[i](theta[i])
-        a, b, c = value[:, f.A], value[:, f.B], value[:, f.C]
+        f = by_name(engine.profiles[i](theta[i])[0])
+        a, b, c = f["crank_inertia"], f["coupling"], f["frame_inertia"]
         side = limb.geometry.travel
         if isinstance(limb.drive, Motor):
             rotor, gear = limb.drive.rotor_inertia, limb.drive.gear_ratio
             a, b, c = a + gear**2 * rotor, b - side * gear * rotor, c + rotor
         frame = turn * np.exp(1j * side * phi[i])
         frame_rate = pitch_rate + side * phi_rate[i]
-        s = frame * (value[:, f.S_X] + 1j * value[:, f.S_Y])
-        own_rate = frame * (value[:, f.DS_X] + 1j * value[:, f.DS_Y]) * theta_rate[i] + 1j * s * frame_rate
+        s = frame * (f["first_moment_x"] + 1j * f["first_moment_y"])
+        slope = f["moment_slope_x"] + 1j * f["moment_slope_y"]
+        own_rate = frame * slope * theta_rate[i] + 1j * s * frame_rate
         arm = turn * complex(*limb.hip)
         hip, hip_rate, mass = place + arm, velocity + 1j * arm * pitch_rate, limb.geometry.mass
         moment = moment + mass * hip + s

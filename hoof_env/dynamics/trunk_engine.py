@@ -15,11 +15,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hoof_env.dynamics import limb_rows as b
-from hoof_env.dynamics import trunk_rows as t
+from hoof_env.dynamics import reactions as r
 from hoof_env.dynamics.advance import (
-    LIMB,
-    LIMB_ROWS,
+    LEG_ROWS,
     STARTS,
     TRUNK_ROWS,
     advance_batch,
@@ -31,9 +29,17 @@ from hoof_env.dynamics.advance import (
 )
 from hoof_env.dynamics.arguments import Floats, all_of, count, finite, flag, one_of
 from hoof_env.dynamics.drive import Drive
-from hoof_env.dynamics.lanes_report import ACCOUNT, LIMB_REPORT, TRUNK_REPORT
+from hoof_env.dynamics.layout import (
+    ACCOUNT,
+    LEG_REPORT,
+    LEG_STATE,
+    STRIDE_SUMS,
+    STRIDES,
+    TRUNK_REPORT,
+    TRUNK_STATE,
+    LegMemory,
+)
 from hoof_env.dynamics.limb import Limb
-from hoof_env.dynamics.reactions import DRIVER, HIP, LOCK
 from hoof_env.dynamics.result import Result
 from hoof_env.dynamics.schemes import SCHEMES
 from hoof_env.dynamics.step_length import StepLength
@@ -215,7 +221,7 @@ class TrunkEngine:
 
     def command_in(self, column: Floats) -> Floats:
         """The command in such a column, shape (legs, 4)."""
-        return column[TRUNK_ROWS:].reshape(len(self.limbs), LIMB_ROWS)[:, LIMB["command"]].copy()
+        return column[TRUNK_ROWS:].reshape(len(self.limbs), LEG_ROWS)[:, LegMemory["command"]].copy()
 
     def alone(self) -> TrunkEngine:
         """An engine like this one, for one environment."""
@@ -398,13 +404,13 @@ class TrunkEngine:
         """The state by name: rows of `trunk_rows.STATE`, shape (num_envs,), and of `limb_rows.STATE`, shape
         (legs, num_envs)."""
         named = named_rows(self._memory)
-        return {name: named[name].copy() for name in (*t.STATE, *b.STATE)}
+        return {name: named[name].copy() for name in (*TRUNK_STATE, *LEG_STATE)}
 
     @property
     def report(self) -> dict[str, Floats]:
-        """What acts at the present instant: `lanes_report.TRUNK_REPORT` and `LIMB_REPORT` by name."""
+        """What acts at the present instant: `layout.TRUNK_REPORT` and `LEG_REPORT` by name."""
         named = named_rows(self._memory)
-        return {name: named[name].copy() for name in (*TRUNK_REPORT, *LIMB_REPORT)}
+        return {name: named[name].copy() for name in (*TRUNK_REPORT, *LEG_REPORT)}
 
     @property
     def account(self) -> dict[str, Floats]:
@@ -415,7 +421,7 @@ class TrunkEngine:
     def strides(self) -> dict[str, Floats]:
         """The open stance and the sums of the last call by name, `limb_rows.STRIDES` and `STRIDE_SUMS`, shape
         (legs, num_envs); see `lanes_strides`. Zeros unless the engine was made with `strides=True`."""
-        names, m = (*b.STRIDES, *b.STRIDE_SUMS), self._memory
+        names, m = (*STRIDES, *STRIDE_SUMS), self._memory
         whole = np.concatenate([m.strides, m.stride_sums], axis=1)
         return {name: whole[:, k] for k, name in enumerate(names)}
 
@@ -429,8 +435,9 @@ class TrunkEngine:
             raise ParameterError("reactions: expected an engine made with reactions=True, got one without")
         found = self._memory.reactions[:, :, : self.num_envs]
         legs, _, n = found.shape
-        joints = found[:, :LOCK].reshape(legs, -1, 2, n).copy()
-        return Reactions(joints, found[:, LOCK].copy(), found[:, DRIVER].copy(), found[:, HIP].copy())
+        parts = {name: found[:, r.Reactions[name]].copy() for name in r.Reactions.fields}
+        joints = parts.pop("joints").reshape(legs, -1, 2, n)
+        return Reactions(joints, **{name: part[:, 0] for name, part in parts.items()})
 
     def tally(self) -> Tally:
         """Momentum, spin and energy of all bodies at the present instant, added up anew from their motion."""

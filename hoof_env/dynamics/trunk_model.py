@@ -8,18 +8,25 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.dynamics import limb_rows as b
-from hoof_env.dynamics import trunk_rows as t
-from hoof_env.dynamics.advance import LANES, LIMB, LIMB_ROWS, MODEL, TRUNK, TRUNK_ROWS
+from hoof_env.dynamics.advance import LANES, LEG_ROWS, MODEL, TRUNK_ROWS
 from hoof_env.dynamics.drive import Motor
-from hoof_env.dynamics.lanes_report import LIMB_REPORT, TRUNK_REPORT
+from hoof_env.dynamics.layout import (
+    LEG_REPORT,
+    LEG_STATE,
+    TRUNK_REPORT,
+    TRUNK_STATE,
+    LegMemory,
+    LegSettings,
+    TrunkMemory,
+    TrunkSettings,
+)
 from hoof_env.dynamics.limb import Limb
-from hoof_env.dynamics.reactions import OUTPUTS, leg_constants
+from hoof_env.dynamics.reactions import Reactions, leg_constants
 from hoof_env.dynamics.schemes import SCHEMES
 from hoof_env.dynamics.trunk import GRAVITY, TRUNKS, Trunk
 from hoof_env.errors import ParameterError
 from hoof_env.ground.contact import Ground
-from hoof_env.ground.friction import FRICTION_LAWS
+from hoof_env.ground.laws import FRICTION_LAWS
 from hoof_env.ground.terrain import Terrain
 from hoof_env.simd.math import EXPONENT_UNIT
 from hoof_env.simd.memory import aligned
@@ -43,13 +50,14 @@ class Memory(NamedTuple):
         data: all of it, shape (rows, columns): whole vectors of environments, so some columns may be idle.
         trunk, limbs: the state, shapes (7, n) and (legs, 16, n).
         trunk_settings, limb_settings: parameters, shapes (17, n) and (legs, 12, n).
-        strides, stride_sums: of `limb_rows`, shapes (legs, 3, n) and (legs, 7, n).
+        strides, stride_sums: of `layout`, shapes (legs, 3, n) and (legs, 7, n).
         command: shape (legs, 4, n).
         account: shape (9, n), added to.
         trunk_report, limb_report: at the end, shapes (8, n) and (legs, 18, n).
         result: how it ended, shape (n,), values of `result.Result`; where it is not OK the state is left as
             it was.
-        constants, reactions: of `reactions`, shapes (legs, CONSTANTS) and (legs, OUTPUTS, columns).
+        constants, reactions: of `reactions`, shapes (legs, LegConstants.size) and (legs, Reactions.size,
+            columns).
     """
 
     data: Floats
@@ -73,22 +81,22 @@ def memory_of(data: Floats, num_envs: int, constants: Floats, reactions: Floats)
     legs = len(constants)
     trunk, limbs = (
         data[:TRUNK_ROWS, :num_envs],
-        data[TRUNK_ROWS:].reshape(legs, LIMB_ROWS, *data.shape[1:])[:, :, :num_envs],
+        data[TRUNK_ROWS:].reshape(legs, LEG_ROWS, *data.shape[1:])[:, :, :num_envs],
     )
-    t_parts = {name: trunk[rows] for name, rows in TRUNK.items()}
-    l_parts = {name: limbs[:, rows] for name, rows in LIMB.items()}
+    t_parts = {name: trunk[TrunkMemory[name]] for name in TrunkMemory.fields}
+    l_parts = {name: limbs[:, LegMemory[name]] for name in LegMemory.fields}
     return Memory(
         data, t_parts["state"], l_parts["state"], t_parts["settings"], l_parts["settings"],
-        l_parts["strides"], l_parts["stride_sums"], l_parts["command"], t_parts["account"],
+        l_parts["strides"], l_parts["sums"], l_parts["command"], t_parts["account"],
         t_parts["report"], l_parts["report"], t_parts["result"][0], constants, reactions,
     )  # fmt: skip
 
 
 def named_rows(memory: Memory) -> dict[str, Floats]:
     """State and report by name, as views."""
-    parts = ((t.STATE, memory.trunk), (TRUNK_REPORT, memory.trunk_report))
+    parts = ((TRUNK_STATE, memory.trunk), (TRUNK_REPORT, memory.trunk_report))
     found = {name: rows[k] for names, rows in parts for k, name in enumerate(names)}
-    limbs = ((b.STATE, memory.limbs), (LIMB_REPORT, memory.limb_report))
+    limbs = ((LEG_STATE, memory.limbs), (LEG_REPORT, memory.limb_report))
     return found | {name: rows[:, k] for names, rows in limbs for k, name in enumerate(names)}
 
 
@@ -101,9 +109,9 @@ def columns_for(num_envs: int) -> int:
 def new_memory(engine: TrunkEngine, columns: int) -> Memory:
     """Memory of an engine whose environments are nowhere, that is not a number, until they are reset."""
     legs = len(engine.limbs)
-    constants = np.array([leg_constants(limb.geometry)[:, 0] for limb in engine.limbs])
-    reactions = np.zeros((legs, OUTPUTS, columns if engine.reacts else 0))
-    whole = memory_of(np.zeros((TRUNK_ROWS + legs * LIMB_ROWS, columns)), columns, constants, reactions)
+    constants = np.array([leg_constants(limb.geometry) for limb in engine.limbs])
+    reactions = np.zeros((legs, Reactions.size, columns if engine.reacts else 0))
+    whole = memory_of(np.zeros((TRUNK_ROWS + legs * LEG_ROWS, columns)), columns, constants, reactions)
     whole.trunk[:], whole.limbs[:] = np.nan, np.nan
     trunk, limbs = settings_of(engine, engine.trunk, engine.ground, engine.limbs)
     whole.trunk_settings[:], whole.limb_settings[:] = trunk[:, None], limbs[:, :, None]
@@ -164,12 +172,12 @@ def check_shared(engine: TrunkEngine, trunk: Trunk, ground: Ground, limbs: Seque
 def settings_of(
     engine: TrunkEngine, trunk: Trunk, ground: Ground, limbs: Sequence[Limb]
 ) -> tuple[Floats, Floats]:
-    """Rows `trunk_rows.PARAMETERS`, shape (17,), and `limb_rows.PARAMETERS`, shape (legs, 12), of an
+    """Rows of `TrunkSettings`, shape (17,), and of `LegSettings`, shape (legs, 12), of an
     environment of this engine under a trunk of the same kind, on a ground with the same laws."""
     mass = trunk.mass + sum(limb.geometry.mass for limb in limbs)
     record, hangs = ground.to_record(), trunk.kind == "suspended"
     values = {
-        "total_mass": mass, "per_mass": 1 / mass, "pitch_inertia": trunk.pitch_inertia,
+        "total_mass": mass, "inverse_mass": 1 / mass, "pitch_inertia": trunk.pitch_inertia,
         "support": (1 - trunk.share) * mass * GRAVITY if hangs else 0.0,
         "spring": trunk.stiffness if hangs else 0.0, "damper": trunk.damping if hangs else 0.0,
         "height": trunk.height, "drag": trunk.drag, "gravity": GRAVITY,
@@ -180,7 +188,7 @@ def settings_of(
     lift_off = LIFT_OFF * mass * GRAVITY / len(limbs)
     firsts = zip(limbs, _first_rows(engine), strict=True)
     each = [_limb_settings(limb, first, lift_off) for limb, first in firsts]
-    return np.array([values[name] for name in t.PARAMETERS]), np.array(each)
+    return np.array([values[name] for name in TrunkSettings.names]), np.array(each)
 
 
 def _first_rows(engine: TrunkEngine) -> list[int]:
@@ -192,9 +200,11 @@ def _first_rows(engine: TrunkEngine) -> list[int]:
 def _limb_settings(limb: Limb, first_row: int, lift_off: float) -> Floats:
     motor = limb.drive if isinstance(limb.drive, Motor) else Motor(0.0, 0.0, 0.0, 0.0)
     side, rotor = float(limb.geometry.travel), motor.rotor_inertia
-    values = (
-        *limb.hip, limb.geometry.mass, side, first_row, float(isinstance(limb.drive, Motor)),
-        motor.speed_gain, motor.torque_limit,
-        motor.reflected_inertia, -side * motor.gear_ratio * rotor, rotor, lift_off,
-    )  # fmt: skip
-    return np.array(values)
+    values = {
+        "hip_on_trunk_x": limb.hip[0], "hip_on_trunk_y": limb.hip[1], "mass": limb.geometry.mass,
+        "side": side, "first_row": first_row, "is_motor": float(isinstance(limb.drive, Motor)),
+        "speed_gain": motor.speed_gain, "torque_limit": motor.torque_limit,
+        "rotor_crank": motor.reflected_inertia, "rotor_coupling": -side * motor.gear_ratio * rotor,
+        "rotor_frame": rotor, "lift_off": lift_off,
+    }  # fmt: skip
+    return np.array([values[name] for name in LegSettings.names])

@@ -9,18 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hoof_env.dynamics import limb_rows as b
-from hoof_env.dynamics import trunk_rows as t
 from hoof_env.dynamics.arguments import Floats, all_of, finite, spread
 from hoof_env.dynamics.drive import Motor
+from hoof_env.dynamics.layout import FARTHEST, LegState, Moving, TrunkState
 from hoof_env.dynamics.trunk import FREE, RAIL, SUSPENDED, TRUNKS
 from hoof_env.errors import ParameterError
 from hoof_env.gait.parameters import GaitParameters
 
 if TYPE_CHECKING:
     from hoof_env.dynamics.trunk_engine import TrunkEngine
-
-FARTHEST = t.FARTHEST
 
 
 def which(envs: ArrayLike | None, num_envs: int) -> NDArray[np.int64]:
@@ -104,11 +101,11 @@ def start(
             raise ParameterError(f"{name}: expected 0 of a {engine.trunk.kind} trunk, got {at[name]}")
     if kind <= RAIL and (at["y"] != engine.trunk.height).any():
         raise ParameterError(f"y: a {engine.trunk.kind} trunk is at {engine.trunk.height:g} m, got {at['y']}")
-    state = np.zeros((len(t.STATE), n))
-    rows = (t.CENTRE, t.CENTRE + 1, t.MOMENTUM, t.MOMENTUM + 1, t.PITCH, t.SPIN)
-    for row, name in zip(rows, ("x", "y", "vx", "vy", "pitch", "pitch_rate"), strict=True):
-        state[row] = at[name]
-    leg = np.zeros((legs, len(b.STATE), n))
-    leg[:, b.THETA], leg[:, b.OMEGA] = angle, spin
-    leg[:, b.VALUE : b.VALUE + 4] = gaits
+    state = np.zeros((TrunkState.size, n))
+    moving = state[TrunkState["moving"]]  # the kernels make of these what they integrate
+    moving[Moving["centre"]], moving[Moving["momentum"]] = (at["x"], at["y"]), (at["vx"], at["vy"])
+    moving[Moving["pitch"]], moving[Moving["spin"]] = at["pitch"], at["pitch_rate"]
+    leg = np.zeros((legs, LegState.size, n))
+    leg[:, LegState["theta"]], leg[:, LegState["theta_rate"]] = angle[:, None], spin[:, None]
+    leg[:, LegState["gait"]] = gaits
     return state, leg

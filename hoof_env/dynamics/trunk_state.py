@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.dynamics import limb_rows as b
-from hoof_env.dynamics import trunk_rows as t
 from hoof_env.dynamics.arguments import Floats, finite
+from hoof_env.dynamics.layout import FARTHEST, LegSettings, LegState, Moving, TrunkState
 from hoof_env.dynamics.trunk_model import Memory
 from hoof_env.errors import ParameterError
 
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
 STATE = ("trunk", "limbs", "strides", "command", "account", "trunk_settings", "limb_settings")
 """Arrays that hold what changes."""
 
-_FIRST_ROW = b.PARAMETERS.index("first_row")
+_FIRST_ROW = LegSettings["first_row"]
 
 
 def read_state(
@@ -54,9 +53,10 @@ def read_state(
     reset: NDArray[np.bool_] = np.logical_not(np.isnan(trunk).all(0) & np.isnan(limbs).all((0, 1)))
     for name in STATE:
         finite(f"state[{name!r}]", arrays[name][..., reset])
-    finite("state['trunk'], places and pitch", trunk[t.CENTRE : t.CENTRE + 2, reset], t.FARTHEST)
-    finite("state['trunk'], places and pitch", trunk[t.PITCH, reset], t.FARTHEST)
-    finite("state['limbs'], crank angles", limbs[:, b.THETA, reset], t.FARTHEST)
+    moving = trunk[TrunkState["moving"]]
+    for name in ("centre", "pitch"):
+        finite("state['trunk'], places and pitch", moving[Moving[name]][:, reset], FARTHEST)
+    finite("state['limbs'], crank angles", limbs[:, LegState["theta"]][..., reset], FARTHEST)
     arrays["limb_settings"][:, _FIRST_ROW] = memory.limb_settings[:, _FIRST_ROW]  # an address
     return arrays, reset
 

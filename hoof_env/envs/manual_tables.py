@@ -10,8 +10,7 @@ from hoof_env.dynamics.schemes import SCHEMES
 from hoof_env.dynamics.trunk import ONE_LEG
 from hoof_env.envs.grounds import SPACING
 from hoof_env.envs.start import HIGHEST, LOWEST
-from hoof_env.ground.friction import FRICTION_LAWS
-from hoof_env.ground.normal_force import NORMAL_LAWS
+from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS
 from hoof_env.leg.geometry import preset_names
 
 Rows = dict[str, tuple[str, str]]

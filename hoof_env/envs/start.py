@@ -17,8 +17,7 @@ from hoof_env.envs.tasks import Settings
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait.parameters import GaitParameters, paper_gaits
 from hoof_env.ground.terrain import Terrain
-from hoof_env.leg import profile as f
-from hoof_env.leg.profile import LegProfile
+from hoof_env.leg.profile import LegProfile, by_name
 
 Floats = NDArray[np.float64]
 
@@ -65,9 +64,9 @@ def hoof_height(profile: LegProfile, gaits: Floats, theta: Floats) -> Floats:
     shape (n, 4)."""
     phi = gaits[:, 1] + gaits[:, 2] * np.sin(theta) + gaits[:, 3] * np.cos(theta)
     sine, cosine = profile.geometry.travel * np.sin(phi), np.cos(phi)
-    value = profile(theta)[0]
-    toe = sine * value[:, f.TOE_X] + cosine * value[:, f.TOE_Y]
-    return np.minimum(toe, sine * value[:, f.HEEL_X] + cosine * value[:, f.HEEL_Y])
+    f = by_name(profile(theta)[0])
+    toe = sine * f["toe_x"] + cosine * f["toe_y"]
+    return np.minimum(toe, sine * f["heel_x"] + cosine * f["heel_y"])
 
 
 def draw_starts(

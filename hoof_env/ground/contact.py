@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.errors import ParameterError, check_choice, check_number
-from hoof_env.ground.friction import FRICTION_LAWS, friction_force
-from hoof_env.ground.normal_force import NORMAL_LAWS, damping, normal_force
+from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS, damping, friction_part, normal_force
 from hoof_env.simd.compile import kernel
 
 CONTACT = np.dtype(
@@ -145,12 +145,11 @@ def touch(contact, position, velocity, ground):  # type: ignore[no-untyped-def]
     contact.normal = 0.0
     contact.friction = 0.0
     if contact.inside:
-        contact.normal = normal_force(
-            contact.penetration, contact.rate, contact.approach,
-            ground.stiffness, ground.exponent, ground.chi, ground.dashpot,
-        )  # fmt: skip
-        contact.friction = friction_force(
-            contact.vx, contact.normal,
-            ground.friction_law, ground.friction, ground.friction_slow, ground.friction_fast,
-        )  # fmt: skip
+        spring = ground.stiffness * contact.penetration**ground.exponent
+        damping = ground.chi * contact.rate / contact.approach
+        contact.normal = normal_force(spring, damping, ground.dashpot * contact.rate)
+        speed = abs(contact.vx)
+        part = friction_part(speed, ground.friction_law, ground.friction_slow, ground.friction_fast)
+        if speed > 0.0:
+            contact.friction = -math.copysign(ground.friction * part * contact.normal, contact.vx)
     return complex(contact.friction, contact.normal)

@@ -34,7 +34,7 @@ import numpy as np
 
 from hoof_env.errors import check_choice, check_number
 from hoof_env.ground.contact import Ground
-from hoof_env.ground.normal_force import damping
+from hoof_env.ground.laws import damping
 from hoof_env.ground.terrain import Terrain
 
 

@@ -25,29 +25,50 @@ from hoof_env.leg.geometry import Geometry, tables
 from hoof_env.leg.kinematics import solve_points
 from hoof_env.leg.linkage import BODIES, POINTS
 from hoof_env.simd.compile import kernel
+from hoof_env.simd.layout import Layout, Row, Vector, block
 from hoof_env.simd.math import ROUNDER
 from hoof_env.simd.memory import intrinsic
 from hoof_env.simd.rows import store_row
 from hoof_env.simd.types import DOUBLE, INDEX, pick, spread, wide
 
-FUNCTIONS = (
-    "toe_x", "toe_y", "heel_x", "heel_y",  # [m]
-    "ds_x", "ds_y",  # derivative of the first moment: a function of its own, for its derivative must be good
-    "a",  # inertia of the crank's turning alone: sum of m |z'|^2 + J alpha'^2 [kg m^2]
-    "b",  # coupling of crank and frame: sum of m z x z' + J alpha' [kg m^2]
-    "s_x", "s_y",  # first moment: sum of m z over the links [kg m]
-    "c", "dc",  # inertia of the frame's turning: sum of m |z|^2 + J [kg m^2], and its derivative
-    "sin", "cos",  # of the crank angle [-]
-)  # fmt: skip
-"""The functions in the order of the table; z are the links' centres, alpha their angles, ' is d/dtheta."""
+_HALF = 8
+"""Functions that are looked up together: one vector of 512 bits."""
 
-(TOE_X, TOE_Y, HEEL_X, HEEL_Y, DS_X, DS_Y, A, B, S_X, S_Y, C, DC, SIN, COS) = range(len(FUNCTIONS))
 
-SLOPED = 8
-"""The first functions, of which derivatives are looked up too."""
+class Functions(Layout):
+    """The functions, in the order of a table row; z: centres of the links, alpha: their angles, ' is d/dtheta."""
 
-WIDTH = 16
-"""Functions of a table row, padded to whole vectors."""
+    toe: Vector  # [m]
+    heel: Vector  # [m]
+    moment_slope: Vector  # s', a function of its own, for its derivative must be good [kg m]
+    crank_inertia: Row  # a, of the crank's turning alone: sum of m |z'|^2 + J alpha'^2 [kg m^2]
+    coupling: Row  # b, of crank and frame: sum of m z x z' + J alpha' [kg m^2]
+    first_moment: Vector  # s: sum of m z over the links [kg m]
+    frame_inertia: Row  # c, of the frame's turning: sum of m |z|^2 + J [kg m^2]
+    frame_inertia_slope: Row  # c'
+    sine: Row  # of the crank angle [-]
+    cosine: Row
+    padding: block(2)  # to whole vectors
+
+
+class Slopes(Layout):
+    """Derivatives of the first functions by the crank angle."""
+
+    toe: Vector
+    heel: Vector
+    moment_slope: Vector
+    crank_inertia: Row
+    coupling: Row
+
+
+FUNCTIONS, SLOPED, WIDTH = Functions.fields["padding"].start, Slopes.size, Functions.size
+"""How many functions there are, how many of them have derivatives, and the numbers of a table row."""
+
+
+def by_name(values: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+    """What `functions` gives, or its derivatives: `Functions` by name, shape (len(theta),) each."""
+    return dict(zip(Functions.names, values.T, strict=False))
+
 
 DEGREE = 7
 CELLS = (256, 512, 1024, 2048)
@@ -70,7 +91,7 @@ def _solve_all(theta, crank, pivot, steps, values, z, dz, ddz):  # type: ignore[
 def functions(
     geometry: Geometry, theta: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """All `FUNCTIONS` in closed form, shape (len(theta), 14), and derivatives of the first `SLOPED`."""
+    """`Functions` in closed form, shape (len(theta), FUNCTIONS), and derivatives of the first `SLOPED`."""
     theta = np.asarray(theta, dtype=np.float64)
     z, dz, ddz = (np.empty((theta.size, len(POINTS)), np.complex128) for _ in range(3))
     crank, pivot = geometry.lengths["OP"], complex(*geometry.pivot)
@@ -152,7 +173,7 @@ class LegProfile:
         for p in range(DEGREE + 1):
             slope = slope * x + value
             value = value * x + rows[:, p]
-        return value[:, : len(FUNCTIONS)], slope[:, :SLOPED]
+        return value[:, :FUNCTIONS], slope[:, :SLOPED]
 
     def _errors(self) -> NDArray[np.float64]:
         """Largest error of a derivative in each cell over its largest value [-], NaN without a place."""
@@ -200,8 +221,6 @@ def _fit(geometry: Geometry, cells: int) -> NDArray[np.float64]:
 #     p = c0 + c1 x, ... in pairs;  q = p + x^2 p, ...;  value = q + x^4 q,
 #
 # and likewise its derivative by the product rule.
-
-_HALF = WIDTH // 2
 
 
 def _polynomials(builder: Any, first: Any, x: Any, sloped: bool) -> tuple[Any, Any]:
@@ -255,11 +274,11 @@ def _columns(builder: Any, rows: list[Any]) -> list[Any]:
 
 
 @intrinsic
-def look_up(context: Any, out: Any, table: Any, first: Any, cells: Any, theta: Any) -> Any:
-    """Fill the first WIDTH + SLOPED rows of `out` with all functions and derivatives.
+def look_up(context: Any, functions: Any, slopes: Any, table: Any, first: Any, cells: Any, theta: Any) -> Any:
+    """Look up all functions and derivatives.
 
     Args:
-        out: `Rows`.
+        functions, slopes: `Rows` to fill.
         table: pointer to the coefficients.
         first: `Lanes`: number of the row where the leg's table begins.
         cells: of a table.
@@ -267,7 +286,7 @@ def look_up(context: Any, out: Any, table: Any, first: Any, cells: Any, theta: A
     """
 
     def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        out, table, first, cells, theta = values
+        functions, slopes, table, first, cells, theta = values
         count = signature.args[0].count
         whole = wide(INDEX, count)
         # The sum's last bits are the number of the cell, turns included: those of one turn are its row.
@@ -280,18 +299,18 @@ def look_up(context: Any, out: Any, table: Any, first: Any, cells: Any, theta: A
         row = builder.add(row, builder.fptosi(first, whole))
         cell, width = builder.fsub(shifted, rounder), builder.fdiv(DOUBLE(2 * np.pi), per_cell)
         x = builder.fsub(theta, builder.fmul(cell, spread(builder, width, count)))
-        parts: dict[int, list[Any]] = {0: [], _HALF: [], WIDTH: []}
+        low, high, derivatives = [], [], []
         for lane in range(count):
             at = builder.mul(pick(builder, row, lane, count), INDEX(WIDTH * (DEGREE + 1)))
             angle, place = pick(builder, x, lane, count), builder.gep(table, [at])
             value, slope = _polynomials(builder, place, angle, sloped=True)
-            parts[0].append(value)
-            parts[WIDTH].append(slope)
+            low.append(value)
+            derivatives.append(slope)
             other = builder.gep(place, [INDEX(_HALF)])
-            parts[_HALF].append(_polynomials(builder, other, angle, sloped=False)[0])
-        for begin, lanes in parts.items():
+            high.append(_polynomials(builder, other, angle, sloped=False)[0])
+        for rows, begin, lanes in ((functions, 0, low), (functions, _HALF, high), (slopes, 0, derivatives)):
             for k, column in enumerate(_columns(builder, lanes)):
-                store_row(builder, column, out, INDEX(begin + k), count)
+                store_row(builder, column, rows, INDEX(begin + k), count)
         return context.get_dummy_value()
 
-    return types.void(out, table, first, types.int64, theta), emit
+    return types.void(functions, slopes, table, first, types.int64, theta), emit

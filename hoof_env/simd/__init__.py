@@ -9,7 +9,8 @@ each name. Floats mix with lanes and are the same in each.
 Lanes live inside kernels only: they come from `rows` and go back into them.
 """
 
-import hoof_env.simd.operators  # noqa: F401  teaches numba the operators
+import hoof_env.simd.layout
+import hoof_env.simd.operators  # noqa: F401  both teach numba: fields and operators
 from hoof_env.simd.functions import (
     across,
     anywhere,
@@ -26,13 +27,13 @@ from hoof_env.simd.functions import (
     size,
     smaller,
 )
-from hoof_env.simd.rows import below, fill, level, read, rows, write
+from hoof_env.simd.rows import columns, fill, level, nth, read, rows, store_vectors, write
 
 __all__ = [
     "across",
     "anywhere",
-    "below",
     "choose",
+    "columns",
     "cross",
     "dot",
     "fill",
@@ -41,6 +42,7 @@ __all__ = [
     "lane_sum",
     "larger",
     "level",
+    "nth",
     "plane",
     "quarter_turns",
     "read",
@@ -48,5 +50,6 @@ __all__ = [
     "rows",
     "size",
     "smaller",
+    "store_vectors",
     "write",
 ]

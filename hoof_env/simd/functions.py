@@ -170,14 +170,22 @@ def quarter_turns(context: Any, cosine: Any, sine: Any, shifted: Any) -> Any:
 
 @intrinsic
 def lane_sum(context: Any, start: Any, x: Any) -> Any:
-    """start + x_0 + x_1 + ..., added in this order, in every lane; `start` is the same in all."""
+    """start + x_0 + x_1 + ..., added in this order, in every lane; `start` is the same in all. Of lanes or of
+    planar vectors."""
+
+    def total(builder: Any, start: Any, x: Any, count: int) -> Any:
+        found = pick(builder, start, 0, count)
+        for lane in range(count):
+            found = builder.fadd(found, pick(builder, x, lane, count))
+        return spread(builder, found, count)
 
     def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        count = signature.return_type.count
-        total = pick(builder, values[0], 0, count)
-        for lane in range(count):
-            total = builder.fadd(total, pick(builder, values[1], lane, count))
-        return spread(builder, total, count)
+        kind = signature.return_type
+        if isinstance(kind, Lanes):
+            return total(builder, *values, kind.count)
+        (a, b), (c, d) = (split(context, builder, kind, value) for value in values)
+        x, y = total(builder, a, c, kind.count), total(builder, b, d, kind.count)
+        return join(context, builder, kind, x, y)
 
     return start(start, x), emit
 

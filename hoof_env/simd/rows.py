@@ -1,4 +1,4 @@
-"""Memory for lanes: rows, and how they are filled from arrays and written back."""
+"""Memory for lanes: rows on the stack, columns of an array, and how one is filled from the other."""
 
 from __future__ import annotations
 
@@ -6,21 +6,92 @@ import operator
 from typing import Any
 
 from numba.core import types
-from numba.core.extending import lower_builtin
+from numba.core.extending import lower_builtin, lower_cast
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 
 from hoof_env.simd.memory import intrinsic
-from hoof_env.simd.types import DOUBLE, INDEX, SINGLE, Lanes, Rows, gathered, is_real, number, pick, wide
+from hoof_env.simd.types import (
+    DOUBLE,
+    INDEX,
+    SINGLE,
+    Columns,
+    Lanes,
+    Rows,
+    gathered,
+    is_real,
+    number,
+    pick,
+    split,
+    wide,
+)
 
 
 @intrinsic(prefer_literal=True)
-def rows(context: Any, pointer: Any, count: Any) -> Any:
-    """The memory at a pointer to doubles, aligned to 64 bytes, as rows of `count` lanes, a constant."""
+def rows(context: Any, pointer: Any, count: Any, layout: Any) -> Any:
+    """The memory at a pointer to doubles, aligned to 64 bytes, as rows of `count` lanes, a constant, with the
+    names of a layout, or None."""
 
     def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         return values[0]
 
-    return Rows(count.literal_value)(pointer, count), emit
+    return Rows(count.literal_value, getattr(layout, "layout", None))(pointer, count, layout), emit
+
+
+@intrinsic(prefer_literal=True)
+def columns(context: Any, pointer: Any, count: Any, layout: Any, start: Any, row: Any, stride: Any) -> Any:
+    """Columns of an array of doubles, `stride` apart; its rows are `row` apart, and the first number of the
+    first one is pointer[start]. They have the names of a layout, or None."""
+
+    def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        pointer, _, _, start, row, stride = values
+        found = context.make_helper(builder, signature.return_type)
+        found.first, found.row, found.stride = builder.gep(pointer, [start]), row, stride
+        return found._getvalue()
+
+    kind, whole = Columns(count.literal_value, getattr(layout, "layout", None)), types.intp
+    return kind(pointer, count, layout, whole, whole, whole), emit
+
+
+@intrinsic
+def nth(context: Any, rows: Any, number: Any, layout: Any) -> Any:
+    """The rows of the `number`-th layout of several one after the other."""
+
+    def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        first = builder.mul(values[1], INDEX(layout.layout.size))
+        return part_of(context, builder, signature.args[0], values[0], first)
+
+    return type(rows)(rows.count, layout.layout)(rows, types.intp, layout), emit
+
+
+def part_of(context: Any, builder: Any, memory: Any, value: Any, first: Any) -> Any:
+    """Rows or columns from row `first` on."""
+    if isinstance(memory, Rows):
+        return builder.gep(value, [builder.mul(first, INDEX(memory.count))], inbounds=True)
+    found = context.make_helper(builder, memory, value=value)
+    found.first = builder.gep(found.first, [builder.mul(first, found.row)])
+    return found._getvalue()
+
+
+def read_row(context: Any, builder: Any, memory: Any, value: Any, row: Any) -> Any:
+    """The lanes of a row."""
+    if isinstance(memory, Rows):
+        return builder.load(_place(builder, value, row, memory.count), align=8 * memory.count)
+    found = context.make_helper(builder, memory, value=value)
+    return _read(builder, found.first, builder.mul(row, found.row), found.stride, memory.count)
+
+
+def write_row(context: Any, builder: Any, memory: Any, value: Any, row: Any, x: Any) -> None:
+    """Put lanes into a row."""
+    if isinstance(memory, Rows):
+        store_row(builder, x, value, row, memory.count)
+        return
+    found = context.make_helper(builder, memory, value=value)
+    _write(builder, x, found.first, builder.mul(row, found.row), found.stride, memory.count)
+
+
+@lower_cast(types.Number, Lanes)
+def _to_lanes(context: Any, builder: Any, given: Any, kind: Any, value: Any) -> Any:
+    return number(context, builder, given, value, kind.count)
 
 
 @intrinsic
@@ -28,10 +99,9 @@ def below(context: Any, rows: Any, row: Any) -> Any:
     """The rows from `row` on."""
 
     def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        offset = builder.mul(values[1], values[1].type(signature.args[0].count))
-        return builder.gep(values[0], [offset], inbounds=True)
+        return part_of(context, builder, signature.args[0], *values)
 
-    return rows(rows, row), emit
+    return type(rows)(rows.count)(rows, types.intp), emit
 
 
 @intrinsic
@@ -110,22 +180,20 @@ def write(context: Any, x: Any, pointer: Any, start: Any, stride: Any) -> Any:
     return types.void(x, pointer, types.intp, types.intp), emit
 
 
-@intrinsic(prefer_literal=True)
-def fill(
-    context: Any, rows: Any, to: Any, count: Any, pointer: Any, start: Any, row: Any, stride: Any
-) -> Any:
-    """`read` `count` rows, a constant, into those from `to` on; in memory they are `row` apart."""
+@intrinsic
+def fill(context: Any, rows: Any, columns: Any) -> Any:
+    """Read columns into rows of the same layout."""
 
     def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        rows, to, _, pointer, at, row, stride = values
-        for _ in range(count.literal_value):
-            x = _read(builder, pointer, at, stride, signature.args[0].count)
-            store_row(builder, x, rows, to, signature.args[0].count)
-            to, at = builder.add(to, INDEX(1)), builder.add(at, row)
+        (to, start), (target, source) = signature.args, values
+        for k in range(to.layout.size):
+            x = read_row(context, builder, start, source, INDEX(k))
+            write_row(context, builder, to, target, INDEX(k), x)
         return context.get_dummy_value()
 
-    whole = types.intp
-    return types.void(rows, whole, count, pointer, whole, whole, whole), emit
+    if rows.layout is not columns.layout:
+        raise TypeError(f"fill: expected one layout, got {rows} and {columns}")
+    return types.void(rows, columns), emit
 
 
 def _place(builder: Any, rows: Any, row: Any, count: int) -> Any:
@@ -138,34 +206,54 @@ def store_row(builder: Any, x: Any, rows: Any, row: Any, count: int) -> None:
     builder.store(x, _place(builder, rows, row, count), align=8 * count)
 
 
+_MEMORY = (Rows, Columns)
+
+
+@intrinsic
+def store_vectors(context: Any, rows: Any, vectors: Any) -> Any:
+    """Put a tuple of planar vectors into rows, two rows each."""
+
+    def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        kind = signature.args[1]
+        for k in range(kind.count):
+            x, y = split(context, builder, kind.dtype, builder.extract_value(values[1], k))
+            write_row(context, builder, signature.args[0], values[0], INDEX(2 * k), x)
+            write_row(context, builder, signature.args[0], values[0], INDEX(2 * k + 1), y)
+        return context.get_dummy_value()
+
+    return types.void(rows, vectors), emit
+
+
 @infer_global(operator.getitem)
 class _GetRow(AbstractTemplate):
     def generic(self, args: Any, kws: Any) -> Any:
-        if isinstance(args[0], Rows) and isinstance(args[1], types.Integer):
+        if isinstance(args[0], _MEMORY) and isinstance(args[1], types.Integer):
             return signature(Lanes(args[0].count), *args)
         return None
-
-
-@lower_builtin(operator.getitem, Rows, types.Integer)
-def _get_row(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-    count = signature.args[0].count
-    row = context.cast(builder, values[1], signature.args[1], types.intp)
-    return builder.load(_place(builder, values[0], row, count), align=8 * count)
 
 
 @infer_global(operator.setitem)
 class _SetRow(AbstractTemplate):
     def generic(self, args: Any, kws: Any) -> Any:
-        if isinstance(args[0], Rows) and isinstance(args[1], types.Integer) and is_real(args[2]):
+        if isinstance(args[0], _MEMORY) and isinstance(args[1], types.Integer) and is_real(args[2]):
             return signature(types.none, *args)
         return None
 
 
-@lower_builtin(operator.setitem, Rows, types.Integer, Lanes)
-@lower_builtin(operator.setitem, Rows, types.Integer, types.Number)
-def _set_row(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-    count = signature.args[0].count
+def _get_row(context: Any, builder: Any, signature: Any, values: Any) -> Any:
     row = context.cast(builder, values[1], signature.args[1], types.intp)
-    x = number(context, builder, signature.args[2], values[2], count)
-    store_row(builder, x, values[0], row, count)
+    return read_row(context, builder, signature.args[0], values[0], row)
+
+
+def _set_row(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+    memory, place, given = signature.args
+    row = context.cast(builder, values[1], place, types.intp)
+    x = number(context, builder, given, values[2], memory.count)
+    write_row(context, builder, memory, values[0], row, x)
     return context.get_dummy_value()
+
+
+for _memory in _MEMORY:
+    lower_builtin(operator.getitem, _memory, types.Integer)(_get_row)
+    for _kind in (Lanes, types.Number):
+        lower_builtin(operator.setitem, _memory, types.Integer, _kind)(_set_row)

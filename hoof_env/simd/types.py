@@ -31,8 +31,22 @@ class Plane(_Counted):
     """`count` planar vectors, x and y, that multiply like complex numbers."""
 
 
-class Rows(_Counted):
-    """Memory with `count` doubles a row, aligned to whole rows."""
+class _Memory(_Counted):
+    """Memory whose rows have the names of `layout`, or numbers only where that is None."""
+
+    def __init__(self, count: int, layout: Any = None) -> None:
+        self.layout = layout
+        super().__init__(count)
+        if layout is not None:
+            self.name = f"{self.name[:-1]}, {layout.__module__}.{layout.__qualname__})"
+
+
+class Rows(_Memory):
+    """Memory of a kernel's own with `count` doubles a row, aligned to whole rows."""
+
+
+class Columns(_Memory):
+    """`count` columns of an array of doubles, a row for each name."""
 
 
 def wide(element: Any, count: int) -> Any:
@@ -62,6 +76,13 @@ class _PlaneModel(models.StructModel):
 class _RowsModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Rows) -> None:
         super().__init__(manager, kind, DOUBLE.as_pointer())
+
+
+@register_model(Columns)
+class _ColumnsModel(models.StructModel):
+    def __init__(self, manager: Any, kind: Columns) -> None:
+        first = types.CPointer(types.float64)
+        super().__init__(manager, kind, [("first", first), ("row", types.intp), ("stride", types.intp)])
 
 
 def spread(builder: Any, x: Any, count: int) -> Any:

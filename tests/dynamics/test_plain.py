@@ -6,10 +6,6 @@ import pytest
 from hoof_env.dynamics.drive import Motor, Prescribed
 from hoof_env.dynamics.engine import LegEngine
 from hoof_env.dynamics.limb import Limb
-from hoof_env.dynamics.plain import PlainHorse
-from hoof_env.dynamics.plain_crank import PlainCrank
-from hoof_env.dynamics.plain_ground import PlainGround
-from hoof_env.dynamics.plain_run import depths, follow, simulate
 from hoof_env.dynamics.trace import new_trace
 from hoof_env.dynamics.trunk import GRAVITY, TRUNKS, Trunk
 from hoof_env.errors import ParameterError
@@ -18,6 +14,10 @@ from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
+from tests.oracle.crank import PlainCrank
+from tests.oracle.ground import PlainGround
+from tests.oracle.horse import PlainHorse
+from tests.oracle.run import depths, follow, simulate
 
 LEG = load_geometry("first_fit")
 OTHER = LEG.replace(travel=-LEG.travel, linear_density=2.0, inertia="paper", lengths={"FG": 0.6})

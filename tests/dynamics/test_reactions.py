@@ -68,9 +68,9 @@ def cross(arms, forces):
 def solve(state, constants, out):
     """A leg a column: turn, rate and acceleration of crank and of frame, lift, forces on toe and heel."""
     count = state.shape[1]
-    g, found = rows(doubles(CONSTANTS), 1), rows(doubles(OUTPUTS), 1)
+    g, found = rows(doubles(CONSTANTS), 1, None), rows(doubles(OUTPUTS), 1, None)
     fill(g, 0, CONSTANTS, address(constants), 0, 1, 1)
-    now = rows(doubles(14), 1)
+    now = rows(doubles(14), 1, None)
     for k in range(count):
         fill(now, 0, 14, address(state), k, count, 1)
         joints, lock, driver, hip = leg_reactions(

@@ -6,16 +6,16 @@ from hypothesis import strategies as st
 
 from hoof_env.dynamics.drive import Motor, Prescribed
 from hoof_env.dynamics.limb import Limb
-from hoof_env.dynamics.plain import PlainHorse
 from hoof_env.dynamics.result import Result
 from hoof_env.dynamics.trunk import TRUNKS, Trunk
 from hoof_env.dynamics.trunk_engine import TrunkEngine
 from hoof_env.gait.motion_law import FILTER, FilterSettings, command_filters
 from hoof_env.gait.parameters import LIMITS, PARAMETERS, GaitParameters
 from hoof_env.ground.contact import Ground
-from hoof_env.ground.friction import FRICTION_LAWS
+from hoof_env.ground.laws import FRICTION_LAWS
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import load_geometry
+from tests.oracle.horse import PlainHorse
 
 FIRST, IDENTIFIED = load_geometry("first_fit"), load_geometry("identified")
 LEGS = (

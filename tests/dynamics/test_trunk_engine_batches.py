@@ -12,7 +12,7 @@ from hoof_env.dynamics.trunk_engine import FEW, TrunkEngine
 from hoof_env.errors import ParameterError
 from hoof_env.gait.parameters import load_gait
 from hoof_env.ground.contact import Ground
-from hoof_env.ground.friction import FRICTION_LAWS
+from hoof_env.ground.laws import FRICTION_LAWS
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import load_geometry
 

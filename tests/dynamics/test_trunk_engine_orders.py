@@ -7,14 +7,14 @@ import pytest
 
 from hoof_env.dynamics.drive import Motor, Prescribed
 from hoof_env.dynamics.limb import Limb
-from hoof_env.dynamics.plain import PlainHorse
-from hoof_env.dynamics.plain_run import simulate
 from hoof_env.dynamics.schemes import SCHEMES
 from hoof_env.dynamics.trunk import Trunk
 from hoof_env.dynamics.trunk_engine import TrunkEngine
 from hoof_env.gait.parameters import GaitParameters, load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
+from tests.oracle.horse import PlainHorse
+from tests.oracle.run import simulate
 
 LEG = load_geometry("first_fit")
 OTHER = LEG.replace(travel=-LEG.travel, lengths={"FG": 0.6})

@@ -15,8 +15,7 @@ from hypothesis import strategies as st
 from hoof_env.dynamics.schemes import SCHEMES
 from hoof_env.dynamics.trunk import GRAVITY
 from hoof_env.envs.tasks import PER_EPISODE
-from hoof_env.ground.friction import FRICTION_LAWS
-from hoof_env.ground.normal_force import NORMAL_LAWS
+from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS
 
 STEPS = int(float(os.environ.get("HOOF_ENV_STEPS", "1e5")))
 """Random steps of each id, in all environments together; a million take seconds."""

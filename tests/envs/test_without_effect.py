@@ -17,8 +17,7 @@ from hoof_env.envs.batch import EpisodeBatch
 from hoof_env.envs.reward import RewardWeights
 from hoof_env.envs.tasks import NEEDED, PER_EPISODE, TASKS, Settings, check_effect
 from hoof_env.errors import FixedSettingError, ParameterError
-from hoof_env.ground.friction import FRICTION_LAWS
-from hoof_env.ground.normal_force import NORMAL_LAWS
+from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS
 
 LEG, RAIL, FIXED = (f"hoof_env/{name}-v0" for name in ("HorseLeg", "HorseLegRail", "HorseLegFixed"))
 OTHER = {

@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 
 from hoof_env.errors import ParameterError
 from hoof_env.ground.contact import HEEL, TOE, Ground, latch, new_contacts, touch
-from hoof_env.ground.friction import friction_force
-from hoof_env.ground.normal_force import normal_force
+from tests.oracle.laws import friction_force, normal_force
 
 INTERPOLATED = Ground(restitution=0.5, approach_floor=0.01).to_record()
 SAMPLED = Ground(restitution=0.5, approach_floor=0.01, approach="sampled").to_record()

@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hoof_env.ground.friction import FRICTION_LAWS, friction_coefficient, friction_force
+from hoof_env.ground.laws import FRICTION_LAWS
+from tests.ground.compiled_laws import friction_coefficient, friction_force
 
 KINETIC, SLOW, FAST = 0.4, 1e-3, 1e-2
 laws = st.sampled_from(range(len(FRICTION_LAWS)))

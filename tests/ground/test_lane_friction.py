@@ -8,27 +8,28 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import njit
 
-from hoof_env.ground import friction, lane_friction
-from hoof_env.ground.lane_friction import AMBROSIO, TANH, THRELFALL
+from hoof_env.ground import laws
+from hoof_env.ground.laws import AMBROSIO, TANH, THRELFALL
 from hoof_env.simd import read, rows, write
 from hoof_env.simd.memory import address, doubles
+from tests.oracle import laws as oracle
 
 LAWS = (AMBROSIO, THRELFALL, TANH)
 
 
 @njit(error_model="numpy")
 def friction_part(speed, law, slow, fast):
-    return lane_friction.friction_part(speed, law, slow, fast)
+    return laws.friction_part(speed, law, slow, fast)
 
 
 def test_the_laws_have_the_numbers_that_records_have():
-    assert [friction.FRICTION_LAWS[law] for law in LAWS] == ["ambrosio", "threlfall", "tanh"]
+    assert [laws.FRICTION_LAWS[law] for law in LAWS] == ["ambrosio", "threlfall", "tanh"]
 
 
 @given(speed=st.floats(0, 20) | st.floats(0, 0.02), law=st.sampled_from(LAWS), slow=st.floats(0, 0.01))
 @settings(deadline=None, max_examples=500)
 def test_friction_is_that_of_the_law(speed, law, slow):
-    expected = friction.friction_coefficient(speed, law, 1.0, slow, slow + 0.02)
+    expected = oracle.friction_coefficient(speed, law, 1.0, slow, slow + 0.02)
     assert friction_part(speed, law, slow, slow + 0.02) == pytest.approx(expected, rel=0, abs=1e-13)
 
 
@@ -38,9 +39,9 @@ def test_what_is_not_a_number_stays_so():
 
 @njit(error_model="numpy")
 def all_lanes(speed, law, out):
-    row = rows(doubles(8), 8)
+    row = rows(doubles(8), 8, None)
     for n in range(0, speed.size, 8):
-        part = lane_friction.friction_part(read(row, address(speed), n, 1), law, 1e-3, 1e-2)
+        part = laws.friction_part(read(row, address(speed), n, 1), law, 1e-3, 1e-2)
         write(part, address(out), n, 1)
 
 

@@ -7,15 +7,15 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from hoof_env.errors import ParameterError
-from hoof_env.ground.normal_force import (
+from hoof_env.ground.laws import (
     FACTORS,
     NORMAL_LAWS,
     damping,
     exact,
-    normal_force,
     restitution_of_damping_ratio,
     restitution_of_factor,
 )
+from tests.ground.compiled_laws import normal_force
 
 # Golden: restitution that a free impact returns, by law and nominal cr; from a table computed with another
 # program, whose ODE solutions for n = 1, 1.5 and 2 agreed with it. None: the damping has no bound there.

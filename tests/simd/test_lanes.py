@@ -36,7 +36,7 @@ def on_lanes(count, operations):
     """A kernel that works on columns, `count` at a time."""
 
     def kernel(given, found):
-        mine, out = rows(doubles(INPUTS * count), count), rows(doubles(OUTPUTS * count), count)
+        mine, out = rows(doubles(INPUTS * count), count, None), rows(doubles(OUTPUTS * count), count, None)
         columns = given.shape[1]
         for n in range(0, columns, count):
             fill(mine, 0, INPUTS, address(given), n, columns, 1)
@@ -149,7 +149,7 @@ def test_the_sum_over_lanes_is_in_their_order():
 def test_memory_is_read_and_written_apart(stride):
     @njit(error_model="numpy")
     def copy(table, index, found):
-        row = rows(doubles(4), 4)
+        row = rows(doubles(4), 4, None)
         x = read(row, address(table), 2, stride)
         write(x, address(found), 1, stride)
         row[0] = gather(address(table), read(row, address(index), 0, 1))
@@ -164,7 +164,7 @@ def test_memory_is_read_and_written_apart(stride):
 def test_lanes_of_different_counts_do_not_mix():
     @njit(error_model="numpy")
     def mix():
-        one, two = rows(doubles(4), 4), rows(doubles(8), 8)
+        one, two = rows(doubles(4), 4, None), rows(doubles(8), 8, None)
         one[0] = one[0] + two[0]
 
     with pytest.raises(TypingError):

@@ -37,7 +37,7 @@ def root_power(d, eighths):
 
 @njit(error_model="numpy")
 def turn_lanes(angle, cosine, sine):
-    row = rows(doubles(LANES), LANES)
+    row = rows(doubles(LANES), LANES, None)
     for n in range(0, angle.size, LANES):
         c, s = exact_math.cos_sin(read(row, address(angle), n, 1))
         write(c, address(cosine), n, 1)
@@ -46,14 +46,14 @@ def turn_lanes(angle, cosine, sine):
 
 @njit(error_model="numpy")
 def decay_lanes(x, out):
-    row = rows(doubles(LANES), LANES)
+    row = rows(doubles(LANES), LANES, None)
     for n in range(0, x.size, LANES):
         write(exact_math.exp_of_negative(read(row, address(x), n, 1)), address(out), n, 1)
 
 
 @njit(error_model="numpy")
 def power_lanes(depth, eighths, out):
-    row = rows(doubles(LANES), LANES)
+    row = rows(doubles(LANES), LANES, None)
     for n in range(0, depth.size, LANES):
         write(exact_math.root_power(read(row, address(depth), n, 1), eighths), address(out), n, 1)
 

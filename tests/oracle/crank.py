@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.drive import Motor
 from hoof_env.dynamics.limb import Limb
-from hoof_env.dynamics.plain import PlainHorse, servo
-from hoof_env.dynamics.plain_ground import PlainGround
-from hoof_env.dynamics.plain_run import Touch, follow
 from hoof_env.dynamics.trunk import Trunk
 from hoof_env.errors import ParameterError
 from hoof_env.gait.parameters import GaitParameters
 from hoof_env.ground.contact import Ground
+from tests.oracle.ground import PlainGround
+from tests.oracle.horse import PlainHorse, servo
+from tests.oracle.run import Touch, follow
 
 Array = NDArray[Any]
 

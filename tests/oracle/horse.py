@@ -20,13 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.drive import Drive, Motor
-from hoof_env.dynamics.jet import Jet
 from hoof_env.dynamics.limb import Limb
-from hoof_env.dynamics.plain_bodies import PlainBodies
-from hoof_env.dynamics.plain_ground import PlainGround
 from hoof_env.dynamics.trunk import GRAVITY, TRUNKS, Trunk
 from hoof_env.gait.motion_law import SPEED
 from hoof_env.ground.contact import Ground
+from tests.oracle.bodies import PlainBodies
+from tests.oracle.ground import PlainGround
+from tests.oracle.jet import Jet
 
 if TYPE_CHECKING:
     from hoof_env.ground.terrain import Terrain

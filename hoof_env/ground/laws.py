@@ -1,18 +1,23 @@
-"""Normal contact laws: how hard the ground pushes back.
+"""Laws of contact: how hard the ground pushes back, and how it rubs. One expression each, for the engine's lanes
+and for the paper's solver.
 
-Every law is one expression, F = K d^n (1 + chi v / v0) + c v with penetration d, penetration rate v and
-approach speed v0 latched at touch-down; the laws differ in the damping factor chi as a function of the
-coefficient of restitution cr (and Kelvin-Voigt in using a dashpot c instead). Eq. 14 of the paper is
-Lankarani and Nikravesh's.
+Normal force (Eq. 14): F = K d^n (1 + chi v / v0) + c v with penetration d, penetration rate v and approach speed
+v0 latched at touch-down; the laws differ in the damping factor chi as a function of the coefficient of
+restitution cr (and Kelvin-Voigt in using a dashpot c instead). The paper's is Lankarani and Nikravesh's.
 
 For a free impact of a mass, any K and n, a factor chi returns the restitution e that solves
 chi (1 + e) = ln[(1 + chi) / (1 - chi e)]; only "exact" returns cr itself. Lankarani and Nikravesh's law at
 cr = 0 bounces with e = 0.66.
 
+Friction (Eq. 15): F_t = -mu(v) F_n v / |v|, Coulomb friction with a coefficient that depends on the sliding
+speed. The paper's is Ambrosio's dynamic correction c_d; its c_f is read as the direction v / |v|, for friction
+opposes sliding. A function of the sliding speed alone cannot hold a hoof at rest: it creeps.
+
 Sources: Lankarani & Nikravesh 1990 (J Mech Des 112:369), Hunt & Crossley 1975 (J Appl Mech 42:440), Flores
 et al. 2011 (Multibody Syst Dyn 25:357), Gonthier et al. 2004 (Multibody Syst Dyn 11:209), Hu & Guo 2015;
 Skrinjar et al. 2018 (Int J Mech Sci 145:171), a review; Schwager & Poeschel 2007 (Granular Matter 9:465) for
-the spring-dashpot that may not pull.
+the spring-dashpot that may not pull. Friction: Ambrosio 2003 (in Virtual Nonlinear Multibody Systems, 57-81);
+Threlfall 1978 (Mech Mach Theory 13:475); hyperbolic tangent, common in robotics.
 """
 
 from __future__ import annotations
@@ -21,7 +26,9 @@ import math
 from collections.abc import Callable
 
 from hoof_env.errors import ParameterError, check_choice, check_number
-from hoof_env.simd.compile import kernel
+from hoof_env.simd import larger, smaller
+from hoof_env.simd.compile import inlined
+from hoof_env.simd.math import exp_of_negative
 
 
 def lankarani_nikravesh(cr: float) -> float:
@@ -134,18 +141,41 @@ def _bisect(f: Callable[[float], float], low: float, high: float) -> float:
             high = middle
 
 
-@kernel
-def normal_force(penetration, rate, approach, stiffness, exponent, chi, dashpot):  # type: ignore[no-untyped-def]
-    """Normal force [N] on a point inside the ground; never negative, zero outside.
-
-    Eq. 14: F = K d^n (1 + chi v / v0), plus c v for Kelvin-Voigt. The ground does not pull.
+@inlined
+def normal_force(spring, damping, dashpot):  # type: ignore[no-untyped-def]
+    """Normal force [N] on a point inside the ground (Eq. 14): S (1 + damping) + dashpot. The ground does not
+    pull.
 
     Args:
-        penetration, rate, approach: d [m], its rate v [m/s] and v at touch-down v0 [m/s] (> 0).
-        stiffness, exponent: K [N/m^n], n [-].
-        chi, dashpot: see `damping`.
+        spring: S = K d^n [N].
+        damping: chi v / v0 [-].
+        dashpot: c v [N].
     """
-    if penetration <= 0.0:
-        return 0.0
-    force = stiffness * penetration**exponent * (1.0 + chi * rate / approach) + dashpot * rate
-    return max(force, 0.0)
+    return larger(spring * (1.0 + damping) + dashpot, 0.0)
+
+
+FRICTION_LAWS = ("ambrosio", "threlfall", "tanh")
+"""Names of the friction laws; kernels take the position in this tuple."""
+
+AMBROSIO, THRELFALL, TANH = range(3)
+
+
+@inlined
+def friction_part(speed, law, slow, fast):  # type: ignore[no-untyped-def]
+    """Friction coefficient over its kinetic value, mu(|v|) / mu_k [-], 0 to 1; 0 at rest.
+
+    Args:
+        speed: sliding speed |v| [m/s].
+        law: index into `FRICTION_LAWS`, the same in all lanes. Ambrosio: c_d = 0 below `slow`, 1 above `fast`,
+            linear between. Threlfall: 1 - exp(-3 |v| / v0) up to v0 = `fast`, constant above. The last:
+            tanh(|v| / `fast`).
+        slow, fast: threshold speeds v0 and v1 [m/s]; the paper does not print them.
+    """
+    if law == AMBROSIO:
+        part = (speed - slow) / (fast - slow)
+    elif law == THRELFALL:
+        part = 1.0 - exp_of_negative(-3.0 * smaller(speed / fast, 1.0))
+    else:
+        e = exp_of_negative(-2.0 * (speed / fast))
+        part = (1.0 - e) / (1.0 + e)
+    return smaller(larger(part, 0.0), 1.0)

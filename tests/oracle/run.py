@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.plain import WORKS, PlainHorse
-from hoof_env.dynamics.plain_ground import PlainGround
 from hoof_env.errors import HoofEnvError, ParameterError
 from hoof_env.gait.motion_law import SPEED
 from hoof_env.gait.parameters import GaitParameters
+from tests.oracle.ground import PlainGround
+from tests.oracle.horse import WORKS, PlainHorse
 
 Array = NDArray[Any]
 

@@ -1,0 +1,121 @@
+"""What the ground does to the hoofs (Eqs. 10 to 15); see `mechanics`."""
+
+from __future__ import annotations
+
+from hoof_env.ground.laws import friction_part, normal_force
+from hoof_env.ground.surface import surface
+from hoof_env.simd import across, anywhere, choose, cross, dot, larger, level, plane, size
+from hoof_env.simd.compile import inlined
+from hoof_env.simd.math import root_power
+
+
+@inlined
+def level_ground(leg):  # type: ignore[no-untyped-def]
+    """What never changes where the ground is the same everywhere."""
+    upward = plane(level(leg, 0.0), 1.0)
+    leg.toe.ground_normal, leg.toe.stiffness_scale, leg.toe.friction_scale = upward, 1.0, 1.0
+    leg.heel.ground_normal, leg.heel.stiffness_scale, leg.heel.friction_scale = upward, 1.0, 1.0
+
+
+@inlined
+def meet_ground(trunk, leg, model):  # type: ignore[no-untyped-def]
+    """Forces of the ground on toe and heel, and their generalised forces on crank and frame."""
+    hip, pitch_rate, w = leg.hip, trunk.rates.pitch_rate, leg.theta_rate
+    leg.beta_rate = pitch_rate + leg.beta_by_theta * w + leg.swing_rate
+    place = trunk.place + hip
+    velocity = trunk.velocity + pitch_rate * across(hip)
+    toe_force, toe_theta, toe_beta = meet_point(
+        trunk, leg, leg.toe, leg.state.toe, leg.functions.toe, leg.slopes.toe, place, velocity, model
+    )
+    force, theta, beta = meet_point(
+        trunk, leg, leg.heel, leg.state.heel, leg.functions.heel, leg.slopes.heel, place, velocity, model
+    )
+    leg.ground_force = toe_force + force
+    leg.ground_moment_theta, leg.ground_moment_beta = toe_theta + theta, toe_beta + beta
+
+
+@inlined
+def meet_point(trunk, leg, point, memory, arm, arm_by_theta, hip, hip_velocity, model):  # type: ignore[no-untyped-def]
+    """Where a hoof point is, how deep in the ground, how fast it goes in and slides, and so the force of the
+    ground on it and that force's part along theta and beta.
+
+    Args:
+        trunk, leg, model: as everywhere.
+        point, memory: the point's `Contact`, and what it remembers.
+        arm, arm_by_theta: the point from O in the leg's frame, and its derivative [m].
+        hip, hip_velocity: of O [m, m/s].
+    """
+    arm, by_theta = leg.turn * arm, leg.turn * arm_by_theta
+    place = hip + arm
+    velocity = hip_velocity + (leg.theta_rate * by_theta + leg.beta_rate * across(arm))
+    penetration, rate, sliding_speed = -place.imag, -velocity.imag, velocity.real  # Eqs. 10, 12, 13
+    if model.is_terrain:
+        height, normal_x, normal_y, stiffness_scale, friction_scale = surface(
+            place.real, model.ground_cells, model.ground_origin, model.ground_per_metre
+        )
+        normal = plane(normal_x, normal_y)
+        penetration, rate = (height - place.imag) * normal_y, -dot(normal, velocity)
+        sliding_speed = -cross(normal, velocity)
+        point.ground_normal = normal
+        point.stiffness_scale, point.friction_scale = stiffness_scale, friction_scale
+    point.place = place
+    point.penetration, point.penetration_rate, point.sliding_speed = penetration, rate, sliding_speed
+
+    nothing = 0.0 * size(penetration)  # what is not a number stays so
+    force, spring, friction = nothing, nothing, nothing
+    inverse_speed, inside = memory.inverse_approach_speed, penetration > 0.0
+    if anywhere(inside):
+        if anywhere(inside & (inverse_speed == 0.0)):
+            entering = inverse_entry_speed(trunk, memory, penetration, rate, model)
+            inverse_speed = choose(inverse_speed > 0.0, inverse_speed, entering)
+        pushed, stored = push_back(trunk, point.stiffness_scale, penetration, rate, inverse_speed, model)
+        laws = trunk.settings
+        part = friction_part(size(sliding_speed), model.friction_law, laws.friction_slow, laws.friction_fast)
+        grip = laws.friction * point.friction_scale * part * pushed  # Eq. 15
+        friction = choose(inside, choose(sliding_speed > 0.0, -grip, grip), nothing)
+        force, spring = choose(inside, pushed, nothing), choose(inside, stored, nothing)
+    normal = point.ground_normal
+    point.spring_force, point.inverse_approach_speed = spring, inverse_speed
+    point.normal_force, point.friction_force = force, friction
+    point.force = force * normal - friction * across(normal)
+    return point.force, dot(point.force, by_theta), cross(arm, point.force)
+
+
+@inlined
+def inverse_entry_speed(trunk, memory, penetration, rate, model):  # type: ignore[no-untyped-def]
+    """1 / v0 with v0 the approach speed at the crossing of the surface, interpolated between the last whole
+    step and now."""
+    before, rate_before, floor = memory.penetration, memory.rate, trunk.settings.approach_floor
+    span, entry = level(memory, 1.0), rate
+    if model.interpolated:
+        crossed = before < 0.0
+        span = choose(crossed, penetration - before, span)
+        entry = choose(crossed, rate_before * span - before * (rate - rate_before), rate)
+    return span / larger(entry, floor * span)
+
+
+@inlined
+def push_back(trunk, stiffness_scale, penetration, rate, inverse_speed, model):  # type: ignore[no-untyped-def]
+    """Normal force on a point inside the ground (Eq. 14), and its spring's part [N]."""
+    if model.eighths == 12:  # the usual exponent, 3/2
+        power = root_power(penetration, 12)
+    else:
+        power = root_power(penetration, model.eighths)
+    laws = trunk.settings
+    spring = laws.stiffness * stiffness_scale * power
+    return normal_force(spring, laws.chi * rate * inverse_speed, laws.dashpot * rate), spring
+
+
+@inlined
+def remember_contacts(leg):  # type: ignore[no-untyped-def]
+    """At a whole step: keep penetration and rate, and the inverse approach speed of a point in the ground."""
+    remember_point(leg.toe, leg.state.toe)
+    remember_point(leg.heel, leg.state.heel)
+
+
+@inlined
+def remember_point(point, memory):  # type: ignore[no-untyped-def]
+    """`remember_contacts` for one point."""
+    memory.penetration, memory.rate = point.penetration, point.penetration_rate
+    kept = choose(point.penetration > 0.0, point.inverse_approach_speed, 0.0)
+    memory.inverse_approach_speed = kept

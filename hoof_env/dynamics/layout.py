@@ -1,0 +1,299 @@
+"""Every row of memory by name: what the kernels keep of trunk and legs, on the stack and in the engine's array.
+
+SI units and radians. beta = pitch + side phi is the world angle of a leg's frame. 'All' means trunk and legs
+together; 'fixed' frame means one that does not swing while the crank turns.
+"""
+
+from __future__ import annotations
+
+from hoof_env.gait.parameters import PARAMETERS
+from hoof_env.leg.profile import Functions, Slopes
+from hoof_env.simd.layout import Layout, Row, Vector, block
+
+FARTHEST = 1e9
+"""Largest angles [rad] and places [m] of a state, which are as good as numbers are fine there: to 6e-10 at
+1e6, to 6e-7 at 1e9; also the largest rates of a start, whose squares are then numbers still."""
+
+# The trunk
+
+
+class Moving(Layout):
+    """What is integrated of the trunk. Where it cannot move, `centre` is its place and a momentum is 0."""
+
+    centre: Vector  # of mass of all [m]
+    momentum: Vector  # of all [kg m/s]
+    pitch: Row  # of the trunk [rad]
+    spin: Row  # angular momentum of all about `centre` [kg m^2/s]
+
+
+class Rates(Layout):
+    """Time derivatives of `Moving`."""
+
+    velocity: Vector  # of the centre of mass of all [m/s]
+    force: Vector  # outer, weight included [N]
+    pitch_rate: Row  # [rad/s]
+    moment: Row  # of the outer forces about the centre [N m]
+
+
+class TrunkState(Layout):
+    """What changes from step to step."""
+
+    time: Row  # [s]
+    moving: Moving
+
+
+class TrunkSettings(Layout):
+    """Settings of one environment."""
+
+    total_mass: Row  # of all [kg]
+    inverse_mass: Row  # [1/kg]
+    pitch_inertia: Row  # of the trunk about its own centre of mass [kg m^2]
+    support: Row  # what the rest of the animal bears [N]
+    spring: Row  # [N/m]
+    damper: Row  # [N s/m]
+    height: Row  # where the spring is at rest [m]
+    drag: Row  # [N s/m]
+    gravity: Row  # [m/s^2]
+    stiffness: Row  # K of Eq. 14 [N/m^n]; this and what follows is the ground's, see `ground.contact.Ground`
+    chi: Row  # [-]
+    dashpot: Row  # [N s/m]
+    approach_floor: Row  # [m/s]
+    friction: Row  # [-]
+    friction_slow: Row  # [m/s]
+    friction_fast: Row  # [m/s]
+    bottom: Row  # height below which the trunk has fallen through the ground [m]
+
+
+class TrunkRows(Layout):
+    """A trunk in the kernels."""
+
+    state: TrunkState
+    stage: Moving  # at the present stage of a step
+    rates: Rates  # there
+    mean_rates: Rates  # weighted mean over the stages so far
+    place: Vector  # of the trunk's own centre of mass [m]
+    velocity: Vector  # [m/s]
+    acceleration: Vector  # [m/s^2]
+    pitch_acceleration: Row  # [rad/s^2]
+    turn: Vector  # e^(i pitch)
+    first_moment: Vector  # of all about the trunk's centre of mass [kg m]
+    relative_momentum: Vector  # of the legs against a trunk that does not pitch [kg m/s]
+    composite_inertia: Row  # of all about the trunk's centre of mass [kg m^2]
+    relative_angular_momentum: Row  # of the legs against a trunk that does not pitch [kg m^2/s]
+    load: Vector  # of the legs on the trunk's equations [N]
+    load_moment: Row  # [N m]
+    mass_xx: Row  # the matrix of the trunk's equations, with the cranks of the motors eliminated
+    mass_xy: Row
+    mass_yy: Row
+    mass_xp: Row
+    mass_yp: Row
+    mass_pp: Row
+    at_dead_point: Row  # 1 once a crank was where its linkage does not close
+    fallen: Row  # 1 once the trunk was below `bottom`
+    settings: TrunkSettings
+
+
+class Account(Layout):
+    """Where the energy went: integrals over time, with the stages and weights of the scheme."""
+
+    crank_work: Row  # by the drives [J]
+    swing_work: Row
+    ground_stored: Row  # in the ground's springs; it comes back [J]
+    ground_loss: Row  # never negative, as those below [J]
+    friction_loss: Row
+    drag_loss: Row
+    damper_loss: Row
+    impulse: Vector  # of the ground on all hoofs [N s]
+
+
+class TrunkReport(Layout):
+    """Motion of the trunk's centre of mass, and its pitch."""
+
+    place: Vector  # [m]
+    velocity: Vector  # [m/s]
+    acceleration: Vector  # [m/s^2]
+    pitch_rate: Row  # [rad/s]
+    pitch_acceleration: Row  # [rad/s^2]
+
+
+class TrunkMemory(Layout):
+    """A trunk in the engine's array."""
+
+    state: TrunkState
+    settings: TrunkSettings
+    account: Account
+    report: TrunkReport
+    result: Row  # of the last call, see `result.Result`
+
+
+# A leg
+
+
+class ContactMemory(Layout):
+    """What a hoof point remembers of the last whole step."""
+
+    penetration: Row  # [m]
+    rate: Row  # [m/s]
+    inverse_approach_speed: Row  # 1 / approach speed while it is in the ground, else 0 [s/m]
+
+
+class LegState(Layout):
+    """What changes from step to step."""
+
+    theta: Row  # crank angle [rad]
+    theta_rate: Row  # [rad/s]
+    gait: block(4)  # outputs of the command filters, in the order of `PARAMETERS`
+    gait_rate: block(4)
+    toe: ContactMemory
+    heel: ContactMemory
+
+
+class Strides(Layout):
+    """The stance that is going on, see `observables`."""
+
+    stance_open: Row  # 1 in a stance, else 0
+    stance_began: Row  # crank angle there [rad]
+    stance_peak: Row  # highest resultant force of this stance [N]
+
+
+class StrideSums(Layout):
+    """Of one call of the engine."""
+
+    peak_grf_increase: Row  # increases of the running peaks of stances [N]
+    highest_grf: Row  # [N]
+    positive_work: Row  # of both drives [J]
+    normal_impulse: Row  # [N s]
+    loaded_time: Row  # [s]
+    stances: Row  # that began
+    travel: Row  # backward, of the hoof along the ground, weighted with the load [m]
+
+
+class LegSettings(Layout):
+    """Settings of one leg."""
+
+    hip_on_trunk: Vector  # O from the trunk's centre of mass [m]
+    mass: Row  # [kg]
+    side: Row  # 1, or -1 of a geometry that travels towards -x
+    first_row: Row  # where the leg's table begins
+    is_motor: Row  # 1, or 0 of a prescribed crank
+    speed_gain: Row  # [N m s/rad]
+    torque_limit: Row  # [N m]
+    rotor_crank: Row  # what the rotor adds to the inertias a, b, c [kg m^2]
+    rotor_coupling: Row
+    rotor_frame: Row
+    lift_off: Row  # normal force that tells stance from swing [N]
+
+
+class Contact(Layout):
+    """A hoof point on the ground."""
+
+    place: Vector  # [m]
+    penetration: Row  # [m]
+    penetration_rate: Row  # [m/s]
+    ground_normal: Vector  # [-]
+    stiffness_scale: Row  # factor of K there [-]
+    friction_scale: Row  # factor of mu there [-]
+    sliding_speed: Row  # along the ground [m/s]
+    spring_force: Row  # the part of the normal force that comes back [N]
+    inverse_approach_speed: Row  # [s/m]
+    normal_force: Row  # [N]
+    friction_force: Row  # along the ground [N]
+    force: Vector  # in the world [N]
+
+
+class LegRows(Layout):
+    """A leg in the kernels."""
+
+    state: LegState
+    strides: Strides
+    sums: StrideSums
+    functions: Functions  # of the crank angle, at the present stage
+    slopes: Slopes
+    command: block(4)
+    gait_acceleration: block(4)  # of the command filters
+    theta: Row  # crank angle, rate and acceleration at the present stage
+    theta_rate: Row
+    theta_acceleration: Row
+    mean_theta_rate: Row  # weighted means over the stages so far
+    mean_theta_acceleration: Row
+    phi: Row  # swing [rad]
+    beta_by_theta: Row  # beta' with time and pitch held [-]
+    swing_rate: Row  # beta's rate less pitch_t and beta' theta_t [rad/s]
+    swing_acceleration: Row  # beta's acceleration less pitch_tt and beta' theta_tt [rad/s^2]
+    beta_rate: Row  # [rad/s]
+    turn: Vector  # e^(i beta)
+    hip: Vector  # O from the trunk's centre of mass [m]
+    first_moment: Vector  # about O [kg m]
+    moment_by_theta: Vector  # its derivative with the frame fixed [kg m]
+    moment_by_crank: Vector  # and with the frame swinging along
+    frame_inertia: Row  # c [kg m^2]
+    crank_coupling: Row  # b + beta' c
+    crank_inertia: Row  # a + 2 beta' b + beta'^2 c
+    crank_pitch_coupling: Row  # b + beta' c + hip x moment_by_crank
+    ground_moment_theta: Row  # generalised forces of the ground [N m]
+    ground_moment_beta: Row
+    ground_force: Vector  # [N]
+    rest_moment_theta: Row  # generalised inertia forces at rest of the accelerations, weight included [N m]
+    rest_moment_beta: Row
+    free_theta_acceleration: Row  # of the crank if the trunk kept still [rad/s^2]
+    crank_mobility: Row  # 1 / crank_inertia, 0 if prescribed
+    crank_torque: Row  # drives [N m, W]
+    frame_torque: Row  # along beta
+    crank_power: Row
+    swing_power: Row
+    toe: Contact
+    heel: Contact
+    settings: LegSettings
+
+
+class PointReport(Layout):
+    """Of a hoof point, along the ground's tangent and normal."""
+
+    x: Row  # [m]
+    y: Row
+    slide: Row  # [m/s]
+    normal: Row  # [N]
+    friction: Row
+
+
+class LegReport(Layout):
+    """Of each leg. A motor turns crank and swing: its torque is the crank's, the hip's is what the gear between
+    them carries, and the hip's power is that of the actuator which changes the swing's parameters."""
+
+    theta_acc: Row  # crank and swing [rad, s]
+    phi: Row
+    phi_rate: Row
+    phi_acc: Row
+    crank_torque: Row  # along theta [N m]
+    hip_torque: Row  # along phi [N m]
+    crank_power: Row  # of the crank's drive [W]
+    hip_power: Row  # of the swing's [W]
+    toe: PointReport
+    heel: PointReport
+
+
+class LegMemory(Layout):
+    """A leg in the engine's array; the legs follow the trunk."""
+
+    state: LegState
+    strides: Strides
+    sums: StrideSums
+    command: block(4)
+    settings: LegSettings
+    report: LegReport
+
+
+# The names that people see, in records, states and infos
+
+TRUNK_STATE = ("time", "centre_x", "centre_y", "momentum_x", "momentum_y", "pitch", "spin")
+TRUNK_REPORT = ("x", "y", "vx", "vy", "ax", "ay", "pitch_rate", "pitch_acc")
+LEG_STATE = (
+    "theta", "theta_rate", *PARAMETERS, *(f"{name}_rate" for name in PARAMETERS),
+    "toe_penetration", "toe_rate", "toe_slowness", "heel_penetration", "heel_rate", "heel_slowness",
+)  # fmt: skip
+LEG_REPORT = LegReport.names
+STRIDES = Strides.names
+STRIDE_SUMS = (
+    "peak_increase", "highest", "positive_work", "load_impulse", "loaded_time", "stances", "travel",
+)  # fmt: skip
+ACCOUNT = Account.names

@@ -1,0 +1,331 @@
+"""The equations of motion of N legs on one trunk, for one environment or several side by side.
+
+Every function is one stage of the mechanics on rows of memory, whose names and units `layout` has. A row holds
+`Lanes`, one for each environment, which do not know of each other; compiled for one lane or eight, a number
+has the same bits: only + - * / and sqrt, no fast-math, no branch on a lane that changes a bit. Where the lanes
+are the legs of one trunk (`together`) each has a copy of the trunk, and sums go over all.
+
+A leg enters as functions of its crank angle theta (`leg.profile`): toe and heel, the first moment s and the
+inertias a, b, c; ' is d/dtheta, _t and _tt are time derivatives. With the world angle beta = pitch +
+side phi(theta, t) of its frame, the velocity v of O and w = theta_t, its kinetic energy is
+
+    T = m |v|^2 / 2 + v . e^(i beta) (s' w + i s beta_t) + (a w^2 + 2 b w beta_t + c beta_t^2) / 2,
+
+and Lagrange's equations follow (docs/engine.md). The trunk's state is the momentum, linear and angular, of
+all bodies together: in flight it is kept to round-off, whatever the scheme.
+"""
+
+from __future__ import annotations
+
+from hoof_env.dynamics.hoof import meet_ground
+from hoof_env.dynamics.layout import FARTHEST, LegRows, Moving
+from hoof_env.dynamics.trunk import FIXED, FREE, RAIL, SUSPENDED
+from hoof_env.gait.motion_law import COS, OFFSET, SIN, SPEED
+from hoof_env.leg.profile import look_up
+from hoof_env.simd import across, choose, cross, dot, lane_sum, level, nth, plane, size
+from hoof_env.simd.compile import inlined, pasted
+from hoof_env.simd.math import clip, cos_sin
+
+MOVING = Moving.size
+
+
+@inlined
+def add(total, x, together):  # type: ignore[no-untyped-def]
+    """total + x, lane by lane; or, where the lanes are the legs of one trunk, all of them one after the other,
+    as in a loop over legs."""
+    if together:
+        return lane_sum(total, x)
+    return total + x
+
+
+@pasted
+def evaluate(trunk, legs, leg_count, model, elapsed):  # type: ignore[no-untyped-def]
+    """All forces and accelerations at the present stage, `elapsed` [s] after the step's start."""
+    if model.kind != FIXED:
+        clear_trunk(trunk, model.kind)
+    for i in range(leg_count):
+        leg = nth(legs, i, LegRows)
+        look_up_functions(trunk, leg, model)
+        place_frame(trunk, leg, elapsed)
+        if model.kind != FIXED:
+            gather_leg(trunk, leg, model.kind, model.together)
+    if model.kind != FIXED:
+        move_trunk(trunk, model.kind)
+    for i in range(leg_count):
+        leg = nth(legs, i, LegRows)
+        meet_ground(trunk, leg, model)
+        feel_leg(trunk, leg, elapsed)
+        if model.kind != FIXED:
+            load_trunk(trunk, leg, model.kind, model.together)
+    if model.kind != FIXED:
+        accelerate_trunk(trunk, model.kind)
+    for i in range(leg_count):
+        accelerate_crank(trunk, nth(legs, i, LegRows))
+
+
+@inlined
+def look_up_functions(trunk, leg, model):  # type: ignore[no-untyped-def]
+    """The functions of the crank angle and their derivatives."""
+    angle = leg.theta
+    look_up(leg.functions, leg.slopes, model.tables, leg.settings.first_row, model.cells, angle)
+    value = leg.functions[0]
+    trunk.at_dead_point = choose((size(angle) <= FARTHEST) & (value != value), 1.0, trunk.at_dead_point)
+
+
+@inlined
+def place_frame(trunk, leg, elapsed):  # type: ignore[no-untyped-def]
+    """The leg's frame: its turn, how that changes with crank angle and time, and first moment and inertia in
+    the world.
+
+    The swing is phi = offset + A sin(theta) + B cos(theta), each parameter moving as its filter does.
+    """
+    sine, cosine, w = leg.functions.sine, leg.functions.cosine, leg.theta_rate
+    offset, rate, bend = filtered(leg, OFFSET, elapsed)
+    part_a, rate_a, bend_a = filtered(leg, SIN, elapsed)
+    part_b, rate_b, bend_b = filtered(leg, COS, elapsed)
+    side, swing = leg.settings.side, part_a * sine + part_b * cosine
+    k = side * (part_a * cosine - part_b * sine)
+    bent = bend + bend_a * sine + bend_b * cosine + (2.0 * (rate_a * cosine - rate_b * sine) - swing * w) * w
+    leg.phi, leg.beta_by_theta = offset + swing, k
+    leg.swing_rate, leg.swing_acceleration = side * (rate + rate_a * sine + rate_b * cosine), side * bent
+
+    cos_beta, sin_beta = cos_sin(trunk.stage.pitch + side * (offset + swing))
+    turn = plane(cos_beta, sin_beta)
+    s, ds = turn * leg.functions.first_moment, turn * leg.functions.moment_slope
+    leg.turn = turn
+    leg.first_moment = s
+    leg.moment_by_theta = ds
+    leg.moment_by_crank = ds + k * across(s)
+    frame = leg.functions.frame_inertia + leg.settings.rotor_frame
+    coupling = leg.functions.coupling + leg.settings.rotor_coupling
+    leg.frame_inertia, leg.crank_coupling = frame, coupling + k * frame
+    leg.crank_inertia = (
+        leg.functions.crank_inertia + leg.settings.rotor_crank + k * (2.0 * coupling + k * frame)
+    )
+
+
+@inlined
+def filtered(leg, k, elapsed):  # type: ignore[no-untyped-def]
+    """Parameter k of the gait, its rate and acceleration, `elapsed` [s] after the step's start."""
+    value, rate, bend = leg.state.gait[k], leg.state.gait_rate[k], leg.gait_acceleration[k]
+    return value + elapsed * (rate + 0.5 * elapsed * bend), rate + elapsed * bend, bend
+
+
+@inlined
+def keep_still(trunk):  # type: ignore[no-untyped-def]
+    """What never changes in a trunk that cannot move, or not pitch."""
+    for k in range(MOVING):
+        trunk.stage[k] = trunk.state.moving[k]
+        trunk.rates[k] = 0.0
+    nothing = plane(level(trunk, 0.0), 0.0)
+    trunk.place = trunk.state.moving.centre
+    trunk.velocity = nothing
+    trunk.acceleration = nothing
+    trunk.pitch_acceleration, trunk.at_dead_point, trunk.fallen = 0.0, 0.0, 0.0
+    trunk.turn = plane(level(trunk, 1.0), 0.0)
+
+
+@inlined
+def clear_trunk(trunk, kind):  # type: ignore[no-untyped-def]
+    """Before the leg_count are gathered."""
+    if kind == FREE:
+        cosine, sine = cos_sin(trunk.stage.pitch)
+        trunk.turn = plane(cosine, sine)
+    nothing = plane(level(trunk, 0.0), 0.0)
+    trunk.first_moment = nothing
+    trunk.relative_momentum = nothing
+    trunk.composite_inertia, trunk.relative_angular_momentum = trunk.settings.pitch_inertia, 0.0
+
+
+@inlined
+def gather_leg(trunk, leg, kind, together):  # type: ignore[no-untyped-def]
+    """Add a leg to the first moment, momentum, inertia and spin of all about the trunk's centre of mass."""
+    s, w, sway = leg.first_moment, leg.theta_rate, leg.swing_rate
+    drift = w * leg.moment_by_crank + sway * across(s)
+    if kind == FREE:
+        leg.hip = trunk.turn * leg.settings.hip_on_trunk
+        hip, frame = leg.hip, leg.frame_inertia
+        trunk.composite_inertia = add(
+            trunk.composite_inertia, dot(hip, leg.settings.mass * hip + 2.0 * s) + frame, together
+        )
+        trunk.relative_angular_momentum = add(
+            trunk.relative_angular_momentum,
+            cross(hip, drift) + leg.crank_coupling * w + frame * sway,
+            together,
+        )
+    trunk.first_moment = add(trunk.first_moment, leg.settings.mass * leg.hip + s, together)
+    trunk.relative_momentum = add(trunk.relative_momentum, drift, together)
+
+
+@inlined
+def move_trunk(trunk, kind):  # type: ignore[no-untyped-def]
+    """Place and velocity of the trunk from centre of mass and momentum of all; what acts on it but its leg_count.
+
+    On a rail the place along y is given and the velocity along y 0.
+    """
+    centre, moment, momentum = (
+        trunk.stage.centre,
+        trunk.first_moment,
+        trunk.stage.momentum,
+    )
+    drift, per_mass = trunk.relative_momentum, trunk.settings.inverse_mass
+    place = centre - per_mass * moment
+    velocity = per_mass * (momentum - drift)
+    rate = level(trunk, 0.0)
+    if kind == RAIL:
+        place, velocity = plane(place.real, centre.imag), plane(velocity.real, 0.0)
+    if kind == FREE:
+        spin = trunk.stage.spin - trunk.relative_angular_momentum + cross(moment, drift) * per_mass
+        rate = spin / (trunk.composite_inertia - dot(moment, moment) * per_mass)
+        velocity = velocity - rate * per_mass * across(moment)
+    trunk.place = place
+    trunk.velocity = velocity
+    trunk.rates.pitch_rate = rate
+    trunk.rates.velocity = per_mass * momentum
+    drag, total = -trunk.settings.drag * velocity.real, trunk.settings.total_mass
+    lift = (
+        trunk.settings.support
+        - total * trunk.settings.gravity
+        - trunk.settings.spring * (place.imag - trunk.settings.height)
+        - trunk.settings.damper * velocity.imag
+    )
+    trunk.rates.force = plane(drag, lift)
+    trunk.rates.moment = -drag * (place.imag - centre.imag)  # the drag acts on the trunk
+    trunk.load = plane(level(trunk, 0.0), 0.0)
+    trunk.load_moment = 0.0
+    trunk.mass_xx, trunk.mass_xy, trunk.mass_yy = total, 0.0, total
+    trunk.mass_xp, trunk.mass_yp, trunk.mass_pp = -moment.imag, moment.real, trunk.composite_inertia
+    trunk.fallen = choose(place.imag < trunk.settings.bottom, 1.0, trunk.fallen)
+
+
+@pasted
+def settle(trunk, legs, leg_count, model, starts):  # type: ignore[no-untyped-def]
+    """Centre of mass, momentum and spin of all where an environment starts, from what stands in their place
+    then: place and velocity of the trunk and rate of its pitch. The inverse of `move_trunk`."""
+    clear_trunk(trunk, model.kind)
+    for i in range(leg_count):
+        leg = nth(legs, i, LegRows)
+        look_up_functions(trunk, leg, model)
+        place_frame(trunk, leg, 0.0)
+        gather_leg(trunk, leg, model.kind, model.together)
+    place, velocity, rate = trunk.state.moving.centre, trunk.state.moving.momentum, trunk.state.moving.spin
+    moment, drift, per_mass = trunk.first_moment, trunk.relative_momentum, trunk.settings.inverse_mass
+    centre = place + per_mass * moment
+    momentum = trunk.settings.total_mass * velocity + drift
+    spin = level(trunk, 0.0)
+    if model.kind == RAIL:
+        centre, momentum = plane(centre.real, place.imag), plane(momentum.real, 0.0)
+    if model.kind == FREE:
+        momentum = momentum + rate * across(moment)
+        about = trunk.composite_inertia - dot(moment, moment) * per_mass
+        spin = rate * about + trunk.relative_angular_momentum - cross(moment, drift) * per_mass
+    trunk.state.moving.centre = choose(starts, centre, place)
+    trunk.state.moving.momentum = choose(starts, momentum, velocity)
+    trunk.state.moving.spin = choose(starts, spin, rate)
+
+
+@inlined
+def feel_leg(trunk, leg, elapsed):  # type: ignore[no-untyped-def]
+    """A crank's equation of motion: INERTIA theta_tt + U . a + LEVER pitch_tt = torque + ground - rest.
+
+    a is the trunk's acceleration. Here a motor's crank is solved for theta_tt as if the trunk kept still; a
+    prescribed one's is given.
+    """
+    w, frame_rate, k = leg.theta_rate, leg.beta_rate, leg.beta_by_theta
+    hip, frame, coupling = leg.hip, leg.frame_inertia, leg.crank_coupling
+    pitch_rate, sway_rate, dc = (
+        trunk.rates.pitch_rate,
+        leg.swing_acceleration,
+        leg.functions.frame_inertia_slope,
+    )
+    da, db = leg.slopes.crank_inertia, leg.slopes.coupling
+    weight = plane(level(trunk, 0.0), trunk.settings.gravity) - pitch_rate * pitch_rate * hip  # a + g of O
+    rest_theta = (
+        (coupling - k * frame) * sway_rate
+        + 0.5 * (da * (w * w) - dc * (frame_rate * frame_rate))
+        + dot(weight, leg.moment_by_theta)
+    )
+    rest_beta = frame * sway_rate + (db * w + dc * frame_rate) * w + dot(weight, across(leg.first_moment))
+    leg.rest_moment_theta, leg.rest_moment_beta = rest_theta, rest_beta
+    leg.crank_pitch_coupling = coupling + cross(hip, leg.moment_by_crank)
+    wanted, wanted_rate, _ = filtered(leg, SPEED, elapsed)
+    torque = clip(leg.settings.speed_gain * (wanted - w), leg.settings.torque_limit)
+    softness, is_motor = 1.0 / leg.crank_inertia, leg.settings.is_motor > 0.0
+    free = softness * (
+        torque + leg.ground_moment_theta - rest_theta + k * (leg.ground_moment_beta - rest_beta)
+    )
+    leg.crank_torque = torque
+    leg.crank_mobility = choose(is_motor, softness, 0.0)
+    leg.free_theta_acceleration = choose(is_motor, free, wanted_rate)
+
+
+@inlined
+def load_trunk(trunk, leg, kind, together):  # type: ignore[no-untyped-def]
+    """A leg's part in the trunk's equations, its crank eliminated, and in the outer force and moment."""
+    w, frame_rate, pitch_rate = leg.theta_rate, leg.beta_rate, trunk.rates.pitch_rate
+    s, hip, u, push = leg.first_moment, leg.hip, leg.moment_by_crank, leg.ground_force
+    mass, lever, free, softness = (
+        leg.settings.mass,
+        leg.crank_pitch_coupling,
+        leg.free_theta_acceleration,
+        leg.crank_mobility,
+    )
+    slope = leg.turn * leg.slopes.moment_slope
+    throw = (  # what the first moment does at rest of all accelerations
+        leg.swing_acceleration * across(s)
+        + w * w * slope
+        + frame_rate * (2.0 * w * across(leg.moment_by_theta) - frame_rate * s)
+    )
+    sling = pitch_rate * pitch_rate * hip  # less O's acceleration
+    soft_u = softness * u
+    trunk.load = add(trunk.load, mass * sling - throw - free * u, together)
+    trunk.mass_xx = add(trunk.mass_xx, -soft_u.real * u.real, together)
+    trunk.mass_xy = add(trunk.mass_xy, -soft_u.real * u.imag, together)
+    trunk.mass_yy = add(trunk.mass_yy, -soft_u.imag * u.imag, together)
+    trunk.rates.force = add(trunk.rates.force, push, together)
+    if kind == FREE:
+        heavy = mass * (plane(level(trunk, 0.0), trunk.settings.gravity) - sling)
+        by_frame = leg.ground_moment_beta - leg.rest_moment_beta
+        trunk.load_moment = add(
+            trunk.load_moment, by_frame + cross(hip, push - heavy - throw) - lever * free, together
+        )
+        trunk.mass_xp = add(trunk.mass_xp, -soft_u.real * lever, together)
+        trunk.mass_yp = add(trunk.mass_yp, -soft_u.imag * lever, together)
+        trunk.mass_pp = add(trunk.mass_pp, -softness * lever * lever, together)
+        off = hip + trunk.place - trunk.stage.centre
+        trunk.rates.moment = add(trunk.rates.moment, leg.ground_moment_beta + cross(off, push), together)
+
+
+@inlined
+def accelerate_trunk(trunk, kind):  # type: ignore[no-untyped-def]
+    """Solve the trunk's equations for its accelerations, by Cramer's rule."""
+    load = trunk.rates.force + trunk.load
+    xx, xy, yy = trunk.mass_xx, trunk.mass_xy, trunk.mass_yy
+    pitch_acc = level(trunk, 0.0)
+    if kind == RAIL:
+        acc = plane(load.real / xx, 0.0)
+        trunk.rates.force = plane(trunk.rates.force.real, 0.0)  # the rail takes the rest
+    elif kind == SUSPENDED:
+        per = 1.0 / (xx * yy - xy * xy)
+        acc = per * plane(yy * load.real - xy * load.imag, xx * load.imag - xy * load.real)
+    else:
+        xp, yp, pp, turning = trunk.mass_xp, trunk.mass_yp, trunk.mass_pp, trunk.load_moment
+        c_xx, c_xy, c_xp = yy * pp - yp * yp, xp * yp - xy * pp, xy * yp - yy * xp
+        c_yy, c_yp, c_pp = xx * pp - xp * xp, xy * xp - xx * yp, xx * yy - xy * xy
+        per = 1.0 / (xx * c_xx + xy * c_xy + xp * c_xp)
+        acc = per * plane(
+            c_xx * load.real + c_xy * load.imag + c_xp * turning,
+            c_xy * load.real + c_yy * load.imag + c_yp * turning,
+        )
+        pitch_acc = per * (c_xp * load.real + c_yp * load.imag + c_pp * turning)
+    if kind != FREE:
+        trunk.rates.moment = 0.0
+    trunk.acceleration = acc
+    trunk.pitch_acceleration = pitch_acc
+
+
+@inlined
+def accelerate_crank(trunk, leg):  # type: ignore[no-untyped-def]
+    """The crank's acceleration: a motor's gives way to the trunk's."""
+    pull = dot(leg.moment_by_crank, trunk.acceleration) + leg.crank_pitch_coupling * trunk.pitch_acceleration
+    leg.theta_acceleration = leg.free_theta_acceleration - leg.crank_mobility * pull

@@ -1,0 +1,126 @@
+"""What is measured of the motion: drive torques and powers, where the energy went, stances; see `mechanics`.
+
+A stance opens when the normal force on the hoof rises above a threshold, as on a force plate. It closes when
+the force falls below it (lift-off), or after one crank revolution, whichever comes first, so that a hoof that
+never lifts has a peak every revolution. While it is open its peak is the highest resultant ground reaction
+force of any step; the increases of a stance's running peak add up to that peak.
+"""
+
+from __future__ import annotations
+
+import math
+
+from hoof_env.dynamics.layout import LegRows
+from hoof_env.dynamics.mechanics import add
+from hoof_env.simd import across, choose, dot, larger, nth, root
+from hoof_env.simd.compile import inlined
+
+REVOLUTION = 2 * math.pi
+
+
+@inlined
+def find_drives(trunk, leg):  # type: ignore[no-untyped-def]
+    """Torques and powers of crank and swing from the accelerations (Lagrange's equations)."""
+    w, acc, k, sway = leg.theta_rate, leg.theta_acceleration, leg.beta_by_theta, leg.swing_rate
+    frame, pitch_acc = leg.frame_inertia, trunk.pitch_acceleration
+    coupling = leg.crank_coupling - k * frame
+    turning = pitch_acc + k * acc
+    lift = trunk.acceleration + pitch_acc * across(leg.hip)
+    by_frame = (
+        coupling * acc
+        + frame * turning
+        + leg.rest_moment_beta
+        + dot(lift, across(leg.first_moment))
+        - leg.ground_moment_beta
+    )
+    needed = (
+        (leg.functions.crank_inertia + leg.settings.rotor_crank) * acc
+        + coupling * turning
+        + leg.rest_moment_theta
+        + dot(lift, leg.moment_by_theta)
+        - leg.ground_moment_theta
+    )
+    is_motor = leg.settings.is_motor > 0.0
+    torque = choose(is_motor, leg.crank_torque, needed)
+    leg.frame_torque, leg.crank_torque, leg.crank_power = by_frame, torque, torque * w
+    leg.swing_power = by_frame * choose(is_motor, sway, k * w + sway)
+
+
+@inlined
+def keep_account(trunk, legs, leg_count, model, account, weight):  # type: ignore[no-untyped-def]
+    """Add the present stage's powers and forces, times `weight` [s], to an `Account`."""
+    velocity, together = trunk.velocity, model.together
+    drag = trunk.settings.drag * (velocity.real * velocity.real)
+    damper = trunk.settings.damper * (velocity.imag * velocity.imag)
+    account.drag_loss = account.drag_loss + weight * drag
+    account.damper_loss = account.damper_loss + weight * damper
+    for i in range(leg_count):
+        leg = nth(legs, i, LegRows)
+        find_drives(trunk, leg)
+        toe, heel = leg.toe.penetration_rate, leg.heel.penetration_rate
+        stored = leg.toe.spring_force * toe + leg.heel.spring_force * heel
+        spent = leg.toe.normal_force * toe + leg.heel.normal_force * heel - stored
+        rubbed = (
+            leg.toe.friction_force * leg.toe.sliding_speed + leg.heel.friction_force * leg.heel.sliding_speed
+        )
+        account.crank_work = add(account.crank_work, weight * leg.crank_power, together)
+        account.swing_work = add(account.swing_work, weight * leg.swing_power, together)
+        account.ground_stored = add(account.ground_stored, weight * stored, together)
+        account.ground_loss = add(account.ground_loss, weight * spent, together)
+        account.friction_loss = add(account.friction_loss, -weight * rubbed, together)
+        account.impulse = add(account.impulse, weight * leg.ground_force, together)
+
+
+@inlined
+def report_trunk(trunk, report):  # type: ignore[no-untyped-def]
+    """Fill a `TrunkReport`."""
+    report.place, report.velocity, report.acceleration = trunk.place, trunk.velocity, trunk.acceleration
+    report.pitch_rate, report.pitch_acceleration = trunk.rates.pitch_rate, trunk.pitch_acceleration
+
+
+@inlined
+def report_leg(trunk, leg, report):  # type: ignore[no-untyped-def]
+    """Fill a `LegReport`."""
+    find_drives(trunk, leg)
+    side, k, w, acc = leg.settings.side, leg.beta_by_theta, leg.theta_rate, leg.theta_acceleration
+    report.theta_acc = acc
+    report.phi = leg.phi
+    report.phi_rate = side * (k * w + leg.swing_rate)
+    report.phi_acc = side * (k * acc + leg.swing_acceleration)
+    report.crank_torque, report.hip_torque = leg.crank_torque, side * leg.frame_torque
+    report.crank_power, report.hip_power = leg.crank_power, leg.swing_power
+    report_point(leg.toe, report.toe)
+    report_point(leg.heel, report.heel)
+
+
+@inlined
+def report_point(point, report):  # type: ignore[no-untyped-def]
+    """Fill a `PointReport`."""
+    report.x, report.y, report.slide = point.place.real, point.place.imag, point.sliding_speed
+    report.normal, report.friction = point.normal_force, point.friction_force
+
+
+@inlined
+def count_stride(trunk, leg, h):  # type: ignore[no-untyped-def]
+    """Add a whole step of `h` [s] that ends here."""
+    find_drives(trunk, leg)
+    push, load = leg.ground_force, leg.toe.normal_force + leg.heel.normal_force
+    force, loaded = root(dot(push, push)), load > leg.settings.lift_off
+    was_open = (leg.strides.stance_open > 0.0) & (leg.state.theta - leg.strides.stance_began < REVOLUTION)
+    goes_on = loaded & was_open
+    begins = choose(loaded, 1.0, 0.0) - choose(goes_on, 1.0, 0.0)
+    peak = choose(goes_on, leg.strides.stance_peak, 0.0)
+    higher = choose(loaded, larger(peak, force), 0.0)
+    leg.strides.stance_open = choose(loaded, 1.0, 0.0)
+    leg.strides.stance_began = choose(begins > 0.0, leg.state.theta, leg.strides.stance_began)
+    leg.strides.stance_peak = higher
+    leg.sums.stances = leg.sums.stances + begins
+    leg.sums.peak_grf_increase = leg.sums.peak_grf_increase + (higher - peak)
+    leg.sums.highest_grf = larger(leg.sums.highest_grf, force)
+    work = larger(leg.crank_power, 0.0) + larger(leg.swing_power, 0.0)
+    leg.sums.positive_work = leg.sums.positive_work + h * work
+    leg.sums.normal_impulse = leg.sums.normal_impulse + h * load
+    down = load > 0.0
+    leg.sums.loaded_time = leg.sums.loaded_time + choose(down, h, 0.0)
+    slid = leg.toe.normal_force * leg.toe.sliding_speed + leg.heel.normal_force * leg.heel.sliding_speed
+    leg.sums.travel = leg.sums.travel - choose(down, h * slid / choose(down, load, 1.0), 0.0)

@@ -1,0 +1,112 @@
+"""One step in time: the stages of an explicit scheme (`schemes`); see `mechanics`."""
+
+from __future__ import annotations
+
+from hoof_env.dynamics.layout import LegRows
+from hoof_env.dynamics.mechanics import MOVING
+from hoof_env.dynamics.trunk import FIXED, FREE
+from hoof_env.gait.motion_law import INNER, SPEED
+from hoof_env.simd import choose, nth
+from hoof_env.simd.compile import inlined
+from hoof_env.simd.math import clip
+
+
+@inlined
+def filter_accelerations(leg, settings):  # type: ignore[no-untyped-def]
+    """Accelerations of the command filters: bounded, towards a bounded rate, towards the command.
+
+    `settings` points to gain, bound of the rate and bound of the acceleration of each filter.
+    """
+    for k in range(4):
+        gain, rate_bound, acc_bound = settings[3 * k], settings[3 * k + 1], settings[3 * k + 2]
+        wanted = clip(gain * (leg.command[k] - leg.state.gait[k]), rate_bound)
+        leg.gait_acceleration[k] = clip(INNER * gain * (wanted - leg.state.gait_rate[k]), acc_bound)
+
+
+@inlined
+def go_on(kind, to, start, factor, slope):  # type: ignore[no-untyped-def]
+    """to = start + factor slope for all rows that move; two are of the pitch."""
+    for k in range(MOVING - 2):
+        to[k] = start[k] + factor * slope[k]
+    if kind == FREE:
+        for k in range(MOVING - 2, MOVING):
+            to[k] = start[k] + factor * slope[k]
+
+
+@inlined
+def begin_step(trunk, legs, leg_count, model):  # type: ignore[no-untyped-def]
+    """The first stage is at the state itself."""
+    if model.kind != FIXED:
+        for k in range(MOVING):
+            trunk.stage[k] = trunk.state.moving[k]
+            trunk.mean_rates[k] = 0.0
+    for i in range(leg_count):
+        leg = nth(legs, i, LegRows)
+        filter_accelerations(leg, model.settings)
+        leg.theta, leg.theta_rate = leg.state.theta, leg.state.theta_rate
+        leg.mean_theta_rate, leg.mean_theta_acceleration = 0.0, 0.0
+
+
+@inlined
+def weigh_stage(trunk, legs, leg_count, model, weight):  # type: ignore[no-untyped-def]
+    """Add the derivatives at the present stage to their means."""
+    if weight == 0.0:
+        return
+    if model.kind != FIXED:
+        go_on(model.kind, trunk.mean_rates, trunk.mean_rates, weight, trunk.rates)
+    for i in range(leg_count):
+        leg = nth(legs, i, LegRows)
+        leg.mean_theta_rate = leg.mean_theta_rate + weight * leg.theta_rate
+        leg.mean_theta_acceleration = leg.mean_theta_acceleration + weight * leg.theta_acceleration
+
+
+@inlined
+def prescribed(leg, elapsed):  # type: ignore[no-untyped-def]
+    """Angle and rate of a prescribed crank `elapsed` [s] into the step, exactly as the filter moves them."""
+    value, rate, bend = leg.state.gait[SPEED], leg.state.gait_rate[SPEED], leg.gait_acceleration[SPEED]
+    theta = leg.state.theta + elapsed * (value + elapsed * (0.5 * rate + elapsed * (1 / 6) * bend))
+    return theta, value + elapsed * (rate + 0.5 * elapsed * bend)
+
+
+@inlined
+def next_stage(trunk, legs, leg_count, model, elapsed):  # type: ignore[no-untyped-def]
+    """Go `elapsed` [s] from the step's start with the derivatives of the present stage."""
+    if model.kind != FIXED:
+        go_on(model.kind, trunk.stage, trunk.state.moving, elapsed, trunk.rates)
+    for i in range(leg_count):
+        leg = nth(legs, i, LegRows)
+        is_motor = leg.settings.is_motor > 0.0
+        angle, spin = prescribed(leg, elapsed)
+        leg.theta = choose(is_motor, leg.state.theta + elapsed * leg.theta_rate, angle)
+        leg.theta_rate = choose(is_motor, leg.state.theta_rate + elapsed * leg.theta_acceleration, spin)
+
+
+@inlined
+def use_new_rates(trunk, h):  # type: ignore[no-untyped-def]
+    """Semi-implicit Euler: centre and pitch go with the velocities that the step ends with."""
+    mean = trunk.mean_rates
+    mean.velocity = mean.velocity + h * trunk.rates.force * trunk.settings.inverse_mass
+    mean.pitch_rate = mean.pitch_rate + h * trunk.pitch_acceleration
+
+
+@inlined
+def end_step(trunk, legs, leg_count, model, h):  # type: ignore[no-untyped-def]
+    """The state a step later; the filters advance exactly."""
+    if model.kind != FIXED:
+        if model.new_rates:
+            use_new_rates(trunk, h)
+        go_on(model.kind, trunk.state.moving, trunk.state.moving, h, trunk.mean_rates)
+    trunk.state.time = trunk.state.time + h
+    for i in range(leg_count):
+        leg = nth(legs, i, LegRows)
+        is_motor = leg.settings.is_motor > 0.0
+        angle, spin = prescribed(leg, h)
+        omega, mean = leg.state.theta_rate + h * leg.mean_theta_acceleration, leg.mean_theta_rate
+        if model.new_rates:
+            mean = omega
+        leg.state.theta = choose(is_motor, leg.state.theta + h * mean, angle)
+        leg.state.theta_rate = choose(is_motor, omega, spin)
+        for k in range(4):
+            rate, bend = leg.state.gait_rate[k], leg.gait_acceleration[k]
+            leg.state.gait[k] = leg.state.gait[k] + h * (rate + 0.5 * h * bend)
+            leg.state.gait_rate[k] = rate + h * bend

@@ -1,0 +1,150 @@
+"""Named rows of memory: `leg.theta` instead of a row number.
+
+A subclass of `Layout` says which fields lie one after the other, each a `Row`, a planar `Vector`, a `Block` of
+rows or another layout. Positions follow from the order, here and nowhere else. Kernels reach the fields as
+attributes, of `Rows` on the stack and of `Columns` in an array; Python reaches them by `slices` and `names`.
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, NamedTuple, get_type_hints
+
+from numba.core import types
+from numba.core.datamodel import models
+from numba.core.extending import infer_getattr, register_model, typeof_impl
+from numba.core.imputils import lower_constant, lower_getattr_generic, lower_setattr_generic
+from numba.core.typing.templates import AttributeTemplate
+
+from hoof_env.simd.rows import part_of, read_row, write_row
+from hoof_env.simd.types import INDEX, Columns, Lanes, Plane, Rows, join, split
+
+
+class Row:
+    """One number a lane."""
+
+    size: ClassVar[int] = 1
+
+
+class Vector:
+    """A planar vector: two rows, x and y."""
+
+    size: ClassVar[int] = 2
+
+
+class Block:
+    """Rows that are reached by their number."""
+
+    size: ClassVar[int]
+
+
+def block(size: int) -> Any:
+    """A `Block` of so many rows."""
+    return type(f"Block{size}", (Block,), {"size": size})
+
+
+class Field(NamedTuple):
+    """The first row of a field, and what it is: `Row`, `Vector`, a `Block` or a layout."""
+
+    start: int
+    kind: Any
+
+
+class _Named(type):
+    """Makes of the annotations of a `Layout` its fields."""
+
+    fields: dict[str, Field]
+    size: int
+    names: tuple[str, ...]
+
+    def __init__(cls, name: str, bases: Any, namespace: dict[str, Any]) -> None:
+        super().__init__(name, bases, namespace)
+        cls.fields, cls.size, names = {}, 0, []
+        for key, kind in get_type_hints(cls).items():
+            cls.fields[key] = Field(cls.size, kind)
+            cls.size += kind.size
+            names += _names(key, kind)
+        cls.names = tuple(names)
+
+    def __getitem__(cls, name: str) -> slice:
+        start, kind = cls.fields[name]
+        return slice(start, start + kind.size)
+
+
+class Layout(metaclass=_Named):
+    """Base of all layouts; the annotations of a subclass are its fields, in order.
+
+    Attributes:
+        fields: `Field`s by name.
+        size: how many rows they take.
+        names: of the rows, those of inner fields behind their field's name.
+    """
+
+
+def _names(key: str, kind: Any) -> list[str]:
+    if isinstance(kind, _Named):
+        return [f"{key}_{name}" for name in kind.names]
+    if issubclass(kind, Vector):
+        return [f"{key}_x", f"{key}_y"]
+    return [f"{key}_{k}" for k in range(kind.size)] if issubclass(kind, Block) else [key]
+
+
+class LayoutConstant(types.Opaque):  # type: ignore[misc]
+    """numba's type of a layout, which a kernel hands to `rows`, `columns` and `nth`."""
+
+    def __init__(self, layout: Any) -> None:
+        self.layout = layout
+        super().__init__(f"Layout({layout.__module__}.{layout.__qualname__})")
+
+
+register_model(LayoutConstant)(models.OpaqueModel)
+
+
+@typeof_impl.register(_Named)
+def _type_of_layout(layout: Any, context: Any) -> LayoutConstant:
+    return LayoutConstant(layout)
+
+
+@lower_constant(LayoutConstant)
+def _no_value(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+    return context.get_dummy_value()
+
+
+class _FieldsOfMemory(AttributeTemplate):  # type: ignore[misc]
+    def generic_resolve(self, memory: Any, name: str) -> Any:
+        field = memory.layout and memory.layout.fields.get(name)
+        if not field:
+            return None
+        if field.kind is Row:
+            return Lanes(memory.count)
+        if field.kind is Vector:
+            return Plane(memory.count)
+        return type(memory)(memory.count, field.kind if isinstance(field.kind, _Named) else None)
+
+
+def _get_field(context: Any, builder: Any, memory: Any, value: Any, name: str) -> Any:
+    start, kind = memory.layout.fields[name]
+    first = INDEX(start)
+    if kind is Row:
+        return read_row(context, builder, memory, value, first)
+    if kind is Vector:
+        x, y = (read_row(context, builder, memory, value, INDEX(start + k)) for k in range(2))
+        return join(context, builder, Plane(memory.count), x, y)
+    return part_of(context, builder, memory, value, first)
+
+
+def _set_field(context: Any, builder: Any, signature: Any, values: Any, name: str) -> Any:
+    (memory, given), (place, value) = signature.args, values
+    start, kind = memory.layout.fields[name]
+    if kind is Row:
+        write_row(context, builder, memory, place, INDEX(start), value)
+    elif kind is Vector:
+        for k, x in enumerate(split(context, builder, given, value)):
+            write_row(context, builder, memory, place, INDEX(start + k), x)
+    else:
+        raise TypeError(f"{name}: the rows of a block or a layout are set one by one")
+
+
+for _memory in (Rows, Columns):
+    infer_getattr(type(f"_{_memory.__name__}Fields", (_FieldsOfMemory,), {"key": _memory}))
+    lower_getattr_generic(_memory)(_get_field)
+    lower_setattr_generic(_memory)(_set_field)

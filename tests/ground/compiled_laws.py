@@ -1,0 +1,22 @@
+"""The laws of `hoof_env.ground.laws` as functions that Python can call."""
+
+import math
+
+from numba import njit
+
+from hoof_env.ground import laws
+
+
+@njit(error_model="numpy")
+def friction_coefficient(speed, law, kinetic, slow, fast):
+    return kinetic * laws.friction_part(speed, law, slow, fast)
+
+
+def friction_force(velocity, normal, law, kinetic, slow, fast):
+    return -math.copysign(friction_coefficient(abs(velocity), law, kinetic, slow, fast) * normal, velocity)
+
+
+@njit(error_model="numpy")
+def normal_force(penetration, rate, approach, stiffness, exponent, chi, dashpot):
+    spring = stiffness * max(penetration, 0.0) ** exponent
+    return laws.normal_force(spring, chi * rate / approach, dashpot * rate)
