@@ -1,6 +1,6 @@
 """The engine's kernels: environments come from the engine's memory, go step after step, and go back.
 
-`advance_leg`, `advance_four` and `advance_batch` are one function, compiled for one leg alone, for four lanes
+`advance_leg`, `advance_four` and `advance_batch` are one function, `run`, compiled for one leg alone, for four lanes
 that are the legs of one trunk, and for `LANES` environments side by side with any number of legs; `react_leg`
 and so on are the same with joint reactions, a fifth more to compile. What they work on lives on the stack,
 where the compiler keeps what it can in registers.
@@ -11,12 +11,14 @@ each leg, as `TRUNK` and `LIMB` have them.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
 from numba import carray  # type: ignore[attr-defined]
 
-from hoof_env.dynamics.hoof import level_ground, remember_contacts
+from hoof_env.dynamics.hoof import law_of, level_ground, remember_contacts
 from hoof_env.dynamics.layout import Account, LegMemory, LegRows, TrunkMemory, TrunkRows
 from hoof_env.dynamics.mechanics import evaluate, keep_still, settle
 from hoof_env.dynamics.observables import count_stride, keep_account, report_leg, report_trunk
@@ -24,7 +26,7 @@ from hoof_env.dynamics.reactions import LegConstants, Reactions, react
 from hoof_env.dynamics.stepping import begin_step, end_step, next_stage, weigh_stage
 from hoof_env.dynamics.trunk import FIXED
 from hoof_env.simd import anywhere, choose, columns, fill, lane_sum, level, nth, rows
-from hoof_env.simd.compile import inlined, kernel, pasted
+from hoof_env.simd.compile import fingerprint, inlined, kernel, pasted
 from hoof_env.simd.memory import address, doubles, offset
 
 LANES = 8
@@ -67,6 +69,7 @@ class Model(NamedTuple):
         tables: pointer to the tables of all legs, one after the other.
         settings, fractions, weights: pointers.
         ground_cells: of the terrain's grid.
+        law: of contact, see `hoof.law_of`.
     """
 
     kind: int
@@ -86,10 +89,11 @@ class Model(NamedTuple):
     ground_cells: Any
     ground_origin: float
     ground_per_metre: float
+    law: Any
 
 
 @inlined
-def inner(model, tables, ground, small, together):  # type: ignore[no-untyped-def]
+def inner(model, tables, ground, small, together, law):  # type: ignore[no-untyped-def]
     """The model from its record and arrays; `small` points to room for 20 doubles."""
     given = model[0]
     for k in range(12):
@@ -100,7 +104,7 @@ def inner(model, tables, ground, small, together):  # type: ignore[no-untyped-de
         given.kind, given.eighths, given.friction_law, given.interpolated, given.is_terrain, given.new_rates,
         given.strides, together, given.cells, address(tables),
         small, given.stages, offset(small, 12), offset(small, 16),
-        carray(address(ground), ground.shape), given.ground_origin, given.ground_per_metre,
+        carray(address(ground), ground.shape), given.ground_origin, given.ground_per_metre, law,
     )  # fmt: skip
 
 
@@ -185,20 +189,9 @@ def run_steps(  # type: ignore[no-untyped-def]
 
 @pasted
 def run(  # type: ignore[no-untyped-def]
-    data,
-    model,
-    tables,
-    ground,
-    constants,
-    reactions,
-    h,
-    steps,
-    keeps_account,
-    leg_count,
-    lanes,
-    together,
-    reacts,
-):
+    data, model, tables, ground, constants, reactions, h, steps, keeps_account,
+    leg_count, lanes, together, reacts, law,
+):  # fmt: skip
     """Advance all environments: `lanes` at a time, or one whose legs the lanes are. With `steps` below 0
     those start whose result is `STARTS`. Unless `reacts`, a constant, no code for reactions is made."""
     trunk = rows(doubles(TRUNK_SIZE * lanes), lanes, TrunkRows)
@@ -206,7 +199,7 @@ def run(  # type: ignore[no-untyped-def]
     account = rows(doubles(ACCOUNT_SIZE * lanes), lanes, Account)
     shapes = rows(doubles(leg_count * CONSTANTS_SIZE * lanes), lanes, None)
     forces = rows(doubles(leg_count * REACTIONS_SIZE * lanes), lanes, None)
-    inside = inner(model, tables, ground, doubles(20), together)
+    inside = inner(model, tables, ground, doubles(20), together, law)
     at, row = address(data), data.shape[1]
     # lanes are neighbours, but where they are legs, as far apart as legs are
     envs, near, far = lanes, 1, 1
@@ -260,41 +253,39 @@ def run(  # type: ignore[no-untyped-def]
                     out[k] = kept[k]
 
 
-@kernel
-def advance_leg(data, model, tables, ground, constants, reactions, h, steps, keeps_account):  # type: ignore[no-untyped-def]
-    """Each environment by itself; they have one leg."""
-    run(data, model, tables, ground, constants, reactions, h, steps, keeps_account, 1, 1, False, False)
+class AdvanceKernels(NamedTuple):
+    """Each environment by itself with one leg, or with four side by side; or `LANES` environments at a time with
+    any number of legs. Those that react compute joint reactions too."""
+
+    advance_leg: Any
+    advance_four: Any
+    advance_batch: Any
+    react_leg: Any
+    react_four: Any
+    react_batch: Any
 
 
-@kernel
-def advance_four(data, model, tables, ground, constants, reactions, h, steps, keeps_account):  # type: ignore[no-untyped-def]
-    """Each environment by itself; they have four leg_count, side by side."""
-    run(data, model, tables, ground, constants, reactions, h, steps, keeps_account, 1, 4, True, False)
+@cache
+def advance_kernels(contact_law: Callable[..., Any] | None = None) -> AdvanceKernels:
+    """The kernels with a law of contact, see `hoof.law_of`; None is that of `ground.laws`."""
+    law, identity = law_of(contact_law), fingerprint(contact_law)
 
+    def made(name: str, legs: int, lanes: int, together: bool, reacts: bool) -> Any:
+        def advance(data, model, tables, ground, constants, reactions, h, steps, keeps_account):  # type: ignore[no-untyped-def]
+            count = legs if legs else model[0].legs
+            run(
+                data, model, tables, ground, constants, reactions, h, steps, keeps_account,
+                count, lanes, together, reacts, law,
+            )  # fmt: skip
 
-@kernel
-def advance_batch(data, model, tables, ground, constants, reactions, h, steps, keeps_account):  # type: ignore[no-untyped-def]
-    """`LANES` environments at a time, with any number of legs."""
-    count = model[0].legs
-    run(
-        data, model, tables, ground, constants, reactions, h, steps, keeps_account, count, LANES, False, False
+        advance.__name__ = name
+        return kernel(advance, f"{name} {identity}")
+
+    return AdvanceKernels(
+        made("advance_leg", 1, 1, False, False),
+        made("advance_four", 1, 4, True, False),
+        made("advance_batch", 0, LANES, False, False),
+        made("react_leg", 1, 1, False, True),
+        made("react_four", 1, 4, True, True),
+        made("react_batch", 0, LANES, False, True),
     )
-
-
-@kernel
-def react_leg(data, model, tables, ground, constants, reactions, h, steps, keeps_account):  # type: ignore[no-untyped-def]
-    """As `advance_leg`, with joint reactions."""
-    run(data, model, tables, ground, constants, reactions, h, steps, keeps_account, 1, 1, False, True)
-
-
-@kernel
-def react_four(data, model, tables, ground, constants, reactions, h, steps, keeps_account):  # type: ignore[no-untyped-def]
-    """As `advance_four`, with joint reactions."""
-    run(data, model, tables, ground, constants, reactions, h, steps, keeps_account, 1, 4, True, True)
-
-
-@kernel
-def react_batch(data, model, tables, ground, constants, reactions, h, steps, keeps_account):  # type: ignore[no-untyped-def]
-    """As `advance_batch`, with joint reactions."""
-    count = model[0].legs
-    run(data, model, tables, ground, constants, reactions, h, steps, keeps_account, count, LANES, False, True)

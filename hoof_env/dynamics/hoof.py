@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 from hoof_env.ground.laws import friction_part, normal_force
 from hoof_env.ground.surface import surface
 from hoof_env.simd import across, anywhere, choose, cross, dot, larger, level, plane, size
@@ -68,7 +71,9 @@ def meet_point(trunk, leg, point, memory, arm, arm_by_theta, hip, hip_velocity, 
         if anywhere(inside & (inverse_speed == 0.0)):
             entering = inverse_entry_speed(trunk, memory, penetration, rate, model)
             inverse_speed = choose(inverse_speed > 0.0, inverse_speed, entering)
-        pushed, stored = push_back(trunk, point.stiffness_scale, penetration, rate, inverse_speed, model)
+        pushed, stored = model.law(
+            trunk.settings, point.stiffness_scale, penetration, rate, inverse_speed, model.eighths
+        )
         laws = trunk.settings
         part = friction_part(size(sliding_speed), model.friction_law, laws.friction_slow, laws.friction_fast)
         grip = laws.friction * point.friction_scale * part * pushed  # Eq. 15
@@ -95,15 +100,34 @@ def inverse_entry_speed(trunk, memory, penetration, rate, model):  # type: ignor
 
 
 @inlined
-def push_back(trunk, stiffness_scale, penetration, rate, inverse_speed, model):  # type: ignore[no-untyped-def]
+def push_back(ground, stiffness_scale, penetration, rate, inverse_speed, eighths):  # type: ignore[no-untyped-def]
     """Normal force on a point inside the ground (Eq. 14), and its spring's part [N]."""
-    if model.eighths == 12:  # the usual exponent, 3/2
+    if eighths == 12:  # the usual exponent, 3/2
         power = root_power(penetration, 12)
     else:
-        power = root_power(penetration, model.eighths)
-    laws = trunk.settings
-    spring = laws.stiffness * stiffness_scale * power
-    return normal_force(spring, laws.chi * rate * inverse_speed, laws.dashpot * rate), spring
+        power = root_power(penetration, eighths)
+    spring = ground.stiffness * stiffness_scale * power
+    return normal_force(spring, ground.chi * rate * inverse_speed, ground.dashpot * rate), spring
+
+
+def law_of(contact_law: Callable[..., Any] | None) -> Any:
+    """What the kernels take for the normal force: `push_back`, or somebody's own law in the same place.
+
+    Args:
+        contact_law: function of the penetration [m], its rate [m/s], the inverse of the approach speed [s/m] and
+            the ground's constants (fields as in `layout.TrunkSettings`); returns the normal force [N], of which
+            what pulls is cut off. None of it counts as stored in the ground.
+    """
+    if contact_law is None:
+        return push_back
+    force = inlined(contact_law)
+
+    @inlined
+    def push(ground, stiffness_scale, penetration, rate, inverse_speed, eighths):  # type: ignore[no-untyped-def]
+        pushed = larger(force(penetration, rate, inverse_speed, ground) * stiffness_scale, 0.0)
+        return pushed, 0.0 * pushed
+
+    return push
 
 
 @inlined

@@ -8,7 +8,7 @@ module is the border: checks and state. A number has the same bits alone and in 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -20,12 +20,7 @@ from hoof_env.dynamics.advance import (
     LEG_ROWS,
     STARTS,
     TRUNK_ROWS,
-    advance_batch,
-    advance_four,
-    advance_leg,
-    react_batch,
-    react_four,
-    react_leg,
+    advance_kernels,
 )
 from hoof_env.dynamics.arguments import Floats, all_of, count, finite, flag, one_of
 from hoof_env.dynamics.drive import Drive
@@ -105,6 +100,7 @@ class TrunkEngine:
         filters: bounds of the command filters.
         reactions: compute the joint reactions of every step; `reactions()` has those of the last.
         strides: count stances, peak forces and work; `strides` has them.
+        contact_law: instead of the ground's normal law, see `hoof.law_of`.
 
     Attributes:
         is_few: environments are run one by one, not side by side.
@@ -136,7 +132,9 @@ class TrunkEngine:
         filters: FilterSettings | None = None,
         reactions: bool = False,
         strides: bool = False,
+        contact_law: Callable[..., Any] | None = None,
     ) -> None:
+        self.contact_law = contact_law
         self.limbs = all_of("limbs", limbs, Limb)
         if len(self.limbs) > MOST_LEGS:
             raise ParameterError(f"limbs: expected at most {MOST_LEGS}, got {len(self.limbs)}")
@@ -153,21 +151,24 @@ class TrunkEngine:
         asked = None if substeps is None else count("substeps", substeps, most=MOST_STEPS)
         self.substeps = length.choose(self.sim_dt, asked)
         self.reacts, self.counts_strides = flag("reactions", reactions), flag("strides", strides)
-        plain, reacting = (advance_leg, advance_four, advance_batch), (react_leg, react_four, react_batch)
-        one, four, many = reacting if self.reacts else plain
-        alone = {1: one, 4: four}.get(len(self.limbs))
-        self.is_few = alone is not None and self.num_envs <= FEW
-        self._run = (alone if self.is_few else None) or many
+        self.is_few = len(self.limbs) in (1, 4) and self.num_envs <= FEW
+        self._choose_kernel()
         self._memory = new_memory(self, self.num_envs if self.is_few else columns_for(self.num_envs))
         self._model = new_model(self)
 
+    def _choose_kernel(self) -> None:
+        kernels = advance_kernels(self.contact_law)
+        one, four, many = kernels[3:] if self.reacts else kernels[:3]
+        self._run = (one if len(self.limbs) == 1 else four) if self.is_few else many
+
     def __getstate__(self) -> dict[str, Any]:
         """A copy has memory of its own, also a shallow one."""
-        m = self._memory
-        return {**vars(self), "_memory": (m.data.copy(), self.num_envs, m.constants, m.reactions.copy())}
+        m, parts = self._memory, {name: part for name, part in vars(self).items() if name != "_run"}
+        return {**parts, "_memory": (m.data.copy(), self.num_envs, m.constants, m.reactions.copy())}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state, _memory=memory_of(*state["_memory"]))
+        self._choose_kernel()
 
     # What it is like
 
@@ -228,6 +229,7 @@ class TrunkEngine:
         return TrunkEngine(
             self.limbs, self.trunk, self.ground, self.terrain, sim_dt=self.sim_dt, integrator=self.integrator,
             substeps=self.substeps, filters=self.filters, reactions=self.reacts, strides=self.counts_strides,
+            contact_law=self.contact_law,
         )  # fmt: skip
 
     # State

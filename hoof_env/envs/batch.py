@@ -13,19 +13,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.advance import LIMB, TRUNK, TRUNK_ROWS
+from hoof_env.dynamics.advance import TRUNK_ROWS
 from hoof_env.dynamics.drive import LARGEST, Drive
 from hoof_env.dynamics.integrators import INTEGRATORS
+from hoof_env.dynamics.layout import LegMemory, TrunkMemory
 from hoof_env.dynamics.limb import Limb
 from hoof_env.dynamics.result import Result
 from hoof_env.dynamics.schemes import SCHEMES
 from hoof_env.dynamics.step_length import StepLength
 from hoof_env.dynamics.trunk import GRAVITY, ONE_LEG, Trunk
 from hoof_env.dynamics.trunk_engine import TrunkEngine
-from hoof_env.envs import episode as e
+from hoof_env.envs import step as kernels
+from hoof_env.envs.episode import ACTIONS, SUMS, episode_layout
 from hoof_env.envs.grounds import make_terrain
-from hoof_env.envs.infos import AT_MEASURED, BEGUN, GAIT, MEASUREMENTS, START, SUMS, named
-from hoof_env.envs.observation import GROUPS, HALF_RANGE, HIGH, LOW, MIDDLE, check_groups, entries, places
+from hoof_env.envs.infos import AT_MEASURED, BEGUN, GAIT, LAST_STEP, MEASUREMENTS, START, named
+from hoof_env.envs.observation import HALF_RANGE, HIGH, LOW, MIDDLE, check_groups, groups_of, observed
 from hoof_env.envs.paper_solver import PaperSolver, check_paper
 from hoof_env.envs.parameters import (
     check_parameters,
@@ -36,7 +38,7 @@ from hoof_env.envs.parameters import (
     resolved,
     substeps_of,
 )
-from hoof_env.envs.reward import RewardWeights
+from hoof_env.envs.reward import check_weights
 from hoof_env.envs.start import HIGHEST, LOWEST, check_options, draw_starts
 from hoof_env.envs.summary import summary_of
 from hoof_env.envs.tasks import Settings, Task
@@ -46,6 +48,7 @@ from hoof_env.ground.contact import Ground
 from hoof_env.ground.preset import load_ground
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.profile import leg_profile
+from hoof_env.simd.layout import views
 
 Floats = NDArray[np.float64]
 
@@ -62,9 +65,13 @@ class EpisodeBatch:
     Attributes:
         task, settings: what it is.
         engine: the mechanics of all.
-        names: of the observation's entries.
-        kernel, desk: one control step of all is `kernel(desk)`; then comes `follow`.
-        episode: memory of the episodes, rows as in `episode`, shape (EPISODE_ROWS, columns).
+        entries, names: of the observation.
+        terms: keys of the reward's terms in infos.
+        kernel, addresses: one control step of all is `kernel(addresses)`; then comes `follow`.
+        episode: memory of the episodes, rows as in `episode.Episode`, shape (rows, columns).
+        now: the same by name, shape (columns,) or (rows, columns) each.
+        actions, observations, rewards: what a step takes and gives, shapes (columns, 4), (columns, entries),
+            (columns,).
         begun: what they started with: rows `infos.START`, the gait and what `randomize` drew, a column an
             environment; not a number where a state does not say.
 
@@ -92,7 +99,8 @@ class EpisodeBatch:
         self.gaits = {name: load_gait(name, s.preset) for name in gait_names(s.preset)}
         self.gait = None if s.gait is None else self.gaits[check_choice("gait", s.gait, self.gaits)]
         self._base = MIDDLE if self.gait is None else self.gait.to_array()
-        self.weights = RewardWeights.of(s.reward_weights)
+        self.terms = tuple(term.key for term in task.terms)
+        self.weights = check_weights(s.reward_weights, task.terms)
         self.substeps = substeps_of(s.dt, s.sim_dt)
         self.dt = s.sim_dt * self.substeps
         low = self.dt * (1 - 1e-9)
@@ -103,7 +111,7 @@ class EpisodeBatch:
         nominal = self.geometry.hip_height
         height = nominal if s.hip_height is None else s.hip_height
         self.height = check_number("hip_height", height, low=LOWEST * nominal, high=HIGHEST * nominal)
-        self.groups = check_groups(s.observation, GROUPS)
+        self.groups = check_groups(s.observation, groups_of(task.entries))
         self.target_speed = None if s.target_speed is None else pair("target_speed", s.target_speed, -20.0)
         self.target_seconds = pair("target_seconds", s.target_seconds, self.dt if self.target_speed else 0.0)
         for group, needed in (("target", "target_speed"), ("ground", "terrain")):
@@ -119,22 +127,23 @@ class EpisodeBatch:
         self.engine = TrunkEngine(
             Limb(self.geometry, drive=drive), trunk, ground, self._terrain, substeps=substeps,
             sim_dt=s.sim_dt, integrator="midpoint" if is_paper else s.integrator,
-            num_envs=num_envs, strides=True,
+            num_envs=num_envs, strides=True, contact_law=task.contact_law,
         )  # fmt: skip
         self.paper = PaperSolver(s, self.engine, self.substeps) if is_paper else None
         self._varied = np.zeros(num_envs, bool)
         self.begun = np.full((BEGUN + len(self.randomize), num_envs), np.nan)
-        self.names = [entry[0] for entry in entries(self.groups, s.trunk)]
+        self.entries = observed(self.groups, s.trunk, task.entries)
+        self.names = [entry.name for entry in self.entries]
         if not self.names:
             raise ParameterError(f"observation: nothing of {s.observation!r} is observed on a fixed trunk")
         columns = self.engine.columns
-        self.episode = np.zeros((e.EPISODE_ROWS, columns))
-        self.episode[e.ACTION : e.ACTION + e.ACTIONS] = 0.0
-        self.episode[e.WEIGHT] = self.engine.weight
-        self.actions = np.zeros((columns, e.ACTIONS), np.float32)
-        self.seen = np.zeros((columns, len(self.names)), np.float32)
+        self.episode = np.zeros((episode_layout(len(task.terms)).size, columns))
+        self.actions = np.zeros((columns, ACTIONS), np.float32)
+        self.observations = np.zeros((columns, len(self.names)), np.float32)
+        self.rewards = np.zeros(columns)
         self._task = self._task_record()
         self._open()
+        self.now.weight[:] = self.engine.weight
         self._compile()
 
     def _physics(self, changes: Mapping[str, float]) -> tuple[Trunk, Ground, Drive]:
@@ -142,52 +151,65 @@ class EpisodeBatch:
         return physics(self.settings, self.height, changes)
 
     def _task_record(self) -> NDArray[Any]:
-        found = np.zeros(1, e.TASK)
+        slots, _, count = kernels.slots_of(self.task.entries)
+        found = np.zeros(1, kernels.task_type(len(self.task.terms), count))
         task = found[0]
         task["base"], task["middle"] = self._base, MIDDLE
         task["half"], task["low"], task["high"] = HALF_RANGE, LOW, HIGH
         task["rate_bound"] = self.engine.filters.to_array()[:, 1]
-        w = self.weights
-        task["weights"] = w.progress, w.peak, w.energy, w.action, w.failure, w.support
-        task["failure_seconds"] = self.episode_seconds
+        task["weights"] = [self.weights[term.name] for term in self.task.terms]
+        task["episode_seconds"] = self.episode_seconds
         task["h"], task["substeps"] = self.engine.substep, self.substeps * self.engine.substeps
         task["dt"], task["episode_steps"] = self.dt, self.steps_per_episode
         task["height"] = self.height
         task["lowest"], task["highest"] = LOWEST * self.height, HIGHEST * self.height
-        task["stays"], task["sees_ground"] = self.settings.trunk == "fixed", "ground" in self.groups
-        task["count"], task["places"] = len(self.names), places(self.names, e.ENTRIES)
+        task["stays"] = self.settings.trunk == "fixed"
+        task["count"], task["places"] = len(self.names), -1
+        for entry, slot in zip(self.task.entries, slots, strict=True):
+            if entry in self.entries:
+                task["places"][slot] = self.entries.index(entry)
         return found
 
     def _open(self) -> None:
-        """Make the desk: addresses of the arrays as they are now."""
-        one, many = (e.step_one, e.look_one), (e.step_batch, e.look_batch)
-        self.kernel, self._look = one if self.engine.is_few or self.paper else many
+        """Find the arrays where they are now, and the kernels."""
+        self.now = views(episode_layout(len(self.task.terms)), self.episode)
+        self._kernels = k = kernels.step_kernels(self.task.terms, self.task.entries, self.task.contact_law)
+        is_few = self.engine.is_few or self.paper
+        self.kernel, self._observe = (
+            (k.step_one, k.observe_one) if is_few else (k.step_batch, k.observe_batch)
+        )
         if self.paper:
             self.kernel = self._step_paper
-        arrays = (*self.engine.arrays, self.episode, self._task, self.actions, self.seen)
-        slots = [[a.ctypes.data, *a.shape, *[0] * (3 - a.ndim)] for a in arrays]
-        self.desk = np.array(slots, np.int64).ravel()
+        self.addresses = kernels.ADDRESSES.of(
+            *self.engine.arrays, self.episode, self._task, self.actions, self.observations, self.rewards
+        )
 
     def _compile(self) -> None:
         """Have every kernel of a step compiled, or loaded, by running it on no environment: what a parent
         makes warms the cache for its workers."""
-        nobody, gait = self.desk.copy(), GaitParameters.from_array(MIDDLE)
-        nobody[2] = 0  # columns
-        for run in (e.take_one, e.judge_one) if self.paper else (self.kernel,):
+        nobody, gait = self.addresses.copy(), GaitParameters.from_array(MIDDLE)
+        nobody[kernels.AT.data + kernels.COLUMNS] = 0
+        for run in (self._kernels.apply_one, self._kernels.finish_one) if self.paper else (self.kernel,):
             run(nobody)
         if self.paper:
             self.paper.compile(gait)
-        self._look(nobody)
+        self._observe(nobody)
         self.engine.reset(gait, envs=[])
 
-    def _step_paper(self, desk: NDArray[np.int64]) -> int:
-        """As `episode.step_one`, with the paper's solver."""
+    def _step_paper(self, addresses: NDArray[np.int64]) -> int:
+        """As `StepKernels.step_one`, with the paper's solver."""
         assert self.paper
-        if not e.take_one(desk):
-            return e.NOT_A_NUMBER
+        if not self._kernels.apply_one(addresses):
+            return kernels.NOT_A_NUMBER
         self.paper.advance()
-        said: int = e.judge_one(desk)
-        return said
+        happened: int = self._kernels.finish_one(addresses)
+        return happened
+
+    def measured(self) -> dict[str, Floats]:
+        """What is observed now, before it is scaled: the entries by name, shape (num_envs,)."""
+        out = np.zeros((len(self.names), self.num_envs))
+        self._kernels.measure_one(self.addresses, out)
+        return dict(zip(self.names, out, strict=True))
 
     # Episodes
 
@@ -244,7 +266,7 @@ class EpisodeBatch:
             What was drawn, by name, one row an environment: gaits, crank_angle, speed, height, x; and
             "parameters", those of this episode by name.
         """
-        which, columns = np.asarray(envs, np.int64), self.episode
+        which, now = np.asarray(envs, np.int64), self.now
         options = {**self.task.start, **options}
         parameters = self.randomize | options.get("parameters", {})
         drawn = {name: np.zeros(len(which)) for name in parameters}
@@ -255,7 +277,7 @@ class EpisodeBatch:
                     drawn[name][k] = value
                 trunk, ground, drive = self._physics(values)
                 self.engine.vary(int(env), trunk, ground, drive)
-                columns[e.WEIGHT, env] = (trunk.mass + self.geometry.mass) * GRAVITY
+                now.weight[env] = (trunk.mass + self.geometry.mass) * GRAVITY
             self._varied[which] = bool(parameters)
         start = draw_starts(
             options, generators, self.engine.profiles[0], self.engine.trunk, self.gaits, self.engine.terrain,
@@ -271,26 +293,27 @@ class EpisodeBatch:
         )
         begun = [*(getattr(start, name) for name in START), *start.gaits.T]
         self.begun[:, which] = [*begun, *(drawn[name] for name in self.randomize)]
-        columns[e.ACTION : e.ACTION + 4, which] = self.action_for(start.gaits).T
-        columns[e.STEPS, which], columns[e.BEFORE, which], columns[e.ENDED, which] = 0.0, start.x, 0.0
-        columns[e.TIME : e.HIGHEST + 1, which] = 0.0
-        columns[e.TERM : e.TERM + len(e.TERMS), which] = 0.0
-        columns[e.TARGET, which], columns[e.SWITCH, which] = np.inf, np.inf
+        now.action[:, which] = self.action_for(start.gaits).T
+        now.steps[which], now.x_before[which], now.ended[which] = 0.0, start.x, 0.0
+        for name in SUMS:
+            getattr(now, name)[which] = 0.0
+        self.rewards[which] = 0.0
+        now.terms[:, which], now.target[which], now.switch[which] = 0.0, np.inf, np.inf
         if self.target_speed:
             for env, generator in zip(which, generators, strict=True):
-                columns[e.TARGET, env] = generator.uniform(*self.target_speed)
+                now.target[env] = generator.uniform(*self.target_speed)
                 self._draw_target(int(env), generator)
         if self.paper:
             self.paper.start(which.tolist(), start.gaits, start.crank_angle, start.x)
-        self._look(self.desk)
+        self._observe(self.addresses)
         return {**vars(start), "parameters": drawn}
 
     def _draw_target(self, env: int, generator: np.random.Generator) -> None:
         """Draw the next commanded speed, and when."""
         assert self.target_speed
-        now = self.episode[e.STEPS, env]
-        self.episode[e.SWITCH, env] = now + round(generator.uniform(*self.target_seconds) / self.dt)
-        self.episode[e.NEXT_TARGET, env] = generator.uniform(*self.target_speed)
+        steps = round(generator.uniform(*self.target_seconds) / self.dt)
+        self.now.switch[env] = self.now.steps[env] + steps
+        self.now.next_target[env] = generator.uniform(*self.target_speed)
 
     def step(self, generators: Sequence[np.random.Generator], idle: NDArray[np.bool_] | None = None) -> bool:
         """One control step under `actions`; returns whether any episode ended.
@@ -302,31 +325,31 @@ class EpisodeBatch:
         Raises:
             ParameterError: an action is not a number; nothing has happened then.
         """
-        return self.follow(self.kernel(self.desk), generators, idle)
+        return self.follow(self.kernel(self.addresses), generators, idle)
 
     def follow(
-        self, said: int, generators: Sequence[np.random.Generator], idle: NDArray[np.bool_] | None = None
+        self, happened: int, generators: Sequence[np.random.Generator], idle: NDArray[np.bool_] | None = None
     ) -> bool:
-        """`step` after its kernel, which said so."""
-        if said < 0:
+        """`step` after its kernel, which returned what happened."""
+        if happened == kernels.NOT_A_NUMBER:
             raise ParameterError("action: expected finite numbers, got some that are not")
-        if said & 1 and not self.paper and self.engine.results.any():
-            self._look_again()
-        if said & e.SWITCHED:
-            due = self.episode[e.STEPS, : self.num_envs] >= self.episode[e.SWITCH, : self.num_envs]
+        if happened & kernels.SOME_ENDED and not self.paper and self.engine.results.any():
+            self._observe_broken()
+        if happened & kernels.SOME_SWITCHED:
+            due = (self.now.steps >= self.now.switch)[: self.num_envs]
             for env in np.flatnonzero(due if idle is None else due & ~idle):
                 self._draw_target(int(env), generators[int(env)])
-        return bool(said & 1)
+        return bool(happened & kernels.SOME_ENDED)
 
-    def _look_again(self) -> None:
+    def _observe_broken(self) -> None:
         """Observe the last good state of what could not be simulated, whose report is of where it broke."""
         data, broken = self.engine.arrays[0], np.flatnonzero(self.engine.results)
-        kept, limb = data.copy(), LIMB["report"]
+        kept, leg = data.copy(), LegMemory["report"]
         self.engine.advance(None, 0)
-        for rows in (TRUNK["report"], slice(TRUNK_ROWS + limb.start, TRUNK_ROWS + limb.stop)):
+        for rows in (TrunkMemory["report"], slice(TRUNK_ROWS + leg.start, TRUNK_ROWS + leg.stop)):
             kept[rows, broken] = data[rows, broken]
         data[:] = kept
-        self._look(self.desk)
+        self._observe(self.addresses)
 
     def infos(self, ended: bool = True) -> dict[str, NDArray[Any]]:
         """What all started with, what is measured of them, and the terms of the last reward, by name: shape
@@ -336,18 +359,18 @@ class EpisodeBatch:
         measured = memory[AT_MEASURED, :n].copy()
         if ended:
             broken = self.engine.results != 0
-            measured[-SUMS:, broken] = 0.0  # nothing happened there
+            measured[LAST_STEP, broken] = 0.0  # nothing happened there
         found: dict[str, NDArray[Any]] = dict(zip(START, begun, strict=False))
         found["gait"] = begun[len(START) : BEGUN].T.view(GAIT)
         if self.randomize:
             found["parameters"] = named(begun[BEGUN:].T, tuple(self.randomize))
         found["measured"] = measured.T.view(MEASUREMENTS)
-        found.update(zip(e.TERMS, self.episode[e.TERM : e.TERM + len(e.TERMS), :n].copy(), strict=True))
+        found.update(zip(self.terms, self.now.terms[:, :n].copy(), strict=True))
         return found
 
     def summary(self, env: int) -> dict[str, float]:
         """Figures of an episode, see `summary.summary_of`."""
-        return summary_of(self.episode[:, env].tolist(), self.dt)
+        return summary_of(self.now, env, self.dt)
 
     def failure(self, env: int) -> str:
         """Why an episode failed, for people."""
@@ -377,7 +400,7 @@ class EpisodeBatch:
             values = gaits.to_array() if isinstance(gaits, GaitParameters) else np.asarray(gaits, np.float64)
         except (TypeError, ValueError):
             values = np.empty(0)
-        if values.shape[-1:] != (e.ACTIONS,) or not np.isfinite(values).all():
+        if values.shape[-1:] != (ACTIONS,) or not np.isfinite(values).all():
             raise ParameterError(
                 f"gait: expected one of {', '.join(self.gaits)}, GaitParameters or an array of shape (4,) or "
                 f"(n, 4), got {gaits!r}"
@@ -398,7 +421,7 @@ class EpisodeBatch:
         Raises:
             ParameterError: the state is of another task, geometry or setting.
         """
-        expected = (e.EPISODE_ROWS, self.num_envs)
+        expected = (len(self.episode), self.num_envs)
         try:
             episode = np.asarray(state["episode"], np.float64)
         except (TypeError, ValueError):
@@ -421,10 +444,14 @@ class EpisodeBatch:
             self.paper.set_state(*of_paper)
         self.episode[:, : self.num_envs], self.begun[:] = episode, begun
         self._varied[:] = True
-        self._look(self.desk)
+        self._observe(self.addresses)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {key: value for key, value in vars(self).items() if key not in ("desk", "kernel", "_look")}
+        return {
+            key: value
+            for key, value in vars(self).items()
+            if key not in ("addresses", "kernel", "now", "_kernels", "_observe")
+        }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)

@@ -14,12 +14,11 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.trunk_engine import TrunkEngine
 from hoof_env.dynamics.trunk_model import LIFT_OFF
-from hoof_env.envs import episode as e
 from hoof_env.envs.batch import EpisodeBatch
-from hoof_env.envs.infos import AT_MEASURED, BEGUN, MEASURED, START, SUMS, named
+from hoof_env.envs.episode import ACTIONS, FAILED
+from hoof_env.envs.infos import AT_MEASURED, BEGUN, LAST_STEP, MEASURED, START, named
 from hoof_env.envs.keywords import Keywords
 from hoof_env.envs.made import Made
-from hoof_env.envs.raw_observation import UNITS, raw_observation
 from hoof_env.envs.recording import Recording
 from hoof_env.envs.start import check_seed
 from hoof_env.envs.state import check_state, generator_of
@@ -30,7 +29,7 @@ from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
 
 RENDER_MODES = ("human", "rgb_array")
-_SHAPE = (e.ACTIONS,)
+_SHAPE = (ACTIONS,)
 
 
 class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
@@ -66,7 +65,7 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.batch = EpisodeBatch(self.task, self.settings, 1)
         self.observation_names = tuple(self.batch.names)
         self.observation_space = spaces.Box(-1.0, 1.0, (len(self.observation_names),), np.float32)
-        self.action_space = spaces.Box(-1.0, 1.0, (e.ACTIONS,), np.float32)
+        self.action_space = spaces.Box(-1.0, 1.0, (ACTIONS,), np.float32)
         self.render_mode = render_mode
         self.metadata = {**type(self).metadata, "render_fps": max(1, round(1 / self.batch.dt))}  # type: ignore[misc]
         self._recording: Recording | None = Recording(self.batch) if render_mode else None
@@ -76,11 +75,13 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def _attach(self) -> None:
         """Views of the batch that every step reads or writes."""
-        self._terms = self.batch.episode[e.TERM : e.TERM + len(e.TERMS), 0]
-        self._action, self._seen = self.batch.actions[0], self.batch.seen[0]
-        self._taken: Any = memoryview(self._action)
-        self._measured = named(self.batch.engine.arrays[0][AT_MEASURED, 0], MEASURED)
-        self._step, self._desk = self.batch.kernel, self.batch.desk
+        batch = self.batch
+        self._terms, self._reward = batch.now.terms[:, 0], memoryview(batch.rewards)
+        self._paid = [(key, k) for k, key in enumerate(batch.terms) if batch.weights[key[len("reward_") :]]]
+        self._action, self._observation = batch.actions[0], batch.observations[0]
+        self._action_buffer: Any = memoryview(self._action)
+        self._measured = named(batch.engine.arrays[0][AT_MEASURED, 0], MEASURED)
+        self._kernel, self._addresses = batch.kernel, batch.addresses
 
     # What pictures, records and policies read
 
@@ -114,7 +115,7 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     @property
     def weight(self) -> float:
         """Weight of trunk and leg [N]."""
-        return float(self.batch.episode[e.WEIGHT, 0])
+        return float(self.batch.now.weight[0])
 
     @property
     def dt(self) -> float:
@@ -155,7 +156,7 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     @property
     def observation_units(self) -> tuple[str, ...]:
         """Of what `raw_observation` gives, in the observation's order."""
-        return tuple(UNITS[name] for name in self.batch.names)
+        return tuple(entry.unit for entry in self.batch.entries)
 
     def raw_observation(self) -> dict[str, np.float64]:
         """What is observed now, before it is scaled: by name, in `observation_units`.
@@ -165,7 +166,7 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         """
         self._refuse_closed("raw_observation")
         self._refuse_new("raw_observation")
-        return {name: values[0] for name, values in raw_observation(self.batch).items()}
+        return {name: values[0] for name, values in self.batch.measured().items()}
 
     def record(self) -> dict[str, NDArray[np.float64]]:
         """State and report of the engine at every substep of the last control step, or at the start, by name,
@@ -211,7 +212,7 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         info = copy.deepcopy(self._begun) | {"measured": self._measured.copy()}
         if start["parameters"]:
             info["parameters"] = named([v[0] for v in start["parameters"].values()], [*start["parameters"]])
-        return self._seen.copy(), info
+        return self._observation.copy(), info
 
     def step(
         self, action: NDArray[np.float32]
@@ -233,30 +234,22 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             self._refuse_new("step")
             self._warn_ended()
         try:
-            self._taken[:] = action  # four float32, the cheapest way
+            self._action_buffer[:] = action  # four float32, the cheapest way
         except (TypeError, ValueError, BufferError):
-            self._take(action)
+            self._read_action(action)
         if self._recording is not None and np.isfinite(self._action).all():  # else nothing will happen
             self._recording.start()
-        said = self._step(self._desk)  # not through the batch: a call costs as much as a substep
-        ended = said != 0 and self.batch.follow(said, (self.np_random,))
-        terms = self._terms
-        progress, peak, energy, change, failure, support = terms.tolist()
-        info = self._begun.copy()  # all keys are there, and stay in their places
+        happened = self._kernel(self._addresses)  # not through the batch: a call costs as much as a substep
+        ended = happened != 0 and self.batch.follow(happened, (self.np_random,))
+        terms, info = self._terms, self._begun.copy()  # all keys are there, and stay in their places
         info["gait"], info["measured"] = info["gait"].copy(), self._measured.copy()
         if self.batch.randomize:
             info["parameters"] = info["parameters"].copy()
-        info["reward_progress"] = terms[0]
-        info["reward_peak"] = terms[1]
-        info["reward_energy"] = terms[2]
-        info["reward_action"] = terms[3]
-        if failure:
-            info["reward_failure"] = terms[4]
-        if support:
-            info["reward_support"] = terms[5]
+        for key, k in self._paid:
+            info[key] = terms[k]
         failed = truncated = False
         if ended:
-            failed = bool(self.batch.episode[e.ENDED, 0] == e.FAILED)
+            failed = bool(self.batch.now.ended[0] == FAILED)
             truncated = not failed
             if self._state == "running":
                 self._state = "ended"
@@ -264,11 +257,10 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             if failed:
                 info["failure"] = self.batch.failure(0)
             if self.batch.engine.results[0]:  # nothing happened
-                info["measured"][-SUMS:] = 0.0
+                info["measured"][LAST_STEP] = 0.0
         if self._recording is not None:
             self._show()
-        reward = progress + peak + energy + change + failure + support
-        return self._seen.copy(), reward, failed, truncated, info
+        return self._observation.copy(), self._reward[0], failed, truncated, info
 
     def _warn_ended(self) -> None:
         """As Gymnasium's own environments do, once after each end."""
@@ -287,9 +279,9 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._begun["gait"] = named(row[n:BEGUN], PARAMETERS)
         if self.batch.randomize:
             self._begun["parameters"] = named(row[BEGUN:], [*self.batch.randomize])
-        self._begun |= {"measured": None, **dict.fromkeys(e.TERMS, np.float64(0.0))}
+        self._begun |= {"measured": None, **dict.fromkeys(self.batch.terms, np.float64(0.0))}
 
-    def _take(self, action: Any) -> None:
+    def _read_action(self, action: Any) -> None:
         """Put an action where the kernel finds it."""
         try:
             given = np.asarray(action)
@@ -376,15 +368,18 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         generator = generator_of(state["generator"])
         self.batch.set_state(state)
         self.np_random = generator
-        self._state = "ended" if self.batch.episode[e.ENDED, 0] else "running"
+        self._state = "ended" if self.batch.now.ended[0] else "running"
         self._begin()
         if self._recording is not None:
             self._recording.forget()
-        return self._seen.copy()
+        return self._observation.copy()
 
     def __getstate__(self) -> dict[str, Any]:
         """Copies and pickles leave the window behind; it belongs to this process and this environment."""
-        views = ("_terms", "_action", "_seen", "_taken", "_measured", "_step", "_desk")
+        views = (
+            "_terms", "_reward", "_paid", "_action", "_action_buffer", "_observation", "_measured", "_kernel",
+            "_addresses",
+        )  # fmt: skip
         return {**{k: v for k, v in vars(self).items() if k not in views}, "_renderer": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:

@@ -13,9 +13,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hoof_env.dynamics import limb_rows as b
-from hoof_env.dynamics.advance import AT_REPORT, LIMB, TRUNK_ROWS
-from hoof_env.dynamics.lanes_report import TRUNK_REPORT
+from hoof_env.dynamics.layout import (
+    LEG_STATE,
+    STRIDE_SUMS,
+    STRIDES,
+    TRUNK_REPORT,
+    LegMemory,
+    TrunkMemory,
+)
 from hoof_env.gait.parameters import PARAMETERS
 
 START = ("crank_angle", "speed", "height", "x")
@@ -24,12 +29,12 @@ START = ("crank_angle", "speed", "height", "x")
 BEGUN = len(START) + len(PARAMETERS)
 """How many numbers these are; those drawn follow."""
 
-MEASURED = (*TRUNK_REPORT, "result", *b.STATE, *b.STRIDES, *b.STRIDE_SUMS)
+MEASURED = (*TRUNK_REPORT, "result", *LEG_STATE, *STRIDES, *STRIDE_SUMS)
 """What an info measures, neighbours in the engine's memory: one copy, whoever looks at it."""
 
-AT_MEASURED = slice(AT_REPORT, TRUNK_ROWS + LIMB["stride_sums"].stop)
-SUMS = len(b.STRIDE_SUMS)
-"""The rows of the engine's memory; the last so many are of the last control step, the others of its end."""
+AT_MEASURED = slice(TrunkMemory["report"].start, TrunkMemory.size + LegMemory["sums"].stop)
+LAST_STEP = slice(-len(STRIDE_SUMS), None)
+"""The rows of the engine's memory, and which of them are of the last control step, not of its end."""
 
 
 class Named(np.ndarray[Any, np.dtype[np.float64]]):

@@ -1,65 +1,189 @@
-"""What a policy sees: numbers in [-1, 1], in groups that can be chosen. `episode.look` computes them."""
+"""What a policy sees: one table of entries, numbers in [-1, 1], in groups that can be chosen. An entry is a row
+here, and nothing else has to be touched."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from hoof_env.envs.episode import AHEAD
 from hoof_env.errors import ParameterError
 from hoof_env.gait.parameters import LIMITS
+from hoof_env.ground.surface import surface
+from hoof_env.simd import choose
+from hoof_env.simd.compile import inlined
+from hoof_env.simd.math import cos_sin
 
 LOW, HIGH = (np.array([limit[i] for limit in LIMITS.values()]) for i in (0, 1))
 MIDDLE, HALF_RANGE = (LOW + HIGH) / 2, (HIGH - LOW) / 2
 """Limits, middle and half range of the gait parameters, shape (4,)."""
 
-GROUPS: dict[str, tuple[tuple[str, str, str], ...]] = {
-    "crank": (("sin(crank angle)", "none", "-"), ("cos(crank angle)", "none", "-")),
-    "gait": (
-        ("crank speed", "as action 0", "rad/s"),
-        ("swing offset", "as action 1", "rad"),
-        ("swing sine coefficient", "as action 2", "rad"),
-        ("swing cosine coefficient", "as action 3", "rad"),
-        ("rate of crank speed", "/ 20", "rad/s^2"),
-        ("rate of swing offset", "/ 6", "rad/s"),
-        ("rate of swing sine coefficient", "/ 6", "rad/s"),
-        ("rate of swing cosine coefficient", "/ 6", "rad/s"),
-    ),
-    "trunk": (
-        ("forward speed", "tanh(x / 5)", "m/s"),
-        ("vertical speed", "tanh(x / 2)", "m/s"),
-        ("height", "tanh((x - hip height) / 0.3)", "m"),
-    ),
-    "hoof": (
-        ("toe contact", "0 or 1", "-"),
-        ("heel contact", "0 or 1", "-"),
-        ("toe load", "tanh(x / 3 weights)", "N"),
-        ("heel load", "tanh(x / 3 weights)", "N"),
-        ("toe approach speed", "tanh(x / 2)", "m/s"),
-        ("heel approach speed", "tanh(x / 2)", "m/s"),
-        ("running peak force", "tanh(x / 3 weights)", "N"),
-    ),
-    "action": tuple(
-        (f"previous action: {name}", "none", "-")
-        for name in ("crank speed", "swing offset", "swing sine coefficient", "swing cosine coefficient")
-    ),
-    "target": (("commanded speed", "tanh(x / 5)", "m/s"),),
-    "ground": tuple((f"height of the ground {x:g} m ahead", "tanh(x / 0.5)", "m") for x in AHEAD),
-}
-"""Names, scaling and unit before scaling of all entries, by group, in the order in which kernels know them;
-the height of the ground is that above the ground under O."""
-
-_KNOWN = [entry[0] for group in GROUPS.values() for entry in group]
-_NUMBERS = {name: k for k, name in enumerate(_KNOWN)}
+AHEAD = (0.25, 0.5, 0.75, 1.0)
+"""Where the height of the ground is seen, from O forward [m]."""
 
 
-def entries(groups: Iterable[str], trunk: str) -> list[tuple[str, str, str]]:
+class Scene(NamedTuple):
+    """What can be observed.
+
+    Attributes:
+        trunk, leg, episode: memory of engine and episode, fields as in `dynamics.layout.TrunkMemory` and
+            `LegMemory` and `episode.Episode`.
+        task: record of the task's constants, see `step.task_type`.
+        ground, ground_origin, ground_per_metre: the terrain, the arguments of `surface` after x.
+    """
+
+    trunk: Any
+    leg: Any
+    episode: Any
+    task: Any
+    ground: Any
+    ground_origin: Any
+    ground_per_metre: Any
+
+
+@dataclass(frozen=True)
+class Scale:
+    """How a measured number comes into [-1, 1], where it is clipped.
+
+    Attributes:
+        text: of the formula, for the manual page.
+        apply: function of the number and the `Scene`; None leaves it.
+        saturates: the hyperbolic tangent of that is taken.
+    """
+
+    text: str
+    apply: Callable[[Any, Any], Any] | None = None
+    saturates: bool = False
+
+
+@dataclass(frozen=True)
+class Entry:
+    """An entry of the observation.
+
+    Attributes:
+        name: what is observed.
+        group: by which it is chosen.
+        unit: of the number before it is scaled.
+        measure: function of a `Scene`: that number. Compiled as `reward.Term.compute` is.
+        scale: how it is scaled.
+    """
+
+    name: str
+    group: str
+    unit: str
+    measure: Callable[[Any], Any]
+    scale: Scale
+
+
+def tanh_of(scale: float, text: str = "") -> Scale:
+    """tanh(x / scale)."""
+    per = 1 / scale
+    return Scale(text or f"tanh(x / {scale:g})", lambda x, scene: x * per, True)
+
+
+PLAIN, TRUTH = Scale("none"), Scale("0 or 1")
+IN_WEIGHTS = Scale("tanh(x / 3 weights)", lambda x, scene: x / (3.0 * scene.episode.weight), True)
+
+
+def _height(x, scene):  # type: ignore[no-untyped-def]
+    return (x - scene.task.height) * (1 / 0.3)
+
+
+def _in_range(k: int) -> Scale:
+    def apply(x, scene):  # type: ignore[no-untyped-def]
+        return (x - scene.task.middle[k]) / scene.task.half[k]
+
+    return Scale(f"as action {k}", apply)
+
+
+def _in_rate(k: int) -> Scale:
+    def apply(x, scene):  # type: ignore[no-untyped-def]
+        return x / scene.task.rate_bound[k]
+
+    return Scale("/ 20" if k == 0 else "/ 6", apply)
+
+
+def _gait(k: int) -> Callable[[Any], Any]:
+    return lambda scene: scene.leg.state.gait[k]
+
+
+def _gait_rate(k: int) -> Callable[[Any], Any]:
+    return lambda scene: scene.leg.state.gait_rate[k]
+
+
+def _action(k: int) -> Callable[[Any], Any]:
+    return lambda scene: scene.episode.action[k]
+
+
+def _sine(scene):  # type: ignore[no-untyped-def]
+    return cos_sin(scene.leg.state.theta)[1]
+
+
+def _cosine(scene):  # type: ignore[no-untyped-def]
+    return cos_sin(scene.leg.state.theta)[0]
+
+
+@inlined
+def _approach_speed(memory):  # type: ignore[no-untyped-def]
+    inverse = memory.inverse_approach_speed
+    return choose(inverse > 0.0, 1.0 / choose(inverse > 0.0, inverse, 1.0), 0.0)
+
+
+def _ahead(distance: float) -> Callable[[Any], Any]:
+    def rise(scene):  # type: ignore[no-untyped-def]
+        x = scene.trunk.report.place.real
+        here = surface(x, scene.ground, scene.ground_origin, scene.ground_per_metre)[0]
+        return surface(x + distance, scene.ground, scene.ground_origin, scene.ground_per_metre)[0] - here
+
+    return rise
+
+
+_PARAMETERS = ("crank speed", "swing offset", "swing sine coefficient", "swing cosine coefficient")
+_UNITS = ("rad/s", "rad", "rad", "rad")
+
+ENTRIES = (
+    Entry("sin(crank angle)", "crank", "-", _sine, PLAIN),
+    Entry("cos(crank angle)", "crank", "-", _cosine, PLAIN),
+    *(Entry(name, "gait", _UNITS[k], _gait(k), _in_range(k)) for k, name in enumerate(_PARAMETERS)),
+    *(
+        Entry(f"rate of {name}", "gait", "rad/s^2" if k == 0 else "rad/s", _gait_rate(k), _in_rate(k))
+        for k, name in enumerate(_PARAMETERS)
+    ),
+    Entry("forward speed", "trunk", "m/s", lambda s: s.trunk.report.velocity.real, tanh_of(5.0)),
+    Entry("vertical speed", "trunk", "m/s", lambda s: s.trunk.report.velocity.imag, tanh_of(2.0)),
+    Entry(
+        "height", "trunk", "m", lambda s: s.trunk.report.place.imag,
+        Scale("tanh((x - hip height) / 0.3)", _height, True),
+    ),
+    Entry("toe contact", "hoof", "-", lambda s: choose(s.leg.state.toe.penetration > 0.0, 1.0, 0.0), TRUTH),
+    Entry("heel contact", "hoof", "-", lambda s: choose(s.leg.state.heel.penetration > 0.0, 1.0, 0.0), TRUTH),
+    Entry("toe load", "hoof", "N", lambda s: s.leg.report.toe.normal, IN_WEIGHTS),
+    Entry("heel load", "hoof", "N", lambda s: s.leg.report.heel.normal, IN_WEIGHTS),
+    Entry("toe approach speed", "hoof", "m/s", lambda s: _approach_speed(s.leg.state.toe), tanh_of(2.0)),
+    Entry("heel approach speed", "hoof", "m/s", lambda s: _approach_speed(s.leg.state.heel), tanh_of(2.0)),
+    Entry("running peak force", "hoof", "N", lambda s: s.leg.strides.stance_peak, IN_WEIGHTS),
+    *(Entry(f"previous action: {name}", "action", "-", _action(k), PLAIN) for k, name in enumerate(_PARAMETERS)),
+    Entry("commanded speed", "target", "m/s", lambda s: s.episode.target, tanh_of(5.0)),
+    *(Entry(f"height of the ground {x:g} m ahead", "ground", "m", _ahead(x), tanh_of(0.5)) for x in AHEAD),
+)  # fmt: skip
+"""All that can be observed, by group, in the order of the observation; the height of the ground is that above the
+ground under O."""
+
+
+def groups_of(entries: Iterable[Entry]) -> tuple[str, ...]:
+    """The groups of some entries, in order."""
+    return tuple(dict.fromkeys(entry.group for entry in entries))
+
+
+def observed(groups: Iterable[str], trunk: str, entries: tuple[Entry, ...] = ENTRIES) -> list[Entry]:
     """The entries of some groups on a kind of trunk: what cannot move is not observed."""
     absent = {"fixed": ("forward speed", "vertical speed", "height"), "rail": ("vertical speed", "height")}
-    return [entry for group in groups for entry in GROUPS[group] if entry[0] not in absent.get(trunk, ())]
+    still = absent.get(trunk, ())
+    return [
+        entry for group in groups for entry in entries if entry.group == group and entry.name not in still
+    ]
 
 
 def check_groups(groups: Any, known: Iterable[str]) -> tuple[str, ...]:
@@ -73,11 +197,3 @@ def check_groups(groups: Any, known: Iterable[str]) -> tuple[str, ...]:
     if not given or not all(group in names and given.count(group) == 1 for group in given):
         raise ParameterError(f"observation: expected a list of some of {', '.join(names)}, got {groups!r}")
     return given
-
-
-def places(names: Iterable[str], count: int) -> NDArray[np.int64]:
-    """Where each entry that the kernels know goes in the observation, -1 for those not asked for."""
-    found = np.full(count, -1, np.int64)
-    for place, name in enumerate(names):
-        found[_NUMBERS[name]] = place
-    return found

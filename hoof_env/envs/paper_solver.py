@@ -14,13 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.constrained import ConstrainedLeg, ConstrainedState
-from hoof_env.dynamics.lanes_report import LIMB_REPORT, TRUNK_REPORT
-from hoof_env.dynamics.limb_rows import STATE as LIMB_STATE
+from hoof_env.dynamics.layout import LEG_REPORT, LEG_STATE, TRUNK_REPORT, TRUNK_STATE
 from hoof_env.dynamics.result import Result
 from hoof_env.dynamics.trace import new_trace
 from hoof_env.dynamics.trunk_engine import TrunkEngine
 from hoof_env.dynamics.trunk_model import LIFT_OFF, Memory, memory_of
-from hoof_env.dynamics.trunk_rows import STATE as TRUNK_STATE
 from hoof_env.envs.stance import ACCOUNT, take_account
 from hoof_env.envs.tasks import Settings
 from hoof_env.envs.trace_names import record_of
@@ -170,8 +168,8 @@ class PaperSolver:
         }
         memory.trunk[:, env] = [now[name] for name in TRUNK_STATE]
         memory.trunk_report[:, env] = [now[name] for name in TRUNK_REPORT]
-        memory.limbs[0, :, env] = [now[name] for name in LIMB_STATE]
-        memory.limb_report[0, :, env] = [now[name] for name in LIMB_REPORT]
+        memory.limbs[0, :, env] = [now[name] for name in LEG_STATE]
+        memory.limb_report[0, :, env] = [now[name] for name in LEG_REPORT]
         account = self._accounts[env]
         memory.strides[0, :, env] = account["open"], account["opened_at"], account["peak"]
 

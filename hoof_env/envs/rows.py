@@ -10,10 +10,8 @@ from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.arguments import count
-from hoof_env.envs import episode as e
 from hoof_env.envs.batch import EpisodeBatch
 from hoof_env.envs.made import fixed_setting
-from hoof_env.envs.raw_observation import UNITS, raw_observation
 from hoof_env.envs.recording import Recording
 from hoof_env.errors import ParameterError
 from hoof_env.ground.terrain import Terrain
@@ -57,7 +55,7 @@ class Rows:
     @property
     def observation_units(self) -> tuple[str, ...]:
         """Of what `raw_observation` gives, in the observation's order."""
-        return tuple(UNITS[name] for name in self.batch.names)
+        return tuple(entry.unit for entry in self.batch.entries)
 
     @property
     def drawn(self) -> int:
@@ -67,7 +65,7 @@ class Rows:
     @property
     def weight(self) -> Floats:
         """Weight of trunk and leg [N], shape (num_envs,)."""
-        return self.batch.episode[e.WEIGHT, : self.num_envs].copy()
+        return self.batch.now.weight[: self.num_envs].copy()
 
     def raw_observation(self) -> dict[str, Floats]:
         """What is observed now, before it is scaled: by name, shape (num_envs,), in `observation_units`.
@@ -76,7 +74,7 @@ class Rows:
             ResetNeeded: an environment has no episode yet.
         """
         self._refuse("raw_observation")
-        return raw_observation(self.batch)
+        return self.batch.measured()
 
     def episode_summary(self) -> dict[str, Floats]:
         """Figures of the episodes so far by name, shape (num_envs,); those of `infos["episode_summary"]`.

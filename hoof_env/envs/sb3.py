@@ -11,7 +11,6 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
-from hoof_env.envs import episode as e
 from hoof_env.envs.infos import row_of
 from hoof_env.envs.keywords import VectorKeywords
 from hoof_env.envs.made import SETTINGS, fixed_setting
@@ -62,7 +61,7 @@ class Sb3VecEnv(VecEnv):
             raise ParameterError(f"autoreset_mode: expected SAME_STEP, got {settings['autoreset_mode']!r}")
         self.envs, self.render_mode = envs, envs.render_mode
         self._actions: NDArray[Any] | None = None
-        self.terms = {name: np.zeros(num_envs) for name in e.TERMS}
+        self.terms = {name: np.zeros(num_envs) for name in envs.batch.terms}
         super().__init__(num_envs, envs.single_observation_space, envs.single_action_space)
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -91,13 +90,13 @@ class Sb3VecEnv(VecEnv):
     def step_wait(self) -> Any:
         """Take the step."""
         observations, rewards, terminated, truncated, infos = self.envs.step(self._actions)  # type: ignore[arg-type]
-        self.terms, self.measured = {name: infos[name] for name in e.TERMS}, infos["measured"]
+        self.terms, self.measured = {name: infos[name] for name in self.terms}, infos["measured"]
         dones = terminated | truncated
         each: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         if dones.any():
             final, figures = infos["final_info"], infos["final_info"]["episode_summary"]
             names = [name for name in figures if not name.startswith("_")]
-            for name in e.TERMS:
+            for name in self.terms:
                 self.terms[name] = np.where(dones, final[name], infos[name])
             started = {key: values for key, values in infos.items() if key in self.reset_infos[0]}
             for env in np.flatnonzero(dones):

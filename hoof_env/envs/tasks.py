@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -16,6 +16,8 @@ from typing import Any
 
 import numpy as np
 
+from hoof_env.envs.observation import ENTRIES, Entry
+from hoof_env.envs.reward import TERMS, Term
 from hoof_env.errors import ParameterError, UnknownArgumentError
 from hoof_env.leg.geometry import DEFAULT_PRESET, Preset
 
@@ -118,6 +120,9 @@ class Task:
         defaults: settings.
         start: reset options, unless others are given.
         reference: the scripted gait that simple policies must stay below.
+        terms: of the reward.
+        entries: all that can be observed.
+        contact_law: instead of `normal_law`, see `dynamics.hoof.law_of`.
     """
 
     name: str
@@ -126,6 +131,9 @@ class Task:
     defaults: Mapping[str, Any]
     start: Mapping[str, Any] = field(default_factory=dict)
     reference: str = "run"
+    terms: tuple[Term, ...] = TERMS
+    entries: tuple[Entry, ...] = ENTRIES
+    contact_law: Callable[..., Any] | None = None
 
     @property
     def id(self) -> str:

@@ -12,10 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.lanes_report import LIMB_REPORT, TRUNK_REPORT
-from hoof_env.dynamics.limb_rows import STATE as LIMB_STATE
+from hoof_env.dynamics.layout import LEG_REPORT, LEG_STATE, TRUNK_REPORT, TRUNK_STATE
 from hoof_env.dynamics.trace import new_trace
-from hoof_env.dynamics.trunk_rows import STATE as TRUNK_STATE
 from hoof_env.gait.parameters import PARAMETERS
 
 Floats = NDArray[np.float64]
@@ -47,7 +45,7 @@ def record_of(trace: NDArray[np.void], filters: NDArray[np.void]) -> dict[str, F
         approach, inside = trace[f"{point}_approach"], trace[f"{point}_penetration"] > 0
         of_leg[f"{point}_slowness"] = np.where(inside, 1 / np.where(approach > 0, approach, np.inf), 0.0)
         of_leg[f"{point}_y"], of_leg[f"{point}_slide"] = -trace[f"{point}_penetration"], trace[f"{point}_vx"]
-    names = (*LIMB_STATE, *LIMB_REPORT)
+    names = (*LEG_STATE, *LEG_REPORT)
     return {name: np.array(values)[:, None] for name, values in of_trunk.items()} | {
         name: np.array(of_leg[name])[:, None, None] for name in names
     }

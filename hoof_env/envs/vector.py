@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.arguments import count
 from hoof_env.dynamics.trunk_model import LIFT_OFF
-from hoof_env.envs import episode as e
 from hoof_env.envs.batch import EpisodeBatch
+from hoof_env.envs.episode import ACTIONS, FAILED, TRUNCATED
 from hoof_env.envs.infos import named
 from hoof_env.envs.keywords import Keywords
 from hoof_env.envs.made import Made
@@ -85,7 +85,7 @@ class HorseLegVectorEnv(Made, Rows, VectorEnv[NDArray[np.float32], NDArray[np.fl
         if max_episode_steps is not None:
             self.batch.limit(count("max_episode_steps", max_episode_steps))
         self.single_observation_space = spaces.Box(-1.0, 1.0, (len(self.batch.names),), np.float32)
-        self.single_action_space = spaces.Box(-1.0, 1.0, (e.ACTIONS,), np.float32)
+        self.single_action_space = spaces.Box(-1.0, 1.0, (ACTIONS,), np.float32)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.metadata = {  # type: ignore[misc]
@@ -158,15 +158,14 @@ class HorseLegVectorEnv(Made, Rows, VectorEnv[NDArray[np.float32], NDArray[np.fl
         batch.actions[:n] = actions_of(actions, n)
         for recording in (*self._recordings, *self._watched.values()):
             recording.start()
-        said = batch.step(self._generators, again)
-        ended = batch.episode[e.ENDED, :n]
-        terminated, truncated = ended == e.FAILED, ended == e.TRUNCATED
+        some_ended = batch.step(self._generators, again)
+        how = batch.now.ended[:n]
+        terminated, truncated = how == FAILED, how == TRUNCATED
         if again is not None:  # NEXT_STEP: these were not stepped, they start
             terminated[again], truncated[again] = False, False
             self._start(np.flatnonzero(again), {})
-        done, infos = terminated | truncated, batch.infos(said)
-        progress, *others = (infos[name] for name in e.TERMS)
-        rewards = sum(others, start=progress)
+        done, infos = terminated | truncated, batch.infos(some_ended)
+        rewards = batch.rewards[:n].copy()
         if done.any():
             self._sum_up(infos, np.flatnonzero(done))
         if done.any() and self.autoreset_mode == AutoresetMode.SAME_STEP:
@@ -181,7 +180,7 @@ class HorseLegVectorEnv(Made, Rows, VectorEnv[NDArray[np.float32], NDArray[np.fl
         """Start again at once what ended; the infos then, with what it ended with."""
         last = np.full(self.num_envs, None, dtype=object)
         for env in np.flatnonzero(done):
-            last[env] = self.batch.seen[env].copy()
+            last[env] = self.batch.observations[env].copy()
         self._show()
         self._start(np.flatnonzero(done), {})
         infos: dict[str, Any] = self.batch.infos()
@@ -255,7 +254,7 @@ class HorseLegVectorEnv(Made, Rows, VectorEnv[NDArray[np.float32], NDArray[np.fl
         summaries = [self.batch.summary(int(env)) for env in envs]
         found = {name: [summary[name] for summary in summaries] for name in summaries[0]}
         infos |= {"episode_summary": self._rows(found, envs), "_episode_summary": self._of(envs)}
-        failed = envs[self.batch.episode[e.ENDED, envs] == e.FAILED]
+        failed = envs[self.batch.now.ended[envs] == FAILED]
         if failed.size:
             infos |= {"failure": np.full(self.num_envs, None, object), "_failure": self._of(failed)}
             infos["failure"][failed] = [self.batch.failure(int(env)) for env in failed]
@@ -266,7 +265,7 @@ class HorseLegVectorEnv(Made, Rows, VectorEnv[NDArray[np.float32], NDArray[np.fl
                 recording.keep(False)
 
     def _observed(self) -> NDArray[np.float32]:
-        return self.batch.seen[: self.num_envs].copy()
+        return self.batch.observations[: self.num_envs].copy()
 
     def _seed(self, seed: Any, mask: NDArray[np.bool_]) -> None:
         """Give the environments of the mask their generators."""

@@ -9,7 +9,7 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.arguments import count
-from hoof_env.envs import episode as e
+from hoof_env.envs.episode import ACTIONS
 from hoof_env.envs.start import check_seed
 from hoof_env.errors import ParameterError
 
@@ -57,9 +57,9 @@ def actions_of(actions: Any, n: int) -> NDArray[np.float32]:
         given = np.asarray(actions)
     except ValueError:
         given = np.empty(0, object)
-    if given.dtype.kind not in "fiu" or given.shape != (n, e.ACTIONS):
+    if given.dtype.kind not in "fiu" or given.shape != (n, ACTIONS):
         raise ParameterError(
-            f"actions: expected finite numbers in [-1, 1], shape {(n, e.ACTIONS)}, "
+            f"actions: expected finite numbers in [-1, 1], shape {(n, ACTIONS)}, "
             f"got {given.dtype} of shape {given.shape}"
         )
     with np.errstate(over="ignore"):  # to infinity, which is refused

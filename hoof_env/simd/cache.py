@@ -60,12 +60,13 @@ class KernelCache(_caching.FunctionCache):
     Args:
         function: the kernel.
         say: takes a line about what is waited for.
+        identity: tells apart kernels of one source that contain different functions.
 
     Raises:
         OutputError: NUMBA_CACHE_DIR is not set, and no folder that numba tries is writable.
     """
 
-    def __init__(self, function: Callable[..., Any], say: Callable[[str], None]) -> None:
+    def __init__(self, function: Callable[..., Any], say: Callable[[str], None], identity: str = "") -> None:
         if given_folder():
             self._impl_class = _FilesInGivenFolder
         try:
@@ -74,8 +75,12 @@ class KernelCache(_caching.FunctionCache):
             raise _no_folder(os.path.dirname(function.__code__.co_filename), error) from None
         # numba looks for changes in the file of a kernel alone, but a kernel contains those that it calls
         self._cache_file._source_stamp = (self._cache_file._source_stamp, _sources())
-        self._say, self._kernel = say, function.__name__
+        self._say, self._kernel, self._identity = say, function.__name__, identity
         self._lock: Any = None
+
+    def _index_key(self, sig: Any, codegen: Any) -> Any:
+        # numba's own has a digest of what a function encloses, which changes with every process
+        return sig, codegen.magic_tuple(), self._identity
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """As numba's; where there is nothing to load, it returns once this process may compile.
@@ -136,7 +141,7 @@ class KernelCache(_caching.FunctionCache):
             self._lock = None
 
 
-def keep(dispatcher: Any, say: Callable[[str], None]) -> None:
+def keep(dispatcher: Any, say: Callable[[str], None], identity: str = "") -> None:
     """Have numba's `dispatcher` keep what it compiles in files, one process at a time compiling a kernel; no
     folder is looked for before it compiles."""
     compile_now, files = dispatcher.compile, None
@@ -145,7 +150,7 @@ def keep(dispatcher: Any, say: Callable[[str], None]) -> None:
         nonlocal files
         with global_compiler_lock:  # numba's, of threads; a kernel compiles those that it calls
             if files is None:
-                files = dispatcher._cache = KernelCache(dispatcher.py_func, say)
+                files = dispatcher._cache = KernelCache(dispatcher.py_func, say, identity)
             collects = gc.isenabled()
             gc.disable()  # it would take a seventh of the time to find nothing
             try:

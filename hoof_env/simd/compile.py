@@ -6,6 +6,7 @@ that a result does not depend on how the compiler arranged a loop.
 
 from __future__ import annotations
 
+import hashlib
 import os
 import sys
 import time
@@ -22,9 +23,13 @@ QUIET = "HOOF_ENV_QUIET"
 """Environment variable; set to 1 it silences what is said while kernels compile."""
 
 
-def kernel(function: F) -> F:
+def kernel(function: F, identity: str = "") -> F:
     """Compile `function` with numba at its first call, and keep the result in numba's cache folder, which the
     environment variable NUMBA_CACHE_DIR names.
+
+    Args:
+        function: the kernel.
+        identity: of the functions from outside this package that it contains, see `fingerprint`.
 
     Of several processes that need it at once one compiles. The first call raises OutputError if the kernel
     has to be compiled and the folder is not writable.
@@ -40,8 +45,34 @@ def kernel(function: F) -> F:
     compiled: Any = numba.njit(error_model="numpy")(function)
     if not hasattr(compiled, "_cache"):  # records have no attributes outside compiled code
         raise HoofEnvError("NUMBA_DISABLE_JIT is set, but kernels run compiled only: unset it")
-    keep(compiled, _say)
+    keep(compiled, _say, identity)
     return cast(F, compiled)
+
+
+def fingerprint(*functions: Callable[..., Any] | None) -> str:
+    """What tells kernels apart that contain different functions: a digest of those from outside this package, with
+    the constants and functions that they name. An edit of any of them changes it."""
+    digest = hashlib.sha256()
+    for function in functions:
+        _add_function(digest, function, set())
+    return digest.hexdigest()
+
+
+def _add_function(digest: Any, function: Any, known: set[int]) -> None:
+    function = getattr(function, "py_func", function)  # of numba's
+    code = getattr(function, "__code__", None)
+    if code is None or id(code) in known:
+        digest.update(repr(function).encode() if isinstance(function, int | float | str | tuple) else b"-")
+        return
+    known.add(id(code))
+    digest.update(f"{function.__module__}.{function.__qualname__}".encode())
+    inside = function.__module__.startswith("hoof_env.")  # whose sources are in every kernel's digest
+    if not inside:
+        digest.update(code.co_code + repr(code.co_consts).encode())
+    cells = [cell.cell_contents for cell in function.__closure__ or ()]
+    named = [] if inside else [function.__globals__.get(name) for name in code.co_names]
+    for part in (*cells, *named, *(function.__defaults__ or ())):
+        _add_function(digest, part, known)
 
 
 def inlined(function: F) -> F:

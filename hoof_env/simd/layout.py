@@ -7,6 +7,7 @@ attributes, of `Rows` on the stack and of `Columns` in an array; Python reaches 
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any, ClassVar, NamedTuple, get_type_hints
 
 from numba.core import types
@@ -14,6 +15,7 @@ from numba.core.datamodel import models
 from numba.core.extending import infer_getattr, register_model, typeof_impl
 from numba.core.imputils import lower_constant, lower_getattr_generic, lower_setattr_generic
 from numba.core.typing.templates import AttributeTemplate
+from numpy.typing import NDArray
 
 from hoof_env.simd.rows import part_of, read_row, write_row
 from hoof_env.simd.types import INDEX, Columns, Lanes, Plane, Rows, join, split
@@ -78,6 +80,13 @@ class Layout(metaclass=_Named):
         size: how many rows they take.
         names: of the rows, those of inner fields behind their field's name.
     """
+
+
+def views(layout: Any, data: NDArray[Any]) -> Any:
+    """The fields of memory by name, as views of an array whose first axis is the rows: of a `Row` without that
+    axis, of anything else with it."""
+    found = {name: data[layout[name]] for name in layout.fields}
+    return SimpleNamespace(**{k: v[0] if layout.fields[k].kind is Row else v for k, v in found.items()})
 
 
 def _names(key: str, kind: Any) -> list[str]:

@@ -9,10 +9,12 @@ and where every index is a constant it becomes registers.
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 from typing import Any
 
 import numpy as np
 from llvmlite import ir
+from numba import carray, from_dtype  # type: ignore[attr-defined]
 from numba.core import cgutils, extending, types
 from numpy.typing import NDArray
 
@@ -66,12 +68,8 @@ def offset(context: Any, pointer: Any, count: Any) -> Any:
     return pointer(pointer, count), emit
 
 
-def pointer_to(kind: Any) -> Any:
-    """A function for kernels that makes a pointer to numba's type `kind` of an address, a whole number.
-
-    A call from Python takes a tenth of a microsecond for each array; one array of addresses replaces many.
-    Whoever makes the addresses keeps the arrays alive, and makes them anew for a copy.
-    """
+def _pointer_to(kind: Any) -> Any:
+    """A function for kernels that makes a pointer to numba's type `kind` of an address, a whole number."""
 
     def pointer(context: Any, number: Any) -> Any:
         def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
@@ -80,3 +78,64 @@ def pointer_to(kind: Any) -> Any:
         return types.CPointer(kind)(types.int64), emit
 
     return intrinsic(pointer)
+
+
+doubles_at, singles_at = _pointer_to(types.float64), _pointer_to(types.float32)
+"""For kernels: a pointer to what is at an address."""
+
+COLUMNS = 2
+"""Behind the slot of a matrix in an array of `Addresses`: how many columns it has."""
+
+
+class Addresses:
+    """Where some arrays are, in one array of whole numbers.
+
+    A call from Python takes a tenth of a microsecond for each array; one array of addresses replaces many.
+    Whoever makes it keeps the arrays alive, and makes it anew for a copy.
+
+    Args:
+        names: of the arrays.
+
+    Attributes:
+        slots: by name, where the address of each is; behind it its shape.
+    """
+
+    def __init__(self, *names: str) -> None:
+        self.slots: Any = namedtuple("Slots", names)(*range(0, 4 * len(names), 4))
+
+    def of(self, *arrays: NDArray[Any]) -> NDArray[np.int64]:
+        """The array of addresses; the arrays in the order of the names, each of three axes at most."""
+        rows = [[a.ctypes.data, *a.shape, *[0] * (3 - a.ndim)] for a in arrays]
+        assert len(rows) == len(self.slots)
+        return np.array(rows, np.int64).ravel()
+
+
+def _array_at(axes: int) -> Any:
+    from hoof_env.simd.compile import inlined
+
+    if axes == 2:
+
+        @inlined
+        def array(addresses, slot):  # type: ignore[no-untyped-def]
+            return carray(doubles_at(addresses[slot]), (addresses[slot + 1], addresses[slot + 2]))
+
+        return array
+
+    @inlined
+    def cube(addresses, slot):  # type: ignore[no-untyped-def]
+        shape = (addresses[slot + 1], addresses[slot + 2], addresses[slot + 3])
+        return carray(doubles_at(addresses[slot]), shape)
+
+    return cube
+
+
+def record_at(kind: np.dtype[Any]) -> Any:
+    """For kernels: the array of one record of a type at an address."""
+    from hoof_env.simd.compile import inlined
+
+    pointer = _pointer_to(from_dtype(kind))
+    return inlined(lambda number: carray(pointer(number), (1,)))
+
+
+matrix_at, cube_at = _array_at(2), _array_at(3)
+"""For kernels: the array of doubles whose slot in an array of `Addresses` is given."""

@@ -1,0 +1,342 @@
+"""A control step, in five verbs: apply the action, advance the engine, compute the reward, decide whether the
+episode goes on, observe.
+
+One source for one environment and for `LANES` side by side, so that a row of a batch has the bits of the
+environment alone. The terms of the reward and the entries of the observation are those of a task (`reward`,
+`observation`); all arrays are reached from one array of addresses, for a call from Python with as many arguments
+costs more than a step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hoof_env.dynamics.advance import LANES, MODEL, TRUNK_ROWS, advance_kernels
+from hoof_env.dynamics.layout import LegMemory, TrunkMemory
+from hoof_env.envs.episode import ACTIONS, FAILED, TRUNCATED, episode_layout
+from hoof_env.envs.observation import Entry, Scene
+from hoof_env.envs.reward import Outcome, Term
+from hoof_env.simd import anywhere, choose, columns, larger, level, read, rows, size, smaller, write
+from hoof_env.simd.compile import fingerprint, inlined, kernel, pasted
+from hoof_env.simd.math import clip, tanh
+from hoof_env.simd.memory import (
+    COLUMNS,
+    Addresses,
+    address,
+    cube_at,
+    doubles,
+    doubles_at,
+    matrix_at,
+    record_at,
+    singles_at,
+)
+
+NOT_A_NUMBER, SOME_ENDED, SOME_SWITCHED = -1, 1, 2
+"""What a step returns: an action is none, and nothing has happened; else the sum of what happened somewhere."""
+
+ADDRESSES = Addresses(
+    "data", "model", "tables", "ground", "constants", "reactions", "episode", "task", "actions", "observations",
+    "rewards",
+)  # fmt: skip
+"""The arrays of a step, those of the engine first."""
+
+AT = ADDRESSES.slots
+
+
+def task_type(terms: int, entries: int) -> np.dtype[Any]:
+    """The record of a task's constants."""
+    return np.dtype(
+        [
+            ("base", "f8", (4,)), ("half", "f8", (4,)),  # command = base + half action
+            ("low", "f8", (4,)), ("high", "f8", (4,)),  # within these
+            ("middle", "f8", (4,)), ("rate_bound", "f8", (4,)),  # (value - middle) / half is observed
+            ("weights", "f8", (terms,)), ("episode_seconds", "f8"),  # of the reward
+            ("h", "f8"), ("substeps", "i8"), ("dt", "f8"), ("episode_steps", "i8"),
+            ("height", "f8"), ("lowest", "f8"), ("highest", "f8"),  # nominal and extreme heights of the trunk [m]
+            ("stays", "?"),  # a fixed trunk
+            ("count", "i8"), ("places", "i8", (entries,)),  # of the observation; -1: not observed
+        ],
+        align=True,
+    )  # fmt: skip
+
+
+@inlined
+def apply_action(task, actions, leg, n):  # type: ignore[no-untyped-def]
+    """Command what an action says, within its limits."""
+    for k in range(ACTIONS):
+        action = clip(read(leg, actions, n * ACTIONS + k, ACTIONS), 1.0)
+        leg.command[k] = smaller(larger(task.base[k] + task.half[k] * action, task.low[k]), task.high[k])
+
+
+@inlined
+def remember_action(actions, episode, n):  # type: ignore[no-untyped-def]
+    """Keep the clipped action; returns the mean square of its change."""
+    change = level(episode, 0.0)
+    for k in range(ACTIONS):
+        action = clip(read(episode, actions, n * ACTIONS + k, ACTIONS), 1.0)
+        difference = action - episode.action[k]
+        change = change + difference * difference
+        episode.action[k] = action
+    return 0.25 * change
+
+
+@inlined
+def find_outcome(task, trunk, leg, episode, action_change):  # type: ignore[no-untyped-def]
+    """What the step brought."""
+    works = trunk.result == 0.0  # else the state is of before: nothing is paid
+    x, y, sums = trunk.report.place.real, trunk.report.place.imag, leg.sums
+    progress = x - episode.x_before
+    if task.stays:
+        progress = sums.travel
+    episode.x_before = x
+    return Outcome(
+        seconds=choose(works, task.dt, 0.0),
+        progress=choose(works, progress, 0.0),
+        commanded_progress=task.dt * episode.target,
+        peak_grf_increase=choose(works, sums.peak_grf_increase, 0.0),
+        highest_grf=choose(works, sums.highest_grf, 0.0),
+        positive_work=choose(works, sums.positive_work, 0.0),
+        normal_impulse=choose(works, sums.normal_impulse, 0.0),
+        loaded_time=choose(works, sums.loaded_time, 0.0),
+        stances=choose(works, sums.stances, 0.0),
+        action_change=action_change,
+        failed=choose(works & (y > task.lowest) & (y < task.highest), 0.0, 1.0),
+        episode_seconds=task.episode_seconds,
+        weight=episode.weight,
+        trunk=trunk,
+        leg=leg,
+        episode=episode,
+    )
+
+
+@inlined
+def add_up(outcome, episode):  # type: ignore[no-untyped-def]
+    """The sums of the episode."""
+    episode.time = episode.time + outcome.seconds
+    episode.distance = episode.distance + outcome.progress
+    episode.work = episode.work + outcome.positive_work
+    episode.impulse = episode.impulse + outcome.normal_impulse
+    episode.loaded_time = episode.loaded_time + outcome.loaded_time
+    episode.stances = episode.stances + outcome.stances
+    episode.peak_sum = episode.peak_sum + outcome.peak_grf_increase
+    episode.highest = larger(episode.highest, outcome.highest_grf)
+
+
+@inlined
+def decide(task, outcome, episode):  # type: ignore[no-untyped-def]
+    """Whether the episode ends, and whether another speed is commanded from the next step on."""
+    steps = episode.steps + 1.0
+    late = choose(steps >= task.episode_steps, float(TRUNCATED), 0.0)
+    ended = choose(outcome.failed > 0.0, float(FAILED), late)
+    switched = steps >= episode.switch
+    episode.steps, episode.ended = steps, ended
+    episode.target = choose(switched, episode.next_target, episode.target)
+    return ended > 0.0, switched
+
+
+def reward_of(terms: tuple[Term, ...]) -> Callable[..., Any]:
+    """A function that computes all terms, keeps them in `episode.terms` and returns their sum."""
+    first, rest = inlined(terms[0].compute), _other_terms(terms, 1)
+
+    @inlined
+    def compute_reward(task, outcome, episode):  # type: ignore[no-untyped-def]
+        episode.terms[0] = first(outcome, task.weights[0])
+        return rest(task, outcome, episode, episode.terms[0])
+
+    return compute_reward
+
+
+def _other_terms(terms: tuple[Term, ...], k: int) -> Callable[..., Any]:
+    """The terms from the k-th on. numba has no loop over functions, so each calls the next."""
+    if k == len(terms):
+        return inlined(lambda task, outcome, episode, total: total)
+    compute, rest = inlined(terms[k].compute), _other_terms(terms, k + 1)
+
+    @inlined
+    def add_term(task, outcome, episode, total):  # type: ignore[no-untyped-def]
+        episode.terms[k] = compute(outcome, task.weights[k])
+        return rest(task, outcome, episode, total + episode.terms[k])
+
+    return add_term
+
+
+def slots_of(entries: tuple[Entry, ...]) -> tuple[list[int], int, int]:
+    """Where the entries stand while they are scaled: those that saturate first, as whole vectors. Returns the
+    slots of the entries, how many vectors they are, and how many slots there are."""
+    saturating = [k for k, entry in enumerate(entries) if entry.scale.saturates]
+    others = [k for k, entry in enumerate(entries) if not entry.scale.saturates]
+    vectors = -(-len(saturating) // LANES)
+    slots = {k: slot for slot, k in enumerate(saturating)}
+    slots |= {k: vectors * LANES + slot for slot, k in enumerate(others)}
+    return [slots[k] for k in range(len(entries))], vectors, vectors * LANES + len(others)
+
+
+def measurement_of(entries: tuple[Entry, ...], scaled: bool, k: int = 0) -> Callable[..., Any]:
+    """A function that puts the entries that are observed, from the k-th on, into their slots."""
+    if k == len(entries):
+        return inlined(lambda scene, numbers: None)
+    measure, apply, slot = inlined(entries[k].measure), entries[k].scale.apply, slots_of(entries)[0][k]
+    rest = measurement_of(entries, scaled, k + 1)
+    scale = inlined(apply) if scaled and apply is not None else inlined(lambda x, scene: x)
+
+    @inlined
+    def put_entry(scene, numbers):  # type: ignore[no-untyped-def]
+        if scene.task.places[slot] >= 0:
+            numbers[slot] = scale(measure(scene), scene)
+        rest(scene, numbers)
+
+    return put_entry
+
+
+class StepKernels(NamedTuple):
+    """Kernels of a task: each takes the array of `ADDRESSES`. What ends in `_one` goes through the environments
+    one by one, what ends in `_batch` takes `LANES` at a time.
+
+    Attributes:
+        step_one, step_batch: a control step; returns what `NOT_A_NUMBER` and the others say.
+        apply_one, finish_one: what is before and behind the engine, for a solver that is not a kernel.
+        observe_one, observe_batch: observations without a step.
+        measure_one: puts what is observed, before it is scaled, into an array of doubles, shape (count, columns).
+    """
+
+    step_one: Any
+    step_batch: Any
+    apply_one: Any
+    finish_one: Any
+    observe_one: Any
+    observe_batch: Any
+    measure_one: Any
+
+
+@cache
+def step_kernels(
+    terms: tuple[Term, ...], entries: tuple[Entry, ...], contact_law: Callable[..., Any] | None
+) -> StepKernels:
+    """The kernels of tasks with these terms, entries and law of contact."""
+    parts = [term.compute for term in terms]
+    parts += [part for entry in entries for part in (entry.measure, entry.scale.apply) if part]
+    identity = fingerprint(*parts, contact_law)
+    Episode = episode_layout(len(terms))
+    compute_reward = reward_of(terms)
+    put_scaled, put_measured = measurement_of(entries, True), measurement_of(entries, False)
+    _, vectors, slots = slots_of(entries)
+    advance = advance_kernels(contact_law)
+    advance_leg, advance_batch = advance.advance_leg, advance.advance_batch
+    task_at, model_at = record_at(task_type(len(terms), slots)), record_at(MODEL)
+
+    @inlined
+    def memories(addresses, lanes, n):  # type: ignore[no-untyped-def]
+        """Trunk, leg and episode of environments n, n + 1, ..."""
+        row = addresses[AT.data + COLUMNS]
+        data, episode = doubles_at(addresses[AT.data]), doubles_at(addresses[AT.episode])
+        return (
+            columns(data, lanes, TrunkMemory, n, row, 1),
+            columns(data, lanes, LegMemory, TRUNK_ROWS * row + n, row, 1),
+            columns(episode, lanes, Episode, n, row, 1),
+        )
+
+    @pasted
+    def scene_of(addresses, lanes, task, n):  # type: ignore[no-untyped-def]
+        trunk, leg, episode = memories(addresses, lanes, n)
+        model, ground = model_at(addresses[AT.model])[0], matrix_at(addresses, AT.ground)
+        return Scene(trunk, leg, episode, task, ground, model.ground_origin, model.ground_per_metre)
+
+    @pasted
+    def apply_actions(addresses, lanes):  # type: ignore[no-untyped-def]
+        """All, or none: returns whether they are numbers."""
+        actions, count = singles_at(addresses[AT.actions]), addresses[AT.data + COLUMNS]
+        task, good = task_at(addresses[AT.task])[0], True
+        for k in range(count * ACTIONS):
+            good &= size(float(actions[k])) < np.inf
+        if good:
+            for n in range(0, count, lanes):
+                apply_action(task, actions, memories(addresses, lanes, n)[1], n)
+        return good
+
+    @pasted
+    def observe(addresses, lanes, task, n, memory):  # type: ignore[no-untyped-def]
+        numbers = rows(memory, lanes, None)
+        for slot in range(slots):
+            numbers[slot] = 0.0
+        put_scaled(scene_of(addresses, lanes, task, n), numbers)
+        if lanes == 1:  # the numbers of one environment, side by side
+            together = rows(memory, LANES, None)
+            for k in range(vectors):
+                together[k] = tanh(together[k])
+        else:
+            for k in range(vectors * LANES):
+                numbers[k] = tanh(numbers[k])
+        observations = singles_at(addresses[AT.observations])
+        for slot in range(slots):
+            place = task.places[slot]
+            if place >= 0:
+                write(clip(numbers[slot], 1.0), observations, n * task.count + place, task.count)
+
+    @pasted
+    def finish(addresses, lanes):  # type: ignore[no-untyped-def]
+        """What follows the engine: reward, end and observation."""
+        task, actions = task_at(addresses[AT.task])[0], singles_at(addresses[AT.actions])
+        rewards, memory, happened = doubles_at(addresses[AT.rewards]), doubles(slots * lanes), 0
+        for n in range(0, addresses[AT.data + COLUMNS], lanes):
+            trunk, leg, episode = memories(addresses, lanes, n)
+            outcome = find_outcome(task, trunk, leg, episode, remember_action(actions, episode, n))
+            add_up(outcome, episode)
+            ended, switched = decide(task, outcome, episode)
+            write(compute_reward(task, outcome, episode), rewards, n, 1)
+            if anywhere(ended):
+                happened |= SOME_ENDED
+            if anywhere(switched):
+                happened |= SOME_SWITCHED
+            observe(addresses, lanes, task, n, memory)
+        return happened
+
+    @pasted
+    def step(addresses, lanes, advance):  # type: ignore[no-untyped-def]
+        if not apply_actions(addresses, lanes):
+            return NOT_A_NUMBER
+        task = task_at(addresses[AT.task])[0]
+        advance(
+            matrix_at(addresses, AT.data), model_at(addresses[AT.model]), matrix_at(addresses, AT.tables),
+            matrix_at(addresses, AT.ground), matrix_at(addresses, AT.constants), cube_at(addresses, AT.reactions),
+            task.h, task.substeps, False,
+        )  # fmt: skip
+        return finish(addresses, lanes)
+
+    @pasted
+    def observe_all(addresses, lanes):  # type: ignore[no-untyped-def]
+        task, memory = task_at(addresses[AT.task])[0], doubles(slots * lanes)
+        for n in range(0, addresses[AT.data + COLUMNS], lanes):
+            observe(addresses, lanes, task, n, memory)
+
+    def step_one(addresses):  # type: ignore[no-untyped-def]
+        return step(addresses, 1, advance_leg)
+
+    def step_batch(addresses):  # type: ignore[no-untyped-def]
+        return step(addresses, LANES, advance_batch)
+
+    def apply_one(addresses):  # type: ignore[no-untyped-def]
+        return apply_actions(addresses, 1)
+
+    def finish_one(addresses):  # type: ignore[no-untyped-def]
+        return finish(addresses, 1)
+
+    def observe_one(addresses):  # type: ignore[no-untyped-def]
+        observe_all(addresses, 1)
+
+    def observe_batch(addresses):  # type: ignore[no-untyped-def]
+        observe_all(addresses, LANES)
+
+    def measure_one(addresses, out):  # type: ignore[no-untyped-def]
+        task, numbers = task_at(addresses[AT.task])[0], rows(doubles(slots), 1, None)
+        for n in range(out.shape[1]):
+            put_measured(scene_of(addresses, 1, task, n), numbers)
+            for slot in range(slots):
+                if task.places[slot] >= 0:
+                    write(numbers[slot], address(out), task.places[slot] * out.shape[1] + n, 1)
+
+    functions = (step_one, step_batch, apply_one, finish_one, observe_one, observe_batch, measure_one)
+    return StepKernels(*(kernel(function, identity) for function in functions))
