@@ -1,9 +1,9 @@
 """The engine's kernels: environments come from the engine's memory, go step after step, and go back.
 
-`advance_leg`, `advance_four` and `advance_batch` are one function, `run`, compiled for one leg alone, for four lanes
-that are the legs of one trunk, and for `LANES` environments side by side with any number of legs; `react_leg`
-and so on are the same with joint reactions, a fifth more to compile. What they work on lives on the stack,
-where the compiler keeps what it can in registers.
+`advance_leg`, `advance_four` and `advance_batch` are one function, `run`, compiled for one leg alone, for
+four lanes that are the legs of one trunk, and for `LANES` environments side by side with any number of legs;
+`react_leg` and so on are the same with joint reactions, a fifth more to compile. What they work on lives on
+the stack, where the compiler keeps what it can in registers.
 
 An engine's memory is one matrix `data`, a column for each environment: the rows of the trunk, then those of
 each leg, as `TRUNK` and `LIMB` have them.
@@ -254,8 +254,8 @@ def run(  # type: ignore[no-untyped-def]
 
 
 class AdvanceKernels(NamedTuple):
-    """Each environment by itself with one leg, or with four side by side; or `LANES` environments at a time with
-    any number of legs. Those that react compute joint reactions too."""
+    """Each environment by itself with one leg, or with four side by side; or `LANES` environments at a time
+    with any number of legs. Those that react compute joint reactions too."""
 
     advance_leg: Any
     advance_four: Any

@@ -114,9 +114,10 @@ def law_of(contact_law: Callable[..., Any] | None) -> Any:
     """What the kernels take for the normal force: `push_back`, or somebody's own law in the same place.
 
     Args:
-        contact_law: function of the penetration [m], its rate [m/s], the inverse of the approach speed [s/m] and
-            the ground's constants (fields as in `layout.TrunkSettings`); returns the normal force [N], of which
-            what pulls is cut off. None of it counts as stored in the ground.
+        contact_law: function of the penetration [m], its rate [m/s], the inverse of the approach speed [s/m]
+        and
+            the ground's constants (fields as in `layout.TrunkSettings`); returns the normal force [N], of
+            which what pulls is cut off. None of it counts as stored in the ground.
     """
     if contact_law is None:
         return push_back

@@ -1,4 +1,5 @@
-"""Every row of memory by name: what the kernels keep of trunk and legs, on the stack and in the engine's array.
+"""Every row of memory by name: what the kernels keep of trunk and legs, on the stack and in the engine's
+array.
 
 SI units and radians. beta = pitch + side phi is the world angle of a leg's frame. 'All' means trunk and legs
 together; 'fixed' frame means one that does not swing while the crank turns.
@@ -6,9 +7,11 @@ together; 'fixed' frame means one that does not swing while the crank turns.
 
 from __future__ import annotations
 
+from typing import Annotated
+
 from hoof_env.gait.parameters import PARAMETERS
 from hoof_env.leg.profile import Functions, Slopes
-from hoof_env.simd.layout import Layout, Row, Vector, block
+from hoof_env.simd.layout import Block, Layout, Row, Vector
 
 FARTHEST = 1e9
 """Largest angles [rad] and places [m] of a state, which are as good as numbers are fine there: to 6e-10 at
@@ -142,8 +145,8 @@ class LegState(Layout):
 
     theta: Row  # crank angle [rad]
     theta_rate: Row  # [rad/s]
-    gait: block(4)  # outputs of the command filters, in the order of `PARAMETERS`
-    gait_rate: block(4)
+    gait: Annotated[Block, 4]  # outputs of the command filters, in the order of `PARAMETERS`
+    gait_rate: Annotated[Block, 4]
     toe: ContactMemory
     heel: ContactMemory
 
@@ -209,8 +212,8 @@ class LegRows(Layout):
     sums: StrideSums
     functions: Functions  # of the crank angle, at the present stage
     slopes: Slopes
-    command: block(4)
-    gait_acceleration: block(4)  # of the command filters
+    command: Annotated[Block, 4]
+    gait_acceleration: Annotated[Block, 4]  # of the command filters
     theta: Row  # crank angle, rate and acceleration at the present stage
     theta_rate: Row
     theta_acceleration: Row
@@ -257,8 +260,8 @@ class PointReport(Layout):
 
 
 class LegReport(Layout):
-    """Of each leg. A motor turns crank and swing: its torque is the crank's, the hip's is what the gear between
-    them carries, and the hip's power is that of the actuator which changes the swing's parameters."""
+    """Of each leg. A motor turns crank and swing: its torque is the crank's, the hip's is what the gear
+    between them carries, and the hip's power is that of the actuator which changes the swing's parameters."""
 
     theta_acc: Row  # crank and swing [rad, s]
     phi: Row
@@ -278,7 +281,7 @@ class LegMemory(Layout):
     state: LegState
     strides: Strides
     sums: StrideSums
-    command: block(4)
+    command: Annotated[Block, 4]
     settings: LegSettings
     report: LegReport
 

@@ -1,9 +1,9 @@
 """The equations of motion of N legs on one trunk, for one environment or several side by side.
 
-Every function is one stage of the mechanics on rows of memory, whose names and units `layout` has. A row holds
-`Lanes`, one for each environment, which do not know of each other; compiled for one lane or eight, a number
-has the same bits: only + - * / and sqrt, no fast-math, no branch on a lane that changes a bit. Where the lanes
-are the legs of one trunk (`together`) each has a copy of the trunk, and sums go over all.
+Every function is one stage of the mechanics on rows of memory, whose names and units `layout` has. A row
+holds `Lanes`, one for each environment, which do not know of each other; compiled for one lane or eight, a
+number has the same bits: only + - * / and sqrt, no fast-math, no branch on a lane that changes a bit. Where
+the lanes are the legs of one trunk (`together`) each has a copy of the trunk, and sums go over all.
 
 A leg enters as functions of its crank angle theta (`leg.profile`): toe and heel, the first moment s and the
 inertias a, b, c; ' is d/dtheta, _t and _tt are time derivatives. With the world angle beta = pitch +
@@ -31,8 +31,8 @@ MOVING = Moving.size
 
 @inlined
 def add(total, x, together):  # type: ignore[no-untyped-def]
-    """total + x, lane by lane; or, where the lanes are the legs of one trunk, all of them one after the other,
-    as in a loop over legs."""
+    """total + x, lane by lane; or, where the lanes are the legs of one trunk, all of them one after the
+    other, as in a loop over legs."""
     if together:
         return lane_sum(total, x)
     return total + x
@@ -159,7 +159,8 @@ def gather_leg(trunk, leg, kind, together):  # type: ignore[no-untyped-def]
 
 @inlined
 def move_trunk(trunk, kind):  # type: ignore[no-untyped-def]
-    """Place and velocity of the trunk from centre of mass and momentum of all; what acts on it but its leg_count.
+    """Place and velocity of the trunk from centre of mass and momentum of all; what acts on it but its
+    leg_count.
 
     On a rail the place along y is given and the velocity along y 0.
     """

@@ -13,7 +13,7 @@ link GJ by link GF.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,13 +22,13 @@ from hoof_env.leg.geometry import Geometry
 from hoof_env.leg.linkage import CONSTRUCTION, JOINTS, Dyad
 from hoof_env.simd import across, choose, cross, dot, level, plane, root, store_vectors
 from hoof_env.simd.compile import inlined
-from hoof_env.simd.layout import Layout, Row, Vector, block
+from hoof_env.simd.layout import Block, Layout, Row, Vector
 
 
 class Reactions(Layout):
     """What is kept of a leg."""
 
-    joints: block(2 * len(JOINTS))  # x and y of each joint's force [N], in the order of `linkage.JOINTS`
+    joints: Annotated[Block, 2 * len(JOINTS)]  # force of each joint, as in `linkage.JOINTS`: x and y [N]
     lock: Row  # moment on body 10 by body 7 [N m]
     driver: Row  # moment on the crank by the leg's frame [N m]
     hip: Row  # moment on the leg's frame by the trunk, about O [N m]

@@ -222,7 +222,7 @@ class TrunkEngine:
 
     def command_in(self, column: Floats) -> Floats:
         """The command in such a column, shape (legs, 4)."""
-        return column[TRUNK_ROWS:].reshape(len(self.limbs), LEG_ROWS)[:, LegMemory["command"]].copy()
+        return column[TRUNK_ROWS:].reshape(len(self.limbs), LEG_ROWS)[:, LegMemory.rows("command")].copy()
 
     def alone(self) -> TrunkEngine:
         """An engine like this one, for one environment."""
@@ -437,7 +437,7 @@ class TrunkEngine:
             raise ParameterError("reactions: expected an engine made with reactions=True, got one without")
         found = self._memory.reactions[:, :, : self.num_envs]
         legs, _, n = found.shape
-        parts = {name: found[:, r.Reactions[name]].copy() for name in r.Reactions.fields}
+        parts = {name: found[:, r.Reactions.rows(name)].copy() for name in r.Reactions.fields}
         joints = parts.pop("joints").reshape(legs, -1, 2, n)
         return Reactions(joints, **{name: part[:, 0] for name, part in parts.items()})
 

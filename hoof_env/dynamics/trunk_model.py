@@ -83,8 +83,8 @@ def memory_of(data: Floats, num_envs: int, constants: Floats, reactions: Floats)
         data[:TRUNK_ROWS, :num_envs],
         data[TRUNK_ROWS:].reshape(legs, LEG_ROWS, *data.shape[1:])[:, :, :num_envs],
     )
-    t_parts = {name: trunk[TrunkMemory[name]] for name in TrunkMemory.fields}
-    l_parts = {name: limbs[:, LegMemory[name]] for name in LegMemory.fields}
+    t_parts = {name: trunk[TrunkMemory.rows(name)] for name in TrunkMemory.fields}
+    l_parts = {name: limbs[:, LegMemory.rows(name)] for name in LegMemory.fields}
     return Memory(
         data, t_parts["state"], l_parts["state"], t_parts["settings"], l_parts["settings"],
         l_parts["strides"], l_parts["sums"], l_parts["command"], t_parts["account"],

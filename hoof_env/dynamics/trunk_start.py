@@ -102,10 +102,10 @@ def start(
     if kind <= RAIL and (at["y"] != engine.trunk.height).any():
         raise ParameterError(f"y: a {engine.trunk.kind} trunk is at {engine.trunk.height:g} m, got {at['y']}")
     state = np.zeros((TrunkState.size, n))
-    moving = state[TrunkState["moving"]]  # the kernels make of these what they integrate
-    moving[Moving["centre"]], moving[Moving["momentum"]] = (at["x"], at["y"]), (at["vx"], at["vy"])
-    moving[Moving["pitch"]], moving[Moving["spin"]] = at["pitch"], at["pitch_rate"]
+    moving = state[TrunkState.rows("moving")]  # the kernels make of these what they integrate
+    moving[Moving.rows("centre")], moving[Moving.rows("momentum")] = (at["x"], at["y"]), (at["vx"], at["vy"])
+    moving[Moving.rows("pitch")], moving[Moving.rows("spin")] = at["pitch"], at["pitch_rate"]
     leg = np.zeros((legs, LegState.size, n))
-    leg[:, LegState["theta"]], leg[:, LegState["theta_rate"]] = angle[:, None], spin[:, None]
-    leg[:, LegState["gait"]] = gaits
+    leg[:, LegState.rows("theta")], leg[:, LegState.rows("theta_rate")] = angle[:, None], spin[:, None]
+    leg[:, LegState.rows("gait")] = gaits
     return state, leg

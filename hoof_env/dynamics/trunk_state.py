@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 STATE = ("trunk", "limbs", "strides", "command", "account", "trunk_settings", "limb_settings")
 """Arrays that hold what changes."""
 
-_FIRST_ROW = LegSettings["first_row"]
+_FIRST_ROW = LegSettings.rows("first_row")
 
 
 def read_state(
@@ -53,10 +53,10 @@ def read_state(
     reset: NDArray[np.bool_] = np.logical_not(np.isnan(trunk).all(0) & np.isnan(limbs).all((0, 1)))
     for name in STATE:
         finite(f"state[{name!r}]", arrays[name][..., reset])
-    moving = trunk[TrunkState["moving"]]
+    moving = trunk[TrunkState.rows("moving")]
     for name in ("centre", "pitch"):
-        finite("state['trunk'], places and pitch", moving[Moving[name]][:, reset], FARTHEST)
-    finite("state['limbs'], crank angles", limbs[:, LegState["theta"]][..., reset], FARTHEST)
+        finite("state['trunk'], places and pitch", moving[Moving.rows(name)][:, reset], FARTHEST)
+    finite("state['limbs'], crank angles", limbs[:, LegState.rows("theta")][..., reset], FARTHEST)
     arrays["limb_settings"][:, _FIRST_ROW] = memory.limb_settings[:, _FIRST_ROW]  # an address
     return arrays, reset
 

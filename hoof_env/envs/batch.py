@@ -49,6 +49,7 @@ from hoof_env.ground.preset import load_ground
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.profile import leg_profile
 from hoof_env.simd.layout import views
+from hoof_env.simd.memory import COLUMNS
 
 Floats = NDArray[np.float64]
 
@@ -188,7 +189,7 @@ class EpisodeBatch:
         """Have every kernel of a step compiled, or loaded, by running it on no environment: what a parent
         makes warms the cache for its workers."""
         nobody, gait = self.addresses.copy(), GaitParameters.from_array(MIDDLE)
-        nobody[kernels.AT.data + kernels.COLUMNS] = 0
+        nobody[kernels.AT.data + COLUMNS] = 0
         for run in (self._kernels.apply_one, self._kernels.finish_one) if self.paper else (self.kernel,):
             run(nobody)
         if self.paper:
@@ -344,9 +345,9 @@ class EpisodeBatch:
     def _observe_broken(self) -> None:
         """Observe the last good state of what could not be simulated, whose report is of where it broke."""
         data, broken = self.engine.arrays[0], np.flatnonzero(self.engine.results)
-        kept, leg = data.copy(), LegMemory["report"]
+        kept, leg = data.copy(), LegMemory.rows("report")
         self.engine.advance(None, 0)
-        for rows in (TrunkMemory["report"], slice(TRUNK_ROWS + leg.start, TRUNK_ROWS + leg.stop)):
+        for rows in (TrunkMemory.rows("report"), slice(TRUNK_ROWS + leg.start, TRUNK_ROWS + leg.stop)):
             kept[rows, broken] = data[rows, broken]
         data[:] = kept
         self._observe(self.addresses)

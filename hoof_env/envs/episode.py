@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
+from typing import Annotated, Any
 
 from hoof_env.envs.reward import TERMS
 from hoof_env.gait.parameters import PARAMETERS
-from hoof_env.simd.layout import Layout, Row, block
+from hoof_env.simd.layout import Block, Layout, Row
 
 ACTIONS = len(PARAMETERS)
 FAILED, TRUNCATED = 1, 2
@@ -20,7 +20,7 @@ SUMS = ("time", "distance", "work", "impulse", "loaded_time", "stances", "peak_s
 class Episode(Layout):
     """Memory of an episode."""
 
-    action: block(ACTIONS)  # the last one, clipped to its limits
+    action: Annotated[Block, ACTIONS]  # the last one, clipped to its limits
     steps: Row  # control steps so far
     x_before: Row  # x of the trunk before this step [m]
     target: Row  # commanded speed [m/s]; infinite if there is none
@@ -33,7 +33,7 @@ class Episode(Layout):
     stances: Row
     peak_sum: Row  # of the stances' peaks [N]
     highest: Row  # force of the episode [N]
-    terms: block(len(TERMS))  # of the last reward
+    terms: Annotated[Block, len(TERMS)]  # of the last reward
     ended: Row  # 0, `FAILED` or `TRUNCATED`
     switch: Row  # the control step after which another speed is commanded
     next_target: Row  # and which [m/s]
@@ -44,5 +44,5 @@ def episode_layout(terms: int) -> Any:
     """`Episode` with room for so many terms."""
     if terms == len(TERMS):
         return Episode
-    fields = {**Episode.__annotations__, "terms": block(terms)}
+    fields = {**Episode.__annotations__, "terms": Annotated[Block, terms]}
     return type(Layout)(f"Episode{terms}", (Layout,), {"__annotations__": fields, "__module__": __name__})

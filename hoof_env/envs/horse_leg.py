@@ -76,7 +76,7 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     def _attach(self) -> None:
         """Views of the batch that every step reads or writes."""
         batch = self.batch
-        self._terms, self._reward = batch.now.terms[:, 0], memoryview(batch.rewards)
+        self._terms, self._reward = batch.now.terms[:, 0], memoryview(batch.rewards)  # type: ignore[arg-type]
         self._paid = [(key, k) for k, key in enumerate(batch.terms) if batch.weights[key[len("reward_") :]]]
         self._action, self._observation = batch.actions[0], batch.observations[0]
         self._action_buffer: Any = memoryview(self._action)

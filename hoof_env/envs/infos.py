@@ -32,7 +32,7 @@ BEGUN = len(START) + len(PARAMETERS)
 MEASURED = (*TRUNK_REPORT, "result", *LEG_STATE, *STRIDES, *STRIDE_SUMS)
 """What an info measures, neighbours in the engine's memory: one copy, whoever looks at it."""
 
-AT_MEASURED = slice(TrunkMemory["report"].start, TrunkMemory.size + LegMemory["sums"].stop)
+AT_MEASURED = slice(TrunkMemory.rows("report").start, TrunkMemory.size + LegMemory.rows("sums").stop)
 LAST_STEP = slice(-len(STRIDE_SUMS), None)
 """The rows of the engine's memory, and which of them are of the last control step, not of its end."""
 

@@ -1,5 +1,5 @@
-"""What a policy sees: one table of entries, numbers in [-1, 1], in groups that can be chosen. An entry is a row
-here, and nothing else has to be touched."""
+"""What a policy sees: one table of entries, numbers in [-1, 1], in groups that can be chosen. An entry is a
+row here, and nothing else has to be touched."""
 
 from __future__ import annotations
 
@@ -156,20 +156,19 @@ ENTRIES = (
     Entry(
         "height", "trunk", "m", lambda s: s.trunk.report.place.imag,
         Scale("tanh((x - hip height) / 0.3)", _height, True),
-    ),
-    Entry("toe contact", "hoof", "-", lambda s: choose(s.leg.state.toe.penetration > 0.0, 1.0, 0.0), TRUTH),
-    Entry("heel contact", "hoof", "-", lambda s: choose(s.leg.state.heel.penetration > 0.0, 1.0, 0.0), TRUTH),
-    Entry("toe load", "hoof", "N", lambda s: s.leg.report.toe.normal, IN_WEIGHTS),
-    Entry("heel load", "hoof", "N", lambda s: s.leg.report.heel.normal, IN_WEIGHTS),
-    Entry("toe approach speed", "hoof", "m/s", lambda s: _approach_speed(s.leg.state.toe), tanh_of(2.0)),
-    Entry("heel approach speed", "hoof", "m/s", lambda s: _approach_speed(s.leg.state.heel), tanh_of(2.0)),
-    Entry("running peak force", "hoof", "N", lambda s: s.leg.strides.stance_peak, IN_WEIGHTS),
-    *(Entry(f"previous action: {name}", "action", "-", _action(k), PLAIN) for k, name in enumerate(_PARAMETERS)),
-    Entry("commanded speed", "target", "m/s", lambda s: s.episode.target, tanh_of(5.0)),
-    *(Entry(f"height of the ground {x:g} m ahead", "ground", "m", _ahead(x), tanh_of(0.5)) for x in AHEAD),
+    ), Entry("toe contact", "hoof", "-", lambda s: choose(s.leg.state.toe.penetration > 0.0, 1.0, 0.0),
+    TRUTH), Entry("heel contact", "hoof", "-", lambda s: choose(s.leg.state.heel.penetration > 0.0, 1.0, 0.0),
+    TRUTH), Entry("toe load", "hoof", "N", lambda s: s.leg.report.toe.normal, IN_WEIGHTS), Entry("heel load",
+    "hoof", "N", lambda s: s.leg.report.heel.normal, IN_WEIGHTS), Entry("toe approach speed", "hoof", "m/s",
+    lambda s: _approach_speed(s.leg.state.toe), tanh_of(2.0)), Entry("heel approach speed", "hoof", "m/s",
+    lambda s: _approach_speed(s.leg.state.heel), tanh_of(2.0)), Entry("running peak force", "hoof", "N",
+    lambda s: s.leg.strides.stance_peak, IN_WEIGHTS), *(Entry(f"previous action: {name}", "action", "-",
+    _action(k), PLAIN) for k, name in enumerate(_PARAMETERS)), Entry("commanded speed", "target", "m/s",
+    lambda s: s.episode.target, tanh_of(5.0)), *(Entry(f"height of the ground {x:g} m ahead", "ground", "m",
+    _ahead(x), tanh_of(0.5)) for x in AHEAD),
 )  # fmt: skip
-"""All that can be observed, by group, in the order of the observation; the height of the ground is that above the
-ground under O."""
+"""All that can be observed, by group, in the order of the observation; the height of the ground is that above
+the ground under O."""
 
 
 def groups_of(entries: Iterable[Entry]) -> tuple[str, ...]:

@@ -1,8 +1,7 @@
 """The reward: one table of terms. A term is a row here, and nothing else has to be touched.
 
-The sum of all terms is the reward, `info["reward_<name>"]` has each. `docs/environment.md` gives the reasons for
-the weights and what they lead to.
-"""
+The sum of all terms is the reward, `info["reward_<name>"]` has each. `docs/environment.md` gives the reasons
+for the weights and what they lead to."""
 
 from __future__ import annotations
 
@@ -89,11 +88,9 @@ class Term:
     """A term of the reward.
 
     Attributes:
-        name: of its weight; the info's key is "reward_" and this.
-        weight: by default.
-        unit: of the weight.
-        meaning: what the weight is paid for, for the manual page.
-        compute: function of an `Outcome` and the weight, compiled for one environment and for eight side by side:
+        name: of its weight; the info's key is "reward_" and this. weight: by default. unit: of the weight.
+        meaning: what the weight is paid for, for the manual page. compute: function of an `Outcome` and the
+        weight, compiled for one environment and for eight side by side:
             + - * /, comparisons, and the functions of `hoof_env.simd`; `choose` in the place of `if`.
     """
 

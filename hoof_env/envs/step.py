@@ -3,9 +3,8 @@ episode goes on, observe.
 
 One source for one environment and for `LANES` side by side, so that a row of a batch has the bits of the
 environment alone. The terms of the reward and the entries of the observation are those of a task (`reward`,
-`observation`); all arrays are reached from one array of addresses, for a call from Python with as many arguments
-costs more than a step.
-"""
+`observation`); all arrays are reached from one array of addresses, for a call from Python with as many
+arguments costs more than a step."""
 
 from __future__ import annotations
 
@@ -36,11 +35,12 @@ from hoof_env.simd.memory import (
 )
 
 NOT_A_NUMBER, SOME_ENDED, SOME_SWITCHED = -1, 1, 2
-"""What a step returns: an action is none, and nothing has happened; else the sum of what happened somewhere."""
+"""What a step returns: an action is none, and nothing has happened; else the sum of what happened
+somewhere."""
 
 ADDRESSES = Addresses(
-    "data", "model", "tables", "ground", "constants", "reactions", "episode", "task", "actions", "observations",
-    "rewards",
+    "data", "model", "tables", "ground", "constants", "reactions", "episode", "task", "actions",
+    "observations", "rewards",
 )  # fmt: skip
 """The arrays of a step, those of the engine first."""
 
@@ -56,7 +56,7 @@ def task_type(terms: int, entries: int) -> np.dtype[Any]:
             ("middle", "f8", (4,)), ("rate_bound", "f8", (4,)),  # (value - middle) / half is observed
             ("weights", "f8", (terms,)), ("episode_seconds", "f8"),  # of the reward
             ("h", "f8"), ("substeps", "i8"), ("dt", "f8"), ("episode_steps", "i8"),
-            ("height", "f8"), ("lowest", "f8"), ("highest", "f8"),  # nominal and extreme heights of the trunk [m]
+            ("height", "f8"), ("lowest", "f8"), ("highest", "f8"),  # of the trunk: nominal and extreme [m]
             ("stays", "?"),  # a fixed trunk
             ("count", "i8"), ("places", "i8", (entries,)),  # of the observation; -1: not observed
         ],
@@ -193,14 +193,14 @@ def measurement_of(entries: tuple[Entry, ...], scaled: bool, k: int = 0) -> Call
 
 
 class StepKernels(NamedTuple):
-    """Kernels of a task: each takes the array of `ADDRESSES`. What ends in `_one` goes through the environments
-    one by one, what ends in `_batch` takes `LANES` at a time.
+    """Kernels of a task: each takes the array of `ADDRESSES`. What ends in `_one` goes through the
+    environments one by one, what ends in `_batch` takes `LANES` at a time.
 
     Attributes:
-        step_one, step_batch: a control step; returns what `NOT_A_NUMBER` and the others say.
-        apply_one, finish_one: what is before and behind the engine, for a solver that is not a kernel.
-        observe_one, observe_batch: observations without a step.
-        measure_one: puts what is observed, before it is scaled, into an array of doubles, shape (count, columns).
+        step_one, step_batch: a control step; returns what `NOT_A_NUMBER` and the others say. apply_one,
+        finish_one: what is before and behind the engine, for a solver that is not a kernel. observe_one,
+        observe_batch: observations without a step. measure_one: puts what is observed, before it is scaled,
+        into an array of doubles, shape (count, columns).
     """
 
     step_one: Any
@@ -217,7 +217,7 @@ def step_kernels(
     terms: tuple[Term, ...], entries: tuple[Entry, ...], contact_law: Callable[..., Any] | None
 ) -> StepKernels:
     """The kernels of tasks with these terms, entries and law of contact."""
-    parts = [term.compute for term in terms]
+    parts: list[Any] = [term.compute for term in terms]
     parts += [part for entry in entries for part in (entry.measure, entry.scale.apply) if part]
     identity = fingerprint(*parts, contact_law)
     Episode = episode_layout(len(terms))
@@ -301,8 +301,8 @@ def step_kernels(
         task = task_at(addresses[AT.task])[0]
         advance(
             matrix_at(addresses, AT.data), model_at(addresses[AT.model]), matrix_at(addresses, AT.tables),
-            matrix_at(addresses, AT.ground), matrix_at(addresses, AT.constants), cube_at(addresses, AT.reactions),
-            task.h, task.substeps, False,
+            matrix_at(addresses, AT.ground), matrix_at(addresses, AT.constants),
+            cube_at(addresses, AT.reactions), task.h, task.substeps, False,
         )  # fmt: skip
         return finish(addresses, lanes)
 

@@ -1,8 +1,8 @@
-"""Laws of contact: how hard the ground pushes back, and how it rubs. One expression each, for the engine's lanes
-and for the paper's solver.
+"""Laws of contact: how hard the ground pushes back, and how it rubs. One expression each, for the engine's
+lanes and for the paper's solver.
 
-Normal force (Eq. 14): F = K d^n (1 + chi v / v0) + c v with penetration d, penetration rate v and approach speed
-v0 latched at touch-down; the laws differ in the damping factor chi as a function of the coefficient of
+Normal force (Eq. 14): F = K d^n (1 + chi v / v0) + c v with penetration d, penetration rate v and approach
+speed v0 latched at touch-down; the laws differ in the damping factor chi as a function of the coefficient of
 restitution cr (and Kelvin-Voigt in using a dashpot c instead). The paper's is Lankarani and Nikravesh's.
 
 For a free impact of a mass, any K and n, a factor chi returns the restitution e that solves
@@ -10,8 +10,8 @@ chi (1 + e) = ln[(1 + chi) / (1 - chi e)]; only "exact" returns cr itself. Lanka
 cr = 0 bounces with e = 0.66.
 
 Friction (Eq. 15): F_t = -mu(v) F_n v / |v|, Coulomb friction with a coefficient that depends on the sliding
-speed. The paper's is Ambrosio's dynamic correction c_d; its c_f is read as the direction v / |v|, for friction
-opposes sliding. A function of the sliding speed alone cannot hold a hoof at rest: it creeps.
+speed. The paper's is Ambrosio's dynamic correction c_d; its c_f is read as the direction v / |v|, for
+friction opposes sliding. A function of the sliding speed alone cannot hold a hoof at rest: it creeps.
 
 Sources: Lankarani & Nikravesh 1990 (J Mech Des 112:369), Hunt & Crossley 1975 (J Appl Mech 42:440), Flores
 et al. 2011 (Multibody Syst Dyn 25:357), Gonthier et al. 2004 (Multibody Syst Dyn 11:209), Hu & Guo 2015;
@@ -165,8 +165,8 @@ def friction_part(speed, law, slow, fast):  # type: ignore[no-untyped-def]
     """Friction coefficient over its kinetic value, mu(|v|) / mu_k [-], 0 to 1; 0 at rest.
 
     Args:
-        speed: sliding speed |v| [m/s].
-        law: index into `FRICTION_LAWS`, the same in all lanes. Ambrosio: c_d = 0 below `slow`, 1 above `fast`,
+        speed: sliding speed |v| [m/s]. law: index into `FRICTION_LAWS`, the same in all lanes. Ambrosio: c_d
+        = 0 below `slow`, 1 above `fast`,
             linear between. Threlfall: 1 - exp(-3 |v| / v0) up to v0 = `fast`, constant above. The last:
             tanh(|v| / `fast`).
         slow, fast: threshold speeds v0 and v1 [m/s]; the paper does not print them.

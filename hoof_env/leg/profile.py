@@ -13,7 +13,7 @@ Everything is in the frame of the leg with O at the origin, after the mirror int
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from llvmlite import ir
@@ -25,7 +25,7 @@ from hoof_env.leg.geometry import Geometry, tables
 from hoof_env.leg.kinematics import solve_points
 from hoof_env.leg.linkage import BODIES, POINTS
 from hoof_env.simd.compile import kernel
-from hoof_env.simd.layout import Layout, Row, Vector, block
+from hoof_env.simd.layout import Block, Layout, Row, Vector
 from hoof_env.simd.math import ROUNDER
 from hoof_env.simd.memory import intrinsic
 from hoof_env.simd.rows import store_row
@@ -36,7 +36,8 @@ _HALF = 8
 
 
 class Functions(Layout):
-    """The functions, in the order of a table row; z: centres of the links, alpha: their angles, ' is d/dtheta."""
+    """The functions, in the order of a table row; z: centres of the links, alpha: their angles, ' is
+    d/dtheta."""
 
     toe: Vector  # [m]
     heel: Vector  # [m]
@@ -48,7 +49,7 @@ class Functions(Layout):
     frame_inertia_slope: Row  # c'
     sine: Row  # of the crank angle [-]
     cosine: Row
-    padding: block(2)  # to whole vectors
+    padding: Annotated[Block, 2]  # to whole vectors
 
 
 class Slopes(Layout):

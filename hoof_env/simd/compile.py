@@ -50,8 +50,8 @@ def kernel(function: F, identity: str = "") -> F:
 
 
 def fingerprint(*functions: Callable[..., Any] | None) -> str:
-    """What tells kernels apart that contain different functions: a digest of those from outside this package, with
-    the constants and functions that they name. An edit of any of them changes it."""
+    """What tells kernels apart that contain different functions: a digest of those from outside this package,
+    with the constants and functions that they name. An edit of any of them changes it."""
     digest = hashlib.sha256()
     for function in functions:
         _add_function(digest, function, set())

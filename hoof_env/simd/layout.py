@@ -1,14 +1,14 @@
 """Named rows of memory: `leg.theta` instead of a row number.
 
-A subclass of `Layout` says which fields lie one after the other, each a `Row`, a planar `Vector`, a `Block` of
-rows or another layout. Positions follow from the order, here and nowhere else. Kernels reach the fields as
+A subclass of `Layout` says which fields lie one after the other, each a `Row`, a planar `Vector`, a `Block`
+of rows or another layout. Positions follow from the order, here and nowhere else. Kernels reach the fields as
 attributes, of `Rows` on the stack and of `Columns` in an array; Python reaches them by `slices` and `names`.
 """
 
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any, ClassVar, NamedTuple, get_type_hints
+from typing import Annotated, Any, ClassVar, NamedTuple, get_origin, get_type_hints
 
 from numba.core import types
 from numba.core.datamodel import models
@@ -34,20 +34,14 @@ class Vector:
 
 
 class Block:
-    """Rows that are reached by their number."""
-
-    size: ClassVar[int]
-
-
-def block(size: int) -> Any:
-    """A `Block` of so many rows."""
-    return type(f"Block{size}", (Block,), {"size": size})
+    """`Annotated[Block, n]`: n rows, reached by their number."""
 
 
 class Field(NamedTuple):
-    """The first row of a field, and what it is: `Row`, `Vector`, a `Block` or a layout."""
+    """The first row of a field, how many it has, and what it is: `Row`, `Vector`, `Block` or a layout."""
 
     start: int
+    size: int
     kind: Any
 
 
@@ -61,15 +55,17 @@ class _Named(type):
     def __init__(cls, name: str, bases: Any, namespace: dict[str, Any]) -> None:
         super().__init__(name, bases, namespace)
         cls.fields, cls.size, names = {}, 0, []
-        for key, kind in get_type_hints(cls).items():
-            cls.fields[key] = Field(cls.size, kind)
-            cls.size += kind.size
-            names += _names(key, kind)
+        for key, hint in get_type_hints(cls, include_extras=True).items():
+            kind, size = (Block, hint.__metadata__[0]) if get_origin(hint) is Annotated else (hint, hint.size)
+            cls.fields[key] = Field(cls.size, size, kind)
+            cls.size += size
+            names += _names(key, cls.fields[key])
         cls.names = tuple(names)
 
-    def __getitem__(cls, name: str) -> slice:
-        start, kind = cls.fields[name]
-        return slice(start, start + kind.size)
+    def rows(cls, name: str) -> slice:
+        """The rows of a field."""
+        start, size, _ = cls.fields[name]
+        return slice(start, start + size)
 
 
 class Layout(metaclass=_Named):
@@ -83,18 +79,18 @@ class Layout(metaclass=_Named):
 
 
 def views(layout: Any, data: NDArray[Any]) -> Any:
-    """The fields of memory by name, as views of an array whose first axis is the rows: of a `Row` without that
-    axis, of anything else with it."""
-    found = {name: data[layout[name]] for name in layout.fields}
+    """The fields of memory by name, as views of an array whose first axis is the rows: of a `Row` without
+    that axis, of anything else with it."""
+    found = {name: data[layout.rows(name)] for name in layout.fields}
     return SimpleNamespace(**{k: v[0] if layout.fields[k].kind is Row else v for k, v in found.items()})
 
 
-def _names(key: str, kind: Any) -> list[str]:
-    if isinstance(kind, _Named):
-        return [f"{key}_{name}" for name in kind.names]
-    if issubclass(kind, Vector):
+def _names(key: str, field: Field) -> list[str]:
+    if isinstance(field.kind, _Named):
+        return [f"{key}_{name}" for name in field.kind.names]
+    if field.kind is Vector:
         return [f"{key}_x", f"{key}_y"]
-    return [f"{key}_{k}" for k in range(kind.size)] if issubclass(kind, Block) else [key]
+    return [key] if field.kind is Row else [f"{key}_{k}" for k in range(field.size)]
 
 
 class LayoutConstant(types.Opaque):  # type: ignore[misc]
@@ -131,7 +127,7 @@ class _FieldsOfMemory(AttributeTemplate):  # type: ignore[misc]
 
 
 def _get_field(context: Any, builder: Any, memory: Any, value: Any, name: str) -> Any:
-    start, kind = memory.layout.fields[name]
+    start, _, kind = memory.layout.fields[name]
     first = INDEX(start)
     if kind is Row:
         return read_row(context, builder, memory, value, first)
@@ -143,7 +139,7 @@ def _get_field(context: Any, builder: Any, memory: Any, value: Any, name: str) -
 
 def _set_field(context: Any, builder: Any, signature: Any, values: Any, name: str) -> Any:
     (memory, given), (place, value) = signature.args, values
-    start, kind = memory.layout.fields[name]
+    start, _, kind = memory.layout.fields[name]
     if kind is Row:
         write_row(context, builder, memory, place, INDEX(start), value)
     elif kind is Vector:
