@@ -45,4 +45,5 @@ def episode_layout(terms: int) -> Any:
     if terms == len(TERMS):
         return Episode
     fields = {**Episode.__annotations__, "terms": Annotated[Block, terms]}
-    return type(Layout)(f"Episode{terms}", (Layout,), {"__annotations__": fields, "__module__": __name__})
+    make: Any = type(Layout)
+    return make(f"Episode{terms}", (Layout,), {"__annotations__": fields, "__module__": __name__})

@@ -7,21 +7,18 @@ import json
 import math
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import fields
 from pathlib import Path
 from string import Template
 from typing import Any
 
 from hoof_env.dynamics.trunk_model import LIFT_OFF
 from hoof_env.envs import manual_tables as tables
-from hoof_env.envs import start
-from hoof_env.envs.episode import TERMS
+from hoof_env.envs import observation, start
 from hoof_env.envs.grounds import HILLS
 from hoof_env.envs.infos import MEASURED
 from hoof_env.envs.manual_text import PAGE
 from hoof_env.envs.multi_objective import HorseLegMOEnv
-from hoof_env.envs.observation import GROUPS, entries
-from hoof_env.envs.reward import RewardWeights
+from hoof_env.envs.reward import TERMS, check_weights
 from hoof_env.envs.tasks import PER_EPISODE, TASKS, Settings, to_json
 from hoof_env.errors import OutputError, check_choice
 from hoof_env.gait.motion_law import FilterSettings
@@ -37,6 +34,9 @@ PAGES = tuple(_NAMES)
 INDEX = "README.md"
 
 MOVES = "The trunk moves by what friction gives it and feels every link swing. "
+
+GROUPS = observation.groups_of(observation.ENTRIES)
+GAIT = [entry for entry in observation.ENTRIES if entry.group == "gait"]
 
 
 def page(task: str) -> str:
@@ -132,7 +132,7 @@ def write_pages(out: Path) -> list[Path]:
 def observed(task: str) -> tuple[str, ...]:
     """Names of the observation's entries of a page's id, by default."""
     settings = TASKS["leg" if task == "mo" else task].settings({})
-    return tuple(entry[0] for entry in entries(settings.observation, settings.trunk))
+    return tuple(entry.name for entry in observation.observed(settings.observation, settings.trunk))
 
 
 # Parts of a page
@@ -142,10 +142,10 @@ def _actions(settings: Settings) -> str:
     bounds = FilterSettings().to_array()[:, 1]
     rows = []
     for k, (low, high) in enumerate(LIMITS.values()):
-        name, _, unit = GROUPS["gait"][k]
+        name, unit = GAIT[k].name, GAIT[k].unit
         if settings.gait:
             low, high = -(high - low) / 2, (high - low) / 2
-        fastest = f"{bounds[k]:g} {GROUPS['gait'][len(LIMITS) + k][2]}"
+        fastest = f"{bounds[k]:g} {GAIT[len(LIMITS) + k].unit}"
         rows.append((str(k), name, f"{low:.5g}", f"{high:.5g}", unit, fastest))
     return _table(
         ("Num", "Offset of" if settings.gait else "Command", "At -1", "At +1", "Unit", "Fastest change"), rows
@@ -153,9 +153,7 @@ def _actions(settings: Settings) -> str:
 
 
 def _offsets(gait: str) -> str:
-    limits = (
-        f"{low:.5g} to {high:.5g} {GROUPS['gait'][k][2]}" for k, (low, high) in enumerate(LIMITS.values())
-    )
+    limits = (f"{low:.5g} to {high:.5g} {GAIT[k].unit}" for k, (low, high) in enumerate(LIMITS.values()))
     return (
         f'It is added to the {gait}, and the sums are clipped to {", ".join(limits)}. What is observed "as'
         ' action" is -1 and 1 at these limits. A gait out of reach has the nearest action.\n\n'
@@ -163,17 +161,15 @@ def _offsets(gait: str) -> str:
 
 
 def _observations(settings: Settings) -> str:
-    rows = [(*entry, group) for group in settings.observation for entry in entries([group], settings.trunk)]
+    entries = observation.observed(settings.observation, settings.trunk)
+    rows = [(entry.name, entry.scale.text, entry.unit, entry.group) for entry in entries]
     head = ("Num", "Observation", "Scaling", "Unit before scaling", "Group")
     return _table(head, [(str(k), *row) for k, row in enumerate(rows)])
 
 
 def _rewards(settings: Settings) -> str:
-    weights = RewardWeights.of(settings.reward_weights)
-    rows = []
-    for term, item in zip(TERMS, fields(RewardWeights), strict=True):
-        unit, meaning = tables.WEIGHTS[item.name]
-        rows.append((f"`{term}`", f"`{item.name}`", f"{getattr(weights, item.name):g}", unit, meaning))
+    weights = check_weights(settings.reward_weights)
+    rows = [(f"`{t.key}`", f"`{t.name}`", f"{weights[t.name]:g}", t.unit, t.meaning) for t in TERMS]
     return _table(("Term", "Weight", "Default", "Unit", "Meaning"), rows)
 
 
@@ -256,8 +252,9 @@ def _docstring(task: str) -> tuple[str, list[str]]:
 def _of_class(task: str) -> str:
     """The page of a class: its docstring, an example and the table of its observation."""
     name, (head, sections) = _NAMES[task], _docstring(task)
-    scaling = {entry[0]: entry for group in GROUPS.values() for entry in group}
-    rows = [(str(k), *scaling[entry]) for k, entry in enumerate(observed(task))]
+    entries = {entry.name: entry for entry in observation.ENTRIES}
+    found = [entries[name] for name in observed(task)]
+    rows = [(str(k), entry.name, entry.scale.text, entry.unit) for k, entry in enumerate(found)]
     table = _table(("Num", "Observation", "Scaling", "Unit before scaling"), rows)
     parts = [f"# {name}", head, PAGE.split("\n\n", 2)[2].split("\n\nenvs = ")[0] + "\n```"]
     for section in sections:

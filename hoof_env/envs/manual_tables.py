@@ -88,20 +88,6 @@ SETTINGS: Rows = {
 }
 """Unit and meaning of each field of `tasks.Settings`."""
 
-WEIGHTS: Rows = {
-    "progress": ("1/m", "forward travel of the trunk"),
-    "peak": (
-        "1/kN",
-        "minus the increase of the stance's running peak GRF, the highest of all substeps; the charges of"
-        " one stance add up to its peak",
-    ),
-    "energy": ("1/kJ", "minus the positive work of crank and swing drive; braking is not recovered"),
-    "action": ("-", "minus the mean squared change of the action"),
-    "failure": ("1/s", "once, minus `episode_seconds`, when the episode fails"),
-    "support": ("1/s", "normal force over the weight of trunk and leg, integrated over the step"),
-}
-"""Unit and meaning of each field of `reward.RewardWeights`."""
-
 OPTIONS: Rows = {
     "gait": ("", "name of a gait of the preset, mapping of the four gait parameters, or `GaitParameters`"),
     "crank_angle": ("rad", "at the start"),

@@ -89,7 +89,7 @@ class Term:
 
     Attributes:
         name: of its weight; the info's key is "reward_" and this. weight: by default. unit: of the weight.
-        meaning: what the weight is paid for, for the manual page. compute: function of an `Outcome` and the
+        meaning: what is weighed, for the manual page. compute: function of an `Outcome` and the
         weight, compiled for one environment and for eight side by side:
             + - * /, comparisons, and the functions of `hoof_env.simd`; `choose` in the place of `if`.
     """
@@ -107,13 +107,23 @@ class Term:
 
 
 TERMS = (
-    Term("progress", 1.0, "1/m", "per metre forward", progress),
-    Term("peak", 0.3, "1/kN", "per kilonewton of every stance's peak ground reaction force", peak),
-    Term("energy", 0.1, "1/kJ", "per kilojoule of positive work of the two drives", energy),
-    Term("action", 0.03, "-", "per control step and unit of mean squared action change", action),
-    Term("failure", 30.0, "1/s", "per second of a whole episode, charged once at a failure", failure),
-    Term("support", 0.0, "1/s", "per second in which the leg bears the whole weight, in parts", support),
-)
+    Term("progress", 1.0, "1/m", "forward travel of the trunk", progress),
+    Term(
+        "peak", 0.3, "1/kN",
+        "minus the increase of the stance's running peak GRF, the highest of all substeps; the charges of"
+        " one stance add up to its peak", peak,
+    ),
+    Term(
+        "energy", 0.1, "1/kJ",
+        "minus the positive work of crank and swing drive; braking is not recovered", energy,
+    ),
+    Term("action", 0.03, "-", "minus the mean squared change of the action", action),
+    Term("failure", 30.0, "1/s", "once, minus `episode_seconds`, when the episode fails", failure),
+    Term(
+        "support", 0.0, "1/s",
+        "normal force over the weight of trunk and leg, integrated over the step", support,
+    ),
+)  # fmt: skip
 """The terms of all ids, in the order in which they are added up."""
 
 

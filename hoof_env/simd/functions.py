@@ -173,7 +173,7 @@ def lane_sum(context: Any, start: Any, x: Any) -> Any:
     """start + x_0 + x_1 + ..., added in this order, in every lane; `start` is the same in all. Of lanes or of
     planar vectors."""
 
-    def total(builder: Any, start: Any, x: Any, count: int) -> Any:
+    def total(builder: Any, start: Any, x: Any, count: Any) -> Any:
         found = pick(builder, start, 0, count)
         for lane in range(count):
             found = builder.fadd(found, pick(builder, x, lane, count))
@@ -182,7 +182,7 @@ def lane_sum(context: Any, start: Any, x: Any) -> Any:
     def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         kind = signature.return_type
         if isinstance(kind, Lanes):
-            return total(builder, *values, kind.count)
+            return total(builder, values[0], values[1], kind.count)
         (a, b), (c, d) = (split(context, builder, kind, value) for value in values)
         x, y = total(builder, a, c, kind.count), total(builder, b, d, kind.count)
         return join(context, builder, kind, x, y)

@@ -93,7 +93,7 @@ def _names(key: str, field: Field) -> list[str]:
     return [key] if field.kind is Row else [f"{key}_{k}" for k in range(field.size)]
 
 
-class LayoutConstant(types.Opaque):  # type: ignore[misc]
+class LayoutConstant(types.Opaque):
     """numba's type of a layout, which a kernel hands to `rows`, `columns` and `nth`."""
 
     def __init__(self, layout: Any) -> None:
@@ -114,8 +114,8 @@ def _no_value(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     return context.get_dummy_value()
 
 
-class _FieldsOfMemory(AttributeTemplate):  # type: ignore[misc]
-    def generic_resolve(self, memory: Any, name: str) -> Any:
+class _FieldsOfMemory(AttributeTemplate):
+    def generic_resolve(self, memory: Any, name: str) -> Any:  # type: ignore[override]
         field = memory.layout and memory.layout.fields.get(name)
         if not field:
             return None
