@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from hoof_env.dynamics.constrained import ConstrainedLeg as ConstrainedLeg
     from hoof_env.dynamics.drive import Motor as Motor
     from hoof_env.dynamics.drive import Prescribed as Prescribed
-    from hoof_env.dynamics.engine import LegEngine as LegEngine
     from hoof_env.dynamics.limb import Limb as Limb
     from hoof_env.dynamics.result import Result as Result
     from hoof_env.dynamics.step_length import StepWarning as StepWarning
@@ -56,7 +55,6 @@ _PUBLIC = {
     "Prescribed": "hoof_env.dynamics.drive",
     "Result": "hoof_env.dynamics.result",
     "StepWarning": "hoof_env.dynamics.step_length",
-    "LegEngine": "hoof_env.dynamics.engine",
     "ConstrainedLeg": "hoof_env.dynamics.constrained",
     "HorseLegEnv": "hoof_env.envs.horse_leg",
     "HorseLegMOEnv": "hoof_env.envs.multi_objective",

@@ -10,10 +10,10 @@ from pathlib import Path
 import gymnasium as gym
 import numpy as np
 import pytest
-from hoof_env.dynamics.trunk_rows import MOMENTUM
 
 from hoof_env import __version__, cli
 from hoof_env._arguments import parse_pairs
+from hoof_env.dynamics.layout import TRUNK_STATE
 from hoof_env.dynamics.trunk import GRAVITY
 from hoof_env.envs.policies import make_policy
 from hoof_env.errors import HoofEnvError, OutputError, ParameterError
@@ -149,7 +149,7 @@ def test_a_step_that_failed_is_not_recorded():
                 self.steps += 1
                 if self.steps == 4:
                     state = env.unwrapped.get_state()
-                    state["engine"]["trunk"][MOMENTUM : MOMENTUM + 2] = 1e308
+                    state["engine"]["trunk"][TRUNK_STATE.index("momentum_x")] = 1e308
                     env.unwrapped.set_state(state)
                 return run.predict(observation, **options)
 

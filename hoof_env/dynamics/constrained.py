@@ -4,7 +4,7 @@
     [ Phi_q  0       ] [ lambda ] = [ gamma - 2 alpha Phi_dot - beta^2 Phi ]      (Eq. 8)
 
 Crank angle and swing follow the motion law exactly; q and qd are integrated numerically and drift. That is
-what this solver is for: it shows what the paper's method does. `dynamics.engine` computes the same motion in
+what this solver is for: it shows what the paper's method does. `TrunkEngine` computes the same motion in
 closed form.
 
 Phi_q is square, so the second row of Eq. 8 alone fixes qdd: contact, masses and weight change the multipliers
@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,10 +31,9 @@ from hoof_env.dynamics.constraints import (
     body_coordinate,
     closed_form,
 )
-from hoof_env.dynamics.engine import BODY, State
 from hoof_env.dynamics.integrators import INTEGRATORS, Vector
+from hoof_env.dynamics.layout import LEG_REPORT, LEG_STATE, TRUNK_REPORT, TRUNK_STATE
 from hoof_env.dynamics.result import Result
-from hoof_env.dynamics.trace import new_trace, record
 from hoof_env.dynamics.trunk import GRAVITY, Trunk
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait.motion_law import (
@@ -57,16 +56,43 @@ SOLE = next(i for i, body in enumerate(BODIES) if {body.tail, body.head} == {"I"
 _X, _Y, _TURN = 3 * SOLE, 3 * SOLE + 1, 3 * SOLE + 2
 
 
-@dataclass
-class ConstrainedState(State):
-    """`engine.State` with q and qd, shape (42,) each, in the frame of the paper's drawing."""
+TRACE = np.dtype([(name, "f8") for name in (*TRUNK_STATE, *TRUNK_REPORT, *LEG_STATE, *LEG_REPORT)])
+"""State and report of one leg at the end of a substep, by the names that `TrunkEngine` gives them. On a fixed
+trunk its velocity, momentum and pitch are 0."""
 
+BODY = np.dtype([("time", "f8"), ("x", "f8")])
+"""Time [s] and place of O [m]."""
+
+
+def new_trace(rows: int) -> NDArray[np.void]:
+    """An empty trace of `rows` substeps, of dtype `TRACE`."""
+    return np.zeros(rows, dtype=TRACE)
+
+
+@dataclass
+class ConstrainedState:
+    """Everything that changes: copying its arrays copies the state.
+
+    Attributes:
+        body: record of dtype `BODY`. motion: record of dtype `MOTION`.
+        filters: shape (4,). contacts: shape (2,), toe first.
+        q, qd: coordinates and their rates in the frame of the paper's drawing, shape (42,) each.
+    """
+
+    body: Any
+    motion: Any
+    filters: NDArray[np.void]
+    contacts: NDArray[np.void]
     q: Vector
     qd: Vector
 
     def copy(self) -> ConstrainedState:
         """An independent copy."""
         return ConstrainedState(**{name: array.copy() for name, array in vars(self).items()})
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        # A record that was pickled has memory that writing by name misses; one taken from an array has not.
+        vars(self).update({name: np.array(values)[()] for name, values in state.items()})
 
 
 class Reactions(NamedTuple):
@@ -87,7 +113,7 @@ class Reactions(NamedTuple):
 class ConstrainedLeg:
     """One leg on a fixed trunk over the ground, by Eq. 8; see the module docstring.
 
-    Interface and meaning of every reported quantity are those of `engine.LegEngine`.
+    It reports by the names of `TrunkEngine`, and every quantity has the same meaning.
 
     Args:
         geometry: the leg.
@@ -159,7 +185,7 @@ class ConstrainedLeg:
                 f"height, speed: a fixed trunk rests at {self.trunk.height:g} m, got {height!r} and {speed!r}"
             )
         state, command = self.state, gait.to_array()
-        state.body["t"], state.body["cx"], state.motion["theta"] = 0.0, x, theta
+        state.body["time"], state.body["x"], state.motion["theta"] = 0.0, x, theta
         state.filters[:] = steady_filters(command)
         state.contacts[:] = new_contacts()
         evaluate_motion(state.motion, state.filters)
@@ -184,7 +210,7 @@ class ConstrainedLeg:
         try:
             with np.errstate(all="ignore"):  # a diverging integration is a result, not a warning
                 for k, row in enumerate(trace):
-                    if not self._substep(command, before.body["t"] + (k + 1) * self.sim_dt, row):
+                    if not self._substep(command, before.body["time"] + (k + 1) * self.sim_dt, row):
                         result = Result.NOT_FINITE
                         break
         except np.linalg.LinAlgError:
@@ -225,7 +251,7 @@ class ConstrainedLeg:
 
         state.q, state.qd = INTEGRATORS[self.integrator](acceleration, state.q, state.qd, self.sim_dt)
         advance_motion(state.motion, state.filters, self.sim_dt)
-        state.body["t"] = t
+        state.body["time"] = t
         return bool(np.isfinite([state.q, state.qd]).all()) and self._evaluate(command, row)
 
     def _evaluate(self, command: NDArray[np.float64], row: np.void) -> bool:
@@ -233,7 +259,7 @@ class ConstrainedLeg:
         state, travel = self.state, self._travel
         command_filters(state.filters, command, self._settings)
         evaluate_motion(state.motion, state.filters)
-        trunk = complex(state.body["cx"], self.trunk.height)
+        trunk = complex(state.body["x"], self.trunk.height)
         arms = self._corner_arms()
         at = complex(state.q[_X], state.q[_Y]) + arms
         velocity = complex(state.qd[_X], state.qd[_Y]) + 1j * state.qd[_TURN] * arms
@@ -244,8 +270,25 @@ class ConstrainedLeg:
         _, multipliers = self._solve(closure, self._ground_load())
         # The drives bring in lambda . Phi_t, so the torques are lambda . dPhi/dtheta and lambda . dPhi/dphi.
         crank, hip = multipliers[DRIVER_ROW], multipliers @ closure.by_phi
-        record(row, state.body["t"], state.motion, trunk, 0j, state.contacts, toe, heel, crank, hip)
+        self._report(row, float(crank), float(hip))
         return bool(np.isfinite(multipliers).all())
+
+    def _report(self, row: np.void, crank: float, hip: float) -> None:
+        """Fill a row of dtype `TRACE`; `crank` and `hip` are the torques of the drives [N m]."""
+        body, motion = self.state.body, self.state.motion
+        row["time"], row["x"], row["y"] = body["time"], body["x"], self.trunk.height
+        row["centre_x"], row["centre_y"] = row["x"], row["y"]
+        for name in ("theta", "theta_rate", "theta_acc", "phi", "phi_rate", "phi_acc"):
+            row[name] = motion[name]
+        for name, command in zip(PARAMETERS, self.state.filters, strict=True):
+            row[name], row[f"{name}_rate"] = command["value"], command["rate"]
+        row["crank_torque"], row["crank_power"] = crank, crank * motion["theta_rate"]
+        row["hip_torque"], row["hip_power"] = hip, hip * motion["phi_rate"]
+        for point, contact in zip(("toe", "heel"), self.state.contacts, strict=True):
+            for name in ("x", "penetration", "rate", "normal", "friction"):
+                row[f"{point}_{name}"] = contact[name]
+            row[f"{point}_y"], row[f"{point}_slide"] = -contact["penetration"], contact["vx"]
+            row[f"{point}_slowness"] = 1 / contact["approach"] if contact["approach"] > 0 else 0.0
 
     def _corner_arms(self) -> NDArray[np.complex128]:
         """Toe and heel relative to the centre of the sole link, in the frame of q [m]."""

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
-import numpy as np
-
-from hoof_env.errors import ParameterError, check_choice, check_number
+from hoof_env.errors import check_choice, check_number
 
 GRAVITY = 9.81
 """[m/s^2], as in the paper's Table 1."""
@@ -18,16 +15,7 @@ TRUNKS = ("fixed", "rail", "suspended", "free")
 FIXED, RAIL, SUSPENDED, FREE = range(4)
 
 ONE_LEG = TRUNKS[:FREE]
-"""The kinds that `LegEngine` knows: a free trunk on one leg is no task."""
-
-TRUNK = np.dtype(
-    [("kind", "i8")]
-    + [
-        (name, "f8")
-        for name in ("mass", "total_mass", "share", "stiffness", "damping", "height", "drag", "gravity")
-    ]
-)
-"""What the kernels of `LegEngine` read; those of `TrunkEngine` read rows (`trunk_rows`)."""
+"""The kinds of the environments: a free trunk on one leg is no task."""
 
 
 @dataclass(frozen=True)
@@ -70,28 +58,3 @@ class Trunk:
         check_number("trunk_drag", self.drag, low=0)
         check_number("trunk_height", self.height, low=0, exclusive_low=True)
         check_number("trunk_pitch_inertia", self.pitch_inertia, low=0, exclusive_low=True)
-
-    def to_record(self, leg_mass: float, gravity: float) -> Any:
-        """The settings as one record of dtype `TRUNK` for the kernels of `LegEngine`."""
-        record = np.zeros(1, dtype=TRUNK)[0]
-        record["kind"] = TRUNKS.index(self.kind)
-        for name in ("mass", "share", "stiffness", "damping", "height", "drag"):
-            record[name] = getattr(self, name)
-        record["total_mass"], record["gravity"] = self.mass + leg_mass, gravity
-        return record
-
-    def check_step(self, h: float, leg_mass: float) -> None:
-        """Raise `ParameterError` where a step of `h` [s] makes semi-implicit Euler blow up the free trunk.
-
-        With the mass m of trunk and leg, spring k and damper c are stable while h^2 k / m + 2 h c / m < 4.
-        """
-        m = self.mass + leg_mass
-        if self.kind == "suspended" and h * h * self.stiffness / m + 2 * h * self.damping / m >= 4:
-            raise ParameterError(
-                f"trunk_stiffness, trunk_damping: expected h^2 k / m + 2 h c / m < 4 with h = {h:g} s and "
-                f"m = {m:g} kg, got k = {self.stiffness:g} N/m and c = {self.damping:g} N s/m"
-            )
-        if self.kind != "fixed" and h * self.drag / m >= 2:
-            raise ParameterError(
-                f"trunk_drag: expected less than 2 m / h = {2 * m / h:g} N s/m, got {self.drag:g} N s/m"
-            )

@@ -403,7 +403,7 @@ class TrunkEngine:
 
     @property
     def state(self) -> dict[str, Floats]:
-        """The state by name: rows of `trunk_rows.STATE`, shape (num_envs,), and of `limb_rows.STATE`, shape
+        """The state by name: rows of `layout.TRUNK_STATE`, shape (num_envs,), and of `LEG_STATE`, shape
         (legs, num_envs)."""
         named = named_rows(self._memory)
         return {name: named[name].copy() for name in (*TRUNK_STATE, *LEG_STATE)}
@@ -416,13 +416,13 @@ class TrunkEngine:
 
     @property
     def account(self) -> dict[str, Floats]:
-        """Integrals since the reset by name, `lanes_report.ACCOUNT`, shape (num_envs,)."""
+        """Integrals since the reset by name, `layout.ACCOUNT`, shape (num_envs,)."""
         return {name: self._memory.account[k].copy() for k, name in enumerate(ACCOUNT)}
 
     @property
     def strides(self) -> dict[str, Floats]:
-        """The open stance and the sums of the last call by name, `limb_rows.STRIDES` and `STRIDE_SUMS`, shape
-        (legs, num_envs); see `lanes_strides`. Zeros unless the engine was made with `strides=True`."""
+        """The open stance and the sums of the last call by name, `layout.STRIDES` and `STRIDE_SUMS`, shape
+        (legs, num_envs); see `observables`. Zeros unless the engine was made with `strides=True`."""
         names, m = (*STRIDES, *STRIDE_SUMS), self._memory
         whole = np.concatenate([m.strides, m.stride_sums], axis=1)
         return {name: whole[:, k] for k, name in enumerate(names)}

@@ -13,20 +13,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.constrained import ConstrainedLeg, ConstrainedState
+from hoof_env.dynamics.constrained import TRACE, ConstrainedLeg, ConstrainedState, new_trace
 from hoof_env.dynamics.layout import LEG_REPORT, LEG_STATE, TRUNK_REPORT, TRUNK_STATE
 from hoof_env.dynamics.result import Result
-from hoof_env.dynamics.trace import new_trace
+from hoof_env.dynamics.stance import Stance
 from hoof_env.dynamics.trunk_engine import TrunkEngine
 from hoof_env.dynamics.trunk_model import LIFT_OFF, Memory, memory_of
-from hoof_env.envs.stance import ACCOUNT, take_account
 from hoof_env.envs.tasks import Settings
-from hoof_env.envs.trace_names import record_of
 from hoof_env.errors import ParameterError
 from hoof_env.gait.parameters import GaitParameters
 
 Floats = NDArray[np.float64]
 Records = NDArray[np.void]
+
+ACCOUNT = np.dtype(
+    [("open", "?"), ("began", "f8"), ("peak", "f8"), ("count", "i8"), ("impulse", "f8"), ("loaded", "f8")]
+)
+"""A stance as `dynamics.stance.Stance` has it, and over the episode the impulse of the normal force
+[N s] and the time under load [s]."""
 
 APART = 1.0
 """A linkage that violates its constraints by more [m, rad] has diverged, though its numbers may still be
@@ -72,29 +76,25 @@ class PaperSolver:
         self.traces = [new_trace(1) for _ in self.legs]
         self.apart = np.zeros(len(self.legs), bool)
         self._accounts: Records = np.zeros(len(self.legs), ACCOUNT)
-        self._accounts["threshold"] = LIFT_OFF * engine.weight
+        self._threshold = LIFT_OFF * engine.weight
 
     def compile(self, gait: GaitParameters) -> None:
         """Have all kernels compiled, or loaded, by a step of a leg that is thrown away."""
         leg = copy.deepcopy(self.legs[0])
         trace = leg.reset(gait)
         leg.advance(gait.to_array(), trace)
-        take_account(self._accounts[0].copy(), trace, leg.sim_dt, 0.0, True)
-        record_of(trace, leg.state.filters)
 
     def start(self, envs: Sequence[int], gaits: Floats, crank_angle: Floats, x: Floats) -> None:
         """Start some environments; arguments as of `Starts`."""
         for k, env in enumerate(envs):
             gait = GaitParameters.from_array(gaits[k])
             self.traces[env] = self.legs[env].reset(gait, float(crank_angle[k]), x=float(x[k]))
-            threshold = self._accounts["threshold"][env]
             self._accounts[env] = np.zeros((), ACCOUNT)
-            self._accounts["threshold"][env] = threshold
             self._put(env, self._memory())
 
     def advance(self) -> None:
         """One control step of all, under the commands in the engine's memory."""
-        memory, h = self._memory(), self.legs[0].sim_dt
+        memory = self._memory()
         for env, leg in enumerate(self.legs):
             trace = new_trace(self.substeps)
             kept, self.traces[env] = leg.state.copy(), self.traces[env][-1:]
@@ -106,19 +106,15 @@ class PaperSolver:
             memory.stride_sums[:, :, env] = 0.0
             if result is Result.OK:
                 self.traces[env] = trace
-                account = self._accounts[env]
-                before = account.copy()
-                take_account(account, trace, h, 0.0, True)
-                since = [account[name] - before[name] for name in ("impulse", "loaded_time", "stances")]
-                highest, travel = trace["grf"].max(), account["progress"]
-                memory.stride_sums[0, :, env] = (
-                    account["peak_increase"], highest, account["work"], *since, travel,
-                )  # fmt: skip
+                memory.stride_sums[0, :, env] = self._sum(env, trace)
                 self._put(env, memory)
 
     def record(self, env: int) -> dict[str, Floats]:
-        """What `Recording.last` gives: the rows of the last control step by the engine's names."""
-        return record_of(self.traces[env], self.legs[env].state.filters)
+        """What `Recording.last` gives: the rows of the last control step by name, shaped as `TrunkEngine.run`
+        shapes them."""
+        trace, of_trunk = self.traces[env], {*TRUNK_STATE, *TRUNK_REPORT}
+        shapes = {name: (-1, 1) if name in of_trunk else (-1, 1, 1) for name in TRACE.names or ()}
+        return {name: trace[name].reshape(shape).copy() for name, shape in shapes.items()}
 
     def get_state(self) -> dict[str, Any]:
         """What changes besides the engine's memory."""
@@ -137,7 +133,7 @@ class PaperSolver:
         """
         try:
             legs = [_state_like(leg.state, one) for leg, one in zip(self.legs, state["legs"], strict=True)]
-            accounts, last = np.array(state["accounts"], ACCOUNT), np.array(state["last"], new_trace(0).dtype)
+            accounts, last = np.array(state["accounts"], ACCOUNT), np.array(state["last"], TRACE)
             if not len(accounts) == len(last) == len(legs):
                 raise ValueError
             if not np.isfinite([(leg.q, leg.qd) for leg in legs]).all():
@@ -162,16 +158,36 @@ class PaperSolver:
 
     def _put(self, env: int, memory: Memory) -> None:
         """Write where a leg is, as the kernels do."""
-        now = {
-            name: values.item()
-            for name, values in record_of(self.traces[env][-1:], self.legs[env].state.filters).items()
-        }
+        now = self.traces[env][-1]
         memory.trunk[:, env] = [now[name] for name in TRUNK_STATE]
         memory.trunk_report[:, env] = [now[name] for name in TRUNK_REPORT]
         memory.limbs[0, :, env] = [now[name] for name in LEG_STATE]
         memory.limb_report[0, :, env] = [now[name] for name in LEG_REPORT]
         account = self._accounts[env]
-        memory.strides[0, :, env] = account["open"], account["opened_at"], account["peak"]
+        memory.strides[0, :, env] = account["open"], account["began"], account["peak"]
+
+    def _sum(self, env: int, trace: Records) -> tuple[float, ...]:
+        """The rows `layout.StrideSums` of a control step; the account goes on."""
+        h = self.legs[env].sim_dt
+        *stance, impulse_before, loaded_before = self._accounts[env].item()
+        since, impulse, loaded = Stance(self._threshold, *stance), impulse_before, loaded_before
+        stances = since.count
+        normal = trace["toe_normal"] + trace["heel_normal"]
+        friction = trace["toe_friction"] + trace["heel_friction"]
+        force = np.sqrt(normal * normal + friction * friction)
+        sliding = trace["toe_normal"] * trace["toe_slide"] + trace["heel_normal"] * trace["heel_slide"]
+        columns = trace["theta"], normal, force, sliding, trace["crank_power"], trace["hip_power"]
+        growth = work = travel = 0.0
+        for theta, n, f, slid, crank, hip in zip(*(values.tolist() for values in columns), strict=True):
+            growth += since.add(theta, n, f)
+            work += h * (max(crank, 0.0) + max(hip, 0.0))
+            impulse += h * n
+            if n > 0.0:
+                loaded += h
+                travel -= h * slid / n
+        sums = growth, force.max(), work, impulse - impulse_before, loaded - loaded_before
+        self._accounts[env] = since.is_open, since.began, since.peak, since.count, impulse, loaded
+        return *sums, since.count - stances, travel
 
 
 def _state_like(own: ConstrainedState, given: Mapping[str, Any]) -> ConstrainedState:

@@ -78,7 +78,7 @@ def draw_angles(figure: Any, reproduction: Reproduction) -> None:
         shade(angle, phases)
         angle.axhline(0, color=GREY, lw=0.6, zorder=1)
         angle.plot(
-            trace["t"], np.degrees(trace["hoof_angle"]), color=BLUE, lw=1.3, label="simulated", zorder=3
+            trace["time"], np.degrees(trace["hoof_angle"]), color=BLUE, lw=1.3, label="simulated", zorder=3
         )
         _mark_angles(angle, reproduction, gait, stance)
         angle.set(xlabel="time [s]")

@@ -35,7 +35,7 @@ def draw_contact(
         ax.plot(*point, "o", ms=4.5, mfc=colour, mec="black", mew=0.8, zorder=9)
 
     force = np.array([row[f"{tip}_friction"], row[f"{tip}_normal"]]) * 0.75 * side / row[f"{tip}_normal"]
-    slip = np.array([np.sign(row[f"{tip}_vx"]) * 0.3 * side, 0])
+    slip = np.array([np.sign(row[f"{tip}_slide"]) * 0.3 * side, 0])
     below = press + np.array([np.sign(slip[0]) * 0.14 * side, -0.3 * side])
     arrows = [
         (press, force * (0, 1), "$F_n$", BLUE), (press, force * (1, 0), "$F_f$", BLUE),

@@ -77,7 +77,7 @@ def draw_forces(figure: Any, reproduction: Reproduction) -> None:
 def _draw_curves(ax: Any, reproduction: Reproduction, gait: str) -> None:
     for condition, colour in CONDITION_COLOURS.items():
         trace = reproduction.traces[gait, condition, SOLVER]
-        t, force = trace["t"], trace["normal"]
+        t, force = trace["time"], trace["normal"]
         ax.plot(t, force, color=colour, lw=1.4, label=f"{condition}, normal force", zorder=4)
         ax.plot(t, trace["grf"], color=colour, lw=0.7, ls=DASHED, zorder=3)
         peaks = find_peaks(force)

@@ -44,7 +44,7 @@ def draw_mechanism(figure: Any, reproduction: Reproduction) -> None:
     set_size(figure, HEAD + 5 + PANEL + 22)
     head(
         figure, reproduction, "Figure 1. Mechanism of the leg and its contact with the ground", "elastic",
-        f"{GAITS[gait]} at {row['t']:.3f} s. Bodies numbered as in Eq. 2.",
+        f"{GAITS[gait]} at {row['time']:.3f} s. Bodies numbered as in Eq. 2.",
     )  # fmt: skip
     close = LEFT + LEG + GAP
     widths = {LEFT: LEG, close: WIDTH - close - 3}

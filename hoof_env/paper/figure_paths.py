@@ -154,6 +154,6 @@ def _published_contacts(
     for row, points in (("contact_start", stance.first_points), ("contact_end", stance.last_points)):
         t = reproduction.published.row(f"{gait}.{row}").value
         for name in sorted(points):
-            x, depth = (np.interp(t, trace["t"], trace[f"{name}_{part}"]) for part in ("x", "penetration"))
+            x, depth = (np.interp(t, trace["time"], trace[f"{name}_{part}"]) for part in ("x", "penetration"))
             places.append((x, -depth))
     return np.array(places)

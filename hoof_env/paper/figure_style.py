@@ -68,13 +68,13 @@ PRINT: dict[Any, Any] = {
 
 def points_at(geometry: Geometry, row: np.void) -> dict[str, NDArray[np.float64]]:
     """World position (x, y) [m] of every named point at one row of a trace."""
-    frame = FrameMotion(phi=float(row["phi"]), position=(float(row["trunk_x"]), float(row["trunk_y"])))
+    frame = FrameMotion(phi=float(row["phi"]), position=(float(row["x"]), float(row["y"])))
     return dict(zip(POINTS, pose(geometry, float(row["theta"]), frame=frame).points, strict=True))
 
 
 def row_at(trace: NDArray[np.void], t: float) -> np.void:
     """The row of a trace nearest to an instant [s]."""
-    return trace[int(np.argmin(np.abs(trace["t"] - t)))]
+    return trace[int(np.argmin(np.abs(trace["time"] - t)))]
 
 
 def elastic_cycles(reproduction: Reproduction) -> dict[str, tuple[NDArray[np.void], Stance]]:

@@ -58,7 +58,7 @@ def draw_vectors(figure: Any, reproduction: Reproduction) -> None:
 
 def _draw_arrows(ax: Any, trace: NDArray[np.void], times: NDArray[np.float64], width: float) -> None:
     """Vectors at the given times [s] in a panel `width` [mm], coloured by their number."""
-    picked = np.searchsorted(trace["t"], times)
+    picked = np.searchsorted(trace["time"], times)
     loaded = np.flatnonzero(trace["normal"][picked] > 0)
     rows = trace[picked[loaded]]
     scale = LONGEST / float(rows["grf"].max())  # [mm/N]

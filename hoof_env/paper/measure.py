@@ -1,4 +1,4 @@
-"""From the trace of one cycle to what the paper reports about it.
+"""From the record of one cycle to what the paper reports about it.
 
 A hoof point is in contact between the instants at which its penetration crosses zero, interpolated linearly
 between samples. First contact is the earliest of these instants over toe and heel, last contact the latest;
@@ -7,16 +7,85 @@ hoof angles there are interpolated too.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hoof_env.dynamics.constrained import TRACE
 from hoof_env.errors import ParameterError
+from hoof_env.ground.contact import HEEL, TOE, Ground, new_contacts, touch
+from hoof_env.simd.compile import kernel
 
 Interval = tuple[float, float]
 
 POINTS = ("toe", "heel")
+
+SUMS = ("normal", "friction", "grf", "cop_x", "hoof_angle")
+"""Normal and friction force on both points and their resultant [N], centre of pressure [m] (NaN without
+load), and the hoof's angle, heel up positive [rad]."""
+
+CYCLE = np.dtype([(name, "f8") for name in (*(TRACE.names or ()), *SUMS)])
+"""A cycle: a row for every substep, what the engine reports of one leg and the sums over its hoof points."""
+
+
+def cycle_of(record: Mapping[str, Any]) -> NDArray[np.void]:
+    """Rows of dtype `CYCLE`, shape (n,), from what an environment's `record` gives."""
+    cycle = np.zeros(len(record["time"]), CYCLE)
+    for name in TRACE.names or ():
+        cycle[name] = np.asarray(record[name]).reshape(len(cycle))
+    return add_sums(cycle)
+
+
+def add_sums(cycle: NDArray[np.void]) -> NDArray[np.void]:
+    """Fill `SUMS` of a cycle on a fixed trunk over level ground; returns it."""
+    c = cycle
+    for name in ("normal", "friction"):
+        c[name] = c[f"toe_{name}"] + c[f"heel_{name}"]
+    c["grf"] = np.hypot(c["normal"], c["friction"])
+    loaded = c["normal"] > 0
+    moment = c["toe_normal"] * c["toe_x"] + c["heel_normal"] * c["heel_x"]
+    c["cop_x"] = np.where(loaded, moment / np.where(loaded, c["normal"], 1.0), np.nan)
+    c["hoof_angle"] = np.arctan2(c["heel_y"] - c["toe_y"], c["toe_x"] - c["heel_x"])
+    return cycle
+
+
+def replay(cycle: NDArray[np.void], ground: Ground, rise: float = 0.0) -> NDArray[np.void]:
+    """The cycle on another ground, which lies higher by `rise` [m]: the trunk stands lower by as much.
+
+    On a fixed trunk the ground changes forces only, so the leg need not move again: contact and forces are
+    computed anew, and torques and powers of the drives become NaN.
+
+    Args:
+        cycle: dtype `CYCLE`, on a fixed trunk.
+        ground: the other ground.
+        rise: how much higher it lies [m].
+    """
+    result = cycle.copy()
+    for drive in ("crank", "hip"):
+        result[f"{drive}_torque"] = result[f"{drive}_power"] = np.nan
+    for name in ("y", "centre_y"):
+        result[name] -= rise
+    for point in POINTS:
+        result[f"{point}_penetration"] += rise
+        result[f"{point}_y"] = -result[f"{point}_penetration"]
+    _touch_again(result, new_contacts(), ground.to_record())
+    return add_sums(result)
+
+
+@kernel
+def _touch_again(cycle, contacts, ground):  # type: ignore[no-untyped-def]
+    toe, heel = contacts[TOE], contacts[HEEL]
+    for k in range(cycle.shape[0]):
+        row = cycle[k]
+        touch(toe, complex(row.toe_x, row.toe_y), complex(row.toe_slide, -row.toe_rate), ground)
+        touch(heel, complex(row.heel_x, row.heel_y), complex(row.heel_slide, -row.heel_rate), ground)
+        row.toe_normal, row.toe_friction = toe.normal, toe.friction
+        row.heel_normal, row.heel_friction = heel.normal, heel.friction
+        row.toe_slowness = 1.0 / toe.approach if toe.inside else 0.0
+        row.heel_slowness = 1.0 / heel.approach if heel.inside else 0.0
 
 
 @dataclass(frozen=True)
@@ -111,7 +180,7 @@ def overlap(one: tuple[Interval, ...], two: tuple[Interval, ...]) -> Interval | 
 
 def integral(trace: NDArray[np.void], values: NDArray[np.float64], start: float, end: float) -> float:
     """Integral over [start, end] [s] of `values` sampled with the trace, linear between samples."""
-    t = trace["t"]
+    t = trace["time"]
     inner = (t > start) & (t < end)
     times = np.concatenate(([start], t[inner], [end]))
     return float(np.sum(np.diff(times) * _midpoints(np.interp(times, t, values))))
@@ -125,12 +194,12 @@ def measure_stance(trace: NDArray[np.void]) -> Stance:
     """Measure one cycle.
 
     Args:
-        trace: dtype `hoof_env.dynamics.trace.TRACE`, from the start of the cycle to its end, both included.
+        trace: dtype `hoof_env.paper.measure.CYCLE`, from the start of the cycle to its end, both included.
 
     Raises:
         ParameterError: no contact, or a contact that the cycle cuts in two.
     """
-    t = trace["t"]
+    t = trace["time"]
     toe, heel = (contact_intervals(t, trace[f"{name}_penetration"]) for name in POINTS)
     if not toe + heel:
         raise ParameterError("trace: expected a cycle with ground contact, got none")
@@ -163,9 +232,9 @@ def hoof_error(trace: NDArray[np.void], exact: NDArray[np.void]) -> NDArray[np.f
 
     Shape of `trace`, at whose instants the other cycle is interpolated.
     """
-    t = trace["t"]
+    t = trace["time"]
     apart = {
-        name: [trace[f"{name}_{part}"] - np.interp(t, exact["t"], exact[f"{name}_{part}"])
+        name: [trace[f"{name}_{part}"] - np.interp(t, exact["time"], exact[f"{name}_{part}"])
                for part in ("x", "penetration")]
         for name in POINTS
     }  # fmt: skip

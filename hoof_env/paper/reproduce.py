@@ -18,14 +18,12 @@ from numpy.typing import NDArray
 
 import hoof_env  # noqa: F401  (registers the environments)
 from hoof_env._output import staged
-from hoof_env.envs.trace_names import trace_of
 from hoof_env.errors import HoofEnvError
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import Geometry
 from hoof_env.paper import report
-from hoof_env.paper.measure import measure_stance
+from hoof_env.paper.measure import cycle_of, measure_stance, replay
 from hoof_env.paper.published import CONDITIONS, Published, load_published
-from hoof_env.paper.replay import replay
 from hoof_env.paper.rows import compare, counted
 from hoof_env.paper.shapes import DEPTHS, judge, sole_velocity, walk_brakes
 from hoof_env.paper.solvers import EXACT, settings_of
@@ -59,7 +57,7 @@ class Reproduction:
         shapes: one dictionary for each claim about shape and solver: kind ("shape"), id, claim, reading,
             solver, holds, evidence, readings (verdict by reading, where there are several), used (the reading
             that holds is of), figure.
-        traces: one cycle of dtype `hoof_env.dynamics.trace.TRACE`, its first row at t = 0, by (gait,
+        traces: one cycle of dtype `hoof_env.paper.measure.CYCLE`, its first row at t = 0, by (gait,
             condition, solver).
         geometry: the leg, identified and not published.
         published: what was compared with.
@@ -92,14 +90,14 @@ def run_cycle(gait: str, solver: str, **settings: Any) -> Trace:
         env.reset(seed=0)
         action = np.zeros(env.action_space.shape or (), np.float32)
         leg: Any = env.unwrapped
-        parts, terminated, truncated = [trace_of(leg.record())], False, False
+        parts, terminated, truncated = [cycle_of(leg.record())], False, False
         while not truncated:
             _, _, terminated, truncated, _ = env.step(action)
             if terminated:
                 raise HoofEnvError(
                     f"{gait} with solver {solver!r}: the simulation failed before the end of its cycle"
                 )
-            parts.append(trace_of(leg.record()))
+            parts.append(cycle_of(leg.record()))
     finally:
         env.close()
     return np.concatenate(parts)

@@ -92,7 +92,7 @@ def walk_order(walk: Stance, trace: Trace) -> Verdict:
     `FLAT_DEG` at some instant, and the toe leaves last."""
     smallest = float("inf")
     if walk.double:
-        t = trace["t"]
+        t = trace["time"]
         both = np.degrees(trace["hoof_angle"][(t >= walk.double[0]) & (t <= walk.double[1])])
         smallest = float(np.abs(both).min()) if both.size else smallest
     return Verdict(
@@ -105,7 +105,7 @@ def walk_order(walk: Stance, trace: Trace) -> Verdict:
 
 def walk_peaks(walk: Stance, trace: Trace) -> Verdict:
     """Two peaks of the normal force, one in each half of stance; toe and heel both bear at the dip."""
-    force, t = trace["normal"], trace["t"]
+    force, t = trace["normal"], trace["time"]
     peaks = find_peaks(force)
     evidence = ", ".join(f"{force[k]:.0f} N at {t[k]:.3f} s" for k in peaks)
     evidence = f"{len(peaks)} peak(s): {evidence}; middle of stance {walk.middle:.3f} s"
@@ -123,7 +123,7 @@ def run_order(run: Stance, walk: Stance, run_trace: Trace, walk_trace: Trace) ->
     """Toe-strike, roll-over, toe-off with a large gap: the toe touches first, the heel follows and leaves
     before the toe, and at toe-off it is higher above the ground than at toe-off in walking."""
     gaps = [
-        float(-np.interp(s.end, tr["t"], tr["heel_penetration"]))
+        float(-np.interp(s.end, tr["time"], tr["heel_penetration"]))
         for s, tr in ((run, run_trace), (walk, walk_trace))
     ]
     rolls = run.first_points == {"toe"} and bool(run.heel) and run.last_points == {"toe"}
@@ -144,7 +144,7 @@ def run_order(run: Stance, walk: Stance, run_trace: Trace, walk_trace: Trace) ->
 def run_peaks(elastic: Trace, inelastic: Trace) -> Verdict:
     """One peak of the normal force in each condition, at least `PEAK_GAP` apart in time."""
     peaks = [find_peaks(trace["normal"]) for trace in (elastic, inelastic)]
-    times = [float(trace["t"][np.argmax(trace["normal"])]) for trace in (elastic, inelastic)]
+    times = [float(trace["time"][np.argmax(trace["normal"])]) for trace in (elastic, inelastic)]
     gap = times[0] - times[1]
     return Verdict(
         all(len(found) == 1 for found in peaks) and abs(gap) >= PEAK_GAP,
@@ -159,8 +159,8 @@ def step_length(trace: Trace, stance: Stance) -> tuple[float, float]:
     The second is the horizontal extent of its closed path. On a fixed trunk the
     first is how far a body would pass over the foot in one stance.
     """
-    sole = (trace["toe_x"] + trace["heel_x"]) / 2 - trace["trunk_x"]
-    start, end = np.interp([stance.start, stance.end], trace["t"], sole)
+    sole = (trace["toe_x"] + trace["heel_x"]) / 2 - trace["x"]
+    start, end = np.interp([stance.start, stance.end], trace["time"], sole)
     return float(start - end), float(np.ptp(sole))
 
 
@@ -229,7 +229,7 @@ def sole_velocity(trace: Trace) -> float:
 
     Under Coulomb friction and full sliding the ground propels where it is negative. NaN without load.
     """
-    velocity = np.concatenate([trace[f"{name}_vx"] for name in POINTS])
+    velocity = np.concatenate([trace[f"{name}_slide"] for name in POINTS])
     load = np.concatenate([trace[f"{name}_normal"] for name in POINTS])
     order = np.argsort(velocity)
     below = np.cumsum(load[order])

@@ -83,7 +83,7 @@ def largest_drift(reproduction: Reproduction, solver: str) -> tuple[float, float
     for gait in {gait for gait, _, _ in reproduction.traces}:
         trace, exact = (reproduction.traces[gait, "elastic", name] for name in (solver, EXACT))
         error, on_ground = hoof_error(trace, exact), measure_stance(exact)
-        inside = (trace["t"] >= on_ground.start) & (trace["t"] <= on_ground.end)
+        inside = (trace["time"] >= on_ground.start) & (trace["time"] <= on_ground.end)
         cycle.append(float(error.max()))
         stance.append(float(error[inside].max()))
     return max(cycle), max(stance)

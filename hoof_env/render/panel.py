@@ -6,15 +6,15 @@ import math
 from collections import deque
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pygame
 
+from hoof_env.dynamics.stance import Stance
 from hoof_env.gait.parameters import LIMITS
 from hoof_env.render.instant import Instant
 from hoof_env.render.paint import CRANK, FAINT, FINE, FORCE, GREY, INK, PAPER, Brush
-from hoof_env.render.stance import Stances
 
 SECONDS = 3
 """Time shown [s]."""
@@ -42,6 +42,50 @@ GAIT = (
     ("swing cosine", "swing_cos", "rad"),
 )
 """Title, field of `Instant` and unit of each gait parameter."""
+
+
+class Peak(NamedTuple):
+    """When a stance had its highest force, and how much it was: [s, N]."""
+
+    time: float
+    force: float
+
+
+class Stances:
+    """Stances and their peaks from a stream of instants.
+
+    Args:
+        threshold: normal force that tells stance from swing [N].
+
+    Attributes:
+        opened: when the open stance began [s]; None between stances.
+        peaks: peak of each stance so far, the last one's still growing while it is open.
+        highest: force so far [N].
+    """
+
+    def __init__(self, threshold: float) -> None:
+        self._stance = Stance(threshold)
+        self.opened: float | None = None
+        self.peaks: list[Peak] = []
+        self.highest = 0.0
+
+    @property
+    def running_peak(self) -> float:
+        """Highest force of the open stance so far [N], 0 between stances."""
+        return self._stance.peak
+
+    def add(self, now: Instant) -> None:
+        """Take the next instant."""
+        force = now.grf
+        self.highest = max(self.highest, force)
+        grown = self._stance.add(now.crank_angle, now.normal, force)
+        if self._stance.count > len(self.peaks):
+            self.opened = now.time
+            self.peaks.append(Peak(now.time, force))
+        elif grown > 0:
+            self.peaks[-1] = Peak(now.time, force)
+        if not self._stance.is_open:
+            self.opened = None
 
 
 class Panel:

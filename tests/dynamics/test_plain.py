@@ -1,12 +1,10 @@
-"""The oracle of the engines against what is older than it: `pose` and Lagrange, `LegEngine`, conservation."""
+"""The oracle of the engines against what is older than it: `pose` and Lagrange, conservation."""
 
 import numpy as np
 import pytest
 
 from hoof_env.dynamics.drive import Motor, Prescribed
-from hoof_env.dynamics.engine import LegEngine
 from hoof_env.dynamics.limb import Limb
-from hoof_env.dynamics.trace import new_trace
 from hoof_env.dynamics.trunk import GRAVITY, TRUNKS, Trunk
 from hoof_env.errors import ParameterError
 from hoof_env.gait.parameters import load_gait
@@ -147,37 +145,6 @@ def test_powers_add_up_to_the_change_of_energy(kind):
         **dict.fromkeys(now.power, False),
         **idle,
     }
-
-
-@pytest.mark.parametrize("kind", ["fixed", "rail", "suspended"])
-def test_it_agrees_with_the_engine_of_one_leg(kind):
-    trunk, h = Trunk(kind, height=LEG.hip_height, drag=30.0), 1e-5
-    engine = LegEngine(LEG, trunk, GROUND, h)
-    horse = PlainHorse(trunk, [Limb(LEG, drive=Prescribed())], GROUND)
-    engine.reset(RUN, theta=0.4, speed=0.0 if kind == "fixed" else 1.0)
-    command, most = np.array([9.0, 0.9, -0.4, 0.1]), 0.0
-    for _ in range(10):
-        trace = new_trace(3000)
-        engine.advance(command, trace)
-        row, filters = trace[-1], engine.state.filters
-        filters = np.stack([filters["value"], filters["rate"], filters["acc"]], axis=-1)[None]
-        approach = np.array([[row["toe_approach"], row["heel_approach"]]])
-        approach[approach == 0] = np.nan
-        now = horse.at(
-            (row["trunk_x"], row["trunk_y"], 0), (row["trunk_vx"], row["trunk_vy"], 0),
-            [row["theta"]], [np.nan], filters, approach,
-        )  # fmt: skip
-        most = max(most, row["normal"])
-        assert now.hoof_force.sum() == pytest.approx(complex(row["friction"], row["normal"]), rel=1e-9)
-        assert now.crank_torque == pytest.approx(row["crank_torque"], rel=1e-9)
-        assert now.hip_torque == pytest.approx(row["hip_torque"], rel=1e-9)
-        powers = (now.power["crank"], now.power["hip"])
-        assert powers == pytest.approx((row["crank_power"], row["hip_power"]), rel=1e-9)
-        differences = [(trace[f"trunk_v{x}"][-1] - trace[f"trunk_v{x}"][-3]) / (2 * h) for x in "xy"]
-        assert now.trunk_acc[:2] == pytest.approx(differences, rel=5e-3, abs=0.02)
-        if kind != "fixed":
-            assert now.momentum.real == pytest.approx(engine.state.body["px"], rel=1e-12)
-    assert most > 300
 
 
 def test_a_limp_horse_falls_as_one():

@@ -1,25 +1,13 @@
 """Joint reactions by dyads against Eq. 8's multipliers and Newton and Euler's laws."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numba import njit
 
 from hoof_env.dynamics.constrained import ConstrainedLeg
 from hoof_env.dynamics.constraints import closed_form
-from hoof_env.dynamics.reactions import (
-    CONSTANTS,
-    DRIVER,
-    HIP,
-    LOCK,
-    OUTPUTS,
-    keep_reactions,
-    leg_constants,
-    leg_reactions,
-)
+from hoof_env.dynamics.reactions import LegConstants, Reactions, leg_constants, leg_reactions
 from hoof_env.dynamics.trunk import GRAVITY
-from hoof_env.dynamics.vectors import vector
 from hoof_env.gait.motion_law import evaluate_motion
 from hoof_env.gait.parameters import load_gait
 from hoof_env.ground.contact import Ground
@@ -28,7 +16,9 @@ from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
 from hoof_env.leg.linkage import BODIES, CRANK, FRAME, JOINTS
 from hoof_env.leg.linkage import LOCK as LOCKED
-from hoof_env.simd import fill, rows, write
+from hoof_env.simd import columns as columns_of
+from hoof_env.simd import fill, rows, store_vectors
+from hoof_env.simd.layout import Layout, Row, Vector, views
 from hoof_env.simd.memory import address, doubles
 
 PRESETS = {name: load_geometry(name) for name in ("first_fit", "identified")}
@@ -64,29 +54,45 @@ def cross(arms, forces):
     return arms[..., 0] * forces[..., 1] - arms[..., 1] * forces[..., 0]
 
 
+class State(Layout):
+    """What `columns` has."""
+
+    turn: Vector
+    rate: Row
+    acceleration: Row
+    frame_turn: Vector
+    frame_rate: Row
+    frame_acceleration: Row
+    lift: Vector
+    toe: Vector
+    heel: Vector
+
+
+CONSTANTS = LegConstants.size
+
+
 @njit(error_model="numpy")
 def solve(state, constants, out):
     """A leg a column: turn, rate and acceleration of crank and of frame, lift, forces on toe and heel."""
     count = state.shape[1]
-    g, found = rows(doubles(CONSTANTS), 1, None), rows(doubles(OUTPUTS), 1, None)
-    fill(g, 0, CONSTANTS, address(constants), 0, 1, 1)
-    now = rows(doubles(14), 1, None)
+    g = rows(doubles(CONSTANTS), 1, LegConstants)
+    fill(g, columns_of(address(constants), 1, LegConstants, 0, 1, 1))
     for k in range(count):
-        fill(now, 0, 14, address(state), k, count, 1)
+        now = columns_of(address(state), 1, State, k, count, 1)
+        kept = columns_of(address(out), 1, Reactions, k, count, 1)
         joints, lock, driver, hip = leg_reactions(
-            g, vector(now, 0), now[2], now[3], vector(now, 4), now[6], now[7], vector(now, 8),
-            vector(now, 10), vector(now, 12),
+            g, now.turn, now.rate, now.acceleration, now.frame_turn, now.frame_rate, now.frame_acceleration,
+            now.lift, now.toe, now.heel,
         )  # fmt: skip
-        keep_reactions(found, joints, lock, driver, hip)
-        for j in range(OUTPUTS):
-            write(found[j], address(out), j * count + k, 1)
+        store_vectors(kept.joints, joints)
+        kept.lock, kept.driver, kept.hip = lock, driver, hip
 
 
 def solved(geometry, state):
-    """Outputs of legs alike, shape (OUTPUTS, count)."""
-    out = np.full((OUTPUTS, state.shape[1]), np.nan)
+    """Reactions of legs alike by name, last axis the legs."""
+    out = np.full((Reactions.size, state.shape[1]), np.nan)
     solve(np.ascontiguousarray(state), leg_constants(geometry), out)
-    return out
+    return views(Reactions, out)
 
 
 def assert_close(value, expected, scale, rtol=1e-9):
@@ -111,14 +117,14 @@ def test_reactions_are_the_multipliers_of_eq_8(geometry, forces):
             turn.real, turn.imag, motion["theta_rate"], motion["theta_acc"],
             beta.real, beta.imag, sigma * motion["phi_rate"], sigma * motion["phi_acc"],
             0.0, GRAVITY, *forces[0], *forces[1],
-        ]]).T)[:, 0]  # fmt: skip
+        ]]).T)  # fmt: skip
         expected = leg.reactions()
         scale = np.abs(expected.joints).max()
-        assert_close(found[:LOCK].reshape(-1, 2), expected.joints, scale)
-        assert_close(found[LOCK], expected.lock, scale * geometry.lengths["EF"])
-        assert_close(found[DRIVER], expected.driver, scale * geometry.lengths["OP"])
+        assert_close(found.joints[:, 0].reshape(-1, 2), expected.joints, scale)
+        assert_close(found.lock[0], expected.lock, scale * geometry.lengths["EF"])
+        assert_close(found.driver[0], expected.driver, scale * geometry.lengths["OP"])
         hip = sigma * leg.solve()[1] @ leg.closure().by_phi
-        assert_close(found[HIP], hip, scale * geometry.lengths["EF"])
+        assert_close(found.hip[0], hip, scale * geometry.lengths["EF"])
 
 
 @pytest.mark.parametrize("name", ["first_fit", "identified", "mirrored", "other toe", "own masses"])
@@ -126,10 +132,10 @@ def test_every_body_obeys_newton_and_euler(name):
     """With a hip that accelerates, and a frame that turns: forces and moments from positions by `pose`."""
     geometry = LEGS[name]
     state, theta, beta = columns(20)
-    outputs = solved(geometry, state)
+    found = solved(geometry, state)
     sigma = geometry.travel
     for k in range(state.shape[1]):
-        found, column = outputs[:, k], state[:, k]
+        column, pushes = state[:, k], found.joints[:, k].reshape(-1, 2)
         lift = column[8:10]
         frame = FrameMotion(
             sigma * beta[k], sigma * column[6], sigma * column[7], acceleration=(lift[0], lift[1])
@@ -144,17 +150,17 @@ def test_every_body_obeys_newton_and_euler(name):
             force[body] += push
             moment[body] += cross(motion.point(point) - centres[body], push)
 
-        for joint, push in zip(JOINTS, found[:LOCK].reshape(-1, 2), strict=True):
+        for joint, push in zip(JOINTS, pushes, strict=True):
             act(joint.i, joint.point, push)
             act(joint.j, joint.point, -push)
-        moment[LOCKED[0]] += found[LOCK]
-        moment[LOCKED[1]] -= found[LOCK]
-        moment[CRANK] += found[DRIVER]
-        moment[FRAME] += found[HIP] - found[DRIVER]
+        moment[LOCKED[0]] += found.lock[k]
+        moment[LOCKED[1]] -= found.lock[k]
+        moment[CRANK] += found.driver[k]
+        moment[FRAME] += found.hip[k] - found.driver[k]
         sole = next(i for i, body in enumerate(BODIES) if (body.tail, body.head) == ("I", "J"))
         act(sole, geometry.toe, column[10:12])
         act(sole, geometry.heel, column[12:14])
-        scale = np.abs(found[:LOCK]).max()
+        scale = np.abs(pushes).max()
         assert_close(force[:14], need, scale)
         assert_close(moment[:14], turn, scale)
         assert_close(moment[FRAME], 0, scale)
@@ -165,11 +171,12 @@ def test_every_body_obeys_newton_and_euler(name):
         about = cross(motion.centres, need).sum() + turn.sum()
         about -= cross(motion.point(geometry.toe), column[10:12])
         about -= cross(motion.point(geometry.heel), column[12:14])
-        assert_close(found[HIP], about, scale)
+        assert_close(found.hip[k], about, scale)
 
 
 def test_a_massless_leg_in_the_air_carries_nothing():
     geometry = PRESETS["identified"].replace(masses=(1e-12,) * 14)
     state, _, _ = columns(50)
     state[10:] = 0
-    assert np.abs(solved(geometry, state)).max() < 1e-6
+    found = solved(geometry, state)
+    assert max(np.abs(part).max() for part in vars(found).values()) < 1e-6

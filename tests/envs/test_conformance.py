@@ -187,7 +187,7 @@ def test_a_state_fits_the_environment_that_a_json_spec_makes():
     env = gym.make(IDS[0], target_speed=(0.5, 2.0), **settings)
     env.reset(seed=0)
     again = gym.make(gym.envs.registration.EnvSpec.from_json(env.spec.to_json())).unwrapped
-    same(again.set_state(env.unwrapped.get_state()), env.unwrapped.batch.seen[0])
+    same(again.set_state(env.unwrapped.get_state()), env.unwrapped.batch.observations[0])
     again.reset()
 
 
@@ -234,7 +234,7 @@ def test_a_state_goes_on_identically_also_elsewhere(env_id):
     first = roll(env, 20), env.reset(), roll(env, 5)
     assert pickle.dumps(state) == kept
     for one in (env, other):
-        same(one.set_state(pickle.loads(kept)), one.batch.seen[0])
+        same(one.set_state(pickle.loads(kept)), one.batch.observations[0])
         again = roll(one, 20), one.reset(), roll(one, 5)
         for a, b in zip(first[0] + first[2], again[0] + again[2], strict=True):
             same(a, b)

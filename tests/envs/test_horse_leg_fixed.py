@@ -7,10 +7,9 @@ import pickle
 import gymnasium as gym
 import numpy as np
 import pytest
-from family import actions, same
+from family import actions, same, substeps, together
 
 import hoof_env  # noqa: F401
-from hoof_env.envs.trace_names import trace_of
 from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.ground.preset import load_ground
 from hoof_env.leg.geometry import preset_names, read_preset
@@ -50,7 +49,7 @@ def test_the_force_is_that_of_the_presets_ground(soft):
     done, highest = False, 0.0
     while not done:
         *_, done, _ = env.step(np.zeros(4, np.float32))
-        trace = trace_of(env.unwrapped.record())
+        trace = together([env.unwrapped.record()])
         highest = max(highest, trace["normal"].max())
         depths = np.maximum([trace["toe_penetration"], trace["heel_penetration"]], 0)
         np.testing.assert_allclose(trace["normal"], 3e4 * (depths**1.375).sum(axis=0), rtol=1e-12)
@@ -121,6 +120,27 @@ def test_a_row_of_the_papers_solver_is_the_environment_alone():
             same(whole, np.array(each))
 
 
+def test_the_papers_solver_counts_strides_as_the_kernels_do():
+    """Its sums of the record are the engine's at the same step, as far as its leg drifts."""
+    measured, distance = {}, {}
+    for solver in ("paper", "exact"):
+        settings = {"integrator": "rk4"} if solver == "paper" else {}
+        env = gym.make(FIXED, solver=solver, gait="run", sim_dt=1e-3, **settings)
+        env.reset(seed=0, options={"crank_angle": 1.0})
+        trace = substeps(env, np.zeros(4, np.float32))
+        summary = env.unwrapped.batch.summary(0)
+        slid = sum(trace[f"{point}_normal"] * trace[f"{point}_slide"] for point in ("toe", "heel"))
+        down = trace["normal"] > 0
+        assert summary["distance_m"] == pytest.approx(-1e-3 * np.sum(slid[down] / trace["normal"][down]))
+        assert summary["duty_factor"] == pytest.approx(down.mean())
+        work = 1e-3 * np.sum(np.maximum(trace["crank_power"], 0) + np.maximum(trace["hip_power"], 0))
+        assert summary["drive_work_j"] == pytest.approx(work)
+        assert summary["peak_grf_n"] == pytest.approx(trace["grf"].max())
+        measured[solver], distance[solver] = summary, summary["distance_m"]
+    for name in ("stances", "stance_peak_sum_n", "mean_grf_n", "duty_factor"):
+        assert measured["paper"][name] == pytest.approx(measured["exact"][name], rel=0.02), name
+
+
 @pytest.mark.parametrize("settings", [{"baumgarte_beta": 1500.0}, {"baumgarte_alpha": 1e6}, {"sim_dt": 0.01}])
 def test_a_linkage_that_diverges_ends_the_episode_and_pays_nothing(settings):
     env = gym.make(FIXED, solver="paper", gait="run", **settings).unwrapped
@@ -128,7 +148,7 @@ def test_a_linkage_that_diverges_ends_the_episode_and_pays_nothing(settings):
     env.record()
     done = False
     while not done:
-        before, time = env.batch.summary(0), env.batch.paper.legs[0].state.body["t"]
+        before, time = env.batch.summary(0), env.batch.paper.legs[0].state.body["time"]
         observation, reward, done, truncated, info = env.step(np.zeros(4, np.float32))
         assert not truncated
         assert np.isfinite(observation).all()

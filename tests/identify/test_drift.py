@@ -9,9 +9,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from hoof_env.dynamics.constrained import ConstrainedLeg
+from hoof_env.dynamics.constrained import ConstrainedLeg, new_trace
 from hoof_env.dynamics.result import Result
-from hoof_env.dynamics.trace import new_trace
 from hoof_env.errors import GeometryError, ParameterError
 from hoof_env.gait.parameters import LIMITS, GaitParameters, load_gait
 from hoof_env.ground.contact import Ground
@@ -48,12 +47,12 @@ def assert_same_motion(geometry, gait, steps, tolerance, theta=0.0, **solver):
     trace = np.concatenate([start, rest])
     cycle = drift_cycle(geometry, gait, theta=theta, steps=steps, **solver)
     assert cycle.finite
-    np.testing.assert_allclose(cycle.t, trace["t"], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(cycle.t, trace["time"], rtol=0, atol=1e-12)
     for end in ("toe", "heel"):
         at, velocity = getattr(cycle, end), getattr(cycle, f"{end}_velocity")
         columns = {
             "x": at.real, "penetration": -(leg.trunk.height + at.imag),
-            "vx": velocity.real, "rate": -velocity.imag,
+            "slide": velocity.real, "rate": -velocity.imag,
         }  # fmt: skip
         for name, got in columns.items():
             np.testing.assert_allclose(got, trace[f"{end}_{name}"], rtol=0, atol=tolerance, err_msg=name)

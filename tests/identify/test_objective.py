@@ -98,7 +98,7 @@ def test_the_features_behind_the_claims_are_the_judges(judged, leg, solver):
             max(trace["toe_penetration"][0], trace["heel_penetration"][0]), abs=1e-6
         )
         assert get["step"] == pytest.approx(step_length(trace, stance)[0], abs=2e-3)
-        heel = float(-np.interp(stance.end, trace["t"], trace["heel_penetration"]))
+        heel = float(-np.interp(stance.end, trace["time"], trace["heel_penetration"]))
         assert get["heel_gap"] == pytest.approx(heel, abs=2e-3)
         for part, (along, up) in zip(("push_1", "push_2"), half_impulses(trace, stance), strict=True):
             assert get[part] == pytest.approx(along / up, abs=0.02)
@@ -112,17 +112,17 @@ def test_the_features_behind_the_claims_are_the_judges(judged, leg, solver):
                 assert (get[f"second_{condition}"] >= PROMINENCE) == (len(peaks) >= 2)
     walk, times = traces["walk", "elastic"], stances["walk", "elastic"]
     assert found["walk.double"] == pytest.approx(times.double[1] - times.double[0], abs=3e-4)
-    both = (walk["t"] >= times.double[0]) & (walk["t"] <= times.double[1])
+    both = (walk["time"] >= times.double[0]) & (walk["time"] <= times.double[1])
     flattest = np.abs(np.degrees(walk["hoof_angle"][both])).min()
     assert found["walk.flattest"] == pytest.approx(flattest, abs=0.5)
     one, two = find_peaks(walk["normal"])
     assert found["walk.third_peak"] < PROMINENCE
-    apart = min(times.middle - walk["t"][one], walk["t"][two] - times.middle)
+    apart = min(times.middle - walk["time"][one], walk["time"][two] - times.middle)
     assert found["walk.peaks_apart"] == pytest.approx(apart, abs=1e-3)
     dip = one + np.argmin(walk["normal"][one:two])
     support = min(walk["toe_penetration"][dip], walk["heel_penetration"][dip])
     assert found["walk.dip_support"] == pytest.approx(support, abs=1e-3)
-    late, soon = (traces["run", c]["t"][np.argmax(traces["run", c]["normal"])] for c in CONDITIONS)
+    late, soon = (traces["run", c]["time"][np.argmax(traces["run", c]["normal"])] for c in CONDITIONS)
     assert found["run.peak_gap"] == pytest.approx(late - soon, abs=1e-3)
 
 

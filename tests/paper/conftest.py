@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hoof_env.dynamics.trace import new_trace
+from hoof_env.paper.measure import CYCLE
 
 
 @pytest.fixture(scope="session")
@@ -23,8 +23,8 @@ def cycle():
     """
 
     def make(toe=(0.3, 0.6), heel=(0.25, 0.5), samples=1000, **columns):
-        trace = new_trace(samples + 1)
-        t = trace["t"] = np.linspace(0, 1, samples + 1)
+        trace = np.zeros(samples + 1, CYCLE)
+        t = trace["time"] = np.linspace(0, 1, samples + 1)
         for name, interval in (("toe", toe), ("heel", heel)):
             enter, leave = interval or (2.0, -1.0)
             trace[f"{name}_penetration"] = np.minimum(t - enter, leave - t)

@@ -118,7 +118,7 @@ def test_figure_3_marks_the_paths_at_the_published_contact_times(draw, reproduct
         stance = measure_stance(trace)
         expected = set()
         for row, points in (("contact_start", stance.first_points), ("contact_end", stance.last_points)):
-            at = trace[np.argmin(np.abs(trace["t"] - value(reproduction, f"{gait}.{row}")))]
+            at = trace[np.argmin(np.abs(trace["time"] - value(reproduction, f"{gait}.{row}")))]
             expected |= {
                 (round(float(at[f"{name}_x"]), 4), round(float(-at[f"{name}_penetration"]), 4))
                 for name in points

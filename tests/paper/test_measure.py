@@ -85,7 +85,7 @@ def test_time_shifts_times_alone_and_force_scales_forces_alone(cycle, bump, shif
 
 def test_integrals_of_a_line_are_exact_between_samples(cycle):
     trace = cycle(samples=10)
-    assert integral(trace, 3 * trace["t"] + 1, 0.123, 0.789) == pytest.approx(
+    assert integral(trace, 3 * trace["time"] + 1, 0.123, 0.789) == pytest.approx(
         1.5 * (0.789**2 - 0.123**2) + 0.666
     )
 

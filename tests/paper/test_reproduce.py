@@ -7,13 +7,12 @@ import gymnasium
 import numpy as np
 import pytest
 
-from hoof_env.dynamics.engine import LegEngine
-from hoof_env.dynamics.trace import new_trace
-from hoof_env.dynamics.trunk import Trunk
 from hoof_env.errors import OutputError, ParameterError
 from hoof_env.gait.parameters import load_gait
 from hoof_env.ground.preset import load_ground
 from hoof_env.leg.geometry import load_geometry
+from hoof_env.leg.kinematics import FrameMotion, pose
+from hoof_env.leg.linkage import POINTS
 from hoof_env.paper import report
 from hoof_env.paper.measure import integral, measure_stance
 from hoof_env.paper.published import CONDITIONS, load_published
@@ -178,9 +177,11 @@ def test_rows_are_what_a_reader_would_measure_on_the_trace(reproduction):
         assert value[f"{gait}.peak_{condition}", solver] == normal.max()
         assert value[f"{gait}.mean_{condition}", solver] == pytest.approx(normal[1:].mean(), rel=1e-6)
         inside = (trace["toe_penetration"] > 0) | (trace["heel_penetration"] > 0)
-        step = trace["t"][1] - trace["t"][0]
+        step = trace["time"][1] - trace["time"][0]
         assert value[f"{gait}.duty", solver] == pytest.approx(inside[1:].mean(), abs=1.01 * step)
-        assert value[f"{gait}.contact_start", solver] == pytest.approx(trace["t"][inside][0], abs=1.01 * step)
+        assert value[f"{gait}.contact_start", solver] == pytest.approx(
+            trace["time"][inside][0], abs=1.01 * step
+        )
 
 
 def test_derived_rows_follow_from_the_others(reproduction):
@@ -212,20 +213,32 @@ def test_motion_does_not_depend_on_the_contact_law(reproduction):
                 np.testing.assert_allclose(elastic[name], inelastic[name], rtol=0, atol=tolerance)
 
 
-def test_the_zero_action_is_the_gait(reproduction):
-    """Of the engine that identification uses."""
-    geometry, gait = load_geometry(), load_gait("run")
-    engine = LegEngine(
-        geometry, Trunk(kind="fixed", height=geometry.hip_height), load_ground(restitution=0.0), 1e-4
-    )
-    parts = [engine.reset(gait)]
-    for _ in range(50):
-        parts.append(new_trace(200))
-        engine.advance(gait.to_array(), parts[-1])
-    expected, trace = np.concatenate(parts), reproduction.traces["run", "inelastic", "exact"]
-    for name in expected.dtype.names:
-        size = max(np.nanmax(np.abs(expected[name])), 1.0)
-        np.testing.assert_allclose(trace[name], expected[name], rtol=0, atol=1e-9 * size, err_msg=name)
+@pytest.mark.parametrize("gait", GAITS)
+def test_the_zero_action_is_the_gait(reproduction, gait):
+    """Every hoof point is where the pose has it under the motion law, and the forces are those of Eq. 14."""
+    geometry, ground, own = load_geometry(), load_ground(restitution=0.0), load_gait(gait)
+    trace = reproduction.traces[gait, "inelastic", "exact"][::7]
+    for point, letter in (("toe", geometry.toe), ("heel", geometry.heel)):
+        places, rates = [], []
+        for t in trace["time"]:
+            w = own.crank_speed
+            s, c, a, b = np.sin(w * t), np.cos(w * t), own.swing_sin, own.swing_cos
+            phi, phi_rate = own.swing_offset + a * s + b * c, w * (a * c - b * s)
+            frame = FrameMotion(phi=phi, phi_rate=phi_rate, position=(0.0, geometry.hip_height))
+            at = pose(geometry, w * t, w, 0.0, frame)
+            places.append(at.point(letter))
+            rates.append(at.point_velocities[POINTS.index(letter)])
+        (x, y), (slide, rise) = np.transpose(places), np.transpose(rates)
+        for name, expected in (("x", x), ("slide", slide), ("penetration", -y), ("rate", -rise)):
+            np.testing.assert_allclose(trace[f"{point}_{name}"], expected, atol=1e-9, err_msg=name)
+        spring = ground.stiffness * np.maximum(-y, 0) ** ground.exponent
+        normal = np.maximum(spring * (1 - 0.75 * rise * trace[f"{point}_slowness"]), 0)
+        slow, fast = ground.friction_slow, ground.friction_fast
+        rubbed = np.sign(slide) * np.clip((np.abs(slide) - slow) / (fast - slow), 0, 1)
+        np.testing.assert_allclose(trace[f"{point}_normal"], normal, rtol=1e-6, atol=1e-6)
+        np.testing.assert_allclose(
+            trace[f"{point}_friction"], -ground.friction * normal * rubbed, rtol=1e-6, atol=1e-6
+        )
 
 
 def test_exact_rows_have_converged(reproduction):

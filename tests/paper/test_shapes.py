@@ -151,7 +151,7 @@ def test_run_direction(cycle, bump, first, second, holds):
 
 def test_the_median_velocity_of_the_sole_is_weighted_by_load(cycle):
     def trace(toe_load, heel_load):
-        return cycle(toe_vx=-2.0, heel_vx=1.0, toe_normal=toe_load, heel_normal=heel_load)
+        return cycle(toe_slide=-2.0, heel_slide=1.0, toe_normal=toe_load, heel_normal=heel_load)
 
     assert shapes.sole_velocity(trace(60.0, 40.0)) == -2.0
     assert shapes.sole_velocity(trace(40.0, 60.0)) == 1.0
@@ -162,7 +162,7 @@ def test_the_median_velocity_of_the_sole_is_weighted_by_load(cycle):
 def test_under_coulomb_friction_the_median_gives_the_direction_of_the_impulse(cycle, samples):
     velocity, load = np.array(samples).T
     trace = cycle(samples=len(samples) - 1) if len(samples) > 1 else cycle(samples=1)[:1]
-    trace["toe_vx"], trace["toe_normal"], trace["heel_normal"] = velocity, load, 0.0
+    trace["toe_slide"], trace["toe_normal"], trace["heel_normal"] = velocity, load, 0.0
     impulse = -np.sum(np.sign(velocity) * load)
     median = shapes.sole_velocity(trace)
     if abs(impulse) > 1e-9 and not np.any(velocity == 0):

@@ -26,8 +26,8 @@ from hoof_env.leg.geometry import load_geometry
 from hoof_env.render.ground import find_patches, footprint
 from hoof_env.render.instant import Instant, columns_of_engine, instants
 from hoof_env.render.paint import Brush
+from hoof_env.render.panel import Stances
 from hoof_env.render.renderer import Renderer, open_window
-from hoof_env.render.stance import Stances
 
 pygame = pytest.importorskip("pygame")
 

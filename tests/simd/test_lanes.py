@@ -1,5 +1,7 @@
 """Lanes are numbers side by side: each operation is NumPy's, with the same bits in one lane and in eight."""
 
+from typing import Annotated
+
 import numpy as np
 import pytest
 from numba import njit
@@ -8,8 +10,8 @@ from numba.core.errors import TypingError
 from hoof_env.simd import (
     across,
     anywhere,
-    below,
     choose,
+    columns,
     cross,
     dot,
     fill,
@@ -27,22 +29,27 @@ from hoof_env.simd import (
     smaller,
     write,
 )
+from hoof_env.simd.layout import Block, Layout
 from hoof_env.simd.memory import address, doubles
 
 INPUTS, OUTPUTS = 6, 40
+
+
+class Inputs(Layout):
+    numbers: Annotated[Block, INPUTS]
 
 
 def on_lanes(count, operations):
     """A kernel that works on columns, `count` at a time."""
 
     def kernel(given, found):
-        mine, out = rows(doubles(INPUTS * count), count, None), rows(doubles(OUTPUTS * count), count, None)
-        columns = given.shape[1]
-        for n in range(0, columns, count):
-            fill(mine, 0, INPUTS, address(given), n, columns, 1)
+        mine, out = rows(doubles(INPUTS * count), count, Inputs), rows(doubles(OUTPUTS * count), count, None)
+        row = given.shape[1]
+        for n in range(0, row, count):
+            fill(mine, columns(address(given), count, Inputs, n, row, 1))
             operations(mine, out)
             for k in range(OUTPUTS):
-                write(out[k], address(found), k * columns + n, 1)
+                write(out[k], address(found), k * row + n, 1)
 
     return njit(error_model="numpy")(kernel)
 
@@ -61,7 +68,7 @@ def arithmetic(x, out):
     out[16], out[17] = dot(z, w), cross(z, w)
     mixed = a * z - w * 2.0 + choose(a > b, z, -w)
     out[18], out[19] = mixed.real, mixed.imag
-    below(out, 20)[1] = a
+    out[21] = a
     out[20] = level(out, 4.0) * a
     out[22] = 1.0 if anywhere(a > 1e9) else 0.0
     for k in range(23, 40):

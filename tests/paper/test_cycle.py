@@ -1,0 +1,115 @@
+"""What a row of a cycle says is what its name says."""
+
+import numpy as np
+import pytest
+
+from hoof_env.leg.geometry import load_geometry
+from hoof_env.leg.kinematics import FrameMotion, pose
+from hoof_env.leg.linkage import POINTS
+from hoof_env.paper.reproduce import GAITS, run_cycle
+
+
+@pytest.fixture(scope="module", params=GAITS)
+def played(request):
+    """The leg, and a cycle of it."""
+    return load_geometry(), run_cycle(request.param, "exact", restitution=0.0)
+
+
+def test_points_are_where_the_pose_has_them(played):
+    leg, trace = played
+    for row in trace[::10]:
+        frame = FrameMotion(
+            row["phi"], row["phi_rate"], row["phi_acc"],
+            (row["x"], row["y"]),
+        )  # fmt: skip
+        at = pose(leg, row["theta"], row["theta_rate"], row["theta_acc"], frame)
+        for name, letter in (("toe", leg.toe), ("heel", leg.heel)):
+            velocity = at.point_velocities[POINTS.index(letter)]
+            assert (row[f"{name}_x"], -row[f"{name}_penetration"]) == pytest.approx(
+                at.point(letter), abs=1e-12
+            )
+            assert (row[f"{name}_slide"], -row[f"{name}_rate"]) == pytest.approx(velocity, abs=1e-9)
+        toe, heel = at.point(leg.toe), at.point(leg.heel)
+        rise = (heel - toe)[1] / np.linalg.norm(heel - toe)
+        assert np.sin(row["hoof_angle"]) == pytest.approx(rise, abs=1e-12)  # heel up is positive
+
+
+def test_a_flat_sole_has_its_toe_in_front(played):
+    _, trace = played
+    flat = trace[np.argmin(np.abs(np.sin(trace["hoof_angle"])))]
+    assert flat["hoof_angle"] == pytest.approx(0.0, abs=0.1)
+    assert flat["toe_x"] > flat["heel_x"]
+
+
+def test_sums_over_both_points(played):
+    _, trace = played
+    assert (trace["normal"] == trace["toe_normal"] + trace["heel_normal"]).all()
+    assert (trace["friction"] == trace["toe_friction"] + trace["heel_friction"]).all()
+    assert trace["grf"] == pytest.approx(np.hypot(trace["normal"], trace["friction"]), rel=1e-14)
+    assert trace["grf"].max() > 100
+
+
+def test_what_is_outside_bears_nothing_and_has_no_approach_speed(played):
+    _, trace = played
+    for point in ("toe", "heel"):
+        outside = trace[f"{point}_penetration"] <= 0
+        assert outside.any()
+        assert not outside.all()
+        for name in ("normal", "friction", "slowness"):
+            assert (trace[f"{point}_{name}"][outside] == 0).all()
+        assert (trace[f"{point}_slowness"][~outside] > 0).all()
+
+
+def test_the_centre_of_pressure_lies_between_the_points_that_bear(played):
+    _, trace = played
+    loaded = trace["normal"] > 0
+    assert np.isnan(trace["cop_x"][~loaded]).all()
+    at = trace[loaded]
+    ends = np.sort([at["toe_x"], at["heel_x"]], axis=0)
+    assert (at["cop_x"] >= ends[0] - 1e-12).all()
+    assert (at["cop_x"] <= ends[1] + 1e-12).all()
+    alone = {point: at[f"{point}_normal"] == at["normal"] for point in ("toe", "heel")}
+    assert any(rows.any() for rows in alone.values())
+    for point, rows in alone.items():
+        assert at["cop_x"][rows] == pytest.approx(at[f"{point}_x"][rows], rel=1e-14)
+    moment = at["toe_normal"] * (at["toe_x"] - at["cop_x"]) + at["heel_normal"] * (at["heel_x"] - at["cop_x"])
+    assert moment == pytest.approx(np.zeros(len(at)), abs=1e-9)
+
+
+# Golden: what the search that identified `first_fit` reported of it, an independent program, at 1 ms. Contact
+# from the first sample inside to the first outside; hoof angle at the first and the last sample inside, least
+# and greatest; peak and mean over the cycle of the normal force, with backward differences as rates.
+IDENTIFIED = {
+    "walk": {
+        "contact": (0.247, 0.583), "angle_deg": (-3.251, 20.393, -10.346, 20.479),
+        "elastic": (176.025, 35.378), "inelastic": (477.671, 74.964),
+    },
+    "run": {
+        "contact": (0.205, 0.484), "angle_deg": (6.014, 70.25, 2.965, 70.25),
+        "elastic": (5885.621, 803.919), "inelastic": (8816.767, 928.29),
+    },
+}  # fmt: skip
+
+
+def inelastic_force(penetrations, h):
+    """Eq. 14 on one point with rates by backward differences, written anew."""
+    forces, approach = [], None
+    for d, v in zip(penetrations, np.diff(penetrations, prepend=penetrations[-1]) / h, strict=True):
+        approach = None if d <= 0 else max(v, 1e-4) if approach is None else approach
+        forces.append(0.0 if d <= 0 else max(2e4 * d**1.5 * (1 + 0.75 * v / approach), 0.0))
+    return np.array(forces)
+
+
+@pytest.mark.parametrize("name", GAITS)
+def test_the_leg_is_the_one_that_was_identified(name):
+    golden, h = IDENTIFIED[name], 1e-3
+    cycle = run_cycle(name, "exact", preset="first_fit", restitution=1.0, sim_dt=h)[1:]
+    inside = np.flatnonzero((cycle["toe_penetration"] > 0) | (cycle["heel_penetration"] > 0))
+    assert (np.diff(inside) == 1).all()
+    assert cycle["time"][[inside[0], inside[-1] + 1]] == pytest.approx(golden["contact"], abs=1e-9)
+    angle = np.degrees(cycle["hoof_angle"][inside])
+    assert (angle[0], angle[-1], angle.min(), angle.max()) == pytest.approx(golden["angle_deg"], abs=6e-4)
+    elastic = cycle["normal"].max(), cycle["normal"].mean()
+    assert elastic == pytest.approx(golden["elastic"], rel=1e-4)  # lengths had six digits
+    force = sum(inelastic_force(cycle[f"{point}_penetration"], h) for point in ("toe", "heel"))
+    assert (force.max(), force.mean()) == pytest.approx(golden["inelastic"], rel=2e-4)
