@@ -23,9 +23,13 @@ if TYPE_CHECKING:
     from hoof_env.dynamics.trunk_engine import TrunkEngine as TrunkEngine
     from hoof_env.envs.horse_leg import HorseLegEnv as HorseLegEnv
     from hoof_env.envs.multi_objective import HorseLegMOEnv as HorseLegMOEnv
+    from hoof_env.envs.observation import Entry as Entry
+    from hoof_env.envs.observation import Scale as Scale
     from hoof_env.envs.policies import make_policy as make_policy
     from hoof_env.envs.randomize import RandomizeParameters as RandomizeParameters
+    from hoof_env.envs.reward import Term as Term
     from hoof_env.envs.sb3 import Sb3VecEnv as Sb3VecEnv
+    from hoof_env.envs.tasks import register as register
     from hoof_env.envs.vector import HorseLegVectorEnv as HorseLegVectorEnv
     from hoof_env.errors import DataFileError as DataFileError
     from hoof_env.errors import GeometryError as GeometryError
@@ -62,6 +66,10 @@ _PUBLIC = {
     "Sb3VecEnv": "hoof_env.envs.sb3",
     "RandomizeParameters": "hoof_env.envs.randomize",
     "make_policy": "hoof_env.envs.policies",
+    "register": "hoof_env.envs.tasks",
+    "Term": "hoof_env.envs.reward",
+    "Entry": "hoof_env.envs.observation",
+    "Scale": "hoof_env.envs.observation",
     "HoofEnvError": "hoof_env.errors",
     "ParameterError": "hoof_env.errors",
     "GeometryError": "hoof_env.errors",

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.advance import TRUNK_ROWS
@@ -48,6 +49,7 @@ from hoof_env.ground.contact import Ground
 from hoof_env.ground.preset import load_ground
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.profile import leg_profile
+from hoof_env.simd.compile import what_cannot_be_compiled
 from hoof_env.simd.layout import views
 from hoof_env.simd.memory import COLUMNS
 
@@ -145,7 +147,10 @@ class EpisodeBatch:
         self._task = self._task_record()
         self._open()
         self.now.weight[:] = self.engine.weight
-        self._compile()
+        try:
+            self._compile()
+        except NumbaError as error:
+            raise ParameterError(f"{task.id}: {what_cannot_be_compiled(error)}") from error
 
     def _physics(self, changes: Mapping[str, float]) -> tuple[Trunk, Ground, Drive]:
         """Trunk, ground and drive with some settings changed."""

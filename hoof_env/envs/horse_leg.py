@@ -22,7 +22,7 @@ from hoof_env.envs.made import Made
 from hoof_env.envs.recording import Recording
 from hoof_env.envs.start import check_seed
 from hoof_env.envs.state import check_state, generator_of
-from hoof_env.envs.tasks import TASKS, to_json
+from hoof_env.envs.tasks import task_of, to_json
 from hoof_env.errors import ParameterError, check_choice
 from hoof_env.gait.parameters import PARAMETERS, GaitParameters
 from hoof_env.ground.terrain import Terrain
@@ -60,7 +60,7 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     ) -> None:
         if render_mode is not None:
             check_choice("render_mode", render_mode, RENDER_MODES)
-        self.task = TASKS[check_choice("task", task, TASKS)]
+        self.task = task_of(task)
         self.settings = self.task.settings(settings)
         self.batch = EpisodeBatch(self.task, self.settings, 1)
         self.observation_names = tuple(self.batch.names)

@@ -68,6 +68,7 @@ class Entry:
         unit: of the number before it is scaled.
         measure: function of a `Scene`: that number. Compiled as `reward.Term.compute` is.
         scale: how it is scaled.
+        scalar: `measure` is a function of ordinary numbers, see `reward.Term`.
     """
 
     name: str
@@ -75,6 +76,7 @@ class Entry:
     unit: str
     measure: Callable[[Any], Any]
     scale: Scale
+    scalar: bool = False
 
 
 def tanh_of(scale: float, text: str = "") -> Scale:

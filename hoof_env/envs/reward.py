@@ -88,10 +88,14 @@ class Term:
     """A term of the reward.
 
     Attributes:
-        name: of its weight; the info's key is "reward_" and this. weight: by default. unit: of the weight.
-        meaning: what is weighed, for the manual page. compute: function of an `Outcome` and the
-        weight, compiled for one environment and for eight side by side:
-            + - * /, comparisons, and the functions of `hoof_env.simd`; `choose` in the place of `if`.
+        name: of its weight; the info's key is "reward_" and this.
+        weight: by default.
+        unit: of the weight.
+        meaning: what is weighed, for the manual page.
+        compute: function of an `Outcome` and the weight, compiled for one environment and for eight side by
+            side: + - * /, comparisons, and the functions of `hoof_env.simd`; `choose` in the place of `if`.
+        scalar: `compute` is a function of ordinary numbers, which may use `if` and `math`; it is called for
+            one environment after the other, which takes longer.
     """
 
     name: str
@@ -99,6 +103,7 @@ class Term:
     unit: str
     meaning: str
     compute: Callable[[Any, Any], Any]
+    scalar: bool = False
 
     @property
     def key(self) -> str:

@@ -19,7 +19,20 @@ from hoof_env.dynamics.layout import LegMemory, TrunkMemory
 from hoof_env.envs.episode import ACTIONS, FAILED, TRUNCATED, episode_layout
 from hoof_env.envs.observation import Entry, Scene
 from hoof_env.envs.reward import Outcome, Term
-from hoof_env.simd import anywhere, choose, columns, larger, level, read, rows, size, smaller, write
+from hoof_env.simd import (
+    anywhere,
+    choose,
+    columns,
+    lane_of,
+    larger,
+    level,
+    read,
+    rows,
+    set_lane,
+    size,
+    smaller,
+    write,
+)
 from hoof_env.simd.compile import fingerprint, inlined, kernel, pasted
 from hoof_env.simd.math import clip, tanh
 from hoof_env.simd.memory import (
@@ -138,30 +151,54 @@ def decide(task, outcome, episode):  # type: ignore[no-untyped-def]
     return ended > 0.0, switched
 
 
-def reward_of(terms: tuple[Term, ...]) -> Callable[..., Any]:
-    """A function that computes all terms, keeps them in `episode.terms` and returns their sum."""
-    first, rest = inlined(terms[0].compute), _other_terms(terms, 1)
+@inlined
+def memories(addresses, lanes, layout, n):  # type: ignore[no-untyped-def]
+    """Trunk, leg and episode of environments n, n + 1, ..., as `lanes` columns, see `simd.columns`."""
+    row = addresses[AT.data + COLUMNS]
+    data, episode = doubles_at(addresses[AT.data]), doubles_at(addresses[AT.episode])
+    return (
+        columns(data, lanes, TrunkMemory, n, row, 1),
+        columns(data, lanes, LegMemory, TRUNK_ROWS * row + n, row, 1),
+        columns(episode, lanes, layout, n, row, 1),
+    )
 
-    @inlined
-    def compute_reward(task, outcome, episode):  # type: ignore[no-untyped-def]
-        episode.terms[0] = first(outcome, task.weights[0])
-        return rest(task, outcome, episode, episode.terms[0])
 
-    return compute_reward
+@inlined
+def outcome_of_one(outcome, lane, trunk, leg, episode):  # type: ignore[no-untyped-def]
+    """One lane of an `Outcome`, ordinary numbers."""
+    return Outcome(
+        lane_of(outcome.seconds, lane), lane_of(outcome.progress, lane),
+        lane_of(outcome.commanded_progress, lane), lane_of(outcome.peak_grf_increase, lane),
+        lane_of(outcome.highest_grf, lane), lane_of(outcome.positive_work, lane),
+        lane_of(outcome.normal_impulse, lane), lane_of(outcome.loaded_time, lane),
+        lane_of(outcome.stances, lane), lane_of(outcome.action_change, lane), lane_of(outcome.failed, lane),
+        outcome.episode_seconds, lane_of(outcome.weight, lane), trunk, leg, episode,
+    )  # fmt: skip
 
 
-def _other_terms(terms: tuple[Term, ...], k: int) -> Callable[..., Any]:
-    """The terms from the k-th on. numba has no loop over functions, so each calls the next."""
+def _with_terms(terms: tuple[Term, ...], k: int = 0) -> Callable[..., Any]:
+    """A function that computes the terms from the k-th on, keeps them in `episode.terms` and returns the sum
+    of all. numba has no loop over functions, so each calls the next."""
     if k == len(terms):
-        return inlined(lambda task, outcome, episode, total: total)
-    compute, rest = inlined(terms[k].compute), _other_terms(terms, k + 1)
+        return inlined(lambda addresses, lanes, task, outcome, episode, n, total: total)
+    compute, rest, is_first = inlined(terms[k].compute), _with_terms(terms, k + 1), k == 0
+    layout = episode_layout(len(terms))
 
     @inlined
-    def add_term(task, outcome, episode, total):  # type: ignore[no-untyped-def]
+    def compute_term(addresses, lanes, task, outcome, episode, n, total):  # type: ignore[no-untyped-def]
         episode.terms[k] = compute(outcome, task.weights[k])
-        return rest(task, outcome, episode, total + episode.terms[k])
+        total = episode.terms[k] if is_first else total + episode.terms[k]
+        return rest(addresses, lanes, task, outcome, episode, n, total)
 
-    return add_term
+    @inlined
+    def compute_one_by_one(addresses, lanes, task, outcome, episode, n, total):  # type: ignore[no-untyped-def]
+        for lane in range(lanes):
+            trunk, leg, own = memories(addresses, 0, layout, n + lane)
+            own.terms[k] = compute(outcome_of_one(outcome, lane, trunk, leg, own), task.weights[k])
+        total = episode.terms[k] if is_first else total + episode.terms[k]
+        return rest(addresses, lanes, task, outcome, episode, n, total)
+
+    return compute_one_by_one if terms[k].scalar else compute_term
 
 
 def slots_of(entries: tuple[Entry, ...]) -> tuple[list[int], int, int]:
@@ -175,21 +212,33 @@ def slots_of(entries: tuple[Entry, ...]) -> tuple[list[int], int, int]:
     return [slots[k] for k in range(len(entries))], vectors, vectors * LANES + len(others)
 
 
-def measurement_of(entries: tuple[Entry, ...], scaled: bool, k: int = 0) -> Callable[..., Any]:
-    """A function that puts the entries that are observed, from the k-th on, into their slots."""
+def _with_entries(entries: tuple[Entry, ...], terms: int, scaled: bool, k: int = 0) -> Callable[..., Any]:
+    """A function that puts the entries that are observed, from the k-th on, into their slots: scaled but for
+    tanh, or as they are measured."""
     if k == len(entries):
-        return inlined(lambda scene, numbers: None)
+        return inlined(lambda addresses, lanes, scene, numbers, n: None)
     measure, apply, slot = inlined(entries[k].measure), entries[k].scale.apply, slots_of(entries)[0][k]
-    rest = measurement_of(entries, scaled, k + 1)
+    rest, layout = _with_entries(entries, terms, scaled, k + 1), episode_layout(terms)
     scale = inlined(apply) if scaled and apply is not None else inlined(lambda x, scene: x)
 
     @inlined
-    def put_entry(scene, numbers):  # type: ignore[no-untyped-def]
+    def put_entry(addresses, lanes, scene, numbers, n):  # type: ignore[no-untyped-def]
         if scene.task.places[slot] >= 0:
             numbers[slot] = scale(measure(scene), scene)
-        rest(scene, numbers)
+        rest(addresses, lanes, scene, numbers, n)
 
-    return put_entry
+    @inlined
+    def put_one_by_one(addresses, lanes, scene, numbers, n):  # type: ignore[no-untyped-def]
+        if scene.task.places[slot] >= 0:
+            for lane in range(lanes):
+                trunk, leg, episode = memories(addresses, 0, layout, n + lane)
+                own = Scene(
+                    trunk, leg, episode, scene.task, scene.ground, scene.ground_origin, scene.ground_per_metre
+                )
+                set_lane(numbers, slot, lane, scale(measure(own), own))
+        rest(addresses, lanes, scene, numbers, n)
+
+    return put_one_by_one if entries[k].scalar else put_entry
 
 
 class StepKernels(NamedTuple):
@@ -197,10 +246,11 @@ class StepKernels(NamedTuple):
     environments one by one, what ends in `_batch` takes `LANES` at a time.
 
     Attributes:
-        step_one, step_batch: a control step; returns what `NOT_A_NUMBER` and the others say. apply_one,
-        finish_one: what is before and behind the engine, for a solver that is not a kernel. observe_one,
-        observe_batch: observations without a step. measure_one: puts what is observed, before it is scaled,
-        into an array of doubles, shape (count, columns).
+        step_one, step_batch: a control step; returns what `NOT_A_NUMBER` and the others say.
+        apply_one, finish_one: what is before and behind the engine, for a solver that is not a kernel.
+        observe_one, observe_batch: observations without a step.
+        measure_one: puts what is observed, before it is scaled, into an array of doubles, shape (count,
+            columns).
     """
 
     step_one: Any
@@ -219,29 +269,19 @@ def step_kernels(
     """The kernels of tasks with these terms, entries and law of contact."""
     parts: list[Any] = [term.compute for term in terms]
     parts += [part for entry in entries for part in (entry.measure, entry.scale.apply) if part]
-    identity = fingerprint(*parts, contact_law)
+    flags = ([term.scalar for term in terms], [(e.scalar, e.scale.saturates) for e in entries])
+    identity = f"{fingerprint(*parts, contact_law)} {flags}"
     Episode = episode_layout(len(terms))
-    compute_reward = reward_of(terms)
-    put_scaled, put_measured = measurement_of(entries, True), measurement_of(entries, False)
+    compute_reward = _with_terms(terms)
+    put_scaled, put_measured = (_with_entries(entries, len(terms), scaled) for scaled in (True, False))
     _, vectors, slots = slots_of(entries)
     advance = advance_kernels(contact_law)
     advance_leg, advance_batch = advance.advance_leg, advance.advance_batch
     task_at, model_at = record_at(task_type(len(terms), slots)), record_at(MODEL)
 
-    @inlined
-    def memories(addresses, lanes, n):  # type: ignore[no-untyped-def]
-        """Trunk, leg and episode of environments n, n + 1, ..."""
-        row = addresses[AT.data + COLUMNS]
-        data, episode = doubles_at(addresses[AT.data]), doubles_at(addresses[AT.episode])
-        return (
-            columns(data, lanes, TrunkMemory, n, row, 1),
-            columns(data, lanes, LegMemory, TRUNK_ROWS * row + n, row, 1),
-            columns(episode, lanes, Episode, n, row, 1),
-        )
-
     @pasted
     def scene_of(addresses, lanes, task, n):  # type: ignore[no-untyped-def]
-        trunk, leg, episode = memories(addresses, lanes, n)
+        trunk, leg, episode = memories(addresses, lanes, Episode, n)
         model, ground = model_at(addresses[AT.model])[0], matrix_at(addresses, AT.ground)
         return Scene(trunk, leg, episode, task, ground, model.ground_origin, model.ground_per_metre)
 
@@ -254,7 +294,7 @@ def step_kernels(
             good &= size(float(actions[k])) < np.inf
         if good:
             for n in range(0, count, lanes):
-                apply_action(task, actions, memories(addresses, lanes, n)[1], n)
+                apply_action(task, actions, memories(addresses, lanes, Episode, n)[1], n)
         return good
 
     @pasted
@@ -262,7 +302,7 @@ def step_kernels(
         numbers = rows(memory, lanes, None)
         for slot in range(slots):
             numbers[slot] = 0.0
-        put_scaled(scene_of(addresses, lanes, task, n), numbers)
+        put_scaled(addresses, lanes, scene_of(addresses, lanes, task, n), numbers, n)
         if lanes == 1:  # the numbers of one environment, side by side
             together = rows(memory, LANES, None)
             for k in range(vectors):
@@ -282,11 +322,13 @@ def step_kernels(
         task, actions = task_at(addresses[AT.task])[0], singles_at(addresses[AT.actions])
         rewards, memory, happened = doubles_at(addresses[AT.rewards]), doubles(slots * lanes), 0
         for n in range(0, addresses[AT.data + COLUMNS], lanes):
-            trunk, leg, episode = memories(addresses, lanes, n)
+            trunk, leg, episode = memories(addresses, lanes, Episode, n)
             outcome = find_outcome(task, trunk, leg, episode, remember_action(actions, episode, n))
             add_up(outcome, episode)
             ended, switched = decide(task, outcome, episode)
-            write(compute_reward(task, outcome, episode), rewards, n, 1)
+            nothing = level(episode, 0.0)
+            reward = compute_reward(addresses, lanes, task, outcome, episode, n, nothing)
+            write(reward, rewards, n, 1)
             if anywhere(ended):
                 happened |= SOME_ENDED
             if anywhere(switched):
@@ -333,7 +375,7 @@ def step_kernels(
     def measure_one(addresses, out):  # type: ignore[no-untyped-def]
         task, numbers = task_at(addresses[AT.task])[0], rows(doubles(slots), 1, None)
         for n in range(out.shape[1]):
-            put_measured(scene_of(addresses, 1, task, n), numbers)
+            put_measured(addresses, 1, scene_of(addresses, 1, task, n), numbers, n)
             for slot in range(slots):
                 if task.places[slot] >= 0:
                     write(numbers[slot], address(out), task.places[slot] * out.shape[1] + n, 1)

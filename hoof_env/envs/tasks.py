@@ -8,17 +8,19 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 
-from hoof_env.envs.observation import ENTRIES, Entry
+from hoof_env.envs.observation import ENTRIES, Entry, check_groups, groups_of
 from hoof_env.envs.reward import TERMS, Term
-from hoof_env.errors import ParameterError, UnknownArgumentError
+from hoof_env.errors import ParameterError, UnknownArgumentError, check_choice
 from hoof_env.leg.geometry import DEFAULT_PRESET, Preset
 
 PRINTED_BETA = math.sqrt(2 * 15.0)
@@ -114,7 +116,7 @@ class Task:
     """A task: `defaults` are its settings where they differ from those of `Settings`.
 
     Attributes:
-        name: of the id, without namespace and version.
+        name: of the id, without namespace and version; or a whole id.
         summary: one line.
         about: what is asked, for the manual page.
         defaults: settings.
@@ -138,7 +140,7 @@ class Task:
     @property
     def id(self) -> str:
         """The registered id."""
-        return f"hoof_env/{self.name}-v0"
+        return self.name if "/" in self.name else f"hoof_env/{self.name}-v0"
 
     def settings(self, changes: Mapping[str, Any]) -> Settings:
         """Its settings with some changed; reward weights that are not named keep the task's values.
@@ -159,6 +161,9 @@ class Task:
         for name, value in changes.items():  # as JSON holds it, and a copy
             if isinstance(value, (Path, Mapping)):
                 changes = {**changes, name: str(value) if isinstance(value, Path) else _plain(value)}
+        unknown = sorted(set(self.defaults) - {item.name for item in fields(Settings)})
+        if unknown:
+            raise UnknownArgumentError(f"{self.id}: unknown settings {', '.join(unknown)}")
         plain = replace(Settings(), **self.defaults)
         settings = replace(plain, **changes)
         for name, value in changes.items():
@@ -232,6 +237,73 @@ TASKS: Mapping[str, Task] = MappingProxyType(
     }
 )
 """The tasks by name."""
+
+
+_OWN: dict[str, Task] = {}
+
+
+def task_of(name: Any) -> Task:
+    """A task of `TASKS` by its name, or one of `register` by its id.
+
+    Raises:
+        ParameterError: there is none.
+    """
+    tasks = {**TASKS, **_OWN}
+    return tasks[check_choice("task", name, tasks)]
+
+
+def register(
+    env_id: str,
+    *,
+    base: str = "leg",
+    terms: Iterable[Term] = (),
+    entries: Iterable[Entry] = (),
+    contact_law: Callable[..., Any] | None = None,
+    **defaults: Any,
+) -> None:
+    """Register an id of one's own: a task of this package with more terms of the reward, more entries of the
+    observation, another law of contact and other settings. It serves `gymnasium.make` and `make_vec`; workers
+    must import the module that registers it, as with `gymnasium.make("my_module:my/Id-v0")`.
+
+    Args:
+        env_id: "namespace/Name-v0". base: a name in `TASKS`, whose settings, terms and entries it begins
+        with. terms: of the reward, behind those of the base; also one with a name that the base has, in its
+        place. entries: that can be observed, behind those of the base; all groups among them are observed by
+        default. contact_law: function of penetration [m], its rate [m/s], inverse approach speed [s/m] and
+        the ground's
+            constants, which returns the normal force [N]; see `dynamics.hoof.law_of`.
+        defaults: settings, see the manual pages.
+
+    Raises:
+        ParameterError: an unknown base, a name twice, or an id that does not read so.
+        UnknownArgumentError: an unknown setting.
+    """
+    own, more = tuple(terms), tuple(entries)
+    if not isinstance(env_id, str) or not re.fullmatch(r"[\w-]+/[\w-]+-v\d+", env_id) or env_id in TASKS:
+        raise ParameterError(f"env_id: expected 'namespace/Name-v0', got {env_id!r}")
+    old = task_of(base)
+    names = [*(term.name for term in own), *(entry.name for entry in more)]
+    known = {entry.name for entry in old.entries}
+    if twice := sorted({name for name in names if names.count(name) > 1 or name in known}):
+        raise ParameterError(f"{env_id}: expected names that differ, got {', '.join(twice)} twice")
+    mine = {term.name: term for term in own}
+    kept = [mine.pop(term.name, term) for term in old.terms]
+    groups = [*old.settings({}).observation, *groups_of(more)]
+    settings = {**old.defaults, "observation": tuple(dict.fromkeys(groups)), **defaults}
+    law = contact_law or old.contact_law
+    summary = f"{old.summary} With terms, entries or laws from outside this package."
+    _OWN[env_id] = task = replace(
+        old, name=env_id, summary=summary, defaults=settings, terms=(*kept, *mine.values()),
+        entries=(*old.entries, *more), contact_law=law,
+    )  # fmt: skip
+    task.settings({})
+    check_groups(task.settings({}).observation, groups_of(task.entries))
+    gym.register(
+        env_id,
+        entry_point="hoof_env.envs.horse_leg:HorseLegEnv",
+        vector_entry_point="hoof_env.envs.vector:HorseLegVectorEnv",
+        kwargs={"task": env_id},
+    )
 
 
 def to_json(settings: Settings) -> dict[str, Any]:

@@ -29,7 +29,7 @@ from hoof_env.envs.made import Made
 from hoof_env.envs.recording import Recording
 from hoof_env.envs.rows import Rows
 from hoof_env.envs.state import check_state, generator_of
-from hoof_env.envs.tasks import TASKS, to_json
+from hoof_env.envs.tasks import task_of, to_json
 from hoof_env.envs.vector_arguments import actions_of, drawn_of, ended_of, mask_of, mode_of, seeds_of
 from hoof_env.errors import ParameterError, check_choice
 
@@ -79,7 +79,7 @@ class HorseLegVectorEnv(Made, Rows, VectorEnv[NDArray[np.float32], NDArray[np.fl
         self.autoreset_mode = mode_of(autoreset_mode)
         if render_mode is not None:
             check_choice("render_mode", render_mode, self.metadata["render_modes"])
-        self.task = TASKS[check_choice("task", task, TASKS)]
+        self.task = task_of(task)
         self.settings = self.task.settings(settings)
         self.batch = EpisodeBatch(self.task, self.settings, self.num_envs)
         if max_episode_steps is not None:

@@ -27,7 +27,7 @@ from hoof_env.simd.functions import (
     size,
     smaller,
 )
-from hoof_env.simd.rows import columns, fill, level, nth, read, rows, store_vectors, write
+from hoof_env.simd.rows import columns, fill, lane_of, level, nth, read, rows, set_lane, store_vectors, write
 
 __all__ = [
     "across",
@@ -39,6 +39,7 @@ __all__ = [
     "fill",
     "floor",
     "gather",
+    "lane_of",
     "lane_sum",
     "larger",
     "level",
@@ -48,6 +49,7 @@ __all__ = [
     "read",
     "root",
     "rows",
+    "set_lane",
     "size",
     "smaller",
     "store_vectors",

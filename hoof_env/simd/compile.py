@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import sys
 import time
 from collections.abc import Callable
@@ -73,6 +74,22 @@ def _add_function(digest: Any, function: Any, known: set[int]) -> None:
     named = [] if inside else [function.__globals__.get(name) for name in code.co_names]
     for part in (*cells, *named, *(function.__defaults__ or ())):
         _add_function(digest, part, known)
+
+
+def what_cannot_be_compiled(error: Exception) -> str:
+    """What numba does not compile of a function from outside, in a line: the operation, the function and the
+    line."""
+    text = str(error)
+    what = re.search(
+        r"No implementation of function (.*?) found for signature|(Cannot cast .*? to bool\w*)", text
+    )
+    places = [place for place in re.findall(r'File "(.*?)", line (\d+)', text) if "hoof_env" not in place[0]]
+    where = f" in {places[-1][0]}, line {places[-1][1]}" if places else ""
+    found = next((part for part in what.groups() if part), "") if what else text.strip().splitlines()[-1]
+    return (
+        f"cannot compile {found}{where}; expected + - * /, comparisons and the functions of hoof_env.simd "
+        "(`choose` in the place of `if`), or scalar=True"
+    )
 
 
 def inlined(function: F) -> F:

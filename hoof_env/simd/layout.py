@@ -17,8 +17,8 @@ from numba.core.imputils import lower_constant, lower_getattr_generic, lower_set
 from numba.core.typing.templates import AttributeTemplate
 from numpy.typing import NDArray
 
-from hoof_env.simd.rows import part_of, read_row, write_row
-from hoof_env.simd.types import INDEX, Columns, Lanes, Plane, Rows, join, split
+from hoof_env.simd.rows import part_of, read_row, row_type, write_row
+from hoof_env.simd.types import INDEX, Columns, Plane, Rows, join, split
 
 
 class Row:
@@ -120,9 +120,9 @@ class _FieldsOfMemory(AttributeTemplate):
         if not field:
             return None
         if field.kind is Row:
-            return Lanes(memory.count)
+            return row_type(memory)
         if field.kind is Vector:
-            return Plane(memory.count)
+            return Plane(memory.count) if memory.count else types.complex128
         return type(memory)(memory.count, field.kind if isinstance(field.kind, _Named) else None)
 
 
@@ -133,7 +133,7 @@ def _get_field(context: Any, builder: Any, memory: Any, value: Any, name: str) -
         return read_row(context, builder, memory, value, first)
     if kind is Vector:
         x, y = (read_row(context, builder, memory, value, INDEX(start + k)) for k in range(2))
-        return join(context, builder, Plane(memory.count), x, y)
+        return join(context, builder, Plane(memory.count) if memory.count else types.complex128, x, y)
     return part_of(context, builder, memory, value, first)
 
 

@@ -72,12 +72,17 @@ def part_of(context: Any, builder: Any, memory: Any, value: Any, first: Any) -> 
     return found._getvalue()
 
 
+def row_type(memory: Any) -> Any:
+    """The type of a row."""
+    return Lanes(memory.count) if memory.count else types.float64
+
+
 def read_row(context: Any, builder: Any, memory: Any, value: Any, row: Any) -> Any:
     """The lanes of a row."""
     if isinstance(memory, Rows):
         return builder.load(_place(builder, value, row, memory.count), align=8 * memory.count)
     found = context.make_helper(builder, memory, value=value)
-    return _read(builder, found.first, builder.mul(row, found.row), found.stride, memory.count)
+    return _read(builder, found.first, builder.mul(row, found.row), found.stride, max(memory.count, 1))
 
 
 def write_row(context: Any, builder: Any, memory: Any, value: Any, row: Any, x: Any) -> None:
@@ -86,7 +91,7 @@ def write_row(context: Any, builder: Any, memory: Any, value: Any, row: Any, x: 
         store_row(builder, x, value, row, memory.count)
         return
     found = context.make_helper(builder, memory, value=value)
-    _write(builder, x, found.first, builder.mul(row, found.row), found.stride, memory.count)
+    _write(builder, x, found.first, builder.mul(row, found.row), found.stride, max(memory.count, 1))
 
 
 @lower_cast(types.Number, Lanes)
@@ -210,6 +215,30 @@ _MEMORY = (Rows, Columns)
 
 
 @intrinsic
+def lane_of(context: Any, x: Any, lane: Any) -> Any:
+    """One lane as an ordinary number."""
+
+    def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        x, lane = values
+        return x if signature.args[0].count == 1 else builder.extract_element(x, lane)
+
+    return types.float64(x, types.intp), emit
+
+
+@intrinsic
+def set_lane(context: Any, rows: Any, row: Any, lane: Any, x: Any) -> Any:
+    """Put an ordinary number into one lane of a row."""
+
+    def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        rows, row, lane, x = values
+        at = builder.add(builder.mul(row, INDEX(signature.args[0].count)), lane)
+        builder.store(x, builder.gep(rows, [at], inbounds=True))
+        return context.get_dummy_value()
+
+    return types.void(rows, types.intp, types.intp, types.float64), emit
+
+
+@intrinsic
 def store_vectors(context: Any, rows: Any, vectors: Any) -> Any:
     """Put a tuple of planar vectors into rows, two rows each."""
 
@@ -228,7 +257,7 @@ def store_vectors(context: Any, rows: Any, vectors: Any) -> Any:
 class _GetRow(AbstractTemplate):
     def generic(self, args: Any, kws: Any) -> Any:
         if isinstance(args[0], _MEMORY) and isinstance(args[1], types.Integer):
-            return signature(Lanes(args[0].count), *args)
+            return signature(row_type(args[0]), *args)
         return None
 
 
@@ -248,7 +277,7 @@ def _get_row(context: Any, builder: Any, signature: Any, values: Any) -> Any:
 def _set_row(context: Any, builder: Any, signature: Any, values: Any) -> Any:
     memory, place, given = signature.args
     row = context.cast(builder, values[1], place, types.intp)
-    x = number(context, builder, given, values[2], memory.count)
+    x = number(context, builder, given, values[2], max(memory.count, 1))
     write_row(context, builder, memory, values[0], row, x)
     return context.get_dummy_value()
 

@@ -46,7 +46,8 @@ class Rows(_Memory):
 
 
 class Columns(_Memory):
-    """`count` columns of an array of doubles, a row for each name."""
+    """`count` columns of an array of doubles, a row for each name; 0 is one column whose rows are ordinary
+    numbers."""
 
 
 def wide(element: Any, count: int) -> Any:

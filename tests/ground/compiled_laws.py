@@ -18,5 +18,7 @@ def friction_force(velocity, normal, law, kinetic, slow, fast):
 
 @njit(error_model="numpy")
 def normal_force(penetration, rate, approach, stiffness, exponent, chi, dashpot):
-    spring = stiffness * max(penetration, 0.0) ** exponent
+    if penetration <= 0.0:
+        return 0.0
+    spring = stiffness * penetration**exponent
     return laws.normal_force(spring, chi * rate / approach, dashpot * rate)

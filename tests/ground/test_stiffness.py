@@ -12,7 +12,7 @@ from hoof_env.ground.contact import Ground
 from hoof_env.ground.laws import restitution_of_factor
 from hoof_env.ground.stiffness import SCHEMES, ContactRates, contact_rates
 from hoof_env.ground.terrain import Terrain
-from tests.oracle.laws import friction_force, normal_force
+from tests.ground.compiled_laws import friction_force, normal_force
 
 GRAVITY = 9.81
 STAGES = {  # fractions of the step, each stage from the one before, and weights

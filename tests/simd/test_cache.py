@@ -142,7 +142,7 @@ def test_what_cannot_be_compiled_lets_go(start, tmp_path):
 def test_who_waits_too_long_compiles_too(start, tmp_path):
     first = start()
     until((tmp_path / "began").exists, first)
-    second = start("from hoof_env import _kernel_cache; _kernel_cache.LONGEST_WAIT = 0.2;" + CALL)
+    second = start("from hoof_env.simd import cache; cache.LONGEST_WAIT = 0.2;" + CALL)
     said = [second.stderr.readline() for _ in range(2)]
     assert said[1] == "hoof-env: waited 0 s for tiny: compiling it here, too\n"
     (tmp_path / "go").touch()

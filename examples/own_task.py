@@ -1,0 +1,70 @@
+"""A task of one's own, outside the package: a term of the reward, an entry of the observation and a law of
+contact.
+
+python examples/own_task.py
+"""
+
+import math
+
+import gymnasium as gym
+import numpy as np
+
+import hoof_env
+from hoof_env.simd import choose, larger
+from hoof_env.simd.math import root_power
+
+
+def slip(step, weight):
+    """Sliding under load costs: power of friction at toe and heel [kW]."""
+    toe, heel = step.leg.report.toe, step.leg.report.heel
+    return 0.001 * weight * (toe.friction * toe.slide + heel.friction * heel.slide)
+
+
+def comfort(step, weight):
+    """An ordinary function of numbers, for `if` and `math`: paid while the trunk hardly accelerates."""
+    if step.failed:
+        return 0.0
+    return weight * math.exp(-abs(step.trunk.report.acceleration.imag) / 9.81)
+
+
+def vertical_acceleration(scene):
+    return scene.trunk.report.acceleration.imag
+
+
+def turf(penetration, rate, inverse_approach_speed, ground):
+    """Firmer with depth, twice; loses more on the way out than Eq. 14 at the same chi."""
+    spring = ground.stiffness * root_power(penetration, 12) * (1.0 + penetration / 0.05)
+    return spring * (
+        1.0 + ground.chi * larger(rate, choose(rate < -1.0, -1.0, rate)) * inverse_approach_speed
+    )
+
+
+hoof_env.register(
+    "my_lab/Turf-v0",
+    base="leg",
+    terms=[
+        hoof_env.Term("slip", 0.5, "1/kJ", "power of friction", slip),
+        hoof_env.Term("comfort", 0.1, "-", "per step without acceleration", comfort, scalar=True),
+    ],
+    entries=[
+        hoof_env.Entry(
+            "vertical acceleration", "feel", "m/s^2", vertical_acceleration,
+            hoof_env.Scale("tanh(x / 9.81)", lambda x, scene: x / 9.81, saturates=True),
+        )
+    ],
+    contact_law=turf,
+    stiffness=5e4,
+)  # fmt: skip
+
+if __name__ == "__main__":
+    env, envs = gym.make("my_lab/Turf-v0"), gym.make_vec("my_lab/Turf-v0", num_envs=64)
+    observation, info = env.reset(seed=0)
+    envs.reset(seed=0)
+    for _ in range(50):
+        observation, reward, *_, info = env.step(np.zeros(4, np.float32))
+        rewards = envs.step(np.zeros((64, 4), np.float32))[1]
+        assert reward == rewards[0]  # the same bits alone and among many
+    print(
+        f"reward {reward:.4f}, of which {info['reward_slip']:.4f} for slip, {info['reward_comfort']:.4f} for
+        comfort"
+    )
