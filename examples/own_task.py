@@ -34,9 +34,8 @@ def vertical_acceleration(scene):
 def turf(penetration, rate, inverse_approach_speed, ground):
     """Firmer with depth, twice; loses more on the way out than Eq. 14 at the same chi."""
     spring = ground.stiffness * root_power(penetration, 12) * (1.0 + penetration / 0.05)
-    return spring * (
-        1.0 + ground.chi * larger(rate, choose(rate < -1.0, -1.0, rate)) * inverse_approach_speed
-    )
+    damping = ground.chi * choose(rate < 0.0, 2.0 * rate, rate) * inverse_approach_speed
+    return spring * larger(1.0 + damping, 0.0)
 
 
 hoof_env.register(
@@ -64,7 +63,5 @@ if __name__ == "__main__":
         observation, reward, *_, info = env.step(np.zeros(4, np.float32))
         rewards = envs.step(np.zeros((64, 4), np.float32))[1]
         assert reward == rewards[0]  # the same bits alone and among many
-    print(
-        f"reward {reward:.4f}, of which {info['reward_slip']:.4f} for slip, {info['reward_comfort']:.4f} for
-        comfort"
-    )
+    slip_paid, comfort_paid = info["reward_slip"], info["reward_comfort"]
+    print(f"reward {reward:.4f}, of which {slip_paid:.4f} for slip and {comfort_paid:.4f} for comfort")
