@@ -2,15 +2,28 @@
 
 from __future__ import annotations
 
+import math
 import platform
 from collections.abc import Iterable, Mapping
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from hoof_env import __version__
-from hoof_env.paper.rows import ILL, counted, severity
-from hoof_env.paper.solvers import EULER
-from hoof_env.paper.solvers_text import ground_text, listed, solvers_text, which_beta
+from hoof_env._output import markdown_table
+from hoof_env.ground.preset import HERTZ
+from hoof_env.paper.measure import hoof_error, measure_stance
+from hoof_env.paper.published import Published
+from hoof_env.paper.rows import (
+    EULER,
+    EXACT,
+    ILL,
+    PRINTED,
+    PROBABLE,
+    betas,
+    counted,
+    severity,
+    slowest_root,
+)  # fmt: skip
 
 if TYPE_CHECKING:
     from hoof_env.paper.reproduce import Reproduction
@@ -97,11 +110,6 @@ def _summary(reproduction: Reproduction, solver: str) -> str:
     return f"Solver `{solver}`: {counts}. Worst: {worst or 'none outside'}."
 
 
-def _table(head: list[str], rows: Iterable[list[str]]) -> str:
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
-
-
 def _rows_table(reproduction: Reproduction, solvers: list[str]) -> str:
     worst = {(row["id"], solver) for solver in solvers for row in _worst(reproduction, solver)}
     lines = []
@@ -123,7 +131,9 @@ def _rows_table(reproduction: Reproduction, solvers: list[str]) -> str:
             ]
         lines.append(line)
     head = ["row", "quantity", "unit", "published", "bar"]
-    return _table(head + [text for solver in solvers for text in (f"solver {solver}", "error")], lines)
+    return markdown_table(
+        head + [text for solver in solvers for text in (f"solver {solver}", "error")], lines
+    )
 
 
 def _ill_conditioned(reproduction: Reproduction) -> list[str]:
@@ -176,7 +186,7 @@ def _beside_table(reproduction: Reproduction, solvers: list[str]) -> str:
                     *values,
                 ]
             )
-    return _table(["row", "reading", "in print", *(f"solver {solver}" for solver in solvers)], lines)
+    return markdown_table(["row", "reading", "in print", *(f"solver {solver}" for solver in solvers)], lines)
 
 
 def _shape(reproduction: Reproduction, claim_id: str, figures: bool) -> str:
@@ -200,3 +210,86 @@ def _definitions(reproduction: Reproduction, solver: str) -> str:
         reading = f" Reading: {row['reading']}." if row["reading"] else ""
         lines.append(f"- `{row['id']}`: {row['definition']}.{reading}")
     return "\n".join(lines)
+
+
+# The ground and the solvers in words
+
+
+def listed(items: Iterable[str], last: str = "and") -> str:
+    """'a', 'a and b', 'a, b and c'; 'none' without items."""
+    *first, end = list(items) or ["none"]
+    return f"{', '.join(first)} {last} {end}" if first else end
+
+
+def ground_text(reproduction: Reproduction) -> str:
+    """On what the leg stands, beside what the paper prints of it."""
+    ground, printed = reproduction.ground, reproduction.published.parameters["stiffness"]
+    return (
+        f"The preset's ground has K = {ground.stiffness:g} N/mⁿ and n = {ground.exponent:g} in Eq. 14; the "
+        f"paper gives K as 'no smaller than' {printed:g} and does not print n (Lankarani and Nikravesh's is "
+        f"{HERTZ:g})."
+    )
+
+
+def solvers_text(published: Published) -> str:
+    """What the names of the solvers mean."""
+    by_name = betas(published)
+    return (
+        f"Solvers `{PRINTED}` and `{PROBABLE}` are the paper's Eq. 8 with its Baumgarte terms and explicit "
+        f"Euler at {1e3 * published.parameters['time_step_s']:g} ms, the first with β = √(2α) = "
+        f"{by_name[EULER[PRINTED]]:.2f} 1/s as printed, the second with β = √2 α = "
+        f"{by_name[EULER[PROBABLE]]:.1f} 1/s as probably meant. Solver `{EXACT}` is the same motion in "
+        "closed form, at a step at which its results have converged."
+    )
+
+
+def which_beta(reproduction: Reproduction) -> str:
+    """Why the bar asks for the probable beta, with what both do in this run."""
+    published = reproduction.published
+    alpha, by_name = published.parameters["baumgarte_alpha"], betas(published)
+    duration = published.parameters["duration_s"]
+    roots = {name: slowest_root(alpha, beta) for name, beta in by_name.items()}
+    decay = listed(
+        f"{root:.2f} 1/s ({name} β; {100 * math.exp(root * duration):.2g} % of an error is left at the end)"
+        for name, root in roots.items()
+    )
+    drifts = {name: largest_drift(reproduction, solver) for solver, name in EULER.items()}
+    drift = listed(
+        f"{1e3 * a:.2f} mm, {1e3 * b:.2f} mm in stance ({name} β)," for name, (a, b) in drifts.items()
+    )
+    within = {solver: _within(reproduction, solver) for solver in EULER}
+    rows = listed(f"{met} of {barred} ({EULER[solver]} β)" for solver, (met, barred) in within.items())
+    met = [EULER[solver] for solver, (inside, barred) in within.items() if inside == barred]
+    verdict = {
+        0: "This leg meets all of them with neither",
+        1: f"This leg meets all of them with the {met[0] if met else ''} β only",
+        2: "This leg meets all of them with both",
+    }[len(met)]
+    damping = alpha / by_name["probable"]
+    return (
+        f"**Which β.** The printed √(2α) is no rate if α is one; √2 α, a damping of {damping:.2f}, is a "
+        f"usual choice. A closure error decays by the roots of s² + 2αs + β² = 0, over a run of "
+        f"{duration:g} s: the slowest is {decay}. In this run toe or heel is up to {drift} from where "
+        f"the exact solver has it at the same instant, and within their bar are {rows} of the rows that "
+        f"have one. {verdict}. Drift that survives the run is part of every number that comes out of it and "
+        f"no property of a leg; so where a bar is asked of the paper's solver the column `{PROBABLE}` "
+        f"counts, and `{PRINTED}` stands beside it."
+    )
+
+
+def largest_drift(reproduction: Reproduction, solver: str) -> tuple[float, float]:
+    """Largest distance of toe or heel from the exact motion over both gaits [m]: in the cycle, in stance."""
+    cycle, stance = [], []
+    for gait in {gait for gait, _, _ in reproduction.traces}:
+        trace, exact = (reproduction.traces[gait, "elastic", name] for name in (solver, EXACT))
+        error, on_ground = hoof_error(trace, exact), measure_stance(exact)
+        inside = (trace["time"] >= on_ground.start) & (trace["time"] <= on_ground.end)
+        cycle.append(float(error.max()))
+        stance.append(float(error[inside].max()))
+    return max(cycle), max(stance)
+
+
+def _within(reproduction: Reproduction, solver: str) -> tuple[int, int]:
+    """Rows within their bar, and rows that have one."""
+    judged = [row["within_bar"] for row in reproduction.rows if row["solver"] == solver]
+    return judged.count(True), len(judged) - judged.count(None)

@@ -16,11 +16,19 @@ from hoof_env.leg.linkage import POINTS
 from hoof_env.paper import report
 from hoof_env.paper.measure import integral, measure_stance
 from hoof_env.paper.published import CONDITIONS, load_published
+from hoof_env.paper.report import largest_drift, which_beta
 from hoof_env.paper.reproduce import ENVIRONMENT, GAITS, SOLVERS, reproduce, run_cycle, write_reproduction
-from hoof_env.paper.rows import ILL_CONDITIONED, compare, counted, severity
+from hoof_env.paper.rows import (
+    EULER,
+    ILL_CONDITIONED,
+    betas,
+    compare,
+    counted,
+    settings_of,
+    severity,
+    slowest_root,
+)
 from hoof_env.paper.shapes import BACKWARD, BRAKING, DEPTHS, HOOF_ON_GROUND, sole_velocity
-from hoof_env.paper.solvers import EULER, betas, settings_of, slowest_root
-from hoof_env.paper.solvers_text import largest_drift, which_beta
 
 ROW_KEYS = {"kind", "id", "gait", "quantity", "unit", "condition", "reading", "definition", "published",
             "bar", "solver", "simulated", "error", "spared", "within_bar", "beside"}  # fmt: skip
