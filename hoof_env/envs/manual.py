@@ -1,4 +1,7 @@
-"""The manual page of each id, in Gymnasium's form: `manual_text` filled from what the environments run on."""
+"""The manual page of each id, in Gymnasium's form: `manual.md` filled from what the environments run on.
+
+`manual.toml` has units and meanings by name; defaults, limits and weights come from the data that has them.
+"""
 
 from __future__ import annotations
 
@@ -6,19 +9,22 @@ import inspect
 import json
 import math
 import re
+import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import fields
 from pathlib import Path
 from string import Template
 from typing import Any
 
+from hoof_env._output import markdown_table
+from hoof_env.dynamics.integrators import INTEGRATORS
+from hoof_env.dynamics.schemes import SCHEMES
+from hoof_env.dynamics.trunk import ONE_LEG
 from hoof_env.dynamics.trunk_model import LIFT_OFF
-from hoof_env.envs import manual_tables as tables
 from hoof_env.envs import start
 from hoof_env.envs.episode import TERMS
-from hoof_env.envs.grounds import HILLS
+from hoof_env.envs.grounds import HILLS, SPACING
 from hoof_env.envs.infos import MEASURED
-from hoof_env.envs.manual_text import PAGE
 from hoof_env.envs.multi_objective import HorseLegMOEnv
 from hoof_env.envs.observation import GROUPS, entries
 from hoof_env.envs.reward import RewardWeights
@@ -26,7 +32,13 @@ from hoof_env.envs.tasks import PER_EPISODE, TASKS, Settings, to_json
 from hoof_env.errors import OutputError, check_choice
 from hoof_env.gait.motion_law import FilterSettings
 from hoof_env.gait.parameters import LIMITS
-from hoof_env.leg.geometry import load_geometry
+from hoof_env.ground.friction import FRICTION_LAWS
+from hoof_env.ground.normal_force import NORMAL_LAWS
+from hoof_env.leg.geometry import load_geometry, preset_names
+
+HERE = Path(__file__).parent
+PAGE = (HERE / "manual.md").read_text(encoding="utf-8")
+"""The page of a task; `page` fills in what begins with $."""
 
 _CLASSES: Mapping[str, Any] = {"mo": HorseLegMOEnv}
 _NAMES = {name: task.name for name, task in TASKS.items()} | {"mo": "HorseLegMO"}
@@ -35,6 +47,24 @@ PAGES = tuple(_NAMES)
 """The tasks, and an id whose page is the docstring of its class."""
 
 INDEX = "README.md"
+
+
+def tables() -> dict[str, dict[str, list[str]]]:
+    """What `manual.toml` says, by table and name: unit and meaning."""
+    names = {
+        "presets": preset_names(), "trunks": ONE_LEG, "schemes": SCHEMES, "paper_schemes": INTEGRATORS,
+        "normal_laws": NORMAL_LAWS, "friction_laws": FRICTION_LAWS,
+    }  # fmt: skip
+    values = {name: ", ".join(f'"{one}"' for one in choices) for name, choices in names.items()}
+    numbers = {"lowest": start.LOWEST, "highest": start.HIGHEST, "spacing": SPACING}
+    values |= {name: f"{number:g}" for name, number in numbers.items()}
+    return {
+        table: {name: [Template(cell).substitute(values) for cell in cells] for name, cells in rows.items()}
+        for table, rows in tomllib.loads((HERE / "manual.toml").read_text(encoding="utf-8")).items()
+    }
+
+
+TABLES = tables()
 
 MOVES = "The trunk moves by what friction gives it and feels every link swing. "
 
@@ -67,17 +97,17 @@ def page(task: str) -> str:
         else "",
         lift_off=f"{100 * LIFT_OFF:g}",
         start=_start(settings, what.start),
-        options=_table(("Option", "Unit", "Range", "Meaning"), _options()),
+        options=markdown_table(("Option", "Unit", "Range", "Meaning"), _options()),
         parameters=", ".join(f"`{name}`" for name in PER_EPISODE),
-        infos=_table(("Key", "Unit", "Meaning"), _quoted(tables.INFO)),
+        infos=markdown_table(("Key", "Unit", "Meaning"), _quoted("info")),
         measured=str(len(MEASURED)),
-        quantities=_table(("Name", "In", "Unit", "Meaning"), _quantities()),
+        quantities=markdown_table(("Name", "In", "Unit", "Meaning"), _quantities()),
         leaves=_leaves(settings),
         seconds=literal(settings.episode_seconds),
-        figures=_table(("Figure", "Unit", "Meaning"), _quoted(tables.SUMMARY)),
-        vector_arguments=_table(("Argument", "Default", "Meaning"), _vector_arguments()),
+        figures=markdown_table(("Figure", "Unit", "Meaning"), _quoted("summary")),
+        vector_arguments=markdown_table(("Argument", "Default", "Meaning"), _vector_arguments()),
         bold=", **bold** where they are not those of [HorseLeg](HorseLeg.md)" if what.defaults else "",
-        settings=_table(("Name", "Default", "Unit", "Meaning"), _settings(settings, what.defaults)),
+        settings=markdown_table(("Name", "Default", "Unit", "Meaning"), _settings(settings, what.defaults)),
         terrain=_terrain() if settings.terrain else "",
     )
     return re.sub(r"\n{3,}", "\n\n", text)
@@ -107,7 +137,7 @@ def index() -> str:
     head = ("id", "what it is", "observation", "reference gait", "native vector environment")
     return (
         "# Environments\n\nWritten by `hoof-env manual --out docs/environments`.\n\n"
-        f"{_table(head, rows)}\n\n"
+        f"{markdown_table(head, rows)}\n\n"
         "Actions are `Box(-1, 1, (4,), float32)`, observations boxes of so many numbers in [-1, 1]. Idle,"
         " airborne, foot-dragging and bang-bang policies must stay below the reference gait.\n"
     )
@@ -147,7 +177,7 @@ def _actions(settings: Settings) -> str:
             low, high = -(high - low) / 2, (high - low) / 2
         fastest = f"{bounds[k]:g} {GROUPS['gait'][len(LIMITS) + k][2]}"
         rows.append((str(k), name, f"{low:.5g}", f"{high:.5g}", unit, fastest))
-    return _table(
+    return markdown_table(
         ("Num", "Offset of" if settings.gait else "Command", "At -1", "At +1", "Unit", "Fastest change"), rows
     )
 
@@ -165,16 +195,16 @@ def _offsets(gait: str) -> str:
 def _observations(settings: Settings) -> str:
     rows = [(*entry, group) for group in settings.observation for entry in entries([group], settings.trunk)]
     head = ("Num", "Observation", "Scaling", "Unit before scaling", "Group")
-    return _table(head, [(str(k), *row) for k, row in enumerate(rows)])
+    return markdown_table(head, [(str(k), *row) for k, row in enumerate(rows)])
 
 
 def _rewards(settings: Settings) -> str:
     weights = RewardWeights.of(settings.reward_weights)
     rows = []
     for term, item in zip(TERMS, fields(RewardWeights), strict=True):
-        unit, meaning = tables.WEIGHTS[item.name]
-        rows.append((f"`{term}`", f"`{item.name}`", f"{getattr(weights, item.name):g}", unit, meaning))
-    return _table(("Term", "Weight", "Default", "Unit", "Meaning"), rows)
+        default = f"{getattr(weights, item.name):g}"
+        rows.append((f"`{term}`", f"`{item.name}`", default, *TABLES["weights"][item.name]))
+    return markdown_table(("Term", "Weight", "Default", "Unit", "Meaning"), rows)
 
 
 def _start(settings: Settings, options: Mapping[str, float]) -> str:
@@ -209,38 +239,39 @@ def _leaves(settings: Settings) -> str:
 
 
 def _options() -> Iterable[tuple[str, ...]]:
-    for name, (unit, meaning) in tables.OPTIONS.items():
+    for name, (unit, meaning) in TABLES["options"].items():
         low, high = start.OPTIONS.get(name, (0.0, 0.0))
         within = "" if low == high else f"{low:.7g} to {high:.7g}" if math.isfinite(high) else f"from {low:g}"
         yield f"`{name}`", unit, within, meaning
 
 
 def _quantities() -> Iterable[tuple[str, ...]]:
-    for names, (within, unit, meaning) in tables.QUANTITIES.items():
-        yield ", ".join(f"`{name}`" for name in names), within, unit, meaning
+    for names, cells in TABLES["quantities"].items():
+        yield ", ".join(f"`{name}`" for name in names.split(", ")), *cells
 
 
 def _vector_arguments() -> Iterable[tuple[str, ...]]:
     from hoof_env.envs.vector import HorseLegVectorEnv
 
     for name, item in inspect.signature(HorseLegVectorEnv).parameters.items():
-        if name in tables.VECTOR:
-            yield f"`{name}`", literal(getattr(item.default, "name", item.default)), tables.VECTOR[name][1]
+        if name in TABLES["vector"]:
+            default = literal(getattr(item.default, "name", item.default))
+            yield f"`{name}`", default, TABLES["vector"][name][1]
 
 
 def _settings(settings: Settings, changed: Iterable[str]) -> Iterable[tuple[str, ...]]:
     for name, value in to_json(settings).items():
         default = f"**{literal(value)}**" if name in changed else literal(value)
-        yield f"`{name}`", default, *tables.SETTINGS[name]
+        yield f"`{name}`", default, *TABLES["settings"][name]
     yield "`render_mode`", "None", "", '"rgb_array" or "human"'
 
 
 def _terrain() -> str:
-    rows = [(f"`{name}`", literal(value), *tables.HILLS[name]) for name, value in HILLS.items()]
+    rows = [(f"`{name}`", literal(value), *TABLES["hills"][name]) for name, value in HILLS.items()]
     return (
         "### Terrain\n\nHills go straight from one random height to the next, each at its own slope, over"
         " patches of random stiffness and friction. They take:\n\n"
-        f"{_table(('Name', 'Default', 'Unit', 'Meaning'), rows)}"
+        f"{markdown_table(('Name', 'Default', 'Unit', 'Meaning'), rows)}"
     )
 
 
@@ -258,7 +289,7 @@ def _of_class(task: str) -> str:
     name, (head, sections) = _NAMES[task], _docstring(task)
     scaling = {entry[0]: entry for group in GROUPS.values() for entry in group}
     rows = [(str(k), *scaling[entry]) for k, entry in enumerate(observed(task))]
-    table = _table(("Num", "Observation", "Scaling", "Unit before scaling"), rows)
+    table = markdown_table(("Num", "Observation", "Scaling", "Unit before scaling"), rows)
     parts = [f"# {name}", head, PAGE.split("\n\n", 2)[2].split("\n\nenvs = ")[0] + "\n```"]
     for section in sections:
         title, text = section.split("\n", 1)
@@ -282,10 +313,5 @@ def literal(value: Any) -> str:
     return "None" if value is None else json.dumps(value)
 
 
-def _quoted(rows: tables.Rows) -> Iterable[tuple[str, ...]]:
-    return ((f"`{name}`", *row) for name, row in rows.items())
-
-
-def _table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
-    first, *rest = (f"| {' | '.join(cells)} |" for cells in (head, *rows))
-    return "\n".join([first, "|" + "---|" * (first.count(" | ") + 1), *rest])
+def _quoted(table: str) -> Iterable[tuple[str, ...]]:
+    return ((f"`{name}`", *cells) for name, cells in TABLES[table].items())
