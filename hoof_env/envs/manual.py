@@ -1,4 +1,4 @@
-"""The manual page of each id, in Gymnasium's form: `manual.md` filled from what the environments run on.
+"""The manual page of each id, in Gymnasium's form: `manual.md.in` filled from what the environments run on.
 
 `manual.toml` has units and meanings by name; defaults, limits and weights come from the data that has them.
 """
@@ -37,7 +37,7 @@ from hoof_env.ground.normal_force import NORMAL_LAWS
 from hoof_env.leg.geometry import load_geometry, preset_names
 
 HERE = Path(__file__).parent
-PAGE = (HERE / "manual.md").read_text(encoding="utf-8")
+PAGE = (HERE / "manual.md.in").read_text(encoding="utf-8")
 """The page of a task; `page` fills in what begins with $."""
 
 _CLASSES: Mapping[str, Any] = {"mo": HorseLegMOEnv}
