@@ -10,8 +10,7 @@ import warnings
 from collections.abc import Callable
 from typing import NoReturn
 
-from hoof_env._arguments import parse_pairs
-from hoof_env.errors import HoofEnvError, check_number
+from hoof_env.errors import HoofEnvError, check_number, parse_pairs
 
 __all__ = ["check_threads", "parse_pairs", "run"]
 

@@ -1,11 +1,11 @@
-"""Writing results so that a failure or an interrupt never leaves half a file behind."""
+"""Writing results so that a failure or an interrupt never leaves half a file behind; tables in Markdown."""
 
 from __future__ import annotations
 
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -67,3 +67,9 @@ def new_file(path: Path, overwrite: bool) -> Iterator[str]:
             with suppress(OSError):
                 folder.rmdir()
         raise
+
+
+def markdown_table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    """A table in Markdown from the cells of its head and of its rows."""
+    first, *rest = (f"| {' | '.join(cells)} |" for cells in (head, *rows))
+    return "\n".join([first, "|" + "---|" * (first.count(" | ") + 1), *rest])

@@ -1,8 +1,12 @@
-"""Errors raised at the border of the package: each names what was given and what was expected."""
+"""Errors raised at the border of the package, and checks that raise them.
+
+Each names what was given and what was expected.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import json
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -72,3 +76,32 @@ def check_choice(name: str, value: Any, choices: Iterable[str]) -> str:
     if not isinstance(value, str) or value not in known:
         raise ParameterError(f"{name}: expected one of {', '.join(known)}, got {value!r}")
     return value
+
+
+def parse_pairs(option: str, items: Sequence[str]) -> dict[str, Any]:
+    """Read `key=value` items, or JSON objects, into one mapping; a value that is not JSON is kept as text.
+
+    >>> parse_pairs("--args", ["trunk=rail", "restitution=0.5", '{"render_mode": null}'])
+    {'trunk': 'rail', 'restitution': 0.5, 'render_mode': None}
+
+    Raises:
+        ParameterError: an item is neither.
+    """
+    pairs: dict[str, Any] = {}
+    for item in items:
+        key, equals, text = item.partition("=")
+        why = ""
+        if item.lstrip().startswith("{"):
+            try:
+                pairs.update(json.loads(item))
+                continue
+            except ValueError as error:
+                why = f" ({error})"
+        elif equals and key.isidentifier():
+            try:
+                pairs[key] = json.loads(text)
+            except ValueError:
+                pairs[key] = text
+            continue
+        raise ParameterError(f"{option}: expected a JSON object or key=value, got {item!r}{why}")
+    return pairs

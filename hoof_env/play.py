@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env import records
-from hoof_env._arguments import parse_pairs
-from hoof_env.errors import HoofEnvError, check_number
+from hoof_env.errors import HoofEnvError, check_number, parse_pairs
 from hoof_env.gait.parameters import GaitParameters
 from hoof_env.render.instant import Instant, instants
 

@@ -12,12 +12,11 @@ import numpy as np
 import pytest
 
 from hoof_env import __version__, cli
-from hoof_env._arguments import parse_pairs
 from hoof_env.dynamics.layout import TRUNK_STATE
 from hoof_env.dynamics.trunk import GRAVITY
 from hoof_env.envs.policies import make_policy
-from hoof_env.errors import HoofEnvError, OutputError, ParameterError
-from hoof_env.export.files import MOT_COLUMNS, export_episode, write
+from hoof_env.errors import HoofEnvError, OutputError, ParameterError, parse_pairs
+from hoof_env.export import MOT_COLUMNS, export_episode, write
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.records import RECORD, describe, find_policy, make_env, record_episode
 

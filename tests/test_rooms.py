@@ -9,10 +9,10 @@ import hoof_env
 
 PACKAGE = Path(hoof_env.__file__).parent
 ORDER = (
-    {"simd"}, {"leg", "ground"}, {"gait"}, {"dynamics"}, {"render"}, {"envs"}, {"export"}, {"paper"},
+    {"simd"}, {"leg", "ground"}, {"gait"}, {"dynamics"}, {"render"}, {"envs"}, {"paper"},
     {"identify"},
 )  # fmt: skip
-AT_THE_END = {"cli.py", "play.py", "records.py", "__init__.py", "__main__.py"}
+AT_THE_END = {"cli.py", "export.py", "play.py", "records.py", "__init__.py", "__main__.py"}
 """Modules that use the public names as any user would."""
 
 RANK = {room: rank for rank, rooms in enumerate(ORDER) for room in rooms}

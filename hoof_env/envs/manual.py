@@ -1,4 +1,7 @@
-"""The manual page of each id, in Gymnasium's form: `manual_text` filled from what the environments run on."""
+"""The manual page of each id, in Gymnasium's form: `manual.md.in` filled from what the environments run on.
+
+`manual.toml` has units and meanings by name; defaults, limits and weights come from the data that has them.
+"""
 
 from __future__ import annotations
 
@@ -6,24 +9,34 @@ import inspect
 import json
 import math
 import re
+import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from string import Template
 from typing import Any
 
+from hoof_env._output import markdown_table
+from hoof_env.dynamics.integrators import INTEGRATORS
+from hoof_env.dynamics.schemes import SCHEMES
+from hoof_env.dynamics.trunk import ONE_LEG
 from hoof_env.dynamics.trunk_model import LIFT_OFF
-from hoof_env.envs import manual_tables as tables
-from hoof_env.envs import observation, start
-from hoof_env.envs.grounds import HILLS
+from hoof_env.envs import start
+from hoof_env.envs.grounds import HILLS, SPACING
 from hoof_env.envs.infos import MEASURED
-from hoof_env.envs.manual_text import PAGE
 from hoof_env.envs.multi_objective import HorseLegMOEnv
+from hoof_env.envs.observation import ENTRIES, groups_of
+from hoof_env.envs.observation import observed as entries_of
 from hoof_env.envs.reward import TERMS, check_weights
 from hoof_env.envs.tasks import PER_EPISODE, TASKS, Settings, to_json
 from hoof_env.errors import OutputError, check_choice
 from hoof_env.gait.motion_law import FilterSettings
 from hoof_env.gait.parameters import LIMITS
-from hoof_env.leg.geometry import load_geometry
+from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS
+from hoof_env.leg.geometry import load_geometry, preset_names
+
+HERE = Path(__file__).parent
+PAGE = (HERE / "manual.md.in").read_text(encoding="utf-8")
+"""The page of a task; `page` fills in what begins with $."""
 
 _CLASSES: Mapping[str, Any] = {"mo": HorseLegMOEnv}
 _NAMES = {name: task.name for name, task in TASKS.items()} | {"mo": "HorseLegMO"}
@@ -33,10 +46,28 @@ PAGES = tuple(_NAMES)
 
 INDEX = "README.md"
 
-MOVES = "The trunk moves by what friction gives it and feels every link swing. "
+GROUPS = groups_of(ENTRIES)
+GAIT = [entry for entry in ENTRIES if entry.group == "gait"]
 
-GROUPS = observation.groups_of(observation.ENTRIES)
-GAIT = [entry for entry in observation.ENTRIES if entry.group == "gait"]
+
+def tables() -> dict[str, dict[str, list[str]]]:
+    """What `manual.toml` says, by table and name: unit and meaning."""
+    names = {
+        "presets": preset_names(), "trunks": ONE_LEG, "schemes": SCHEMES, "paper_schemes": INTEGRATORS,
+        "normal_laws": NORMAL_LAWS, "friction_laws": FRICTION_LAWS,
+    }  # fmt: skip
+    values = {name: ", ".join(f'"{one}"' for one in choices) for name, choices in names.items()}
+    numbers = {"lowest": start.LOWEST, "highest": start.HIGHEST, "spacing": SPACING}
+    values |= {name: f"{number:g}" for name, number in numbers.items()}
+    return {
+        table: {name: [Template(cell).substitute(values) for cell in cells] for name, cells in rows.items()}
+        for table, rows in tomllib.loads((HERE / "manual.toml").read_text(encoding="utf-8")).items()
+    }
+
+
+TABLES = tables()
+
+MOVES = "The trunk moves by what friction gives it and feels every link swing. "
 
 
 def page(task: str) -> str:
@@ -67,17 +98,17 @@ def page(task: str) -> str:
         else "",
         lift_off=f"{100 * LIFT_OFF:g}",
         start=_start(settings, what.start),
-        options=_table(("Option", "Unit", "Range", "Meaning"), _options()),
+        options=markdown_table(("Option", "Unit", "Range", "Meaning"), _options()),
         parameters=", ".join(f"`{name}`" for name in PER_EPISODE),
-        infos=_table(("Key", "Unit", "Meaning"), _quoted(tables.INFO)),
+        infos=markdown_table(("Key", "Unit", "Meaning"), _quoted("info")),
         measured=str(len(MEASURED)),
-        quantities=_table(("Name", "In", "Unit", "Meaning"), _quantities()),
+        quantities=markdown_table(("Name", "In", "Unit", "Meaning"), _quantities()),
         leaves=_leaves(settings),
         seconds=literal(settings.episode_seconds),
-        figures=_table(("Figure", "Unit", "Meaning"), _quoted(tables.SUMMARY)),
-        vector_arguments=_table(("Argument", "Default", "Meaning"), _vector_arguments()),
+        figures=markdown_table(("Figure", "Unit", "Meaning"), _quoted("summary")),
+        vector_arguments=markdown_table(("Argument", "Default", "Meaning"), _vector_arguments()),
         bold=", **bold** where they are not those of [HorseLeg](HorseLeg.md)" if what.defaults else "",
-        settings=_table(("Name", "Default", "Unit", "Meaning"), _settings(settings, what.defaults)),
+        settings=markdown_table(("Name", "Default", "Unit", "Meaning"), _settings(settings, what.defaults)),
         terrain=_terrain() if settings.terrain else "",
     )
     return re.sub(r"\n{3,}", "\n\n", text)
@@ -107,7 +138,7 @@ def index() -> str:
     head = ("id", "what it is", "observation", "reference gait", "native vector environment")
     return (
         "# Environments\n\nWritten by `hoof-env manual --out docs/environments`.\n\n"
-        f"{_table(head, rows)}\n\n"
+        f"{markdown_table(head, rows)}\n\n"
         "Actions are `Box(-1, 1, (4,), float32)`, observations boxes of so many numbers in [-1, 1]. Idle,"
         " airborne, foot-dragging and bang-bang policies must stay below the reference gait.\n"
     )
@@ -132,7 +163,7 @@ def write_pages(out: Path) -> list[Path]:
 def observed(task: str) -> tuple[str, ...]:
     """Names of the observation's entries of a page's id, by default."""
     settings = TASKS["leg" if task == "mo" else task].settings({})
-    return tuple(entry.name for entry in observation.observed(settings.observation, settings.trunk))
+    return tuple(entry.name for entry in entries_of(settings.observation, settings.trunk))
 
 
 # Parts of a page
@@ -147,7 +178,7 @@ def _actions(settings: Settings) -> str:
             low, high = -(high - low) / 2, (high - low) / 2
         fastest = f"{bounds[k]:g} {GAIT[len(LIMITS) + k].unit}"
         rows.append((str(k), name, f"{low:.5g}", f"{high:.5g}", unit, fastest))
-    return _table(
+    return markdown_table(
         ("Num", "Offset of" if settings.gait else "Command", "At -1", "At +1", "Unit", "Fastest change"), rows
     )
 
@@ -161,16 +192,16 @@ def _offsets(gait: str) -> str:
 
 
 def _observations(settings: Settings) -> str:
-    entries = observation.observed(settings.observation, settings.trunk)
+    entries = entries_of(settings.observation, settings.trunk)
     rows = [(entry.name, entry.scale.text, entry.unit, entry.group) for entry in entries]
     head = ("Num", "Observation", "Scaling", "Unit before scaling", "Group")
-    return _table(head, [(str(k), *row) for k, row in enumerate(rows)])
+    return markdown_table(head, [(str(k), *row) for k, row in enumerate(rows)])
 
 
 def _rewards(settings: Settings) -> str:
     weights = check_weights(settings.reward_weights)
     rows = [(f"`{t.key}`", f"`{t.name}`", f"{weights[t.name]:g}", t.unit, t.meaning) for t in TERMS]
-    return _table(("Term", "Weight", "Default", "Unit", "Meaning"), rows)
+    return markdown_table(("Term", "Weight", "Default", "Unit", "Meaning"), rows)
 
 
 def _start(settings: Settings, options: Mapping[str, float]) -> str:
@@ -205,38 +236,39 @@ def _leaves(settings: Settings) -> str:
 
 
 def _options() -> Iterable[tuple[str, ...]]:
-    for name, (unit, meaning) in tables.OPTIONS.items():
+    for name, (unit, meaning) in TABLES["options"].items():
         low, high = start.OPTIONS.get(name, (0.0, 0.0))
         within = "" if low == high else f"{low:.7g} to {high:.7g}" if math.isfinite(high) else f"from {low:g}"
         yield f"`{name}`", unit, within, meaning
 
 
 def _quantities() -> Iterable[tuple[str, ...]]:
-    for names, (within, unit, meaning) in tables.QUANTITIES.items():
-        yield ", ".join(f"`{name}`" for name in names), within, unit, meaning
+    for names, cells in TABLES["quantities"].items():
+        yield ", ".join(f"`{name}`" for name in names.split(", ")), *cells
 
 
 def _vector_arguments() -> Iterable[tuple[str, ...]]:
     from hoof_env.envs.vector import HorseLegVectorEnv
 
     for name, item in inspect.signature(HorseLegVectorEnv).parameters.items():
-        if name in tables.VECTOR:
-            yield f"`{name}`", literal(getattr(item.default, "name", item.default)), tables.VECTOR[name][1]
+        if name in TABLES["vector"]:
+            default = literal(getattr(item.default, "name", item.default))
+            yield f"`{name}`", default, TABLES["vector"][name][1]
 
 
 def _settings(settings: Settings, changed: Iterable[str]) -> Iterable[tuple[str, ...]]:
     for name, value in to_json(settings).items():
         default = f"**{literal(value)}**" if name in changed else literal(value)
-        yield f"`{name}`", default, *tables.SETTINGS[name]
+        yield f"`{name}`", default, *TABLES["settings"][name]
     yield "`render_mode`", "None", "", '"rgb_array" or "human"'
 
 
 def _terrain() -> str:
-    rows = [(f"`{name}`", literal(value), *tables.HILLS[name]) for name, value in HILLS.items()]
+    rows = [(f"`{name}`", literal(value), *TABLES["hills"][name]) for name, value in HILLS.items()]
     return (
         "### Terrain\n\nHills go straight from one random height to the next, each at its own slope, over"
         " patches of random stiffness and friction. They take:\n\n"
-        f"{_table(('Name', 'Default', 'Unit', 'Meaning'), rows)}"
+        f"{markdown_table(('Name', 'Default', 'Unit', 'Meaning'), rows)}"
     )
 
 
@@ -252,10 +284,9 @@ def _docstring(task: str) -> tuple[str, list[str]]:
 def _of_class(task: str) -> str:
     """The page of a class: its docstring, an example and the table of its observation."""
     name, (head, sections) = _NAMES[task], _docstring(task)
-    entries = {entry.name: entry for entry in observation.ENTRIES}
-    found = [entries[name] for name in observed(task)]
-    rows = [(str(k), entry.name, entry.scale.text, entry.unit) for k, entry in enumerate(found)]
-    table = _table(("Num", "Observation", "Scaling", "Unit before scaling"), rows)
+    entries = {entry.name: entry for entry in ENTRIES}
+    rows = [(str(k), n, entries[n].scale.text, entries[n].unit) for k, n in enumerate(observed(task))]
+    table = markdown_table(("Num", "Observation", "Scaling", "Unit before scaling"), rows)
     parts = [f"# {name}", head, PAGE.split("\n\n", 2)[2].split("\n\nenvs = ")[0] + "\n```"]
     for section in sections:
         title, text = section.split("\n", 1)
@@ -279,10 +310,5 @@ def literal(value: Any) -> str:
     return "None" if value is None else json.dumps(value)
 
 
-def _quoted(rows: tables.Rows) -> Iterable[tuple[str, ...]]:
-    return ((f"`{name}`", *row) for name, row in rows.items())
-
-
-def _table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
-    first, *rest = (f"| {' | '.join(cells)} |" for cells in (head, *rows))
-    return "\n".join([first, "|" + "---|" * (first.count(" | ") + 1), *rest])
+def _quoted(table: str) -> Iterable[tuple[str, ...]]:
+    return ((f"`{name}`", *cells) for name, cells in TABLES[table].items())

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
-from hoof_env.paper.figure_labels import spread, text_size
-from hoof_env.paper.figure_layout import panel
-from hoof_env.paper.figure_style import GREY, SMALL, half_bar, mark_published
+from hoof_env.paper.figure_style import GREY, SMALL, half_bar, mark_published, panel, text_size
 from hoof_env.paper.measure import POINTS, Stance
 from hoof_env.paper.published import PublishedRow
 
@@ -83,6 +82,24 @@ def mark_contacts(ax: Any, reproduction: Reproduction, gait: str, y: float) -> N
 
 def _contact_rows(reproduction: Reproduction, gait: str) -> list[PublishedRow]:
     return [reproduction.published.row(f"{gait}.{name}") for name in ("contact_start", "contact_end")]
+
+
+def spread(centres: Sequence[float], widths: Sequence[float], low: float, high: float) -> list[float]:
+    """Centres of labels in a row, moved as little as keeps them apart and, if they fit, within [low, high].
+
+    Args:
+        centres: where the labels would like to be, increasing [mm].
+        widths: their widths, with the gap to the next [mm].
+        low, high: ends of the row [mm].
+    """
+    placed = []
+    for centre, width in zip(centres, widths, strict=True):
+        placed.append(max(centre, low + width / 2))
+        low = placed[-1] + width / 2
+    for k in reversed(range(len(placed))):
+        placed[k] = min(placed[k], high - widths[k] / 2)
+        high = placed[k] - widths[k] / 2
+    return placed
 
 
 def name_phases(

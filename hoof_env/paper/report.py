@@ -2,21 +2,39 @@
 
 from __future__ import annotations
 
+import math
 import platform
 from collections.abc import Iterable, Mapping
 from importlib.metadata import version
+from pathlib import Path
+from string import Template
 from typing import TYPE_CHECKING, Any
 
 from hoof_env import __version__
-from hoof_env.paper.rows import ILL, counted, severity
-from hoof_env.paper.solvers import EULER
-from hoof_env.paper.solvers_text import ground_text, listed, solvers_text, which_beta
+from hoof_env._output import markdown_table
+from hoof_env.ground.preset import HERTZ
+from hoof_env.paper.measure import hoof_error, measure_stance
+from hoof_env.paper.rows import (
+    EULER,
+    EXACT,
+    ILL,
+    PRINTED,
+    PROBABLE,
+    betas,
+    counted,
+    severity,
+    slowest_root,
+)  # fmt: skip
 
 if TYPE_CHECKING:
     from hoof_env.paper.reproduce import Reproduction
 
 WORST = 3
 """How many rows of each solver are named as its worst."""
+
+FIGURES = ("figure1", "figure3", "figure4", "figure5", "figure6")
+PAGE = Path(__file__).with_name("report.md.in")
+"""The page, whose numbers and tables begin with $."""
 
 _DIGITS = {"s": 4, "deg": 2, "N": 1, "%": 2, "-": 3, "point": 2, "": 3}
 _PACKAGES = ("gymnasium", "numpy", "numba")
@@ -31,42 +49,37 @@ def markdown(reproduction: Reproduction, *, command: str, figures: bool) -> str:
         figures: whether pictures lie beside it.
     """
     solvers = list(dict.fromkeys(row["solver"] for row in reproduction.rows))
-    versions = ", ".join(
-        [f"Python {platform.python_version()}", *(f"{name} {version(name)}" for name in _PACKAGES)]
+    geometry, published = reproduction.geometry, reproduction.published
+    page = Template(PAGE.read_text(encoding="utf-8")).substitute(
+        source=published.source,
+        preset=geometry.name,
+        provenance=geometry.provenance,
+        stiffness=f"{reproduction.ground.stiffness:g}",
+        exponent=f"{reproduction.ground.exponent:g}",
+        printed_stiffness=f"{published.parameters['stiffness']:g}",
+        hertz=f"{HERTZ:g}",
+        step=f"{1e3 * published.parameters['time_step_s']:g}",
+        printed=PRINTED,
+        probable=PROBABLE,
+        exact=EXACT,
+        command=command,
+        version=__version__,
+        versions=", ".join(
+            [f"Python {platform.python_version()}", *(f"{name} {version(name)}" for name in _PACKAGES)]
+        ),
+        summaries="\n\n".join(_summary(reproduction, solver) for solver in solvers),
+        rows=_rows_table(reproduction, solvers),
+        ill_conditioned=_ill_conditioned(reproduction),
+        resultants=_resultants(reproduction, solvers),
+        beside=_beside_table(reproduction, solvers),
+        claims="\n\n".join(_shape(reproduction, claim.id, figures) for claim in published.claims),
+        definitions=_definitions(reproduction, solvers[0]),
+        **which_beta(reproduction),
     )
-    geometry = reproduction.geometry
-    parts = [
-        "# The paper's four conditions, reproduced",
-        f"{reproduction.published.source}.",
-        f"**The leg's geometry and its gaits are identified, not published** (preset `{geometry.name}`). "
-        f"{geometry.provenance}",
-        "Each condition is one cycle of 1 s on a fixed trunk under the zero action. "
-        f"{ground_text(reproduction)} {solvers_text(reproduction.published)}",
-        f"Written by `{command}` with hoof-env {__version__}, {versions}.",
-        "## Published beside simulated",
-        *(_summary(reproduction, solver) for solver in solvers),
-        which_beta(reproduction),
-        "Errors are in the measure of the bar; ✗ marks a row outside its bar, and bold its solver's worst. "
-        "Counted are the rows that have a bar with the solver: not those whose bar is 'reported', and not "
-        "the ill-conditioned ones, marked †.",
-        _rows_table(reproduction, solvers),
-        *_ill_conditioned(reproduction),
-        "## Other readings of the same rows",
-        _resultants(reproduction, solvers),
-        _beside_table(reproduction, solvers),
-        "## Claims about shape",
-        *(_shape(reproduction, claim.id, figures) for claim in reproduction.published.claims),
-        "## How each row is measured",
-        _definitions(reproduction, solvers[0]),
-    ]
     if figures:
-        shown = [f"![{name}]({name}.png)\n[{name}.svg]({name}.svg)" for name in _figure_names()]
-        parts += ["## Figures", *shown]
-    return "\n\n".join(parts) + "\n"
-
-
-def _figure_names() -> tuple[str, ...]:
-    return ("figure1", "figure3", "figure4", "figure5", "figure6")
+        shown = [f"![{name}]({name}.png)\n[{name}.svg]({name}.svg)" for name in FIGURES]
+        page += "\n" + "\n\n".join(["## Figures", *shown]) + "\n"
+    return page
 
 
 def _of(entries: Iterable[Mapping[str, Any]], **wanted: str) -> list[Any]:
@@ -97,11 +110,6 @@ def _summary(reproduction: Reproduction, solver: str) -> str:
     return f"Solver `{solver}`: {counts}. Worst: {worst or 'none outside'}."
 
 
-def _table(head: list[str], rows: Iterable[list[str]]) -> str:
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
-
-
 def _rows_table(reproduction: Reproduction, solvers: list[str]) -> str:
     worst = {(row["id"], solver) for solver in solvers for row in _worst(reproduction, solver)}
     lines = []
@@ -123,23 +131,24 @@ def _rows_table(reproduction: Reproduction, solvers: list[str]) -> str:
             ]
         lines.append(line)
     head = ["row", "quantity", "unit", "published", "bar"]
-    return _table(head + [text for solver in solvers for text in (f"solver {solver}", "error")], lines)
+    head += [text for solver in solvers for text in (f"solver {solver}", "error")]
+    return markdown_table(head, lines)
 
 
-def _ill_conditioned(reproduction: Reproduction) -> list[str]:
+def _ill_conditioned(reproduction: Reproduction) -> str:
     """Section on the rows that a solver is spared for being ill-conditioned, if there are any."""
     spared = dict.fromkeys(row["id"] for row in _of(reproduction.rows, spared=ILL))
     if not spared:
-        return []
-    return [
-        "## Ill-conditioned rows",
+        return ""
+    return (
+        "## Ill-conditioned rows\n\n"
         f"These rows, marked †, have no bar with {listed((f'`{solver}`' for solver in EULER), 'or')}: "
         f"{listed(f'`{name}`' for name in spared)}. Inelastic walking depends on the approach speed at a "
         "touch-down that grazes the ground. The paper's loop takes that speed at its first step inside the "
         "ground, so a small change of the time step, of β or of the identified ground level moves these rows "
         "by many bars. How far each row moves is measured in the repository's "
-        "[docs/evidence/conditions.md](../evidence/conditions.md).",
-    ]
+        "[docs/evidence/conditions.md](../evidence/conditions.md).\n\n"
+    )
 
 
 def _resultants(reproduction: Reproduction, solvers: list[str]) -> str:
@@ -153,11 +162,7 @@ def _resultants(reproduction: Reproduction, solvers: list[str]) -> str:
             readings += [(row["within_bar"], bar.holds(bar.error(v, row["published"]))) for v in other]
         used, other_used = (sum(map(bool, verdicts)) for verdicts in zip(*readings, strict=True))
         parts.append(f"{used} and {other_used} of {len(readings)} counted with solver `{solver}`")
-    return (
-        "'Maximum force' is the normal force summed over toe and heel throughout, in both gaits and both "
-        "conditions. The other reading, the resultant with friction, stands here beside every peak and "
-        f"reduction. Within their bars are, as read and as resultants, {', '.join(parts)}."
-    )
+    return ", ".join(parts)
 
 
 def _beside_table(reproduction: Reproduction, solvers: list[str]) -> str:
@@ -176,7 +181,7 @@ def _beside_table(reproduction: Reproduction, solvers: list[str]) -> str:
                     *values,
                 ]
             )
-    return _table(["row", "reading", "in print", *(f"solver {solver}" for solver in solvers)], lines)
+    return markdown_table(["row", "reading", "in print", *(f"solver {solver}" for solver in solvers)], lines)
 
 
 def _shape(reproduction: Reproduction, claim_id: str, figures: bool) -> str:
@@ -200,3 +205,58 @@ def _definitions(reproduction: Reproduction, solver: str) -> str:
         reading = f" Reading: {row['reading']}." if row["reading"] else ""
         lines.append(f"- `{row['id']}`: {row['definition']}.{reading}")
     return "\n".join(lines)
+
+
+def listed(items: Iterable[str], last: str = "and") -> str:
+    """'a', 'a and b', 'a, b and c'; 'none' without items."""
+    *first, end = list(items) or ["none"]
+    return f"{', '.join(first)} {last} {end}" if first else end
+
+
+def which_beta(reproduction: Reproduction) -> dict[str, str]:
+    """What both readings of beta do in this run, by the names that the page has for it."""
+    published = reproduction.published
+    alpha, by_name = published.parameters["baumgarte_alpha"], betas(published)
+    seconds = published.parameters["duration_s"]
+    roots = {name: slowest_root(alpha, beta) for name, beta in by_name.items()}
+    drifts = {name: largest_drift(reproduction, solver) for solver, name in EULER.items()}
+    within = {EULER[solver]: _within(reproduction, solver) for solver in EULER}
+    met = [name for name, (inside, barred) in within.items() if inside == barred]
+    return {
+        "printed_beta": f"{by_name['printed']:.2f}",
+        "probable_beta": f"{by_name['probable']:.1f}",
+        "damping": f"{alpha / by_name['probable']:.2f}",
+        "duration": f"{seconds:g}",
+        "decay": listed(
+            f"{root:.2f} 1/s ({name} β; {100 * math.exp(root * seconds):.2g} % of an error is left at the "
+            "end)"
+            for name, root in roots.items()
+        ),
+        "drift": listed(
+            f"{1e3 * a:.2f} mm, {1e3 * b:.2f} mm in stance ({name} β)," for name, (a, b) in drifts.items()
+        ),
+        "within": listed(f"{inside} of {barred} ({name} β)" for name, (inside, barred) in within.items()),
+        "verdict": {
+            0: "This leg meets all of them with neither",
+            1: f"This leg meets all of them with the {met[0] if met else ''} β only",
+            2: "This leg meets all of them with both",
+        }[len(met)],
+    }
+
+
+def largest_drift(reproduction: Reproduction, solver: str) -> tuple[float, float]:
+    """Largest distance of toe or heel from the exact motion over both gaits [m]: in the cycle, in stance."""
+    cycle, stance = [], []
+    for gait in {gait for gait, _, _ in reproduction.traces}:
+        trace, exact = (reproduction.traces[gait, "elastic", name] for name in (solver, EXACT))
+        error, on_ground = hoof_error(trace, exact), measure_stance(exact)
+        inside = (trace["time"] >= on_ground.start) & (trace["time"] <= on_ground.end)
+        cycle.append(float(error.max()))
+        stance.append(float(error[inside].max()))
+    return max(cycle), max(stance)
+
+
+def _within(reproduction: Reproduction, solver: str) -> tuple[int, int]:
+    """Rows within their bar, and rows that have one."""
+    judged = [row["within_bar"] for row in reproduction.rows if row["solver"] == solver]
+    return judged.count(True), len(judged) - judged.count(None)

@@ -1,6 +1,6 @@
 """The paper's four conditions, walking and running, elastic and inelastic, through the public environment.
 
-Every solver of `hoof_env.paper.solvers` runs them: the paper's, with either beta, and the exact one. The
+Every solver of `hoof_env.paper.rows` runs them: the paper's, with either beta, and the exact one. The
 trunk is fixed and the action is zero, which is exactly the gait.
 """
 
@@ -24,10 +24,9 @@ from hoof_env.leg.geometry import Geometry
 from hoof_env.paper import report
 from hoof_env.paper.measure import cycle_of, measure_stance, replay
 from hoof_env.paper.published import CONDITIONS, Published, load_published
-from hoof_env.paper.rows import compare, counted
+from hoof_env.paper.rows import EXACT, compare, counted, settings_of
+from hoof_env.paper.rows import SOLVERS as SOLVERS
 from hoof_env.paper.shapes import DEPTHS, judge, sole_velocity, walk_brakes
-from hoof_env.paper.solvers import EXACT, settings_of
-from hoof_env.paper.solvers import SOLVERS as SOLVERS
 
 ENVIRONMENT = "hoof_env/HorseLegFixed-v0"
 GAITS = ("walk", "run")

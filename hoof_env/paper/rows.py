@@ -1,18 +1,30 @@
-"""The published rows beside what a simulation gives: one dictionary a row, ready for JSON.
+"""The published rows beside what a simulation gives, and the solvers that give it.
 
 A row is counted as within or outside its bar unless it is spared: its bar is 'reported', or it is one of
-`ILL_CONDITIONED` and the solver is one of the paper's.
+`ILL_CONDITIONED` and the solver is one of the paper's. Solver "paper" is the paper's Eq. 8 in explicit Euler
+at 1 ms with Baumgarte's beta as printed, sqrt(2 alpha), and "paper, probable beta" the same with the beta
+that is probably meant, sqrt(2) alpha. "exact" is the closed form at a step at which the results no longer
+change.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from hoof_env.paper.measure import Stance
-from hoof_env.paper.published import Published, PublishedRow
-from hoof_env.paper.solvers import EULER
+from hoof_env.paper.published import Published, PublishedRow, load_published
+
+PRINTED, PROBABLE, EXACT = "paper", "paper, probable beta", "exact"
+
+EULER = {PRINTED: "printed", PROBABLE: "probable"}
+"""The reading of beta by solver, of those that integrate as the paper does."""
+
+SOLVERS = (*EULER, EXACT)
 
 Stances = Mapping[tuple[str, str], Stance]
 """Measured cycles by (gait, condition)."""
@@ -160,3 +172,21 @@ def severity(row: Mapping[str, Any], published: Published) -> float:
     if limit is None:
         return 0.0
     return float("inf") if row["error"] is None else abs(row["error"]) / limit
+
+
+def betas(published: Published) -> dict[str, float]:
+    """Baumgarte's beta [1/s] by its reading, in the order of `EULER`."""
+    parameters = published.parameters
+    return {"printed": parameters["baumgarte_beta"], "probable": math.sqrt(2) * parameters["baumgarte_alpha"]}
+
+
+def slowest_root(alpha: float, beta: float) -> float:
+    """Real part of the root of s^2 + 2 alpha s + beta^2, by which a closure error decays slowest [1/s]."""
+    return max(float(root.real) for root in np.roots([1, 2 * alpha, beta**2]))
+
+
+def settings_of(solver: str) -> dict[str, Any]:
+    """The arguments of `hoof_env/HorseLegFixed-v0` that make it this solver, one of `SOLVERS`."""
+    if solver == PROBABLE:
+        return {"solver": "paper", "baumgarte_beta": betas(load_published())["probable"]}
+    return {"solver": solver}

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env._arguments import parse_pairs
 from hoof_env._output import staged
-from hoof_env.errors import HoofEnvError, ParameterError, check_number
+from hoof_env.errors import HoofEnvError, ParameterError, check_number, parse_pairs
 from hoof_env.render.instant import Columns, Instant, instants
 
 if TYPE_CHECKING:

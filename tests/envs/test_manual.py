@@ -15,8 +15,8 @@ import pytest
 
 from hoof_env import cli
 from hoof_env.envs import manual
-from hoof_env.envs import manual_tables as tables
 from hoof_env.envs.grounds import HILLS
+from hoof_env.envs.manual import TABLES
 from hoof_env.envs.reward import check_weights
 from hoof_env.envs.start import OPTIONS
 from hoof_env.envs.tasks import PER_EPISODE, TASKS, Settings, to_json
@@ -168,12 +168,12 @@ def test_every_setting_is_documented_with_its_default(page):
 
 
 def test_the_tables_have_what_there_is_and_nothing_else():
-    assert list(tables.SETTINGS) == [item.name for item in fields(Settings)]
-    assert set(tables.OPTIONS) == {"gait", "parameters", *OPTIONS}
-    assert list(tables.HILLS) == list(HILLS)
+    assert list(TABLES["settings"]) == [item.name for item in fields(Settings)]
+    assert set(TABLES["options"]) == {"gait", "parameters", *OPTIONS}
+    assert list(TABLES["hills"]) == list(HILLS)
     known = inspect.signature(HorseLegVectorEnv).parameters
-    assert set(tables.VECTOR) == {*known} - {"num_envs", "task", "settings"}
-    assert all(meaning for table in (tables.SETTINGS, tables.OPTIONS) for _, meaning in table.values())
+    assert set(TABLES["vector"]) == {*known} - {"num_envs", "task", "settings"}
+    assert all(meaning for table in (TABLES["settings"], TABLES["options"]) for _, meaning in table.values())
 
 
 @pytest.mark.parametrize("page", TASKS)

@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env._arguments import parse_pairs
 from hoof_env._output import staged
-from hoof_env.errors import HoofEnvError, check_number
+from hoof_env.errors import HoofEnvError, check_number, parse_pairs
 from hoof_env.records import check_place, describe, find_policy, make_env, record_episode
 
 Record = Mapping[str, NDArray[np.float64]]

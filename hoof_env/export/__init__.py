@@ -1,1 +1,0 @@
-"""Ground reaction force records as files that statistics and gait-lab tools open."""
