@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from benchmarks.common import Assembly, GroundForces, Record, Start, corners
-from benchmarks.trunk_legs import TrunkLegs
 from hoof_env.dynamics.drive import Drive, Motor, Prescribed
 from hoof_env.dynamics.limb import Limb
 from hoof_env.dynamics.trunk import Trunk
@@ -17,6 +16,7 @@ from hoof_env.gait.parameters import load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.preset import load_ground
 from hoof_env.leg.geometry import load_geometry
+from tests.peers.trunk_legs import TrunkLegs
 
 HIGH = 10.0
 """Of a trunk whose legs are in the air [m]."""

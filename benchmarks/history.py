@@ -9,8 +9,11 @@ import csv
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from benchmarks.speed_report import table
+from benchmarks.rounds import is_met, table
 from hoof_env._output import staged
+
+RESULTS = Path(__file__).parent / "results"
+"""Holds a folder for each vector width, and the history of all."""
 
 RUN = ("date", "commit", "compiled for", "processor")
 COLUMNS = ("case", "beside", "bits", "ratio", "q1", "q3", "required", *RUN)
@@ -30,17 +33,17 @@ def keep(folder: Path, machine: Mapping[str, str], bits: int, rows: Iterable[Row
 
     Args:
         folder: of all results; that of each width is inside.
-        machine: `benchmarks.speed.machine()`.
+        machine: `benchmarks.machine.machine()`.
         bits: of the widest vectors.
         rows: of one run.
     """
-    known = {"bits": str(bits)} | {name: machine[name] for name in RUN}
+    run = {"bits": str(bits)} | {name: machine[name] for name in RUN}
     kept = read(folder)
     for case, beside, ratio, required in rows:
         if ratio is not None and required is not None:
-            found = {"ratio": ratio["median"], "q1": ratio["q1"], "q3": ratio["q3"], "required": required}
-            told = {name: f"{value:.3g}" for name, value in found.items()}
-            kept.append({"case": case, "beside": beside} | told | known)
+            numbers = {"ratio": ratio["median"], "q1": ratio["q1"], "q3": ratio["q3"], "required": required}
+            texts = {name: f"{value:.3g}" for name, value in numbers.items()}
+            kept.append({"case": case, "beside": beside} | texts | run)
     with staged(folder) as stage:
         with (stage / "speed.csv").open("w", newline="") as file:
             writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
@@ -67,10 +70,9 @@ def page(rows: list[dict[str, str]], folder: Path) -> str:
     head = ["case", "beside", "bits", "ratio", "required", *RUN]
     lines = []
     for row in ordered:
-        is_met = float(row["ratio"]) >= float(row["required"])
         shown = row | {
             "ratio": f"{row['ratio']} ({row['q1']} to {row['q3']})",
-            "required": f"{row['required']}: {'met' if is_met else 'not met'}",
+            "required": is_met(float(row["required"]), {"median": float(row["ratio"])}),
         }
         lines.append([shown[name] for name in head])
     return "\n\n".join([INTRO, "\n".join(listed), table(head, lines)]) + "\n"
