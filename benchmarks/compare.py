@@ -9,6 +9,8 @@ base's in one round, above 1 where the work tree is faster. Exits with 1 where a
 
 from __future__ import annotations
 
+import benchmarks.one_thread  # noqa: F401  # isort: skip
+
 import argparse
 import io
 import json
@@ -28,10 +30,8 @@ CASES = Path(__file__).with_name("compare_cases.py")
 KEPT = ROOT / "runs" / "compare"
 """Checkouts of bases, kept so that their kernels are compiled once."""
 
-LOWEST = 0.95
-"""Of a median ratio."""
-
-Seconds = dict[str, float]
+LOWEST = 0.95  # of a median ratio
+RUNS = 15  # of each case in a process
 
 
 def checkout(commit: str) -> Path:
@@ -40,10 +40,8 @@ def checkout(commit: str) -> Path:
     Raises:
         ValueError: there is no such commit.
     """
-    name = f"{commit}^{{commit}}"
-    done = subprocess.run(
-        ["git", "rev-parse", "--verify", "-q", name], cwd=ROOT, capture_output=True, text=True
-    )
+    ask = ["git", "rev-parse", "--verify", "--quiet", f"{commit}^{{commit}}"]
+    done = subprocess.run(ask, cwd=ROOT, capture_output=True, text=True)
     if done.returncode:
         raise ValueError(f"expected a commit of this repository, got {commit!r}")
     tree = KEPT / done.stdout.strip()[:12]
@@ -51,36 +49,32 @@ def checkout(commit: str) -> Path:
         archive = ["git", "archive", done.stdout.strip(), "hoof_env"]
         packed = subprocess.run(archive, cwd=ROOT, capture_output=True, check=True).stdout
         with tarfile.open(fileobj=io.BytesIO(packed)) as files:
-            files.extractall(tree, filter="data")
+            files.extractall(part := tree.with_suffix(".part"), filter="data")
+        part.rename(tree)
     return tree
 
 
-def run_cases(tree: Path, share: float) -> Seconds:
-    """Processor time [s] of each case in a process that takes the package from `tree`.
-
-    Args:
-        share: of the usual length of each case.
+def run_cases(tree: Path, runs: int = RUNS) -> dict[str, float]:
+    """Processor time [s] of each case, run so often, in a process that takes the package from `tree`.
 
     Raises:
         RuntimeError: the process took the package from elsewhere.
     """
-    threads = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
-    settings = {"PYTHONPATH": str(tree), "HOOF_ENV_QUIET": "1"} | dict.fromkeys(threads, "1")
-    command = [sys.executable, "-P", str(CASES), str(share)]  # -P: with no module of this folder beside it
+    settings = {"PYTHONPATH": str(tree), "HOOF_ENV_QUIET": "1"}
+    command = [sys.executable, "-P", str(CASES), str(runs)]  # -P: with no module of this folder beside it
     done = subprocess.run(command, cwd=tree, env=os.environ | settings, stdout=subprocess.PIPE, check=True)
     result = json.loads(done.stdout)
     if not Path(result["package"]).is_relative_to(tree):
         raise RuntimeError(f"expected hoof_env of {tree}, got that of {result['package']}")
-    seconds: Seconds = result["seconds"]
-    return seconds
+    return dict(result["seconds"])
 
 
-def compare(base: Path, now: Path, rounds: int, share: float = 1.0) -> dict[str, list[float]]:
+def compare(base: Path, now: Path, rounds: int) -> dict[str, list[float]]:
     """Ratios of speed, `now` over `base`, by case, one a round; a round before them compiles and warms up."""
     trees, order = {"base": base, "now": now}, np.random.default_rng(0)
     ratios: dict[str, list[float]] = {}
     for k in range(rounds + 1):
-        seconds = {name: run_cases(trees[name], share) for name in order.permutation(list(trees))}
+        seconds = {name: run_cases(trees[name]) for name in order.permutation(list(trees))}
         for case, spent in seconds["now"].items() if k else ():
             ratios.setdefault(case, []).append(seconds["base"][case] / spent)
         print(f"\r{k} of {rounds} rounds", end="", file=sys.stderr, flush=True)

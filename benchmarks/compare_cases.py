@@ -1,7 +1,7 @@
 """The cases of `compare`, as a script that knows only what every commit has: public names and ids.
 
-Its argument is the share of the usual length. Prints the folder of the package, and for each case the median
-processor time of several runs [s].
+Its argument is how many runs of each case to time. Prints where the package is, and for each case the median
+processor time of a run [s].
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import sys
 import time
 import warnings
 from collections.abc import Callable
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -19,7 +20,7 @@ import numpy as np
 import hoof_env
 from hoof_env import Ground, Limb, Motor, Trunk, TrunkEngine, load_gait, load_geometry
 
-BATCH, RUNS = 1024, 15
+BATCH = 1024
 
 
 def advance(hips: tuple[float, ...], trunk: str, count: int, steps: int, calls: int) -> Callable[[], object]:
@@ -42,13 +43,13 @@ def advance(hips: tuple[float, ...], trunk: str, count: int, steps: int, calls: 
     return run
 
 
-def step(env_id: str, steps: int) -> Callable[[], object]:
-    """So many steps of one environment with random actions, from the same seed each time."""
-    env = gym.make(env_id)
-    actions = np.random.default_rng(0).uniform(-1, 1, (steps, 4)).astype(np.float32)
+def step(env: gym.Env, steps: int) -> Callable[[], object]:
+    """So many steps of one environment with random actions, going on from the last."""
+    shape: tuple[int, ...] = env.action_space.shape or ()
+    actions = np.random.default_rng(0).uniform(-1, 1, (steps, *shape)).astype(env.action_space.dtype)
+    env.reset(seed=0)
 
     def run() -> None:
-        env.reset(seed=0)
         for action in actions:
             _, _, terminated, truncated, _ = env.step(action)
             if terminated or truncated:
@@ -57,48 +58,46 @@ def step(env_id: str, steps: int) -> Callable[[], object]:
     return run
 
 
-def step_many(env_id: str, steps: int) -> Callable[[], object]:
-    """So many steps of `BATCH` environments at once."""
-    envs = gym.make_vec(env_id, num_envs=BATCH)
-    actions = np.random.default_rng(0).uniform(-1, 1, (steps, BATCH, 4)).astype(np.float32)
+def step_many(envs: Any, count: int, steps: int) -> Callable[[], object]:
+    """So many steps of `count` environments that have been reset, of Gymnasium or EnvPool."""
+    shape = (min(steps, 8), count, envs.action_space.shape[-1])
+    actions = np.random.default_rng(0).uniform(-1, 1, shape).astype(envs.action_space.dtype)
 
     def run() -> None:
-        envs.reset(seed=0)
-        for action in actions:
-            envs.step(action)
+        for k in range(steps):
+            envs.step(actions[k % len(actions)])
 
     return run
 
 
-def seconds_of(run: Callable[[], object]) -> float:
+def seconds_of(run: Callable[[], object], runs: int) -> float:
     """Median processor time [s] of a run, after one that compiles and warms up."""
     run()
     spent = []
-    for _ in range(RUNS):
+    for _ in range(runs):
         begin = time.thread_time()
         run()
         spent.append(time.thread_time() - begin)
     return statistics.median(spent)
 
 
-def main(share: float) -> None:
+def main(runs: int) -> None:
     """Time all cases and print them."""
     leg, terrain = "hoof_env/HorseLeg-v0", "hoof_env/HorseLegTerrain-v0"
 
-    def length(number: int) -> int:
-        return max(1, round(share * number))
-
+    many = gym.make_vec(leg, num_envs=BATCH)
+    many.reset(seed=0)
     cases = {
-        "one leg": advance((0.0,), "fixed", 1, 1000, length(100)),
-        f"{BATCH} legs": advance((0.0,), "fixed", BATCH, 100, length(4)),
-        "one horse": advance((0.6, 0.6, -0.6, -0.6), "free", 1, 500, length(60)),
-        "HorseLeg, step": step(leg, length(3000)),
-        "HorseLegTerrain, step": step(terrain, length(3000)),
-        f"HorseLeg, {BATCH} at once": step_many(leg, length(50)),
+        "one leg": advance((0.0,), "fixed", 1, 1000, 100),
+        f"{BATCH} legs": advance((0.0,), "fixed", BATCH, 100, 4),
+        "one horse": advance((0.6, 0.6, -0.6, -0.6), "free", 1, 500, 60),
+        "HorseLeg, step": step(gym.make(leg), 3000),
+        "HorseLegTerrain, step": step(gym.make(terrain), 3000),
+        f"HorseLeg, {BATCH} at once": step_many(many, BATCH, 50),
     }
-    seconds = {name: seconds_of(run) for name, run in cases.items()}
+    seconds = {name: seconds_of(run, runs) for name, run in cases.items()}
     json.dump({"package": hoof_env.__file__, "seconds": seconds}, sys.stdout)
 
 
 if __name__ == "__main__":
-    main(float(sys.argv[1]))
+    main(int(sys.argv[1]))

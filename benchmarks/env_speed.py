@@ -14,9 +14,8 @@ import benchmarks.one_thread  # noqa: F401  # isort: skip
 
 import argparse
 import importlib.util
-import json
 import time
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,10 +23,10 @@ import gymnasium as gym
 import numpy as np
 
 import hoof_env  # noqa: F401  registers the ids
-from benchmarks.history import RESULTS, keep
+from benchmarks.compare_cases import step, step_many
+from benchmarks.history import RESULTS, write
 from benchmarks.machine import machine, vector_bits
-from benchmarks.rounds import describe, interleave, is_met, spread, table
-from hoof_env._output import staged
+from benchmarks.rounds import describe, interleave, is_met, spread, table, timed
 
 BARRED = ("HorseLeg", "HorseLegRail", "HorseLegSpeed", "HorseLegTerrain")
 IDS = (*BARRED, "HorseLegFixed")
@@ -44,59 +43,26 @@ interleaved rounds of wall time: median (quartiles; extremes). A step is 20 subs
 come."""
 
 
-def single(env_id: str, steps: int) -> Callable[[], float]:
-    """Seconds of `steps` single steps with random actions."""
-    env = gym.make(env_id)
-    env.action_space.seed(0)
-    actions = [env.action_space.sample() for _ in range(steps)]
-    env.reset(seed=0)
-
-    def run() -> float:
-        begin = time.perf_counter()
-        for action in actions:
-            _, _, terminated, truncated, _ = env.step(action)
-            if terminated or truncated:
-                env.reset()
-        return time.perf_counter() - begin
-
-    run()
-    return run
-
-
-def vector(envs: Any, num_envs: int, steps: int) -> Callable[[], float]:
-    """Seconds of `steps` steps of all environments with random actions."""
-    space, generator = envs.action_space, np.random.default_rng(0)
-    shape = (num_envs, space.shape[-1])
-    actions = [generator.uniform(-1, 1, shape).astype(space.dtype) for _ in range(8)]
-    envs.reset()
-
-    def run() -> float:
-        begin = time.perf_counter()
-        for k in range(steps):
-            envs.step(actions[k % 8])
-        return time.perf_counter() - begin
-
-    run()
-    return run
-
-
 def measure(rounds: int, steps: int) -> dict[str, Any]:
     """Rates and ratios."""
     cheetah = "HalfCheetah-v5, single"
-    runs, units = {cheetah: single("HalfCheetah-v5", steps)}, {cheetah: steps}
+    runs, units = {cheetah: step(gym.make("HalfCheetah-v5"), steps)}, {cheetah: steps}
     for name in IDS:
-        env_id = f"hoof_env/{name}-v0"
-        runs[f"{name}, single"], units[f"{name}, single"] = single(env_id, steps), steps
-        title, many = f"{name}, {BATCH} at once", max(steps // 20, 5)
-        runs[title], units[title] = vector(gym.make_vec(env_id, num_envs=BATCH), BATCH, many), many * BATCH
+        one, all_at_once, many = f"{name}, single", f"{name}, {BATCH} at once", max(steps // 20, 5)
+        env, envs = gym.make(f"hoof_env/{name}-v0"), gym.make_vec(f"hoof_env/{name}-v0", num_envs=BATCH)
+        envs.reset(seed=0)
+        runs |= {one: step(env, steps), all_at_once: step_many(envs, BATCH, many)}
+        units |= {one: steps, all_at_once: many * BATCH}
     if importlib.util.find_spec("envpool"):
         import envpool
 
         for size in POOLS:
             envs = envpool.make("HalfCheetah-v4", env_type="gymnasium", num_envs=size, num_threads=1)
+            envs.reset()
             title, few = f"EnvPool HalfCheetah-v4, {size} at once", max(4 * steps // size, 2)
-            runs[title], units[title] = vector(envs, size, few), few * size
-    seconds = interleave(runs, rounds)
+            runs[title], units[title] = step_many(envs, size, few), few * size
+    clocked = {name: partial(timed, time.perf_counter, lambda: None, run) for name, run in runs.items()}
+    seconds = interleave(clocked, rounds)
     rate = {name: units[name] / seconds[name] for name in runs}
     pools = [name for name in rate if name.startswith("EnvPool")]
     pool = max(pools, key=lambda name: float(np.median(rate[name])), default=cheetah)
@@ -138,11 +104,8 @@ def main() -> None:
     given = parser.parse_args()
     result = measure(given.rounds, given.steps)
     print(page(result))
-    with staged(given.out / f"{result['bits']}-bits") as folder:
-        (folder / "env_speed.json").write_text(json.dumps(result, indent=1) + "\n")
-        (folder / "env_speed.md").write_text(page(result))
     rows = [(row["case"], row["beside"], row["ratio"], (row["bars"] or [None])[0]) for row in result["rows"]]
-    keep(given.out, result["machine"], result["bits"], rows)
+    write(given.out, "env_speed", result, page(result), rows)
 
 
 if __name__ == "__main__":

@@ -6,8 +6,10 @@ A run adds rows to `speed.csv`; `speed.md` shows them all.
 from __future__ import annotations
 
 import csv
+import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
 from benchmarks.rounds import is_met, table
 from hoof_env._output import staged
@@ -26,6 +28,16 @@ its quartiles; bits are of the widest vectors that numba compiled. The last run 
 
 Row = tuple[str, str, Mapping[str, float] | None, float | None]
 """Case, what it is beside, the ratio's spread if it was measured, and the bar if there is one."""
+
+
+def write(folder: Path, name: str, result: Mapping[str, Any], page: str, rows: Iterable[Row]) -> Path:
+    """Write a run and its page for its vector width, and `keep` its rows; returns the folder of the width."""
+    own = folder / f"{result['bits']}-bits"
+    with staged(own) as stage:
+        (stage / f"{name}.json").write_text(json.dumps(result, indent=1) + "\n")
+        (stage / f"{name}.md").write_text(page)
+    keep(folder, result["machine"], result["bits"], rows)
+    return own
 
 
 def keep(folder: Path, machine: Mapping[str, str], bits: int, rows: Iterable[Row]) -> None:

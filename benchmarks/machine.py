@@ -23,17 +23,12 @@ PACKAGES = ("hoof-env", "numba", "llvmlite", "numpy", "mujoco", "exudyn")
 
 def machine() -> dict[str, str]:
     """Processor, vector width, system, versions, date and commit."""
-    versions = []
-    for package in PACKAGES:
-        try:
-            versions.append(f"{package} {metadata.version(package)}")
-        except metadata.PackageNotFoundError:
-            versions.append(f"{package} not installed")
+    installed = {d.metadata["Name"]: d.version for d in metadata.distributions()}
     return {
         "processor": f"{_processor()}, {os.cpu_count()} cores, one used",
         "compiled for": f"{compiled_for()}, vectors of {vector_bits()} bits",
         "system": f"{platform.system()} {platform.machine()}, Python {platform.python_version()}",
-        "versions": ", ".join(versions),
+        "versions": ", ".join(f"{package} {installed.get(package, 'not installed')}" for package in PACKAGES),
         "date": datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M UTC"),
         "commit": _commit(),
     }
@@ -62,24 +57,18 @@ def vector_bits() -> int:
 
 
 def _processor() -> str:
-    try:
-        text = Path("/proc/cpuinfo").read_text()
-        return next(
-            line.split(":", 1)[1].strip() for line in text.splitlines() if line.startswith("model name")
-        )
-    except (OSError, StopIteration):
-        return platform.processor() or "unknown"
+    path = Path("/proc/cpuinfo")
+    name = re.search(r"^model name\s*: (.*)$", path.read_text() if path.exists() else "", re.M)
+    return name[1] if name else platform.processor() or "unknown"
 
 
 def _commit() -> str:
     def git(*arguments: str) -> str:
-        done = subprocess.run(
-            ["git", *arguments], cwd=Path(__file__).parent, capture_output=True, text=True, check=True
-        )
-        return done.stdout.strip()
+        here = Path(__file__).parent
+        return subprocess.check_output(["git", *arguments], cwd=here, text=True, stderr=subprocess.DEVNULL)
 
     try:
         changed = git("status", "--porcelain", "--untracked-files=no", "--", "../hoof_env", ".", ":!results")
-        return git("rev-parse", "--short", "HEAD") + (" and changes" if changed else "")
+        return git("rev-parse", "--short", "HEAD").strip() + (" and changes" if changed else "")
     except (OSError, subprocess.CalledProcessError):
         return "unknown"

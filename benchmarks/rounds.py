@@ -29,6 +29,14 @@ def interleave(runs: Mapping[str, Callable[[], float]], rounds: int, seed: int =
     return seconds
 
 
+def timed(clock: Callable[[], float], before: Callable[[], Any], work: Callable[[], Any]) -> float:
+    """Time of `work` [s], after `before`, which does not count."""
+    before()
+    begin = clock()
+    work()
+    return clock() - begin
+
+
 def spread(values: Floats) -> dict[str, float]:
     """Median, quartiles and extremes."""
     low, q1, median, q3, high = np.quantile(values, [0, 0.25, 0.5, 0.75, 1]).tolist()

@@ -27,7 +27,6 @@ from hoof_env.leg.geometry import load_geometry
 
 DT = 1e-3
 SPEED = 2 * np.pi
-CRANK = 0.3  # the first leg's at the start
 
 
 @dataclass(frozen=True)
@@ -50,10 +49,6 @@ class Scene:
     softness: float
 
     @property
-    def gait(self) -> GaitParameters:
-        return GaitParameters(SPEED, self.swing, 0.0, 0.0)
-
-    @property
     def start(self) -> Start:
         n = len(self.limbs)
         return Start(self.cranks, (SPEED,) * n, (self.swing,) * n, position=(0.0, self.trunk.height))
@@ -65,13 +60,13 @@ def scenes(preset: str) -> dict[str, Scene]:
     high, one = geometry.hip_height, (Limb(geometry, drive=Motor()),)
     hips = ((0.6, 0.0), (0.6, 0.0), (-0.6, 0.0), (-0.6, 0.0))
     four = tuple(Limb(geometry, hip=hip, drive=Motor()) for hip in hips)
-    trot = tuple(CRANK + x for x in (0.0, np.pi, np.pi, 0.0))
+    trot = tuple(0.3 + x for x in (0.0, np.pi, np.pi, 0.0))
     big = Trunk(kind="free", mass=200.0, pitch_inertia=150.0, height=high)
     return {
         scene.name: scene
         for scene in (
-            Scene("leg", one, Trunk(kind="fixed", height=high - 0.05), (CRANK,), swing, 1.0),
-            Scene("suspended leg", one, Trunk(kind="suspended", height=high), (CRANK,), swing, 0.1),
+            Scene("leg", one, Trunk(kind="fixed", height=high - 0.05), (0.3,), swing, 1.0),
+            Scene("suspended leg", one, Trunk(kind="suspended", height=high), (0.3,), swing, 0.1),
             Scene("horse", four, big, trot, swing, 0.1),
         )
     }
@@ -85,5 +80,6 @@ def engine(scene: Scene, preset: str, num_envs: int = 1, **options: Any) -> Trun
             scene.limbs, scene.trunk, load_ground(preset), sim_dt=DT, substeps=1, num_envs=num_envs, **options
         )
     turns = 2 * np.pi / num_envs * np.random.default_rng(0).permutation(num_envs)
-    made.reset(scene.gait, np.array(scene.cranks)[:, None] + turns)
+    gait = GaitParameters(SPEED, scene.swing, 0.0, 0.0)
+    made.reset(gait, np.array(scene.cranks)[:, None] + turns)
     return made

@@ -10,7 +10,6 @@ import benchmarks.one_thread  # noqa: F401  # isort: skip
 
 import argparse
 import importlib.util
-import json
 import os
 import subprocess
 import sys
@@ -25,11 +24,10 @@ from typing import Any
 import numpy as np
 
 from benchmarks.common import ALL, RIGID, GroundForces
-from benchmarks.history import RESULTS, keep
+from benchmarks.history import RESULTS, write
 from benchmarks.machine import machine, vector_bits
-from benchmarks.rounds import describe, interleave, is_met, spread, table
+from benchmarks.rounds import describe, interleave, is_met, spread, table, timed
 from benchmarks.scenes import DT, Scene, engine, scenes
-from hoof_env._output import staged
 from hoof_env.ground.preset import load_ground
 
 ROUNDS = 40
@@ -50,15 +48,15 @@ BARS = {
 
 STEPS = {("leg", 1): 20000, ("leg", BATCH): 100, ("horse", 1): 1000, ("horse", BATCH): 40}
 
-IMPORT_BAR, COMPILE_BAR = 0.3, 30.0
-"""Most seconds to import the package, and to compile all kernels of the environments."""
+START_BARS = {"import hoof_env": 0.3, "compile the kernels of the environments": 30.0}
+"""Most seconds in a fresh process."""
 
-VARIANTS: tuple[tuple[str, dict[str, Any]], ...] = (
-    ("", {}),
-    (", all joint reactions", {"reactions": True}),
-    (", semi_implicit_euler", {"integrator": "semi_implicit_euler"}),
+VARIANTS: tuple[tuple[str, dict[str, Any], float], ...] = (
+    ("", {}, 1.0),
+    (", all joint reactions", {"reactions": True}, 0.5),
+    (", semi_implicit_euler", {"integrator": "semi_implicit_euler"}, 0.0),
 )
-"""Bars with all joint reactions are half of those without; MuJoCo's own scheme has none."""
+"""Name, options of the engine, and share of the bars that is asked of it; the last is MuJoCo's own scheme."""
 
 INTRO = """\
 # How fast it is
@@ -106,34 +104,24 @@ CLOCKS = {"wall": time.perf_counter, "processor": time.thread_time}
 Clock = Callable[[], float]
 
 
-def timed(clock: Clock, before: Callable[[], Any], work: Callable[[], Any]) -> float:
-    """Time of `work` [s], after `before`, which does not count."""
-    before()
-    begin = clock()
-    work()
-    return clock() - begin
-
-
-def own_cases(preset: str, quick: bool, clock: Clock) -> list[Case]:
+def own_cases(quick: bool, clock: Clock) -> list[Case]:
     """Cases of this project's engine."""
     cases = []
     for (name, count), steps in STEPS.items():
         n, steps = (min(count, 64), max(steps // 20, 4)) if quick else (count, steps)
         title = f"{name}, " + ("one" if n == 1 else f"batch of {n}")
-        for what, options in VARIANTS:
-            made = engine(scenes(preset)[name], preset, n, **options)
+        for what, options, share in VARIANTS:
+            made = engine(scenes(PRESET)[name], PRESET, n, **options)
             made.advance(steps=1, account=False)  # compiled from here on
             before = partial(made.set_state, made.get_state())
             run = partial(timed, clock, before, partial(made.advance, steps=steps, account=False))
-            required = aimed = None
-            if not quick and "integrator" not in options:
-                share = 0.5 if "reactions" in options else 1.0
-                required, aimed = (bar and share * bar for bar in BARS[name, count])
+            bars = (None, None) if quick or not share else BARS[name, count]
+            required, aimed = (bar and share * bar for bar in bars)
             cases.append(Case(title + what, name, run, n * steps, "", required, aimed, vector_bits()))
     return cases
 
 
-def mujoco_cases(preset: str, quick: bool, clock: Clock) -> list[Case]:
+def mujoco_cases(quick: bool, clock: Clock) -> list[Case]:
     """MuJoCo's `mj_step`, with its own contact and the Jacobian that is faster here."""
     import mujoco
 
@@ -154,7 +142,7 @@ def mujoco_cases(preset: str, quick: bool, clock: Clock) -> list[Case]:
     for name in ("leg", "horse"):
         for assembly in ASSEMBLIES:
             runs = {
-                kind: run_of(scenes(preset)[name], assembly, k) for k, kind in enumerate(("dense", "sparse"))
+                kind: run_of(scenes(PRESET)[name], assembly, k) for k, kind in enumerate(("dense", "sparse"))
             }
             fastest = {kind: min(run() for _ in range(2 if quick else 7)) for kind, run in runs.items()}
             best = min(runs, key=lambda kind: fastest[kind])
@@ -162,18 +150,18 @@ def mujoco_cases(preset: str, quick: bool, clock: Clock) -> list[Case]:
     return cases
 
 
-def exudyn_cases(preset: str, quick: bool, clock: Clock) -> list[Case]:
+def exudyn_cases(quick: bool, clock: Clock) -> list[Case]:
     """Exudyn at its fastest, with our contact law and our motor in Python."""
     from benchmarks.exudyn_legs import ExudynLegs
 
     def run(scene: Scene) -> float:
-        law = GroundForces(load_ground(preset), len(scene.limbs))
+        law = GroundForces(load_ground(PRESET), len(scene.limbs))
         legs = ExudynLegs(scene.limbs, scene.trunk, scene.start, dt=DT, outside=law)
         return timed(clock, lambda: None, partial(legs.run, steps * DT, 1, fast=True))
 
     steps, title = 5 if quick else 50, "Exudyn with our contact law from Python"
     return [
-        Case(f"{name}, {title}", name, partial(run, scenes(preset)[name]), steps, "modified Newton")
+        Case(f"{name}, {title}", name, partial(run, scenes(PRESET)[name]), steps, "modified Newton")
         for name in ("leg", "horse")
     ]
 
@@ -185,11 +173,8 @@ def compare(cases: list[Case], rounds: int) -> list[dict[str, Any]]:
     rows = []
     for case in cases:
         peers = {a: f"{case.group}, MuJoCo {a}" for a in ASSEMBLIES}
-        ratios = {
-            a: spread(rate[case.name] / rate[peer])
-            for a, peer in peers.items()
-            if peer in rate and peer != case.name
-        }
+        others = {a: rate[peer] for a, peer in peers.items() if peer in rate and peer != case.name}
+        ratios = {a: spread(rate[case.name] / other) for a, other in others.items()}
         rows.append(
             {"name": case.name, "group": case.group, "note": case.note, "bits": case.bits,
              "rate": spread(rate[case.name]), "ratios": ratios,
@@ -214,28 +199,25 @@ def start() -> dict[str, float]:
 
     with tempfile.TemporaryDirectory() as folder:
         load = "from hoof_env.envs.kernels import compile_kernels"
-        compiled = seconds_of(
-            "compile_kernels(lambda line: None)", load, NUMBA_CACHE_DIR=folder, HOOF_ENV_QUIET="1"
-        )
-    return {
-        "import": float(np.median([seconds_of("import hoof_env") for _ in range(5)])),
-        "compile": compiled,
-    }
+        cold = {"NUMBA_CACHE_DIR": folder, "HOOF_ENV_QUIET": "1"}
+        compiled = seconds_of("compile_kernels(lambda line: None)", load, **cold)
+    imported = float(np.median([seconds_of("import hoof_env") for _ in range(5)]))
+    return dict(zip(START_BARS, (imported, compiled), strict=True))
 
 
-def measure(preset: str, quick: bool, peers: bool, rounds: int, clock_name: str) -> dict[str, Any]:
+def measure(quick: bool, rounds: int, clock_name: str) -> dict[str, Any]:
     """All of it; what `speed.json` holds."""
     clock = CLOCKS[clock_name]
-    cases, notes = own_cases(preset, quick, clock), []
+    cases, notes = own_cases(quick, clock), []
     for package, title, peer in (("mujoco", "MuJoCo", mujoco_cases), ("exudyn", "Exudyn", exudyn_cases)):
-        if peers and importlib.util.find_spec(package):
-            cases += peer(preset, quick, clock)
+        if importlib.util.find_spec(package):
+            cases += peer(quick, clock)
         else:
             notes.append(f"{title} is left out")
     print(f"{len(cases)} cases, {rounds} rounds", file=sys.stderr, flush=True)
     rows = compare(cases, rounds)
     return {
-        "machine": machine(), "bits": vector_bits(), "preset": preset, "quick": quick, "clock": clock_name,
+        "machine": machine(), "bits": vector_bits(), "preset": PRESET, "quick": quick, "clock": clock_name,
         "rounds": rounds, "dt_s": DT, "cases": rows, "notes": notes, "start": None if quick else start(),
     }  # fmt: skip
 
@@ -265,11 +247,8 @@ def page(result: dict[str, Any]) -> str:
     parts += [f"- {note}" for note in result["notes"]]
     if seconds := result["start"]:
         rows = [
-            [what, f"{seconds[key]:.2f}", f"under {bar:g}: {'met' if seconds[key] < bar else 'not met'}"]
-            for what, key, bar in (
-                ("import hoof_env", "import", IMPORT_BAR),
-                ("compile the kernels of the environments", "compile", COMPILE_BAR),
-            )
+            [what, f"{seconds[what]:.2f}", f"under {bar:g}: {'met' if seconds[what] < bar else 'not met'}"]
+            for what, bar in START_BARS.items()
         ]
         parts += ["## Start", table(["in a fresh process", "wall s", "bar"], rows)]
     return "\n\n".join(parts) + "\n"
@@ -279,20 +258,14 @@ def main(arguments: list[str] | None = None) -> None:
     """The command; see `--help`."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.speed", description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=RESULTS, help="folder for those of all vector widths")
-    parser.add_argument("--preset", default=PRESET, help="whose leg and ground")
     parser.add_argument("--rounds", type=int, help=f"how many; {ROUNDS} if not given")
     parser.add_argument("--clock", choices=CLOCKS, default="wall", help="processor: on a busy machine")
     parser.add_argument("--quick", action="store_true", help="a smoke test: small numbers that mean nothing")
-    parser.add_argument("--no-peers", action="store_true", help="this engine alone")
     given = parser.parse_args(arguments)
     rounds = given.rounds or (2 if given.quick else ROUNDS)
-    result = measure(given.preset, given.quick, not given.no_peers, rounds, given.clock)
-    own = given.out / f"{result['bits']}-bits"
-    with staged(own) as folder:
-        (folder / "speed.json").write_text(json.dumps(result, indent=1) + "\n")
-        (folder / "speed.md").write_text(page(result))
+    result = measure(given.quick, rounds, given.clock)
     rows = [(row["name"], "MuJoCo ALL", row["ratios"].get("ALL"), row["required"]) for row in result["cases"]]
-    keep(given.out, result["machine"], result["bits"], rows)
+    own = write(given.out, "speed", result, page(result), rows)
     print(speed_table(result["cases"]))
     print(f"written to {own}")
 

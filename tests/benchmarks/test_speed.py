@@ -82,17 +82,25 @@ def test_every_case_runs_once_a_round_in_changing_order():
 def test_a_comparison_takes_its_ratios_within_a_round(tmp_path, monkeypatch):
     """The work tree takes twice the time of the base in every round; both are slower in some."""
     pace = {"base": iter([9.0, 1.0, 10.0, 1.0]), "now": iter([9.0, 2.0, 20.0, 2.0])}
-    monkeypatch.setattr(compare, "run_cases", lambda tree, share: {"one leg": next(pace[tree.name])})
+    monkeypatch.setattr(compare, "run_cases", lambda tree: {"one leg": next(pace[tree.name])})
     assert compare.compare(tmp_path / "base", tmp_path / "now", 3) == {"one leg": [0.5] * 3}
 
 
-def test_a_comparison_takes_the_package_of_the_commit(capsys, tmp_path):
-    tree = compare.checkout("HEAD")
-    seconds = compare.run_cases(tree, share=0.001)
+def test_a_process_times_every_case_of_its_own_package(tmp_path):
+    seconds = compare.run_cases(compare.ROOT, runs=1)
     assert len(seconds) == 6
     assert min(seconds.values()) > 0
     with pytest.raises(RuntimeError, match="expected hoof_env of"):
-        compare.run_cases(tmp_path, share=0.001)
+        compare.run_cases(tmp_path, runs=1)
+
+
+@pytest.mark.skipif(not (compare.ROOT / ".git").exists(), reason="this is no clone")
+def test_a_base_is_the_package_of_its_commit(capsys, monkeypatch, tmp_path):
+    monkeypatch.setattr(compare, "KEPT", tmp_path)
+    tree = compare.checkout("HEAD")
+    assert (tree / "hoof_env" / "__init__.py").is_file()
+    assert compare.checkout("HEAD") == tree
+    assert [path.name for path in tmp_path.iterdir()] == [tree.name]
     with pytest.raises(SystemExit):
         compare.main(["--base", "no such commit"])
     assert "expected a commit of this repository, got 'no such commit'" in capsys.readouterr().err

@@ -67,9 +67,7 @@ class Case:
         def start(thetas: Any, height: float) -> Start:
             swing = gait.swing_offset + a * np.sin(thetas) + b * np.cos(thetas)
             k = len(thetas)
-            return Start(
-                tuple(thetas), (gait.crank_speed,) * k, tuple(swing), (a,) * k, (b,) * k, (0.0, height)
-            )
+            return Start(tuple(thetas), (gait.crank_speed,) * k, tuple(swing), a, b, (0.0, height))
 
         def sole(thetas: Any, limbs: Sequence[Limb]) -> list[float]:
             """Height of the lower of toe and heel above the trunk's centre [m]."""
