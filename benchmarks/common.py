@@ -126,57 +126,42 @@ LOCKED = "link 10"
 
 @dataclass(frozen=True)
 class Start:
-    """How a horse begins.
+    """How a horse begins, its trunk upright and at rest.
 
     Attributes:
         crank, crank_speed: of each leg [rad, rad/s].
         swing: phi of each leg [rad].
-        swing_sin, swing_cos: how phi follows the crank from there, the gait's two coefficients [rad].
-        position, velocity: of the trunk's point, x and y [m, m/s].
-        pitch, pitch_rate: of the trunk [rad, rad/s].
+        swing_sin, swing_cos: how phi of all follows the crank from there, the gait's coefficients [rad].
+        position: of the trunk's point, x and y [m].
     """
 
     crank: tuple[float, ...]
     crank_speed: tuple[float, ...]
     swing: tuple[float, ...]
-    swing_sin: tuple[float, ...] = ()
-    swing_cos: tuple[float, ...] = ()
+    swing_sin: float = 0.0
+    swing_cos: float = 0.0
     position: tuple[float, float] = (0.0, 0.0)
-    velocity: tuple[float, float] = (0.0, 0.0)
-    pitch: float = 0.0
-    pitch_rate: float = 0.0
 
     @property
     def swings(self) -> bool:
         """Whether phi moves at all."""
-        return any(self.swing_sin) or any(self.swing_cos)
+        return bool(self.swing_sin or self.swing_cos)
 
     def phi(self, leg: int, theta: float) -> tuple[float, float]:
         """Swing of a leg at a crank angle, and its slope by the crank angle."""
-        a = self.swing_sin[leg] if self.swing_sin else 0.0
-        b = self.swing_cos[leg] if self.swing_cos else 0.0
-        s0, c0, s, c = *_circle(self.crank[leg]), *_circle(theta)
-        return self.swing[leg] + a * (s - s0) + b * (c - c0), a * c - b * s
+        a, b, begin = self.swing_sin, self.swing_cos, self.crank[leg]
+        s, c = math.sin(theta), math.cos(theta)
+        return self.swing[leg] + a * (s - math.sin(begin)) + b * (c - math.cos(begin)), a * c - b * s
 
     def poses(self, limbs: Sequence[Limb]) -> list[Pose]:
         """Every point and body of each leg."""
         poses = []
         for i, limb in enumerate(limbs):
-            sigma = limb.geometry.travel
-            arm = complex(*limb.hip) * np.exp(1j * self.pitch)
-            at, velocity = complex(*self.position) + arm, complex(*self.velocity) + 1j * self.pitch_rate * arm
-            frame = FrameMotion(
-                phi=self.swing[i] + sigma * self.pitch,
-                phi_rate=self.phi(i, self.crank[i])[1] * self.crank_speed[i] + sigma * self.pitch_rate,
-                position=(at.real, at.imag),
-                velocity=(velocity.real, velocity.imag),
-            )
+            rate = self.phi(i, self.crank[i])[1] * self.crank_speed[i]
+            at = (self.position[0] + limb.hip[0], self.position[1] + limb.hip[1])
+            frame = FrameMotion(phi=self.swing[i], phi_rate=rate, position=at)
             poses.append(pose(limb.geometry, self.crank[i], self.crank_speed[i], frame=frame))
         return poses
-
-
-def _circle(angle: float) -> tuple[float, float]:
-    return math.sin(angle), math.cos(angle)
 
 
 @dataclass

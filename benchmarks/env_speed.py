@@ -10,10 +10,12 @@ environments as serve it best; else HalfCheetah-v5 stands for it.
 
 from __future__ import annotations
 
+import benchmarks.one_thread  # noqa: F401  # isort: skip
+
 import argparse
-import json
+import importlib.util
 import time
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,12 +23,10 @@ import gymnasium as gym
 import numpy as np
 
 import hoof_env  # noqa: F401  registers the ids
-from benchmarks.speed import RESULTS, machine
-from benchmarks.speed_code import vector_bits
-from benchmarks.speed_history import keep
-from benchmarks.speed_peers import has
-from benchmarks.speed_rounds import interleave, spread, told
-from hoof_env._output import staged
+from benchmarks.compare_cases import step, step_many
+from benchmarks.history import RESULTS, write
+from benchmarks.machine import machine, vector_bits
+from benchmarks.rounds import describe, interleave, is_met, spread, table, timed
 
 BARRED = ("HorseLeg", "HorseLegRail", "HorseLegSpeed", "HorseLegTerrain")
 IDS = (*BARRED, "HorseLegFixed")
@@ -34,120 +34,65 @@ BATCH = 1024
 SINGLE_BAR, VECTOR_BARS = 5.0, (20.0, 35.0)
 POOLS = (64, 256, 1024)
 
+INTRO = """\
+# How fast the environments are
 
-def single(env_id: str, steps: int) -> Callable[[], float]:
-    """Seconds of `steps` single steps with random actions."""
-    env = gym.make(env_id)
-    env.action_space.seed(0)
-    actions = [env.action_space.sample() for _ in range(steps)]
-    env.reset(seed=0)
-
-    def run() -> float:
-        begin = time.perf_counter()
-        for action in actions:
-            _, _, terminated, truncated, _ = env.step(action)
-            if terminated or truncated:
-                env.reset()
-        return time.perf_counter() - begin
-
-    run()
-    return run
-
-
-def vector(envs: Any, width: int, steps: int) -> Callable[[], float]:
-    """Seconds of `steps` steps of all environments with random actions."""
-    generator = np.random.default_rng(0)
-    actions = [generator.uniform(-1, 1, (envs.num_envs, width)).astype(np.float32) for _ in range(8)]
-
-    def run() -> float:
-        begin = time.perf_counter()
-        for k in range(steps):
-            envs.step(actions[k % 8])
-        return time.perf_counter() - begin
-
-    run()
-    return run
-
-
-def pool(num_envs: int, steps: int) -> Callable[[], float]:
-    """The same for EnvPool's HalfCheetah on one thread."""
-    import envpool
-
-    envs = envpool.make("HalfCheetah-v4", env_type="gymnasium", num_envs=num_envs, num_threads=1)
-    envs.reset()
-    generator = np.random.default_rng(0)
-    actions = [generator.uniform(-1, 1, (num_envs, 6)) for _ in range(8)]
-
-    def run() -> float:
-        begin = time.perf_counter()
-        for k in range(steps):
-            envs.step(actions[k % 8])
-        return time.perf_counter() - begin
-
-    run()
-    return run
+Written by `python -m benchmarks.env_speed`, part of `make bench`. One process, one thread, {rounds}
+interleaved rounds of wall time: median (quartiles; extremes). A step is 20 substeps; HorseLegFixed takes
+200, so it has no bars. Bits: of the widest vectors in the code that numba compiles; the others are as they
+come."""
 
 
 def measure(rounds: int, steps: int) -> dict[str, Any]:
     """Rates and ratios."""
-    runs: dict[str, Callable[[], float]] = {"HalfCheetah-v5, single": single("HalfCheetah-v5", steps)}
-    units = {"HalfCheetah-v5, single": steps}
+    cheetah = "HalfCheetah-v5, single"
+    runs, units = {cheetah: step(gym.make("HalfCheetah-v5"), steps)}, {cheetah: steps}
     for name in IDS:
-        env_id = f"hoof_env/{name}-v0"
-        runs[f"{name}, single"], units[f"{name}, single"] = single(env_id, steps), steps
-        envs = gym.make_vec(env_id, num_envs=BATCH)
+        one, all_at_once, many = f"{name}, single", f"{name}, {BATCH} at once", max(steps // 20, 5)
+        env, envs = gym.make(f"hoof_env/{name}-v0"), gym.make_vec(f"hoof_env/{name}-v0", num_envs=BATCH)
         envs.reset(seed=0)
-        many = max(steps // 20, 5)
-        title = f"{name}, {BATCH} at once"
-        runs[title], units[title] = vector(envs, 4, many), many * BATCH
-    if has("envpool"):
+        runs |= {one: step(env, steps), all_at_once: step_many(envs, BATCH, many)}
+        units |= {one: steps, all_at_once: many * BATCH}
+    if importlib.util.find_spec("envpool"):
+        import envpool
+
         for size in POOLS:
+            envs = envpool.make("HalfCheetah-v4", env_type="gymnasium", num_envs=size, num_threads=1)
+            envs.reset()
             title, few = f"EnvPool HalfCheetah-v4, {size} at once", max(4 * steps // size, 2)
-            runs[title], units[title] = pool(size, few), few * size
-    seconds = interleave(runs, rounds)
+            runs[title], units[title] = step_many(envs, size, few), few * size
+    clocked = {name: partial(timed, time.perf_counter, lambda: None, run) for name, run in runs.items()}
+    seconds = interleave(clocked, rounds)
     rate = {name: units[name] / seconds[name] for name in runs}
     pools = [name for name in rate if name.startswith("EnvPool")]
-    reference = max(pools, key=lambda name: float(np.median(rate[name])), default="HalfCheetah-v5, single")
+    pool = max(pools, key=lambda name: float(np.median(rate[name])), default=cheetah)
     rows = []
     for name in rate:
-        alone = name.endswith("single")
-        beside = "HalfCheetah-v5, single" if alone else reference
-        bars = [SINGLE_BAR] if alone else list(VECTOR_BARS)
-        bits = vector_bits() if name.startswith(IDS) else None
+        beside, bars = (cheetah, [SINGLE_BAR]) if name.endswith("single") else (pool, list(VECTOR_BARS))
         rows.append(
-            {"case": name, "bits": bits, "rate": spread(rate[name]), "beside": beside,
-             "ratio": spread(rate[name] / rate[beside]),
+            {"case": name, "bits": vector_bits() if name.startswith(IDS) else None,
+             "rate": spread(rate[name]), "beside": beside, "ratio": spread(rate[name] / rate[beside]),
              "bars": bars if name.split(",")[0] in BARRED else None}
         )  # fmt: skip
     return {"machine": machine(), "bits": vector_bits(), "rounds": rounds, "rows": rows}
 
 
-def page(found: dict[str, Any]) -> str:
+def page(result: dict[str, Any]) -> str:
     """The table as Markdown."""
     lines = [
-        "# How fast the environments are", "",
-        "Written by `python -m benchmarks.env_speed`, part of `make bench`. One process, one thread,"
-        f" {found['rounds']} interleaved rounds of wall time: median (quartiles; extremes)."
-        " A step is 20 substeps; HorseLegFixed takes 200, so it has no bars. Bits: of the widest vectors in"
-        " the code that numba compiles; the others are as they come.", "",
-        "| | |", "|---|---|",
-        *[f"| {key} | {value} |" for key, value in found["machine"].items()], "",
-        "| case | bits | environment steps/s | beside | ratio | bars |", "|---|---|---|---|---|---|",
-    ]  # fmt: skip
-    for row in found["rows"]:
-        bars = "".join(
-            f"{bar:g}: {'met' if row['ratio']['median'] >= bar else 'not met'} " for bar in row["bars"] or ()
-        )
-        cells = (
+        [
             row["case"],
             str(row["bits"] or ""),
             f"{row['rate']['median']:,.0f}",
             row["beside"],
-            told(row["ratio"]),
-            bars.strip(),
-        )
-        lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join(lines) + "\n"
+            describe(row["ratio"]),
+            " ".join(is_met(bar, row["ratio"]) for bar in row["bars"] or ()),
+        ]
+        for row in result["rows"]
+    ]
+    head = ["case", "bits", "environment steps/s", "beside", "ratio", "bars"]
+    about = table(["", ""], [[key, value] for key, value in result["machine"].items()])
+    return "\n\n".join((INTRO.format(**result), about, table(head, lines))) + "\n"
 
 
 def main() -> None:
@@ -157,14 +102,10 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=2000, help="of a single environment in a round")
     parser.add_argument("--out", type=Path, default=RESULTS, help="folder for those of all vector widths")
     given = parser.parse_args()
-    found = measure(given.rounds, given.steps)
-    text = page(found)
-    print(text)
-    with staged(given.out / f"{found['bits']}-bits") as folder:
-        (folder / "env_speed.json").write_text(json.dumps(found, indent=1) + "\n")
-        (folder / "env_speed.md").write_text(text)
-    rows = [(row["case"], row["beside"], row["ratio"], (row["bars"] or [None])[0]) for row in found["rows"]]
-    keep(given.out, found["machine"], found["bits"], rows)
+    result = measure(given.rounds, given.steps)
+    print(page(result))
+    rows = [(row["case"], row["beside"], row["ratio"], (row["bars"] or [None])[0]) for row in result["rows"]]
+    write(given.out, "env_speed", result, page(result), rows)
 
 
 if __name__ == "__main__":

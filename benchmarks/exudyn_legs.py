@@ -21,14 +21,15 @@ from numpy.typing import NDArray
 from benchmarks.common import ALL, Assembly, Outside, Record, Start
 from hoof_env.dynamics.drive import Motor
 from hoof_env.dynamics.limb import Limb
-from hoof_env.dynamics.trunk import GRAVITY, Trunk
+from hoof_env.dynamics.trunk import GRAVITY, TRUNKS, Trunk
 from hoof_env.leg.linkage import BODIES, FRAME, JOINTS, LOCK
 
 eii: Any = exudyn.itemInterface  # its types ask for protocols that closures do not meet by name
 
+SPECTRAL_RADIUS = 0.6
+"""Of generalised alpha, below 1."""
+
 SOLE = 13
-FREE = {"fixed": (), "rail": (0,), "suspended": (0, 1), "free": (0, 1, 2)}
-"""Which of x, y and pitch each kind of trunk leaves free."""
 
 
 class ExudynLegs:
@@ -36,11 +37,9 @@ class ExudynLegs:
 
     Args:
         limbs, trunk: the horse.
-        start: its first pose; a prescribed crank keeps the speed that it has there.
+        start: its first pose; each crank keeps or is to keep the speed that it has there.
         dt: time step [s].
         outside: forces at toe and heel; none if None. Called without `commit` within a step, with it after.
-        command: speed [rad/s] that each motor is to keep; that of the start if None.
-        spectral_radius: of generalised alpha, below 1.
     """
 
     assembly: Assembly = ALL
@@ -52,12 +51,8 @@ class ExudynLegs:
         start: Start,
         dt: float = 1e-3,
         outside: Outside | None = None,
-        command: Sequence[float] | None = None,
-        spectral_radius: float = 0.6,
     ) -> None:
         self.limbs, self.trunk, self.start, self.dt, self.outside = tuple(limbs), trunk, start, dt, outside
-        self.command = tuple(command or start.crank_speed)
-        self.spectral_radius = spectral_radius
         self._container = exu.SystemContainer()
         self.mbs = self._container.AddSystem()
         self._reference: list[float] = []
@@ -66,8 +61,8 @@ class ExudynLegs:
         self._still = self.mbs.AddMarker(
             eii.MarkerNodeCoordinate(nodeNumber=self.mbs.AddNode(eii.NodePointGround()), coordinate=0)
         )
-        pose = (*start.position, start.pitch)
-        self._trunk = self._body(trunk.mass, trunk.pitch_inertia, pose, (*start.velocity, start.pitch_rate))
+        pose = (*start.position, 0.0)
+        self._trunk = self._body(trunk.mass, trunk.pitch_inertia, pose, (0.0, 0.0, 0.0))
         self._hang()
         self._legs = [self._leg(i) for i in range(len(limbs))]
         self.mbs.Assemble()
@@ -97,7 +92,7 @@ class ExudynLegs:
         settings: Any = exu.SimulationSettings()
         time = settings.timeIntegration
         time.numberOfSteps, time.endTime, time.verboseMode = steps, steps * self.dt, 0
-        time.generalizedAlpha.spectralRadius = self.spectral_radius
+        time.generalizedAlpha.spectralRadius = SPECTRAL_RADIUS
         time.newton.useModifiedNewton = fast
         time.newton.absoluteTolerance = time.newton.relativeTolerance = 1e-6 if fast else 1e-10
         settings.solution.file.write = False
@@ -139,7 +134,7 @@ class ExudynLegs:
         trunk = self.trunk
         for axis in range(3):
             at = self._coordinate(self._trunk, axis)
-            if axis not in FREE[trunk.kind]:
+            if axis >= TRUNKS.index(trunk.kind):  # of x, y and pitch each kind leaves free one more
                 self._hold(self._still, at)
             elif axis == 0:
                 self._spring(at, 0.0, trunk.drag, 0.0)
@@ -164,11 +159,8 @@ class ExudynLegs:
         geometry, sigma = limb.geometry, limb.geometry.travel
         pose = start.poses(self.limbs)[i]
         swing_rate = start.phi(i, start.crank[i])[1] * start.crank_speed[i]
-        beta = start.pitch + sigma * start.swing[i]
-        frame = self._body(
-            0.0, 0.0, (*pose.point("O"), beta),
-            (*pose.point_velocities[0], start.pitch_rate + sigma * swing_rate),
-        )  # fmt: skip
+        rates = (*pose.point_velocities[0], sigma * swing_rate)
+        frame = self._body(0.0, 0.0, (*pose.point("O"), sigma * start.swing[i]), rates)
         bodies = [
             self._body(
                 float(geometry.body_masses[k]), float(geometry.body_inertias[k]),
@@ -176,7 +168,6 @@ class ExudynLegs:
             )
             for k in range(len(BODIES))
         ]  # fmt: skip
-        half = geometry.body_lengths / 2
 
         def local(k: int, point: str) -> tuple[float, float]:
             if k == FRAME:
@@ -188,56 +179,44 @@ class ExudynLegs:
         self.mbs.AddObject(eii.ObjectJointRevolute2D(markerNumbers=hip))
         joints, ends = [], []
         for joint in JOINTS:
-            one, two = bodies[joint.i], frame if joint.j == FRAME else bodies[joint.j]
-            pair = [
-                self._point(two, *local(joint.j, joint.point)),
-                self._point(one, *local(joint.i, joint.point)),
-            ]
-            joints.append(self.mbs.AddObject(eii.ObjectJointRevolute2D(markerNumbers=pair)))
-            ends.append((one, local(joint.i, joint.point), two, local(joint.j, joint.point)))
+            pair = [(frame if k == FRAME else bodies[k], local(k, joint.point)) for k in (joint.j, joint.i)]
+            markers = [self._point(body, *at) for body, at in pair]
+            joints.append(self.mbs.AddObject(eii.ObjectJointRevolute2D(markerNumbers=markers)))
+            ends.append(pair)
         self._hold(self._coordinate(bodies[LOCK[1]], 2), self._coordinate(bodies[LOCK[0]], 2))
 
         axes = [self._coordinate(body, 2) for body in (self._trunk, frame, bodies[0])]
-        drives = (self._motor if isinstance(limb.drive, Motor) else self._prescribe)(
-            i, frame, bodies[0], axes
-        )
-        corners = (
-            [-half[SOLE], half[SOLE]] if geometry.toe == BODIES[SOLE].tail else [half[SOLE], -half[SOLE]]
-        )
+        is_motor = isinstance(limb.drive, Motor)
+        drives = self._motor(i, frame, bodies[0], axes) if is_motor else self._prescribe(i, axes)
+        half = geometry.body_lengths[SOLE] / 2
+        corners = (-half, half) if geometry.toe == BODIES[SOLE].tail else (half, -half)
         if self.outside is not None:
             for point, x in enumerate(corners):
-                ends_at = [self._point(self._ground, 0.0, 0.0), self._point(bodies[SOLE], x, 0.0)]
-                self.mbs.AddObject(
-                    eii.CartesianSpringDamper(
-                        markerNumbers=ends_at, springForceUserFunction=self._push(i, point)
-                    )
-                )
+                markers = [self._point(self._ground, 0.0, 0.0), self._point(bodies[SOLE], x, 0.0)]
+                law = {"springForceUserFunction": self._push(i, point)}
+                self.mbs.AddObject(eii.CartesianSpringDamper(markerNumbers=markers, **law))
         return {"frame": frame, "bodies": bodies, "joints": joints, "ends": ends, "corners": corners} | drives
 
-    def _prescribe(self, i: int, frame: int, crank: int, axes: list[int]) -> dict[str, Any]:
+    def _prescribe(self, i: int, axes: list[int]) -> dict[str, Any]:
         """Crank and swing as functions of time."""
         sigma, start = self.limbs[i].geometry.travel, self.start
         theta, speed = start.crank[i], start.crank_speed[i]
-        return {
-            "swing": self._hold(
-                axes[0], axes[1], lambda t: sigma * (start.phi(i, theta + speed * t)[0] - start.swing[i])
-            ),
-            "driver": self._hold(axes[1], axes[2], lambda t: -sigma * speed * t),
-        }
+
+        def swing(t: float) -> float:
+            return sigma * (start.phi(i, theta + speed * t)[0] - start.swing[i])
+
+        driver = self._hold(axes[1], axes[2], lambda t: -sigma * speed * t)
+        return {"swing": self._hold(axes[0], axes[1], swing), "driver": driver}
 
     def _motor(self, i: int, frame: int, crank: int, axes: list[int]) -> dict[str, Any]:
         """A torque between frame and crank, the rotor, and the swing geared to the crank."""
         limb, sigma, start = self.limbs[i], self.limbs[i].geometry.travel, self.start
-        motor, speed = limb.drive, self.command[i]
+        motor = limb.drive
         assert isinstance(motor, Motor)
 
-        def torque(
-            mbs: Any, t: float, item: int, u: float, v: float, k: float, d: float, offset: float
-        ) -> float:
+        def torque(mbs: Any, t: float, item: int, u: float, v: float, *unused: float) -> float:
             """On the crank, against the clock; Exudyn's force pulls marker 1 back."""
-            return sigma * float(
-                np.clip(motor.speed_gain * (speed + sigma * v), -motor.torque_limit, motor.torque_limit)
-            )
+            return sigma * self._servo(i, -sigma * v)
 
         nodes = [self.mbs.GetObjectParameter(body, "nodeNumber") for body in (self._trunk, frame, crank)]
         self.mbs.AddObject(
@@ -266,24 +245,22 @@ class ExudynLegs:
             row[0, [2, 5, 8]] = -1.0, 1.0 - slope, slope
             return row
 
-        return {
-            "swing": int(
-                self.mbs.AddObject(
-                    eii.CoordinateVectorConstraint(
-                        markerNumbers=[
-                            self.mbs.AddMarker(eii.MarkerObjectODE2Coordinates(objectNumber=rotor)),
-                            self.mbs.AddMarker(eii.MarkerNodeCoordinates(nodeNumber=self._none())),
-                        ],
-                        scalingMarker0=np.zeros((1, 9)),
-                        constraintUserFunction=error,
-                        jacobianUserFunction=jacobian,
-                    )
-                )
-            )
-        }
+        fixed = self.mbs.AddNode(eii.NodePointGround())
+        markers = [
+            self.mbs.AddMarker(eii.MarkerObjectODE2Coordinates(objectNumber=rotor)),
+            self.mbs.AddMarker(eii.MarkerNodeCoordinates(nodeNumber=fixed)),
+        ]
+        gear = eii.CoordinateVectorConstraint(
+            markerNumbers=markers, scalingMarker0=np.zeros((1, 9)), constraintUserFunction=error,
+            jacobianUserFunction=jacobian,
+        )  # fmt: skip
+        return {"swing": int(self.mbs.AddObject(gear))}
 
-    def _none(self) -> int:
-        return int(self.mbs.AddNode(eii.NodePointGround()))
+    def _servo(self, i: int, speed: float) -> float:
+        """Torque of a motor whose crank turns at `speed`, along theta [N m]."""
+        motor: Any = self.limbs[i].drive
+        asked = motor.speed_gain * (self.start.crank_speed[i] - speed)
+        return float(np.clip(asked, -motor.torque_limit, motor.torque_limit))
 
     # The forces
 
@@ -319,34 +296,26 @@ class ExudynLegs:
         q = (np.array(self._reference) + system.GetODE2Coordinates()).reshape(-1, 3)
         v = np.array(system.GetODE2Coordinates_t()).reshape(-1, 3)
         tied = np.array(system.GetAECoordinates())
-        rows: list[tuple[Any, ...]] = []
+        row, rows = self._rows, []
+
+        def multiplier(item: int) -> Any:
+            return -tied[list(system.GetObjectLTGAE(item))]
+
+        def place(body: int, at: tuple[float, float]) -> complex:
+            return complex(*q[row[body], :2]) + complex(*at) * np.exp(1j * q[row[body], 2])
+
         for i, (limb, leg) in enumerate(zip(self.limbs, self._legs, strict=True)):
-            sigma, drive = limb.geometry.travel, limb.drive
-
-            def multiplier(item: int) -> Any:
-                return -tied[list(system.GetObjectLTGAE(item))]
-
-            row = self._rows
+            sigma = limb.geometry.travel
             frame, crank = row[leg["frame"]], row[leg["bodies"][0]]
             start = self._reference[3 * crank + 2] - self._reference[3 * frame + 2]
             theta = self.start.crank[i] - sigma * (q[crank, 2] - q[frame, 2] - start)
             speed = -sigma * (v[crank, 2] - v[frame, 2])
             swing = sigma * float(multiplier(leg["swing"])[0])
-            if isinstance(drive, Motor):
-                torque = float(
-                    np.clip(
-                        drive.speed_gain * (self.command[i] - speed), -drive.torque_limit, drive.torque_limit
-                    )
-                )
+            if isinstance(limb.drive, Motor):
+                torque = self._servo(i, speed)
             else:
                 torque = -sigma * float(multiplier(leg["driver"])[0])
-            gaps = []
-            for one, at_one, two, at_two in leg["ends"]:
-                ends = [
-                    complex(*q[row[body], :2]) + complex(*at) * np.exp(1j * q[row[body], 2])
-                    for body, at in ((one, at_one), (two, at_two))
-                ]
-                gaps.append(abs(ends[0] - ends[1]))
+            gaps = [abs(place(*one) - place(*two)) for one, two in leg["ends"]]
             pins = np.array([multiplier(joint) for joint in leg["joints"]])
             rows.append((theta, speed, torque, swing, pins, max(gaps)))
         thetas, speeds, torques, swings, forces, widest = map(np.array, zip(*rows, strict=True))

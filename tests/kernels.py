@@ -6,7 +6,7 @@ is compiled by the first test that wants it.
 
 import numpy as np
 
-from benchmarks.speed_cases import engine, scenes
+from benchmarks.scenes import engine, scenes
 from hoof_env.envs.kernels import compile_kernels
 from hoof_env.gait.parameters import load_gait
 from hoof_env.identify.candidate import encode

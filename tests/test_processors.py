@@ -16,9 +16,8 @@ import numpy as np
 import pytest
 from numba import njit
 
-from benchmarks.speed_cases import engine, scenes
-from benchmarks.speed_ceilings import WIDE, ceilings, loops
-from benchmarks.speed_code import WIDTHS, assembly, instructions, is_counted, vector_bits
+from benchmarks.machine import vector_bits
+from benchmarks.scenes import engine, scenes
 from hoof_env.simd import anywhere, choose, floor, read, rows, write
 from hoof_env.simd import math as exact_math
 from hoof_env.simd.memory import address, doubles
@@ -65,11 +64,7 @@ def engine_bits():
 
 
 def report(engines):
-    timed = ceilings(WIDTHS[-1] // 64, 10)  # of vectors that the processor need not have
-    return {
-        "bits": vector_bits(), "ceilings": {kind: run() for kind, (run, _) in timed.items()},
-        "lanes": lane_bits(), "engines": engine_bits() if engines else {},
-    }  # fmt: skip
+    return {"bits": vector_bits(), "lanes": lane_bits(), "engines": engine_bits() if engines else {}}
 
 
 def on(processor, *arguments):
@@ -86,10 +81,9 @@ def on(processor, *arguments):
 
 @needs_x86
 @pytest.mark.parametrize(("processor", "bits"), [("haswell", 256), ("x86-64", 128)])
-def test_the_probe_and_the_lanes_run_on_lesser_processors(processor, bits):
+def test_lanes_have_the_same_bits_on_lesser_processors(processor, bits):
     found = on(processor)
     assert found["bits"] == bits
-    assert all(seconds > 0 for seconds in found["ceilings"].values())
     assert found["lanes"] == lane_bits()
 
 
@@ -99,15 +93,6 @@ def test_the_probe_and_the_lanes_run_on_lesser_processors(processor, bits):
 def test_engines_have_the_same_bits_on_every_processor(processor):
     """With the same NumPy, BLAS and C library, which make the leg's table."""
     assert on(processor, "engines")["engines"] == engine_bits()
-
-
-@pytest.mark.skipif(not is_counted(), reason="counts x86 code")
-def test_the_probe_does_what_it_counts():
-    bits = vector_bits()
-    for kind, (loop, count) in loops(bits // 64).items():
-        loop(np.zeros(WIDE * bits // 64), 2)
-        found = instructions(assembly(loop))
-        assert found[kind, bits] >= WIDE * count, kind
 
 
 if __name__ == "__main__":

@@ -1,22 +1,16 @@
-"""The benchmark runs without peers, writes its files, and its arithmetic is right."""
+"""The benchmarks run without peers, write their files, and their arithmetic is right."""
 
 import json
-import platform
 import sys
 
 import numpy as np
 import pytest
 
-pytest.importorskip("matplotlib")
-
-from benchmarks import speed
-from benchmarks.speed_cases import Case, engine, scenes
-from benchmarks.speed_code import WIDTHS, by_kind, instructions, target, vector_bits
-from benchmarks.speed_history import keep, read
-from benchmarks.speed_report import speed_table
-from benchmarks.speed_rounds import interleave, spread
-from benchmarks.speed_scaling import line_error
-from benchmarks.speed_stages import STAGES, Pass
+from benchmarks import compare, speed
+from benchmarks.history import keep, read
+from benchmarks.machine import compiled_for, vector_bits
+from benchmarks.rounds import interleave, spread
+from benchmarks.speed import Case, speed_table
 
 
 def test_quick_mode_runs_without_peers_and_writes_its_files(tmp_path, monkeypatch, capsys):
@@ -25,28 +19,19 @@ def test_quick_mode_runs_without_peers_and_writes_its_files(tmp_path, monkeypatc
     speed.main(["--quick", "--rounds", "2", "--out", str(tmp_path)])
     bits = vector_bits()
     own = tmp_path / f"{bits}-bits"
-    assert {path.name for path in own.iterdir()} == {
-        "speed.json",
-        "speed.md",
-        "scaling.png",
-        "scaling.svg",
-    }
+    assert {path.name for path in own.iterdir()} == {"speed.json", "speed.md"}
     result = json.loads((own / "speed.json").read_text())
     assert result["machine"]["processor"]
-    assert result["machine"]["compiled for"] == f"{target()[1]}, vectors of {bits} bits"
-    assert {case["group"] for case in result["cases"]} == {"leg", "suspended leg", "horse"}
+    assert result["machine"]["compiled for"] == f"{compiled_for()}, vectors of {bits} bits"
+    assert {case["group"] for case in result["cases"]} == {"leg", "horse"}
     assert all(case["rate"]["min"] > 0 and not case["ratios"] for case in result["cases"])
-    assert "MuJoCo is left out" in " ".join(result["notes"])
+    assert result["notes"] == ["MuJoCo is left out", "Exudyn is left out"]
     assert {case["bits"] for case in result["cases"]} == {bits}
-    assert list(result["limits"]["ceilings_per_ns"]) == [str(w) for w in WIDTHS if w <= bits]
     page = (own / "speed.md").read_text()
     assert "leg, one" in page
     assert f"vectors of {bits} bits" in page
-    for width in WIDTHS:
-        assert (f"Vectors of {width} bits are left out" in page) == (width > bits)
     assert f"[{bits}-bits, speed]({bits}-bits/speed.md)" in (tmp_path / "speed.md").read_text()
     assert read(tmp_path) == []  # numbers of a smoke test mean nothing
-    assert "scaling.svg" in page
     assert "leg, one" in capsys.readouterr().out
 
 
@@ -94,49 +79,40 @@ def test_every_case_runs_once_a_round_in_changing_order():
     assert len(set(rounds)) > 3
 
 
-def test_machine_code_is_counted_by_width():
-    code = "\n".join(
-        [
-            "loop:",
-            "\t.p2align\t4",
-            "\tvmulpd\t(%rax), %zmm1, %zmm2",
-            "\tvdivpd\t%ymm1, %ymm2, %ymm3",
-            "\tvsqrtsd\t%xmm1, %xmm2, %xmm3",
-            "\tvaddpd\t.LCPI0_1(%rip), %xmm1, %xmm2",
-            "\tvmovupd\t%zmm2, 64(%rsp) {%k1}",
-            "\tvmovapd\t%zmm2, %zmm3",
-            "\tmovq\t8(%rsp), %rax  # 8-byte Reload",
-            "\tleaq\t8(%rsp), %rax",
-            "\tretq",
-            "\tmulpd\t%xmm0, %xmm1",
-            "\tsqrtsd\t%xmm0, %xmm1",
-            "\tmovhpd\t8(%rax), %xmm1",
-        ]
-    )
-    found = instructions(code)
-    assert +found == {
-        ("all", 0): 12, ("arithmetic", 512): 1, ("divisions", 256): 1, ("square roots", 64): 2,
-        ("arithmetic", 128): 2, ("loads", 512): 1, ("stores", 512): 1, ("loads", 64): 2,
-    }  # fmt: skip
-    assert by_kind(found) == {
-        "instructions": 12, "divisions": 1, "square roots": 2, "arithmetic": 3, "loads": 3, "stores": 1,
-    }  # fmt: skip
+def test_a_comparison_takes_its_ratios_within_a_round(tmp_path, monkeypatch):
+    """The work tree takes twice the time of the base in every round; both are slower in some."""
+    pace = {"base": iter([9.0, 1.0, 10.0, 1.0]), "now": iter([9.0, 2.0, 20.0, 2.0])}
+    monkeypatch.setattr(compare, "run_cases", lambda tree: {"one leg": next(pace[tree.name])})
+    assert compare.compare(tmp_path / "base", tmp_path / "now", 3) == {"one leg": [0.5] * 3}
 
 
-@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="counts x86 code")
-def test_a_stage_is_counted_for_all_legs():
-    """One division for a crank, whatever the loop around it; the trunk's 3 x 3 system has one of its own."""
-    horse = Pass(engine(scenes("identified")["horse"], "identified", 8), lanes=8)
-    legs, trunk = (horse.count(STAGES[name]) for name in ("feel the leg", "accelerate the trunk"))
-    bits = {
-        kind: sum(n * w for (k, w), n in legs.items() if k == kind) for kind in ("divisions", "square roots")
-    }
-    assert bits == {"divisions": 4 * 8 * 64, "square roots": 0}
-    assert by_kind(trunk)["divisions"] * 4 == by_kind(legs)["divisions"]
+def test_a_process_times_every_case_of_its_own_package(tmp_path):
+    seconds = compare.run_cases(compare.ROOT, runs=1)
+    assert len(seconds) == 6
+    assert min(seconds.values()) > 0
+    with pytest.raises(RuntimeError, match="expected hoof_env of"):
+        compare.run_cases(tmp_path, runs=1)
 
 
-def test_departure_from_a_straight_line():
-    x = [1, 10, 100]
-    straight = [{"median": (5 + 2 * n) / n} for n in x]
-    assert line_error({"x": x, "line_from": 1, "per_unit_s": straight}) < 1e-9
-    assert line_error({"x": x, "line_from": 1, "per_unit_s": [{"median": n} for n in x]}) > 0.1
+@pytest.mark.skipif(not (compare.ROOT / ".git").exists(), reason="this is no clone")
+def test_a_base_is_the_package_of_its_commit(capsys, monkeypatch, tmp_path):
+    monkeypatch.setattr(compare, "KEPT", tmp_path)
+    tree = compare.checkout("HEAD")
+    assert (tree / "hoof_env" / "__init__.py").is_file()
+    assert compare.checkout("HEAD") == tree
+    assert [path.name for path in tmp_path.iterdir()] == [tree.name]
+    with pytest.raises(SystemExit):
+        compare.main(["--base", "no such commit"])
+    assert "expected a commit of this repository, got 'no such commit'" in capsys.readouterr().err
+
+
+def test_a_slower_work_tree_is_named(capsys, monkeypatch):
+    monkeypatch.setattr(compare, "checkout", lambda commit: compare.KEPT / commit)
+    ratios = {"one leg": [0.9, 0.94, 1.0], "one horse": [0.94, 0.96, 1.2]}
+    monkeypatch.setattr(compare, "compare", lambda *given: ratios)
+    assert compare.main(["--base", "abc"]) == 1
+    leg, horse = capsys.readouterr().out.splitlines()[2:]
+    assert "0.94 (" in leg
+    assert leg.endswith("| slower |")
+    assert "0.96 (" in horse
+    assert horse.endswith("|  |")

@@ -1,23 +1,19 @@
 """Bars of accuracy: crank angle after 2 s of walking, order of the schemes, what is kept in flight."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from benchmarks.accuracy import BARS
-from benchmarks.crank_accuracy import BARRED, DURATION, FILE, PHASES, Case, read_references
-from benchmarks.horse_accuracy import converged, fly, ground_account, stiff
 from hoof_env.dynamics.schemes import SCHEMES
 from hoof_env.errors import ParameterError
+from tests.dynamics.crank_accuracy import BARRED, BARS, DURATION, PATH, PHASES, Case, read_references
+from tests.dynamics.horse_accuracy import converged, fly, ground_account, stiff
 
 PRESETS = ("first_fit", "identified")
-PATH = Path(__file__).parent / FILE
 
 
 @pytest.fixture(scope="module")
 def references():
-    return read_references(PATH)
+    return read_references()
 
 
 @pytest.mark.parametrize("ground", ["natural", "elastic"])
@@ -63,7 +59,7 @@ def test_a_changed_leg_asks_for_new_references(tmp_path):
     (tmp_path / "old.json").write_text(
         PATH.read_text(encoding="utf-8").replace('"fingerprint": "', '"fingerprint": "0'), encoding="utf-8"
     )
-    with pytest.raises(ParameterError, match="it has changed, run python -m benchmarks"):
+    with pytest.raises(ParameterError, match="it has changed, run python -m tests"):
         read_references(tmp_path / "old.json")
 
 

@@ -31,7 +31,7 @@ def rms(x):
 def beginning(gait):
     a, b = gait.swing_sin, gait.swing_cos
     swing = gait.swing_offset + a * np.sin(THETA) + b * np.cos(THETA)
-    return Start((THETA,), (gait.crank_speed,), (swing,), (a,), (b,), position=(0.0, HIGH))
+    return Start((THETA,), (gait.crank_speed,), (swing,), a, b, position=(0.0, HIGH))
 
 
 def exact(geometry, gait, angles):

@@ -7,10 +7,10 @@ import pytest
 pytest.importorskip("mujoco")
 pytest.importorskip("exudyn")
 
-from benchmarks.agreement import PEERS, compare, quantities
-from benchmarks.cases import CASES, Case
 from benchmarks.common import ALL
 from hoof_env.dynamics.drive import Motor
+from tests.peers.agreement import PEERS, compare, quantities
+from tests.peers.cases import CASES, Case
 
 COARSE = {"ours": 5e-4, "MuJoCo": 1e-3, "Exudyn": 1e-3}
 

@@ -5,9 +5,9 @@ import pytest
 pytest.importorskip("mujoco")
 pytest.importorskip("exudyn")
 
-from benchmarks.agreement import PEERS, compare
-from benchmarks.cases import CASES
-from benchmarks.trunk_legs import TrunkLegs
+from tests.peers.agreement import PEERS, compare
+from tests.peers.cases import CASES
+from tests.peers.trunk_legs import TrunkLegs
 
 GROUND = [case for case in CASES if case.ground]
 pytestmark = pytest.mark.peers
@@ -15,7 +15,7 @@ pytestmark = pytest.mark.peers
 
 @pytest.mark.parametrize("case", GROUND, ids=lambda case: case.name)
 def test_engine_agrees_with_the_peers(case):
-    """On one leg, for time; `python -m benchmarks.agreement` has both."""
+    """On one leg, for time; docs/evidence/agreement.md has both."""
     for row in compare("identified", case):
         label = f"{row.engine}, {row.quantity}: {row}"
         if row.engine in PEERS:

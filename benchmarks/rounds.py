@@ -29,13 +29,33 @@ def interleave(runs: Mapping[str, Callable[[], float]], rounds: int, seed: int =
     return seconds
 
 
+def timed(clock: Callable[[], float], before: Callable[[], Any], work: Callable[[], Any]) -> float:
+    """Time of `work` [s], after `before`, which does not count."""
+    before()
+    begin = clock()
+    work()
+    return clock() - begin
+
+
 def spread(values: Floats) -> dict[str, float]:
     """Median, quartiles and extremes."""
-    low, q1, median, q3, high = np.quantile(values, [0, 0.25, 0.5, 0.75, 1])
+    low, q1, median, q3, high = np.quantile(values, [0, 0.25, 0.5, 0.75, 1]).tolist()
     return {"median": median, "q1": q1, "q3": q3, "min": low, "max": high}
 
 
-def told(s: Mapping[str, Any], digits: int = 3) -> str:
+def describe(s: Mapping[str, Any]) -> str:
     """'median (q1 to q3; min to max)'."""
-    number = {name: f"{value:.{digits}g}" for name, value in s.items()}
+    number = {name: f"{value:.3g}" for name, value in s.items()}
     return f"{number['median']} ({number['q1']} to {number['q3']}; {number['min']} to {number['max']})"
+
+
+def is_met(bar: float, s: Mapping[str, float] | None) -> str:
+    """The bar and whether the median reaches it."""
+    if s is None:
+        return f"{bar:g}: not measured"
+    return f"{bar:g}: {'met' if s['median'] >= bar else 'not met'}"
+
+
+def table(head: list[str], rows: list[list[str]]) -> str:
+    """A Markdown table."""
+    return "\n".join("| " + " | ".join(row) + " |" for row in (head, ["---"] * len(head), *rows))

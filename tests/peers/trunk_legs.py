@@ -41,17 +41,17 @@ class TrunkLegs:
     ) -> None:
         self.limbs, self.start = tuple(limbs), start
         self.engine = TrunkEngine(limbs, trunk, ground, sim_dt=dt, integrator=integrator, reactions=True)
-        none = [0.0] * len(self.limbs)
-        rows = (start.crank, start.crank_speed, start.swing, start.swing_sin or none, start.swing_cos or none)
+        a, b = start.swing_sin, start.swing_cos
         gaits = [
             GaitParameters(speed, swing - a * np.sin(theta) - b * np.cos(theta), a, b)
-            for theta, speed, swing, a, b in zip(*rows, strict=True)
+            for theta, speed, swing in zip(start.crank, start.crank_speed, start.swing, strict=True)
         ]
         self.engine.reset(
-            gaits, np.array(start.crank)[:, None],
-            x=start.position[0], y=start.position[1], pitch=start.pitch,
-            vx=start.velocity[0], vy=start.velocity[1], pitch_rate=start.pitch_rate,
-        )  # fmt: skip
+            gaits,
+            np.array(start.crank)[:, None],
+            x=start.position[0],
+            y=start.position[1],
+        )
 
     def run(self, duration: float, samples: int) -> Record:
         """Advance by `duration` [s] and look `samples` times besides the beginning, evenly.

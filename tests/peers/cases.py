@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from benchmarks.common import Assembly, GroundForces, Record, Start, corners
-from benchmarks.trunk_legs import TrunkLegs
 from hoof_env.dynamics.drive import Drive, Motor, Prescribed
 from hoof_env.dynamics.limb import Limb
 from hoof_env.dynamics.trunk import Trunk
@@ -17,6 +16,7 @@ from hoof_env.gait.parameters import load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.preset import load_ground
 from hoof_env.leg.geometry import load_geometry
+from tests.peers.trunk_legs import TrunkLegs
 
 HIGH = 10.0
 """Of a trunk whose legs are in the air [m]."""
@@ -67,9 +67,7 @@ class Case:
         def start(thetas: Any, height: float) -> Start:
             swing = gait.swing_offset + a * np.sin(thetas) + b * np.cos(thetas)
             k = len(thetas)
-            return Start(
-                tuple(thetas), (gait.crank_speed,) * k, tuple(swing), (a,) * k, (b,) * k, (0.0, height)
-            )
+            return Start(tuple(thetas), (gait.crank_speed,) * k, tuple(swing), a, b, (0.0, height))
 
         def sole(thetas: Any, limbs: Sequence[Limb]) -> list[float]:
             """Height of the lower of toe and heel above the trunk's centre [m]."""

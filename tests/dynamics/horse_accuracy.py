@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.crank_accuracy import NATURAL, STRONG, quiet
 from hoof_env.dynamics.limb import Limb
 from hoof_env.dynamics.step_length import StepWarning
 from hoof_env.dynamics.trunk import Trunk
@@ -17,8 +16,7 @@ from hoof_env.gait.parameters import load_gait
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import pose
 from hoof_env.leg.linkage import BODIES, POINTS
-from tests.oracle.horse import PlainHorse
-from tests.oracle.run import simulate
+from tests.dynamics.crank_accuracy import NATURAL, STRONG, quiet
 
 Floats = NDArray[np.float64]
 
@@ -161,17 +159,6 @@ def states(engine: TrunkEngine, preset: str) -> Floats:
 def converged(preset: str) -> Floats:
     """The states by steps of 2 us."""
     return states(horse(preset, integrator="rk4", sim_dt=1e-3, substeps=512), preset)
-
-
-def plain_difference(preset: str, expected: Floats) -> float:
-    """Largest difference of the first of `TIMES` from an adaptive run of the plain horse [m, rad]."""
-    engine = horse(preset)
-    stand(engine, preset)
-    start = (0.0, float(engine.report["y"][0]), 0.0)
-    plain = PlainHorse(engine.trunk, engine.limbs, STIFF)
-    gaits = [load_gait("walk", preset)] * len(HIPS)
-    run = simulate(plain, gaits, [0.0, TIMES[0]], STARTS, trunk=start, tolerance=1e-11)
-    return float(np.abs(np.concatenate([run.trunk[-1], run.theta[-1]]) - expected[0]).max())
 
 
 def stiff(preset: str, scheme: str, step: float, substeps: int | None, expected: Floats) -> Step:

@@ -6,11 +6,16 @@ A run adds rows to `speed.csv`; `speed.md` shows them all.
 from __future__ import annotations
 
 import csv
+import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
-from benchmarks.speed_report import table
+from benchmarks.rounds import is_met, table
 from hoof_env._output import staged
+
+RESULTS = Path(__file__).parent / "results"
+"""Holds a folder for each vector width, and the history of all."""
 
 RUN = ("date", "commit", "compiled for", "processor")
 COLUMNS = ("case", "beside", "bits", "ratio", "q1", "q3", "required", *RUN)
@@ -25,22 +30,32 @@ Row = tuple[str, str, Mapping[str, float] | None, float | None]
 """Case, what it is beside, the ratio's spread if it was measured, and the bar if there is one."""
 
 
+def write(folder: Path, name: str, result: Mapping[str, Any], page: str, rows: Iterable[Row]) -> Path:
+    """Write a run and its page for its vector width, and `keep` its rows; returns the folder of the width."""
+    own = folder / f"{result['bits']}-bits"
+    with staged(own) as stage:
+        (stage / f"{name}.json").write_text(json.dumps(result, indent=1) + "\n")
+        (stage / f"{name}.md").write_text(page)
+    keep(folder, result["machine"], result["bits"], rows)
+    return own
+
+
 def keep(folder: Path, machine: Mapping[str, str], bits: int, rows: Iterable[Row]) -> None:
     """Add those of `rows` that have a bar and a ratio to the files in `folder`.
 
     Args:
         folder: of all results; that of each width is inside.
-        machine: `benchmarks.speed.machine()`.
+        machine: `benchmarks.machine.machine()`.
         bits: of the widest vectors.
         rows: of one run.
     """
-    known = {"bits": str(bits)} | {name: machine[name] for name in RUN}
+    run = {"bits": str(bits)} | {name: machine[name] for name in RUN}
     kept = read(folder)
     for case, beside, ratio, required in rows:
         if ratio is not None and required is not None:
-            found = {"ratio": ratio["median"], "q1": ratio["q1"], "q3": ratio["q3"], "required": required}
-            told = {name: f"{value:.3g}" for name, value in found.items()}
-            kept.append({"case": case, "beside": beside} | told | known)
+            numbers = {"ratio": ratio["median"], "q1": ratio["q1"], "q3": ratio["q3"], "required": required}
+            texts = {name: f"{value:.3g}" for name, value in numbers.items()}
+            kept.append({"case": case, "beside": beside} | texts | run)
     with staged(folder) as stage:
         with (stage / "speed.csv").open("w", newline="") as file:
             writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
@@ -67,10 +82,9 @@ def page(rows: list[dict[str, str]], folder: Path) -> str:
     head = ["case", "beside", "bits", "ratio", "required", *RUN]
     lines = []
     for row in ordered:
-        is_met = float(row["ratio"]) >= float(row["required"])
         shown = row | {
             "ratio": f"{row['ratio']} ({row['q1']} to {row['q3']})",
-            "required": f"{row['required']}: {'met' if is_met else 'not met'}",
+            "required": is_met(float(row["required"]), {"median": float(row["ratio"])}),
         }
         lines.append([shown[name] for name in head])
     return "\n\n".join([INTRO, "\n".join(listed), table(head, lines)]) + "\n"

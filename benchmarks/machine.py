@@ -1,0 +1,74 @@
+"""What a benchmark ran on, and what numba compiled for there."""
+
+from __future__ import annotations
+
+import datetime
+import os
+import platform
+import re
+import subprocess
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+
+import numba
+import numpy as np
+from numba.core.registry import cpu_target
+
+from hoof_env.simd import read, rows, write
+from hoof_env.simd.memory import address, doubles
+
+PACKAGES = ("hoof-env", "numba", "llvmlite", "numpy", "mujoco", "exudyn")
+
+
+def machine() -> dict[str, str]:
+    """Processor, vector width, system, versions, date and commit."""
+    installed = {d.metadata["Name"]: d.version for d in metadata.distributions()}
+    return {
+        "processor": f"{_processor()}, {os.cpu_count()} cores, one used",
+        "compiled for": f"{compiled_for()}, vectors of {vector_bits()} bits",
+        "system": f"{platform.system()} {platform.machine()}, Python {platform.python_version()}",
+        "versions": ", ".join(f"{package} {installed.get(package, 'not installed')}" for package in PACKAGES),
+        "date": datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        "commit": _commit(),
+    }
+
+
+def compiled_for() -> str:
+    """LLVM's name of the processor that numba compiles for; `NUMBA_CPU_NAME` can name another."""
+    return str(cpu_target.target_context.codegen().magic_tuple()[1])
+
+
+@cache
+def vector_bits() -> int:
+    """Bits of the widest vectors in the code that numba makes here, read off the sum of eight lanes."""
+
+    @numba.njit
+    def add(x):  # type: ignore[no-untyped-def]
+        row = rows(doubles(8), 8)
+        one = read(row, address(x), 0, 1)
+        write(one + one, address(x), 0, 1)
+
+    add(np.zeros(8))
+    code = "".join(add.inspect_asm().values())
+    if registers := re.findall(r"%([xyz])mm", code):  # of x86
+        return {"x": 128, "y": 256, "z": 512}[max(registers)]
+    return 128 if re.search(r"\bv\d+\.2d", code) else 64
+
+
+def _processor() -> str:
+    path = Path("/proc/cpuinfo")
+    name = re.search(r"^model name\s*: (.*)$", path.read_text() if path.exists() else "", re.M)
+    return name[1] if name else platform.processor() or "unknown"
+
+
+def _commit() -> str:
+    def git(*arguments: str) -> str:
+        here = Path(__file__).parent
+        return subprocess.check_output(["git", *arguments], cwd=here, text=True, stderr=subprocess.DEVNULL)
+
+    try:
+        changed = git("status", "--porcelain", "--untracked-files=no", "--", "../hoof_env", ".", ":!results")
+        return git("rev-parse", "--short", "HEAD").strip() + (" and changes" if changed else "")
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
