@@ -26,7 +26,7 @@ import hoof_env  # noqa: F401  registers the ids
 from benchmarks.compare_cases import step, step_many
 from benchmarks.history import RESULTS, write
 from benchmarks.machine import machine, vector_bits
-from benchmarks.rounds import describe, interleave, is_met, spread, table, timed
+from benchmarks.rounds import bar_text, describe, interleave, spread, table, timed
 
 BARRED = ("HorseLeg", "HorseLegRail", "HorseLegSpeed", "HorseLegTerrain")
 IDS = (*BARRED, "HorseLegFixed")
@@ -86,7 +86,7 @@ def page(result: dict[str, Any]) -> str:
             f"{row['rate']['median']:,.0f}",
             row["beside"],
             describe(row["ratio"]),
-            " ".join(is_met(bar, row["ratio"]) for bar in row["bars"] or ()),
+            " ".join(bar_text(bar, row["ratio"]) for bar in row["bars"] or ()),
         ]
         for row in result["rows"]
     ]
