@@ -85,7 +85,6 @@ def least_seconds(cases: dict[str, Callable[[], object]], runs: int) -> dict[str
 def main(runs: int) -> None:
     """Time all cases and print them."""
     leg, terrain = "hoof_env/HorseLeg-v0", "hoof_env/HorseLegTerrain-v0"
-
     many = gym.make_vec(leg, num_envs=BATCH)
     many.reset(seed=0)
     cases = {

@@ -26,7 +26,7 @@ import hoof_env  # noqa: F401  registers the ids
 from benchmarks.compare_cases import step, step_many
 from benchmarks.history import RESULTS, write
 from benchmarks.machine import machine, vector_bits
-from benchmarks.rounds import describe, interleave, is_met, spread, table, timed
+from benchmarks.rounds import bar_text, describe, interleave, spread, table, timed
 
 BARRED = ("HorseLeg", "HorseLegRail", "HorseLegSpeed", "HorseLegTerrain")
 IDS = (*BARRED, "HorseLegFixed")
@@ -57,18 +57,18 @@ def measure(rounds: int, steps: int) -> dict[str, Any]:
         import envpool
 
         for size in POOLS:
-            envs = envpool.make("HalfCheetah-v4", env_type="gymnasium", num_envs=size, num_threads=1)
-            envs.reset()
+            pool = envpool.make("HalfCheetah-v4", env_type="gymnasium", num_envs=size, num_threads=1)
+            pool.reset()
             title, few = f"EnvPool HalfCheetah-v4, {size} at once", max(4 * steps // size, 2)
-            runs[title], units[title] = step_many(envs, size, few), few * size
+            runs[title], units[title] = step_many(pool, size, few), few * size
     clocked = {name: partial(timed, time.perf_counter, lambda: None, run) for name, run in runs.items()}
     seconds = interleave(clocked, rounds)
     rate = {name: units[name] / seconds[name] for name in runs}
     pools = [name for name in rate if name.startswith("EnvPool")]
-    pool = max(pools, key=lambda name: float(np.median(rate[name])), default=cheetah)
+    best = max(pools, key=lambda name: float(np.median(rate[name])), default=cheetah)
     rows = []
     for name in rate:
-        beside, bars = (cheetah, [SINGLE_BAR]) if name.endswith("single") else (pool, list(VECTOR_BARS))
+        beside, bars = (cheetah, [SINGLE_BAR]) if name.endswith("single") else (best, list(VECTOR_BARS))
         rows.append(
             {"case": name, "bits": vector_bits() if name.startswith(IDS) else None,
              "rate": spread(rate[name]), "beside": beside, "ratio": spread(rate[name] / rate[beside]),
@@ -86,7 +86,7 @@ def page(result: dict[str, Any]) -> str:
             f"{row['rate']['median']:,.0f}",
             row["beside"],
             describe(row["ratio"]),
-            " ".join(is_met(bar, row["ratio"]) for bar in row["bars"] or ()),
+            " ".join(bar_text(bar, row["ratio"]) for bar in row["bars"] or ()),
         ]
         for row in result["rows"]
     ]

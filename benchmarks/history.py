@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from benchmarks.rounds import is_met, table
+from benchmarks.rounds import bar_text, table
 from hoof_env._output import staged
 
 RESULTS = Path(__file__).parent / "results"
@@ -84,7 +84,7 @@ def page(rows: list[dict[str, str]], folder: Path) -> str:
     for row in ordered:
         shown = row | {
             "ratio": f"{row['ratio']} ({row['q1']} to {row['q3']})",
-            "required": is_met(float(row["required"]), {"median": float(row["ratio"])}),
+            "required": bar_text(float(row["required"]), {"median": float(row["ratio"])}),
         }
         lines.append([shown[name] for name in head])
     return "\n\n".join([INTRO, "\n".join(listed), table(head, lines)]) + "\n"

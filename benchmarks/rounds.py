@@ -49,7 +49,7 @@ def describe(s: Mapping[str, Any]) -> str:
     return f"{number['median']} ({number['q1']} to {number['q3']}; {number['min']} to {number['max']})"
 
 
-def is_met(bar: float, s: Mapping[str, float] | None) -> str:
+def bar_text(bar: float, s: Mapping[str, float] | None) -> str:
     """The bar and whether the median reaches it."""
     if s is None:
         return f"{bar:g}: not measured"

@@ -26,7 +26,7 @@ import numpy as np
 from benchmarks.common import ALL, RIGID, GroundForces
 from benchmarks.history import RESULTS, write
 from benchmarks.machine import machine, vector_bits
-from benchmarks.rounds import describe, interleave, is_met, spread, table, timed
+from benchmarks.rounds import bar_text, describe, interleave, spread, table, timed
 from benchmarks.scenes import DT, Scene, engine, scenes
 from hoof_env.ground.preset import load_ground
 
@@ -234,7 +234,7 @@ def speed_table(rows: list[dict[str, Any]]) -> str:
                 str(row["bits"] or ""),
                 f"{rate / 1e6:.2f} M" if rate >= 1e6 else f"{rate / 1e3:.3g} k",
                 *(describe(ratios[a]) if a in ratios else "" for a in ASSEMBLIES),
-                *(is_met(row[bar], ratios.get("ALL")) if row[bar] else "" for bar in ("required", "aimed")),
+                *(bar_text(row[bar], ratios.get("ALL")) if row[bar] else "" for bar in ("required", "aimed")),
             ]
         )
     return table(head, lines)
