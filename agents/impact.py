@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.trunk_model import LIFT_OFF
+from hoof_env.dynamics.memory import LIFT_OFF
 
 Floats = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.limb import Limb
+from hoof_env.dynamics.parts import Limb
 from hoof_env.ground.contact import Ground, new_contacts, touch
 from hoof_env.leg.kinematics import FrameMotion, Pose, pose
 from hoof_env.leg.linkage import BODIES, FRAME, JOINTS

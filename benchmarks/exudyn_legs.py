@@ -19,9 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.common import ALL, Assembly, Outside, Record, Start
-from hoof_env.dynamics.drive import Motor
-from hoof_env.dynamics.limb import Limb
-from hoof_env.dynamics.trunk import GRAVITY, TRUNKS, Trunk
+from hoof_env.dynamics.parts import GRAVITY, TRUNKS, Limb, Motor, Trunk
 from hoof_env.leg.linkage import BODIES, FRAME, JOINTS, LOCK
 
 eii: Any = exudyn.itemInterface  # its types ask for protocols that closures do not meet by name

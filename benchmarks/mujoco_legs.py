@@ -26,9 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.common import ALL, LOCKED, RIGID, Assembly, Outside, Record, Start, corners
-from hoof_env.dynamics.drive import Motor
-from hoof_env.dynamics.limb import Limb
-from hoof_env.dynamics.trunk import GRAVITY, Trunk
+from hoof_env.dynamics.parts import GRAVITY, Limb, Motor, Trunk
 from hoof_env.leg.kinematics import Pose, cross
 
 FLYWHEEL = 1e9

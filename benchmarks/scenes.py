@@ -16,13 +16,11 @@ from typing import Any
 import numpy as np
 
 from benchmarks.common import Start
-from hoof_env.dynamics.drive import Motor
-from hoof_env.dynamics.limb import Limb
+from hoof_env.dynamics.engine import TrunkEngine
+from hoof_env.dynamics.parts import Limb, Motor, Trunk
 from hoof_env.dynamics.step_length import StepWarning
-from hoof_env.dynamics.trunk import Trunk
-from hoof_env.dynamics.trunk_engine import TrunkEngine
 from hoof_env.gait.parameters import GaitParameters, load_gait
-from hoof_env.ground.preset import load_ground
+from hoof_env.ground.contact import load_ground
 from hoof_env.leg.geometry import load_geometry
 
 DT = 1e-3

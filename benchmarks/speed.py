@@ -28,7 +28,7 @@ from benchmarks.history import RESULTS, write
 from benchmarks.machine import machine, vector_bits
 from benchmarks.rounds import bar_text, describe, interleave, spread, table, timed
 from benchmarks.scenes import DT, Scene, engine, scenes
-from hoof_env.ground.preset import load_ground
+from hoof_env.ground.contact import load_ground
 
 ROUNDS = 40
 BATCH = 1024

@@ -14,13 +14,13 @@ from hoof_env._version import __version__
 
 if TYPE_CHECKING:
     from hoof_env.dynamics.constrained import ConstrainedLeg as ConstrainedLeg
-    from hoof_env.dynamics.drive import Motor as Motor
-    from hoof_env.dynamics.drive import Prescribed as Prescribed
-    from hoof_env.dynamics.limb import Limb as Limb
-    from hoof_env.dynamics.result import Result as Result
+    from hoof_env.dynamics.engine import TrunkEngine as TrunkEngine
+    from hoof_env.dynamics.parts import Limb as Limb
+    from hoof_env.dynamics.parts import Motor as Motor
+    from hoof_env.dynamics.parts import Prescribed as Prescribed
+    from hoof_env.dynamics.parts import Result as Result
+    from hoof_env.dynamics.parts import Trunk as Trunk
     from hoof_env.dynamics.step_length import StepWarning as StepWarning
-    from hoof_env.dynamics.trunk import Trunk as Trunk
-    from hoof_env.dynamics.trunk_engine import TrunkEngine as TrunkEngine
     from hoof_env.envs.horse_leg import HorseLegEnv as HorseLegEnv
     from hoof_env.envs.multi_objective import HorseLegMOEnv as HorseLegMOEnv
     from hoof_env.envs.observation import Entry as Entry
@@ -52,12 +52,12 @@ _PUBLIC = {
     "load_gait": "hoof_env.gait.parameters",
     "Ground": "hoof_env.ground.contact",
     "Terrain": "hoof_env.ground.terrain",
-    "Trunk": "hoof_env.dynamics.trunk",
-    "TrunkEngine": "hoof_env.dynamics.trunk_engine",
-    "Limb": "hoof_env.dynamics.limb",
-    "Motor": "hoof_env.dynamics.drive",
-    "Prescribed": "hoof_env.dynamics.drive",
-    "Result": "hoof_env.dynamics.result",
+    "Trunk": "hoof_env.dynamics.parts",
+    "TrunkEngine": "hoof_env.dynamics.engine",
+    "Limb": "hoof_env.dynamics.parts",
+    "Motor": "hoof_env.dynamics.parts",
+    "Prescribed": "hoof_env.dynamics.parts",
+    "Result": "hoof_env.dynamics.parts",
     "StepWarning": "hoof_env.dynamics.step_length",
     "ConstrainedLeg": "hoof_env.dynamics.constrained",
     "HorseLegEnv": "hoof_env.envs.horse_leg",

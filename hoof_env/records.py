@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 import hoof_env
 from hoof_env._output import check_folder
-from hoof_env.dynamics.trunk_model import LIFT_OFF
+from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.envs.policies import Scripted, load_open_loop, make_policy, policy_names, read_open_loop
 from hoof_env.errors import MissingExtraError, OutputError, ParameterError, check_number
 from hoof_env.gait.parameters import PARAMETERS, GaitParameters

@@ -13,7 +13,7 @@ import pytest
 
 from hoof_env import __version__, cli
 from hoof_env.dynamics.layout import TRUNK_STATE
-from hoof_env.dynamics.trunk import GRAVITY
+from hoof_env.dynamics.parts import GRAVITY
 from hoof_env.envs.policies import make_policy
 from hoof_env.errors import HoofEnvError, OutputError, ParameterError, parse_pairs
 from hoof_env.export import MOT_COLUMNS, export_episode, write

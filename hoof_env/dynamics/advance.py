@@ -22,9 +22,9 @@ from hoof_env.dynamics.hoof import law_of, level_ground, remember_contacts
 from hoof_env.dynamics.layout import Account, LegMemory, LegRows, TrunkMemory, TrunkRows
 from hoof_env.dynamics.mechanics import evaluate, keep_still, settle
 from hoof_env.dynamics.observables import count_stride, keep_account, report_leg, report_trunk
+from hoof_env.dynamics.parts import FIXED
 from hoof_env.dynamics.reactions import LegConstants, Reactions, react
 from hoof_env.dynamics.stepping import begin_step, end_step, next_stage, weigh_stage
-from hoof_env.dynamics.trunk import FIXED
 from hoof_env.simd import anywhere, choose, columns, fill, lane_sum, level, nth, rows
 from hoof_env.simd.compile import fingerprint, inlined, kernel, pasted
 from hoof_env.simd.memory import address, doubles, offset

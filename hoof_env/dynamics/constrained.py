@@ -33,8 +33,7 @@ from hoof_env.dynamics.constraints import (
 )
 from hoof_env.dynamics.integrators import INTEGRATORS, Vector
 from hoof_env.dynamics.layout import LEG_REPORT, LEG_STATE, TRUNK_REPORT, TRUNK_STATE
-from hoof_env.dynamics.result import Result
-from hoof_env.dynamics.trunk import GRAVITY, Trunk
+from hoof_env.dynamics.parts import GRAVITY, Result, Trunk
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait.motion_law import (
     MOTION,

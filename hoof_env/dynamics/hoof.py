@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from hoof_env.ground.laws import friction_part, normal_force
-from hoof_env.ground.surface import surface
+from hoof_env.ground.terrain import surface
 from hoof_env.simd import across, anywhere, choose, cross, dot, larger, level, plane, size
 from hoof_env.simd.compile import inlined
 from hoof_env.simd.math import root_power

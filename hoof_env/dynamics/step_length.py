@@ -22,9 +22,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.drive import Motor
-from hoof_env.dynamics.limb import Limb
-from hoof_env.dynamics.trunk import GRAVITY, Trunk
+from hoof_env.dynamics.parts import GRAVITY, Limb, Motor, Trunk
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.stiffness import LARGEST_ANGLE, SCHEMES, contact_rates
 from hoof_env.ground.terrain import Terrain

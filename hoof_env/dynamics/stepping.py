@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from hoof_env.dynamics.layout import LegRows
 from hoof_env.dynamics.mechanics import MOVING
-from hoof_env.dynamics.trunk import FIXED, FREE
+from hoof_env.dynamics.parts import FIXED, FREE
 from hoof_env.gait.motion_law import INNER, SPEED
 from hoof_env.simd import choose, nth
 from hoof_env.simd.compile import inlined

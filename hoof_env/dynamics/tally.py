@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.drive import Motor
-from hoof_env.dynamics.trunk import GRAVITY
+from hoof_env.dynamics.parts import GRAVITY, Motor
 from hoof_env.leg.profile import by_name
 
 if TYPE_CHECKING:
-    from hoof_env.dynamics.trunk_engine import TrunkEngine
+    from hoof_env.dynamics.engine import TrunkEngine
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

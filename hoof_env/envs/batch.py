@@ -15,15 +15,12 @@ from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.advance import TRUNK_ROWS
-from hoof_env.dynamics.drive import LARGEST, Drive
+from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.integrators import INTEGRATORS
 from hoof_env.dynamics.layout import LegMemory, TrunkMemory
-from hoof_env.dynamics.limb import Limb
-from hoof_env.dynamics.result import Result
+from hoof_env.dynamics.parts import GRAVITY, LARGEST, ONE_LEG, Drive, Limb, Result, Trunk
 from hoof_env.dynamics.schemes import SCHEMES
 from hoof_env.dynamics.step_length import StepLength
-from hoof_env.dynamics.trunk import GRAVITY, ONE_LEG, Trunk
-from hoof_env.dynamics.trunk_engine import TrunkEngine
 from hoof_env.envs import step as kernels
 from hoof_env.envs.episode import ACTIONS, SUMS, episode_layout
 from hoof_env.envs.grounds import make_terrain
@@ -45,8 +42,7 @@ from hoof_env.envs.summary import summary_of
 from hoof_env.envs.tasks import Settings, Task
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait.parameters import GaitParameters, gait_names, load_gait
-from hoof_env.ground.contact import Ground
-from hoof_env.ground.preset import load_ground
+from hoof_env.ground.contact import Ground, load_ground
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.profile import leg_profile
 from hoof_env.simd.compile import what_cannot_be_compiled

@@ -12,8 +12,8 @@ from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.trunk_engine import TrunkEngine
-from hoof_env.dynamics.trunk_model import LIFT_OFF
+from hoof_env.dynamics.engine import TrunkEngine
+from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.envs.batch import EpisodeBatch
 from hoof_env.envs.episode import ACTIONS, FAILED
 from hoof_env.envs.infos import AT_MEASURED, BEGUN, LAST_STEP, MEASURED, START, named

@@ -17,9 +17,9 @@ from typing import Any
 
 from hoof_env._output import markdown_table
 from hoof_env.dynamics.integrators import INTEGRATORS
+from hoof_env.dynamics.memory import LIFT_OFF
+from hoof_env.dynamics.parts import ONE_LEG
 from hoof_env.dynamics.schemes import SCHEMES
-from hoof_env.dynamics.trunk import ONE_LEG
-from hoof_env.dynamics.trunk_model import LIFT_OFF
 from hoof_env.envs import start
 from hoof_env.envs.grounds import HILLS, SPACING
 from hoof_env.envs.infos import MEASURED

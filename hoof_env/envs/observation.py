@@ -11,7 +11,7 @@ import numpy as np
 
 from hoof_env.errors import ParameterError
 from hoof_env.gait.parameters import LIMITS
-from hoof_env.ground.surface import surface
+from hoof_env.ground.terrain import surface
 from hoof_env.simd import choose
 from hoof_env.simd.compile import inlined
 from hoof_env.simd.math import cos_sin

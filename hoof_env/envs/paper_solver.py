@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.constrained import TRACE, ConstrainedLeg, ConstrainedState, new_trace
+from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.layout import LEG_REPORT, LEG_STATE, TRUNK_REPORT, TRUNK_STATE
-from hoof_env.dynamics.result import Result
+from hoof_env.dynamics.memory import LIFT_OFF, Memory, memory_of
+from hoof_env.dynamics.parts import Result
 from hoof_env.dynamics.stance import Stance
-from hoof_env.dynamics.trunk_engine import TrunkEngine
-from hoof_env.dynamics.trunk_model import LIFT_OFF, Memory, memory_of
 from hoof_env.envs.tasks import Settings
 from hoof_env.errors import ParameterError
 from hoof_env.gait.parameters import GaitParameters

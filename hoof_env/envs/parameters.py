@@ -8,12 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from hoof_env.dynamics.drive import Drive, Motor, Prescribed
-from hoof_env.dynamics.trunk import Trunk
+from hoof_env.dynamics.parts import Drive, Motor, Prescribed, Trunk
 from hoof_env.envs.tasks import PER_EPISODE, SOLVERS, Settings, check_effect
 from hoof_env.errors import ParameterError, check_choice, check_number
-from hoof_env.ground.contact import Ground
-from hoof_env.ground.preset import load_ground
+from hoof_env.ground.contact import Ground, load_ground
 
 MOST_SUBSTEPS = 100_000
 """Of a control step."""

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.result import Result
+from hoof_env.dynamics.parts import Result
 from hoof_env.envs.batch import EpisodeBatch
 from hoof_env.render.instant import columns_of_engine, instants
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.arguments import count
-from hoof_env.dynamics.trunk import Trunk
+from hoof_env.dynamics.parts import Trunk
 from hoof_env.envs.parameters import check_parameters
 from hoof_env.envs.tasks import Settings
 from hoof_env.errors import ParameterError, check_choice, check_number

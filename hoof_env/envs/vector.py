@@ -20,7 +20,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.arguments import count
-from hoof_env.dynamics.trunk_model import LIFT_OFF
+from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.envs.batch import EpisodeBatch
 from hoof_env.envs.episode import ACTIONS, FAILED, TRUNCATED
 from hoof_env.envs.infos import named

@@ -17,7 +17,7 @@ import numpy as np
 
 from hoof_env.errors import HoofEnvError, ParameterError, check_choice, check_number
 from hoof_env.gait.parameters import load_gait
-from hoof_env.ground.preset import load_ground
+from hoof_env.ground.contact import load_ground
 from hoof_env.identify.candidate import Choice, encode, to_preset
 from hoof_env.identify.confirm import GIVEN_UP, JUDGED, confirm
 from hoof_env.identify.job import CHECKPOINT_EVERY

@@ -23,8 +23,7 @@ from typing import Any
 
 from hoof_env.errors import DataFileError, HoofEnvError, ParameterError, check_choice, check_number
 from hoof_env.gait.parameters import GaitParameters
-from hoof_env.ground.contact import Ground
-from hoof_env.ground.preset import read_ground, write_ground
+from hoof_env.ground.contact import Ground, read_ground, write_ground
 from hoof_env.leg.geometry import Geometry
 
 GAITS = ("walk", "run")

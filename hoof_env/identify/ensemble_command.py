@@ -19,8 +19,7 @@ from hoof_env.errors import (
     check_choice,
     check_number,
 )
-from hoof_env.ground.contact import Ground
-from hoof_env.ground.preset import load_ground
+from hoof_env.ground.contact import Ground, load_ground
 from hoof_env.identify.candidate import Choice, names
 from hoof_env.identify.command import check_extras, digest_of, load_start
 from hoof_env.identify.confirm import GIVEN_UP, JUDGED

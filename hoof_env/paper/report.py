@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from hoof_env import __version__
 from hoof_env._output import markdown_table
-from hoof_env.ground.preset import HERTZ
+from hoof_env.ground.contact import HERTZ
 from hoof_env.paper.measure import hoof_error, measure_stance
 from hoof_env.paper.rows import (
     EULER,

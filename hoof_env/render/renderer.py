@@ -16,7 +16,7 @@ from gymnasium import logger
 from gymnasium.error import DependencyNotInstalled, ResetNeeded
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.trunk import ONE_LEG
+from hoof_env.dynamics.parts import ONE_LEG
 from hoof_env.errors import HoofEnvError, ParameterError, check_choice, check_number
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry

@@ -16,11 +16,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.drive import Motor
-from hoof_env.dynamics.limb import Limb
+from hoof_env.dynamics.engine import TrunkEngine
+from hoof_env.dynamics.parts import Limb, Motor, Trunk
 from hoof_env.dynamics.step_length import StepWarning
-from hoof_env.dynamics.trunk import Trunk
-from hoof_env.dynamics.trunk_engine import TrunkEngine
 from hoof_env.errors import ParameterError
 from hoof_env.gait.parameters import GaitParameters, load_gait
 from hoof_env.ground.contact import Ground

@@ -8,10 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.limb import Limb
+from hoof_env.dynamics.engine import TrunkEngine
+from hoof_env.dynamics.parts import Limb, Trunk
 from hoof_env.dynamics.step_length import StepWarning
-from hoof_env.dynamics.trunk import Trunk
-from hoof_env.dynamics.trunk_engine import TrunkEngine
 from hoof_env.gait.parameters import load_gait
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import pose

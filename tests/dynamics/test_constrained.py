@@ -15,12 +15,9 @@ from hypothesis import strategies as st
 
 from hoof_env.dynamics.constrained import TRACE, ConstrainedLeg, new_trace
 from hoof_env.dynamics.constraints import closed_form
-from hoof_env.dynamics.drive import Prescribed
-from hoof_env.dynamics.limb import Limb
-from hoof_env.dynamics.result import Result
+from hoof_env.dynamics.engine import TrunkEngine
+from hoof_env.dynamics.parts import GRAVITY, Limb, Prescribed, Result, Trunk
 from hoof_env.dynamics.step_length import StepWarning
-from hoof_env.dynamics.trunk import GRAVITY, Trunk
-from hoof_env.dynamics.trunk_engine import TrunkEngine
 from hoof_env.errors import ParameterError
 from hoof_env.gait.parameters import LIMITS, GaitParameters, load_gait
 from hoof_env.ground.contact import Ground

@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from hoof_env.dynamics.drive import Motor, Prescribed
-from hoof_env.dynamics.limb import Limb
-from hoof_env.dynamics.trunk import GRAVITY, TRUNKS, Trunk
+from hoof_env.dynamics.parts import GRAVITY, TRUNKS, Limb, Motor, Prescribed, Trunk
 from hoof_env.errors import ParameterError
 from hoof_env.gait.parameters import load_gait
 from hoof_env.ground.contact import Ground

@@ -4,11 +4,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hoof_env.dynamics.drive import Motor, Prescribed
-from hoof_env.dynamics.limb import Limb
-from hoof_env.dynamics.result import Result
-from hoof_env.dynamics.trunk import TRUNKS, Trunk
-from hoof_env.dynamics.trunk_engine import TrunkEngine
+from hoof_env.dynamics.engine import TrunkEngine
+from hoof_env.dynamics.parts import TRUNKS, Limb, Motor, Prescribed, Result, Trunk
 from hoof_env.gait.motion_law import FILTER, FilterSettings, command_filters
 from hoof_env.gait.parameters import LIMITS, PARAMETERS, GaitParameters
 from hoof_env.ground.contact import Ground

@@ -3,12 +3,9 @@
 import numpy as np
 import pytest
 
-from hoof_env.dynamics.drive import Motor, Prescribed
-from hoof_env.dynamics.limb import Limb
-from hoof_env.dynamics.result import Result
+from hoof_env.dynamics.engine import FEW, TrunkEngine
+from hoof_env.dynamics.parts import TRUNKS, Limb, Motor, Prescribed, Result, Trunk
 from hoof_env.dynamics.schemes import SCHEMES
-from hoof_env.dynamics.trunk import TRUNKS, Trunk
-from hoof_env.dynamics.trunk_engine import FEW, TrunkEngine
 from hoof_env.errors import ParameterError
 from hoof_env.gait.parameters import load_gait
 from hoof_env.ground.contact import Ground

@@ -3,11 +3,8 @@
 import numpy as np
 import pytest
 
-from hoof_env.dynamics.drive import Motor, Prescribed
-from hoof_env.dynamics.limb import Limb
-from hoof_env.dynamics.result import Result
-from hoof_env.dynamics.trunk import Trunk
-from hoof_env.dynamics.trunk_engine import TrunkEngine
+from hoof_env.dynamics.engine import TrunkEngine
+from hoof_env.dynamics.parts import Limb, Motor, Prescribed, Result, Trunk
 from hoof_env.errors import ParameterError
 from hoof_env.gait.parameters import GaitParameters, load_gait
 from hoof_env.leg.geometry import load_geometry

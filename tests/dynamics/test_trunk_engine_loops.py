@@ -5,10 +5,8 @@ import pytest
 
 from hoof_env.dynamics.constrained import SOLE, ConstrainedLeg
 from hoof_env.dynamics.constraints import DRIVER_ROW, closed_form
-from hoof_env.dynamics.drive import Motor, Prescribed
-from hoof_env.dynamics.limb import Limb
-from hoof_env.dynamics.trunk import Trunk
-from hoof_env.dynamics.trunk_engine import TrunkEngine
+from hoof_env.dynamics.engine import TrunkEngine
+from hoof_env.dynamics.parts import Limb, Motor, Prescribed, Trunk
 from hoof_env.gait.motion_law import command_filters, evaluate_motion
 from hoof_env.gait.parameters import LIMITS, PARAMETERS, load_gait
 from hoof_env.ground.contact import Ground

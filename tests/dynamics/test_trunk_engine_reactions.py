@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 
 from hoof_env.dynamics.constrained import ConstrainedLeg
-from hoof_env.dynamics.drive import Prescribed
-from hoof_env.dynamics.limb import Limb
-from hoof_env.dynamics.trunk import GRAVITY, Trunk
-from hoof_env.dynamics.trunk_engine import TrunkEngine
+from hoof_env.dynamics.engine import TrunkEngine
+from hoof_env.dynamics.parts import GRAVITY, Limb, Prescribed, Trunk
 from hoof_env.errors import ParameterError
 from hoof_env.gait.parameters import load_gait
 from hoof_env.ground.contact import Ground

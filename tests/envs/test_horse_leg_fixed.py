@@ -11,7 +11,7 @@ from family import actions, same, substeps, together
 
 import hoof_env  # noqa: F401
 from hoof_env.errors import DataFileError, ParameterError
-from hoof_env.ground.preset import load_ground
+from hoof_env.ground.contact import load_ground
 from hoof_env.leg.geometry import preset_names, read_preset
 
 FIXED, LEG = "hoof_env/HorseLegFixed-v0", "hoof_env/HorseLeg-v0"

@@ -10,8 +10,8 @@ import pytest
 from family import IDS, actions, effective, roll, same, substeps
 
 from hoof_env import RandomizeParameters
+from hoof_env.dynamics.parts import GRAVITY
 from hoof_env.dynamics.step_length import StepWarning
-from hoof_env.dynamics.trunk import GRAVITY
 from hoof_env.envs.tasks import PER_EPISODE, Settings
 from hoof_env.errors import ParameterError
 

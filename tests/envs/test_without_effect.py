@@ -12,7 +12,7 @@ from family import IDS, actions, same
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 from hoof_env import RandomizeParameters, Sb3VecEnv
-from hoof_env.dynamics.trunk import ONE_LEG
+from hoof_env.dynamics.parts import ONE_LEG
 from hoof_env.envs.batch import EpisodeBatch
 from hoof_env.envs.reward import check_weights
 from hoof_env.envs.tasks import NEEDED, PER_EPISODE, TASKS, Settings, check_effect

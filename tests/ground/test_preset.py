@@ -5,8 +5,7 @@ import json
 import pytest
 
 from hoof_env.errors import DataFileError, ParameterError
-from hoof_env.ground.contact import Ground
-from hoof_env.ground.preset import load_ground, read_ground, write_ground
+from hoof_env.ground.contact import Ground, load_ground, read_ground, write_ground
 from hoof_env.leg.geometry import preset_names, read_preset
 
 

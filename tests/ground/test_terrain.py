@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numba import njit
 
 from hoof_env.errors import ParameterError
-from hoof_env.ground import surface as lanes
+from hoof_env.ground import terrain as lanes
 from hoof_env.ground.terrain import LONG_WAY, Terrain
 
 

@@ -10,7 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from hoof_env.dynamics.constrained import ConstrainedLeg, new_trace
-from hoof_env.dynamics.result import Result
+from hoof_env.dynamics.parts import Result
 from hoof_env.errors import GeometryError, ParameterError
 from hoof_env.gait.parameters import LIMITS, GaitParameters, load_gait
 from hoof_env.ground.contact import Ground

@@ -15,7 +15,7 @@ import pytest
 
 from hoof_env import cli
 from hoof_env.errors import DataFileError, HoofEnvError, OutputError, ParameterError
-from hoof_env.ground.preset import load_ground
+from hoof_env.ground.contact import load_ground
 from hoof_env.identify import ensemble_attempt, ensemble_command, ensemble_search
 from hoof_env.identify.candidate import Choice, to_preset
 from hoof_env.identify.command import load_start

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hoof_env.errors import GeometryError, HoofEnvError
-from hoof_env.ground.preset import load_ground
+from hoof_env.ground.contact import load_ground
 from hoof_env.identify.candidate import Choice
 from hoof_env.identify.command import load_start, ship
 from hoof_env.identify.confirm import JUDGED, confirm

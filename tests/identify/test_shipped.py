@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hoof_env.gait.parameters import load_gait
-from hoof_env.ground.preset import load_ground
+from hoof_env.ground.contact import load_ground
 from hoof_env.identify.candidate import encode
 from hoof_env.identify.confirm import confirm
 from hoof_env.identify.ensemble import load_ensemble

@@ -12,9 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.drive import Motor
-from hoof_env.dynamics.limb import Limb
-from hoof_env.dynamics.trunk import Trunk
+from hoof_env.dynamics.parts import Limb, Motor, Trunk
 from hoof_env.errors import ParameterError
 from hoof_env.gait.motion_law import COS, OFFSET, SIN
 from hoof_env.leg.linkage import BODIES, CONSTRUCTION, Dyad

@@ -10,9 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.drive import Motor
-from hoof_env.dynamics.limb import Limb
-from hoof_env.dynamics.trunk import Trunk
+from hoof_env.dynamics.parts import Limb, Motor, Trunk
 from hoof_env.errors import ParameterError
 from hoof_env.gait.parameters import GaitParameters
 from hoof_env.ground.contact import Ground

@@ -19,9 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.drive import Drive, Motor
-from hoof_env.dynamics.limb import Limb
-from hoof_env.dynamics.trunk import GRAVITY, TRUNKS, Trunk
+from hoof_env.dynamics.parts import GRAVITY, TRUNKS, Drive, Limb, Motor, Trunk
 from hoof_env.gait.motion_law import SPEED
 from hoof_env.ground.contact import Ground
 from tests.oracle.bodies import PlainBodies

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from hoof_env.ground.contact import Ground
-from hoof_env.ground.preset import load_ground
+from hoof_env.ground.contact import Ground, load_ground
 from hoof_env.paper.measure import SUMS, measure_stance, replay
 from hoof_env.paper.reproduce import GAITS, run_cycle
 

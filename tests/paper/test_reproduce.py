@@ -9,7 +9,7 @@ import pytest
 
 from hoof_env.errors import OutputError, ParameterError
 from hoof_env.gait.parameters import load_gait
-from hoof_env.ground.preset import load_ground
+from hoof_env.ground.contact import load_ground
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
 from hoof_env.leg.linkage import POINTS

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from benchmarks.common import ALL, Assembly, Record
 from benchmarks.exudyn_legs import ExudynLegs
 from benchmarks.mujoco_legs import MujocoLegs
-from hoof_env.dynamics.drive import Motor
-from hoof_env.dynamics.trunk import TRUNKS
+from hoof_env.dynamics.parts import TRUNKS, Motor
 from tests.peers.cases import Case
 
 PEERS = {"MuJoCo": MujocoLegs, "Exudyn": ExudynLegs}

@@ -9,12 +9,9 @@ from typing import Any
 import numpy as np
 
 from benchmarks.common import Assembly, GroundForces, Record, Start, corners
-from hoof_env.dynamics.drive import Drive, Motor, Prescribed
-from hoof_env.dynamics.limb import Limb
-from hoof_env.dynamics.trunk import Trunk
+from hoof_env.dynamics.parts import Drive, Limb, Motor, Prescribed, Trunk
 from hoof_env.gait.parameters import load_gait
-from hoof_env.ground.contact import Ground
-from hoof_env.ground.preset import load_ground
+from hoof_env.ground.contact import Ground, load_ground
 from hoof_env.leg.geometry import load_geometry
 from tests.peers.trunk_legs import TrunkLegs
 

@@ -5,9 +5,7 @@ import pytest
 
 from benchmarks.common import ALL, RIGID, Start
 from hoof_env.dynamics.constrained import ConstrainedLeg
-from hoof_env.dynamics.drive import Motor, Prescribed
-from hoof_env.dynamics.limb import Limb
-from hoof_env.dynamics.trunk import Trunk
+from hoof_env.dynamics.parts import Limb, Motor, Prescribed, Trunk
 from hoof_env.gait.parameters import GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry

@@ -8,7 +8,7 @@ pytest.importorskip("mujoco")
 pytest.importorskip("exudyn")
 
 from benchmarks.common import ALL
-from hoof_env.dynamics.drive import Motor
+from hoof_env.dynamics.parts import Motor
 from tests.peers.agreement import PEERS, compare, quantities
 from tests.peers.cases import CASES, Case
 

@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 
 from benchmarks.common import RIGID, GroundForces, Start
-from hoof_env.dynamics.drive import Motor
-from hoof_env.dynamics.limb import Limb
-from hoof_env.dynamics.trunk import Trunk
+from hoof_env.dynamics.parts import Limb, Motor, Trunk
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
 

@@ -8,10 +8,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.common import ALL, Assembly, Record, Start
-from hoof_env.dynamics.limb import Limb
-from hoof_env.dynamics.result import Result
-from hoof_env.dynamics.trunk import Trunk
-from hoof_env.dynamics.trunk_engine import TrunkEngine
+from hoof_env.dynamics.engine import TrunkEngine
+from hoof_env.dynamics.parts import Limb, Result, Trunk
 from hoof_env.gait.parameters import GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.kinematics import FrameMotion, pose

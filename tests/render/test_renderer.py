@@ -14,9 +14,8 @@ import numpy as np
 import pytest
 from gymnasium.error import DependencyNotInstalled, ResetNeeded
 
-from hoof_env.dynamics.limb import Limb
-from hoof_env.dynamics.trunk import Trunk
-from hoof_env.dynamics.trunk_engine import TrunkEngine
+from hoof_env.dynamics.engine import TrunkEngine
+from hoof_env.dynamics.parts import Limb, Trunk
 from hoof_env.envs.policies import make_policy
 from hoof_env.errors import HoofEnvError, ParameterError
 from hoof_env.gait.parameters import LIMITS, PARAMETERS, load_gait

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.advance import LANES, LEG_ROWS, MODEL, TRUNK_ROWS
-from hoof_env.dynamics.drive import Motor
 from hoof_env.dynamics.layout import (
     LEG_REPORT,
     LEG_STATE,
@@ -20,10 +19,9 @@ from hoof_env.dynamics.layout import (
     TrunkMemory,
     TrunkSettings,
 )
-from hoof_env.dynamics.limb import Limb
+from hoof_env.dynamics.parts import GRAVITY, TRUNKS, Limb, Motor, Trunk
 from hoof_env.dynamics.reactions import Reactions, leg_constants
 from hoof_env.dynamics.schemes import SCHEMES
-from hoof_env.dynamics.trunk import GRAVITY, TRUNKS, Trunk
 from hoof_env.errors import ParameterError
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.laws import FRICTION_LAWS
@@ -32,7 +30,7 @@ from hoof_env.simd.math import EXPONENT_UNIT
 from hoof_env.simd.memory import aligned
 
 if TYPE_CHECKING:
-    from hoof_env.dynamics.trunk_engine import TrunkEngine
+    from hoof_env.dynamics.engine import TrunkEngine
 
 Floats = NDArray[np.float64]
 

@@ -23,7 +23,7 @@ from hoof_env.dynamics.advance import (
     advance_kernels,
 )
 from hoof_env.dynamics.arguments import Floats, all_of, count, finite, flag, one_of
-from hoof_env.dynamics.drive import Drive
+from hoof_env.dynamics.engine_state import STATE, gaits_of, layout, read_state, start, which
 from hoof_env.dynamics.layout import (
     ACCOUNT,
     LEG_REPORT,
@@ -34,13 +34,7 @@ from hoof_env.dynamics.layout import (
     TRUNK_STATE,
     LegMemory,
 )
-from hoof_env.dynamics.limb import Limb
-from hoof_env.dynamics.result import Result
-from hoof_env.dynamics.schemes import SCHEMES
-from hoof_env.dynamics.step_length import StepLength
-from hoof_env.dynamics.tally import Tally, tally
-from hoof_env.dynamics.trunk import GRAVITY, Trunk
-from hoof_env.dynamics.trunk_model import (
+from hoof_env.dynamics.memory import (
     check_shared,
     columns_for,
     memory_of,
@@ -49,8 +43,10 @@ from hoof_env.dynamics.trunk_model import (
     new_model,
     settings_of,
 )
-from hoof_env.dynamics.trunk_start import gaits_of, start, which
-from hoof_env.dynamics.trunk_state import STATE, layout, read_state
+from hoof_env.dynamics.parts import GRAVITY, Drive, Limb, Result, Trunk
+from hoof_env.dynamics.schemes import SCHEMES
+from hoof_env.dynamics.step_length import StepLength
+from hoof_env.dynamics.tally import Tally, tally
 from hoof_env.errors import NotStartedError, ParameterError, check_choice, check_number
 from hoof_env.gait.motion_law import FilterSettings
 from hoof_env.gait.parameters import GaitParameters

@@ -1,0 +1,171 @@
+"""What the legs hang from: a trunk that is fixed, on a rail, suspended by the rest of the animal, or free."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+from hoof_env.errors import ParameterError, check_choice, check_number
+from hoof_env.leg.geometry import Geometry
+
+GRAVITY = 9.81
+"""[m/s^2], as in the paper's Table 1."""
+
+TRUNKS = ("fixed", "rail", "suspended", "free")
+"""Kinds of trunk; the kernels take the position in this tuple."""
+
+FIXED, RAIL, SUSPENDED, FREE = range(4)
+
+ONE_LEG = TRUNKS[:FREE]
+"""The kinds of the environments: a free trunk on one leg is no task."""
+
+
+@dataclass(frozen=True)
+class Trunk:
+    """The trunk over one leg, or over several; with one, O, the crank centre, is its point by default.
+
+    "fixed": O stays where it is. "rail": O slides along x at fixed height. "suspended": O moves along x and
+    y; the leg must bear `share` of the weight of trunk and leg, the rest of the animal carries the other part
+    and adds a vertical spring and damper towards `height`. These three do not pitch. "free": the trunk moves
+    along x and y and pitches, under its weight, its drag and its legs.
+
+    Attributes:
+        kind: one of `TRUNKS`.
+        mass: trunk mass that goes with the legs [kg], without their own.
+        share: part of the weight that the leg must bear, 0 to 1; "suspended" only.
+        stiffness, damping: vertical spring [N/m] and damper [N s/m]; "suspended" only.
+        drag: resistance to forward motion [N s/m].
+        height: height of O above the ground [m] where the spring is at rest, of the rail, or at a start.
+        pitch_inertia: of the trunk about its centre of mass [kg m^2]; "free" only.
+
+    Raises:
+        ParameterError: an unknown kind or a value out of range.
+    """
+
+    kind: str = "suspended"
+    mass: float = 80.0
+    share: float = 0.8
+    stiffness: float = 4000.0
+    damping: float = 1130.0
+    drag: float = 20.0
+    height: float = 1.7
+    pitch_inertia: float = 20.0
+
+    def __post_init__(self) -> None:
+        check_choice("trunk", self.kind, TRUNKS)
+        check_number("trunk_mass", self.mass, low=0, exclusive_low=True)
+        check_number("trunk_share", self.share, low=0, high=1)
+        check_number("trunk_stiffness", self.stiffness, low=0)
+        check_number("trunk_damping", self.damping, low=0)
+        check_number("trunk_drag", self.drag, low=0)
+        check_number("trunk_height", self.height, low=0, exclusive_low=True)
+        check_number("trunk_pitch_inertia", self.pitch_inertia, low=0, exclusive_low=True)
+
+
+@dataclass(frozen=True)
+class Prescribed:
+    """The crank follows the filtered command exactly (the paper's driver, row 42 of Eq. 2)."""
+
+
+LARGEST = 1e9
+"""Of each number of a motor, whose squares are then numbers still."""
+
+
+@dataclass(frozen=True)
+class Motor:
+    """A speed servo: torque = speed_gain (commanded - actual crank speed), limited to +-torque_limit.
+
+    The rotor sits on the leg's frame, turns `gear_ratio` times as fast as the crank and in the same sense;
+    what it adds to the crank's inertia is gear_ratio^2 rotor_inertia.
+
+    Attributes:
+        speed_gain: [N m s/rad], at the crank.
+        torque_limit: [N m], at the crank.
+        rotor_inertia: of the rotor about its axis [kg m^2].
+        gear_ratio: turns of the rotor for one of the crank [-].
+
+    Raises:
+        ParameterError: a value is not finite, negative or beyond `LARGEST`.
+    """
+
+    speed_gain: float = 100.0
+    torque_limit: float = 600.0
+    rotor_inertia: float = 2e-4
+    gear_ratio: float = 50.0
+
+    def __post_init__(self) -> None:
+        for name in ("speed_gain", "torque_limit", "rotor_inertia", "gear_ratio"):
+            check_number(f"motor.{name}", getattr(self, name), low=0, high=LARGEST)
+
+    @property
+    def reflected_inertia(self) -> float:
+        """What the rotor adds to the inertia of the crank [kg m^2]."""
+        return self.gear_ratio**2 * self.rotor_inertia
+
+
+Drive = Prescribed | Motor
+
+
+FARTHEST = 1e3
+"""Of O from the trunk's centre of mass [m]."""
+
+
+@dataclass(frozen=True)
+class Limb:
+    """One leg on a trunk.
+
+    Attributes:
+        geometry: the leg.
+        hip: where the crank centre O sits on the trunk, from the trunk's centre of mass [m], forward and up.
+        drive: what turns its crank.
+
+    Raises:
+        ParameterError: a part is of the wrong type, not finite, or the hip beyond `FARTHEST`.
+    """
+
+    geometry: Geometry
+    hip: tuple[float, float] = (0.0, 0.0)
+    drive: Drive = field(default_factory=Motor)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.geometry, Geometry):
+            raise ParameterError(f"limb.geometry: expected a Geometry, got {self.geometry!r}")
+        if not isinstance(self.drive, (Prescribed, Motor)):
+            raise ParameterError(f"limb.drive: expected a Motor or Prescribed, got {self.drive!r}")
+        try:
+            x, y = self.hip
+        except (TypeError, ValueError):
+            raise ParameterError(
+                f"limb.hip: expected two numbers (x, y) in metres, got {self.hip!r}"
+            ) from None
+        hip = tuple(
+            check_number(f"limb.hip[{k}]", v, low=-FARTHEST, high=FARTHEST) for k, v in enumerate((x, y))
+        )
+        object.__setattr__(self, "hip", hip)
+
+
+class Result(IntEnum):
+    """Outcome of an advance."""
+
+    OK = 0
+    NOT_FINITE = 1
+    SINGULAR = 2
+    DEAD_POINT = 3
+    FALLEN = 4
+
+    @property
+    def message(self) -> str:
+        """What happened, for people."""
+        return _MESSAGES[self]
+
+
+_MESSAGES = {
+    Result.OK: "ok",
+    Result.NOT_FINITE: "the state stopped being finite; it was put back to the last good one",
+    Result.SINGULAR: "the equations of motion are singular; the state was put back to the last good one",
+    Result.DEAD_POINT: (
+        "a crank was driven to an angle at which its linkage does not close; "
+        "the state was put back to the last good one"
+    ),
+    Result.FALLEN: "the trunk fell through the ground; the state was put back to the last good one",
+}
