@@ -17,7 +17,7 @@ from hoof_env.dynamics.constrained import TRACE, ConstrainedLeg, ConstrainedStat
 from hoof_env.dynamics.lanes_report import LIMB_REPORT, TRUNK_REPORT
 from hoof_env.dynamics.limb_rows import STATE as LIMB_STATE
 from hoof_env.dynamics.result import Result
-from hoof_env.dynamics.stance import Stance
+from hoof_env.dynamics.stance import StanceCounter
 from hoof_env.dynamics.trunk_engine import TrunkEngine
 from hoof_env.dynamics.trunk_model import LIFT_OFF, Memory, memory_of
 from hoof_env.dynamics.trunk_rows import STATE as TRUNK_STATE
@@ -31,7 +31,7 @@ Records = NDArray[np.void]
 ACCOUNT = np.dtype(
     [("open", "?"), ("began", "f8"), ("peak", "f8"), ("count", "i8"), ("impulse", "f8"), ("loaded", "f8")]
 )
-"""A stance as `dynamics.stance.Stance` has it, and over the episode the impulse of the normal force
+"""A stance as `dynamics.stance.StanceCounter` has it, and over the episode the impulse of the normal force
 [N s] and the time under load [s]."""
 
 APART = 1.0
@@ -172,7 +172,7 @@ class PaperSolver:
         """The rows `limb_rows.STRIDE_SUMS` of a control step; the account goes on."""
         h = self.legs[env].sim_dt
         *stance, impulse_before, loaded_before = self._accounts[env].item()
-        since, impulse, loaded = Stance(self._threshold, *stance), impulse_before, loaded_before
+        since, impulse, loaded = StanceCounter(self._threshold, *stance), impulse_before, loaded_before
         stances = since.count
         normal = trace["toe_normal"] + trace["heel_normal"]
         friction = trace["toe_friction"] + trace["heel_friction"]
