@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 
 @dataclass
-class Stance:
+class StanceCounter:
     """Stances of one leg so far.
 
     Attributes:

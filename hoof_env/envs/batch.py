@@ -131,8 +131,7 @@ class EpisodeBatch:
         self.paper = PaperSolver(s, self.engine, self.substeps) if is_paper else None
         self._varied = np.zeros(num_envs, bool)
         self.begun = np.full((BEGUN + len(self.randomize), num_envs), np.nan)
-        self.entries = observed(self.groups, s.trunk, task.entries)
-        self.names = [entry.name for entry in self.entries]
+        self.names = [entry.name for entry in observed(self.groups, s.trunk, task.entries)]
         if not self.names:
             raise ParameterError(f"observation: nothing of {s.observation!r} is observed on a fixed trunk")
         columns = self.engine.columns
@@ -168,12 +167,13 @@ class EpisodeBatch:
         task["stays"] = self.settings.trunk == "fixed"
         task["count"], task["places"] = len(self.names), -1
         for entry, slot in zip(self.task.entries, slots, strict=True):
-            if entry in self.entries:
-                task["places"][slot] = self.entries.index(entry)
+            if entry.name in self.names:
+                task["places"][slot] = self.names.index(entry.name)
         return found
 
     def _open(self) -> None:
         """Find the arrays where they are now, and the kernels."""
+        self.entries = observed(self.groups, self.settings.trunk, self.task.entries)
         self.now = views(episode_layout(len(self.task.terms)), self.episode)
         self._kernels = k = kernels.step_kernels(self.task.terms, self.task.entries, self.task.contact_law)
         is_few = self.engine.is_few or self.paper
@@ -452,7 +452,7 @@ class EpisodeBatch:
         return {
             key: value
             for key, value in vars(self).items()
-            if key not in ("addresses", "kernel", "now", "_kernels", "_observe")
+            if key not in ("addresses", "entries", "kernel", "now", "_kernels", "_observe")
         }
 
     def __setstate__(self, state: dict[str, Any]) -> None:

@@ -18,7 +18,7 @@ from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.layout import LEG_REPORT, LEG_STATE, TRUNK_REPORT, TRUNK_STATE
 from hoof_env.dynamics.memory import LIFT_OFF, Memory, memory_of
 from hoof_env.dynamics.parts import Result
-from hoof_env.dynamics.stance import Stance
+from hoof_env.dynamics.stance import StanceCounter
 from hoof_env.envs.tasks import Settings
 from hoof_env.errors import ParameterError
 from hoof_env.gait.parameters import GaitParameters
@@ -29,7 +29,7 @@ Records = NDArray[np.void]
 ACCOUNT = np.dtype(
     [("open", "?"), ("began", "f8"), ("peak", "f8"), ("count", "i8"), ("impulse", "f8"), ("loaded", "f8")]
 )
-"""A stance as `dynamics.stance.Stance` has it, and over the episode the impulse of the normal force
+"""A stance as `dynamics.stance.StanceCounter` has it, and over the episode the impulse of the normal force
 [N s] and the time under load [s]."""
 
 APART = 1.0
@@ -170,7 +170,7 @@ class PaperSolver:
         """The rows `layout.StrideSums` of a control step; the account goes on."""
         h = self.legs[env].sim_dt
         *stance, impulse_before, loaded_before = self._accounts[env].item()
-        since, impulse, loaded = Stance(self._threshold, *stance), impulse_before, loaded_before
+        since, impulse, loaded = StanceCounter(self._threshold, *stance), impulse_before, loaded_before
         stances = since.count
         normal = trace["toe_normal"] + trace["heel_normal"]
         friction = trace["toe_friction"] + trace["heel_friction"]

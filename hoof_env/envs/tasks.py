@@ -142,6 +142,10 @@ class Task:
         """The registered id."""
         return self.name if "/" in self.name else f"hoof_env/{self.name}-v0"
 
+    def __reduce__(self) -> Any:
+        """Copies and pickles are this one: what it is made of may be functions without a name."""
+        return task_of, (next(name for name, task in {**TASKS, **_OWN}.items() if task is self),)
+
     def settings(self, changes: Mapping[str, Any]) -> Settings:
         """Its settings with some changed; reward weights that are not named keep the task's values.
 

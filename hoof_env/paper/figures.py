@@ -94,13 +94,7 @@ def draw_paths(figure: Any, reproduction: Reproduction) -> None:
             figure, left, HEAD + 5, width, tall, xlim=across, ylim=(low, low + rise), xticklabels=[]
         )
         near = panel(
-            figure,
-            left,
-            HEAD + 9 + tall,
-            width,
-            NEAR,
-            xlim=across,
-            xlabel="x forward of crank centre O [m]",
+            figure, left, HEAD + 9 + tall, width, NEAR, xlim=across, xlabel="x forward of crank centre O [m]"
         )
         contacts = _published_contacts(reproduction, gait, trace, stance)
         deepest = max(trace["toe_penetration"].max(), trace["heel_penetration"].max())

@@ -253,9 +253,7 @@ def gait_walks(medians: Mapping[float, float]) -> Verdict:
 
 
 def judge(
-    traces: Mapping[tuple[str, str], Trace],
-    medians: Mapping[str, Mapping[float, float]],
-    brakes: bool,
+    traces: Mapping[tuple[str, str], Trace], medians: Mapping[str, Mapping[float, float]], brakes: bool
 ) -> dict[str, Verdict]:
     """Every claim by id.
 

@@ -7,7 +7,7 @@ the renderer. Nothing behind this boundary knows an engine.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, get_type_hints
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +17,14 @@ from hoof_env.ground.terrain import Terrain
 
 Columns = dict[str, NDArray[np.float64]]
 """Arrays of shape (n,) by the names of `Instant`'s fields, for n instants in the order of time."""
+
+
+Second = Annotated[float, "s"]
+Metre = Annotated[float, "m"]
+MetrePerSecond = Annotated[float, "m/s"]
+Radian = Annotated[float, "rad"]
+RadianPerSecond = Annotated[float, "rad/s"]
+Newton = Annotated[float, "N"]
 
 
 class Instant(NamedTuple):
@@ -30,40 +38,40 @@ class Instant(NamedTuple):
     is zero, and it is 0, 0 without load, as force plates report it. What an engine does not say is NaN.
     """
 
-    time: float
-    trunk_x: float
-    trunk_y: float
-    trunk_vx: float
-    trunk_vy: float
-    pitch: float
-    crank_angle: float
-    crank_speed: float
-    swing_angle: float
-    swing_offset: float
-    swing_sin: float
-    swing_cos: float
-    command_crank_speed: float
-    command_swing_offset: float
-    command_swing_sin: float
-    command_swing_cos: float
-    toe_x: float
-    toe_y: float
-    toe_depth: float
-    toe_normal: float
-    toe_friction: float
-    toe_force_x: float
-    toe_force_y: float
-    heel_x: float
-    heel_y: float
-    heel_depth: float
-    heel_normal: float
-    heel_friction: float
-    heel_force_x: float
-    heel_force_y: float
-    force_x: float
-    force_y: float
-    cop_x: float
-    cop_y: float
+    time: Second
+    trunk_x: Metre
+    trunk_y: Metre
+    trunk_vx: MetrePerSecond
+    trunk_vy: MetrePerSecond
+    pitch: Radian
+    crank_angle: Radian
+    crank_speed: RadianPerSecond
+    swing_angle: Radian
+    swing_offset: Radian
+    swing_sin: Radian
+    swing_cos: Radian
+    command_crank_speed: RadianPerSecond
+    command_swing_offset: Radian
+    command_swing_sin: Radian
+    command_swing_cos: Radian
+    toe_x: Metre
+    toe_y: Metre
+    toe_depth: Metre
+    toe_normal: Newton
+    toe_friction: Newton
+    toe_force_x: Newton
+    toe_force_y: Newton
+    heel_x: Metre
+    heel_y: Metre
+    heel_depth: Metre
+    heel_normal: Newton
+    heel_friction: Newton
+    heel_force_x: Newton
+    heel_force_y: Newton
+    force_x: Newton
+    force_y: Newton
+    cop_x: Metre
+    cop_y: Metre
 
     @property
     def normal(self) -> float:
@@ -78,16 +86,7 @@ class Instant(NamedTuple):
 
 POINTS = ("toe", "heel")
 
-UNITS = {
-    "time": "s", "trunk_x": "m", "trunk_y": "m", "trunk_vx": "m/s", "trunk_vy": "m/s", "pitch": "rad",
-    "crank_angle": "rad", "crank_speed": "rad/s", "swing_angle": "rad",
-    **{f"{part}{name}": "rad/s" if name == "crank_speed" else "rad"
-       for part in ("", "command_") for name in PARAMETERS},
-    **{f"{point}_{name}": unit for point in POINTS for name, unit in (
-        ("x", "m"), ("y", "m"), ("depth", "m"), ("normal", "N"), ("friction", "N"),
-        ("force_x", "N"), ("force_y", "N"))},
-    "force_x": "N", "force_y": "N", "cop_x": "m", "cop_y": "m",
-}  # fmt: skip
+UNITS = {name: kind.__metadata__[0] for name, kind in get_type_hints(Instant, include_extras=True).items()}
 """Unit of each field of `Instant`."""
 
 

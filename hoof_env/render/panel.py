@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pygame
 
-from hoof_env.dynamics.stance import Stance
+from hoof_env.dynamics.stance import StanceCounter
 from hoof_env.gait.parameters import LIMITS
 from hoof_env.render.instant import Instant
 from hoof_env.render.paint import CRANK, FAINT, FINE, FORCE, GREY, INK, PAPER, Brush
@@ -64,7 +64,7 @@ class Stances:
     """
 
     def __init__(self, threshold: float) -> None:
-        self._stance = Stance(threshold)
+        self._stance = StanceCounter(threshold)
         self.opened: float | None = None
         self.peaks: list[Peak] = []
         self.highest = 0.0

@@ -24,20 +24,7 @@ from hoof_env.leg.linkage import POINTS
 from hoof_env.render.body import Body
 from hoof_env.render.ground import SOIL_LINE, GroundPainter
 from hoof_env.render.instant import Instant
-from hoof_env.render.paint import (
-    CRANK,
-    FINE,
-    FORCE,
-    GREY,
-    HEEL,
-    PAPER,
-    TOE,
-    Brush,
-    Colour,
-    arrow,
-    bar,
-    mix,
-)
+from hoof_env.render.paint import CRANK, FINE, FORCE, GREY, HEEL, PAPER, TOE, Brush, Colour, arrow, bar, mix
 
 SKY_TOP, SKY_BOTTOM = (219, 231, 242), (249, 250, 252)
 

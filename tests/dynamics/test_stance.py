@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hoof_env.dynamics.stance import Stance
+from hoof_env.dynamics.stance import StanceCounter
 
 
 def peaks_of(loads, angles, forces, threshold):
@@ -23,7 +23,7 @@ def peaks_of(loads, angles, forces, threshold):
 
 def play(loads, angles, forces, threshold):
     """The stance after all, and what its running peaks have grown by."""
-    stance = Stance(threshold)
+    stance = StanceCounter(threshold)
     return stance, sum(stance.add(*now) for now in zip(angles, loads, forces, strict=True))
 
 

@@ -22,6 +22,7 @@ ARGUMENTS = [
     ({"task": "fly"}, "task: expected one of fixed, leg, .*got 'fly'"),
     ({"preset": "no_such_leg"}, "preset: expected one of first_fit, identified, got 'no_such_leg'"),
     ({"trunk": "floating"}, "trunk: expected one of fixed, rail, suspended, got 'floating'"),
+    ({"trunk": "free"}, "trunk: expected one of fixed, rail, suspended, got 'free'"),
     ({"trunk": 3}, "trunk: expected one of fixed, rail, suspended, got 3"),
     ({"gait": "trot"}, "gait: expected one of run, walk, got 'trot'"),
     ({"solver": "fast"}, "solver: expected one of exact, paper, got 'fast'"),
