@@ -146,7 +146,7 @@ def ship(choice: Choice, env_id: str, out: Path, seconds: float = 4.0) -> dict[s
         DataFileError: the model does not fit. OutputError: the folder cannot be written or gets too large.
         HoofEnvError: a package is missing.
     """
-    from hoof_env.render.film import render_episode
+    from hoof_env.film import render_episode
 
     saved, trained_on = choice.saved, choice.saved.record["env_id"]
     record = {key: value for key, value in saved.record.items() if key not in NOT_COPIED}

@@ -11,7 +11,7 @@ import gymnasium as gym
 import numpy as np
 
 from hoof_env._output import staged
-from hoof_env.render.film import check_whole, send
+from hoof_env.film import check_whole, send
 
 
 def film(

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from hoof_env.envs.multi_objective import HorseLegMOEnv as HorseLegMOEnv
     from hoof_env.envs.observation import Entry as Entry
     from hoof_env.envs.observation import Scale as Scale
+    from hoof_env.envs.parameters import RandomizeParameters as RandomizeParameters
     from hoof_env.envs.policies import make_policy as make_policy
-    from hoof_env.envs.randomize import RandomizeParameters as RandomizeParameters
     from hoof_env.envs.reward import Term as Term
     from hoof_env.envs.sb3 import Sb3VecEnv as Sb3VecEnv
     from hoof_env.envs.tasks import register as register
@@ -64,7 +64,7 @@ _PUBLIC = {
     "HorseLegMOEnv": "hoof_env.envs.multi_objective",
     "HorseLegVectorEnv": "hoof_env.envs.vector",
     "Sb3VecEnv": "hoof_env.envs.sb3",
-    "RandomizeParameters": "hoof_env.envs.randomize",
+    "RandomizeParameters": "hoof_env.envs.parameters",
     "make_policy": "hoof_env.envs.policies",
     "register": "hoof_env.envs.tasks",
     "Term": "hoof_env.envs.reward",

@@ -153,7 +153,7 @@ def render(
         overwrite: replace the file if there is one.
     """
     from hoof_env._output import new_file
-    from hoof_env.render.film import render_episode
+    from hoof_env.film import render_episode
 
     with new_file(out, overwrite) as made:
         count = render_episode(out, policy, id, args, seed, seconds, slow, fps, size)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -21,9 +21,8 @@ from hoof_env.envs.policies import Scripted, load_open_loop, make_policy, policy
 from hoof_env.errors import MissingExtraError, OutputError, ParameterError, check_number
 from hoof_env.gait.parameters import PARAMETERS, GaitParameters
 from hoof_env.ground.terrain import Terrain
-from hoof_env.leg.geometry import Geometry
 from hoof_env.onnx_policy import OnnxPolicy
-from hoof_env.render.instant import UNITS, Columns, columns_of_engine
+from hoof_env.render.instant import UNITS, Columns, Setting, columns_of_engine
 from hoof_env.saved_policy import SavedModel
 
 NOT_RECORDED = ("swing_offset", "swing_sin", "swing_cos")
@@ -32,26 +31,6 @@ NOT_RECORDED = ("swing_offset", "swing_sin", "swing_cos")
 RECORD = {name: unit for name, unit in UNITS.items() if name not in NOT_RECORDED} | {"free_moment": "N m"}
 """Columns of a record and their units. They mean what `Instant` says; the free moment is 0, for the centre of
 pressure is where the ground's forces have no moment."""
-
-
-class Setting(NamedTuple):
-    """What pictures and files say of an environment beside its motion.
-
-    Attributes:
-        geometry, terrain: the leg and what it stands on.
-        weight_n: weight of trunk and leg [N].
-        trunk: its kind, one of `dynamics.trunk.ONE_LEG`.
-        lift_off_n: normal force that tells stance from swing [N].
-        dt, sim_dt: control step and substep [s].
-    """
-
-    geometry: Geometry
-    terrain: Terrain
-    weight_n: float
-    trunk: str
-    lift_off_n: float
-    dt: float
-    sim_dt: float
 
 
 def setting(env: Any) -> Setting:

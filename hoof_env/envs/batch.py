@@ -22,7 +22,7 @@ from hoof_env.dynamics.parts import GRAVITY, LARGEST, ONE_LEG, Drive, Limb, Resu
 from hoof_env.dynamics.schemes import SCHEMES
 from hoof_env.dynamics.step_length import StepLength
 from hoof_env.envs import step as kernels
-from hoof_env.envs.episode import ACTIONS, SUMS, episode_layout
+from hoof_env.envs.episode import ACTIONS, SUMS, episode_layout, summary_of
 from hoof_env.envs.grounds import make_terrain
 from hoof_env.envs.infos import AT_MEASURED, BEGUN, GAIT, LAST_STEP, MEASUREMENTS, START, named
 from hoof_env.envs.observation import HALF_RANGE, HIGH, LOW, MIDDLE, check_groups, groups_of, observed
@@ -38,7 +38,6 @@ from hoof_env.envs.parameters import (
 )
 from hoof_env.envs.reward import check_weights
 from hoof_env.envs.start import HIGHEST, LOWEST, check_options, draw_starts
-from hoof_env.envs.summary import summary_of
 from hoof_env.envs.tasks import Settings, Task
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait.parameters import GaitParameters, gait_names, load_gait

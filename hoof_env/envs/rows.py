@@ -10,8 +10,8 @@ from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.arguments import count
+from hoof_env.envs.arguments import fixed_setting
 from hoof_env.envs.batch import EpisodeBatch
-from hoof_env.envs.made import fixed_setting
 from hoof_env.envs.recording import Recording
 from hoof_env.errors import ParameterError
 from hoof_env.ground.terrain import Terrain

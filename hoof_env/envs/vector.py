@@ -21,16 +21,24 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.arguments import count
 from hoof_env.dynamics.memory import LIFT_OFF
+from hoof_env.envs.arguments import (
+    Made,
+    actions_of,
+    check_state,
+    drawn_of,
+    ended_of,
+    generator_of,
+    mask_of,
+    mode_of,
+    seeds_of,
+)
 from hoof_env.envs.batch import EpisodeBatch
 from hoof_env.envs.episode import ACTIONS, FAILED, TRUNCATED
 from hoof_env.envs.infos import named
 from hoof_env.envs.keywords import Keywords
-from hoof_env.envs.made import Made
 from hoof_env.envs.recording import Recording
 from hoof_env.envs.rows import Rows
-from hoof_env.envs.state import check_state, generator_of
 from hoof_env.envs.tasks import task_of, to_json
-from hoof_env.envs.vector_arguments import actions_of, drawn_of, ended_of, mask_of, mode_of, seeds_of
 from hoof_env.errors import ParameterError, check_choice
 
 MOST_ENVS = 1_000_000

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.gait.parameters import PARAMETERS
 from hoof_env.ground.terrain import Terrain
+from hoof_env.leg.geometry import Geometry
 
 Columns = dict[str, NDArray[np.float64]]
 """Arrays of shape (n,) by the names of `Instant`'s fields, for n instants in the order of time."""
@@ -25,6 +26,26 @@ MetrePerSecond = Annotated[float, "m/s"]
 Radian = Annotated[float, "rad"]
 RadianPerSecond = Annotated[float, "rad/s"]
 Newton = Annotated[float, "N"]
+
+
+class Setting(NamedTuple):
+    """What pictures and files say of an environment beside its motion.
+
+    Attributes:
+        geometry, terrain: the leg and what it stands on.
+        weight_n: weight of trunk and leg [N].
+        trunk: its kind, one of `dynamics.trunk.ONE_LEG`.
+        lift_off_n: normal force that tells stance from swing [N].
+        dt, sim_dt: control step and substep [s].
+    """
+
+    geometry: Geometry
+    terrain: Terrain
+    weight_n: float
+    trunk: str
+    lift_off_n: float
+    dt: float
+    sim_dt: float
 
 
 class Instant(NamedTuple):

@@ -20,10 +20,9 @@ from hoof_env.dynamics.parts import ONE_LEG
 from hoof_env.errors import HoofEnvError, ParameterError, check_choice, check_number
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
-from hoof_env.render.instant import Instant
+from hoof_env.render.instant import Instant, Setting
 
 if TYPE_CHECKING:
-    from hoof_env.records import Setting
     from hoof_env.render.panel import Stances
 
 MODES = ("rgb_array", "human")

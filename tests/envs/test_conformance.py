@@ -177,7 +177,7 @@ def test_ids_work_in_a_fresh_process_by_module_prefix():
 def test_spec_is_json_serialisable():
     env = gym.make("hoof_env/HorseLeg-v0", trunk="rail", reward_weights={"peak": 0.5})
     again = gym.make(gym.envs.registration.EnvSpec.from_json(env.spec.to_json()))
-    assert again.unwrapped.batch.weights.peak == 0.5
+    assert again.unwrapped.batch.weights["peak"] == 0.5
     assert again.unwrapped.engine.trunk.kind == "rail"
 
 

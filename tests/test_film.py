@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from hoof_env import cli
+from hoof_env import film as render_clip
+from hoof_env.film import frames, write_film
 from hoof_env.records import episode, find_policy, make_env, setting
-from hoof_env.render import film as render_clip
-from hoof_env.render.film import frames, write_film
 from hoof_env.render.renderer import new_renderer
 
 pytest.importorskip("pygame")
