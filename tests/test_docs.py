@@ -8,7 +8,7 @@ import pytest
 from hoof_env.cli import COMMANDS
 
 ROOT = Path(__file__).resolve().parent.parent
-FOLDERS = ("agents", "benchmarks", "docs", "examples", "hoof_env", "scripts", "tests")
+FOLDERS = ("agents", "benchmarks", "docs", "examples", "hoof_env", "research", "scripts", "tests")
 PAGES = sorted([*ROOT.glob("*.md"), *(page for folder in FOLDERS for page in (ROOT / folder).rglob("*.md"))])
 LIVE = [page for page in PAGES if "evidence" not in page.parts]
 """Frozen pages name the commands of their commits."""
@@ -46,7 +46,7 @@ def test_links_lead_somewhere(page):
 @pytest.mark.parametrize("page", LIVE, ids=name)
 def test_commands_and_files_exist(page):
     text = page.read_text(encoding="utf-8")
-    modules = set(re.findall(r"python -m ((?:agents|benchmarks|hoof_env|tests)[\w.]*\w)", text))
+    modules = set(re.findall(r"python -m ((?:agents|benchmarks|hoof_env|research|tests)[\w.]*\w)", text))
     assert not {one for one in modules if not (ROOT / one.replace(".", "/")).with_suffix(".py").is_file()}
     commands = set(re.findall(r"(?:`|bin/)hoof-env ([a-z]+)\b(?![^.:]{0,60}\sof commit)", text))
     assert not commands - set(COMMANDS)
@@ -74,3 +74,12 @@ def test_it_can_fail(tmp_path):
         "# One head\n[a](none.md) [b](page.md#one-head) [c](#two) `[d](no.md)` [e](https://x.org)\n"
     )
     assert list(broken(page)) == ["none.md", "#two"]
+
+
+def test_the_example_of_side_by_side_numbers_runs():
+    text = (ROOT / "hoof_env/simd/README.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    path = Path(__file__)  # kernels need a file
+    space = {"__name__": "example"}
+    exec(compile(code, str(path), "exec"), space)
+    assert (space["balls"][space["Ball"].rows("bounces")] == 1.0).all()
