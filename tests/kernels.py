@@ -9,10 +9,10 @@ import numpy as np
 from benchmarks.speed_cases import engine, scenes
 from hoof_env.envs.kernels import compile_kernels
 from hoof_env.gait.parameters import load_gait
-from hoof_env.identify.candidate import encode
-from hoof_env.identify.objective import Objective
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.paper.reproduce import run_cycle
+from research.identify.candidate import encode
+from research.identify.objective import Objective
 
 PRESET = "first_fit"
 

@@ -23,13 +23,13 @@ from hoof_env.dynamics.vectors import vector
 from hoof_env.gait.motion_law import evaluate_motion
 from hoof_env.gait.parameters import load_gait
 from hoof_env.ground.contact import Ground
-from hoof_env.identify.ensemble import load_ensemble
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
 from hoof_env.leg.linkage import BODIES, CRANK, FRAME, JOINTS
 from hoof_env.leg.linkage import LOCK as LOCKED
 from hoof_env.simd import fill, rows, write
 from hoof_env.simd.memory import address, doubles
+from research.identify.ensemble import load_ensemble
 
 PRESETS = {name: load_geometry(name) for name in ("first_fit", "identified")}
 LEGS = {

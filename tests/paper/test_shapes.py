@@ -194,6 +194,6 @@ def test_a_gait_walks_if_its_sole_goes_back_fast_enough_at_every_level(medians, 
 
 
 def test_the_search_asks_for_the_same_speed():
-    from hoof_env.identify.features import BACKWARD
+    from research.identify.features import BACKWARD
 
     assert BACKWARD == shapes.BACKWARD
