@@ -1,62 +1,178 @@
-"""`python -m research.identify.collect`: the ensemble."""
+"""Collecting an ensemble: rounds of attempts from the legs found so far, kept as files and resumable.
+
+What an attempt starts from depends on earlier rounds alone, so that the number of processes, a kill and a
+resumption change nothing in what is found.
+"""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Sequence
-from pathlib import Path
-from typing import Literal
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from functools import partial
+from typing import Any
 
-from research.identify.run import run, say
+import numpy as np
 
-NAME = "python -m research.identify.collect"
+from hoof_env.errors import HoofEnvError
+from research.identify.attempt import Aim, Attempt, Task, attempt, judge
+from research.identify.leg import BODY, Choice, Vector
+from research.identify.processes import Run, processes
+from research.identify.state import State
+
+ROUND = 8
+"""Attempts a round; more processes than that have nothing to do."""
+
+ALONG_ONE = 0.6
+"""Part of the pushes along a single coordinate of the leg; the rest go along all at random."""
+
+FROM_EDGE = 0.6
+"""Part of the pushes that go on from the leg that is furthest in their direction; the rest from any leg."""
+
+
+@dataclass(frozen=True)
+class Start:
+    """A leg to begin with: its name, and see `leg`."""
+
+    name: str
+    choice: Choice
+    x: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Collection:
+    """What was collected.
+
+    Attributes:
+        members: confirmed by the full system; the first that of the first start that has one, then each the
+            furthest from those before it.
+        attempts: all, those of the starts first. refused: legs within the bar by kinematics that the full
+            system was asked about and found no members.
+    """
+
+    members: tuple[Attempt, ...]
+    attempts: tuple[Attempt, ...]
+    refused: tuple[Attempt, ...]
+
+
+def distance(one: Attempt, two: Attempt) -> float:
+    """Root mean square difference of log lengths and pivot [-, m], some 0.02 where lengths differ by 2 %;
+    infinite between different choices."""
+    if one.choice != two.choice:
+        return float("inf")
+    return float(np.sqrt(np.mean((_body(one) - _body(two)) ** 2)))
+
+
+def _body(made: Attempt) -> Vector:
+    return np.array(made.y[:BODY])
 
 
 def collect(
-    out: Path,
-    preset: str,
-    starts: tuple[str, ...] = (),
-    size: int = 24,
-    bar: float = 1.0,
-    both: bool = False,
-    walk: Literal["walks", "brakes"] = "walks",
-    beta: Literal["printed", "probable"] = "probable",
-    targets: Path | None = None,
+    starts: Sequence[Start],
+    aim: Aim,
+    state: State,
+    say: Callable[[str], None],
+    *,
+    size: int,
+    attempts: int,
     seed: int = 0,
-    attempts: int = 240,
     workers: int = 2,
-    resume: bool = False,
-) -> None:
-    """Collect legs that fit the published numbers, far apart: what those leave open (needs 'identify').
+) -> Collection:
+    """Make attempts, then choose `size` legs within the bar that are far apart.
 
     Args:
-        out: folder for ensemble.json; made if need be.
-        preset: the leg to begin with, a name or a JSON file; all members stand on its ground.
-        starts: more of them, or folders of `python -m research.identify`, whose independent starts all count.
-        size: members wanted.
-        bar: largest error of a row, in units of its own bar.
-        both: rows count with the paper's solver too, all but the ill-conditioned.
-        walk: a walk that moves its animal, or one that brakes through its stance (figure 6 read literally).
-        beta: of the paper's solver: as printed, sqrt(2 alpha), or as it is probably meant, sqrt(2) alpha.
-        targets: JSON file of the rows to meet, as published.json.
-        seed: the same seed and options find the same legs, with any number of workers.
-        attempts: to find a further leg; the members are chosen among all that were found.
+        starts: legs to begin with; each is first brought within the bar, and may be a member.
+        aim: what a member must meet. state: where finished attempts lie.
+        say: takes a line for each round.
+        size: members wanted; there may be fewer.
+        attempts: beside the starts; the last round is made whole.
         workers: processes.
-        resume: go on with a collection in this folder that was interrupted or killed.
+
+    Raises:
+        HoofEnvError: no start comes within the bar, a damaged file, a folder that cannot be written, or a
+            process that died.
     """
-    from research.identify.ensemble_command import ensemble
+    made: list[Attempt] = []
+    inside: list[Attempt] = []
+    rounds = -(-attempts // ROUND)
+    tasks = [
+        Task(0, i, seed, f"0000-{i:02d}", start.name, start.choice, start.x) for i, start in enumerate(starts)
+    ]
+    with processes(workers) as run:
+        for number in range(rounds + 1):
+            if number:
+                tasks = [_push_from(inside, number, index, seed) for index in range(ROUND)]
+            made += _round(tasks, aim, state, run)
+            inside = [one for one in made if one.merit <= aim.bar]
+            say(f"round {number} of {rounds}: {len(inside)} of {len(made)} legs within {aim.bar:g} bars")
+            if not inside:
+                nearest = min(one.merit for one in made)
+                raise HoofEnvError(
+                    f"no start comes within {aim.bar:g} bars without a shortage, the nearest has "
+                    f"{nearest:.3f}: expected a better start or a wider --bar"
+                )
+        return _choose(made, inside, aim, state, run, size)
 
-    paths = ensemble(
-        out, say, preset=preset, starts=starts, size=size, bar=bar, both=both, walk=walk, beta=beta,
-        targets=targets, seed=seed, attempts=attempts, workers=workers, resume=resume,
-    )  # fmt: skip
-    say(f"{paths[0]} written")
+
+def _push_from(inside: Sequence[Attempt], number: int, index: int, seed: int) -> Task:
+    """The next push: along one coordinate or all, from the leg that is furthest that way or from any."""
+    rng = np.random.default_rng([seed, number, index])
+    choices = list(dict.fromkeys(one.choice for one in inside))
+    choice = choices[int(rng.integers(len(choices)))]
+    legs = [one for one in inside if one.choice == choice]
+    direction = rng.standard_normal(len(legs[0].y))
+    if rng.random() < ALONG_ONE:
+        one = int(rng.integers(BODY))
+        direction = np.sign(direction[one]) * np.eye(direction.size)[one]
+    direction /= np.linalg.norm(direction)
+    if rng.random() < FROM_EDGE:
+        parent = max(legs, key=lambda leg: (float(_body(leg) @ direction[:BODY]), leg.id))
+    else:
+        parent = legs[int(rng.integers(len(legs)))]
+    way = tuple(direction.tolist())
+    return Task(number, index, seed, parent.id, parent.start, choice, parent.y, way)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; returns the exit code."""
-    return run(collect, NAME, arguments)
+def _round(tasks: Sequence[Task], aim: Aim, state: State, run: Run[Attempt]) -> list[Attempt]:
+    """Make the attempts that are not yet in the folder; all of them in their order."""
+    done = {task.id: kept for task in tasks if (kept := _load(state, task.id))}
+    for made in run(partial(attempt, aim=aim), [task for task in tasks if task.id not in done]):
+        _save(state, made)
+        done[made.id] = made
+    return [done[task.id] for task in tasks]
 
 
-if __name__ == "__main__":
-    sys.exit(main())
+def _choose(
+    made: list[Attempt], inside: list[Attempt], aim: Aim, state: State, run: Run[Attempt], size: int
+) -> Collection:
+    """Members far apart, once the full system has seen all of them; one that it refuses another replaces."""
+    known = {one.id: one for one in inside}
+    while True:
+        members = _far_apart([one for one in known.values() if not one.errors or one.holds(aim)], size)
+        waiting = [one for one in members if not one.errors]
+        if not waiting:
+            break
+        for one in run(partial(judge, aim=aim), waiting):
+            _save(state, one)
+            known[one.id] = one
+    refused = tuple(one for one in known.values() if one.errors and not one.holds(aim))
+    return Collection(tuple(members), tuple(known.get(one.id, one) for one in made), refused)
+
+
+def _far_apart(legs: Sequence[Attempt], size: int) -> list[Attempt]:
+    """The first, then again and again the one that is furthest from all chosen; no leg twice."""
+    if not legs:
+        return []
+    chosen, gaps = [legs[0]], np.array([distance(legs[0], leg) for leg in legs])
+    while len(chosen) < size and gaps.max() > 0:
+        chosen.append(legs[int(np.argmax(gaps))])
+        gaps = np.minimum(gaps, [distance(chosen[-1], leg) for leg in legs])
+    return chosen
+
+
+def _load(state: State, name: str) -> Attempt | None:
+    return state.load(f"attempt-{name}", Attempt.from_dict)
+
+
+def _save(state: State, made: Attempt) -> None:
+    content: Any = asdict(made)
+    state.save(f"attempt-{made.id}", content)

@@ -1,7 +1,9 @@
-"""Legs that all meet the published numbers: what those numbers leave open, as a file.
+"""Collect legs that all meet the published numbers, far apart: what those numbers leave open.
 
-The ensemble of a preset lies in `ensembles` beside this file, under the preset's name. A member is written as
-a preset file writes a leg and its gaits, with how well it fits:
+    python -m research.identify.ensemble --preset identified --both --out runs/ensemble
+
+The ensemble of a preset lies in `ensembles` beside this file, under the preset's name. A member is the
+content of a preset file, with how well it fits:
 
     {"provenance": ..., "units": ..., "walk": "walks", "ground": {"exponent": ...},
      "bar": {"exact": 0.97, "paper": 0.99},
@@ -14,48 +16,25 @@ All legs share the preset's ground, written as in a preset file; without it they
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+import sys
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from hoof_env.errors import DataFileError, HoofEnvError, ParameterError, check_choice, check_number
-from hoof_env.gait.parameters import GaitParameters
 from hoof_env.ground.contact import Ground
-from hoof_env.ground.preset import read_ground, write_ground
-from hoof_env.leg.geometry import Geometry
-
-GAITS = ("walk", "run")
-SOLVERS = ("exact", "paper")
-WALKS = ("walks", "brakes")
-"""How the walk of an ensemble may be read."""
-
-
-@dataclass(frozen=True)
-class Member:
-    """One leg of an ensemble.
-
-    Attributes:
-        geometry: the leg. gaits: "walk" and "run".
-        errors: by solver, the largest error of a row [bars].
-        short: by name, shortage of the demands on plausibility that the leg misses; empty if none.
-        ground: what it stands on.
-    """
-
-    geometry: Geometry
-    gaits: Mapping[str, GaitParameters]
-    errors: Mapping[str, float]
-    short: Mapping[str, float]
-    ground: Ground = field(default_factory=Ground)
-
-    def to_preset(self) -> dict[str, Any]:
-        """The content of a preset file of this leg."""
-        geometry = self.geometry.to_dict()
-        provenance = geometry.pop("provenance")
-        gaits = {gait: asdict(parameters) for gait, parameters in self.gaits.items()}
-        ground = write_ground(self.ground)
-        return {"provenance": provenance, "geometry": geometry, "gaits": gaits, "ground": ground}
+from hoof_env.ground.preset import load_ground, read_ground, write_ground
+from research.identify.__main__ import load_start
+from research.identify.attempt import SOLVERS, Aim, Attempt
+from research.identify.collect import Collection, Start, collect
+from research.identify.demands import WALK_DEMANDS
+from research.identify.leg import encode
+from research.identify.problem import LegProblem
+from research.identify.run import check_counts, check_extras, run
+from research.identify.state import digest_of, open_state, read_json, versions, write_json
+from research.identify.targets import load_targets
 
 
 @dataclass(frozen=True)
@@ -63,120 +42,203 @@ class Ensemble:
     """At least one leg.
 
     Attributes:
-        name: of the preset that it belongs to, or of its file. provenance: where it comes from.
-        walk: the reading of the walk that its members share, one of `WALKS`.
-        members: in the order in which they were found or chosen.
+        provenance: where it comes from.
+        walk: the reading of the walk that its members share, "walks" or "brakes".
+        bar: by solver, the bar that all members meet: the largest error of any [bars].
+        members: each the content of a preset, with its ground.
+        errors: of each member, by solver.
     """
 
-    name: str
     provenance: str
     walk: str
-    members: tuple[Member, ...]
-
-    @property
-    def bar(self) -> dict[str, float]:
-        """By solver, the bar that all members meet: the largest error of any [bars]."""
-        return {solver: max(member.errors[solver] for member in self.members) for solver in SOLVERS}
-
-
-def has_ensemble(preset: str) -> bool:
-    """Whether the package has an ensemble for this preset; false for a preset file."""
-    return _file_of(preset).is_file()
+    bar: Mapping[str, float]
+    members: tuple[dict[str, Any], ...]
+    errors: tuple[Mapping[str, float], ...]
 
 
 def load_ensemble(source: str | Path) -> Ensemble:
     """The ensemble of a preset (by name) or of a file (by path).
 
     Raises:
-        ParameterError: the preset has none.
-        DataFileError: the file is unreadable, lacks a part, holds a leg that does not turn or is there
-            twice, or its bar is not that of its members.
+        DataFileError: the file is missing, unreadable, lacks a part, holds a leg that does not turn or is
+            there twice, or its bar is not that of its members.
     """
-    if isinstance(source, Path) or str(source).endswith(".json"):
-        path: Any = Path(source)
-    elif has_ensemble(source):
-        path = _file_of(source)
-    else:
-        raise ParameterError(f"ensemble: expected a preset that has one or a .json file, got {source!r}")
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise DataFileError(f"cannot read {path}: {error.strerror or error}") from None
-    except (ValueError, RecursionError) as error:
-        raise DataFileError(f"{path}: expected an ensemble in JSON, but it does not parse: {error}") from None
-    members = data.get("members") if isinstance(data, dict) else None
-    if not isinstance(members, list) or not members:
+    path = Path(source)
+    if path.suffix != ".json":
+        path = Path(__file__).with_name("ensembles") / f"{path.name}.json"
+    data = read_json(path, "expected an ensemble in JSON")
+    entries = data.get("members") if isinstance(data, dict) else None
+    if not isinstance(entries, list) or not entries:
         raise DataFileError(f"{path}: expected an object with a list 'members' of at least one leg")
-    ground = read_ground(data, str(path))
-    found: list[Member] = []
-    for number, entry in enumerate(members, 1):
+    ground = write_ground(read_ground(data, str(path)))
+    members: list[dict[str, Any]] = []
+    errors: list[dict[str, float]] = []
+    for number, entry in enumerate(entries, 1):
         try:
-            found.append(read_member(entry, f"member {number}", ground))
-        except HoofEnvError as error:
-            raise DataFileError(f"{path}, member {number}: {error}") from None
-    for number, member in enumerate(found, 1):
-        for twin, other in enumerate(found[: number - 1], 1):
-            if member.geometry.replace(name=other.geometry.name) == other.geometry:
+            members.append({"geometry": entry["geometry"], "gaits": entry["gaits"], "ground": ground})
+            encode(members[-1])
+            errors.append({s: check_number(f"errors[{s!r}]", entry["errors"][s], low=0) for s in SOLVERS})
+        except (HoofEnvError, KeyError, TypeError) as error:
+            raise DataFileError(f"{path}, member {number}: {_what(error)}") from None
+        for twin, other in enumerate(members[:-1], 1):
+            if members[-1]["geometry"] == other["geometry"]:
                 raise DataFileError(
                     f"{path}: members {twin} and {number}: expected different legs, got one twice"
                 )
     try:
-        walk = check_choice("walk", data.get("walk", WALKS[0]), WALKS)
+        walk = check_choice("walk", data.get("walk"), WALK_DEMANDS)
     except ParameterError as error:
         raise DataFileError(f"{path}: {error}") from None
-    name = source if isinstance(source, str) else source.stem
-    ensemble = Ensemble(name, str(data.get("provenance", "")), walk, tuple(found))
-    if data.get("bar") != ensemble.bar:
+    bar = largest(errors)
+    if data.get("bar") != bar:
         raise DataFileError(
-            f"{path}: bar: expected {ensemble.bar}, its members' largest errors, got {data.get('bar')!r}"
+            f"{path}: bar: expected {bar}, its members' largest errors, got {data.get('bar')!r}"
         )
-    return ensemble
+    return Ensemble(str(data.get("provenance", "")), walk, bar, tuple(members), tuple(errors))
 
 
-def read_member(entry: Any, name: str, ground: Ground) -> Member:
-    """A member as an ensemble's file writes it, on the ensemble's ground; `name` becomes that of its leg.
+def _what(error: Exception) -> str:
+    return f"lacks {error}" if isinstance(error, KeyError) else str(error)
 
-    Raises:
-        HoofEnvError: something is missing, unknown or out of range, or the leg does not turn.
+
+def largest(errors: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    """The largest error of any member, by solver [bars]."""
+    return {solver: max(error[solver] for error in errors) for solver in SOLVERS}
+
+
+def ensemble(
+    out: Path,
+    preset: str,
+    starts: tuple[str, ...] = (),
+    size: int = 24,
+    bar: float = 1.0,
+    both: bool = False,
+    walk: Literal["walks", "brakes"] = "walks",
+    beta: Literal["printed", "probable"] = "probable",
+    targets: Path | None = None,
+    seed: int = 0,
+    attempts: int = 240,
+    workers: int = 2,
+    resume: bool = False,
+) -> None:
+    """Collect legs that fit the published numbers, far apart: what those leave open (needs 'identify').
+
+    Args:
+        out: folder for ensemble.json; made if need be. Its folder state holds what a killed collection is
+            resumed from.
+        preset: the leg to begin with, a name or a JSON file; all members stand on its ground.
+        starts: more of them, as identified.json of other searches.
+        size: members wanted.
+        bar: largest error of a row, in units of its own bar.
+        both: rows count with the paper's solver too, all but the ill-conditioned.
+        walk: a walk that moves its animal, or one that brakes through its stance (figure 6 read literally).
+        beta: of the paper's solver: as printed, sqrt(2 alpha), or as it is probably meant, sqrt(2) alpha.
+        targets: JSON file of the rows to meet, as published.json.
+        seed: the same seed and options find the same legs, with any number of workers.
+        attempts: to find a further leg; the members are chosen among all that were found.
+        workers: processes.
+        resume: go on with a collection in this folder that was interrupted or killed.
     """
-    if not isinstance(entry, dict):
-        raise ParameterError(f"expected an object with geometry, gaits and errors, got {entry!r}")
-    try:
-        geometry = dict(entry["geometry"])
-        leg = Geometry(**{**geometry, "pivot": tuple(geometry["pivot"]), "name": name})
-        gaits = {gait: GaitParameters(**entry["gaits"][gait]) for gait in GAITS}
-        errors = {s: check_number(f"errors[{s!r}]", entry["errors"][s], low=0) for s in SOLVERS}
-        short = {k: check_number(f"short[{k!r}]", v, low=0) for k, v in entry.get("short", {}).items()}
-    except KeyError as error:
-        raise ParameterError(f"lacks {error}") from None
-    except HoofEnvError:
-        raise
-    except (AttributeError, TypeError, ValueError) as error:
-        raise ParameterError(f"is incomplete or has unknown entries: {error}") from None
-    return Member(leg, gaits, errors, short, ground)
-
-
-def write_member(preset: Mapping[str, Any], errors: Mapping[str, float], short: Mapping[str, float]) -> Any:
-    """A member as an ensemble's file writes it, from the content of a preset file."""
-    parts = {key: preset[key] for key in ("geometry", "gaits")}
-    return {**parts, "errors": dict(errors), "short": dict(short)}
-
-
-def to_data(
-    members: list[dict[str, Any]], provenance: str, walk: str, ground: Ground | None = None
-) -> dict[str, Any]:
-    """The content of an ensemble's file, from members as `write_member` gives them, on one ground
-    (by default the one that a preset has which says nothing of it)."""
-    bar = {solver: max(member["errors"][solver] for member in members) for solver in SOLVERS}
-    return {
-        "provenance": provenance,
+    check_extras()
+    size, seed, workers = check_counts(size=size, seed=seed, workers=workers)
+    attempts = int(check_number("attempts", attempts, low=0, high=1e6))
+    bar = check_number("bar", bar, low=0, high=100, exclusive_low=True)
+    ground = load_ground(preset)
+    if ground.stiffness != Ground().stiffness:
+        raise ParameterError(
+            f"preset {preset}: expected a ground with the paper's stiffness, {Ground().stiffness:g} N/m^n, "
+            f"got {ground.stiffness:g}"
+        )
+    aim = Aim(LegProblem(load_targets(targets), walk, None, beta), bar, both)
+    legs = load_starts([preset, *starts], ground.exponent)
+    about = {
+        "ensemble of": Path(preset).stem,
+        "starts": [f"{leg.name} ({digest_of([asdict(leg.choice), leg.x])})" for leg in legs],
+        "targets": aim.problem.targets.digest,
+        "walk": walk,
+        "bar": bar,
+        "both": both,
+        "beta": beta,
+        "exponent": ground.exponent,
+        "seed": seed,
+        "attempts": attempts,
+        "size": size,
+        "versions": versions(),
+    }
+    state = open_state(out, about, resume=resume, product="ensemble.json", kind="collection")
+    found = collect(legs, aim, state, _say, size=size, attempts=attempts, seed=seed, workers=workers)
+    if not found.members:
+        why = Counter(reason for one in found.refused for reason in one.reasons(aim))
+        raise HoofEnvError(
+            f"the full system refuses all legs within {bar:g} bars: {', '.join(why)}; expected a wider --bar"
+        )
+    errors = [dict(one.errors) for one in found.members]
+    content = {
+        "provenance": provenance(about, found),
         "units": "m, rad, rad/s, N/m^n; errors in bars",
         "walk": walk,
-        "ground": write_ground(ground or Ground()),
-        "bar": bar,
-        "members": members,
+        "ground": write_ground(ground),
+        "bar": largest(errors),
+        "members": [_member(one, aim) for one in found.members],
     }
+    path = write_json(out, "ensemble", content)
+    met = " and ".join(f"{error:.4f} with the {solver} solver" for solver, error in largest(errors).items())
+    _say(f"{len(errors)} of {size} members; largest error {met} [bars]; {len(found.refused)} legs refused")
+    _say(f"{path} written")
 
 
-def _file_of(preset: str) -> Any:
-    return Path(__file__).with_name("ensembles") / f"{Path(preset).name}.json"
+def load_starts(sources: Sequence[str], exponent: float) -> list[Start]:
+    """The legs of presets, by name or file, on ground with this exponent.
+
+    Raises:
+        HoofEnvError: a preset whose leg does not turn, a damaged file, or the same leg twice; the message
+            names it.
+    """
+    legs: list[Start] = []
+    for source in sources:
+        start = load_start(source, exponent)
+        if start is None:
+            raise ParameterError(f"start {source}: expected a preset, by name or file")
+        for leg in legs:
+            if (leg.choice, leg.x) == start:
+                raise ParameterError(
+                    f"starts: expected different legs, got one twice: {leg.name} and {source}"
+                )
+        legs.append(Start(Path(source).stem, *start))
+    return legs
+
+
+def provenance(about: Mapping[str, Any], found: Collection) -> str:
+    """How the members were found, in words."""
+    shares = Counter(one.start for one in found.members)
+    settings = {key: about[key] for key in ("walk", "bar", "both", "beta", "exponent", "seed", "targets")}
+    words = ", ".join(f"{key} {value}" for key, value in {**settings, **about["versions"]}.items())
+    return (
+        "Identified, not published: legs that fit the results printed in Batbaatar & Wagatsuma 2021 (doi "
+        "10.2991/jrnal.k.210713.002), which prints neither lengths nor swing parameters. Found by "
+        f"research.identify.ensemble from {'; '.join(about['starts'])}: legs known to fit were pushed in random "
+        "directions, along one length or all, as far as the bar let them, "
+        f"{len(found.attempts) - len(about['starts'])} times; of all that fit, the {len(found.members)} "
+        "members are chosen far apart, so that extremes are more frequent among them than among all legs "
+        "that fit, and their range is a lower limit of what the numbers leave open. Members: "
+        f"{', '.join(f'{count} from {start}' for start, count in shares.items())}. Settings: {words}."
+    )
+
+
+def _member(one: Attempt, aim: Aim) -> dict[str, Any]:
+    preset, source = one.preset(aim), {"attempt": one.id, "start": one.start}
+    parts = {"geometry": preset["geometry"], "gaits": preset["gaits"]}
+    return {**parts, "errors": dict(one.errors), "short": dict(one.short), "found": source}
+
+
+def _say(line: str) -> None:
+    print(line, flush=True)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns the exit code."""
+    return run(ensemble, "research.identify.ensemble", arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,216 +1,166 @@
-"""One job: where it starts, how it goes on after a checkpoint, and what it found."""
+"""One job of a search: where it starts, how it goes on, and what it finds."""
 
 from __future__ import annotations
 
-import pickle
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, Protocol
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
+from research.identify.leg import Choice, Vector
 from research.identify.minimax import Rating, descend
-from research.identify.records import Array, Job, Problem, Progress, Result, Standing
+from research.identify.problem import PENALTY, SAMPLES, TOE_SCALES, LegProblem
 from research.identify.schedule import Phase
 
-CHECKPOINT_EVERY = 10.0
-"""Seconds between two checkpoints of a job."""
 CLEAR = 0.995
 """Largest error with which a job ends at the bar [bars], so that the judge, who samples finer, agrees."""
-TELL_EVERY = 0.5
-"""Seconds between two reports of a job's progress."""
-PENALTY = 2.0
-"""What a shortage of one counts for in a minimax job [bars]."""
 
 
-class _Method(Protocol):
-    """How a job looks for better candidates; it pickles."""
+@dataclass(frozen=True)
+class Result:
+    """What a job found.
 
-    best: Array
-    value: float
+    Attributes:
+        id: round and index. phase: its name.
+        root: id of the independent start that it goes back to.
+        choice, x: the best leg, see `leg`.
+        evaluations, seconds: spent. stop: why it ended.
+        exact, both: merit [bars] with the exact solver alone and with both.
+        standing: in words, with both solvers once the leg meets every bar with the exact one.
+        confirmed: the full system finds every bar met and every claim true.
+    """
+
+    id: str
+    phase: str
+    root: str
+    choice: Choice
+    x: tuple[float, ...]
     evaluations: int
+    seconds: float
+    stop: str
+    exact: float
+    both: float
+    standing: str
+    confirmed: bool
 
-    def advance(self, evaluate: Any) -> None:
-        """Go on a little."""
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Result:
+        """Inverse of `dataclasses.asdict`; KeyError or TypeError for anything else."""
+        return cls(**{**data, "choice": Choice.from_dict(data["choice"]), "x": tuple(data["x"])})
 
-    def ended(self) -> str:
-        """Why it cannot go on, or ""."""
+    def to_dict(self) -> dict[str, Any]:
+        return asdict(self)
 
 
-class _Normal:
-    """`randn` for cma from a generator of the job's own, which its checkpoint contains."""
+@dataclass(frozen=True)
+class Job:
+    """A job: its place in the search, the search's seed, what it may spend and what it may start from."""
 
-    def __init__(self, rng: np.random.Generator) -> None:
-        self.rng = rng
+    round: int
+    index: int
+    phase: Phase
+    seed: int
+    evaluations: int
+    parents: tuple[Result, ...] = ()
 
-    def __call__(self, *shape: int) -> Array:
-        return self.rng.standard_normal(shape)
+    @property
+    def id(self) -> str:
+        return f"{self.round:03d}-{self.index:02d}"
 
 
 class _CmaEs:
-    """A generation of CMA-ES at a time, on `Problem.cost`."""
+    """A generation of CMA-ES at a time, on `Objective.cost`."""
 
-    def __init__(
-        self, y: Array, sigma: float, population: int, scales: Array, rng: np.random.Generator
-    ) -> None:
+    def __init__(self, y: Vector, sigma: float, population: int, rng: np.random.Generator) -> None:
         import cma
 
         options = {
             "verbose": -9,
             "seed": np.nan,  # draws come from `randn` alone
-            "randn": _Normal(rng),
+            "randn": lambda *shape: rng.standard_normal(shape),
             "popsize": population,
             "tolfun": 1e-5,
-            "CMA_stds": scales,
+            "CMA_stds": TOE_SCALES,
             "signals_filename": "",
         }
         self.es: Any = cma.CMAEvolutionStrategy(y, sigma, options)
         self.best, self.value, self.evaluations = y, np.inf, 0
 
-    def advance(self, evaluate: Callable[[Array], float]) -> None:
-        points = [
-            np.ascontiguousarray(point) for point in self.es.ask()
-        ]  # rows of one: kernels know one type
-        self.es.tell(points, [evaluate(point) for point in points])
+    def advance(self, cost: Callable[[Vector], float]) -> None:
+        points = [np.ascontiguousarray(point) for point in self.es.ask()]  # kernels know one type
+        self.es.tell(points, [cost(point) for point in points])
         self.best, self.value = np.array(self.es.best.x), float(self.es.best.f)
         self.evaluations = int(self.es.countevals)
 
     def ended(self) -> str:
+        """Why it cannot go on, or ""."""
         return ", ".join(self.es.stop())
 
 
 class _Hops:
-    """A descent at a time, on `Problem.rate`: from the start, then from beside the best so far."""
+    """A descent at a time, on `Objective.rate`: from the start, then from beside the best so far."""
 
-    def __init__(self, y: Array, sigmas: tuple[float, ...], scales: Array, rng: np.random.Generator) -> None:
-        self.sigmas, self.scales, self.rng = sigmas, scales, rng
+    def __init__(self, y: Vector, sigmas: tuple[float, ...], rng: np.random.Generator) -> None:
+        self.sigmas, self.rng = sigmas, rng
         self.best, self.value, self.evaluations = y, np.inf, 0
 
-    def advance(self, evaluate: Callable[[Array], Rating]) -> None:
+    def advance(self, rate: Callable[[Vector], Rating]) -> None:
         hop = float(self.rng.choice(self.sigmas)) if self.evaluations else 0.0
-        start = self.best + hop * self.scales * self.rng.standard_normal(self.best.size)
+        start = self.best + hop * TOE_SCALES * self.rng.standard_normal(self.best.size)
         central = bool(self.rng.integers(2))
-        found = descend(evaluate, start, self.scales, penalty=PENALTY, central=central)
-        self.evaluations += found.evaluations
-        if (value := found.rating.merit(PENALTY)) < self.value:
-            self.best, self.value = found.y, value
+        end = descend(rate, start, TOE_SCALES, penalty=PENALTY, central=central)
+        self.evaluations += end.evaluations
+        if (value := end.rating.merit(PENALTY)) < self.value:
+            self.best, self.value = end.y, value
 
     def ended(self) -> str:
         return ""
 
 
-@dataclass
-class _Run:
-    """A started job: all that a checkpoint contains."""
-
-    method: _Method
-    choice: dict[str, Any]
-    root: str
-    sigma: float
-    population: int
-    seconds: float = 0.0
-
-
-def run_job(
-    problem: Problem,
-    job: Job,
-    checkpoint: bytes | None,
-    save: Callable[[bytes], None],
-    tell: Callable[[Progress], None],
-    every: float = CHECKPOINT_EVERY,
-) -> Result:
-    """Run a job, or the rest of it after a checkpoint; either way the result is the same, bit for bit.
-
-    Args:
-        save: called with a checkpoint every so many seconds.
-        tell: called with the progress now and then.
-        every: seconds between two checkpoints.
-    """
-    run: _Run = pickle.loads(checkpoint) if checkpoint is not None else _start(problem, job)
-    phase, method = job.phase, run.method
-    evaluate = (problem.rate if phase.method == "minimax" else problem.cost)(run.choice, phase)
-    before, began = run.seconds, time.monotonic()
-    saved = told = began
-    judged = np.inf
-    while True:
-        met = False
-        if phase.ends_at_bar and method.value < judged:
-            standing = _standing(problem, run, phase)
-            judged, met = method.value, standing.met and abs(standing.error) <= CLEAR
-        now = time.monotonic()
-        run.seconds = before + now - began
-        if now - told > TELL_EVERY and method.evaluations:
-            tell(Progress(job.id, method.evaluations, method.value, _standing(problem, run, phase)))
-            told = now
-        stop = _stop(job, method, met)
-        if stop:
-            break
-        if now - saved > every:
-            save(pickle.dumps(run))
-            saved = now
-        method.advance(evaluate)
-    return _result(problem, job, run, stop)
-
-
-def _start(problem: Problem, job: Job) -> _Run:
-    phase, rng = job.phase, np.random.default_rng([job.seed, job.round, job.index])
-    sigma, population = float(rng.choice(phase.sigmas)), int(rng.choice(phase.populations))
-    root = job.id
-    if phase.start == "cold":
-        choice, y = problem.cold(rng, phase)
-    elif phase.start == "given":
-        choice, y = problem.given(rng, phase)
-    else:
+def run_job(problem: LegProblem, job: Job) -> Result:
+    """Run a job; the same job gives the same result, bit for bit."""
+    began, phase, rng = time.monotonic(), job.phase, np.random.default_rng([job.seed, job.round, job.index])
+    sigma = float(rng.choice(phase.sigmas))
+    if phase.start == "best":
         parent = job.parents[job.index % len(job.parents)]
         choice, root = parent.choice, parent.root
-        y = problem.inward(choice, np.array(parent.x), phase)
-    scales = problem.scales(choice, phase)
-    if phase.method == "minimax":
-        return _Run(_Hops(y, phase.sigmas, scales, rng), choice, root, 0.0, 0)
-    return _Run(_CmaEs(y, sigma, population, scales, rng), choice, root, sigma, population)
-
-
-def _standing(problem: Problem, run: _Run, phase: Phase) -> Standing:
-    """Of the best candidate so far."""
-    x = problem.outward(run.choice, run.method.best, phase)
-    return problem.standing(run.choice, x, phase.paper_solver)
-
-
-def _stop(job: Job, method: _Method, met: bool) -> str:
-    """Why a job ends now, or ""."""
-    if method.evaluations >= job.evaluations:
-        return "evaluations spent"
-    if met:
-        return "bar reached"
-    for evaluations, value in job.phase.give_up:
-        if method.evaluations >= evaluations and method.value > value:
-            return f"cost above {value:g} after {evaluations} evaluations"
-    return method.ended()
-
-
-def _result(problem: Problem, job: Job, run: _Run, stop: str) -> Result:
-    began = time.monotonic()
-    x = problem.outward(run.choice, run.method.best, job.phase)
-    exact, full = problem.rank(run.choice, x)
-    both = None if full is None else problem.standing(run.choice, x, True)
-    confirmed = both is not None and both.met and problem.confirm(run.choice, x)
+        y = problem.inward(choice, np.array(parent.x), phase.samples)
+    else:
+        (choice, y), root = problem.begin(rng, phase), job.id
+    objective = problem.objective(choice, phase.samples, phase.paper_solver, True)
+    method: Any
+    if phase.method == "cma":
+        method, evaluate = _CmaEs(y, sigma, phase.population, rng), objective.cost
+    else:
+        method, evaluate = _Hops(y, phase.sigmas, rng), objective.rate
+    judged, stop = np.inf, ""
+    while not stop:
+        met = False
+        if phase.ends_at_bar and method.value < judged:
+            x = problem.outward(choice, method.best, phase.samples)
+            standing = problem.objective(choice, SAMPLES, phase.paper_solver).standing(x)
+            judged, met = method.value, standing.met and abs(standing.error) <= CLEAR
+        if method.evaluations >= job.evaluations:
+            stop = "evaluations spent"
+        else:
+            stop = "bar reached" if met else method.ended()
+        if not stop:
+            method.advance(evaluate)
+    x = problem.outward(choice, method.best, phase.samples)
+    exact, both = (problem.objective(choice, SAMPLES, both).standing(x) for both in (False, True))
     return Result(
         id=job.id,
-        phase=job.phase.name,
-        start=job.phase.start,
-        root=run.root,
-        choice=run.choice,
-        sigma=run.sigma,
-        population=run.population,
-        evaluations=run.method.evaluations,
-        seconds=run.seconds + time.monotonic() - began,
+        phase=phase.name,
+        root=root,
+        choice=choice,
+        x=tuple(x.tolist()),
+        evaluations=method.evaluations,
+        seconds=time.monotonic() - began,
         stop=stop,
-        x=x.tolist(),
-        cost=run.method.value,
-        exact=exact,
-        full=full,
-        standing=problem.standing(run.choice, x, False),
-        both=both,
-        confirmed=confirmed,
+        exact=problem.merit(choice, x, False),
+        both=problem.merit(choice, x, True),
+        standing=str(both if exact.met else exact),
+        confirmed=both.met and problem.confirm(choice, x),
     )

@@ -179,5 +179,5 @@ class _Model:
         limits = np.concatenate([-upper, lower, -demands]).clip(-1e3, 1e3)
         bounds = [(-radius * s - d, radius * s - d) for s, d in zip(self.scales, moved, strict=True)]
         bounds += [(0.0, None)] * (self.costs.size - len(bounds))
-        found = linprog(self.costs, A_ub=self.matrix, b_ub=limits, bounds=bounds, method="highs-ds")
-        return (found.x[: moved.size], float(found.fun)) if found.status == 0 else (None, np.inf)
+        solution = linprog(self.costs, A_ub=self.matrix, b_ub=limits, bounds=bounds, method="highs-ds")
+        return (solution.x[: moved.size], float(solution.fun)) if solution.status == 0 else (None, np.inf)

@@ -1,11 +1,13 @@
-"""What both commands share: options from a function's signature, one line for an error."""
+"""What both commands share: options from a function's signature, checks, one line for an error."""
 
 from __future__ import annotations
 
+import importlib
 import sys
 from collections.abc import Callable, Sequence
+from typing import Any
 
-from hoof_env.errors import HoofEnvError
+from hoof_env.errors import HoofEnvError, MissingExtraError, check_number
 
 
 def run(command: Callable[..., None], name: str, arguments: Sequence[str] | None = None) -> int:
@@ -14,16 +16,36 @@ def run(command: Callable[..., None], name: str, arguments: Sequence[str] | None
     import tyro
 
     try:
-        tyro.cli(command, prog=name, args=arguments)
+        tyro.cli(command, prog=f"python -m {name}", args=arguments)
     except HoofEnvError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
+        print("interrupted; go on with the same command and --resume", file=sys.stderr)
         return 130
     return 0
 
 
-def say(line: str) -> None:
-    """Print a line at once."""
-    print(line, flush=True)
+def check_extras() -> None:
+    """Raise `MissingExtraError` with the way out unless the optimisers can be imported."""
+    for name in ("cma", "scipy", "tqdm"):
+        try:
+            importlib.import_module(name)
+        except ImportError:
+            raise MissingExtraError(f'identify needs {name}: pip install "hoof-env[identify]"') from None
+
+
+def check_counts(**counts: Any) -> list[int]:
+    """Whole numbers: seed of 0 or more, all others of 1 or more.
+
+    Raises:
+        ParameterError: one is out of range; the message names it.
+    """
+    return [
+        int(
+            check_number(
+                name, value, low=0 if name == "seed" else 1, high=1024 if name == "workers" else 2**53
+            )
+        )
+        for name, value in counts.items()
+    ]

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 PAPER_WEIGHT = 12
 """How many evaluations one with the paper's solver counts for: it takes that much longer."""
 
-
 BUDGET = 10_000_000
 """Evaluations of a search unless told otherwise; one takes some 0.1 ms."""
 
@@ -22,20 +21,18 @@ class Phase:
         name: in reports.
         start: "given" (around the start preset), "cold" (anywhere) or "best" (from results so far: job i
             from the i-th best of the independent starts).
-        method: "cma" (CMA-ES on the cost of all errors) or "minimax" (descents of the largest error, each
-            from beside the best so far, see `minimax`).
         jobs, rounds: jobs a round, and rounds.
         evaluations: at most, a job; a descent that has begun is finished.
         sigmas: one is drawn for a job of CMA-ES, or for each hop between descents; in scales.
-        populations: one is drawn for a job of CMA-ES.
+        method: "cma" (CMA-ES on the cost of all errors) or "minimax" (descents of the largest error, each
+            from beside the best so far, see `minimax`).
+        population: of CMA-ES.
         spreads: "given" only, one is drawn: the start's distance from the preset, in scales.
         tries: how many random legs the best of which is the start; "given" and "cold" only.
         elite: "best" only: how many independent starts are kept.
         below: "best" only: results of other phases that are further out with the exact solver [bars] are
             not refined; without any left the phase is skipped.
-        give_up: pairs (evaluations, cost): a job that costs more after so many evaluations ends.
         samples: instants a revolution.
-        by_toe: search the walking toe's touch-down instead of ground level and offset, see `Objective`.
         paper_solver: the objective contains the paper's solver too.
         ends_at_bar: a job ends as soon as all rows are clear within their bars and nothing falls short.
     """
@@ -46,15 +43,13 @@ class Phase:
     evaluations: int
     sigmas: tuple[float, ...]
     method: str = "cma"
-    populations: tuple[int, ...] = (20,)
+    population: int = 20
     rounds: int = 1
     spreads: tuple[float, ...] = (0.0, 0.15, 0.3, 0.5)
     tries: int = 300
     elite: int = 6
     below: float = float("inf")
-    give_up: tuple[tuple[int, float], ...] = ()
-    samples: int = 201
-    by_toe: bool = True
+    samples: int = 101
     paper_solver: bool = False
     ends_at_bar: bool = False
 
@@ -68,47 +63,32 @@ Schedule = tuple[Phase, ...]
 """Phases, run again and again until the bar is reached or the budget spent."""
 
 _HOPS = (0.003, 0.01, 0.03, 0.1)
-_START = Phase(
-    "start", "given", jobs=1, evaluations=6_000, sigmas=_HOPS, method="minimax", spreads=(0.0,), samples=401
-)
-_AROUND = Phase("around", "given", jobs=24, evaluations=4_000, sigmas=(0.1,), samples=101)
-_COLD = Phase("cold", "cold", jobs=24, evaluations=4_000, sigmas=(0.2,), tries=1500, samples=101)
-_SETTLE = Phase("settle", "best", jobs=8, elite=8, evaluations=8_000, sigmas=(0.05,), samples=101)
-_DESCEND = Phase(
-    "descend", "best", jobs=8, elite=8, evaluations=4_000, sigmas=_HOPS, method="minimax", samples=401
-)
-_POLISH = Phase(
-    "polish",
-    "best",
-    jobs=4,
-    elite=2,
-    rounds=3,
-    evaluations=16_000,
-    sigmas=_HOPS,
-    method="minimax",
-    samples=401,
-    ends_at_bar=True,
-)
-_BOTH = Phase(
-    "both solvers",
-    "best",
-    jobs=4,
-    elite=2,
-    rounds=2,
-    evaluations=8_000,
-    sigmas=(0.002, 0.005, 0.01, 0.02, 0.04),
-    method="minimax",
-    samples=401,
-    below=1.5,
-    paper_solver=True,
-    ends_at_bar=True,
+_DESCENTS = Phase("descend", "best", 8, 4_000, _HOPS, method="minimax", elite=8, samples=401)
+_START = replace(_DESCENTS, name="start", start="given", jobs=1, evaluations=6_000, spreads=(0.0,))
+_AROUND = Phase("around", "given", 24, 4_000, (0.1,))
+_COLD = Phase("cold", "cold", 24, 4_000, (0.2,), tries=1500)
+_REFINE = (
+    Phase("settle", "best", 8, 8_000, (0.05,), elite=8),
+    _DESCENTS,
+    replace(_DESCENTS, name="polish", jobs=4, elite=2, rounds=3, evaluations=16_000, ends_at_bar=True),
+    replace(
+        _DESCENTS,
+        name="both solvers",
+        jobs=4,
+        elite=2,
+        rounds=2,
+        evaluations=8_000,
+        sigmas=(0.002, 0.005, 0.01, 0.02, 0.04),
+        below=1.5,
+        paper_solver=True,
+        ends_at_bar=True,
+    ),
 )
 
-FROM_PRESET: Schedule = (_AROUND, _SETTLE, _DESCEND, _POLISH, _BOTH)
-BEYOND: Schedule = (_START, replace(_AROUND, spreads=(0.15, 0.3, 0.5)), _SETTLE, _DESCEND, _POLISH, _BOTH)
+FROM_PRESET: Schedule = (_AROUND, *_REFINE)
+COLD: Schedule = (_COLD, *_REFINE)
+BEYOND: Schedule = (_START, replace(_AROUND, spreads=(0.15, 0.3, 0.5)), *_REFINE)
 """For a search that keeps going, whose start may lie within the bars already."""
-
-COLD: Schedule = (_COLD, _SETTLE, _DESCEND, _POLISH, _BOTH)
 
 
 def rounds(schedule: Schedule) -> Iterator[tuple[int, Phase]]:

@@ -3,24 +3,15 @@ a kill and a resumption change nothing in what is found."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
+from functools import partial
 
-from research.identify.job import CHECKPOINT_EVERY
-from research.identify.records import Job, Parent, Problem, Progress, Result
+from research.identify.job import Job, Result, run_job
+from research.identify.problem import LegProblem
+from research.identify.processes import processes
 from research.identify.schedule import Phase, Schedule, rounds
 from research.identify.state import State
-from research.identify.workers import Workers
-
-
-class Monitor(Protocol):
-    """Who looks on."""
-
-    def planned(self, jobs: list[Job]) -> None: ...
-
-    def running(self, progress: Progress) -> None: ...
-
-    def finished(self, result: Result) -> None: ...
 
 
 @dataclass(frozen=True)
@@ -39,65 +30,58 @@ class Outcome:
 
 
 def search(
-    problem: Problem,
+    problem: LegProblem,
     schedule: Schedule,
     state: State,
-    monitor: Monitor,
+    report: Callable[[Result, int], None],
     *,
     seed: int,
     budget: int,
     workers: int = 2,
     keep_going: bool = False,
-    every: float = CHECKPOINT_EVERY,
 ) -> Outcome:
     """Run or resume a search until a candidate is confirmed or the budget is spent.
 
     Args:
+        report: called with each result and what it spent, by its weight.
         budget: evaluations, one with the paper's solver by its weight; the last round may exceed it a little.
         workers: processes.
         keep_going: spend the whole budget; no job ends at the bar, and the winner is the best.
-        every: seconds between two checkpoints of a job.
 
     Raises:
         HoofEnvError: a damaged file, a folder that cannot be written, a job that failed.
     """
     results: list[Result] = []
     spent = 0
-    with Workers(problem, state, workers, every) as processes:
+    with processes(workers) as run:
         for number, phase in rounds(schedule):
             if spent >= budget:
                 break
-            if keep_going:
-                phase = replace(phase, ends_at_bar=False)
+            phase = replace(phase, ends_at_bar=phase.ends_at_bar and not keep_going)
             jobs = plan(number, phase, results, seed, budget - spent)
-            if not jobs:
-                continue
-            monitor.planned(jobs)
-            found = {job.id: result for job in jobs if (result := state.result(job.id))}
-            last = min((job.index for job in jobs if _ends(found.get(job.id), keep_going)), default=len(jobs))
-
-            def done(result: Result, found: dict[str, Result] = found) -> bool:
-                found[result.id] = result
-                monitor.finished(result)
-                return _ends(result, keep_going)
-
-            for result in found.values():
-                monitor.finished(result)
-            missing = [job for job in jobs if job.id not in found and job.index < last]
-            processes.run(missing, monitor.running, done)
-            for job in jobs:
-                if job.id not in found:
-                    continue
-                results.append(found[job.id])
-                spent += phase.weight * found[job.id].evaluations
-                if _ends(found[job.id], keep_going):
-                    return Outcome(tuple(results), found[job.id], spent)
+            done = {job.id: there for job in jobs if (there := state.load(f"job-{job.id}", Result.from_dict))}
+            for result in done.values():
+                report(result, phase.weight * result.evaluations)
+            missing = [job for job in _needed(jobs, done, keep_going) if job.id not in done]
+            for result in run(partial(run_job, problem), missing):
+                state.save(f"job-{result.id}", result.to_dict())
+                done[result.id] = result
+                report(result, phase.weight * result.evaluations)
+                if all(job.id in done for job in _needed(jobs, done, keep_going)):
+                    break
+            for job in _needed(jobs, done, keep_going):
+                results.append(done[job.id])
+                spent += phase.weight * done[job.id].evaluations
+                if done[job.id].confirmed and not keep_going:
+                    return Outcome(tuple(results), done[job.id], spent)
     confirmed = [result for result in results if result.confirmed]
-    return Outcome(tuple(results), min(confirmed, key=lambda r: r.full or 0.0, default=None), spent)
+    return Outcome(tuple(results), min(confirmed, key=lambda r: r.both, default=None), spent)
 
 
-def _ends(result: Result | None, keep_going: bool) -> bool:
-    return result is not None and result.confirmed and not keep_going
+def _needed(jobs: list[Job], done: dict[str, Result], keep_going: bool) -> list[Job]:
+    """The jobs up to the first that ends the search."""
+    ends = (job.index for job in jobs if job.id in done and done[job.id].confirmed and not keep_going)
+    return jobs[: min(ends, default=len(jobs)) + 1]
 
 
 def plan(number: int, phase: Phase, results: list[Result], seed: int, left: int) -> list[Job]:
@@ -113,15 +97,11 @@ def plan(number: int, phase: Phase, results: list[Result], seed: int, left: int)
     return [Job(number, index, phase, seed, evaluations, parents) for index in range(phase.jobs)]
 
 
-def elite(phase: Phase, results: list[Result]) -> tuple[Parent, ...]:
+def elite(phase: Phase, results: list[Result]) -> tuple[Result, ...]:
     """The best result of each of the best independent starts, best first, by the phase's solvers."""
-    ranked = []
-    for result in results:
-        merit = result.full if phase.paper_solver else result.exact
-        if merit is not None and (result.exact < phase.below or result.phase == phase.name):
-            ranked.append((merit, result.parent))
-    ranked.sort(key=lambda pair: pair[0])
-    best: dict[str, Parent] = {}
-    for _, parent in ranked:
-        best.setdefault(parent.root, parent)
+    ranked = [result for result in results if result.exact < phase.below or result.phase == phase.name]
+    ranked.sort(key=lambda result: result.both if phase.paper_solver else result.exact)
+    best: dict[str, Result] = {}
+    for result in ranked:
+        best.setdefault(result.root, result)
     return tuple(best.values())[: phase.elite]

@@ -1,21 +1,24 @@
 """What a search leaves in its folder so that it can go on after it was killed.
 
-`problem.json` says what is searched, `job-ROUND-INDEX.json` holds a finished job, `.pickle` a running one.
-Every file is written beside its name and then moved there, so that a kill never leaves half of one.
+`state/problem.json` says what is searched, and every finished part of it has a file of its own there.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
-import os
-import pickle
-from collections.abc import Mapping
+import platform
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-from hoof_env.errors import DataFileError, HoofEnvError, OutputError
-from research.identify.records import Result
+from hoof_env import __version__
+from hoof_env._output import staged
+from hoof_env.errors import DataFileError, OutputError
+
+T = TypeVar("T")
 
 FOLDER = "state"
 _HINT = "name another folder or delete this one"
@@ -32,121 +35,78 @@ class State:
     digest: str
     kind: str = "search"
 
-    def result(self, job_id: str) -> Result | None:
-        """A finished job, or None.
+    def load(self, name: str, read: Callable[[Any], T]) -> T | None:
+        """What `save` wrote under a name, through `read`; None if there is nothing.
 
         Raises:
-            DataFileError: its file is damaged or of another search.
+            DataFileError: the file is damaged or of another search.
         """
-        path = self.folder / f"job-{job_id}.json"
+        path = self.folder / f"{name}.json"
         if not path.exists():
             return None
-        data = read_json(path, f"delete it to repeat job {job_id}")
+        data = read_json(path, f"delete it to repeat {name}")
         try:
-            digest, result = data["problem"], Result.from_dict(data["result"])
+            digest, content = data["problem"], data["content"]
+            if digest != self.digest:
+                raise DataFileError(
+                    f"{path} belongs to another {self.kind} (expected {self.digest}, got {digest!r}); {_HINT}"
+                )
+            return read(content)
         except (KeyError, TypeError):
-            raise DataFileError(f"{path} is damaged; delete it to repeat job {job_id}") from None
-        self.check(path, digest)
-        return result
+            raise DataFileError(f"{path} is damaged; delete it to repeat {name}") from None
 
-    def finish(self, result: Result) -> None:
-        """Write a finished job, which ends its checkpoint."""
-        text = json.dumps({"problem": self.digest, "result": result.to_dict()}, indent=1, allow_nan=False)
-        write(self.folder / f"job-{result.id}.json", text.encode())
-        self._checkpoint(result.id).unlink(missing_ok=True)
-
-    def load(self, job_id: str) -> bytes | None:
-        """The checkpoint of a running job, or None.
+    def save(self, name: str, content: Any) -> None:
+        """Write a JSON value under a name; a kill never leaves half of it.
 
         Raises:
-            DataFileError: it is damaged or of another search.
+            OutputError: it cannot be written.
         """
-        path = self._checkpoint(job_id)
-        if not path.exists():
-            return None
-        try:
-            digest, _, content = path.read_bytes().partition(b"\n")
-        except OSError as error:
-            raise DataFileError(f"cannot read {path}: {error.strerror or error}") from None
-        self.check(path, digest.decode(errors="replace"))
-        try:
-            pickle.loads(content)
-        except Exception:  # a damaged pickle may raise anything
-            raise DataFileError(f"{path} is damaged; delete it to repeat job {job_id}") from None
-        return content
-
-    def save(self, job_id: str, checkpoint: bytes) -> None:
-        """Write the checkpoint of a running job."""
-        write(self._checkpoint(job_id), self.digest.encode() + b"\n" + checkpoint)
-
-    def _checkpoint(self, job_id: str) -> Path:
-        return self.folder / f"job-{job_id}.pickle"
-
-    def check(self, path: Path, digest: Any) -> None:
-        """Raise `DataFileError` unless a file's digest is that of this search."""
-        if digest != self.digest:
-            raise DataFileError(
-                f"{path} belongs to another {self.kind} (expected {self.digest}, got {digest!r}); {_HINT}"
-            )
+        write_json(self.folder, name, {"problem": self.digest, "content": content})
 
 
 def open_state(
-    out: Path,
-    problem: Mapping[str, Any],
-    digest: str,
-    *,
-    resume: bool,
-    kind: str = "search",
-    product: str = "identified.json",
+    out: Path, problem: Mapping[str, Any], *, resume: bool, product: str, kind: str = "search"
 ) -> State:
     """Begin a search in `out`, or go on with the one that is there.
 
     Args:
         out: the search's output folder, made if need be.
-        problem: JSON object, what tells this search from another; `digest` of the same.
+        problem: JSON object, what tells this search from another.
         resume: go on with a search rather than begin one.
-        kind: what errors call it. product: the file that it ends with.
+        product: the file that it ends with. kind: what errors call it.
 
     Raises:
         DataFileError: nothing to resume, or a search for something else, or a damaged file.
         OutputError: the folder holds a search that would be overwritten, or cannot be written.
     """
-    folder = out / FOLDER
+    folder, wanted = out / FOLDER, json.loads(json.dumps(problem))
     file = folder / "problem.json"
     try:
-        if resume:
-            _check_same(out, file, problem, kind)
-        elif file.exists() or (out / product).exists():
-            raise OutputError(
-                f"{str(out)!r} already holds a search or what one found; name another folder, or go on with "
-                f"the same {kind} by --resume"
-            )
-        else:
-            folder.mkdir(parents=True, exist_ok=True)
-            write(file, json.dumps(problem, indent=1).encode())
-    except HoofEnvError:
-        raise
+        is_there, is_taken = file.is_file(), file.exists() or (out / product).exists()
     except OSError as error:
-        raise OutputError(
-            f"cannot write to {str(out)!r} ({error.strerror}); expected a writable folder"
-        ) from None
-    return State(folder, digest, kind)
-
-
-def _check_same(out: Path, file: Path, problem: Mapping[str, Any], kind: str) -> None:
-    if not file.is_file():
+        raise OutputError(f"cannot write to {str(out)!r} ({error.strerror})") from None
+    if resume and not is_there:
         raise DataFileError(f"{str(out)!r} holds no {kind} to resume; leave out --resume to begin one")
-    found = read_json(file, f"nothing can be resumed: {_HINT}")
-    differing = _differences(found, json.loads(json.dumps(problem)))
-    if differing:
-        raise DataFileError(f"{str(out)!r} holds another {kind}: {'; '.join(differing)}; {_HINT}")
+    if resume:
+        there = read_json(file, f"nothing can be resumed: {_HINT}")
+        there = there if isinstance(there, dict) else {}
+        keys = [key for key in {**wanted, **there} if there.get(key) != wanted.get(key)]
+        if keys:
+            differing = (f"{key} is {there.get(key)!r} there and {wanted.get(key)!r} here" for key in keys)
+            raise DataFileError(f"{str(out)!r} holds another {kind}: {'; '.join(differing)}; {_HINT}")
+    elif is_taken:
+        raise OutputError(
+            f"{str(out)!r} already holds a search or what one found; name another folder, or go on with "
+            f"the same {kind} by --resume"
+        )
+    else:
+        write_json(folder, "problem", wanted)
+    return State(folder, digest_of(problem), kind)
 
 
-def _differences(found: Any, wanted: dict[str, Any]) -> list[str]:
-    if not isinstance(found, dict):
-        return [f"its problem.json holds no object but {type(found).__name__}"]
-    keys = [key for key in {**wanted, **found} if found.get(key) != wanted.get(key)]
-    return [f"{key} is {found.get(key)!r} there and {wanted.get(key)!r} here" for key in keys]
+def digest_of(content: Any) -> str:
+    """16 hexadecimal digits that tell one JSON value from another."""
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
 
 
 def read_json(path: Path, hint: str) -> Any:
@@ -163,16 +123,15 @@ def read_json(path: Path, hint: str) -> Any:
         raise DataFileError(f"{path} is damaged; {hint}") from None
 
 
-def write(path: Path, content: bytes) -> None:
-    """Write a file beside its name, then move it there.
+def write_json(folder: Path, name: str, content: Any) -> Path:
+    """Write a JSON file whole or not at all; returns its path."""
+    text = json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    with staged(folder) as stage:
+        (stage / f"{name}.json").write_text(text, encoding="utf-8")
+    return folder / f"{name}.json"
 
-    Raises:
-        OutputError: it cannot be written.
-    """
-    part = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        part.write_bytes(content)
-        os.replace(part, path)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise OutputError(f"cannot write {path}: {error.strerror or error}") from None
+
+def versions() -> dict[str, str]:
+    """Of what a search's numbers depend on."""
+    packages = {name: version(name) for name in ("cma", "numpy", "numba")}
+    return {"hoof-env": __version__, "Python": platform.python_version(), **packages}

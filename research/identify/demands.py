@@ -16,12 +16,6 @@ from research.identify.features import FEATURES
 LENGTH_RANGE = (0.08, 3.0)
 """Shortest and longest link [m]: none vanishes, none is longer than the animal."""
 
-PART_RANGE = (0.1, 0.9)
-"""Where an 'inner point' of link 6 or 7 may lie [-]: nearer to an end it is that end."""
-
-OVAL_LIMIT = 0.5
-"""Longest half axis of the moving pivot's ellipse [m], the hip height's third."""
-
 LEG = np.dtype(
     [
         (name, "f8")
@@ -32,8 +26,7 @@ LEG = np.dtype(
             "sole", "sole_part",  # length of the sole [m], and over the hip height [-]
             "lowest",  # smallest height of a joint other than toe and heel over both cycles [m]
             "length_excess",  # log lengths beyond `LENGTH_RANGE`, summed [-]
-            "part_excess",  # how far Q lies outside `PART_RANGE` [-]
-            "walk_excess", "run_excess",  # swing beyond the limits of a gait, summed [rad, m]
+            "walk_excess", "run_excess",  # swing beyond the limits of a gait, summed [rad]
         )
     ]
 )  # fmt: skip
@@ -83,7 +76,6 @@ LEG_DEMANDS = (
     _at_most("sole_long", "leg.sole_part", 0.159, 200, "a hoof, not a foot: under 0.16 of the hip height"),
     _at_least("joints", "leg.lowest", 0.01, 50, "no joint but toe and heel goes under the ground"),
     _at_most("lengths", "leg.length_excess", 0.0, 3, "links of an animal's size"),
-    _at_most("part", "leg.part_excess", 0.0, 20, "link 9 at an inner point, where it ends on link 6 or 7"),
     _at_most("walk.limits", "leg.walk_excess", 0.0, 10, "the gait can be commanded (gait.LIMITS)"),
     _at_most("run.limits", "leg.run_excess", 0.0, 10, "the gait can be commanded (gait.LIMITS)"),
 )
@@ -144,7 +136,3 @@ WALK_DEMANDS = {
 def demands(walk: str) -> tuple[Demand, ...]:
     """All demands for a walk that "walks" or "brakes", those of the leg first."""
     return (*LEG_DEMANDS, *GAIT_DEMANDS, *WALK_DEMANDS[walk])
-
-
-PLAUSIBILITY = tuple(demand.name for demand in demands("walks"))
-"""Names of the demands, for a walk that walks."""
