@@ -8,29 +8,19 @@ with the push as its only row and everything else as a demand).
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from hoof_env.errors import HoofEnvError
-from research.identify.confirm import confirm
+from research.identify.confirm import COUNTED, confirm
 from research.identify.job import CLEAR
-from research.identify.leg import Choice, Vector, to_preset
-from research.identify.measure import MISSED_ROW
+from research.identify.leg import Vector, to_preset
 from research.identify.minimax import Rate, Rating, descend
-from research.identify.objective import INSIDE
+from research.identify.objective import INSIDE, MISSED_ROW
 from research.identify.problem import TOE_SCALES, LegProblem
-
-SOLVERS = ("exact", "paper")
-
-HOPS = (0.002, 0.005, 0.01, 0.03)
-"""Sizes of the hops, in a search's scales, between descents of a start that is outside the bar."""
-
-TRIES = 12
-"""Descents at most of such a start, with each solver."""
 
 REACH = 0.5
 """How far a push wants to go, in a search's scales: further than it ever gets."""
@@ -68,14 +58,13 @@ class Aim:
         asks for `INSIDE` more than they do."""
         return self.bar / INSIDE
 
-    def rate(self, choice: Choice, both: bool) -> Rate:
+    def rate(self, both: bool) -> Rate:
         """Rating of y, with the exact solver alone or with both."""
-        return self.problem.objective(choice, SAMPLES, both, by_toe=True).rate
+        return self.problem.objective(SAMPLES, both, by_toe=True).rate
 
-    def runs(self, choice: Choice, y: Vector) -> bool:
+    def runs(self, y: Vector) -> bool:
         """Whether the paper's solver comes through both cycles; near a dead point it may not."""
-        x = self.problem.outward(choice, y, SAMPLES)
-        rows = self.problem.objective(choice, SAMPLES, False).paper_rows(x)
+        rows = self.problem.objective(SAMPLES, False).paper_rows(self.problem.outward(y, SAMPLES))
         return bool(np.abs(rows).max() < MISSED_ROW)
 
 
@@ -85,17 +74,15 @@ class Task:
 
     Attributes:
         round, index: its place. seed: of its random numbers, with its place.
-        origin, start: the attempt that it goes on from, and the start behind that; the same for a start.
-        choice, y: the leg that it goes on from, y as a search by touch-down has it; for a start x.
+        start: name of the start that it goes back to.
+        y: the leg that it goes on from, as a search by touch-down has it; for a start x.
         direction: unit vector, shape as y, in a search's scales; empty for a start.
     """
 
     round: int
     index: int
     seed: int
-    origin: str
     start: str
-    choice: Choice
     y: tuple[float, ...]
     direction: tuple[float, ...] = ()
 
@@ -106,92 +93,53 @@ class Task:
 
 @dataclass(frozen=True)
 class Attempt:
-    """A made attempt; see `Task`.
-
-    Attributes:
-        merit: largest error [bars] and what shortages cost, see `Aim.penalty`; `MISSED_ROW` if the paper's
-            solver cannot simulate the leg. evaluations, seconds: spent.
-        errors: by solver, the largest error of a row [bars], by the full system; empty before its verdict.
-        short: demands that fall short, by name. untrue: claims that the full system finds untrue, of the
-            solvers that count.
-    """
+    """A made attempt; see `Task`. Its merit is the largest error [bars] and what shortages cost, see
+    `Aim.penalty`; `MISSED_ROW` if the paper's solver cannot simulate the leg."""
 
     id: str
-    origin: str
     start: str
-    choice: Choice
     y: tuple[float, ...]
     merit: float
-    evaluations: int
-    seconds: float
-    errors: Mapping[str, float]
-    short: Mapping[str, float]
-    untrue: tuple[str, ...] = ()
-
-    def holds(self, aim: Aim) -> bool:
-        """Whether the full system has found it a member."""
-        return bool(self.errors) and not self.reasons(aim)
-
-    def reasons(self, aim: Aim) -> list[str]:
-        """Why the full system refuses it."""
-        counted = {solver: self.errors[solver] for solver in (SOLVERS if aim.both else SOLVERS[:1])}
-        errors = [f"{s} error of {error:.2f} bars" for s, error in counted.items() if error > aim.bar]
-        return [*errors, *self.short, *self.untrue]
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Attempt:
         """Inverse of `dataclasses.asdict`; KeyError or TypeError for anything else."""
-        choice = Choice.from_dict(data["choice"])
-        return cls(**{**data, "choice": choice, "y": tuple(data["y"]), "untrue": tuple(data["untrue"])})
+        return cls(**{**data, "y": tuple(data["y"])})
 
-    def preset(self, aim: Aim) -> dict[str, Any]:
-        """The content of a preset file.
 
-        Raises:
-            HoofEnvError: the leg does not turn, or a gait is beyond its limits.
-        """
-        return to_preset(self.x(aim), self.choice, "a candidate of an ensemble")
+@dataclass(frozen=True)
+class Verdict:
+    """What the full system says of an attempt.
 
-    def x(self, aim: Aim) -> Vector:
-        return aim.problem.outward(self.choice, np.array(self.y), SAMPLES)
+    Attributes:
+        preset: the leg, content of a preset file; empty if it does not turn.
+        errors: by solver, the largest error of a row [bars].
+        short: demands that fall short, by name.
+        reasons: why it is no member, in words; empty for a member.
+    """
+
+    preset: Mapping[str, Any]
+    errors: Mapping[str, float]
+    short: Mapping[str, float]
+    reasons: tuple[str, ...]
 
 
 def attempt(task: Task, aim: Aim) -> Attempt:
     """Make an attempt; the same task and aim give the same result."""
-    began, choice = time.monotonic(), task.choice
     if task.direction:
-        y, spent = _push(task, aim)
+        y = _push(task, aim)
     else:
-        y, spent = aim.problem.inward(choice, np.array(task.y), SAMPLES), 0
+        y = aim.problem.inward(np.array(task.y), SAMPLES)
         for both in (False, True) if aim.both else (False,):
-            y, more = _enter(task, both, y, aim)
-            spent += more
-    merit = aim.rate(choice, aim.both)(y).merit(aim.penalty) if aim.runs(choice, y) else MISSED_ROW
-    seconds = time.monotonic() - began
-    return Attempt(task.id, task.origin, task.start, choice, tuple(y.tolist()), merit, spent, seconds, {}, {})
+            goal = CLEAR * aim.bar
+            y = descend(aim.rate(both), y, TOE_SCALES, penalty=aim.penalty, central=True, goal=goal).y
+    merit = aim.rate(aim.both)(y).merit(aim.penalty) if aim.runs(y) else MISSED_ROW
+    return Attempt(task.id, task.start, tuple(y.tolist()), merit)
 
 
-def _enter(task: Task, both: bool, y: Vector, aim: Aim) -> tuple[Vector, int]:
-    """Descents from y, then from beside the best so far, until one is within the bar."""
-    rate, rng = aim.rate(task.choice, both), np.random.default_rng([task.seed, task.round, task.index])
-    lowest, goal, spent, start = rate(y).merit(aim.penalty), CLEAR * aim.bar, 1, y
-    if not aim.runs(task.choice, y):
-        lowest = np.inf
-    for _ in range(TRIES):
-        if lowest <= goal:
-            break
-        end = descend(rate, start, TOE_SCALES, penalty=aim.penalty, central=True, goal=goal)
-        spent += end.evaluations
-        merit = end.rating.merit(aim.penalty)
-        if merit < lowest and aim.runs(task.choice, end.y):
-            y, lowest = end.y, merit
-        start = y + float(rng.choice(HOPS)) * TOE_SCALES * rng.standard_normal(y.size)
-    return y, spent
-
-
-def _push(task: Task, aim: Aim) -> tuple[Vector, int]:
+def _push(task: Task, aim: Aim) -> Vector:
     """The leg that a push ends with; that which it goes on from unless the new one is within the bar."""
-    rate, origin, limit = aim.rate(task.choice, aim.both), np.array(task.y), CLEAR * aim.bar
+    rate, origin, limit = aim.rate(aim.both), np.array(task.y), CLEAR * aim.bar
     direction = np.array(task.direction) / TOE_SCALES
 
     def missing(y: Vector) -> Rating:
@@ -202,19 +150,21 @@ def _push(task: Task, aim: Aim) -> tuple[Vector, int]:
         return Rating(np.array([REACH - (y - origin) @ direction]), limits, {})
 
     end = descend(missing, origin, TOE_SCALES, penalty=FIRM, central=True, iterations=aim.steps)
-    within = rate(end.y).merit(aim.penalty) <= aim.bar and aim.runs(task.choice, end.y)
-    return end.y if within else origin, end.evaluations
+    within = rate(end.y).merit(aim.penalty) <= aim.bar and aim.runs(end.y)
+    return end.y if within else origin
 
 
-def judge(made: Attempt, aim: Aim) -> Attempt:
-    """The same with the verdict of the full system, and of demands sampled finely."""
-    problem = aim.problem
-    short = problem.objective(made.choice, FINE, aim.both).plausibility(made.x(aim))
+def judge(made: Attempt, aim: Aim) -> tuple[str, Verdict]:
+    """Id and verdict of the full system, with demands sampled finely."""
+    problem, x = aim.problem, aim.problem.outward(np.array(made.y), SAMPLES)
+    short = problem.objective(FINE, aim.both).plausibility(x)
     try:
-        verdict = confirm(made.preset(aim), problem.targets, problem.walk, problem.beta)
+        preset = to_preset(x, problem.choice, "a candidate of an ensemble")
+        run = confirm(preset, problem.targets)
     except HoofEnvError as error:  # a dead point between two samples, a gait beyond its limits
-        missed = dict.fromkeys(SOLVERS, MISSED_ROW)
-        return replace(made, errors=missed, short=short, untrue=(f"cannot be simulated: {error}",))
-    counted = verdict.counted if aim.both else verdict.counted[:1]
-    untrue = tuple(f"{claim} ({solver})" for claim, solver in verdict.untrue if solver in counted)
-    return replace(made, errors=dict(zip(SOLVERS, verdict.errors, strict=True)), short=short, untrue=untrue)
+        return made.id, Verdict({}, {}, short, (f"cannot be simulated: {error}",))
+    counted = [name for name in COUNTED if aim.both or name == "exact"]
+    far = [f"{name} error of {run.errors[name]:.2f} bars" for name in counted if run.errors[name] > aim.bar]
+    solvers = [COUNTED[name] for name in counted]
+    untrue = [f"{claim} ({solver})" for claim, solver in run.untrue if solver in solvers]
+    return made.id, Verdict(preset, run.errors, short, (*far, *short, *untrue))

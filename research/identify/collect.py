@@ -9,13 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
-from typing import Any
 
 import numpy as np
 
 from hoof_env.errors import HoofEnvError
-from research.identify.attempt import Aim, Attempt, Task, attempt, judge
-from research.identify.leg import BODY, Choice, Vector
+from research.identify.attempt import Aim, Attempt, Task, Verdict, attempt, judge
+from research.identify.leg import BODY, Vector
 from research.identify.processes import Run, processes
 from research.identify.state import State
 
@@ -30,35 +29,23 @@ FROM_EDGE = 0.6
 
 
 @dataclass(frozen=True)
-class Start:
-    """A leg to begin with: its name, and see `leg`."""
-
-    name: str
-    choice: Choice
-    x: tuple[float, ...]
-
-
-@dataclass(frozen=True)
 class Collection:
     """What was collected.
 
     Attributes:
         members: confirmed by the full system; the first that of the first start that has one, then each the
             furthest from those before it.
-        attempts: all, those of the starts first. refused: legs within the bar by kinematics that the full
-            system was asked about and found no members.
+        attempts: all, those of the starts first.
+        verdicts: of members, and of legs within the bar by kinematics that are none, by id.
     """
 
     members: tuple[Attempt, ...]
     attempts: tuple[Attempt, ...]
-    refused: tuple[Attempt, ...]
+    verdicts: dict[str, Verdict]
 
 
 def distance(one: Attempt, two: Attempt) -> float:
-    """Root mean square difference of log lengths and pivot [-, m], some 0.02 where lengths differ by 2 %;
-    infinite between different choices."""
-    if one.choice != two.choice:
-        return float("inf")
+    """Root mean square difference of log lengths and pivot [-, m], some 0.02 where lengths differ by 2 %."""
     return float(np.sqrt(np.mean((_body(one) - _body(two)) ** 2)))
 
 
@@ -67,7 +54,7 @@ def _body(made: Attempt) -> Vector:
 
 
 def collect(
-    starts: Sequence[Start],
+    starts: dict[str, tuple[float, ...]],
     aim: Aim,
     state: State,
     say: Callable[[str], None],
@@ -80,7 +67,7 @@ def collect(
     """Make attempts, then choose `size` legs within the bar that are far apart.
 
     Args:
-        starts: legs to begin with; each is first brought within the bar, and may be a member.
+        starts: legs x to begin with, by name; each is first brought within the bar, and may be a member.
         aim: what a member must meet. state: where finished attempts lie.
         say: takes a line for each round.
         size: members wanted; there may be fewer.
@@ -94,13 +81,12 @@ def collect(
     made: list[Attempt] = []
     inside: list[Attempt] = []
     rounds = -(-attempts // ROUND)
-    tasks = [
-        Task(0, i, seed, f"0000-{i:02d}", start.name, start.choice, start.x) for i, start in enumerate(starts)
-    ]
     with processes(workers) as run:
         for number in range(rounds + 1):
             if number:
                 tasks = [_push_from(inside, number, index, seed) for index in range(ROUND)]
+            else:
+                tasks = [Task(0, i, seed, name, x) for i, (name, x) in enumerate(starts.items())]
             made += _round(tasks, aim, state, run)
             inside = [one for one in made if one.merit <= aim.bar]
             say(f"round {number} of {rounds}: {len(inside)} of {len(made)} legs within {aim.bar:g} bars")
@@ -110,52 +96,46 @@ def collect(
                     f"no start comes within {aim.bar:g} bars without a shortage, the nearest has "
                     f"{nearest:.3f}: expected a better start or a wider --bar"
                 )
-        return _choose(made, inside, aim, state, run, size)
+        members, verdicts = _choose(inside, aim, run, size)
+    return Collection(tuple(members), tuple(made), verdicts)
 
 
 def _push_from(inside: Sequence[Attempt], number: int, index: int, seed: int) -> Task:
     """The next push: along one coordinate or all, from the leg that is furthest that way or from any."""
     rng = np.random.default_rng([seed, number, index])
-    choices = list(dict.fromkeys(one.choice for one in inside))
-    choice = choices[int(rng.integers(len(choices)))]
-    legs = [one for one in inside if one.choice == choice]
-    direction = rng.standard_normal(len(legs[0].y))
+    direction = rng.standard_normal(len(inside[0].y))
     if rng.random() < ALONG_ONE:
         one = int(rng.integers(BODY))
         direction = np.sign(direction[one]) * np.eye(direction.size)[one]
     direction /= np.linalg.norm(direction)
     if rng.random() < FROM_EDGE:
-        parent = max(legs, key=lambda leg: (float(_body(leg) @ direction[:BODY]), leg.id))
+        parent = max(inside, key=lambda leg: (float(_body(leg) @ direction[:BODY]), leg.id))
     else:
-        parent = legs[int(rng.integers(len(legs)))]
-    way = tuple(direction.tolist())
-    return Task(number, index, seed, parent.id, parent.start, choice, parent.y, way)
+        parent = inside[int(rng.integers(len(inside)))]
+    return Task(number, index, seed, parent.start, parent.y, tuple(direction.tolist()))
 
 
-def _round(tasks: Sequence[Task], aim: Aim, state: State, run: Run[Attempt]) -> list[Attempt]:
+def _round(tasks: Sequence[Task], aim: Aim, state: State, run: Run) -> list[Attempt]:
     """Make the attempts that are not yet in the folder; all of them in their order."""
-    done = {task.id: kept for task in tasks if (kept := _load(state, task.id))}
+    done = {t.id: kept for t in tasks if (kept := state.load(f"attempt-{t.id}", Attempt.from_dict))}
     for made in run(partial(attempt, aim=aim), [task for task in tasks if task.id not in done]):
-        _save(state, made)
+        state.save(f"attempt-{made.id}", asdict(made))
         done[made.id] = made
     return [done[task.id] for task in tasks]
 
 
 def _choose(
-    made: list[Attempt], inside: list[Attempt], aim: Aim, state: State, run: Run[Attempt], size: int
-) -> Collection:
+    inside: Sequence[Attempt], aim: Aim, run: Run, size: int
+) -> tuple[list[Attempt], dict[str, Verdict]]:
     """Members far apart, once the full system has seen all of them; one that it refuses another replaces."""
-    known = {one.id: one for one in inside}
+    verdicts: dict[str, Verdict] = {}
     while True:
-        members = _far_apart([one for one in known.values() if not one.errors or one.holds(aim)], size)
-        waiting = [one for one in members if not one.errors]
+        fit = [one for one in inside if one.id not in verdicts or not verdicts[one.id].reasons]
+        members = _far_apart(fit, size)
+        waiting = [one for one in members if one.id not in verdicts]
         if not waiting:
-            break
-        for one in run(partial(judge, aim=aim), waiting):
-            _save(state, one)
-            known[one.id] = one
-    refused = tuple(one for one in known.values() if one.errors and not one.holds(aim))
-    return Collection(tuple(members), tuple(known.get(one.id, one) for one in made), refused)
+            return members, verdicts
+        verdicts |= run(partial(judge, aim=aim), waiting)
 
 
 def _far_apart(legs: Sequence[Attempt], size: int) -> list[Attempt]:
@@ -167,12 +147,3 @@ def _far_apart(legs: Sequence[Attempt], size: int) -> list[Attempt]:
         chosen.append(legs[int(np.argmax(gaps))])
         gaps = np.minimum(gaps, [distance(chosen[-1], leg) for leg in legs])
     return chosen
-
-
-def _load(state: State, name: str) -> Attempt | None:
-    return state.load(f"attempt-{name}", Attempt.from_dict)
-
-
-def _save(state: State, made: Attempt) -> None:
-    content: Any = asdict(made)
-    state.save(f"attempt-{made.id}", content)

@@ -7,7 +7,7 @@ what `hoof_env.paper.shapes` decides by, so that a leg without a shortage passes
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -47,8 +47,7 @@ MEASURED = tuple(f"{group}.{name}" for group, kind in GROUPS for name in kind.na
 """Every measured number, in the order of the array that holds them."""
 
 
-@dataclass(frozen=True)
-class Demand:
+class Demand(NamedTuple):
     """`measured` must be at least (sense +1) or at most (sense -1) `bound`; `scale`: shortage per unit."""
 
     name: str
@@ -59,80 +58,57 @@ class Demand:
     why: str
 
 
-def _at_least(name: str, measured: str, bound: float, scale: float, why: str) -> Demand:
-    return Demand(name, measured, 1, bound, scale, why)
+LEAST, MOST = 1, -1
+_WALKS = "it moves its animal: most load on points that go back at 0.3 m/s, also deeper in the ground"
+_FORWARD = "claim walk.direction: one direction through stance, forward on the leg"
 
-
-def _at_most(name: str, measured: str, bound: float, scale: float, why: str) -> Demand:
-    return Demand(name, measured, -1, bound, scale, why)
-
-
-LEG_DEMANDS = (
-    _at_most("assembles", "leg.miss", 0.0, 100, "every dyad closes through the revolution"),
-    _at_least("transmission", "leg.transmission", 0.101, 40, "no dyad near a dead point: 0.1"),
-    _at_least("hip_low", "leg.hip_height", 1.202, 20, "a horse's hip: 1.2 m or more"),
-    _at_most("hip_high", "leg.hip_height", 1.698, 20, "a horse's hip: 1.7 m or less"),
-    _at_least("sole_short", "leg.sole", 0.051, 100, "a hoof, not a point: 5 cm or more"),
-    _at_most("sole_long", "leg.sole_part", 0.159, 200, "a hoof, not a foot: under 0.16 of the hip height"),
-    _at_least("joints", "leg.lowest", 0.01, 50, "no joint but toe and heel goes under the ground"),
-    _at_most("lengths", "leg.length_excess", 0.0, 3, "links of an animal's size"),
-    _at_most("walk.limits", "leg.walk_excess", 0.0, 10, "the gait can be commanded (gait.LIMITS)"),
-    _at_most("run.limits", "leg.run_excess", 0.0, 10, "the gait can be commanded (gait.LIMITS)"),
+_LEG = (
+    ("assembles", "leg.miss", MOST, 0.0, 100, "every dyad closes through the revolution"),
+    ("transmission", "leg.transmission", LEAST, 0.101, 40, "no dyad near a dead point: 0.1"),
+    ("hip_low", "leg.hip_height", LEAST, 1.202, 20, "a horse's hip: 1.2 m or more"),
+    ("hip_high", "leg.hip_height", MOST, 1.698, 20, "a horse's hip: 1.7 m or less"),
+    ("sole_short", "leg.sole", LEAST, 0.051, 100, "a hoof, not a point: 5 cm or more"),
+    ("sole_long", "leg.sole_part", MOST, 0.159, 200, "a hoof, not a foot: under 0.16 of the hip height"),
+    ("joints", "leg.lowest", LEAST, 0.01, 50, "no joint but toe and heel goes under the ground"),
+    ("lengths", "leg.length_excess", MOST, 0.0, 3, "links of an animal's size"),
+    ("walk.limits", "leg.walk_excess", MOST, 0.0, 10, "the gait can be commanded (gait.LIMITS)"),
+    ("run.limits", "leg.run_excess", MOST, 0.0, 10, "the gait can be commanded (gait.LIMITS)"),
+)
+_EACH_GAIT = (
+    ("ankle", "ankle", LEAST, 0.01, 50, "the ankle stays above the sole in stance"),
+    ("starts_in_air", "start_depth", MOST, -0.002, 50, "stance is one, not cut in two"),
+    ("enters_once", "extra_entries", MOST, 0.0, 1, "toe and heel come in once a cycle"),
+    ("both_touch", "missing", MOST, 0.0, 20, "toe and heel both bear"),
+)
+_GAITS = (
+    ("walk.heel_first", "walk.toe_after_heel_in", LEAST, 0.005, 200, "claim walk.order: heel-strike"),
+    ("walk.toe_last", "walk.toe_after_heel_out", LEAST, 0.005, 200, "claim walk.order: toe-off"),
+    ("walk.double", "walk.double", LEAST, 0.01, 200, "claim walk.order: heel and toe bear together"),
+    ("walk.flat", "walk.flattest", MOST, 2.8, 1, "claim walk.order: flat within 3 deg while both bear"),
+    ("walk.two_peaks", "walk.second_elastic", LEAST, 0.108, 60, "claim walk.peaks: a second by 10 %"),
+    ("walk.halves", "walk.peaks_apart", LEAST, 0.003, 200, "claim walk.peaks: each in its half of stance"),
+    ("walk.no_third", "walk.third_peak", MOST, 0.08, 50, "claim walk.peaks: no third by 10 %"),
+    ("walk.supported", "walk.dip_support", LEAST, 0.001, 500, "claim walk.peaks: both bear in the dip"),
+    ("run.toe_first", "run.toe_after_heel_in", MOST, -0.003, 200, "claim run.order: toe-strike"),
+    ("run.toe_last", "run.toe_after_heel_out", LEAST, 0.004, 200, "claim run.order: roll-over, toe-off"),
+    ("run.heel_gap", "both.heel_gap", LEAST, 0.02, 50, "claim run.order: higher than in walking"),
+    ("run.one_elastic", "run.second_elastic", MOST, 0.07, 50, "claim run.peaks: no second peak by 10 %"),
+    ("run.one_inelastic", "run.second_inelastic", MOST, 0.07, 50, "claim run.peaks: nor inelastic"),
+    ("run.apart", "run.peak_gap", LEAST, 0.0108, 300, "claim run.peaks: 10 ms apart, elastic later"),
+    ("run.step", "both.step", LEAST, 0.02, 20, "claim run.step: longer than the walking step"),
+    ("run.propels", "run.push_2", LEAST, 0.02, 15, "claim run.direction: forward in the second half"),
+    ("run.turns", "both.turn", LEAST, 0.001, 50, "claim run.direction: more than in the first half"),
+    *(
+        (f"{gait}.walks_{d}", f"{gait}.swept_{d}", LEAST, 0.52, 15, _WALKS)
+        for gait in ("run", "walk")
+        for d in (0, 5, 10)
+    ),
+    *((f"walk.forward_{half}", f"walk.push_{half}", LEAST, 0.02, 15, _FORWARD) for half in (1, 2)),
 )
 
-
-def _of_each_gait(gait: str) -> tuple[Demand, ...]:
-    return (
-        _at_least(f"{gait}.ankle", f"{gait}.ankle", 0.01, 50, "the ankle stays above the sole in stance"),
-        _at_most(f"{gait}.starts_in_air", f"{gait}.start_depth", -0.002, 50, "stance is one, not cut in two"),
-        _at_most(f"{gait}.enters_once", f"{gait}.extra_entries", 0.0, 1, "toe and heel come in once a cycle"),
-        _at_most(f"{gait}.both_touch", f"{gait}.missing", 0.0, 20, "toe and heel both bear"),
-    )
-
-
-def _walks(gait: str) -> tuple[Demand, ...]:
-    why = "it moves its animal: most load on points that go back at 0.3 m/s, also deeper in the ground"
-    return tuple(_at_least(f"{gait}.walks_{d}", f"{gait}.swept_{d}", 0.52, 15, why) for d in (0, 5, 10))
-
-
+LEG_DEMANDS = tuple(Demand(*row) for row in _LEG)
 GAIT_DEMANDS = (
-    *_of_each_gait("walk"),
-    *_of_each_gait("run"),
-    _at_least("walk.heel_first", "walk.toe_after_heel_in", 0.005, 200, "claim walk.order: heel-strike"),
-    _at_least("walk.toe_last", "walk.toe_after_heel_out", 0.005, 200, "claim walk.order: toe-off"),
-    _at_least("walk.double", "walk.double", 0.01, 200, "claim walk.order: heel and toe bear together"),
-    _at_most("walk.flat", "walk.flattest", 2.8, 1, "claim walk.order: flat within 3 deg while both bear"),
-    _at_least("walk.two_peaks", "walk.second_elastic", 0.108, 60, "claim walk.peaks: a second by 10 %"),
-    _at_least("walk.halves", "walk.peaks_apart", 0.003, 200, "claim walk.peaks: each in its half of stance"),
-    _at_most("walk.no_third", "walk.third_peak", 0.08, 50, "claim walk.peaks: no third by 10 %"),
-    _at_least("walk.supported", "walk.dip_support", 0.001, 500, "claim walk.peaks: both bear in the dip"),
-    _at_most("run.toe_first", "run.toe_after_heel_in", -0.003, 200, "claim run.order: toe-strike"),
-    _at_least("run.toe_last", "run.toe_after_heel_out", 0.004, 200, "claim run.order: roll-over, toe-off"),
-    _at_least("run.heel_gap", "both.heel_gap", 0.02, 50, "claim run.order: higher than in walking"),
-    _at_most("run.one_elastic", "run.second_elastic", 0.07, 50, "claim run.peaks: no second peak by 10 %"),
-    _at_most("run.one_inelastic", "run.second_inelastic", 0.07, 50, "claim run.peaks: nor inelastic"),
-    _at_least("run.apart", "run.peak_gap", 0.0108, 300, "claim run.peaks: 10 ms apart, elastic later"),
-    _at_least("run.step", "both.step", 0.02, 20, "claim run.step: longer than the walking step"),
-    _at_least("run.propels", "run.push_2", 0.02, 15, "claim run.direction: forward in the second half"),
-    _at_least("run.turns", "both.turn", 0.001, 50, "claim run.direction: more than in the first half"),
-    *_walks("run"),
-)  # fmt: skip
-
-_ONE_WAY = "claim walk.direction: one direction through stance"
-WALK_DEMANDS = {
-    "walks": (
-        *_walks("walk"),
-        _at_least("walk.forward_1", "walk.push_1", 0.02, 15, f"{_ONE_WAY}, forward on the leg"),
-        _at_least("walk.forward_2", "walk.push_2", 0.02, 15, f"{_ONE_WAY}, forward on the leg"),
-    ),
-    "brakes": (
-        _at_most("walk.backward_1", "walk.push_1", -0.02, 15, f"{_ONE_WAY}, backward: figure 6 literally"),
-        _at_most("walk.backward_2", "walk.push_2", -0.02, 15, f"{_ONE_WAY}, backward: figure 6 literally"),
-    ),
-}
-"""A walk that moves its animal, or one that brakes through its stance."""
-
-
-def demands(walk: str) -> tuple[Demand, ...]:
-    """All demands for a walk that "walks" or "brakes", those of the leg first."""
-    return (*LEG_DEMANDS, *GAIT_DEMANDS, *WALK_DEMANDS[walk])
+    *(Demand(f"{g}.{row[0]}", f"{g}.{row[1]}", *row[2:]) for g in ("walk", "run") for row in _EACH_GAIT),
+    *(Demand(*row) for row in _GAITS),
+)
+DEMANDS = (*LEG_DEMANDS, *GAIT_DEMANDS)

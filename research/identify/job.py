@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from research.identify.leg import Choice, Vector
+from research.identify.leg import Vector
 from research.identify.minimax import Rating, descend
 from research.identify.problem import PENALTY, SAMPLES, TOE_SCALES, LegProblem
 from research.identify.schedule import Phase
 
 CLEAR = 0.995
 """Largest error with which a job ends at the bar [bars], so that the judge, who samples finer, agrees."""
+
+POPULATION = 20
+"""Of CMA-ES."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +28,7 @@ class Result:
     Attributes:
         id: round and index. phase: its name.
         root: id of the independent start that it goes back to.
-        choice, x: the best leg, see `leg`.
+        x: the best leg, see `leg`.
         evaluations, seconds: spent. stop: why it ended.
         exact, both: merit [bars] with the exact solver alone and with both.
         standing: in words, with both solvers once the leg meets every bar with the exact one.
@@ -35,7 +38,6 @@ class Result:
     id: str
     phase: str
     root: str
-    choice: Choice
     x: tuple[float, ...]
     evaluations: int
     seconds: float
@@ -48,22 +50,21 @@ class Result:
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Result:
         """Inverse of `dataclasses.asdict`; KeyError or TypeError for anything else."""
-        return cls(**{**data, "choice": Choice.from_dict(data["choice"]), "x": tuple(data["x"])})
-
-    def to_dict(self) -> dict[str, Any]:
-        return asdict(self)
+        return cls(**{**data, "x": tuple(data["x"])})
 
 
 @dataclass(frozen=True)
 class Job:
-    """A job: its place in the search, the search's seed, what it may spend and what it may start from."""
+    """A job: its place in the search, the search's seed, what it may spend and where it starts: around x, or
+    from what the job `root` came to."""
 
     round: int
     index: int
     phase: Phase
     seed: int
     evaluations: int
-    parents: tuple[Result, ...] = ()
+    x: tuple[float, ...]
+    root: str = ""
 
     @property
     def id(self) -> str:
@@ -73,14 +74,14 @@ class Job:
 class _CmaEs:
     """A generation of CMA-ES at a time, on `Objective.cost`."""
 
-    def __init__(self, y: Vector, sigma: float, population: int, rng: np.random.Generator) -> None:
+    def __init__(self, y: Vector, sigma: float, rng: np.random.Generator) -> None:
         import cma
 
         options = {
             "verbose": -9,
             "seed": np.nan,  # draws come from `randn` alone
             "randn": lambda *shape: rng.standard_normal(shape),
-            "popsize": population,
+            "popsize": POPULATION,
             "tolfun": 1e-5,
             "CMA_stds": TOE_SCALES,
             "signals_filename": "",
@@ -88,14 +89,12 @@ class _CmaEs:
         self.es: Any = cma.CMAEvolutionStrategy(y, sigma, options)
         self.best, self.value, self.evaluations = y, np.inf, 0
 
-    def advance(self, cost: Callable[[Vector], float]) -> None:
+    def advance(self, cost: Callable[[Vector], float]) -> str:
+        """Go on a little; returns why it cannot go on further, or ""."""
         points = [np.ascontiguousarray(point) for point in self.es.ask()]  # kernels know one type
         self.es.tell(points, [cost(point) for point in points])
         self.best, self.value = np.array(self.es.best.x), float(self.es.best.f)
         self.evaluations = int(self.es.countevals)
-
-    def ended(self) -> str:
-        """Why it cannot go on, or ""."""
         return ", ".join(self.es.stop())
 
 
@@ -106,7 +105,8 @@ class _Hops:
         self.sigmas, self.rng = sigmas, rng
         self.best, self.value, self.evaluations = y, np.inf, 0
 
-    def advance(self, rate: Callable[[Vector], Rating]) -> None:
+    def advance(self, rate: Callable[[Vector], Rating]) -> str:
+        """As `_CmaEs.advance`."""
         hop = float(self.rng.choice(self.sigmas)) if self.evaluations else 0.0
         start = self.best + hop * TOE_SCALES * self.rng.standard_normal(self.best.size)
         central = bool(self.rng.integers(2))
@@ -114,53 +114,40 @@ class _Hops:
         self.evaluations += end.evaluations
         if (value := end.rating.merit(PENALTY)) < self.value:
             self.best, self.value = end.y, value
-
-    def ended(self) -> str:
         return ""
 
 
 def run_job(problem: LegProblem, job: Job) -> Result:
     """Run a job; the same job gives the same result, bit for bit."""
     began, phase, rng = time.monotonic(), job.phase, np.random.default_rng([job.seed, job.round, job.index])
-    sigma = float(rng.choice(phase.sigmas))
-    if phase.start == "best":
-        parent = job.parents[job.index % len(job.parents)]
-        choice, root = parent.choice, parent.root
-        y = problem.inward(choice, np.array(parent.x), phase.samples)
-    else:
-        (choice, y), root = problem.begin(rng, phase), job.id
-    objective = problem.objective(choice, phase.samples, phase.paper_solver, True)
-    method: Any
-    if phase.method == "cma":
-        method, evaluate = _CmaEs(y, sigma, phase.population, rng), objective.cost
-    else:
-        method, evaluate = _Hops(y, phase.sigmas, rng), objective.rate
+    sigma, x = float(rng.choice(phase.sigmas)), np.array(job.x)
+    y = problem.inward(x, phase.samples) if job.root else problem.around(x, phase.samples, rng)
+    objective = problem.objective(phase.samples, phase.paper_solver, True)
+    method: Any = _CmaEs(y, sigma, rng) if phase.method == "cma" else _Hops(y, phase.sigmas, rng)
+    evaluate = objective.cost if phase.method == "cma" else objective.rate
     judged, stop = np.inf, ""
     while not stop:
-        met = False
+        stop = method.advance(evaluate)
         if phase.ends_at_bar and method.value < judged:
-            x = problem.outward(choice, method.best, phase.samples)
-            standing = problem.objective(choice, SAMPLES, phase.paper_solver).standing(x)
-            judged, met = method.value, standing.met and abs(standing.error) <= CLEAR
+            judged = method.value
+            x = problem.outward(method.best, phase.samples)
+            standing = problem.objective(SAMPLES, phase.paper_solver).standing(x)
+            if standing.met and abs(standing.error) <= CLEAR:
+                stop = "bar reached"
         if method.evaluations >= job.evaluations:
             stop = "evaluations spent"
-        else:
-            stop = "bar reached" if met else method.ended()
-        if not stop:
-            method.advance(evaluate)
-    x = problem.outward(choice, method.best, phase.samples)
-    exact, both = (problem.objective(choice, SAMPLES, both).standing(x) for both in (False, True))
+    x = problem.outward(method.best, phase.samples)
+    exact, both = (problem.objective(SAMPLES, both).standing(x) for both in (False, True))
     return Result(
         id=job.id,
         phase=phase.name,
-        root=root,
-        choice=choice,
+        root=job.root or job.id,
         x=tuple(x.tolist()),
         evaluations=method.evaluations,
         seconds=time.monotonic() - began,
         stop=stop,
-        exact=problem.merit(choice, x, False),
-        both=problem.merit(choice, x, True),
-        standing=str(both if exact.met else exact),
-        confirmed=both.met and problem.confirm(choice, x),
+        exact=problem.merit(x, False),
+        both=problem.merit(x, True),
+        standing=both.words if exact.met else exact.words,
+        confirmed=both.met and problem.confirm(x),
     )

@@ -5,14 +5,13 @@ x holds log lengths [m], the pivot and the hip's height [m] and the swing of bot
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.errors import ParameterError, check_choice, check_number
+from hoof_env.errors import ParameterError
 from hoof_env.gait.parameters import LIMITS, GaitParameters, load_gait
 from hoof_env.ground.preset import load_ground
 from hoof_env.leg.geometry import Geometry, Preset, load_geometry
@@ -47,58 +46,15 @@ class Choice:
     """What a search cannot change continuously.
 
     Attributes:
-        assembly: +1 or -1 for each of `SIGNS`, as `Geometry.assembly`.
-        toe: which hoof corner is the toe, "I" or "J"; the other is the heel.
-        travel: +1 or -1, as `Geometry.travel`.
+        assembly: +1 or -1 for each of `SIGNS`; toe, heel, travel: as in `Geometry`.
         exponent: n of Eq. 14, which the paper does not print [-].
-
-    Raises:
-        ParameterError: another value.
     """
 
     assembly: tuple[int, ...]
     toe: str
+    heel: str
     travel: int
     exponent: float
-
-    def __post_init__(self) -> None:
-        if len(self.assembly) != len(SIGNS) or any(sign not in (1, -1) for sign in self.assembly):
-            raise ParameterError(
-                f"assembly: expected +1 or -1 for each of {', '.join(SIGNS)}, got {self.assembly!r}"
-            )
-        check_choice("toe", self.toe, ("I", "J"))
-        if self.travel not in (1, -1):
-            raise ParameterError(f"travel: expected +1 or -1, got {self.travel!r}")
-        check_number("exponent", self.exponent, low=1, high=3)
-
-    @property
-    def heel(self) -> str:
-        """The hoof corner that is the heel."""
-        return "J" if self.toe == "I" else "I"
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Choice:
-        """Inverse of `dataclasses.asdict`; KeyError or TypeError for anything else."""
-        return cls(**{**data, "assembly": tuple(data["assembly"])})
-
-
-def random_choice(rng: np.random.Generator, exponent: float) -> Choice:
-    """A choice with every assembly, toe and travel equally likely."""
-    signs = tuple(rng.choice([-1, 1], len(SIGNS)).tolist())
-    return Choice(signs, str(rng.choice(["I", "J"])), int(rng.choice([-1, 1])), exponent)
-
-
-def random_start(rng: np.random.Generator) -> Vector:
-    """One x of a leg of a horse's size, seldom one that turns: take the best of many.
-
-    Lengths are around 0.5 m within a factor of 1.6, the crank around 0.27 m; the swing's range covers the
-    limits of the product's gaits.
-    """
-    crank = rng.normal(-1.3, 0.3, 1)
-    links, pivot = rng.normal(-0.6, 0.5, len(LENGTHS) - 1), rng.normal(0.0, 0.7, 2)
-    height, offsets = rng.uniform(1.2, 1.7, 1), rng.uniform(*LIMITS["swing_offset"], (2, 1))
-    walk, run = rng.normal(0.0, 0.2, 2), rng.normal(-0.2, 0.4, 2)
-    return np.concatenate([crank, links, pivot, height, offsets[0], walk, offsets[1], run])
 
 
 def encode(preset: Preset, exponent: float | None = None) -> tuple[Choice, Vector]:
@@ -116,7 +72,8 @@ def encode(preset: Preset, exponent: float | None = None) -> tuple[Choice, Vecto
                 f"{name}.crank_speed: expected the paper's {SPEED:.6f} rad/s, got {gait.crank_speed!r}"
             )
     signs = tuple(geometry.assembly[point] for point in SIGNS)
-    choice = Choice(signs, geometry.toe, geometry.travel, ground.exponent if exponent is None else exponent)
+    exponent = ground.exponent if exponent is None else exponent
+    choice = Choice(signs, geometry.toe, geometry.heel, geometry.travel, exponent)
     logs = [np.log(geometry.lengths[name]) for name in LENGTHS]
     swings = [value for gait in gaits.values() for value in gait.to_array()[1:]]
     return choice, np.array([*logs, *geometry.pivot, geometry.hip_height, *swings])

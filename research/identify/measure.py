@@ -1,8 +1,4 @@
-"""From a vector x to every measured number, and from there to errors, shortages and a cost: kernels.
-
-`measure_exact` and `measure_paper` measure a vector, `rate_rows` and `rate_demands` judge it.
-`objective.Objective` keeps the arrays.
-"""
+"""From a vector x to every measured number: kernels, whose arrays `objective.Objective` keeps."""
 
 from __future__ import annotations
 
@@ -22,12 +18,6 @@ from research.identify.leg import LEVEL, SPEED
 from research.identify.motion import STEPS, leg_paths, swing_hoof
 
 Array = NDArray[np.float64]
-
-DEAD_ZONE = 0.6
-"""An error below this costs nothing [bars], so that no row is pressed while another is outside its bar."""
-
-MISSED_ROW, MISSED = 300.0, 20.0
-"""Error [bars] of a row, and shortage of a demand, that cannot be measured."""
 
 PAPER_SAMPLES, PAPER_STEP = 1001, 1e-3
 """Instants of the paper's solver in its one second, and its time step [s]."""
@@ -67,8 +57,8 @@ class Setup(NamedTuple):
 
 
 class Arrays(NamedTuple):
-    """Scratch of a solver: numbers of the construction (8, 3), gaits (2, 4), paths of all points (11, n), of toe
-    and heel (2, n) and of the ankle (n,), forces of both gaits (2, 6, n)."""
+    """Scratch of a solver: numbers of the construction (8, 3), gaits (2, 4), paths of all points (11, n), of
+    toe and heel (2, n) and of the ankle (n,), forces of both gaits (2, 6, n)."""
 
     values: Array
     gaits: Array
@@ -84,13 +74,15 @@ def new_arrays(n: int) -> Arrays:
     """For n instants a revolution."""
     gaits = np.zeros((2, 4))
     gaits[:, 0] = SPEED
-    paths, hoof = np.zeros((2, len(POINTS), n), np.complex128), np.zeros((2, 2, n), np.complex128)
-    return Arrays(np.zeros((len(STEPS), 3)), gaits, *paths, *hoof, np.zeros(n), np.zeros((2, 6, n)))
+    z, dz = np.zeros((2, len(POINTS), n), np.complex128)
+    at, velocity = np.zeros((2, 2, n), np.complex128)
+    return Arrays(np.zeros((len(STEPS), 3)), gaits, z, dz, at, velocity, np.zeros(n), np.zeros((2, 6, n)))
 
 
 def new_bodies() -> Bodies:
     """Of the paper's solver."""
-    return Bodies(*np.zeros((3, len(BODIES), 3)), np.zeros(len(BODIES)))
+    q, qd, qdd = np.zeros((3, len(BODIES), 3))
+    return Bodies(q, qd, qdd, np.zeros(len(BODIES)))
 
 
 @kernel
@@ -215,26 +207,3 @@ def measure_paper(x, height, setup, exact, bodies, arrays, features, both):  # t
             cycle = Cycle(at, velocity, ankle, height, h, True, setup.stiffness, setup.exponent)
             measure_gait(cycle, arrays.work[g], features[g])
     compare_gaits(features[0], features[1], both)
-
-
-@kernel
-def rate_rows(measured, where, target, per_unit, weights, errors):  # type: ignore[no-untyped-def]
-    """Fill the errors in bars and return their cost: a^2 / (1 + a / 2) beyond the dead zone, weighted."""
-    cost = 0.0
-    for i in range(where.shape[0]):
-        error = (measured[where[i]] - target[i]) * per_unit[i]
-        errors[i] = error if np.isfinite(error) else MISSED_ROW
-        a = max(abs(errors[i]) - DEAD_ZONE, 0.0)
-        cost += weights[i] * a * a / (1.0 + 0.5 * a)
-    return cost
-
-
-@kernel
-def rate_demands(measured, where, sense, bound, scale, shortages):  # type: ignore[no-untyped-def]
-    """Fill the shortages and return their cost: p^2 / (1 + p / 2) + 0.3 p, which closes even a small one."""
-    cost = 0.0
-    for i in range(where.shape[0]):
-        p = sense[i] * (bound[i] - measured[where[i]]) * scale[i]
-        shortages[i] = max(p, 0.0) if np.isfinite(p) else MISSED
-        cost += shortages[i] * shortages[i] / (1.0 + 0.5 * shortages[i]) + 0.3 * shortages[i]
-    return cost

@@ -10,20 +10,18 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from typing import Any, TypeVar
+from typing import Any
 
 from hoof_env.errors import HoofEnvError
 
-T = TypeVar("T")
-
-Run = Callable[[Callable[[Any], T], Sequence[Any]], Iterable[T]]
+Run = Callable[[Callable[[Any], Any], Sequence[Any]], Iterable[Any]]
 """A function and its tasks to results, as they come."""
 
 _ONE_THREAD = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
 
 
 @contextmanager
-def processes(count: int) -> Iterator[Run[Any]]:
+def processes(count: int) -> Iterator[Run]:
     """A function that maps over tasks in up to `count` processes; one is this process itself.
 
     The results come as they are done; tasks begin in their order. At the end of the block, tasks that run
@@ -40,7 +38,7 @@ def processes(count: int) -> Iterator[Run[Any]]:
     context = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(count, context, initializer=_end_with_parent)
 
-    def run(function: Callable[[Any], T], tasks: Sequence[Any]) -> Iterator[T]:
+    def run(function: Callable[[Any], Any], tasks: Sequence[Any]) -> Iterator[Any]:
         with _quiet_start():
             futures = [pool.submit(function, task) for task in tasks]
         try:

@@ -20,20 +20,15 @@ from hoof_env.errors import DataFileError, OutputError
 
 T = TypeVar("T")
 
-FOLDER = "state"
 _HINT = "name another folder or delete this one"
 
 
 @dataclass(frozen=True)
 class State:
-    """The files of one search (see `open_state`); `digest` marks those that belong to it.
-
-    `kind` is what errors call it.
-    """
+    """The files of one search in `folder`; `digest` marks those that belong to it."""
 
     folder: Path
     digest: str
-    kind: str = "search"
 
     def load(self, name: str, read: Callable[[Any], T]) -> T | None:
         """What `save` wrote under a name, through `read`; None if there is nothing.
@@ -46,14 +41,14 @@ class State:
             return None
         data = read_json(path, f"delete it to repeat {name}")
         try:
-            digest, content = data["problem"], data["content"]
-            if digest != self.digest:
-                raise DataFileError(
-                    f"{path} belongs to another {self.kind} (expected {self.digest}, got {digest!r}); {_HINT}"
-                )
-            return read(content)
+            digest, content = data["problem"], read(data["content"])
         except (KeyError, TypeError):
             raise DataFileError(f"{path} is damaged; delete it to repeat {name}") from None
+        if digest != self.digest:
+            raise DataFileError(
+                f"{path} belongs to another search (expected {self.digest}, got {digest!r}); {_HINT}"
+            )
+        return content
 
     def save(self, name: str, content: Any) -> None:
         """Write a JSON value under a name; a kill never leaves half of it.
@@ -64,44 +59,41 @@ class State:
         write_json(self.folder, name, {"problem": self.digest, "content": content})
 
 
-def open_state(
-    out: Path, problem: Mapping[str, Any], *, resume: bool, product: str, kind: str = "search"
-) -> State:
+def open_state(out: Path, problem: Mapping[str, Any], *, resume: bool, product: str) -> State:
     """Begin a search in `out`, or go on with the one that is there.
 
     Args:
         out: the search's output folder, made if need be.
         problem: JSON object, what tells this search from another.
-        resume: go on with a search rather than begin one.
-        product: the file that it ends with. kind: what errors call it.
+        resume: go on with a search rather than begin one. product: the file that it ends with.
 
     Raises:
         DataFileError: nothing to resume, or a search for something else, or a damaged file.
         OutputError: the folder holds a search that would be overwritten, or cannot be written.
     """
-    folder, wanted = out / FOLDER, json.loads(json.dumps(problem))
-    file = folder / "problem.json"
+    state = State(out / "state", digest_of(problem))
+    file = state.folder / "problem.json"
     try:
         is_there, is_taken = file.is_file(), file.exists() or (out / product).exists()
     except OSError as error:
         raise OutputError(f"cannot write to {str(out)!r} ({error.strerror})") from None
-    if resume and not is_there:
-        raise DataFileError(f"{str(out)!r} holds no {kind} to resume; leave out --resume to begin one")
-    if resume:
-        there = read_json(file, f"nothing can be resumed: {_HINT}")
-        there = there if isinstance(there, dict) else {}
-        keys = [key for key in {**wanted, **there} if there.get(key) != wanted.get(key)]
-        if keys:
-            differing = (f"{key} is {there.get(key)!r} there and {wanted.get(key)!r} here" for key in keys)
-            raise DataFileError(f"{str(out)!r} holds another {kind}: {'; '.join(differing)}; {_HINT}")
-    elif is_taken:
+    if is_taken and not resume:
         raise OutputError(
             f"{str(out)!r} already holds a search or what one found; name another folder, or go on with "
-            f"the same {kind} by --resume"
+            "the same search by --resume"
         )
-    else:
-        write_json(folder, "problem", wanted)
-    return State(folder, digest_of(problem), kind)
+    if not resume:
+        write_json(state.folder, "problem", problem)
+        return state
+    if not is_there:
+        raise DataFileError(f"{str(out)!r} holds no search to resume; leave out --resume to begin one")
+    there, here = read_json(file, f"nothing can be resumed: {_HINT}"), json.loads(json.dumps(problem))
+    if there != here:
+        keys = [key for key in here if not isinstance(there, dict) or there.get(key) != here[key]]
+        other = there if isinstance(there, dict) else {}
+        differing = (f"{key} is {other.get(key)!r} there and {here[key]!r} here" for key in keys)
+        raise DataFileError(f"{str(out)!r} holds another search: {'; '.join(differing)}; {_HINT}")
+    return state
 
 
 def digest_of(content: Any) -> str:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from hoof_env.errors import HoofEnvError, MissingExtraError, check_number
+from research.identify.leg import Choice, encode
 
 
 def run(command: Callable[..., None], name: str, arguments: Sequence[str] | None = None) -> int:
@@ -21,7 +22,7 @@ def run(command: Callable[..., None], name: str, arguments: Sequence[str] | None
         print(f"error: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print("interrupted; go on with the same command and --resume", file=sys.stderr)
+        print("interrupted; the same command goes on with --resume", file=sys.stderr)
         return 130
     return 0
 
@@ -36,16 +37,25 @@ def check_extras() -> None:
 
 
 def check_counts(**counts: Any) -> list[int]:
-    """Whole numbers: seed of 0 or more, all others of 1 or more.
+    """Whole numbers: seed and attempts 0 or more, all others 1 or more.
 
     Raises:
         ParameterError: one is out of range; the message names it.
     """
     return [
-        int(
-            check_number(
-                name, value, low=0 if name == "seed" else 1, high=1024 if name == "workers" else 2**53
-            )
-        )
-        for name, value in counts.items()
+        int(check_number(n, v, low=n not in ("seed", "attempts"), high=1024 if n == "workers" else 2**53))
+        for n, v in counts.items()
     ]
+
+
+def load_start(start: str, exponent: float) -> tuple[Choice, tuple[float, ...]]:
+    """Choice and x of a preset, by name or file, on ground with this exponent.
+
+    Raises:
+        HoofEnvError: there is no such preset, or its leg does not turn; the message names it.
+    """
+    try:
+        choice, x = encode(start, exponent)
+    except HoofEnvError as error:
+        raise type(error)(f"start {start}: {error}") from None
+    return choice, tuple(x.tolist())
