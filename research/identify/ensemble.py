@@ -40,10 +40,8 @@ def load_ensemble(preset: str) -> list[dict[str, Any]]:
     """The members of a preset's ensemble, each the content of a preset."""
     path = Path(__file__).with_name("ensembles") / f"{preset}.json"
     data = read_json(path, "take it from the repository again")
-    return [
-        {**{part: one[part] for part in ("geometry", "gaits")}, "ground": data["ground"]}
-        for one in data["members"]
-    ]
+    about = {"provenance": f"a member of the ensemble of {preset}", "ground": data["ground"]}
+    return [{**about, "geometry": one["geometry"], "gaits": one["gaits"]} for one in data["members"]]
 
 
 def largest(errors: Sequence[Mapping[str, float]]) -> dict[str, float]:

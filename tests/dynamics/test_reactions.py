@@ -40,8 +40,8 @@ LEGS = {
     ),
     "own masses": PRESETS["identified"].replace(masses=tuple(np.linspace(3, 0.2, 14)), inertia="paper"),
     **{
-        f"ensemble {k}": member.geometry
-        for k, member in enumerate(load_ensemble("identified").members)
+        f"ensemble {k}": load_geometry(member)
+        for k, member in enumerate(load_ensemble("identified"))
         if k % 5 == 0
     },
 }

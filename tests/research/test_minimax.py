@@ -6,18 +6,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from hoof_env.gait.parameters import load_gait
-from hoof_env.leg.geometry import load_geometry
-from research.identify.candidate import encode, standard_deviations
+from research.identify.leg import encode
 from research.identify.minimax import Rating, descend
 from research.identify.objective import Objective
-from research.identify.problem import TOE_SCALES, _with_toe
+from research.identify.problem import TOE_SCALES
 
 MET = np.array([-1.0])
-
-
-def first_fit():
-    return encode(load_geometry("first_fit"), *(load_gait(gait, "first_fit") for gait in ("walk", "run")))
 
 
 def test_the_best_polynomial_is_found_and_its_errors_alternate():
@@ -101,21 +95,19 @@ def test_a_goal_ends_it_early_and_a_rating_without_numbers_is_survived():
 
 def test_the_published_seed_gets_better_at_once():
     """One descent from first_fit takes a third off its merit; CMA-ES needs some ten thousand evaluations."""
-    choice, x = first_fit()
+    choice, x = encode("first_fit")
     objective = Objective(choice, by_toe=True)
     y = objective.to_touch_down(x)
-    scales = _with_toe(choice, standard_deviations(choice), *TOE_SCALES)
-    found = descend(objective.rate, y, scales)
+    found = descend(objective.rate, y, TOE_SCALES)
     assert found.rating.merit(2.0) < 0.67 * objective.rate(y).merit(2.0)
     assert found.evaluations < 1000
 
 
 def test_a_rating_is_the_objectives_rows_and_shortages():
-    choice, x = first_fit()
+    choice, x = encode("first_fit")
     for paper_solver in (False, True):
         objective = Objective(choice, samples=2001, paper_solver=paper_solver)
         rating = objective.rate(x)
         np.testing.assert_allclose(rating.rows[:22], objective.rows(x), atol=0.02)
-        short = {k: v for k, v in zip(objective.demands, objective.plausibility(x), strict=True) if v > 0}
         positive = rating.demands[rating.demands > 0.01]
-        assert sorted(positive - 0.01) == pytest.approx(sorted(short.values()), abs=1e-6)
+        assert sorted(positive - 0.01) == pytest.approx(sorted(objective.plausibility(x).values()), abs=1e-6)

@@ -1,297 +1,203 @@
 """The search on problems whose answer is known, and on tiny budgets of the real one."""
 
 import os
-import pickle
-import signal
 import subprocess
 import sys
 import time
-from dataclasses import replace
+from dataclasses import asdict, replace
+from functools import partial
 
 import numpy as np
 import pytest
 
 from hoof_env.errors import DataFileError, HoofEnvError, OutputError
-from research.identify.candidate import names
 from research.identify.command import load_start
-from research.identify.job import CLEAR, run_job
+from research.identify.job import CLEAR, Job, Result, run_job
+from research.identify.leg import LEVEL, NAMES
 from research.identify.minimax import Rating
-from research.identify.problem import LegProblem
-from research.identify.records import Job, Result, Standing
-from research.identify.schedule import COLD, FROM_PRESET, Phase, rounds
+from research.identify.objective import Standing
+from research.identify.problem import SAMPLES, TOE_SCALES, LegProblem
+from research.identify.processes import processes
+from research.identify.schedule import SCHEDULE, Phase, rounds
 from research.identify.search import elite, plan, search
 from research.identify.state import open_state
 from research.identify.targets import load_targets
-from research.identify.workers import Workers
 
-PHASE = Phase(
-    "around",
-    "given",
-    jobs=3,
-    evaluations=400,
-    sigmas=(0.02, 0.05),
-    populations=(8, 12),
-    tries=5,
-    by_toe=False,
-)
-MINIMAX = replace(PHASE, name="descend", method="minimax", start="best", jobs=2, sigmas=(0.002, 0.01))
+PHASE = Phase("around", jobs=3, evaluations=400, sigmas=(0.02, 0.05))
+MINIMAX = replace(PHASE, name="descend", method="minimax", elite=6, jobs=2, sigmas=(0.002, 0.01))
 TINY = (
-    replace(PHASE, by_toe=True),
-    replace(MINIMAX, by_toe=True, evaluations=300),
-    replace(PHASE, name="both", start="best", jobs=2, evaluations=60, by_toe=True, paper_solver=True),
+    PHASE,
+    replace(MINIMAX, evaluations=300),
+    replace(MINIMAX, name="both", evaluations=60, paper_solver=True),
 )
 
 
-class Bowl:
-    """A valley with its bottom at (1, 1, 1); within 1e-3 of it every row of two is within its bar."""
+class Valley:
+    """A slightly curved valley in 24 dimensions with its bottom at 1; a row is within its bar within 1e-3 of it."""
 
-    def given(self, rng, phase):
-        return {"side": 1}, float(rng.choice(phase.spreads)) * rng.standard_normal(3)
+    def objective(self, samples, both, by_toe=False):
+        return self
 
-    def cold(self, rng, phase):
-        return {"side": int(rng.choice([-1, 1]))}, rng.standard_normal(3)
+    def around(self, x, samples, rng):
+        return float(rng.choice((0.0, 0.3))) * rng.standard_normal(24)
 
-    def scales(self, choice, phase):
-        return np.ones(3)
+    def inward(self, x, samples):
+        return 2 * x
 
-    def inward(self, choice, x, phase):
-        return 2 * x if phase.by_toe else x
+    def outward(self, y, samples):
+        return y / 2
 
-    def outward(self, choice, y, phase):
-        return y / 2 if phase.by_toe else y
+    def cost(self, y):
+        return float(((y / 2 - 1) ** 2).sum())
 
-    calls = 0
+    def rate(self, y):
+        x = y / 2
+        return Rating(np.array([x[0] - 1, x[1] - x[0] ** 2, *(x[2:] - 1)]), np.array([-1.0]), {})
 
-    def cost(self, choice, phase):
-        def cost(y):
-            self.calls += 1
-            x = self.outward(choice, y, phase)
-            return float((x[0] - 1) ** 2 + 100 * ((x[1:] - x[:-1] ** 2) ** 2).sum())
+    def standing(self, x):
+        return Standing(bool(np.abs(x - 1).max() < 1e-3), float(1e3 * (x[0] - 1)), "in words")
 
-        return cost
+    def merit(self, x, both):
+        return self.cost(2 * x)
 
-    def rate(self, choice, phase):
-        def rate(y):
-            self.calls += 1
-            x = self.outward(choice, y, phase)
-            return Rating(np.array([x[0] - 1, *(x[1:] - x[:-1] ** 2)]), np.array([-1.0]), {})
-
-        return rate
-
-    def standing(self, choice, x, paper_solver):
-        within = int(np.abs(x - 1).max() < 1e-3)
-        return Standing(1 + within, 2, "x", float(1e3 * (x[0] - 1)), 0.0)
-
-    def rank(self, choice, x):
-        cost = self.cost(choice, PHASE)(x)
-        return cost, cost
-
-    def confirm(self, choice, x):
+    def confirm(self, x):
         return True
-
-
-class Silent:
-    """A monitor that keeps what it is told."""
-
-    def __init__(self):
-        self.results = []
-
-    def planned(self, jobs):
-        pass
-
-    def running(self, progress):
-        pass
-
-    def finished(self, result):
-        self.results.append(result)
-
-
-class Killed(Exception):
-    pass
-
-
-def ignore(_):
-    pass
 
 
 @pytest.fixture(scope="module")
 def leg():
-    return LegProblem(load_targets(), "walks", load_start("first_fit"))
+    choice, x = load_start("first_fit", 1.375)
+    return LegProblem(load_targets(), choice), x
 
 
-def found(result):
+def plain(result):
     """All but the wall time."""
     return replace(result, seconds=0.0)
 
 
-def result(job_id, root, exact, full=None, confirmed=False):
-    standing = Standing(1, 2, "walk.duty", 1.5, 0.0)
-    return Result(
-        job_id, "around", "given", root, {}, 0.1, 8, 100, 1.0, "evaluations spent", [1.0],
-        exact, exact, full, standing, None, confirmed,
-    )  # fmt: skip
+def result(job_id, root, exact, both=99.0, confirmed=False):
+    x = (0.0,) * 24
+    return Result(job_id, "around", root, x, 100, 1.0, "evaluations spent", exact, both, "words", confirmed)
 
 
 # --- one job ---------------------------------------------------------------------------------------------
 
 
-def test_a_job_finds_the_bottom_of_a_valley_and_says_how():
-    done = run_job(Bowl(), Job(0, 2, PHASE, 1, 20_000), None, ignore, ignore)
+def test_a_job_of_cma_es_finds_the_bottom_and_says_how():
+    done = run_job(Valley(), Job(0, 2, PHASE, 1, 40_000, (0.0,) * 24))
     np.testing.assert_allclose(done.x, 1, atol=1e-2)
-    assert (done.id, done.root, done.phase, done.start) == ("000-02", "000-02", "around", "given")
-    assert done.sigma in PHASE.sigmas
-    assert done.population in PHASE.populations
-    assert done.evaluations <= 20_012
+    assert (done.id, done.root, done.phase) == ("000-02", "000-02", "around")
+    assert done.evaluations <= 40_020
+
+
+def test_a_job_of_descents_finds_the_same_bottom_and_keeps_its_root():
+    done = run_job(Valley(), Job(1, 0, MINIMAX, 1, 3000, (0.0,) * 24, "000-00"))
+    np.testing.assert_allclose(done.x, 1, atol=1e-3)
+    assert done.root == "000-00"
+    assert 3000 <= done.evaluations < 9000
 
 
 def test_a_job_repeats_itself_and_others_differ():
-    jobs = [Job(0, 0, PHASE, 0, 200), Job(0, 0, PHASE, 0, 200)]
-    jobs += [Job(1, 0, PHASE, 0, 200), Job(0, 1, PHASE, 0, 200), Job(0, 0, PHASE, 1, 200)]
-    first, again, *others = (run_job(Bowl(), job, None, ignore, ignore).x for job in jobs)
+    jobs = [Job(*place, PHASE, seed, 200, (0.0,) * 24) for *place, seed in [(0, 0, 0)] * 2 + [(1, 0, 0)]]
+    jobs += [Job(0, 1, PHASE, 0, 200, (0.0,) * 24), Job(0, 0, PHASE, 1, 200, (0.0,) * 24)]
+    np.random.standard_normal(5)  # noqa: NPY002  (the global generator plays no part)
+    first, again, *others = (run_job(Valley(), job).x for job in jobs)
     assert first == again
     assert all(other != first for other in others)
 
 
-def test_a_job_of_descents_finds_the_same_bottom():
-    start = result("000-00", "000-00", 3.0)
-    parents = (replace(start, x=[0.0, 0.0, 0.0]).parent,)
-    done = run_job(Bowl(), Job(1, 0, MINIMAX, 1, 3000, parents), None, ignore, ignore)
-    np.testing.assert_allclose(done.x, 1, atol=1e-3)
-    assert done.root == "000-00"
-    assert 3000 <= done.evaluations < 6000
-
-
-@pytest.mark.parametrize("kills", [1, 3])
-@pytest.mark.parametrize(("phase", "steps"), [(PHASE, 20), (MINIMAX, 6)], ids=["cma", "minimax"])
-def test_a_job_that_was_killed_goes_on_to_the_same_result_bit_for_bit(kills, phase, steps):
-    parents = (replace(result("000-00", "000-00", 3.0), x=[0.0, 0.0, 0.0]).parent,)
-    job = Job(0, 0, phase, 3, 4000 if phase is PHASE else 1200, parents)
-    whole = run_job(Bowl(), job, None, ignore, ignore)
-    checkpoint = None
-    for _ in range(kills):
-        saved = []
-
-        def save(content, saved=saved):
-            saved.append(content)
-            if len(saved) == steps:
-                raise Killed
-
-        with pytest.raises(Killed):
-            run_job(Bowl(), job, checkpoint, save, ignore, every=-1)
-        checkpoint = saved[-2]  # the last may not have been written
-    np.random.standard_normal(5)  # noqa: NPY002  (the global generator plays no part)
-    problem = Bowl()
-    assert found(run_job(problem, job, checkpoint, ignore, ignore)) == found(whole)
-    spared = pickle.loads(checkpoint).method.evaluations
-    assert spared > 50 * kills
-    assert problem.calls <= whole.evaluations - spared + 1  # it did not begin anew
-
-
-def test_a_hopeless_job_gives_up_and_a_finished_one_ends():
-    hopeless = replace(PHASE, give_up=((100, 1e-9),))
-    done = run_job(Bowl(), Job(0, 0, hopeless, 0, 4000), None, ignore, ignore)
-    assert done.stop == "cost above 1e-09 after 100 evaluations"
-    assert 100 <= done.evaluations < 120
-    ending = replace(PHASE, ends_at_bar=True)
-    done = run_job(Bowl(), Job(0, 0, ending, 0, 20_000), None, ignore, ignore)
+def test_a_job_ends_at_the_bar():
+    done = run_job(Valley(), Job(0, 0, replace(MINIMAX, ends_at_bar=True), 0, 20_000, (0.0,) * 24, "000-00"))
     assert done.stop == "bar reached"
-    assert done.standing.met
-    assert abs(done.standing.error) <= CLEAR
+    assert abs(Valley().standing(np.array(done.x)).error) <= CLEAR
     assert done.confirmed
 
 
-def test_a_result_is_in_plain_coordinates_whatever_a_phase_searches_in():
-    done = run_job(Bowl(), Job(0, 0, replace(PHASE, by_toe=True), 1, 20_000), None, ignore, ignore)
-    np.testing.assert_allclose(done.x, 1, atol=1e-2)
-    assert done.exact == done.cost
-
-
 def test_a_leg_keeps_its_ground_level_through_a_search_by_touch_down(leg):
-    choice, x = leg.start[0].to_dict(), np.array(leg.start[1])
-    phase = replace(PHASE, by_toe=True, samples=401)
-    y = leg.inward(choice, x, phase)
-    level, offset = np.flatnonzero(y != x)
-    assert names(leg.start[0])[offset] == "walk.swing_offset"
-    assert leg.scales(choice, phase)[level] != leg.scales(choice, PHASE)[level]
-    np.testing.assert_allclose(leg.outward(choice, y, phase), x, atol=1e-6)
-    assert leg.cost(choice, phase)(y) == pytest.approx(
-        leg.cost(choice, replace(PHASE, samples=401))(x), rel=1e-3
-    )
+    problem, x = leg[0], np.array(leg[1])
+    y = problem.inward(x, SAMPLES)
+    assert [NAMES[i] for i in np.flatnonzero(y != x)] == ["hip_height", "walk.swing_offset"]
+    assert TOE_SCALES[LEVEL] == 0.1
+    np.testing.assert_allclose(problem.outward(y, SAMPLES), x, atol=1e-6)
+    cost = problem.objective(SAMPLES, False, True).cost(y)
+    assert cost == pytest.approx(problem.objective(SAMPLES, False).cost(x), rel=1e-3)
     high = x.copy()
-    high[level] += 1.0  # a toe in the air is put down
-    lower = leg.outward(choice, leg.inward(choice, high, phase), phase)
-    assert lower[level] < high[level] - 0.5
+    high[LEVEL] += 1.0  # a toe in the air is put down
+    lower = problem.outward(problem.inward(high, SAMPLES), SAMPLES)
+    assert lower[LEVEL] < high[LEVEL] - 0.5
 
 
 def test_a_result_survives_json():
-    done = run_job(Bowl(), Job(0, 0, PHASE, 0, 100), None, ignore, ignore)
-    assert Result.from_dict(done.to_dict()) == done
-    assert Result.from_dict(result("000-00", "000-00", 1.0).to_dict()).both is None
+    done = run_job(Valley(), Job(0, 0, PHASE, 0, 100, (0.0,) * 24))
+    assert Result.from_dict(asdict(done)) == done
 
 
 # --- rounds ----------------------------------------------------------------------------------------------
 
 
 def test_phases_come_round_and_round():
-    order = [phase.name for _, phase in zip(range(10), (p for _, p in rounds(FROM_PRESET)), strict=False)]
+    order = [phase.name for _, phase in zip(range(10), (p for _, p in rounds(SCHEDULE)), strict=False)]
     once = ["around", "settle", "descend", "polish", "polish", "polish", "both solvers", "both solvers"]
     assert order == [*once, "around", "settle"]
-    assert COLD[0].start == "cold"
 
 
 def test_the_elite_is_the_best_result_of_each_of_the_best_starts():
     results = [
-        result("000-00", "000-00", 5.0),
-        result("000-01", "000-01", 3.0, full=9.0),
-        result("001-00", "000-01", 2.0, full=8.0),
-        result("001-01", "000-00", 4.0, full=30.0),
-        result("002-00", "002-00", 50.0, full=60.0),
+        result("000-00", "000-00", 5.0, both=40.0),
+        result("000-01", "000-01", 3.0, both=9.0),
+        result("001-00", "000-01", 2.0, both=8.0),
+        result("001-01", "000-00", 4.0, both=30.0),
+        result("002-00", "002-00", 50.0, both=60.0),
     ]
-    phase = replace(PHASE, start="best", elite=2)
-    assert [parent.root for parent in elite(phase, results)] == ["000-01", "000-00"]
+    phase = replace(PHASE, elite=2)
+    assert [one.root for one in elite(phase, results)] == ["000-01", "000-00"]
     assert len(elite(replace(phase, elite=9), results)) == 3
     both = replace(phase, name="both", paper_solver=True, below=10.0)
-    assert [parent.root for parent in elite(both, results)] == ["000-01", "000-00"]
-    assert [parent.root for parent in elite(replace(both, below=2.5), results)] == ["000-01"]
-    assert plan(3, replace(both, below=1.0), results, 0, 10_000) == []
-    results.append(replace(results[0], phase="both", full=1.0))
-    assert [p.root for p in elite(replace(both, below=1.0), results)] == ["000-00"]
+    assert [one.root for one in elite(both, results)] == ["000-01", "000-00"]
+    assert [one.root for one in elite(replace(both, below=2.5), results)] == ["000-01"]
+    assert plan(3, replace(both, below=1.0), (), results, 0, 10_000) == []
+    results.append(replace(results[0], phase="both", both=1.0))
+    assert [one.root for one in elite(replace(both, below=1.0), results)] == ["000-00"]
 
 
 def test_the_budget_is_shared_and_the_papers_solver_weighs_more():
-    assert [job.evaluations for job in plan(0, PHASE, [], 0, 10_000)] == [400] * 3
-    assert [job.evaluations for job in plan(0, PHASE, [], 0, 300)] == [100] * 3
     both = replace(PHASE, paper_solver=True)
-    assert [job.evaluations for job in plan(0, both, [], 0, 3600)] == [3600 // 3 // both.weight] * 3
+    cases = ((PHASE, 10_000, 400), (PHASE, 300, 100), (both, 3600, 1200 // both.weight))
+    for phase, left, each in cases:
+        assert [job.evaluations for job in plan(0, phase, (), [], 0, left)] == [each] * 3
 
 
-def run(problem, out, workers=2, phases=TINY, budget=6000, resume=False, **options):
-    state = open_state(out, {"a": 1}, "digest", resume=resume)
-    monitor = Silent()
-    outcome = search(problem, phases, state, monitor, seed=5, budget=budget, workers=workers, **options)
-    assert sorted(r.id for r in monitor.results) == sorted(r.id for r in outcome.results)
-    return outcome
+def begin(out, resume=False):
+    return open_state(out, {"a": 1}, resume=resume, product="identified.json")
+
+
+def run(leg, out, workers=1, resume=False):
+    reported = []
+    results = search(
+        *leg, TINY, begin(out, resume), lambda one, spent: reported.append(one.id), seed=5, budget=6000,
+        workers=workers,
+    )  # fmt: skip
+    assert sorted(reported) == sorted(one.id for one in results)
+    return list(map(plain, results))
 
 
 @pytest.fixture(scope="module")
 def whole(leg, tmp_path_factory):
-    return run(leg, tmp_path_factory.mktemp("whole"), workers=1)
+    return run(leg, tmp_path_factory.mktemp("whole"))
 
 
 def test_a_search_spends_its_budget_and_refines_its_best(whole):
-    assert whole.spent >= 6000
-    assert whole.winner is None
-    by_phase = {phase.name: [r for r in whole.results if r.phase == phase.name] for phase in TINY}
-    assert all(by_phase.values())
-    best = min(r.exact for r in by_phase["around"][:3])
-    assert min(r.exact for r in by_phase["descend"]) < best
-    assert {r.root for r in by_phase["descend"]} <= {r.id for r in by_phase["around"]}
+    weights = {phase.name: phase.weight for phase in TINY}
+    assert sum(weights[one.phase] * one.evaluations for one in whole) >= 6000
+    assert not whole[-1].confirmed
+    by_phase = {name: [one for one in whole if one.phase == name] for name in weights}
+    best = min(one.exact for one in by_phase["around"][:3])
+    assert min(one.exact for one in by_phase["descend"]) < best
+    assert {one.root for one in by_phase["descend"]} <= {one.id for one in by_phase["around"]}
 
 
 def test_the_number_of_processes_changes_nothing(leg, whole, tmp_path):
-    other = run(leg, tmp_path, workers=2)
-    assert list(map(found, other.results)) == list(map(found, whole.results))
-    assert other.spent == whole.spent
+    assert run(leg, tmp_path, workers=2) == whole
 
 
 SCRIPT = """
@@ -299,8 +205,8 @@ import sys
 from pathlib import Path
 from test_search import *
 if __name__ == "__main__":
-    problem = LegProblem(load_targets(), "walks", load_start("first_fit"))
-    run(problem, Path(sys.argv[1]), workers=1, every=0.02)
+    choice, x = load_start("first_fit", 1.375)
+    run((LegProblem(load_targets(), choice), x), Path(sys.argv[1]), workers=2)
 """
 
 
@@ -316,8 +222,8 @@ def test_a_search_that_was_killed_goes_on_to_the_same_result(leg, whole, tmp_pat
     )
     state = tmp_path / "out" / "state"
     deadline = time.monotonic() + 300
-    while not list(state.glob("job-*.pickle")):
-        assert process.poll() is None, "ended before its first checkpoint"
+    while len(list(state.glob("job-*.json"))) < 2:
+        assert process.poll() is None, "ended before its second job"
         assert time.monotonic() < deadline
         time.sleep(0.01)
     process.kill()
@@ -329,95 +235,69 @@ def test_a_search_that_was_killed_goes_on_to_the_same_result(leg, whole, tmp_pat
             break
         assert time.monotonic() < deadline, "a worker outlived its parent"
         time.sleep(0.05)
-    assert len(list(state.glob("job-*.json"))) < len(whole.results)
-    resumed = run(leg, tmp_path / "out", workers=1, resume=True)
-    assert list(map(found, resumed.results)) == list(map(found, whole.results))
+    kept = {file: file.read_bytes() for file in state.glob("job-*.json")}
+    assert len(kept) < len(whole)
+    assert run(leg, tmp_path / "out", resume=True) == whole
+    assert all(file.read_bytes() == content for file, content in kept.items())
 
 
-def test_a_confirmed_candidate_ends_the_search_the_same_way_with_any_number_of_processes(tmp_path):
-    outcomes = []
-    for number in (0, 1):
-        state = open_state(tmp_path / str(number), {}, "digest", resume=False)
-        for index in (1, 2) if number else ():  # as if later jobs had been faster
-            state.finish(result(f"000-{index:02d}", f"000-{index:02d}", 1.0, 1.0, confirmed=True))
-        if not number:
-            state.finish(result("000-01", "000-01", 1.0, 1.0, confirmed=True))
-        state.finish(result("000-00", "000-00", 2.0))
-        outcomes.append(search(Bowl(), (PHASE,), state, Silent(), seed=0, budget=10_000))
-    assert outcomes[0] == outcomes[1]
-    assert outcomes[0].winner.id == "000-01"
-    assert [r.id for r in outcomes[0].results] == ["000-00", "000-01"]
+@pytest.mark.parametrize("later", [(1,), (1, 2)])
+def test_a_confirmed_candidate_ends_the_search_whichever_jobs_were_faster(tmp_path, later):
+    state = begin(tmp_path)
+    for index in later:
+        state.save(f"job-000-0{index}", asdict(result(f"000-0{index}", "000-01", 1.0, 1.0, confirmed=True)))
+    state.save("job-000-00", asdict(result("000-00", "000-00", 2.0)))
+    results = search(Valley(), (), (PHASE,), state, lambda *_: None, seed=0, budget=10_000)
+    assert [one.id for one in results] == ["000-00", "000-01"]
 
 
 # --- what goes wrong -------------------------------------------------------------------------------------
 
 
-def test_a_process_that_dies_is_one_error_that_names_the_way_on(leg, tmp_path):
-    state = open_state(tmp_path, {}, "digest", resume=False)
-    long = Job(0, 0, replace(PHASE, populations=(8,)), 0, 10**9)
-    with Workers(leg, state, 1, 10.0) as workers:
-
-        def tell(_):
-            os.kill(workers._workers[0][0].pid, signal.SIGTERM)
-
-        with pytest.raises(HoofEnvError, match=r"a process died while it ran job 000-00 .*--resume"):
-            workers.run([long], tell, lambda _: False)
+def test_a_process_that_dies_is_one_error_that_names_the_way_on():
+    with processes(2) as run, pytest.raises(HoofEnvError, match=r"a process died .*--resume"):
+        list(run(os._exit, [1]))
 
 
-def test_an_error_in_a_job_comes_out_of_it(tmp_path):
-    state = open_state(tmp_path, {}, "digest", resume=False)
-    coldless = LegProblem(load_targets(), "walks", None)
-    with Workers(coldless, state, 1, 10.0) as workers, pytest.raises(HoofEnvError, match="cold starts only"):
-        workers.run([Job(0, 0, PHASE, 0, 100)], ignore, lambda _: False)
+def test_an_error_in_a_job_comes_out_of_it(leg):
+    problem = replace(leg[0], targets=())
+    with processes(2) as run, pytest.raises(HoofEnvError, match="at least one row with a bar"):
+        list(run(partial(run_job, problem), [Job(0, 0, PHASE, 0, 100, leg[1])]))
 
 
 def test_a_search_is_not_begun_over_another_nor_resumed_from_nothing(tmp_path):
     with pytest.raises(DataFileError, match="holds no search to resume; leave out --resume"):
-        open_state(tmp_path / "new", {}, "d", resume=True)
+        begin(tmp_path / "new", resume=True)
     assert not (tmp_path / "new").exists()
-    open_state(tmp_path, {"seed": 0}, "d", resume=False)
+    begin(tmp_path)
     with pytest.raises(OutputError, match=r"already holds a search or what one found; name another folder"):
-        open_state(tmp_path, {"seed": 0}, "d", resume=False)
+        begin(tmp_path)
 
 
 def test_a_folder_with_an_impossible_name_is_an_error_of_ours(tmp_path):
-    for resume, error in [(False, OutputError), (True, HoofEnvError)]:
-        with pytest.raises(error, match="cannot write to"):
-            open_state(tmp_path / ("a" * 300), {}, "d", resume=resume)
+    for resume in (False, True):
+        with pytest.raises(OutputError, match="cannot write to"):
+            begin(tmp_path / ("a" * 300), resume)
 
 
-def test_a_search_for_something_else_is_not_resumed(tmp_path):
-    open_state(tmp_path, {"seed": 0, "walk": "walks"}, "d", resume=False)
-    before = (tmp_path / "state" / "problem.json").read_bytes()
-    with pytest.raises(DataFileError, match=r"another search: seed is 0 there and 1 here; name another"):
-        open_state(tmp_path, {"seed": 1, "walk": "walks"}, "d", resume=True)
-    assert (tmp_path / "state" / "problem.json").read_bytes() == before
-
-
-@pytest.mark.parametrize("content", ["", "[]", "{}", '{"problem": "digest", "result": {"id": 3}}'])
+@pytest.mark.parametrize("content", ["", "[]", "{}", '{"problem": "digest", "content": {"id": 3}}'])
 def test_a_damaged_job_is_named(tmp_path, content):
-    state = open_state(tmp_path, {}, "digest", resume=False)
+    state = begin(tmp_path)
     path = tmp_path / "state" / "job-000-01.json"
     path.write_text(content)
-    with pytest.raises(DataFileError, match=r"job-000-01\.json is damaged; delete it to repeat job 000-01"):
-        state.result("000-01")
+    with pytest.raises(DataFileError, match=r"job-000-01\.json is damaged; delete it to repeat job-000-01"):
+        state.load("job-000-01", Result.from_dict)
     assert path.read_text() == content
 
 
-def test_a_damaged_checkpoint_and_files_of_another_search_are_named(tmp_path):
-    state = open_state(tmp_path, {}, "digest", resume=False)
-    state.save("000-00", pickle.dumps(1))
-    assert pickle.loads(state.load("000-00")) == 1
-    (tmp_path / "state" / "job-000-00.pickle").write_bytes(b"digest\nnot a pickle")
-    with pytest.raises(DataFileError, match=r"job-000-00\.pickle is damaged"):
-        state.load("000-00")
-    other = replace(state, digest="other")
-    with pytest.raises(DataFileError, match=r"belongs to another search \(expected other, got 'digest'\)"):
-        other.load("000-00")
-    state.finish(result("000-00", "000-00", 1.0))
-    assert state.load("000-00") is None
-    with pytest.raises(DataFileError, match="belongs to another search"):
-        other.result("000-00")
-    (tmp_path / "state" / "problem.json").write_text("{")
-    with pytest.raises(DataFileError, match=r"problem\.json is damaged; nothing can be resumed"):
-        open_state(tmp_path, {}, "digest", resume=True)
+def test_files_of_another_search_and_a_damaged_problem_are_named(tmp_path):
+    state = begin(tmp_path)
+    state.save("job-000-00", asdict(result("000-00", "000-00", 1.0)))
+    with pytest.raises(DataFileError, match=r"belongs to another search \(expected other, got '"):
+        replace(state, digest="other").load("job-000-00", Result.from_dict)
+    with pytest.raises(DataFileError, match=r"another search: a is 1 there and 2 here; name another"):
+        open_state(tmp_path, {"a": 2}, resume=True, product="identified.json")
+    for content, message in (("{", "damaged; nothing can be resumed"), ("[]", "another search: a is None")):
+        (tmp_path / "state" / "problem.json").write_text(content)
+        with pytest.raises(DataFileError, match=message):
+            begin(tmp_path, resume=True)
