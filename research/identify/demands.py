@@ -26,6 +26,7 @@ LEG = np.dtype(
             "sole", "sole_part",  # length of the sole [m], and over the hip height [-]
             "lowest",  # smallest height of a joint other than toe and heel over both cycles [m]
             "length_excess",  # log lengths beyond `LENGTH_RANGE`, summed [-]
+            "pivot_excess",  # how much further C is from O than the longest link may be [m]
             "walk_excess", "run_excess",  # swing beyond the limits of a gait, summed [rad]
         )
     ]
@@ -71,6 +72,7 @@ _LEG = (
     ("sole_long", "leg.sole_part", MOST, 0.159, 200, "a hoof, not a foot: under 0.16 of the hip height"),
     ("joints", "leg.lowest", LEAST, 0.01, 50, "no joint but toe and heel goes under the ground"),
     ("lengths", "leg.length_excess", MOST, 0.0, 3, "links of an animal's size"),
+    ("pivot", "leg.pivot_excess", MOST, 0.0, 20, "a pivot within the animal"),
     ("walk.limits", "leg.walk_excess", MOST, 0.0, 10, "the gait can be commanded (gait.LIMITS)"),
     ("run.limits", "leg.run_excess", MOST, 0.0, 10, "the gait can be commanded (gait.LIMITS)"),
 )

@@ -116,6 +116,7 @@ def unpack(x, setup, arrays, leg):  # type: ignore[no-untyped-def]
         else:
             leg.run_excess = excess
     leg.sole = lengths[_SOLE]
+    leg.pivot_excess = max(abs(complex(x[_PIVOT_X], x[_PIVOT_Y])) - LENGTH_RANGE[1], 0.0)
     return lengths[0]
 
 

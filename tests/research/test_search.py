@@ -33,7 +33,7 @@ TINY = (
 
 
 class Valley:
-    """A slightly curved valley in 24 dimensions with its bottom at 1; a row is within its bar within 1e-3 of it."""
+    """A slightly curved valley in 24 dimensions; within 1e-3 of its bottom, at 1, all is within the bars."""
 
     def objective(self, samples, both, by_toe=False):
         return self
