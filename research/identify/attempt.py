@@ -22,6 +22,12 @@ from research.identify.minimax import Rate, Rating, descend
 from research.identify.objective import INSIDE, MISSED_ROW
 from research.identify.problem import TOE_SCALES, LegProblem
 
+HOPS = (0.002, 0.005, 0.01, 0.03)
+"""Sizes of the hops, in a search's scales, between descents of a start that is outside the bar."""
+
+TRIES = 12
+"""Descents at most of such a start, with each solver."""
+
 REACH = 0.5
 """How far a push wants to go, in a search's scales: further than it ever gets."""
 
@@ -131,10 +137,24 @@ def attempt(task: Task, aim: Aim) -> Attempt:
     else:
         y = aim.problem.inward(np.array(task.y), SAMPLES)
         for both in (False, True) if aim.both else (False,):
-            goal = CLEAR * aim.bar
-            y = descend(aim.rate(both), y, TOE_SCALES, penalty=aim.penalty, central=True, goal=goal).y
+            y = _enter(task, both, y, aim)
     merit = aim.rate(aim.both)(y).merit(aim.penalty) if aim.runs(y) else MISSED_ROW
     return Attempt(task.id, task.start, tuple(y.tolist()), merit)
+
+
+def _enter(task: Task, both: bool, y: Vector, aim: Aim) -> Vector:
+    """Descents from y, then from beside the best so far, until one is within the bar."""
+    rate, rng = aim.rate(both), np.random.default_rng([task.seed, task.round, task.index])
+    lowest, goal, start = rate(y).merit(aim.penalty) if aim.runs(y) else np.inf, CLEAR * aim.bar, y
+    for _ in range(TRIES):
+        if lowest <= goal:
+            break
+        end = descend(rate, start, TOE_SCALES, penalty=aim.penalty, central=True, goal=goal)
+        merit = end.rating.merit(aim.penalty)
+        if merit < lowest and aim.runs(end.y):
+            y, lowest = end.y, merit
+        start = y + float(rng.choice(HOPS)) * TOE_SCALES * rng.standard_normal(y.size)
+    return y
 
 
 def _push(task: Task, aim: Aim) -> Vector:

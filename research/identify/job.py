@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,7 +29,7 @@ class Result:
         id: round and index. phase: its name.
         root: id of the independent start that it goes back to.
         x: the best leg, see `leg`.
-        evaluations, seconds: spent. stop: why it ended.
+        evaluations, seconds: spent.
         exact, both: merit [bars] with the exact solver alone and with both.
         standing: in words, with both solvers once the leg meets every bar with the exact one.
         confirmed: the full system finds every bar met and every claim true.
@@ -41,7 +41,6 @@ class Result:
     x: tuple[float, ...]
     evaluations: int
     seconds: float
-    stop: str
     exact: float
     both: float
     standing: str
@@ -71,50 +70,43 @@ class Job:
         return f"{self.round:03d}-{self.index:02d}"
 
 
-class _CmaEs:
-    """A generation of CMA-ES at a time, on `Objective.cost`."""
-
-    def __init__(self, y: Vector, sigma: float, rng: np.random.Generator) -> None:
-        import cma
-
-        options = {
-            "verbose": -9,
-            "seed": np.nan,  # draws come from `randn` alone
-            "randn": lambda *shape: rng.standard_normal(shape),
-            "popsize": POPULATION,
-            "tolfun": 1e-5,
-            "CMA_stds": TOE_SCALES,
-            "signals_filename": "",
-        }
-        self.es: Any = cma.CMAEvolutionStrategy(y, sigma, options)
-        self.best, self.value, self.evaluations = y, np.inf, 0
-
-    def advance(self, cost: Callable[[Vector], float]) -> str:
-        """Go on a little; returns why it cannot go on further, or ""."""
-        points = [np.ascontiguousarray(point) for point in self.es.ask()]  # kernels know one type
-        self.es.tell(points, [cost(point) for point in points])
-        self.best, self.value = np.array(self.es.best.x), float(self.es.best.f)
-        self.evaluations = int(self.es.countevals)
-        return ", ".join(self.es.stop())
+Progress = Iterator[tuple[Vector, float, int]]
+"""The best y so far, its value and the evaluations spent, again and again."""
 
 
-class _Hops:
-    """A descent at a time, on `Objective.rate`: from the start, then from beside the best so far."""
+def evolve(cost: Callable[[Vector], float], y: Vector, sigma: float, rng: np.random.Generator) -> Progress:
+    """CMA-ES on `Objective.cost`, a generation at a time, until it has converged."""
+    import cma
 
-    def __init__(self, y: Vector, sigmas: tuple[float, ...], rng: np.random.Generator) -> None:
-        self.sigmas, self.rng = sigmas, rng
-        self.best, self.value, self.evaluations = y, np.inf, 0
+    options = {
+        "verbose": -9,
+        "seed": np.nan,  # draws come from `randn` alone
+        "randn": lambda *shape: rng.standard_normal(shape),
+        "popsize": POPULATION,
+        "tolfun": 1e-5,
+        "CMA_stds": TOE_SCALES,
+        "signals_filename": "",
+    }
+    strategy = cma.CMAEvolutionStrategy(y, sigma, options)
+    while not strategy.stop():
+        points = [np.ascontiguousarray(point) for point in strategy.ask()]  # kernels know one type
+        strategy.tell(points, [cost(point) for point in points])
+        yield np.array(strategy.best.x), float(strategy.best.f), int(strategy.countevals)
 
-    def advance(self, rate: Callable[[Vector], Rating]) -> str:
-        """As `_CmaEs.advance`."""
-        hop = float(self.rng.choice(self.sigmas)) if self.evaluations else 0.0
-        start = self.best + hop * TOE_SCALES * self.rng.standard_normal(self.best.size)
-        central = bool(self.rng.integers(2))
-        end = descend(rate, start, TOE_SCALES, penalty=PENALTY, central=central)
-        self.evaluations += end.evaluations
-        if (value := end.rating.merit(PENALTY)) < self.value:
-            self.best, self.value = end.y, value
-        return ""
+
+def hop(
+    rate: Callable[[Vector], Rating], y: Vector, sigmas: tuple[float, ...], rng: np.random.Generator
+) -> Progress:
+    """Descents of `Objective.rate`, one at a time: from y, then from beside the best so far."""
+    value, spent = np.inf, 0
+    while True:
+        size = float(rng.choice(sigmas)) if spent else 0.0
+        start = y + size * TOE_SCALES * rng.standard_normal(y.size)
+        end = descend(rate, start, TOE_SCALES, penalty=PENALTY, central=bool(rng.integers(2)))
+        spent += end.evaluations
+        if end.rating.merit(PENALTY) < value:
+            y, value = end.y, end.rating.merit(PENALTY)
+        yield y, value, spent
 
 
 def run_job(problem: LegProblem, job: Job) -> Result:
@@ -123,29 +115,28 @@ def run_job(problem: LegProblem, job: Job) -> Result:
     sigma, x = float(rng.choice(phase.sigmas)), np.array(job.x)
     y = problem.inward(x, phase.samples) if job.root else problem.around(x, phase.samples, rng)
     objective = problem.objective(phase.samples, phase.paper_solver, True)
-    method: Any = _CmaEs(y, sigma, rng) if phase.method == "cma" else _Hops(y, phase.sigmas, rng)
-    evaluate = objective.cost if phase.method == "cma" else objective.rate
-    judged, stop = np.inf, ""
-    while not stop:
-        stop = method.advance(evaluate)
-        if phase.ends_at_bar and method.value < judged:
-            judged = method.value
-            x = problem.outward(method.best, phase.samples)
+    if phase.method == "cma":
+        progress = evolve(objective.cost, y, sigma, rng)
+    else:
+        progress = hop(objective.rate, y, phase.sigmas, rng)
+    judged, spent = np.inf, 0
+    for y, value, spent in progress:
+        if phase.ends_at_bar and value < judged:
+            judged, x = value, problem.outward(y, phase.samples)
             standing = problem.objective(SAMPLES, phase.paper_solver).standing(x)
             if standing.met and abs(standing.error) <= CLEAR:
-                stop = "bar reached"
-        if method.evaluations >= job.evaluations:
-            stop = "evaluations spent"
-    x = problem.outward(method.best, phase.samples)
+                break
+        if spent >= job.evaluations:
+            break
+    x = problem.outward(y, phase.samples)
     exact, both = (problem.objective(SAMPLES, both).standing(x) for both in (False, True))
     return Result(
         id=job.id,
         phase=phase.name,
         root=job.root or job.id,
         x=tuple(x.tolist()),
-        evaluations=method.evaluations,
+        evaluations=spent,
         seconds=time.monotonic() - began,
-        stop=stop,
         exact=problem.merit(x, False),
         both=problem.merit(x, True),
         standing=both.words if exact.met else exact.words,

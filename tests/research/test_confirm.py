@@ -61,7 +61,7 @@ def test_a_leg_that_is_its_own_target_meets_every_row(verdict, tmp_path):
 def test_the_best_leg_that_turns_becomes_a_preset():
     choice, x = load_start("first_fit", 1.375)
     problem = LegProblem(load_targets(), choice)
-    first = Result("000-00", "around", "000-00", x, 500, 2.0, "", 8.0, 9.0, "words", False)
+    first = Result("000-00", "around", "000-00", x, 500, 2.0, 8.0, 9.0, "words", False)
     stuck = replace(first, id="000-01", x=(1.0, *x[1:]), both=6.5)
     result, preset, _ = best_leg(problem, [first, stuck], ABOUT)
     assert result is first

@@ -15,6 +15,7 @@ import pytest
 
 from hoof_env.errors import DataFileError, HoofEnvError
 from hoof_env.leg.geometry import read_preset
+from research.identify import attempt as attempting
 from research.identify import collect as collecting
 from research.identify import ensemble as command
 from research.identify.attempt import Aim, Attempt, Task, attempt, judge
@@ -168,7 +169,8 @@ def test_a_leg_that_the_full_system_refuses_is_replaced(start, whole, folder, tm
 # --- bad input -------------------------------------------------------------------------------------------
 
 
-def test_no_leg_within_the_bar_says_how_far_the_nearest_is(start, tmp_path):
+def test_no_leg_within_the_bar_says_how_far_the_nearest_is(start, tmp_path, monkeypatch):
+    monkeypatch.setattr(attempting, "TRIES", 1)
     with pytest.raises(
         HoofEnvError, match=r"no start comes within 0\.01 bars without a shortage, the nearest has \d+\.\d+"
     ):
