@@ -15,13 +15,12 @@ import numpy as np
 
 from hoof_env.errors import HoofEnvError, ParameterError, check_number
 from hoof_env.simd.math import EXPONENT_UNIT
-from research.identify.command import check_counts, check_extras, load_start, run
+from research.identify.command import check_counts, check_extras, load_start, provenance, run
 from research.identify.confirm import Confirmation, confirm
 from research.identify.job import Result
 from research.identify.leg import to_preset
 from research.identify.problem import LegProblem
-from research.identify.schedule import BUDGET, SCHEDULE
-from research.identify.search import search
+from research.identify.search import BUDGET, SCHEDULE, search
 from research.identify.state import digest_of, open_state, versions, write_json
 from research.identify.targets import load_targets
 
@@ -107,16 +106,10 @@ def best_leg(
     Args:
         about: what was searched, for the provenance.
     """
-    settings = {**about, **about["versions"]}
-    words = ", ".join(f"{name} {settings[name]}" for name in settings if name not in ("versions", "schedule"))
     for result in sorted(results, key=lambda result: (not result.confirmed, result.both)):
-        provenance = (
-            "Identified, not published: found by research.identify from the results printed in Batbaatar & "
-            "Wagatsuma 2021 (doi 10.2991/jrnal.k.210713.002), which prints neither lengths nor swing "
-            f"parameters; {words}; job {result.id}."
-        )
+        origin = provenance(f"research.identify, job {result.id}", about)
         try:
-            preset = to_preset(np.array(result.x), problem.choice, provenance)
+            preset = to_preset(np.array(result.x), problem.choice, origin)
             return result, preset, confirm(preset, problem.targets)
         except HoofEnvError:  # it does not turn, or a gait is beyond its limits
             continue

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from hoof_env.errors import HoofEnvError, MissingExtraError, check_number
@@ -46,6 +46,17 @@ def check_counts(**counts: Any) -> list[int]:
         int(check_number(n, v, low=n not in ("seed", "attempts"), high=1024 if n == "workers" else 2**53))
         for n, v in counts.items()
     ]
+
+
+def provenance(how: str, about: Mapping[str, Any]) -> str:
+    """Where the numbers of a leg come from: found how, with what settings."""
+    settings = {**about, **about["versions"]}
+    words = (f"{name} {value}" for name, value in settings.items() if name not in ("versions", "schedule"))
+    return (
+        "Identified, not published: found from the results printed in Batbaatar & Wagatsuma 2021 (doi "
+        f"10.2991/jrnal.k.210713.002), which prints neither lengths nor swing parameters, by {how}. "
+        f"Settings: {', '.join(words)}."
+    )
 
 
 def load_start(start: str, exponent: float) -> tuple[Choice, tuple[float, ...]]:

@@ -28,8 +28,8 @@ from hoof_env.errors import HoofEnvError, ParameterError, check_number
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.preset import load_ground, write_ground
 from research.identify.attempt import Aim
-from research.identify.collect import Collection, collect
-from research.identify.command import check_counts, check_extras, load_start, run
+from research.identify.collect import collect
+from research.identify.command import check_counts, check_extras, load_start, provenance, run
 from research.identify.confirm import COUNTED
 from research.identify.problem import LegProblem
 from research.identify.state import digest_of, open_state, read_json, versions, write_json
@@ -123,8 +123,16 @@ def ensemble(
         parts = {name: verdict.preset[name] for name in ("geometry", "gaits")}
         origin = {"attempt": one.id, "start": one.start}
         members.append({**parts, "errors": verdict.errors, "short": verdict.short, "found": origin})
+    counts = Counter(one.start for one in found.members)
+    shares = ", ".join(f"{count} from {start}" for start, count in counts.items())
+    how = (
+        "research.identify.ensemble: legs known to fit were pushed in random directions, along one length or "
+        f"all, as far as the bar let them, {len(found.attempts) - len(legs)} times; of all that fit, the "
+        f"{len(members)} members ({shares}) are chosen far apart, so that extremes are more frequent among "
+        "them than among all legs that fit, and their range is a lower limit of what the numbers leave open"
+    )
     content = {
-        "provenance": provenance(about, found),
+        "provenance": provenance(how, about),
         "units": "m, rad, rad/s, N/m^n; errors in bars",
         "ground": write_ground(ground),
         "bar": largest([member["errors"] for member in members]),
@@ -133,24 +141,6 @@ def ensemble(
     refused = len(found.verdicts) - len(members)
     say(f"{len(members)} of {size} members; largest errors {content['bar']} [bars]; {refused} legs refused")
     say(f"{write_json(out, 'ensemble', content)} written")
-
-
-def provenance(about: Mapping[str, Any], found: Collection) -> str:
-    """How the members were found, in words."""
-    shares = Counter(one.start for one in found.members)
-    settings = {**about, **about["versions"]}
-    words = (f"{name} {settings[name]}" for name in settings if name not in ("starts", "versions"))
-    return (
-        "Identified, not published: legs that fit the results printed in Batbaatar & Wagatsuma 2021 (doi "
-        "10.2991/jrnal.k.210713.002), which prints neither lengths nor swing parameters. Found by "
-        f"research.identify.ensemble from {'; '.join(about['starts'])}: legs known to fit were pushed in "
-        "random directions, along one length or all, as far as the bar let them, "
-        f"{len(found.attempts) - len(about['starts'])} times; of all that fit, the {len(found.members)} "
-        "members are chosen far apart, so that extremes are more frequent among them than among all legs "
-        "that fit, and their range is a lower limit of what the numbers leave open. Members: "
-        f"{', '.join(f'{count} from {start}' for start, count in shares.items())}. Settings: "
-        f"{', '.join(words)}."
-    )
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

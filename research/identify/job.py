@@ -12,13 +12,54 @@ import numpy as np
 from research.identify.leg import Vector
 from research.identify.minimax import Rating, descend
 from research.identify.problem import PENALTY, SAMPLES, TOE_SCALES, LegProblem
-from research.identify.schedule import Phase
 
 CLEAR = 0.995
 """Largest error with which a job ends at the bar [bars], so that the judge, who samples finer, agrees."""
 
 POPULATION = 20
 """Of CMA-ES."""
+
+
+PAPER_WEIGHT = 12
+"""How many evaluations one with the paper's solver counts for: it takes that much longer."""
+
+
+@dataclass(frozen=True)
+class Phase:
+    """One or more rounds of equal jobs, each from a start of its own.
+
+    Attributes:
+        name: in reports.
+        jobs, rounds: jobs a round, and rounds.
+        evaluations: at most, a job; a descent that has begun is finished.
+        sigmas: one is drawn for a job of CMA-ES, or for each hop between descents; in scales.
+        method: "cma" (CMA-ES on the cost of all errors) or "minimax" (descents of the largest error, each
+            from beside the best so far, see `minimax`).
+        elite: how many independent starts are refined, job i from the best result of the i-th best of them;
+            0: a job is an independent start, from a leg around the preset.
+        below: results of other phases that are further out with the exact solver [bars] are not refined;
+            without any left the phase is skipped.
+        samples: instants a revolution.
+        paper_solver: the objective contains the paper's solver too.
+        ends_at_bar: a job ends as soon as all rows are clear within their bars and nothing falls short.
+    """
+
+    name: str
+    jobs: int
+    evaluations: int
+    sigmas: tuple[float, ...]
+    method: str = "cma"
+    rounds: int = 1
+    elite: int = 0
+    below: float = float("inf")
+    samples: int = 101
+    paper_solver: bool = False
+    ends_at_bar: bool = False
+
+    @property
+    def weight(self) -> int:
+        """What an evaluation counts for."""
+        return PAPER_WEIGHT if self.paper_solver else 1
 
 
 @dataclass(frozen=True)

@@ -3,15 +3,44 @@ a kill and a resumption change nothing in what is found."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import asdict
+import itertools
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, replace
 from functools import partial
 
-from research.identify.job import Job, Result, run_job
+from research.identify.job import Job, Phase, Result, run_job
 from research.identify.problem import LegProblem
 from research.identify.processes import processes
-from research.identify.schedule import Phase, Schedule, rounds
 from research.identify.state import State
+
+BUDGET = 10_000_000
+"""Evaluations of a search unless told otherwise; one takes some 0.1 ms."""
+
+Schedule = tuple[Phase, ...]
+"""Phases, run again and again until the bar is reached or the budget spent."""
+
+_DESCEND = Phase("descend", 8, 4_000, (0.003, 0.01, 0.03, 0.1), method="minimax", elite=8, samples=401)
+_POLISH = replace(
+    _DESCEND, name="polish", jobs=4, elite=2, rounds=3, evaluations=16_000, ends_at_bar=True
+)  # fmt: skip
+_BOTH = replace(
+    _POLISH, name="both solvers", rounds=2, evaluations=8_000, sigmas=(0.002, 0.005, 0.01, 0.02, 0.04),
+    below=1.5, paper_solver=True,
+)  # fmt: skip
+
+SCHEDULE: Schedule = (
+    Phase("around", 24, 4_000, (0.1,)),
+    Phase("settle", 8, 8_000, (0.05,), elite=8),
+    _DESCEND,
+    _POLISH,
+    _BOTH,
+)
+
+
+def rounds(schedule: Schedule) -> Iterator[tuple[int, Phase]]:
+    """Endless: (number of the round, its phase)."""
+    phases = itertools.chain.from_iterable(itertools.repeat(phase, phase.rounds) for phase in schedule)
+    yield from enumerate(itertools.cycle(phases))
 
 
 def search(

@@ -68,6 +68,8 @@ def test_the_best_leg_that_turns_becomes_a_preset():
     leg, given = load_geometry(preset), load_geometry("first_fit")
     assert leg.lengths == pytest.approx(dict(given.lengths), rel=1e-12)
     assert leg.provenance.startswith("Identified, not published: ")
-    assert leg.provenance.endswith("start first_fit (0), seed 0, cma 4; job 000-00.")
+    assert leg.provenance.endswith(
+        "by research.identify, job 000-00. Settings: start first_fit (0), seed 0, cma 4."
+    )
     assert best_leg(problem, [stuck], ABOUT) is None
     assert problem.confirm(np.array(stuck.x)) is False

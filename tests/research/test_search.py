@@ -12,14 +12,13 @@ import pytest
 
 from hoof_env.errors import DataFileError, HoofEnvError, OutputError
 from research.identify.command import load_start
-from research.identify.job import CLEAR, Job, Result, run_job
+from research.identify.job import CLEAR, Job, Phase, Result, run_job
 from research.identify.leg import LEVEL, NAMES
 from research.identify.minimax import Rating
 from research.identify.objective import Standing
 from research.identify.problem import SAMPLES, TOE_SCALES, LegProblem
 from research.identify.processes import processes
-from research.identify.schedule import SCHEDULE, Phase, rounds
-from research.identify.search import elite, plan, search
+from research.identify.search import SCHEDULE, elite, plan, rounds, search
 from research.identify.state import open_state
 from research.identify.targets import load_targets
 
