@@ -11,7 +11,6 @@ import shlex
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Literal
 
 from hoof_env._version import __version__
 from hoof_env.errors import HoofEnvError
@@ -42,86 +41,6 @@ def reproduce(out: Path, figures: bool = True, preset: str | None = None) -> Non
 
     paths = write_reproduction(reproduce(_say, preset=preset), out, figures=figures, command=command)
     _say(f"{len(paths)} files written; read {out / 'reproduction.md'} first")
-
-
-def identify(
-    out: Path,
-    start: str = "first_fit",
-    seed: int = 0,
-    targets: Path | None = None,
-    walk: Literal["walks", "brakes"] = "walks",
-    exponent: float = 1.375,
-    beta: Literal["printed", "probable"] = "probable",
-    workers: int = 2,
-    budget: int | None = None,
-    resume: bool = False,
-    keep_going: bool = False,
-) -> None:
-    """Search for the leg, the ground level and the gaits that the paper does not print (needs 'identify').
-
-    Ends at the first leg that meets every bar with the exact and the paper's solver, or with the budget.
-
-    Args:
-        out: folder for identified.json (a preset), identify.json and identify.md; made if need be.
-        start: where to search: around a preset (a name or a JSON file), or "cold" for anywhere.
-        seed: the same seed and options find the same leg, with any number of workers.
-        targets: JSON file of the rows to meet, as published.json, each with an optional weight.
-        walk: a walk that moves its animal, or one that brakes through its stance (figure 6 read literally).
-        exponent: of the contact law (Eq. 14), which the paper does not print.
-        beta: of the paper's solver: as printed, sqrt(2 alpha), or as it is probably meant, sqrt(2) alpha.
-        workers: processes.
-        budget: evaluations at most; one with the paper's solver counts for several.
-        resume: go on with a search in this folder that was interrupted or killed.
-        keep_going: spend the whole budget: the leg furthest inside the bars, and how many starts meet them.
-    """
-    from hoof_env.identify.command import identify
-
-    paths = identify(
-        out, _say, start=start, seed=seed, targets=targets, walk=walk, exponent=exponent, beta=beta,
-        workers=workers, budget=budget, resume=resume, keep_going=keep_going,
-    )  # fmt: skip
-    _say(f"{len(paths)} files written; read {out / 'identify.md'} first")
-
-
-def ensemble(
-    out: Path,
-    preset: str,
-    starts: tuple[str, ...] = (),
-    size: int = 24,
-    bar: float = 1.0,
-    both: bool = False,
-    walk: Literal["walks", "brakes"] = "walks",
-    beta: Literal["printed", "probable"] = "probable",
-    targets: Path | None = None,
-    seed: int = 0,
-    attempts: int = 240,
-    workers: int = 2,
-    resume: bool = False,
-) -> None:
-    """Collect legs that fit the published numbers, far apart: what those leave open (needs 'identify').
-
-    Args:
-        out: folder for ensemble.json; made if need be.
-        preset: the leg to begin with, a name or a JSON file; all members stand on its ground.
-        starts: more of them, or folders of `hoof-env identify`, whose independent starts all count.
-        size: members wanted.
-        bar: largest error of a row, in units of its own bar.
-        both: rows count with the paper's solver too, all but the ill-conditioned.
-        walk: a walk that moves its animal, or one that brakes through its stance (figure 6 read literally).
-        beta: of the paper's solver: as printed, sqrt(2 alpha), or as it is probably meant, sqrt(2) alpha.
-        targets: JSON file of the rows to meet, as published.json.
-        seed: the same seed and options find the same legs, with any number of workers.
-        attempts: to find a further leg; the members are chosen among all that were found.
-        workers: processes.
-        resume: go on with a collection in this folder that was interrupted or killed.
-    """
-    from hoof_env.identify.ensemble_command import ensemble
-
-    paths = ensemble(
-        out, _say, preset=preset, starts=starts, size=size, bar=bar, both=both, walk=walk, beta=beta,
-        targets=targets, seed=seed, attempts=attempts, workers=workers, resume=resume,
-    )  # fmt: skip
-    _say(f"{paths[0]} written")
 
 
 def render(
@@ -228,8 +147,8 @@ def manual(id: str = "hoof_env/HorseLeg-v0", out: Path | None = None) -> None:
 def compile() -> None:
     """Compile the kernels of all environments now, for an image of a container or before workers begin.
 
-    They are kept in the folder NUMBA_CACHE_DIR. An engine with four legs, `identify` and `reproduce` have
-    more of their own.
+    They are kept in the folder NUMBA_CACHE_DIR. An engine with four legs and `reproduce` have more
+    of their own.
     """
     from hoof_env.envs.kernels import compile_kernels
 
@@ -238,8 +157,6 @@ def compile() -> None:
 
 COMMANDS: dict[str, Callable[..., None]] = {
     "reproduce": reproduce,
-    "identify": identify,
-    "ensemble": ensemble,
     "render": render,
     "play": play,
     "export": export,

@@ -4,15 +4,11 @@ Otherwise each of the tests' processes, which begin together, compiles them for 
 is compiled by the first test that wants it.
 """
 
-import numpy as np
-
 from benchmarks.scenes import engine, scenes
 from hoof_env.envs.kernels import compile_kernels
-from hoof_env.gait.parameters import load_gait
-from hoof_env.identify.candidate import encode
-from hoof_env.identify.objective import Objective
-from hoof_env.leg.geometry import load_geometry
 from hoof_env.paper.reproduce import run_cycle
+from research.identify.leg import encode
+from research.identify.objective import Objective
 
 PRESET = "first_fit"
 
@@ -24,9 +20,8 @@ def horse():
 
 def search():
     """Costs of a leg."""
-    choice, x = encode(load_geometry(PRESET), *(load_gait(gait, PRESET) for gait in ("walk", "run")))
-    objective = Objective(choice, paper_solver=True)
-    objective.cost(np.array(x))
+    choice, x = encode(PRESET)
+    Objective(choice, paper_solver=True).rate(x)
 
 
 if __name__ == "__main__":

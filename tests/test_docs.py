@@ -38,6 +38,10 @@ def broken(page):
             yield link
 
 
+def is_command(module):
+    return module.with_suffix(".py").is_file() or (module / "__main__.py").is_file()
+
+
 @pytest.mark.parametrize("page", PAGES, ids=name)
 def test_links_lead_somewhere(page):
     assert not list(broken(page))
@@ -47,11 +51,13 @@ def test_links_lead_somewhere(page):
 def test_commands_and_files_exist(page):
     text = page.read_text(encoding="utf-8")
     modules = set(re.findall(r"python -m ((?:agents|benchmarks|hoof_env|research|tests)[\w.]*\w)", text))
-    assert not {one for one in modules if not (ROOT / one.replace(".", "/")).with_suffix(".py").is_file()}
+    assert not {one for one in modules if not is_command(ROOT / one.replace(".", "/"))}
     commands = set(re.findall(r"(?:`|bin/)hoof-env ([a-z]+)\b(?![^.:]{0,60}\sof commit)", text))
     assert not commands - set(COMMANDS)
     files = set(
-        re.findall(r"`((?:agents|benchmarks|docs|examples|hoof_env|scripts|tests)/[\w./-]+\.\w+)`", text)
+        re.findall(
+            r"`((?:agents|benchmarks|docs|examples|hoof_env|research|scripts|tests)/[\w./-]+\.\w+)`", text
+        )
     )
     assert not {file for file in files if not (ROOT / file).is_file()}
 

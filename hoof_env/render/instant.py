@@ -34,7 +34,7 @@ class Setting(NamedTuple):
     Attributes:
         geometry, terrain: the leg and what it stands on.
         weight_n: weight of trunk and leg [N].
-        trunk: its kind, one of `dynamics.trunk.ONE_LEG`.
+        trunk: its kind, one of `dynamics.parts.ONE_LEG`.
         lift_off_n: normal force that tells stance from swing [N].
         dt, sim_dt: control step and substep [s].
     """

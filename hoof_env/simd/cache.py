@@ -23,8 +23,8 @@ from numba.core.compiler_lock import global_compiler_lock
 
 from hoof_env.errors import OutputError
 
-MECHANICS = ("simd", "leg", "ground", "gait", "dynamics", "identify")
-"""The rooms whose sources end up in kernels."""
+MECHANICS = ("simd", "leg", "ground", "gait", "dynamics")
+"""The rooms of this package whose sources end up in kernels."""
 
 LONGEST_WAIT = 600.0
 """Seconds to wait for another process, which may be stopped; then the kernel is compiled here."""
@@ -74,7 +74,8 @@ class KernelCache(_caching.FunctionCache):
         except (RuntimeError, OSError) as error:
             raise _no_folder(os.path.dirname(function.__code__.co_filename), error) from None
         # numba looks for changes in the file of a kernel alone, but a kernel contains those that it calls
-        self._cache_file._source_stamp = (self._cache_file._source_stamp, _sources())
+        own = Path(function.__code__.co_filename).parent
+        self._cache_file._source_stamp = (self._cache_file._source_stamp, _sources(), _digest(own))
         self._say, self._kernel, self._identity = say, function.__name__, identity
         self._lock: Any = None
 
@@ -172,8 +173,15 @@ def _no_folder(folder: str, error: Exception) -> OutputError:
 
 @cache
 def _sources() -> str:
-    """Digest of everything that kernels are made from."""
-    package, digest = Path(__file__).parents[1], hashlib.sha256()
-    for path in sorted(path for room in MECHANICS for path in (package / room).glob("*.py")):
+    """Digest of everything in this package that kernels are made from."""
+    package = Path(__file__).parents[1]
+    return "".join(_digest(package / room) for room in MECHANICS)
+
+
+@cache
+def _digest(folder: Path) -> str:
+    """Digest of the modules in a folder: a kernel may call any that lies beside it."""
+    digest = hashlib.sha256()
+    for path in sorted(path for path in folder.glob("*.py") if path.is_file()):
         digest.update(path.read_bytes())
     return digest.hexdigest()

@@ -11,7 +11,6 @@ from hoof_env.dynamics.reactions import LegConstants, Reactions, leg_constants, 
 from hoof_env.gait.motion_law import evaluate_motion
 from hoof_env.gait.parameters import load_gait
 from hoof_env.ground.contact import Ground
-from hoof_env.identify.ensemble import load_ensemble
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
 from hoof_env.leg.linkage import BODIES, CRANK, FRAME, JOINTS
@@ -20,6 +19,7 @@ from hoof_env.simd import columns as columns_of
 from hoof_env.simd import fill, rows, store_vectors
 from hoof_env.simd.layout import Layout, Row, Vector, views
 from hoof_env.simd.memory import address, doubles
+from research.identify.ensemble import load_ensemble
 
 PRESETS = {name: load_geometry(name) for name in ("first_fit", "identified")}
 LEGS = {
@@ -30,8 +30,8 @@ LEGS = {
     ),
     "own masses": PRESETS["identified"].replace(masses=tuple(np.linspace(3, 0.2, 14)), inertia="paper"),
     **{
-        f"ensemble {k}": member.geometry
-        for k, member in enumerate(load_ensemble("identified").members)
+        f"ensemble {k}": load_geometry(member)
+        for k, member in enumerate(load_ensemble("identified"))
         if k % 5 == 0
     },
 }

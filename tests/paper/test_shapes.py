@@ -191,9 +191,3 @@ def test_a_gait_walks_if_its_sole_goes_back_fast_enough_at_every_level(medians, 
     for words in (f"{medians[0]:+.2f} m/s,", f"{medians[1]:+.2f} m/s 5 cm", f"{medians[2]:+.2f} m/s 10 cm"):
         assert words in verdict.evidence
     assert "-0.3 m/s or less" in verdict.evidence
-
-
-def test_the_search_asks_for_the_same_speed():
-    from hoof_env.identify.features import BACKWARD
-
-    assert BACKWARD == shapes.BACKWARD

@@ -139,6 +139,23 @@ def test_what_cannot_be_compiled_lets_go(start, tmp_path):
     assert out == "tiny.wrong is free []"
 
 
+def test_an_edit_beside_a_kernel_recompiles_it_and_another_does_not(start, tmp_path):
+    """A kernel's own file stays as it was; what it calls lies in a module of the same folder."""
+    folder = tmp_path / "kernels"
+    folder.mkdir()
+    kernel = "from hoof_env.simd.compile import kernel\n\n@kernel\ndef "
+    (folder / "caller.py").write_text(
+        f"from helper import part\n{kernel}whole(x):\n    return 2.0 * part(x)\n"
+    )
+    code = "import caller; from hoof_env.simd.cache import COMPILED; print(caller.whole(3.0), COMPILED)"
+    both = "['part', 'whole']"
+    for change, value, compiled in ((1.0, 8.0, both), (1.0, 8.0, "[]"), (2.0, 10.0, both)):
+        (folder / "helper.py").write_text(f"{kernel}part(x):\n    return x + {change}\n")
+        assert ended(start(code, PYTHONPATH=f"{ROOT}{os.pathsep}{folder}"))[0] == f"{value} {compiled}"
+    (tmp_path / "elsewhere.py").write_text("x = 1\n")
+    assert ended(start(code, PYTHONPATH=f"{ROOT}{os.pathsep}{folder}"))[0] == "10.0 []"
+
+
 def test_who_waits_too_long_compiles_too(start, tmp_path):
     first = start()
     until((tmp_path / "began").exists, first)

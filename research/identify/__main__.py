@@ -1,0 +1,125 @@
+"""Search the leg, the ground level and the gaits that the paper does not print; see docs/identification.md.
+
+python -m research.identify --out runs/identify
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hoof_env.errors import HoofEnvError, ParameterError, check_number
+from hoof_env.simd.math import EXPONENT_UNIT
+from research.identify.command import check_counts, check_extras, load_start, provenance, run
+from research.identify.confirm import Confirmation, confirm
+from research.identify.job import Result
+from research.identify.leg import to_preset
+from research.identify.problem import LegProblem
+from research.identify.search import BUDGET, SCHEDULE, search
+from research.identify.state import digest_of, open_state, versions, write_json
+from research.identify.targets import load_targets
+
+EXPONENT = 1.375
+"""n of Eq. 14 unless told otherwise: with it a leg meets every published number, see docs/decisions.md."""
+
+
+def identify(
+    out: Path,
+    start: str = "first_fit",
+    seed: int = 0,
+    targets: Path | None = None,
+    exponent: float = EXPONENT,
+    workers: int = 2,
+    budget: int = BUDGET,
+    resume: bool = False,
+) -> None:
+    """Search the leg, the ground level and the gaits that the paper does not print (needs 'identify').
+
+    Ends at the first leg that meets every bar with the exact and the paper's solver, or with the budget.
+
+    Args:
+        out: folder for identified.json, a preset, and identify.json, how good it is; made if need be. Its
+            folder state holds what a killed search is resumed from.
+        start: a preset to search around, a name or a JSON file.
+        seed: the same seed and options find the same leg, with any number of workers.
+        targets: JSON file of the rows to meet, as published.json.
+        exponent: of the contact law (Eq. 14), which the paper does not print.
+        workers: processes.
+        budget: evaluations at most; one with the paper's solver counts for several.
+        resume: go on with a search in this folder that was interrupted or killed.
+    """
+    check_extras()
+    from tqdm import tqdm
+
+    seed, workers, budget = check_counts(seed=seed, workers=workers, budget=budget)
+    exponent = check_number("exponent", exponent, low=1, high=3)
+    if exponent * EXPONENT_UNIT % 1:
+        raise ParameterError(
+            f"exponent: expected a multiple of 1/{EXPONENT_UNIT}, for no environment takes another, "
+            f"got {exponent!r}"
+        )
+    choice, x = load_start(start, exponent)
+    problem = LegProblem(load_targets(targets), choice)
+    about = {
+        "start": f"{Path(start).stem} ({digest_of([asdict(choice), x])})",
+        "targets": digest_of([asdict(row) for row in problem.targets]),
+        "exponent": exponent,
+        "seed": seed,
+        "budget": budget,
+        "schedule": digest_of([asdict(phase) for phase in SCHEDULE]),
+        "versions": versions(),
+    }
+    state = open_state(out, about, resume=resume, product="identified.json")
+    with tqdm(total=budget, disable=None, dynamic_ncols=True) as bar:
+
+        def report(result: Result, spent: int) -> None:
+            end = ", confirmed by the full system" if result.confirmed else ""
+            bar.write(
+                f"job {result.id} ({result.phase}): {result.standing}; {result.evaluations} evaluations in "
+                f"{result.seconds:.0f} s{end}"
+            )
+            bar.update(min(spent, budget - bar.n))
+
+        results = search(problem, x, SCHEDULE, state, report, seed=seed, budget=budget, workers=workers)
+    data: dict[str, Any] = {"search": about, "reached": results[-1].confirmed}
+    leg = best_leg(problem, results, about)
+    if leg is None:
+        print("no candidate was found that the full system can simulate")
+    else:
+        result, preset, verdict = leg
+        data |= {"best": result.id, **asdict(verdict)}
+        print(f"job {result.id}: {verdict}\n{write_json(out, 'identified', preset)} written")
+    data["jobs"] = [asdict(result) for result in results]
+    print(f"{write_json(out, 'identify', data)} written")
+
+
+def best_leg(
+    problem: LegProblem, results: Sequence[Result], about: Mapping[str, Any]
+) -> tuple[Result, dict[str, Any], Confirmation] | None:
+    """What was confirmed, else the best that the full system can run, as a preset with that system's verdict.
+
+    Args:
+        about: what was searched, for the provenance.
+    """
+    for result in sorted(results, key=lambda result: (not result.confirmed, result.both)):
+        origin = provenance(f"research.identify, job {result.id}", about)
+        try:
+            preset = to_preset(np.array(result.x), problem.choice, origin)
+            return result, preset, confirm(preset, problem.targets)
+        except HoofEnvError:  # it does not turn, or a gait is beyond its limits
+            continue
+    return None
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns the exit code."""
+    return run(identify, "research.identify", arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

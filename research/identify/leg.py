@@ -1,0 +1,125 @@
+"""A leg and its two gaits as numbers: a `Choice` of what cannot vary continuously, the rest a vector x.
+
+x holds log lengths [m], the pivot and the hip's height [m] and the swing of both gaits [rad]; see `NAMES`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoof_env.errors import ParameterError
+from hoof_env.gait.parameters import LIMITS, GaitParameters, load_gait
+from hoof_env.ground.contact import load_ground
+from hoof_env.leg.geometry import Geometry, Preset, load_geometry
+from hoof_env.leg.linkage import DYADS, LENGTHS
+
+Vector = NDArray[np.float64]
+
+GAITS = ("walk", "run")
+SIGNS = tuple(dyad.point for dyad in DYADS)
+"""The points whose side of their dyad is a choice, in the order of `Choice.assembly`."""
+
+SPEED = 2 * np.pi
+"""The paper's crank speed in both gaits [rad/s]; not searched."""
+
+_BODY = (*(f"log {name}" for name in LENGTHS), "pivot_x", "pivot_y")
+_SWING = tuple(name for name in LIMITS if name != "crank_speed")
+
+NAMES = (*_BODY, "hip_height", *(f"{gait}.{name}" for gait in GAITS for name in _SWING))
+"""Names of the entries of x: log [m], m, and rad."""
+
+BODY = len(_BODY)
+"""So many first entries are the leg's own; the ground level is not among them."""
+
+LEVEL, OFFSET = NAMES.index("hip_height"), NAMES.index("walk.swing_offset")
+
+SCALES = np.array([1.0] * len(LENGTHS) + [0.6, 0.6, 0.5] + [0.6] * 6)
+"""How far each entry of x ranges, beside one: the scales of a search."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What a search cannot change continuously.
+
+    Attributes:
+        assembly: +1 or -1 for each of `SIGNS`; toe, heel, travel: as in `Geometry`.
+        exponent: n of Eq. 14, which the paper does not print [-].
+    """
+
+    assembly: tuple[int, ...]
+    toe: str
+    heel: str
+    travel: int
+    exponent: float
+
+
+def encode(preset: Preset, exponent: float | None = None) -> tuple[Choice, Vector]:
+    """The leg and the two gaits of a preset as (choice, x), on its own ground or one with this exponent.
+
+    Raises:
+        HoofEnvError: there is no such preset, its leg does not turn, or a crank has another speed than the
+            paper's.
+    """
+    geometry, ground = load_geometry(preset), load_ground(preset)
+    gaits = {name: load_gait(name, preset) for name in GAITS}
+    for name, gait in gaits.items():
+        if abs(gait.crank_speed - SPEED) > 1e-9:
+            raise ParameterError(
+                f"{name}.crank_speed: expected the paper's {SPEED:.6f} rad/s, got {gait.crank_speed!r}"
+            )
+    signs = tuple(geometry.assembly[point] for point in SIGNS)
+    exponent = ground.exponent if exponent is None else exponent
+    choice = Choice(signs, geometry.toe, geometry.heel, geometry.travel, exponent)
+    logs = [np.log(geometry.lengths[name]) for name in LENGTHS]
+    swings = [value for gait in gaits.values() for value in gait.to_array()[1:]]
+    return choice, np.array([*logs, *geometry.pivot, geometry.hip_height, *swings])
+
+
+def check_vector(x: Any) -> Vector:
+    """x as floats.
+
+    Raises:
+        ParameterError: another length than `NAMES`, or a number that is not finite.
+    """
+    try:
+        array = np.asarray(x, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ParameterError(f"x: expected {len(NAMES)} numbers, got {x!r}") from None
+    if array.shape != (len(NAMES),) or not np.isfinite(array).all():
+        raise ParameterError(f"x: expected {len(NAMES)} finite numbers, got {x!r}")
+    return array
+
+
+def to_preset(x: Any, choice: Choice, provenance: str) -> dict[str, Any]:
+    """The content of a preset file, as those in `hoof_env/data`.
+
+    Args:
+        x, choice: the leg. provenance: where its numbers come from.
+
+    Raises:
+        ParameterError: x has another length, or a gait is outside its limits. GeometryError: the leg cannot
+            turn.
+    """
+    values = dict(zip(NAMES, check_vector(x).tolist(), strict=True))
+    geometry = Geometry(
+        lengths={name: float(np.exp(values[f"log {name}"])) for name in LENGTHS},
+        pivot=(values["pivot_x"], values["pivot_y"]),
+        assembly=dict(zip(SIGNS, choice.assembly, strict=True)),
+        toe=choice.toe,
+        heel=choice.heel,
+        travel=choice.travel,
+        hip_height=values["hip_height"],
+    ).to_dict()
+    kept = ("lengths", "pivot", "assembly", "toe", "heel", "travel", "hip_height")
+    gaits = {gait: GaitParameters(SPEED, *(values[f"{gait}.{name}"] for name in _SWING)) for gait in GAITS}
+    return {
+        "provenance": provenance,
+        "units": "m, rad, rad/s",
+        "geometry": {key: geometry[key] for key in kept},
+        "ground": {"exponent": choice.exponent},
+        "gaits": {gait: vars(parameters) for gait, parameters in gaits.items()},
+    }

@@ -1,0 +1,210 @@
+"""From a vector x to every measured number: kernels, whose arrays `objective.Objective` keeps."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoof_env.gait.parameters import LIMITS
+from hoof_env.leg.linkage import BODIES, CONSTRUCTION, LENGTHS, POINTS, Dyad
+from hoof_env.simd.compile import kernel
+from research.identify.demands import LENGTH_RANGE
+from research.identify.euler import Bodies, euler_cycle
+from research.identify.features import Cycle, cubic, measure_gait
+from research.identify.leg import LEVEL, SPEED
+from research.identify.motion import STEPS, leg_paths, swing_hoof
+
+Array = NDArray[np.float64]
+
+PAPER_SAMPLES, PAPER_STEP = 1001, 1e-3
+"""Instants of the paper's solver in its one second, and its time step [s]."""
+
+_LOG_RANGE = (math.log(LENGTH_RANGE[0]), math.log(LENGTH_RANGE[1]))
+_COUNT, _SOLE = len(LENGTHS), LENGTHS.index("IJ")
+_PIVOT_X, _PIVOT_Y, _REST = _COUNT, _COUNT + 1, LEVEL + 1
+_LOW, _HIGH = (
+    np.array([LIMITS[name][end] for name in ("swing_offset", "swing_sin", "swing_cos")]) for end in (0, 1)
+)
+_MIDDLE = 0.5 * float(_LOW[0] + _HIGH[0])
+_USED = [(s.from_first, s.from_second) if isinstance(s, Dyad) else (s.distance, s.span) for s in CONSTRUCTION]
+_SOURCES = np.array([[LENGTHS.index(name) for name in pair] for pair in _USED])
+"""For each step of the construction, the two lengths that it needs."""
+
+
+class Setup(NamedTuple):
+    """What a search does not change.
+
+    Attributes:
+        signs: side of each step's dyad, 0 for an extension, shape (8,).
+        travel, toe, heel: as in `Geometry`, the corners as point numbers.
+        stiffness, exponent: K [N/m^n] and n [-] of Eq. 14.
+        alpha, beta: Baumgarte's, of the paper's solver [1/s].
+        by_toe: see `measure_exact`.
+    """
+
+    signs: Array
+    travel: float
+    toe: int
+    heel: int
+    stiffness: float
+    exponent: float
+    alpha: float
+    beta: float
+    by_toe: bool
+
+
+class Arrays(NamedTuple):
+    """Scratch of a solver: numbers of the construction (8, 3), gaits (2, 4), paths of all points (11, n), of
+    toe and heel (2, n) and of the ankle (n,), forces of both gaits (2, 6, n)."""
+
+    values: Array
+    gaits: Array
+    z: NDArray[np.complex128]
+    dz: NDArray[np.complex128]
+    at: NDArray[np.complex128]
+    velocity: NDArray[np.complex128]
+    ankle: Array
+    work: Array
+
+
+def new_arrays(n: int) -> Arrays:
+    """For n instants a revolution."""
+    gaits = np.zeros((2, 4))
+    gaits[:, 0] = SPEED
+    z, dz = np.zeros((2, len(POINTS), n), np.complex128)
+    at, velocity = np.zeros((2, 2, n), np.complex128)
+    return Arrays(np.zeros((len(STEPS), 3)), gaits, z, dz, at, velocity, np.zeros(n), np.zeros((2, 6, n)))
+
+
+def new_bodies() -> Bodies:
+    """Of the paper's solver."""
+    q, qd, qdd = np.zeros((3, len(BODIES), 3))
+    return Bodies(q, qd, qdd, np.zeros(len(BODIES)))
+
+
+@kernel
+def offset_excess(offset):  # type: ignore[no-untyped-def]
+    """How far a swing offset lies beyond its limits [rad]."""
+    return max(offset - _HIGH[0], _LOW[0] - offset, 0.0)
+
+
+@kernel
+def unpack(x, setup, arrays, leg):  # type: ignore[no-untyped-def]
+    """Turn x into `arrays.values` and `arrays.gaits`, and fill what `leg` has of them; returns OP [m]."""
+    lengths, values, gaits = np.exp(x[:_COUNT]), arrays.values, arrays.gaits
+    leg.length_excess = 0.0
+    for i in range(_COUNT):
+        leg.length_excess += max(x[i] - _LOG_RANGE[1], _LOG_RANGE[0] - x[i], 0.0) if i != _SOLE else 0.0
+    for j in range(STEPS.shape[0]):
+        one, two = lengths[_SOURCES[j, 0]], lengths[_SOURCES[j, 1]]
+        if STEPS[j, 0] == 1:
+            values[j, 0], values[j, 1], values[j, 2] = one, two, setup.signs[j]
+        else:
+            values[j, 0] = one / two
+    for g in range(2):
+        excess = 0.0
+        for i in range(3):
+            value = x[_REST + 3 * g + i]
+            gaits[g, i + 1] = value
+            if i > 0 or g > 0 or not setup.by_toe:  # else the walk's offset is not yet known
+                excess += max(value - _HIGH[i], _LOW[i] - value, 0.0)
+        if g == 0:
+            leg.walk_excess = excess
+        else:
+            leg.run_excess = excess
+    leg.sole = lengths[_SOLE]
+    leg.pivot_excess = max(abs(complex(x[_PIVOT_X], x[_PIVOT_Y])) - LENGTH_RANGE[1], 0.0)
+    return lengths[0]
+
+
+@kernel
+def offset_at(z, dz, gait, toe, t, speed):  # type: ignore[no-untyped-def]
+    """Swing offset [rad] with which the toe sinks at so many m/s at time t [s].
+
+    Turning the frame turns the toe's velocity: the offset follows in closed form. Of the two that there are,
+    about half a turn apart, it is the one nearer to the middle of the limits. A toe that is too slow gets the
+    nearest it can.
+
+    Args:
+        z, dz: from `leg_paths`. gait: as in `swing_hoof`, its offset ignored.
+    """
+    h = 2.0 * np.pi / (z.shape[1] - 1)
+    theta = min(max(gait[0] * t, 0.0), 6.28)
+    k = int(theta / (2.0 * np.pi) * (z.shape[1] - 1))
+    arm, moving = cubic(z[toe, k], z[toe, k + 1], dz[toe, k], dz[toe, k + 1], h, theta / h - k)
+    s, c = np.sin(theta), np.cos(theta)
+    moving = gait[0] * (moving + 1j * (gait[2] * c - gait[3] * s) * arm)
+    down = np.arcsin(min(max(-speed / max(abs(moving), 1e-9), -1.0), 1.0))
+    behind = np.angle(moving) + gait[2] * s + gait[3] * c + _MIDDLE
+    one, other = down - behind, np.pi - down - behind
+    one -= 2.0 * np.pi * np.round(one / (2.0 * np.pi))
+    other -= 2.0 * np.pi * np.round(other / (2.0 * np.pi))
+    return _MIDDLE + (one if abs(one) < abs(other) else other)
+
+
+@kernel
+def height_at(at, velocity, h, t):  # type: ignore[no-untyped-def]
+    """Height [m] of the swing's centre above a ground that the toe crosses at time t [s].
+
+    Args:
+        at, velocity: from `swing_hoof`. h: time between two samples [s].
+    """
+    part = min(max(t / h, 0.0), at.shape[1] - 1.001)
+    k = int(part)
+    y, _ = cubic(at[0, k].imag, at[0, k + 1].imag, velocity[0, k].imag, velocity[0, k + 1].imag, h, part - k)
+    return -y
+
+
+@kernel
+def compare_gaits(walk, run, both):  # type: ignore[no-untyped-def]
+    """Fill `both`, a record of dtype `BOTH`."""
+    both.angle_variation = run.angle_variation / walk.angle_variation
+    both.step = run.step - walk.step
+    both.heel_gap = run.heel_gap - walk.heel_gap
+    both.turn = run.push_2 - run.push_1
+
+
+@kernel
+def measure_exact(x, setup, arrays, leg, features, both):  # type: ignore[no-untyped-def]
+    """Fill `leg`, `features` (walk, run) and `both` by kinematics alone, and the arrays.
+
+    With `setup.by_toe` x holds for the hip's height the time at which the walking toe touches down, and for
+    the walk's swing offset the logarithm of its approach speed there.
+    """
+    z, dz, gaits = arrays.z, arrays.dz, arrays.gaits
+    at, velocity, ankle = arrays.at, arrays.velocity, arrays.ankle
+    crank, height = unpack(x, setup, arrays, leg), x[LEVEL]
+    leg.miss, leg.transmission = leg_paths(crank, complex(x[_PIVOT_X], x[_PIVOT_Y]), arrays.values, z, dz)
+    leg.lowest = np.inf
+    if setup.by_toe:
+        speed = np.exp(min(x[_REST], 5.0))
+        gaits[0, 1] = offset_at(z, dz, gaits[0], setup.toe, x[LEVEL], speed)
+        leg.walk_excess += offset_excess(gaits[0, 1])
+    for g in range(2):
+        h = 2.0 * np.pi / gaits[g, 0] / (at.shape[1] - 1)
+        lowest = swing_hoof(z, dz, gaits[g], setup, at, velocity, ankle)
+        if g == 0 and setup.by_toe:
+            height = height_at(at, velocity, h, x[LEVEL])
+        leg.lowest = min(leg.lowest, lowest + height)
+        cycle = Cycle(at, velocity, ankle, height, h, False, setup.stiffness, setup.exponent)
+        measure_gait(cycle, arrays.work[g], features[g])
+    leg.hip_height, leg.sole_part = height, leg.sole / max(height, 0.1)
+    compare_gaits(features[0], features[1], both)
+
+
+@kernel
+def measure_paper(x, height, setup, exact, bodies, arrays, features, both):  # type: ignore[no-untyped-def]
+    """Fill `features` and `both` through the paper's solver, after `measure_exact` has filled the arrays
+    `exact` and found the hip's `height` [m]."""
+    crank, pivot = np.exp(x[0]), complex(x[_PIVOT_X], x[_PIVOT_Y])
+    values, at, velocity, ankle = exact.values, arrays.at, arrays.velocity, arrays.ankle
+    for g in range(2):
+        gait = exact.gaits[g]
+        if euler_cycle(crank, pivot, values, setup, gait, 0.0, PAPER_STEP, bodies, at, velocity, ankle):
+            h = 2.0 * np.pi / gait[0] / (at.shape[1] - 1)
+            cycle = Cycle(at, velocity, ankle, height, h, True, setup.stiffness, setup.exponent)
+            measure_gait(cycle, arrays.work[g], features[g])
+    compare_gaits(features[0], features[1], both)

@@ -1,0 +1,260 @@
+"""Collecting an ensemble: small collections at a loose bar, kills, processes, and bad input."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from functools import partial
+from unittest.mock import patch
+
+import numpy as np
+import pytest
+
+from hoof_env.errors import DataFileError, HoofEnvError
+from hoof_env.leg.geometry import read_preset
+from research.identify import attempt as attempting
+from research.identify import collect as collecting
+from research.identify import ensemble as command
+from research.identify.attempt import Aim, Attempt, Task, attempt, judge
+from research.identify.collect import collect, distance
+from research.identify.command import load_start
+from research.identify.confirm import confirm
+from research.identify.leg import encode, to_preset
+from research.identify.objective import Objective
+from research.identify.problem import LegProblem
+from research.identify.state import open_state
+from research.identify.targets import load_targets
+
+PRESET = "first_fit"
+CHOICE, X = load_start(PRESET, 1.5)
+AIM = Aim(LegProblem(load_targets(), CHOICE), 20.0, False, steps=1)
+
+
+@pytest.fixture(scope="module")
+def entered():
+    """The preset's leg, brought within the bar."""
+    return attempt(Task(0, 0, 0, PRESET, X), AIM)
+
+
+@pytest.fixture(scope="module")
+def start(entered):
+    return tuple(AIM.problem.outward(np.array(entered.y), 801).tolist())
+
+
+def silent(line):
+    pass
+
+
+def gather(out, start, aim=AIM, resume=False, workers=1, size=3):
+    state = open_state(out, {"a": 1}, resume=resume, product="ensemble.json")
+    with patch.object(collecting, "ROUND", 4):
+        return collect({PRESET: start}, aim, state, silent, size=size, attempts=3, seed=3, workers=workers)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("whole")
+
+
+@pytest.fixture(scope="module")
+def whole(start, folder):
+    return gather(folder, start)
+
+
+# --- attempts --------------------------------------------------------------------------------------------
+
+
+def assert_within(made):
+    objective, x = Objective(CHOICE, samples=2001), AIM.problem.outward(np.array(made.y), 801)
+    assert np.abs(objective.rows(x)).max() <= AIM.bar
+    assert objective.plausibility(x) == {}
+
+
+def test_a_start_comes_within_the_bar_and_a_push_stays_there_and_goes_its_way(entered):
+    assert_within(entered)
+    direction = np.zeros(24)
+    direction[5] = 1.0
+    task = Task(1, 0, 0, PRESET, entered.y, tuple(direction))
+    pushed = attempt(task, replace(AIM, steps=4))
+    assert_within(pushed)
+    assert pushed.y[5] > entered.y[5] + 0.001
+    assert attempt(task, replace(AIM, steps=4)) == pushed
+    stays = attempt(task, replace(AIM, bar=0.5 * entered.merit))  # no leg near it is within that bar
+    assert stays.y == entered.y
+
+
+def test_the_verdict_is_that_of_the_full_system():
+    y = AIM.problem.inward(np.array(X), 801)
+    _, judged = judge(Attempt("0", PRESET, tuple(y.tolist()), 0.0), AIM)
+    verdict = confirm(read_preset(PRESET), AIM.problem.targets)
+    assert judged.errors == pytest.approx(verdict.errors, rel=1e-4)
+    assert set(judged.reasons) >= {f"{n} ({s})" for n, s in verdict.untrue if s == "exact"}
+    short = Objective(CHOICE, samples=2001).plausibility(np.array(X))
+    assert judged.short == pytest.approx(short, rel=1e-3, abs=1e-4)
+    assert set(short) <= set(judged.reasons)
+    _, strict = judge(Attempt("0", PRESET, tuple(y.tolist()), 0.0), replace(AIM, bar=0.01, both=True))
+    assert [reason.split(" error")[0] for reason in strict.reasons[:2]] == ["exact", "paper"]
+
+
+# --- collections -----------------------------------------------------------------------------------------
+
+
+def test_members_meet_the_bar_are_different_and_begin_with_the_start(whole):
+    assert len(whole.members) == 3
+    assert not any(whole.verdicts[one.id].reasons for one in whole.members)
+    assert whole.members[0].id == "0000-00"
+    gaps = [distance(a, b) for i, a in enumerate(whole.members) for b in whole.members[:i]]
+    assert min(gaps) > 1e-4
+    assert len(whole.attempts) == 5  # a round is made whole
+    fit = [
+        one for one in whole.attempts if one.id not in whole.verdicts or not whole.verdicts[one.id].reasons
+    ]
+    assert distance(*whole.members[:2]) == max(distance(whole.members[0], one) for one in fit)
+
+
+def test_the_number_of_processes_changes_nothing(start, whole, tmp_path):
+    other = gather(tmp_path, start, workers=2, size=1)
+    assert other.members[0] == whole.members[0]
+    assert other.attempts == whole.attempts
+
+
+SCRIPT = """
+import sys
+from pathlib import Path
+from test_ensemble import *
+if __name__ == "__main__":
+    gather(Path(sys.argv[1]), tuple(json.loads(Path(sys.argv[2]).read_text())))
+"""
+
+
+def test_a_collection_that_was_killed_goes_on_to_the_same_members(start, whole, tmp_path):
+    script, leg = tmp_path / "script.py", tmp_path / "leg.json"
+    script.write_text(SCRIPT)
+    leg.write_text(json.dumps(start))
+    path = os.pathsep.join([os.path.dirname(__file__), *sys.path])
+    process = subprocess.Popen(
+        [sys.executable, str(script), str(tmp_path / "out"), str(leg)], env={**os.environ, "PYTHONPATH": path}
+    )
+    state, deadline = tmp_path / "out" / "state", time.monotonic() + 300
+    while len(list(state.glob("attempt-0001-*.json"))) < 2:
+        assert process.poll() is None, "ended before it was killed"
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    process.kill()
+    process.wait()
+    kept = {file: file.read_bytes() for file in state.glob("attempt-*.json")}
+    assert len(kept) < len(whole.attempts)
+    assert gather(tmp_path / "out", start, resume=True) == whole
+    assert all(file.read_bytes() == content for file, content in kept.items())
+
+
+def test_a_leg_that_the_full_system_refuses_is_replaced(start, whole, folder, tmp_path, monkeypatch):
+    refused = whole.members[1].id
+    shutil.copytree(folder / "state", tmp_path / "state")
+
+    def strict(made, aim):
+        name, verdict = judge(made, aim)
+        return name, replace(verdict, reasons=("it",)) if name == refused else verdict
+
+    monkeypatch.setattr(collecting, "judge", strict)
+    other = gather(tmp_path, start, resume=True)
+    assert len(other.members) == 3
+    assert other.verdicts[refused].reasons == ("it",)
+    assert refused not in [one.id for one in other.members]
+
+
+# --- bad input -------------------------------------------------------------------------------------------
+
+
+def test_no_leg_within_the_bar_says_how_far_the_nearest_is(start, tmp_path, monkeypatch):
+    monkeypatch.setattr(attempting, "TRIES", 1)
+    with pytest.raises(
+        HoofEnvError, match=r"no start comes within 0\.01 bars without a shortage, the nearest has \d+\.\d+"
+    ):
+        gather(tmp_path, start, replace(AIM, bar=0.01))
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("{", "damaged; delete it to repeat attempt-0000-00"),
+        ('{"problem": "digest"}', "damaged; delete it to repeat attempt-0000-00"),
+        (
+            '{"problem": "other", "content": {"id": "", "start": "", "y": [], "merit": 0}}',
+            "belongs to another search",
+        ),
+    ],
+)
+def test_a_damaged_attempt_or_one_of_another_collection_is_named(start, tmp_path, content, message):
+    open_state(tmp_path, {"a": 1}, resume=False, product="ensemble.json")
+    file = tmp_path / "state" / "attempt-0000-00.json"
+    file.write_text(content)
+    with pytest.raises(DataFileError, match=rf"attempt-0000-00\.json.*{message}"):
+        gather(tmp_path, start, resume=True)
+    assert file.read_text() == content
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--preset", "STUCK"], "dyad 1 (C-B-P"),
+        (["--preset", "nobody"], "preset: expected one of"),
+        (["--starts", PRESET], "starts: expected different legs, got one twice"),
+        (["--starts", "OTHER"], "expected assembly, toe and travel of first_fit"),
+        (["--preset", "STIFF"], "expected a ground with the paper's stiffness, 20000 N/m^n, got 30000"),
+        (["--bar", "0"], "bar: expected"),
+        (["--size", "0"], "size: expected"),
+        (["--workers", "0"], "workers: expected"),
+        (["--resume"], "holds no search to resume"),
+    ],
+)
+def test_bad_input_is_one_line_before_anything_is_written(tmp_path, capsys, arguments, message):
+    stuck, other = read_preset(PRESET), read_preset(PRESET)
+    stuck["geometry"]["lengths"]["CB"] = 0.05
+    other["geometry"]["travel"] = -other["geometry"]["travel"]
+    files = {"STUCK": stuck, "OTHER": other, "STIFF": {**read_preset(PRESET), "ground": {"stiffness": 3e4}}}
+    for name, content in files.items():
+        (tmp_path / f"{name}.json").write_text(json.dumps(content))
+    given = [str(tmp_path / f"{a}.json") if a in files else a for a in arguments]
+    if "--preset" not in given:
+        given += ["--preset", PRESET]
+    assert command.main(["--out", str(tmp_path / "out"), *given]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("error: ")
+    assert error.count("\n") == 1
+    assert message in error
+    assert not (tmp_path / "out").exists()
+
+
+# --- the command -----------------------------------------------------------------------------------------
+
+
+def test_the_command_writes_an_ensemble_says_how_it_was_found_and_overwrites_nothing(
+    start, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.setattr(command, "Aim", partial(Aim, steps=1))
+    out, preset = tmp_path / "out", tmp_path / "leg.json"
+    preset.write_text(json.dumps(to_preset(start, CHOICE, "a test")))
+    given = ["--out", str(out), "--preset", str(preset), "--size", "2", "--bar", "20", "--attempts", "1"]
+    given += ["--workers", "1"]
+    assert command.main(given) == 0
+    assert "2 of 2 members; largest errors {" in capsys.readouterr().out
+    path = out / "ensemble.json"
+    data, before = json.loads(path.read_text()), path.read_bytes()
+    assert data["bar"]["exact"] <= 20.0
+    assert all(text in data["provenance"] for text in ("Identified, not published", "leg (", "seed 0"))
+    assert data["members"][0]["found"]["attempt"] == "0000-00"
+    for member in data["members"]:
+        preset = {"provenance": "a test", "ground": data["ground"], "gaits": member["gaits"]}
+        encode({**preset, "geometry": member["geometry"]})
+    for more, message in (
+        ([], "already holds a search or what one found"),
+        (["--seed", "1", "--resume"], "another search: seed is 0 there and 1 here"),
+    ):
+        assert command.main([*given, *more]) == 2
+        assert message in capsys.readouterr().err
+    assert command.main([*given, "--resume"]) == 0
+    assert path.read_bytes() == before
