@@ -37,7 +37,7 @@ from agents.baselines_results import Reference, Row, reference
 from agents.baselines_stats import Interval, over_seeds
 from agents.open_loop import GAITS
 from agents.score import score_vector
-from hoof_env.gait.parameters import LIMITS, GaitParameters
+from hoof_env.gait.gait import LIMITS, GaitParameters
 
 SPEED = "hoof_env/HorseLegSpeed-v0"
 LOWER = ("peak_grf_n", "stance_peak_n", "cost_of_transport")

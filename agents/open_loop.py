@@ -36,7 +36,7 @@ from hoof_env.envs.policies import GAITS as GAITS
 from hoof_env.envs.policies import load_open_loop as load_open_loop
 from hoof_env.envs.policies import stored as stored
 from hoof_env.errors import DataFileError, HoofEnvError, ParameterError, check_number
-from hoof_env.gait.parameters import PARAMETERS
+from hoof_env.gait.gait import PARAMETERS
 
 EPISODES = {"constant": 10_240, "clocked": 30_720}
 """Of a search, by family."""

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from hoof_env.envs.multi_objective import HorseLegMOEnv as HorseLegMOEnv
     from hoof_env.envs.observation import Entry as Entry
     from hoof_env.envs.observation import Scale as Scale
-    from hoof_env.envs.parameters import RandomizeParameters as RandomizeParameters
     from hoof_env.envs.policies import make_policy as make_policy
+    from hoof_env.envs.randomize import RandomizeParameters as RandomizeParameters
     from hoof_env.envs.reward import Term as Term
     from hoof_env.envs.sb3 import Sb3VecEnv as Sb3VecEnv
     from hoof_env.envs.tasks import register as register
@@ -37,8 +37,8 @@ if TYPE_CHECKING:
     from hoof_env.errors import MissingExtraError as MissingExtraError
     from hoof_env.errors import OutputError as OutputError
     from hoof_env.errors import ParameterError as ParameterError
-    from hoof_env.gait.parameters import GaitParameters as GaitParameters
-    from hoof_env.gait.parameters import load_gait as load_gait
+    from hoof_env.gait.gait import GaitParameters as GaitParameters
+    from hoof_env.gait.gait import load_gait as load_gait
     from hoof_env.ground.contact import Ground as Ground
     from hoof_env.ground.terrain import Terrain as Terrain
     from hoof_env.leg.geometry import Geometry as Geometry
@@ -48,8 +48,8 @@ if TYPE_CHECKING:
 _PUBLIC = {
     "Geometry": "hoof_env.leg.geometry",
     "load_geometry": "hoof_env.leg.geometry",
-    "GaitParameters": "hoof_env.gait.parameters",
-    "load_gait": "hoof_env.gait.parameters",
+    "GaitParameters": "hoof_env.gait.gait",
+    "load_gait": "hoof_env.gait.gait",
     "Ground": "hoof_env.ground.contact",
     "Terrain": "hoof_env.ground.terrain",
     "Trunk": "hoof_env.dynamics.parts",
@@ -64,7 +64,7 @@ _PUBLIC = {
     "HorseLegMOEnv": "hoof_env.envs.multi_objective",
     "HorseLegVectorEnv": "hoof_env.envs.vector",
     "Sb3VecEnv": "hoof_env.envs.sb3",
-    "RandomizeParameters": "hoof_env.envs.parameters",
+    "RandomizeParameters": "hoof_env.envs.randomize",
     "make_policy": "hoof_env.envs.policies",
     "register": "hoof_env.envs.tasks",
     "Term": "hoof_env.envs.reward",

@@ -111,7 +111,7 @@ class OnnxPolicy:
 
 def describe(env: Any) -> dict[str, Any]:
     """What an environment says of what it takes and gives: spaces, and names where it has them."""
-    from hoof_env.gait.parameters import PARAMETERS
+    from hoof_env.gait.gait import PARAMETERS
 
     found = {"observation_space": str(env.observation_space), "action_space": str(env.action_space)}
     names = getattr(env.unwrapped, "observation_names", None)

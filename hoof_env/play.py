@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from hoof_env import records
 from hoof_env.errors import HoofEnvError, check_number, parse_pairs
-from hoof_env.gait.parameters import GaitParameters
+from hoof_env.gait.gait import GaitParameters
 from hoof_env.render.instant import Instant, instants
 
 HELD = {
@@ -182,7 +182,7 @@ def _strip(size: tuple[int, int]) -> int:
 
 def _draw_strip(window: Any, renderer: Any, game: Game, size: tuple[int, int]) -> None:
     """Score, state and keys, below the picture."""
-    from hoof_env.render.paint import CRANK, FORCE, GREY, INK, PAPER
+    from hoof_env.render.body import CRANK, FORCE, GREY, INK, PAPER
 
     brush = renderer.brush
     unit, top = brush.unit, size[1]

@@ -19,7 +19,7 @@ from hoof_env._output import check_folder
 from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.envs.policies import Scripted, load_open_loop, make_policy, policy_names, read_open_loop
 from hoof_env.errors import MissingExtraError, OutputError, ParameterError, check_number
-from hoof_env.gait.parameters import PARAMETERS, GaitParameters
+from hoof_env.gait.gait import PARAMETERS, GaitParameters
 from hoof_env.ground.terrain import Terrain
 from hoof_env.onnx_policy import OnnxPolicy
 from hoof_env.render.instant import UNITS, Columns, Setting, columns_of_engine

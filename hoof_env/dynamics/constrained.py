@@ -15,7 +15,9 @@ points go to the world, and ground forces come back, through one mirror.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,19 +33,19 @@ from hoof_env.dynamics.constraints import (
     body_coordinate,
     closed_form,
 )
-from hoof_env.dynamics.integrators import INTEGRATORS, Vector
 from hoof_env.dynamics.layout import LEG_REPORT, LEG_STATE, TRUNK_REPORT, TRUNK_STATE
 from hoof_env.dynamics.parts import GRAVITY, Result, Trunk
 from hoof_env.errors import ParameterError, check_choice, check_number
-from hoof_env.gait.motion_law import (
+from hoof_env.gait.gait import (
     MOTION,
+    PARAMETERS,
     FilterSettings,
+    GaitParameters,
     advance_motion,
     command_filters,
     evaluate_motion,
     steady_filters,
 )
-from hoof_env.gait.parameters import PARAMETERS, GaitParameters
 from hoof_env.ground.contact import HEEL, TOE, Ground, new_contacts, touch
 from hoof_env.leg.geometry import Geometry, check_full_revolution
 from hoof_env.leg.kinematics import cross, mirror
@@ -308,3 +310,43 @@ class ConstrainedLeg:
         stabilised = closure.gamma - 2 * self.alpha * closure.error_rate - self.beta**2 * closure.error
         solution = np.linalg.solve(self._system, np.concatenate([self._weight + load, stabilised]))
         return solution[:SIZE], solution[SIZE:]
+
+
+Vector = NDArray[np.float64]
+Acceleration = Callable[[float, Vector, Vector], Vector]
+Scheme = Callable[[Acceleration, Vector, Vector, float], tuple[Vector, Vector]]
+
+
+def euler(acceleration: Acceleration, q: Vector, qd: Vector, h: float) -> tuple[Vector, Vector]:
+    """Explicit Euler, first order: the paper's scheme (Eq. 9)."""
+    return q + h * qd, qd + h * acceleration(0.0, q, qd)
+
+
+def semi_implicit_euler(acceleration: Acceleration, q: Vector, qd: Vector, h: float) -> tuple[Vector, Vector]:
+    """Semi-implicit Euler, first order: the new rate moves the coordinates."""
+    qd = qd + h * acceleration(0.0, q, qd)
+    return q + h * qd, qd
+
+
+def midpoint(acceleration: Acceleration, q: Vector, qd: Vector, h: float) -> tuple[Vector, Vector]:
+    """Explicit midpoint rule, second order."""
+    q1, v1 = euler(acceleration, q, qd, h / 2)
+    return q + h * v1, qd + h * acceleration(h / 2, q1, v1)
+
+
+def rk4(acceleration: Acceleration, q: Vector, qd: Vector, h: float) -> tuple[Vector, Vector]:
+    """The classical Runge-Kutta scheme, fourth order."""
+    a0 = acceleration(0.0, q, qd)
+    v1 = qd + h / 2 * a0
+    a1 = acceleration(h / 2, q + h / 2 * qd, v1)
+    v2 = qd + h / 2 * a1
+    a2 = acceleration(h / 2, q + h / 2 * v1, v2)
+    v3 = qd + h * a2
+    a3 = acceleration(h, q + h * v2, v3)
+    return q + h / 6 * (qd + 2 * v1 + 2 * v2 + v3), qd + h / 6 * (a0 + 2 * a1 + 2 * a2 + a3)
+
+
+INTEGRATORS = MappingProxyType(
+    {"euler": euler, "semi_implicit_euler": semi_implicit_euler, "midpoint": midpoint, "rk4": rk4}
+)
+"""The schemes by name."""

@@ -22,7 +22,6 @@ from hoof_env.dynamics.advance import (
     TRUNK_ROWS,
     advance_kernels,
 )
-from hoof_env.dynamics.arguments import Floats, all_of, count, finite, flag, one_of
 from hoof_env.dynamics.engine_state import STATE, gaits_of, layout, read_state, start, which
 from hoof_env.dynamics.layout import (
     ACCOUNT,
@@ -43,13 +42,23 @@ from hoof_env.dynamics.memory import (
     new_model,
     settings_of,
 )
+from hoof_env.dynamics.observables import Tally, tally
 from hoof_env.dynamics.parts import GRAVITY, Drive, Limb, Result, Trunk
-from hoof_env.dynamics.schemes import SCHEMES
 from hoof_env.dynamics.step_length import StepLength
-from hoof_env.dynamics.tally import Tally, tally
-from hoof_env.errors import NotStartedError, ParameterError, check_choice, check_number
-from hoof_env.gait.motion_law import FilterSettings
-from hoof_env.gait.parameters import GaitParameters
+from hoof_env.dynamics.stepping import SCHEMES
+from hoof_env.errors import (
+    Floats,
+    NotStartedError,
+    ParameterError,
+    all_of,
+    check_choice,
+    check_number,
+    count,
+    finite,
+    flag,
+    one_of,
+)
+from hoof_env.gait.gait import FilterSettings, GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.profile import leg_profile

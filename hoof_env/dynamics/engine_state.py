@@ -12,12 +12,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hoof_env.dynamics.arguments import Floats, all_of, finite, spread
 from hoof_env.dynamics.layout import FARTHEST, LegSettings, LegState, Moving, TrunkState
 from hoof_env.dynamics.memory import Memory
 from hoof_env.dynamics.parts import FREE, RAIL, SUSPENDED, TRUNKS, Motor
-from hoof_env.errors import ParameterError
-from hoof_env.gait.parameters import GaitParameters
+from hoof_env.errors import Floats, ParameterError, all_of, finite, spread
+from hoof_env.gait.gait import GaitParameters
 
 if TYPE_CHECKING:
     from hoof_env.dynamics.engine import TrunkEngine

@@ -21,7 +21,7 @@ from hoof_env.dynamics.layout import (
 )
 from hoof_env.dynamics.parts import GRAVITY, TRUNKS, Limb, Motor, Trunk
 from hoof_env.dynamics.reactions import Reactions, leg_constants
-from hoof_env.dynamics.schemes import SCHEMES
+from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.errors import ParameterError
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.laws import FRICTION_LAWS

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from types import MappingProxyType
+
 from hoof_env.dynamics.layout import LegRows
 from hoof_env.dynamics.mechanics import MOVING
 from hoof_env.dynamics.parts import FIXED, FREE
-from hoof_env.gait.motion_law import INNER, SPEED
+from hoof_env.gait.gait import INNER, SPEED
 from hoof_env.simd import choose, nth
 from hoof_env.simd.compile import inlined
 from hoof_env.simd.math import clip
@@ -110,3 +113,31 @@ def end_step(trunk, legs, leg_count, model, h):  # type: ignore[no-untyped-def]
             rate, bend = leg.state.gait_rate[k], leg.gait_acceleration[k]
             leg.state.gait[k] = leg.state.gait[k] + h * (rate + 0.5 * h * bend)
             leg.state.gait_rate[k] = rate + h * bend
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """One scheme.
+
+    Attributes:
+        order: of convergence [-].
+        fractions: a_j, one less than stages [-].
+        weights: w_j [-].
+        new_rates: coordinates move with the rates of the step's end.
+    """
+
+    order: int
+    fractions: tuple[float, ...]
+    weights: tuple[float, ...]
+    new_rates: bool = False
+
+
+SCHEMES = MappingProxyType(
+    {
+        "semi_implicit_euler": Scheme(1, (), (1.0,), new_rates=True),
+        "midpoint": Scheme(2, (1 / 2,), (0.0, 1.0)),
+        "rk3": Scheme(3, (1 / 3, 2 / 3), (1 / 4, 0.0, 3 / 4)),  # Heun
+        "rk4": Scheme(4, (1 / 2, 1 / 2, 1.0), (1 / 6, 1 / 3, 1 / 3, 1 / 6)),
+    }
+)
+"""The schemes by name."""

@@ -5,19 +5,19 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.arguments import count
 from hoof_env.envs.batch import EpisodeBatch
 from hoof_env.envs.episode import ACTIONS
 from hoof_env.envs.start import check_seed
 from hoof_env.envs.tasks import PER_EPISODE, Settings
-from hoof_env.errors import FixedSettingError, ParameterError
+from hoof_env.errors import FixedSettingError, ParameterError, count
+from hoof_env.leg.geometry import Preset
 
 
 def mode_of(value: Any) -> AutoresetMode:
@@ -211,3 +211,56 @@ class Made:
             spec = copy.copy(spec)  # it may be the registered one
             spec.max_episode_steps = self.batch.steps_per_episode
         self._spec = spec
+
+
+Range = float | Sequence[float]
+"""Lowest and highest, or one number for both."""
+
+
+class Keywords(TypedDict, total=False):
+    """Of `HorseLegEnv`, beside its own."""
+
+    preset: Preset
+    gait: str | None
+    trunk: str
+    hip_height: float | None
+    trunk_mass: float
+    trunk_share: float
+    trunk_stiffness: float
+    trunk_damping: float
+    trunk_drag: float
+    stiffness: float | None
+    exponent: float | None
+    normal_law: str
+    restitution: float
+    approach_floor: float
+    friction_law: str
+    friction: float
+    friction_slow: float
+    friction_fast: float
+    terrain: Mapping[str, Any] | None
+    drive: str
+    motor_gain: float
+    motor_torque: float
+    motor_inertia: float
+    solver: str
+    baumgarte_alpha: float
+    baumgarte_beta: float
+    integrator: str | None
+    sim_dt: float | None
+    dt: float
+    episode_seconds: float
+    target_speed: Range | None
+    target_seconds: Range
+    observation: Sequence[str]
+    reward_weights: Mapping[str, float] | None
+    randomize: Mapping[str, Range] | None
+
+
+class VectorKeywords(Keywords, total=False):
+    """Of `Sb3VecEnv`, which hands them to `HorseLegVectorEnv`."""
+
+    autoreset_mode: AutoresetMode | str
+    max_episode_steps: int | None
+    render_mode: str | None
+    rendered: int

@@ -15,15 +15,14 @@ from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.advance import TRUNK_ROWS
+from hoof_env.dynamics.constrained import INTEGRATORS
 from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.dynamics.integrators import INTEGRATORS
 from hoof_env.dynamics.layout import LegMemory, TrunkMemory
 from hoof_env.dynamics.parts import GRAVITY, LARGEST, ONE_LEG, Drive, Limb, Result, Trunk
-from hoof_env.dynamics.schemes import SCHEMES
 from hoof_env.dynamics.step_length import StepLength
+from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.envs import step as kernels
 from hoof_env.envs.episode import ACTIONS, SUMS, episode_layout, summary_of
-from hoof_env.envs.grounds import make_terrain
 from hoof_env.envs.infos import AT_MEASURED, BEGUN, GAIT, LAST_STEP, MEASUREMENTS, START, named
 from hoof_env.envs.observation import HALF_RANGE, HIGH, LOW, MIDDLE, check_groups, groups_of, observed
 from hoof_env.envs.paper_solver import PaperSolver, check_paper
@@ -31,6 +30,7 @@ from hoof_env.envs.parameters import (
     check_parameters,
     draw_parameters,
     extremes,
+    make_terrain,
     pair,
     physics,
     resolved,
@@ -40,7 +40,7 @@ from hoof_env.envs.reward import check_weights
 from hoof_env.envs.start import HIGHEST, LOWEST, check_options, draw_starts
 from hoof_env.envs.tasks import Settings, Task
 from hoof_env.errors import ParameterError, check_choice, check_number
-from hoof_env.gait.parameters import GaitParameters, gait_names, load_gait
+from hoof_env.gait.gait import GaitParameters, gait_names, load_gait
 from hoof_env.ground.contact import Ground, load_ground
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.profile import leg_profile

@@ -14,16 +14,15 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.memory import LIFT_OFF
-from hoof_env.envs.arguments import Made, check_state, generator_of
+from hoof_env.envs.arguments import Keywords, Made, check_state, generator_of
 from hoof_env.envs.batch import EpisodeBatch
 from hoof_env.envs.episode import ACTIONS, FAILED
 from hoof_env.envs.infos import AT_MEASURED, BEGUN, LAST_STEP, MEASURED, START, named
-from hoof_env.envs.keywords import Keywords
 from hoof_env.envs.recording import Recording
 from hoof_env.envs.start import check_seed
 from hoof_env.envs.tasks import task_of, to_json
 from hoof_env.errors import ParameterError, check_choice
-from hoof_env.gait.parameters import PARAMETERS, GaitParameters
+from hoof_env.gait.gait import PARAMETERS, GaitParameters
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
 

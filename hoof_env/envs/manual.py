@@ -16,21 +16,20 @@ from string import Template
 from typing import Any
 
 from hoof_env._output import markdown_table
-from hoof_env.dynamics.integrators import INTEGRATORS
+from hoof_env.dynamics.constrained import INTEGRATORS
 from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.dynamics.parts import ONE_LEG
-from hoof_env.dynamics.schemes import SCHEMES
+from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.envs import start
-from hoof_env.envs.grounds import HILLS, SPACING
 from hoof_env.envs.infos import MEASURED
 from hoof_env.envs.multi_objective import HorseLegMOEnv
 from hoof_env.envs.observation import ENTRIES, groups_of
 from hoof_env.envs.observation import observed as entries_of
+from hoof_env.envs.parameters import HILLS, SPACING
 from hoof_env.envs.reward import TERMS, check_weights
 from hoof_env.envs.tasks import PER_EPISODE, TASKS, Settings, to_json
 from hoof_env.errors import OutputError, check_choice
-from hoof_env.gait.motion_law import FilterSettings
-from hoof_env.gait.parameters import LIMITS
+from hoof_env.gait.gait import LIMITS, FilterSettings
 from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS
 from hoof_env.leg.geometry import load_geometry, preset_names
 

@@ -17,11 +17,11 @@ from hoof_env.dynamics.constrained import TRACE, ConstrainedLeg, ConstrainedStat
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.layout import LEG_REPORT, LEG_STATE, TRUNK_REPORT, TRUNK_STATE
 from hoof_env.dynamics.memory import LIFT_OFF, Memory, memory_of
+from hoof_env.dynamics.observables import StanceCounter
 from hoof_env.dynamics.parts import Result
-from hoof_env.dynamics.stance import StanceCounter
 from hoof_env.envs.tasks import Settings
 from hoof_env.errors import ParameterError
-from hoof_env.gait.parameters import GaitParameters
+from hoof_env.gait.gait import GaitParameters
 
 Floats = NDArray[np.float64]
 Records = NDArray[np.void]

@@ -9,11 +9,10 @@ import numpy as np
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.arguments import count
 from hoof_env.envs.arguments import fixed_setting
 from hoof_env.envs.batch import EpisodeBatch
 from hoof_env.envs.recording import Recording
-from hoof_env.errors import ParameterError
+from hoof_env.errors import ParameterError, count
 from hoof_env.ground.terrain import Terrain
 
 Floats = NDArray[np.float64]

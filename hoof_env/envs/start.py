@@ -10,12 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.arguments import count
 from hoof_env.dynamics.parts import Trunk
 from hoof_env.envs.parameters import check_parameters
 from hoof_env.envs.tasks import Settings
-from hoof_env.errors import ParameterError, check_choice, check_number
-from hoof_env.gait.parameters import GaitParameters, paper_gaits
+from hoof_env.errors import ParameterError, check_choice, check_number, count
+from hoof_env.gait.gait import GaitParameters, paper_gaits
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.profile import LegProfile, by_name
 

@@ -19,9 +19,9 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.arguments import count
 from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.envs.arguments import (
+    Keywords,
     Made,
     actions_of,
     check_state,
@@ -35,11 +35,10 @@ from hoof_env.envs.arguments import (
 from hoof_env.envs.batch import EpisodeBatch
 from hoof_env.envs.episode import ACTIONS, FAILED, TRUNCATED
 from hoof_env.envs.infos import named
-from hoof_env.envs.keywords import Keywords
 from hoof_env.envs.recording import Recording
 from hoof_env.envs.rows import Rows
 from hoof_env.envs.tasks import task_of, to_json
-from hoof_env.errors import ParameterError, check_choice
+from hoof_env.errors import ParameterError, check_choice, count
 
 MOST_ENVS = 1_000_000
 

@@ -11,8 +11,8 @@ import pygame
 from numpy.typing import NDArray
 
 from hoof_env.ground.terrain import Terrain
+from hoof_env.render.body import PAPER, Brush, Colour, mix
 from hoof_env.render.instant import Instant
-from hoof_env.render.paint import PAPER, Brush, Colour, mix
 
 SOIL, SOIL_LINE = (214, 200, 174), (112, 95, 66)
 STIFFER, SOFTER = (150, 152, 158), (238, 226, 170)

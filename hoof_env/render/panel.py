@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import pygame
 
-from hoof_env.dynamics.stance import StanceCounter
-from hoof_env.gait.parameters import LIMITS
+from hoof_env.dynamics.observables import StanceCounter
+from hoof_env.gait.gait import LIMITS
+from hoof_env.render.body import CRANK, FAINT, FINE, FORCE, GREY, INK, PAPER, Brush
 from hoof_env.render.instant import Instant
-from hoof_env.render.paint import CRANK, FAINT, FINE, FORCE, GREY, INK, PAPER, Brush
 
 SECONDS = 3
 """Time shown [s]."""

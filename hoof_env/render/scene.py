@@ -16,15 +16,28 @@ from typing import Any
 import numpy as np
 import pygame
 
-from hoof_env.gait.parameters import LIMITS
+from hoof_env.gait.gait import LIMITS
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry, tables
 from hoof_env.leg.kinematics import pose, solve_points
 from hoof_env.leg.linkage import POINTS
-from hoof_env.render.body import Body
+from hoof_env.render.body import (
+    CRANK,
+    FINE,
+    FORCE,
+    GREY,
+    HEEL,
+    PAPER,
+    TOE,
+    Body,
+    Brush,
+    Colour,
+    arrow,
+    bar,
+    mix,
+)
 from hoof_env.render.ground import SOIL_LINE, GroundPainter
 from hoof_env.render.instant import Instant
-from hoof_env.render.paint import CRANK, FINE, FORCE, GREY, HEEL, PAPER, TOE, Brush, Colour, arrow, bar, mix
 
 SKY_TOP, SKY_BOTTOM = (219, 231, 242), (249, 250, 252)
 

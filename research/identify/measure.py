@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.gait.parameters import LIMITS
+from hoof_env.gait.gait import LIMITS
 from hoof_env.leg.linkage import BODIES, CONSTRUCTION, LENGTHS, POINTS, Dyad
 from hoof_env.simd.compile import kernel
 from research.identify.demands import LENGTH_RANGE

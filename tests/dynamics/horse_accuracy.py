@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limb, Trunk
 from hoof_env.dynamics.step_length import StepWarning
-from hoof_env.gait.parameters import load_gait
+from hoof_env.gait.gait import load_gait
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import pose
 from hoof_env.leg.linkage import BODIES, POINTS

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hoof_env.dynamics.schemes import SCHEMES
+from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.errors import ParameterError
 from tests.dynamics.crank_accuracy import BARRED, BARS, DURATION, PATH, PHASES, Case, read_references
 from tests.dynamics.horse_accuracy import converged, fly, ground_account, stiff

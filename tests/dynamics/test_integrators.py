@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hoof_env.dynamics.integrators import INTEGRATORS
+from hoof_env.dynamics.constrained import INTEGRATORS
 
 ORDERS = {"euler": 1, "semi_implicit_euler": 1, "midpoint": 2, "rk4": 4}
 

@@ -8,8 +8,7 @@ from hoof_env.dynamics.constrained import ConstrainedLeg
 from hoof_env.dynamics.constraints import closed_form
 from hoof_env.dynamics.parts import GRAVITY
 from hoof_env.dynamics.reactions import LegConstants, Reactions, leg_constants, leg_reactions
-from hoof_env.gait.motion_law import evaluate_motion
-from hoof_env.gait.parameters import load_gait
+from hoof_env.gait.gait import evaluate_motion, load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hoof_env.dynamics.stance import StanceCounter
+from hoof_env.dynamics.observables import StanceCounter
 
 
 def peaks_of(loads, angles, forces, threshold):

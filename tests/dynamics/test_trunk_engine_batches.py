@@ -5,9 +5,9 @@ import pytest
 
 from hoof_env.dynamics.engine import FEW, TrunkEngine
 from hoof_env.dynamics.parts import TRUNKS, Limb, Motor, Prescribed, Result, Trunk
-from hoof_env.dynamics.schemes import SCHEMES
+from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.errors import ParameterError
-from hoof_env.gait.parameters import load_gait
+from hoof_env.gait.gait import load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.laws import FRICTION_LAWS
 from hoof_env.ground.terrain import Terrain

@@ -7,10 +7,10 @@ import pytest
 
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limb, Motor, Prescribed, Result, Trunk
-from hoof_env.dynamics.schemes import SCHEMES
 from hoof_env.dynamics.step_length import StepWarning
+from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.errors import NotStartedError, ParameterError
-from hoof_env.gait.parameters import GaitParameters, load_gait
+from hoof_env.gait.gait import GaitParameters, load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import load_geometry

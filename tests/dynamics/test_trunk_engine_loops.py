@@ -7,8 +7,7 @@ from hoof_env.dynamics.constrained import SOLE, ConstrainedLeg
 from hoof_env.dynamics.constraints import DRIVER_ROW, closed_form
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limb, Motor, Prescribed, Trunk
-from hoof_env.gait.motion_law import command_filters, evaluate_motion
-from hoof_env.gait.parameters import LIMITS, PARAMETERS, load_gait
+from hoof_env.gait.gait import LIMITS, PARAMETERS, command_filters, evaluate_motion, load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, mirror, pose

@@ -15,14 +15,14 @@ import pytest
 
 from hoof_env import cli
 from hoof_env.envs import manual
-from hoof_env.envs.grounds import HILLS
 from hoof_env.envs.manual import TABLES
+from hoof_env.envs.parameters import HILLS
 from hoof_env.envs.reward import check_weights
 from hoof_env.envs.start import OPTIONS
 from hoof_env.envs.tasks import PER_EPISODE, TASKS, Settings, to_json
 from hoof_env.envs.vector import HorseLegVectorEnv
 from hoof_env.errors import ParameterError
-from hoof_env.gait.parameters import LIMITS, load_gait
+from hoof_env.gait.gait import LIMITS, load_gait
 
 DOCS = Path(__file__).parents[2] / "docs" / "environments"
 IDS = {page: re.search(r'gym.make\("(.+?)"', manual.page(page))[1] for page in manual.PAGES}

@@ -13,7 +13,7 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from hoof_env.dynamics.parts import GRAVITY
-from hoof_env.dynamics.schemes import SCHEMES
+from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.envs.tasks import PER_EPISODE
 from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS
 

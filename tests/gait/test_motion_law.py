@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hoof_env.errors import ParameterError
-from hoof_env.gait.motion_law import (
+from hoof_env.gait.gait import (
+    LIMITS,
     MOTION,
     FilterSettings,
     advance_motion,
@@ -14,7 +15,6 @@ from hoof_env.gait.motion_law import (
     evaluate_motion,
     steady_filters,
 )
-from hoof_env.gait.parameters import LIMITS
 
 LOW, HIGH = np.array(list(LIMITS.values())).T
 SETTINGS = FilterSettings()

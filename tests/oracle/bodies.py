@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.parts import Limb, Motor, Trunk
 from hoof_env.errors import ParameterError
-from hoof_env.gait.motion_law import COS, OFFSET, SIN
+from hoof_env.gait.gait import COS, OFFSET, SIN
 from hoof_env.leg.linkage import BODIES, CONSTRUCTION, Dyad
 from tests.oracle.jet import Jet, concatenate, direction, inverse, root, stack, turn
 

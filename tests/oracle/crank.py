@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.parts import Limb, Motor, Trunk
 from hoof_env.errors import ParameterError
-from hoof_env.gait.parameters import GaitParameters
+from hoof_env.gait.gait import GaitParameters
 from hoof_env.ground.contact import Ground
 from tests.oracle.ground import PlainGround
 from tests.oracle.horse import PlainHorse, servo

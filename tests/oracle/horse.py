@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.parts import GRAVITY, TRUNKS, Drive, Limb, Motor, Trunk
-from hoof_env.gait.motion_law import SPEED
+from hoof_env.gait.gait import SPEED
 from hoof_env.ground.contact import Ground
 from tests.oracle.bodies import PlainBodies
 from tests.oracle.ground import PlainGround

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.errors import HoofEnvError, ParameterError
-from hoof_env.gait.motion_law import SPEED
-from hoof_env.gait.parameters import GaitParameters
+from hoof_env.gait.gait import SPEED, GaitParameters
 from tests.oracle.ground import PlainGround
 from tests.oracle.horse import WORKS, PlainHorse
 

@@ -10,7 +10,7 @@ import numpy as np
 from benchmarks.common import ALL, Assembly, Record, Start
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limb, Result, Trunk
-from hoof_env.gait.parameters import GaitParameters
+from hoof_env.gait.gait import GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.kinematics import FrameMotion, pose
 

@@ -18,13 +18,13 @@ from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limb, Trunk
 from hoof_env.envs.policies import make_policy
 from hoof_env.errors import HoofEnvError, ParameterError
-from hoof_env.gait.parameters import LIMITS, PARAMETERS, load_gait
+from hoof_env.gait.gait import LIMITS, PARAMETERS, load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import load_geometry
+from hoof_env.render.body import Brush
 from hoof_env.render.ground import find_patches, footprint
 from hoof_env.render.instant import Instant, columns_of_engine, instants
-from hoof_env.render.paint import Brush
 from hoof_env.render.panel import Stances
 from hoof_env.render.renderer import Renderer, open_window
 

@@ -6,10 +6,10 @@ from importlib import resources
 
 import numpy as np
 import pytest
-from hoof_env.paper.solvers import EXACT, PROBABLE
 
 from hoof_env.leg.geometry import load_geometry, read_preset
 from hoof_env.paper.reproduce import reproduce
+from hoof_env.paper.rows import EXACT, PROBABLE
 from research.identify.__main__ import best_leg
 from research.identify.command import load_start
 from research.identify.confirm import COUNTED, confirm

@@ -13,8 +13,7 @@ from hoof_env.dynamics.constrained import ConstrainedLeg, new_trace
 from hoof_env.dynamics.constraints import Constraints
 from hoof_env.dynamics.parts import Result
 from hoof_env.errors import GeometryError
-from hoof_env.gait.motion_law import MOTION, evaluate_motion, steady_filters
-from hoof_env.gait.parameters import LIMITS, GaitParameters, load_gait
+from hoof_env.gait.gait import LIMITS, MOTION, GaitParameters, evaluate_motion, load_gait, steady_filters
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry, tables
 from hoof_env.leg.kinematics import FrameMotion, pose

@@ -5,10 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hoof_env.paper.solvers import EXACT, PROBABLE
 
 from hoof_env.leg.geometry import load_geometry, read_preset
-from hoof_env.paper.rows import ILL_CONDITIONED
+from hoof_env.paper.rows import EXACT, ILL_CONDITIONED, PROBABLE
 from research.identify import ensemble
 from research.identify.confirm import confirm
 from research.identify.leg import encode
