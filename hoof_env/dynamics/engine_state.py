@@ -1,5 +1,5 @@
-"""Where `TrunkEngine` starts: checks of environments, gaits, crank angles and the place and speed of the
-trunk."""
+"""States of `TrunkEngine`: where it starts, and whether a state that was kept fits it and can be gone on
+from."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
 """What is measured of the motion: drive torques and powers, where the energy went, stances; see `mechanics`.
+Behind that, in NumPy, the rule of a stance for other solvers, and momentum and energy added up anew.
 
 A stance opens when the normal force on the hoof rises above a threshold, as on a force plate. It closes when
 the force falls below it (lift-off), or after one crank revolution, whichever comes first, so that a hoof that
 never lifts has a peak every revolution. While it is open its peak is the highest resultant ground reaction
-force of any step; the increases of a stance's running peak add up to that peak.
-"""
+force of any step; the increases of a stance's running peak add up to that peak."""
 
 from __future__ import annotations
 

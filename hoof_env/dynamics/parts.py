@@ -1,4 +1,9 @@
-"""What the legs hang from: a trunk that is fixed, on a rail, suspended by the rest of the animal, or free."""
+"""What an engine is made of: a trunk, legs in their places on it, and what turns their cranks; and how a run
+of it ends.
+
+A prescribed drive is the paper's: the crank angle is a function of time and of the commands, whatever torque
+that takes. A motor is a speed servo with a torque limit, a rotor and a gear, so that a ground force slows the
+crank. In both the swing is a function of the crank angle and of the gait parameters."""
 
 from __future__ import annotations
 

@@ -1,4 +1,12 @@
-"""One step in time: the stages of an explicit scheme (`schemes`); see `mechanics`."""
+"""One step in time, by an explicit scheme; see `mechanics`.
+
+In a scheme each stage takes the derivatives of the one before: stage j + 1 is taken at fraction a_j of the
+step, from the step's start with the derivatives f_j of stage j,
+
+    y_(j+1) = y_0 + a_j h f_j,    y(t + h) = y_0 + h sum of w_j f_j,
+
+which needs one derivative in memory and one sum. Semi-implicit Euler has one stage and moves the coordinates
+with the new rates. Source: Hairer, Norsett & Wanner, Solving Ordinary Differential Equations I."""
 
 from __future__ import annotations
 

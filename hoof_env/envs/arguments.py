@@ -1,4 +1,5 @@
-"""What callers give the vector environment: checks that name what was given and what was expected."""
+"""What callers give environments, alone or many at once: the keywords and their types, checks that name what
+was given and what was expected, states, and specs that say how long an episode lasts."""
 
 from __future__ import annotations
 

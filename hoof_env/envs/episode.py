@@ -1,4 +1,5 @@
-"""What an environment remembers of its episode, besides the engine's memory."""
+"""What an environment remembers of its episode, besides the engine's memory, and the figures of the
+episode."""
 
 from __future__ import annotations
 

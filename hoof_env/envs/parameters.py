@@ -1,4 +1,5 @@
-"""Masses, springs, ground and motors of an episode: checked, drawn, and made of the settings."""
+"""From settings to mechanics: trunk, ground, terrain and motors, the same for all episodes or drawn for
+each."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Gait parameters: what a policy may ask of the leg, with units, limits and the paper's presets."""
+"""The gait: parameters that a policy commands, with units, limits and the paper's presets; the filters that
+they pass; and the motion of crank and swing that follows."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Which hoof point touches, since when, how fast it came in, and what the ground does to it (Eqs. 10-15)."""
+"""The ground and what it does to a hoof point (Eqs. 10-15): its settings, those of a preset, and for the
+paper's solver when a point touches and how fast it came in."""
 
 from __future__ import annotations
 

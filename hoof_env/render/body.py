@@ -1,4 +1,5 @@
-"""The body: the trunk with what holds it, and the leg with flesh, links and joints."""
+"""The body, painted with smooth edges: the trunk with what holds it, and the leg with flesh, links and
+joints."""
 
 from __future__ import annotations
 
