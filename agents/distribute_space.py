@@ -5,24 +5,22 @@ from __future__ import annotations
 
 import ast
 import inspect
-import json
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
 from agents.settings import algorithm_class
+from hoof_env._arguments import parse_pairs
 from hoof_env.errors import ParameterError
 
 DRAWS = {
-    name: count
-    for count, names in {
-        1: "choice",
-        2: "uniform loguniform randint lograndint",
-        3: "quniform qloguniform qrandint qlograndint",
-    }.items()
-    for name in names.split()
-}
+    "choice": 1, "uniform": 2, "loguniform": 2, "randint": 2, "lograndint": 2,
+    "quniform": 3, "qloguniform": 3, "qrandint": 3, "qlograndint": 3,
+}  # fmt: skip
 """Distributions of ray.tune, with the number of their arguments."""
+
+LISTED = "grid_search"
 
 ENV = "env."
 """Before the name of an argument of the environment."""
@@ -39,7 +37,7 @@ class Axis:
     @property
     def values(self) -> list[Any]:
         """Those that are listed, or the arguments of the distribution: something of the right kind to try."""
-        return list(self.arguments[0]) if self.draw in ("grid_search", "choice") else list(self.arguments[:2])
+        return list(self.arguments[0] if self.draw in (LISTED, "choice") else self.arguments[:2])
 
     def build(self) -> Any:
         """The same for Tune.
@@ -51,11 +49,11 @@ class Axis:
 
         try:
             built = getattr(tune, self.draw)(*self.arguments)
-            if self.draw != "grid_search":
+            if self.draw != LISTED:
                 built.sample()
         except (TypeError, ValueError, ArithmeticError, AssertionError) as error:
-            said = f"--space {self.key}: {self.draw}{self.arguments} cannot be drawn from: {error}"
-            raise ParameterError(said) from None
+            reason = f"--space {self.key}: {self.draw}{self.arguments} cannot be drawn from: {error}"
+            raise ParameterError(reason) from None
         return built
 
 
@@ -73,10 +71,9 @@ Axis(key='learning_rate', draw='loguniform', arguments=(0.0001, 0.01))]
     for item in items:
         key, _, text = item.partition("=")
         draw, arguments = _read(text)
-        given = len(arguments) and (draw not in ("grid_search", "choice") or arguments[0])
-        if not key or not given or len(arguments) != DRAWS.get(draw, 1):
-            told = ", ".join(f"{name}({', '.join('abq'[:count])})" for name, count in DRAWS.items())
-            raise ParameterError(f"--space: expected key=[JSON, ...] or key=draw of {told}; got {item!r}")
+        if not key or not draw:
+            known = ", ".join(f"{name}({', '.join('abq'[:count])})" for name, count in DRAWS.items())
+            raise ParameterError(f"--space: expected key=[JSON, ...] or key=draw of {known}; got {item!r}")
         if key in axes:
             raise ParameterError(f"--space: {key} is given twice")
         axes[key] = Axis(key, draw, arguments)
@@ -84,20 +81,16 @@ Axis(key='learning_rate', draw='loguniform', arguments=(0.0001, 0.01))]
 
 
 def _read(text: str) -> tuple[str, tuple[Any, ...]]:
-    """Name and arguments of what stands behind the equals sign; no arguments where it cannot be read."""
-    try:
-        listed = json.loads(text)
-        return "grid_search", (listed,) if isinstance(listed, list) else ()
-    except json.JSONDecodeError:
-        pass
-    try:
-        call = ast.parse(text.strip(), mode="eval").body
-        if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id in DRAWS:
-            arguments = tuple(ast.literal_eval(node) for node in call.args)
-            if not call.keywords and (call.func.id != "choice" or isinstance(arguments[0], list)):
-                return call.func.id, arguments
-    except (SyntaxError, ValueError, IndexError):
-        pass
+    """Name and arguments of what stands behind the equals sign; no name where it cannot be read."""
+    values = parse_pairs("--space", [f"values={text}"])["values"]
+    if isinstance(values, list):
+        return (LISTED, (values,)) if values else ("", ())
+    with suppress(SyntaxError, ValueError):
+        match ast.parse(text.strip(), mode="eval").body:
+            case ast.Call(func=ast.Name(id=name), args=nodes, keywords=[]) if len(nodes) == DRAWS.get(name):
+                arguments = tuple(ast.literal_eval(node) for node in nodes)
+                if name != "choice" or (isinstance(arguments[0], list) and arguments[0]):
+                    return name, arguments
     return "", ()
 
 

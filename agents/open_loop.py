@@ -30,11 +30,9 @@ import numpy as np
 from agents import runs
 from agents.command import parse_pairs, run
 from agents.evaluate import estimate
-from agents.open_loop_search import ROWS, TEST_SEED, Court, Episodes, decode, search
+from agents.open_loop_search import ROWS, TEST_SEED, Episodes, Objective, decode, search
 from hoof_env._output import check_folder
-from hoof_env.envs.policies import GAITS as GAITS
-from hoof_env.envs.policies import load_open_loop as load_open_loop
-from hoof_env.envs.policies import stored as stored
+from hoof_env.envs.policies import stored
 from hoof_env.errors import DataFileError, HoofEnvError, ParameterError, check_number
 from hoof_env.gait.parameters import PARAMETERS
 
@@ -82,9 +80,40 @@ def optimise(args: Args) -> dict[str, Any]:
             OutputError: the file is of something else, or cannot be written. KeyboardInterrupt: Ctrl-C; what
             was found is in the file.
     """
+    episodes = check(args)
+    from tqdm import tqdm
+
+    path = args.out or Path("runs/open_loop", file_name(args))
+    about: dict[str, Any] = {
+        "env_id": args.env_id, "env_kwargs": parse_pairs("--env-kwargs", args.env_kwargs),
+        "family": args.family, "objective": args.objective,
+        "speed": args.speed, "weight_share": args.weight_share,
+        "episodes_of_a_search": episodes, "test_episodes": args.test_episodes,
+        "start": stored(args.start)["parameters"]["constant"] if args.start else None,
+    }  # fmt: skip
+    restarts = earlier(path, about)
+    check_folder(path.parent)
+    objective = Objective(
+        args.env_id, about["env_kwargs"], args.family, args.objective, args.speed, args.weight_share
+    )
+    left = [seed for seed in range(args.restarts) if seed not in [one["seed"] for one in restarts]]
+    content: dict[str, Any] = {}
+    with tqdm(total=episodes * len(left), unit=" episodes", leave=False, disable=None) as bar:
+        for k, seed in enumerate(left):
+            bar.set_description(f"{path.stem}, search {seed}")
+            restarts.append(search_once(objective, seed, about, bar))
+            content = write(path, about, objective, restarts, content)
+            if restarts[-1].get("interrupted"):
+                raise KeyboardInterrupt
+            bar.n = (k + 1) * episodes  # a search may have converged before
+    return content or write(path, about, objective, restarts, {})
+
+
+def check(args: Args) -> int:
+    """Refuse what does not fit; returns the episodes of a search."""
     try:
         import cma  # noqa: F401
-        from tqdm import tqdm
+        import tqdm  # noqa: F401
     except ModuleNotFoundError as error:
         raise HoofEnvError(
             f'agents.open_loop needs {error.name}: pip install "hoof-env[train,identify]"'
@@ -96,79 +125,71 @@ def optimise(args: Args) -> dict[str, Any]:
     if (args.objective == "return") != (args.speed is None):
         raise ParameterError(f"speed: expected one for 'peak' and 'transport' alone, got {args.speed!r}")
     if args.objective == "return" and args.weight_share is not None:
-        raise ParameterError("weight_share: expected none for 'return', where nothing is asked for")
-    if args.speed is not None:
-        check_number("speed", args.speed, low=0, high=20)
-    if args.weight_share is not None:
-        check_number("weight_share", args.weight_share, low=0, high=1)
-    kwargs = parse_pairs("--env-kwargs", args.env_kwargs)
-    path = args.out or Path("runs/open_loop", file_name(args))
-    about: dict[str, Any] = {
-        "env_id": args.env_id, "env_kwargs": kwargs, "family": args.family, "objective": args.objective,
-        "speed": args.speed, "weight_share": args.weight_share,
-        "episodes_of_a_search": episodes, "test_episodes": args.test_episodes,
-        "start": stored(args.start)["parameters"]["constant"] if args.start else None,
-    }  # fmt: skip
-    restarts = earlier(path, about)
-    check_folder(path.parent)
-    court = Court(args.env_id, kwargs, args.family, args.objective, args.speed, args.weight_share)
-    left = [seed for seed in range(args.restarts) if seed not in [one["seed"] for one in restarts]]
-    found: dict[str, Any] = {}
-    with tqdm(total=episodes * len(left), unit=" episodes", leave=False, disable=None) as bar:
-        for k, seed in enumerate(left):
-            bar.set_description(f"{path.stem}, search {seed}")
-            began, used, court.spent = time.monotonic(), time.process_time(), 0
+        raise ParameterError("weight_share: expected none for 'return', which has no conditions")
+    for name, high in (("speed", 20), ("weight_share", 1)):
+        if getattr(args, name) is not None:
+            check_number(name, getattr(args, name), low=0, high=high)
+    return episodes
 
-            def tick(count: int, lowest: float) -> None:
-                bar.update(count)
-                bar.set_postfix(cost=f"{lowest:.3f}")
 
-            start = about["start"] if seed % 2 else None
-            x, least, interrupted = search(court, seed, episodes, tick, start)
-            parameters = {key: value.tolist() for key, value in decode(args.family, x).items()}
-            one: dict[str, Any] = {"seed": seed, "cost": least, "parameters": parameters}
-            one |= {"episodes": court.spent, "wall_s": round(time.monotonic() - began, 1)}
-            one["cpu_s"] = round(time.process_time() - used, 1)
-            one["mean"] = means(court.test(parameters, args.test_episodes))
-            restarts.append(one | ({"interrupted": True} if interrupted else {}))
-            found = write(path, about, court, restarts, found)
-            if interrupted:
-                raise KeyboardInterrupt
-            bar.n = (k + 1) * episodes  # a search may have converged before
-    return found or write(path, about, court, restarts, {})
+def search_once(objective: Objective, seed: int, about: dict[str, Any], bar: Any) -> dict[str, Any]:
+    """One search, as the file keeps it."""
+    began, used, objective.spent = time.monotonic(), time.process_time(), 0
+
+    def tick(count: int, lowest: float) -> None:
+        bar.update(count)
+        bar.set_postfix(cost=f"{lowest:.3f}")
+
+    start = about["start"] if seed % 2 else None
+    x, cost, interrupted = search(objective, seed, about["episodes_of_a_search"], tick, start)
+    parameters = {key: value.tolist() for key, value in decode(objective.family, x).items()}
+    return {
+        "seed": seed,
+        "cost": cost,
+        "parameters": parameters,
+        "episodes": objective.spent,
+        "wall_s": round(time.monotonic() - began, 1),
+        "cpu_s": round(time.process_time() - used, 1),
+        "mean": means(objective.test(parameters, about["test_episodes"])),
+        **({"interrupted": True} if interrupted else {}),
+    }
 
 
 def means(episodes: Episodes) -> dict[str, float | None]:
     """Of the figures that are kept; None for an infinite one."""
-    found = {key: float(np.mean([one[key] for one in episodes])) for key in KEPT}
-    return {key: value if math.isfinite(value) else None for key, value in found.items()}
+    figures = {key: float(np.mean([one[key] for one in episodes])) for key in KEPT}
+    return {key: value if math.isfinite(value) else None for key, value in figures.items()}
 
 
 def write(
-    path: Path, about: dict[str, Any], court: Court, restarts: list[dict[str, Any]], before: dict[str, Any]
+    path: Path,
+    about: dict[str, Any],
+    objective: Objective,
+    restarts: list[dict[str, Any]],
+    before: dict[str, Any],
 ) -> dict[str, Any]:
     """Write the best of the searches, scored, and all of them; returns what the file holds.
 
     Args:
         path, about: the file, and what was asked for.
-        court: the judge.
+        objective: what scores a gait.
         restarts: the searches.
         before: what the file held, or nothing.
     """
     best = min(restarts, key=lambda one: one["cost"])
     score = before.get("score")
     if before.get("parameters") != best["parameters"]:
-        episodes = court.test(best["parameters"], about["test_episodes"])
+        episodes = objective.test(best["parameters"], about["test_episodes"])
         score = {"first_seed": TEST_SEED, "mean": means(episodes), "interval95": {}}
         for key, mean in score["mean"].items():
-            found = estimate([one[key] for one in episodes]) if mean is not None else None
-            score["interval95"][key] = [found.low, found.high] if found else None
-    gait = court.leg.command_of(np.array(best["parameters"]["constant"])).tolist()
-    whole = {
+            interval = estimate([one[key] for one in episodes]) if mean is not None else None
+            score["interval95"][key] = [interval.low, interval.high] if interval else None
+    gait = objective.leg.command_of(np.array(best["parameters"]["constant"])).tolist()
+    content = {
         **about,
         "parameters": best["parameters"],
         "gait": dict(zip(PARAMETERS, gait, strict=True)),
-        "dt": court.leg.dt,
+        "dt": objective.leg.dt,
         "score": score,
         "episodes": sum(one["episodes"] for one in restarts),
         **{key: round(sum(one[key] for one in restarts), 1) for key in ("wall_s", "cpu_s")},
@@ -176,8 +197,8 @@ def write(
         "versions": {**runs.versions(), "cma": version("cma")},
         "restarts": restarts,
     }
-    runs.write_text(path, json.dumps(whole, indent=1, allow_nan=False) + "\n")
-    return whole
+    runs.write_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
+    return content
 
 
 def earlier(path: Path, about: dict[str, Any]) -> list[dict[str, Any]]:
@@ -189,9 +210,9 @@ def earlier(path: Path, about: dict[str, Any]) -> list[dict[str, Any]]:
     if not path.is_file():
         return []
     with suppress(OSError, ValueError, KeyError, TypeError, AttributeError):
-        found = json.loads(path.read_text(encoding="utf-8"))
-        if all(found.get(key) == value for key, value in about.items()):
-            return [one for one in found["restarts"] if not one.get("interrupted")]
+        content = json.loads(path.read_text(encoding="utf-8"))
+        if all(content.get(key) == value for key, value in about.items()):
+            return [one for one in content["restarts"] if not one.get("interrupted")]
     raise DataFileError(f"{path}: expected searches with {about} to go on with; name another --out")
 
 
@@ -206,16 +227,14 @@ def main(argv: list[str] | None = None) -> None:
     import tyro
 
     args = tyro.cli(Args, args=argv, prog="python -m agents.open_loop", description=__doc__)
-    found = optimise(args)
-    for one in found["restarts"]:
+    content = optimise(args)
+    for one in content["restarts"]:
         print(
             f"search {one['seed']}: cost {one['cost']:.3f}, {one['episodes']} episodes, {one['wall_s']:.0f} s"
         )
-    for key, mean in found["score"]["mean"].items():
-        low_high = found["score"]["interval95"][key]
-        print(
-            f"{key:18} " + (f"{mean:.3f} [{low_high[0]:.3f}, {low_high[1]:.3f}]" if low_high else "infinite")
-        )
+    for key, mean in content["score"]["mean"].items():
+        bounds = content["score"]["interval95"][key]
+        print(f"{key:18} " + (f"{mean:.3f} [{bounds[0]:.3f}, {bounds[1]:.3f}]" if bounds else "infinite"))
     print(f"written: {args.out or Path('runs/open_loop', file_name(args))}")
 
 

@@ -36,8 +36,20 @@ STEP, HARMONIC = 0.3, 0.3
 TEST_SEED, SEARCH_SEED = 1000, 10_000_000
 """First seeds of the final score, `agents.evaluate`'s, and of the searches."""
 
+OPTIONS = {
+    "bounds": [-1, 1], "tolx": 1e-3, "tolfun": 0, "tolfunhist": 0, "tolstagnation": 10**9,
+    "verbose": -9, "verb_log": 0,
+}  # fmt: skip
+"""Of CMA-ES: it ends when the steps are small."""
+
 SHORTFALL = 10.0
 """What 1 m/s or a whole weight too little costs, and failing always: more than it can save."""
+
+
+AVERAGED = (
+    "return", "speed_m_s", "stance_peak_n", "drive_work_j", "distance_m", "weight_share", "failed",
+)  # fmt: skip
+"""Figures of an episode that a cost is made of."""
 
 
 def decode(family: str, x: Floats) -> dict[str, Floats]:
@@ -58,18 +70,7 @@ def cost(episodes: Episodes, objective: str, weight: float, speed: float = 0.0, 
         weight: of trunk and leg [N].
         speed, share: conditions: mean speed [m/s] and part of the weight that the leg bears, or more.
     """
-    mean = {
-        key: float(np.mean([one[key] for one in episodes]))
-        for key in (
-            "return",
-            "speed_m_s",
-            "stance_peak_n",
-            "drive_work_j",
-            "distance_m",
-            "weight_share",
-            "failed",
-        )
-    }
+    mean = {key: float(np.mean([one[key] for one in episodes])) for key in AVERAGED}
     if objective == "return":
         return -mean["return"]
     missing = max(0.0, speed - mean["speed_m_s"]) + max(0.0, share - mean["weight_share"])
@@ -80,8 +81,8 @@ def cost(episodes: Episodes, objective: str, weight: float, speed: float = 0.0, 
     return min(transport, SHORTFALL) + penalty
 
 
-class Court:
-    """Judges candidates by episodes in the rows of one vector environment.
+class Objective:
+    """Scores candidates by episodes in the rows of one vector environment.
 
     Args:
         env_id, env_kwargs: the environment.
@@ -134,7 +135,7 @@ class Court:
 
 
 def search(
-    court: Court,
+    objective: Objective,
     seed: int,
     episodes: int,
     tick: Callable[[int, float], Any],
@@ -146,51 +147,52 @@ def search(
     of the distribution, the luckiest candidate and the best of the last generation meet more.
 
     Args:
-        court: the judge.
+        objective: what scores candidates.
         seed: of the search; searches of different seeds share no start.
         episodes: to spend, about.
         tick: called with the number of episodes that were added and the lowest cost in them.
         start: the constant action to begin with, shape (4,); harmonics are none there.
 
     Returns:
-        What it found, its cost over starts that the search had not met, and whether Ctrl-C ended it.
+        The best point, its cost over starts that the search had not met, and whether Ctrl-C ended it.
 
     Raises:
         KeyboardInterrupt: Ctrl-C before anything was found.
     """
     import cma
 
-    size, generator, fresh = SIZES[court.family], np.random.default_rng([seed, 6]), SEARCH_SEED * (seed + 1)
+    size, generator, fresh = (
+        SIZES[objective.family],
+        np.random.default_rng([seed, 6]),
+        SEARCH_SEED * (seed + 1),
+    )
 
-    def judge(x: Any, starts: int = STARTS) -> list[float]:
+    def costs(x: Any, starts: int) -> list[float]:
         nonlocal fresh
-        found = court.costs(np.array(x), range(fresh, fresh + starts))
+        values = objective.costs(np.array(x), range(fresh, fresh + starts))
         fresh += starts
-        tick(ROWS, min(found))
-        return found
+        tick(ROWS, min(values))
+        return values
 
     if start is None:
         screened = generator.uniform(-1, 1, (ROWS // 4, size))
         screened[:, 4:12] *= HARMONIC
-        first, step = screened[np.argmin(judge(screened, 4))], STEP
+        first, step = screened[np.argmin(costs(screened, 4))], STEP
     else:
         first, step = np.array([*start, *[0.0] * (size - 4)]), STEP / 3
-    options = {
-        "bounds": [-1, 1], "popsize": POPULATION, "seed": int(generator.integers(1, 2**31)), "tolx": 1e-3,
-        "tolfun": 0, "tolfunhist": 0, "tolstagnation": 10**9, "verbose": -9, "verb_log": 0,
-    }  # fmt: skip
-    strategy, found, interrupted = cma.CMAEvolutionStrategy(first, step, options), [first], False
+    options = OPTIONS | {"popsize": POPULATION, "seed": int(generator.integers(1, 2**31))}
+    strategy, best, interrupted = cma.CMAEvolutionStrategy(first, step, options), [first], False
     try:
         for _ in range(episodes // ROWS - 2):
             if strategy.stop():
                 break
-            asked = strategy.ask()
-            values = judge(asked)
-            strategy.tell(asked, values)
-            best = [asked[k] for k in np.argsort(values)[: FINALISTS - 2]]
-            found = [strategy.result.xfavorite, strategy.result.xbest, *best]
+            candidates = strategy.ask()
+            values = costs(candidates, STARTS)
+            strategy.tell(candidates, values)
+            lowest = [candidates[k] for k in np.argsort(values)[: FINALISTS - 2]]
+            best = [strategy.result.xfavorite, strategy.result.xbest, *lowest]
     except KeyboardInterrupt:
         interrupted = True
-    finalists = np.clip(np.round((found * FINALISTS)[:FINALISTS], 5), -1.0, 1.0)
-    final = judge(finalists, ROWS // FINALISTS)
+    finalists = np.clip(np.round((best * FINALISTS)[:FINALISTS], 5), -1.0, 1.0)
+    final = costs(finalists, ROWS // FINALISTS)
     return finalists[np.argmin(final)], min(final), interrupted

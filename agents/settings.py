@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import yaml
@@ -13,6 +13,9 @@ import yaml
 from hoof_env.errors import DataFileError
 from hoof_env.plain_policy import ALGORITHMS as ALGORITHMS
 from hoof_env.plain_policy import algorithm_class as algorithm_class
+
+Algorithm = Literal["ppo", "sac", "td3", "tqc"]
+"""Names of `ALGORITHMS`, for the commands."""
 
 FOLDER = Path(__file__).parent / "hyperparams"
 COUNTED = ("n_epochs", "n_steps", "batch_size", "buffer_size", "policy_delay")

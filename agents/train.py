@@ -12,21 +12,26 @@ machine and versions give the same run, resumed or not (agents/checkpoints.py sa
 
 from __future__ import annotations
 
-import json
 import warnings
 from contextlib import closing
 from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import yaml
 
 from agents import checkpoints, runs
 from agents.command import check_threads, parse_pairs, run
-from agents.settings import FOLDER, algorithm_class, load_settings, model_arguments, normalize_arguments
-from agents.watch import EndedError, check_divergence, diverged, make_watch, stop_on_signals
+from agents.settings import (
+    FOLDER,
+    Algorithm,
+    algorithm_class,
+    load_settings,
+    model_arguments,
+    normalize_arguments,
+)
 from hoof_env.errors import HoofEnvError, OutputError, ParameterError, check_number
 from hoof_env.plain_policy import WEIGHTS
 
@@ -35,7 +40,7 @@ from hoof_env.plain_policy import WEIGHTS
 class Args:
     env_id: str = "hoof_env/HorseLeg-v0"
     """registered environment; module:id imports the module first"""
-    algo: Literal["ppo", "sac", "td3", "tqc"] = "ppo"
+    algo: Algorithm = "ppo"
     """algorithm of Stable-Baselines3 or sb3-contrib, with its file in agents/hyperparams"""
     seed: int = 0
     """of the environments, the network and the sampling"""
@@ -121,63 +126,82 @@ def _train(
     also: tuple[Any, ...],
 ) -> Trained:
     """`train` in a folder that nobody else works in."""
-    n_envs, steps = settings["n_envs"], settings["n_timesteps"]
     earlier = find_earlier(args, folder, record, settings)
     if finished := earlier.get("finished"):
         checkpoints.tidy(folder, keep=0)  # of a process that was killed before it did so
         return Trained(folder, finished["steps"], finished["seconds"], None)
     checkpoints.tidy(folder)
-    found = checkpoints.checkpoints(folder) if earlier else []
-    if found:
+    start = next(iter(checkpoints.checkpoints(folder)), None) if earlier else None
+    if start:
         warn_of_bits(folder, earlier, record)
-        record = {**earlier, "resumed": [*earlier.get("resumed", []), int(found[0].name)]}
-
-    # Importing torch takes seconds: only now
-    import torch
-    from stable_baselines3.common.callbacks import CallbackList
-
-    if args.device.startswith("cuda") and not torch.cuda.is_available():  # the library would take the CPU
-        raise ParameterError(f"device: expected one that torch finds here, got {args.device!r}")
-    torch.set_num_threads(args.torch_threads)
+        record = {**earlier, "resumed": [*earlier.get("resumed", []), int(start.name)]}
+    set_up_torch(args)
     config = yaml.safe_dump({args.env_id: settings}, sort_keys=False)  # the library adds to policy_kwargs
-    envs = many = runs.make_vec_env(args.env_id, n_envs, **env_kwargs)
+    envs = many = runs.make_vec_env(args.env_id, settings["n_envs"], **env_kwargs)
     try:
-        algorithm = algorithm_class(args.algo)
-        resumed = checkpoints.Resumed(found[0], algorithm, many, args.device) if found else None
+        resumed = None
+        if start:
+            resumed = checkpoints.Resumed(start, algorithm_class(args.algo), many, args.device)
         model = resumed.model if resumed else make_model(args, settings, many)
         envs = model.env
         # Nothing is refused any more
-        runs.write_text(folder / "run.json", json.dumps(record, indent=2) + "\n")
+        runs.write_record(folder, record)
         runs.write_text(folder / "config.yml", config)
         if not resumed:
             checkpoints.write_episodes(envs, folder / "monitor.csv")
         model.set_logger(make_logger(folder / "tensorboard", model.num_timesteps + 1 if resumed else 0))
-        watch = make_watch(folder, steps, args.checkpoint_every, args.max_minutes, resumed)
-        callbacks = CallbackList([watch, *also])
-        through = False
-        with closing(watch), stop_on_signals(watch):
-            try:
-                model.learn(steps - model.num_timesteps, callbacks, reset_num_timesteps=not resumed)
-                through = True
-            except EndedError:
-                callbacks.on_training_end()
-            except (ValueError, RuntimeError) as error:  # of torch or the environment: not finite
-                check_divergence(model, folder)
-                if "of distribution" in str(error):
-                    raise diverged(model, folder, "the policy's actions have no distribution") from None
-                if "without overflow" in str(error):
-                    raise diverged(model, folder, str(error)) from None
-                raise
-            seconds = watch.seconds
-            check_divergence(model, folder)
-            runs.save_model(model, folder / "model.zip")
-            if through:
-                record["finished"] = {"steps": model.num_timesteps, "seconds": round(seconds, 3)}
-                runs.write_text(folder / "run.json", json.dumps(record, indent=2) + "\n")
-                checkpoints.tidy(folder, keep=0)
-        return Trained(folder, model.num_timesteps, seconds, watch.stopped_by)
+        return learn(args, folder, record, settings["n_timesteps"], model, resumed, also)
     finally:
         envs.close()
+
+
+def set_up_torch(args: Args) -> None:
+    """Threads and device of torch, whose import takes seconds; `ParameterError` for a GPU that is not there,
+    where the library would take the CPU."""
+    import torch
+
+    if args.device.startswith("cuda") and not torch.cuda.is_available():
+        raise ParameterError(f"device: expected one that torch finds here, got {args.device!r}")
+    torch.set_num_threads(args.torch_threads)
+
+
+def learn(
+    args: Args,
+    folder: Path,
+    record: dict[str, Any],
+    steps: int,
+    model: Any,
+    resumed: checkpoints.Resumed | None,
+    also: tuple[Any, ...],
+) -> Trained:
+    """Let the model learn until it has `steps`, and write it."""
+    from stable_baselines3.common.callbacks import CallbackList
+
+    from agents.watch import EndedError, Watch, check_divergence, diverged, stop_on_signals
+
+    watch = Watch(folder, steps, args.checkpoint_every, args.max_minutes, resumed)
+    callbacks, is_through = CallbackList([watch, *also]), False
+    with closing(watch), stop_on_signals(watch):
+        try:
+            model.learn(steps - model.num_timesteps, callbacks, reset_num_timesteps=not resumed)
+            is_through = True
+        except EndedError:
+            callbacks.on_training_end()
+        except (ValueError, RuntimeError) as error:  # of torch or the environment: not finite
+            check_divergence(model, folder)
+            if "of distribution" in str(error):
+                raise diverged(model, folder, "the policy's actions have no distribution") from None
+            if "without overflow" in str(error):
+                raise diverged(model, folder, str(error)) from None
+            raise
+        trained = Trained(folder, model.num_timesteps, watch.seconds, watch.stopped_by)
+        check_divergence(model, folder)
+        runs.save_model(model, folder / "model.zip")
+        if is_through:
+            record["finished"] = {"steps": trained.steps, "seconds": round(trained.seconds, 3)}
+            runs.write_record(folder, record)
+            checkpoints.tidy(folder, keep=0)
+    return trained
 
 
 def checked(args: Args) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -104,6 +104,6 @@ def test_help_names_both(capsys):
 )
 def test_reason(monkeypatch, error, said):
     monkeypatch.setitem(sys.modules, "ray", SimpleNamespace(tune=SimpleNamespace(Callback=object)))
-    report = runpy.run_path(str(ROOT / "agents" / "distribute_report.py"))
+    report = runpy.run_path(str(ROOT / "agents" / "distribute_trial.py"))
     told = f"Failure # 1 (occurred at noon)\nold\nFailure # 2 (occurred at one)\n{error}\n"
     assert report["reason"](told) == said

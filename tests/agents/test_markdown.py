@@ -1,7 +1,11 @@
 import pytest
 
-from agents.markdown import put
+from agents.markdown import put, table
 from hoof_env.errors import DataFileError
+
+
+def test_a_table():
+    assert table(["a", "b"], [["1", "2"], ["3"]]) == "| a | b |\n| --- | --- |\n| 1 | 2 |\n| 3 |  |"
 
 
 def test_a_table_goes_between_its_marks():

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from agents import open_loop, open_loop_search
-from agents.evaluate import find_policy, play
-from agents.open_loop import GAITS, Args, load_open_loop, main, optimise
+from agents.open_loop import Args, main, optimise
 from agents.open_loop_search import SIZES, cost, decode, search
 from agents.runs import make_env
-from agents.score import score_vector
+from agents.score import find_policy, play, score_vector
 from hoof_env import records
+from hoof_env.envs.policies import GAITS, load_open_loop
 from hoof_env.errors import DataFileError, HoofEnvError, ParameterError
 
 ENV_ID = "hoof_env/HorseLeg-v0"
@@ -38,7 +38,7 @@ def arguments(path, **changes):
 
 
 class Bowl:
-    """A court where the distance to a point costs, and starts add noise that all candidates share."""
+    """An objective where the distance to a point costs, and starts add noise that all candidates share."""
 
     family = "constant"
 
@@ -56,31 +56,31 @@ class Bowl:
 
 
 def test_a_search_finds_the_bottom_of_a_bowl_and_never_meets_a_start_twice():
-    court, ticks = Bowl(), []
-    x, _, interrupted = search(court, 0, 64 * 40, lambda count, best: ticks.append(count))
-    np.testing.assert_allclose(x, court.middle, atol=0.05)
+    objective, ticks = Bowl(), []
+    x, _, interrupted = search(objective, 0, 64 * 40, lambda count, best: ticks.append(count))
+    np.testing.assert_allclose(x, objective.middle, atol=0.05)
     assert not interrupted
-    assert sum(map(len, court.met)) == len(set.union(*court.met))
-    assert min(set.union(*court.met)) > open_loop_search.TEST_SEED + 1_000_000
+    assert sum(map(len, objective.met)) == len(set.union(*objective.met))
+    assert min(set.union(*objective.met)) > open_loop_search.TEST_SEED + 1_000_000
     assert sum(ticks) <= 64 * 40
     other = Bowl()
     search(other, 1, 64 * 40, lambda *_: None)
-    assert not set.union(*court.met) & set.union(*other.met)
+    assert not set.union(*objective.met) & set.union(*other.met)
 
 
 def test_an_interrupted_search_keeps_the_best_so_far():
-    court = Bowl(interrupt_after=12)
-    x, _, interrupted = search(court, 0, 64 * 40, lambda *_: None)
+    objective = Bowl(interrupt_after=12)
+    x, _, interrupted = search(objective, 0, 64 * 40, lambda *_: None)
     assert interrupted
-    assert ((x - court.middle) ** 2).sum() < 0.5
+    assert ((x - objective.middle) ** 2).sum() < 0.5
     with pytest.raises(KeyboardInterrupt):
         search(Bowl(interrupt_after=1), 0, 64 * 40, lambda *_: None)
 
 
 def test_a_start_is_the_first_point(monkeypatch):
-    court = Bowl()
-    x, _, _ = search(court, 0, 64 * 3, lambda *_: None, start=court.middle)
-    assert ((x - court.middle) ** 2).sum() < 0.1
+    objective = Bowl()
+    x, _, _ = search(objective, 0, 64 * 3, lambda *_: None, start=objective.middle)
+    assert ((x - objective.middle) ** 2).sum() < 0.1
 
 
 def test_decoding_reaches_all_frequencies():
@@ -131,7 +131,7 @@ def test_searches_that_are_there_are_not_made_again(tmp_path, monkeypatch):
     monkeypatch.setattr(
         open_loop,
         "search",
-        lambda court, seed, *rest: (seed == 1 or pytest.fail("again")) and search(court, seed, *rest),
+        lambda objective, seed, *rest: (seed == 1 or pytest.fail("again")) and search(objective, seed, *rest),
     )
     both = optimise(arguments(tmp_path, restarts=2))
     assert both["restarts"][0] == first["restarts"][0]

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from agents import score
-from agents.evaluate import find_policy, play
 from agents.runs import make_env
-from agents.score import Held, score_vector
+from agents.score import Held, find_policy, play, score_vector
 from hoof_env.errors import ParameterError
 
 ENV_ID = "hoof_env/HorseLeg-v0"

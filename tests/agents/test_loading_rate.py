@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from agents.evaluate import Args, evaluate, find_policy, play
-from agents.impact import loading_rates, stances, steepest
+from agents.evaluate import Args, evaluate
+from agents.loading_rate import loading_rates, stances, steepest
 from agents.runs import make_env
+from agents.score import find_policy, play
 from hoof_env.errors import ParameterError
 
 LEG = "hoof_env/HorseLeg-v0"
@@ -23,14 +24,14 @@ def test_whole_stances_alone_count():
     force = np.zeros(100)
     force[:5] = force[95:] = 500.0  # began before, ends after
     force[20:30] = 300.0
-    force[40] = 40.0  # grazes, less than 5 % of the weight
+    force[40] = 40.0  # grazes, less than the threshold
     force[60:80], force[65] = 200.0, 900.0
-    assert stances(force, 1000.0).tolist() == [[20, 30], [60, 80]]
-    rates = loading_rates(force, np.zeros(100), 1000.0, 1e-3)
+    assert stances(force, 50.0).tolist() == [[20, 30], [60, 80]]
+    rates = loading_rates(force, np.zeros(100), 50.0, 1e-3)
     assert rates == pytest.approx([300 / 1e-3, 900 / 5e-3 - 200 / 5e-3])
     friction = np.zeros(100)
     friction[62] = 1e4  # the highest ground reaction force, and so the end of the rise
-    assert loading_rates(force, friction, 1000.0, 1e-3)[1] == pytest.approx(200 / 3e-3)
+    assert loading_rates(force, friction, 50.0, 1e-3)[1] == pytest.approx(200 / 3e-3)
 
 
 def rate_of(policy, **env_kwargs):
