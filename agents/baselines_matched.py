@@ -24,7 +24,7 @@ import numpy as np
 from agents import runs
 from agents.baselines_results import Row, Scored, over_seeds, reference
 from agents.baselines_run import LEG
-from agents.markdown import table
+from agents.command import table
 from agents.score import CURVE_SEEDS, FINAL_SEEDS, mean_figures, score_vector
 from hoof_env.envs.policies import GAITS
 from hoof_env.gait.parameters import LIMITS, GaitParameters
@@ -139,26 +139,6 @@ def seeds_that_dominate(agent: Scored, other: Scored) -> str:
         for one in agent.seeds
     )
     return f"{count}/{len(agent.seeds)}" if agent.seeds else ""
-
-
-def versus(agent: Scored, other: Scored) -> str:
-    """Both speeds, and how much lower the agent is in each of `LOWER`, in words."""
-    fast, slow = (one.intervals["speed_m_s"].text(2) for one in (agent, other))
-    titles = {key: COLUMNS[key][0].removesuffix(" kN") for key in LOWER}
-    lower = [
-        f"{title} {100 * (1 - agent.intervals[key].mean / other.intervals[key].mean):.0f} %"
-        for key, title in titles.items()
-    ]
-    return f"{fast} m/s beside {slow}, lower by {', '.join(lower)}"
-
-
-def bar(row: Row, run: Scored) -> str:
-    """Whether the agents of a labelled entry do what is asked of them beside the run, in words."""
-    agent = row.scored
-    word = "met" if dominates(agent, run) else "not met"
-    if word == "met" and bears_less(agent, run):
-        word = "not met" if row.entry.bearing else "met, bearing less of the weight"
-    return f"{word}: {versus(agent, run)}; seed by seed in {seeds_that_dominate(agent, run)}"
 
 
 def compare(rows: Sequence[Row], best: Row | None, run: Scored) -> str:

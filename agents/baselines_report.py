@@ -1,7 +1,9 @@
 """The page of the baselines from what `agents.baselines` left: tables, curves as CSV and as pictures.
 
-python -m agents.baselines                  trains, then writes docs/baselines.md
-python -m agents.baselines_report           writes it again, from whatever is done
+    python -m agents.baselines                  trains, then writes runs/baselines/report.md
+    python -m agents.baselines_report           writes it again, from whatever is done
+
+docs/baselines.md says what the tables mean and what came of the full plan.
 """
 
 from __future__ import annotations
@@ -10,12 +12,16 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+import matplotlib
 import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import EngFormatter, NullFormatter
 
 from agents import runs
 from agents.baselines_matched import COLUMNS as GAIT_COLUMNS
-from agents.baselines_matched import bar, cells, compare
+from agents.baselines_matched import cells, compare
 from agents.baselines_results import (
     GAITS,
     OPEN_LOOP,
@@ -27,20 +33,16 @@ from agents.baselines_results import (
     references,
     versions_of,
 )
-from agents.baselines_run import COLUMNS, FOLDERS, LEG, Plan, load_plan, write_csv
-from agents.command import run
-from agents.markdown import put, table
-
-QUICK_SECONDS, QUICK_SHARE = 120.0, 0.9
-"""PPO is to beat both gaits so soon in so large a share of its seeds."""
-
-PAGE = Path("docs/baselines.md")
-"""Of the full plan; a small one is written beside its trainings, over agents/templates/baselines.md."""
-
-BLANK = Path(__file__).parent / "templates" / "baselines.md"
+from agents.baselines_run import COLUMNS, CURVE, FOLDERS, LEG, Plan, load_plan, read_curve, write_csv
+from agents.command import run, table
+from agents.evaluate import Score
+from hoof_env.paper.figure_style import BLUE, GREEN, GREY, ORANGE, PURPLE, STYLE
 
 POINTS = 40
 """Of a curve."""
+
+BINS = 60
+"""Of training episodes in the picture of one training."""
 
 WIDE = 5.0
 """An axis is logarithmic where the longest training is so many times the shortest."""
@@ -56,8 +58,8 @@ class Args:
     runs: Path | None = None
     """folder of the trainings; otherwise runs/baselines or runs/baselines-nightly"""
     page: Path | None = None
-    """the page; pictures and CSV go into the folder beside it of the same name; otherwise baselines.md in the
-    folder of the trainings that is given, or docs/baselines.md, or beside the nightly runs"""
+    """the page; pictures and CSV go into the folder beside it of the same name; otherwise report.md in the
+    folder of the trainings"""
 
 
 def unlabelled(rows: Sequence[Row], env_id: str) -> list[Row]:
@@ -124,26 +126,6 @@ def figures_table(rows: Sequence[Row], gaits: References) -> str:
     return table(["id", "policy", *(title for title, *_ in GAIT_COLUMNS.values())], lines)
 
 
-def bars_table(rows: Sequence[Row], known: Mapping[str, Scored]) -> str:
-    """What was asked of the baselines, and whether they do it."""
-    best, lines = best_of(rows), []
-    if best is not None:
-        ours = best.scored.intervals["return"]
-        for name in (name for name in ("run", OPEN_LOOP) if name in known):
-            other = known[name].intervals["return"]
-            word = "met" if ours.above(other) else "not met"
-            asked = f"the best agent returns more than {name}, intervals apart"
-            lines.append([asked, f"{word}: {best.title} {ours.text()} beside {other.text()}"])
-    lines += [[row.entry.asked, bar(row, known["run"])] for row in rows if row.entry.label]
-    for row in unlabelled(rows, LEG):
-        if row.entry.algo == "ppo":
-            quick = sum(seconds <= QUICK_SECONDS for seconds in times_to_beat(row, known))
-            word = "met" if quick >= QUICK_SHARE * row.entry.seeds else "not met"
-            asked = f"PPO beats both gaits within {QUICK_SECONDS:.0f} s in {QUICK_SHARE:.0%} of its seeds"
-            lines.append([asked, f"{word}: {quick} of {row.entry.seeds}"])
-    return table(["bar", ""], lines)
-
-
 def made_text(rows: Sequence[Row]) -> str:
     """The command of each entry's first seed, and the versions of all."""
     commands = "\n".join(f"    {row.command}" for row in rows)
@@ -179,12 +161,6 @@ def over_time(row: Row, key: str, is_log: bool) -> tuple[Floats, Floats]:
 
 def draw_curves(rows: Sequence[Row], known: Mapping[str, Scored], path: Path) -> None:
     """One picture: the return against steps and against wall time, a line and a band for each entry."""
-    import matplotlib
-    from matplotlib.figure import Figure
-    from matplotlib.ticker import EngFormatter, NullFormatter
-
-    from hoof_env.paper.figure_style import BLUE, GREEN, GREY, ORANGE, PURPLE, STYLE
-
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(9, 3.6), layout="constrained")
         panels = figure.subplots(1, 2, sharey=True)
@@ -217,34 +193,88 @@ def draw_curves(rows: Sequence[Row], known: Mapping[str, Scored], path: Path) ->
         figure.savefig(path, dpi=130)
 
 
+def draw_learning_curve(folder: Path, scores: Sequence[Score], path: Path, **options: Any) -> None:
+    """Draw the training episodes of a run folder, the scores on the way where it has a curve.csv, the trained
+    policy, which is the first of `scores`, and the means of the others.
+
+    Args:
+        folder: of the run.
+        scores: of the trained policy, and of others to compare it with.
+        path: of the picture.
+        options: of `Figure.savefig`.
+    """
+    episodes = runs.read_episodes(folder)
+    bins = [part for part in np.array_split(episodes, BINS) if len(part)]
+    with matplotlib.rc_context({**STYLE, "font.size": 10}):
+        figure = Figure(figsize=(7, 3.6), layout="constrained")
+        axes = figure.subplots()
+        if bins:
+            steps = [1e-6 * part[:, 0].mean() for part in bins]
+            low, middle, high = np.transpose([np.quantile(part[:, 1], (0.1, 0.5, 0.9)) for part in bins])
+            axes.fill_between(
+                steps, low, high, color=BLUE, alpha=0.2, lw=0, label="80 % of training episodes"
+            )
+            axes.plot(steps, middle, color=BLUE, lw=1.5, label="their median")
+        if curve := read_curve(folder / CURVE):
+            points = [(1e-6 * row["steps"], row["return"]) for row in curve]
+            axes.plot(*zip(*points, strict=True), color=GREEN, lw=1, label="without noise on the way")
+        policy, *others = [(score.policy, score.estimates["return"].mean) for score in scores]
+        label = f"this policy, without noise: {policy[1]:.1f}"
+        axes.plot(1e-6 * training_length(folder)[0], policy[1], "o", color=GREEN, label=label)
+        for name, level in others:
+            axes.axhline(level, color=ORANGE, lw=1, ls="--")
+            axes.annotate(
+                f"{name} {level:.1f}", (1, level), (4, 0), xycoords=axes.get_yaxis_transform(),
+                textcoords="offset points", va="center", color=ORANGE,
+            )  # fmt: skip
+        axes.set(xlabel="environment steps [millions]", ylabel="return of an episode")
+        axes.set_xlim(left=0)
+        axes.grid(axis="y", color=GREY, alpha=0.15)
+        figure.legend(loc="outside upper left", ncols=2)
+        figure.savefig(path, **options)
+
+
+def training_length(folder: Path) -> tuple[int, float]:
+    """Environment steps and seconds of wall time of a training."""
+    if finished := runs.read_record(folder).get("finished"):
+        return int(finished["steps"]), float(finished["seconds"])
+    episodes = runs.read_episodes(folder)
+    return (int(episodes[-1, 0]), float(episodes[:, 2].max())) if len(episodes) else (0, 0.0)
+
+
 def report(args: Args) -> Path:
     """Write page, pictures and CSV; returns the page.
 
     Raises:
-        DataFileError: nothing is done, a result cannot be read, or the page has lost its marks.
+        DataFileError: nothing is done, or a result cannot be read.
     """
     folder = args.runs or FOLDERS[args.subset]
     rows = read_results(load_plan(args.subset), folder)
-    is_small = args.runs is not None or args.subset != "full"
-    page = args.page or (folder / "baselines.md" if is_small else PAGE)
+    page = args.page or folder / "report.md"
     beside = page.with_suffix("")
     beside.mkdir(parents=True, exist_ok=True)
     gaits = {row.entry.env_id: references(row.entry.env_id) for row in rows}
+    pictures = []
     for env_id, known in gaits.items():
         if shown := unlabelled(rows, env_id):
-            draw_curves(shown, known, beside / f"{env_id.rpartition('/')[2]}.png")
+            name = env_id.rpartition("/")[2]
+            draw_curves(shown, known, beside / f"{name}.png")
+            pictures.append(f"![{name}]({beside.name}/{name}.png)")
     write_data(rows, beside)
     known = gaits.get(LEG) or references(LEG)
-    text = (BLANK if args.subset != "full" or not page.is_file() else page).read_text(encoding="utf-8")
-    for mark, content in {
-        "bars": bars_table(rows, known),
-        "table": results_table(rows, gaits),
-        "figures": figures_table(rows, gaits),
-        "matched": compare(rows, best_of(rows), known["run"]),
-        "made": made_text(rows),
-    }.items():
-        text = put(text, mark, content)
-    runs.write_text(page, text)
+    parts = [
+        f"# Baselines: the {args.subset} plan",
+        "## Returns",
+        results_table(rows, gaits),
+        *pictures,
+        "## What the gaits are like",
+        figures_table(rows, gaits),
+        "## At matched speed",
+        compare(rows, best_of(rows), known["run"]),
+        "## How it was made",
+        made_text(rows),
+    ]
+    runs.write_text(page, "\n\n".join(parts) + "\n")
     return page
 
 

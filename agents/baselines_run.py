@@ -28,7 +28,7 @@ import yaml
 from agents import runs
 from agents.command import parse_pairs, run
 from agents.score import CURVE_SEEDS, FIGURES, FINAL_SEEDS, mean_figures, score_vector
-from agents.settings import FOLDER, Algorithm, load_settings
+from agents.settings import FOLDER, TrainingArgs, load_settings
 from agents.train import Args as TrainArgs
 from agents.train import train
 from agents.watch import Scorer
@@ -61,8 +61,6 @@ class Entry:
     env_kwargs: Mapping[str, Any] = field(default_factory=dict, hash=False)
     label: str = ""
     paid: str = ""
-    asked: str = ""
-    bearing: bool = False
 
     @property
     def name(self) -> str:
@@ -113,19 +111,9 @@ def runs_of(plan: Sequence[Entry]) -> Iterator[Run]:
 
 
 @dataclass(frozen=True)
-class Args:
-    algo: Algorithm = "ppo"
-    """algorithm, with its file in agents/hyperparams"""
-    env_id: str = LEG
-    """registered environment"""
-    env_kwargs: tuple[str, ...] = ()
-    """its arguments: key=value ..., or one JSON object"""
+class Args(TrainingArgs):
     seed: int = 0
     """of the training"""
-    steps: int | None = None
-    """environment steps; otherwise n_timesteps of the hyperparameter file"""
-    params: tuple[str, ...] = ()
-    """hyperparameters to change: key=value ..., or one JSON object"""
     points: int = 30
     """scores on the way, at equal distances"""
     out: Path | None = None

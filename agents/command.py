@@ -1,5 +1,5 @@
 """What the commands of this folder share: key=value arguments, threads, one line for an error, 130 for
-Ctrl-C."""
+Ctrl-C, and tables in Markdown."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ import os
 import sys
 import threading
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from typing import NoReturn
 
 from hoof_env._arguments import parse_pairs
 from hoof_env.errors import HoofEnvError, check_number
 
-__all__ = ["check_threads", "parse_pairs", "run"]
+__all__ = ["check_threads", "parse_pairs", "run", "table"]
 
 
 def check_threads(threads: int) -> None:
@@ -37,3 +37,9 @@ def run(command: Callable[[], int | None]) -> NoReturn:
         print("\ninterrupted", file=sys.stderr)
         code = 130
     sys.exit(code)
+
+
+def table(titles: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table; a row that is shorter than its head ends in empty cells."""
+    lines = [titles, ["---"] * len(titles), *([*row, *[""] * (len(titles) - len(row))] for row in rows)]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)

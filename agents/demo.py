@@ -25,8 +25,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from agents import evaluate, runs, train
+from agents.baselines_report import draw_learning_curve
 from agents.command import run
-from agents.learning_curve import draw_learning_curve
 from agents.ship import TEMPLATES
 from hoof_env._output import check_folder, staged
 from hoof_env.errors import check_number

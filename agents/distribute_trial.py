@@ -13,11 +13,10 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from ray import tune
-from tqdm import tqdm
 
 from agents import checkpoints, runs
-from agents.distribute_space import ENV
 from agents.score import CURVE_SEEDS
+from agents.settings import ENV
 from agents.train import Args, train
 from agents.watch import DivergedError, Scorer
 from hoof_env.errors import DataFileError, ParameterError
@@ -109,7 +108,7 @@ def figures(report: dict[str, Any] | None) -> dict[str, Any]:
 
 
 class Progress(tune.Callback):
-    """A bar over trials, and a line when one ends, when its worker died and when it goes on.
+    """A line for each score, and when a trial ends, when its worker died and when it goes on.
 
     Attributes:
         going: ids of trials that had not ended at the last step; of the class, for Tune works with a copy.
@@ -117,39 +116,32 @@ class Progress(tune.Callback):
 
     going: ClassVar[set[str]] = set()
 
-    def setup(self, **info: Any) -> None:
-        self.bar: Any = None  # made where the experiment runs: Ray may send this object there
-
     def on_step_end(self, iteration: int, trials: list[Any], **info: Any) -> None:
         Progress.going = {t.trial_id for t in trials if t.status not in ("TERMINATED", "ERROR")}
-        ended = len(trials) - len(Progress.going)
-        if self.bar is None:
-            self.bar = tqdm(unit=" trials", initial=ended, mininterval=0.0)
-        returns = [x for trial in trials if (x := figures(trial.last_result)["return"]) is not None]
-        running = sum(trial.status == "RUNNING" for trial in trials)
-        line = f"{running} running" + (f", best return {max(returns):.1f}" if returns else "")
-        if (ended, line) != (self.bar.n, self.bar.postfix):
-            self.bar.total, self.bar.n = len(trials), ended
-            self.bar.set_postfix_str(line)
+
+    def on_trial_result(
+        self, iteration: int, trials: list[Any], trial: Any, result: dict[str, Any], **info: Any
+    ) -> None:
+        score = figures(result)
+        if score["return"] is not None:  # as where no episode of RLlib's ended
+            write_line(trial, f"{score['steps']:,.0f} steps, return {score['return']:.2f}")
 
     def on_trial_recover(self, iteration: int, trials: list[Any], trial: Any, **info: Any) -> None:
         kept = trial.latest_checkpoint_result
         steps = figures(kept.metrics)["steps"] if kept else 0
-        self._write(trial, f"{last_failure(trial)} Retry {trial.num_failures}, from step {steps:,.0f}")
+        write_line(trial, f"{last_failure(trial)} Retry {trial.num_failures}, from step {steps:,.0f}")
 
     def on_trial_error(self, iteration: int, trials: list[Any], trial: Any, **info: Any) -> None:
-        self._write(trial, f"{last_failure(trial)} No retry is left")
+        write_line(trial, f"{last_failure(trial)} No retry is left")
 
     def on_trial_complete(self, iteration: int, trials: list[Any], trial: Any, **info: Any) -> None:
-        score = figures(trial.last_result)["return"]  # none where no episode of RLlib's ended
-        self._write(trial, "done" if score is None else f"done, return {score:.2f}")
+        ended = sum(trial.status in ("TERMINATED", "ERROR") for trial in trials)
+        write_line(trial, f"done; {ended} of {len(trials)} trials have ended")
 
-    def on_experiment_end(self, trials: list[Any], **info: Any) -> None:
-        if self.bar is not None:
-            self.bar.close()
 
-    def _write(self, trial: Any, what: str) -> None:
-        tqdm.write(f"trial {trial.trial_id.rpartition('_')[2]}: {what}")
+def write_line(trial: Any, what: str) -> None:
+    """A line about a trial, at once."""
+    print(f"trial {trial.trial_id.rpartition('_')[2]}: {what}", flush=True)
 
 
 def last_failure(trial: Any) -> str:

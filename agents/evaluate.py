@@ -57,7 +57,7 @@ METRICS = {
 }
 """The columns: "return", figures of the episode summary (`hoof_env.envs.summary.summary_of`), and two means
 over the stances of an episode, 0 without a stance: "stance_peak_n", of their highest force, and, where it is
-asked for, "loading_rate_n_s" (`agents.loading_rate`), of the steepest rise of the force at impact."""
+asked for, "loading_rate_n_s" (`agents.score.LoadingRate`), of the steepest rise of the force at impact."""
 
 
 @dataclass(frozen=True)

@@ -31,11 +31,10 @@ import numpy as np
 from tyro.conf import Positional
 
 from agents import runs
-from agents.command import run
+from agents.baselines_report import draw_learning_curve, training_length
+from agents.command import run, table
 from agents.evaluate import METRICS, Interval, Score, cell, to_json
 from agents.export import about, write_policy
-from agents.learning_curve import draw_learning_curve, training_length
-from agents.markdown import table
 from agents.score import FINAL_SEEDS as SCORE_SEEDS
 from agents.score import score_vector
 from hoof_env._output import check_folder, staged
@@ -45,6 +44,7 @@ from hoof_env.errors import DataFileError, OutputError, ParameterError, check_ch
 from hoof_env.onnx_policy import FILE, OnnxPolicy
 from hoof_env.plain_policy import ABOUT, WEIGHTS
 from hoof_env.records import setting
+from hoof_env.render.film import render_episode
 
 POLICIES = Path(__file__).with_name("policies")
 TEMPLATES = Path(__file__).with_name("templates")
@@ -60,8 +60,8 @@ CHECKED = 20
 GAITS = ("run", "walk", "carrying_walk", "open-loop")
 """Scored beside the policy, where an id has them."""
 
-LIMIT, FILM_LIMIT = 1_000_000, 750_000
-"""Bytes of a folder and of the film in it, which is made shorter where it is larger."""
+LIMIT = 1_000_000
+"""Bytes of a folder."""
 
 COPIED = (WEIGHTS, ABOUT, "config.yml")
 NOT_COPIED = ("args",)
@@ -169,7 +169,6 @@ def ship(choice: Choice, env_id: str, out: Path, seconds: float = 4.0) -> dict[s
         score = score_record(policy, scores, env_id, trained_on)
         if env_id != trained_on:
             record["trained_on"] = trained_on
-            score["objectives"] = objectives(policy, env_id)
         for name in COPIED:
             if saved.path.with_name(name).is_file():
                 shutil.copyfile(saved.path.with_name(name), stage / name)
@@ -178,23 +177,13 @@ def ship(choice: Choice, env_id: str, out: Path, seconds: float = 4.0) -> dict[s
         (stage / "score.json").write_text(text + "\n", encoding="utf-8")
         no_name = {"Software": None}  # of the program that drew it
         draw_learning_curve(saved.path.parent, scores, stage / "curve.png", dpi=90, metadata=no_name)
-        film(stage, env_id, seconds)
+        where = {"seed": SCORE_SEEDS[0], "seconds": seconds, "fps": 20, "size": (480, 270)}
+        render_episode(stage / "film.gif", str(stage / FILE), env_id, **where)
         write_card(stage, env_id, record, score, scores, choice)
         size = sum(file.stat().st_size for file in stage.iterdir())
         if size > LIMIT:
-            raise OutputError(f"{folder}: expected at most {LIMIT:,} bytes, got {size:,}")
+            raise OutputError(f"{folder}: expected at most {LIMIT:,} bytes, got {size:,}; shorten --seconds")
     return score
-
-
-def film(folder: Path, env_id: str, seconds: float) -> None:
-    """Write film.gif of the policy in `folder`, shorter where it would be larger than `FILM_LIMIT`."""
-    from hoof_env.render.film import render_episode
-
-    path = folder / "film.gif"
-    while not path.is_file() or path.stat().st_size > FILM_LIMIT:
-        policy = str(folder / FILE)
-        render_episode(path, policy, env_id, seed=SCORE_SEEDS[0], seconds=seconds, fps=20, size=(480, 270))
-        seconds *= 0.75
 
 
 @cache
@@ -246,21 +235,6 @@ def tolerance(policy: Any, env_id: str, returns: Sequence[float]) -> float:
     again = score_vector(Trembling(policy), env_id, SCORE_SEEDS[:CHECKED])
     off = np.array([episode["return"] for episode in again]) - returns[: len(again)]
     return float(4 * np.sqrt(np.mean(off**2) / len(off)) + 0.01 * abs(np.mean(returns)))
-
-
-def objectives(policy: Any, env_id: str) -> dict[str, float]:
-    """Mean return of each objective of a multi-objective id over the checked episodes."""
-    from hoof_env.envs.multi_objective import OBJECTIVES
-
-    sums = np.zeros(len(OBJECTIVES))
-    with runs.make_env(env_id) as env:
-        for seed in SCORE_SEEDS[:CHECKED]:
-            observation, _ = env.reset(seed=seed)
-            done = False
-            while not done:
-                observation, reward, terminated, truncated, _ = env.step(policy.predict(observation)[0])
-                sums, done = sums + np.asarray(reward), terminated or truncated
-    return dict(zip(OBJECTIVES, (sums / CHECKED).round(4).tolist(), strict=True))
 
 
 def shown_command(command: str) -> str:

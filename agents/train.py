@@ -26,7 +26,7 @@ from agents import checkpoints, runs
 from agents.command import check_threads, parse_pairs, run
 from agents.settings import (
     FOLDER,
-    Algorithm,
+    TrainingArgs,
     algorithm_class,
     load_settings,
     model_arguments,
@@ -37,22 +37,11 @@ from hoof_env.plain_policy import WEIGHTS
 
 
 @dataclass(frozen=True)
-class Args:
-    env_id: str = "hoof_env/HorseLeg-v0"
-    """registered environment; module:id imports the module first"""
-    algo: Algorithm = "ppo"
-    """algorithm of Stable-Baselines3 or sb3-contrib, with its file in agents/hyperparams"""
+class Args(TrainingArgs):
     seed: int = 0
     """of the environments, the network and the sampling"""
-    steps: int | None = None
-    """environment steps in all, rounded up to whole rollouts (n_steps times n_envs); otherwise n_timesteps
-    of the hyperparameter file"""
     n_envs: int | None = None
     """environments stepped side by side; otherwise n_envs of the hyperparameter file"""
-    env_kwargs: tuple[str, ...] = ()
-    """arguments of the environment: key=value ..., or one JSON object"""
-    params: tuple[str, ...] = ()
-    """hyperparameters to change: key=value ..., or one JSON object"""
     hyperparams: Path | None = None
     """YAML file in rl-baselines3-zoo's format; otherwise agents/hyperparams/ALGO.yml"""
     out: Path | None = None

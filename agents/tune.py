@@ -21,13 +21,13 @@ from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import yaml
 
 from agents import runs
 from agents.command import parse_pairs, run
-from agents.settings import FOLDER, Algorithm, load_settings
+from agents.settings import FOLDER, TrainingArgs, load_settings
 from agents.train import Args as TrainArgs
 from agents.train import checked, make_model, make_record, train
 from agents.watch import DivergedError, EndedError, Scorer
@@ -39,25 +39,13 @@ SEEDS = range(1000, 1064)
 
 
 @dataclass(frozen=True)
-class Args:
-    algo: Algorithm = "ppo"
-    """algorithm, with its file in agents/hyperparams"""
-    env_id: str = "hoof_env/HorseLeg-v0"
-    """registered environment; module:id imports the module first"""
-    env_kwargs: tuple[str, ...] = ()
-    """its arguments: key=value ..., or one JSON object"""
+class Args(TrainingArgs):
     trials: int = 20
     """that the study has in the end, those of earlier starts counted"""
-    steps: int | None = None
-    """of each trial; otherwise n_timesteps of the hyperparameter file"""
     scores: int = 10
     """how often a trial is scored, the last time at its end"""
-    params: tuple[str, ...] = ()
-    """settings that are held: key=value ..., or one JSON object; they are not drawn"""
     space: Path = SPACES
-    """YAML file of what is drawn"""
-    pruner: Literal["median", "hyperband", "none"] = "median"
-    """what ends a bad trial early"""
+    """YAML file of what is drawn; settings in --params are held"""
     seed: int = 0
     """of the search; trial n trains with seed + n"""
     out: Path | None = None
@@ -230,7 +218,7 @@ def open_study(args: Args, folder: Path, about: dict[str, Any]) -> Any:
         raise ParameterError("agents.tune needs Optuna: pip install 'hoof-env[tune]'") from None
     optuna.logging.set_verbosity(optuna.logging.ERROR)  # what ends a trial is raised, too
     check_space(args, about)
-    study = load_study(folder / "study.db", make_pruner(args.pruner, about["base"]["n_timesteps"]))
+    study = load_study(folder / "study.db", about["base"]["n_timesteps"])
     # Of the same seed a study that goes on would draw again what it has drawn
     seed = args.seed + len(study.trials)
     study.sampler = optuna.samplers.TPESampler(seed=seed, multivariate=True, n_startup_trials=8)
@@ -259,20 +247,8 @@ def check_space(args: Args, about: dict[str, Any]) -> None:
         make_model(training, settings, many)
 
 
-def make_pruner(name: str, steps: int) -> Any:
-    """What ends a bad trial of a training of so many steps."""
-    from optuna import pruners
-
-    if name == "hyperband":
-        return pruners.HyperbandPruner(max(1, steps // 10), steps)
-    if name == "none":
-        return pruners.NopPruner()
-    # By the median of five whole trials at the least, and not before a third of a training
-    return pruners.MedianPruner(5, n_warmup_steps=steps // 3)
-
-
-def load_study(path: Path, pruner: Any) -> Any:
-    """Optuna's study in the database at `path`, made if need be."""
+def load_study(path: Path, steps: int) -> Any:
+    """Optuna's study in the database at `path`, made if need be, of trainings of so many steps."""
     import optuna
     from sqlalchemy.exc import SQLAlchemyError
 
@@ -280,7 +256,8 @@ def load_study(path: Path, pruner: Any) -> Any:
         study = optuna.create_study(
             storage=f"sqlite:///{path}",
             study_name="study",
-            pruner=pruner,
+            # By the median of five whole trials at the least, and not before a third of a training
+            pruner=optuna.pruners.MedianPruner(5, n_warmup_steps=steps // 3),
             direction="maximize",
             load_if_exists=True,
         )

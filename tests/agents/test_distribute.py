@@ -8,8 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from agents.distribute import Rllib, Trials, main, prepare, start
-from agents.distribute_space import Axis, parse_space
+from agents.distribute import Axis, Rllib, Trials, main, parse_space, prepare, start
 from hoof_env.errors import HoofEnvError, ParameterError
 
 ROOT = Path(__file__).parents[2]

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from agents.evaluate import Args, evaluate
-from agents.loading_rate import loading_rates, stances, steepest
 from agents.runs import make_env
-from agents.score import find_policy, play
+from agents.score import find_policy, loading_rates, play, stances, steepest
 from hoof_env.errors import ParameterError
 
 LEG = "hoof_env/HorseLeg-v0"
