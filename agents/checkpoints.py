@@ -65,8 +65,8 @@ def whole(folder: Path) -> Iterator[Path]:
 
 def checkpoints(run: Path) -> list[Path]:
     """The checkpoints of a run, the last one first; whatever else was left half-done is not among them."""
-    found = (path for path in (run / runs.CHECKPOINTS).glob("*") if path.name.isdigit())
-    return sorted(found, key=lambda path: int(path.name), reverse=True)
+    folders = (path for path in (run / runs.CHECKPOINTS).glob("*") if path.name.isdigit())
+    return sorted(folders, key=lambda path: int(path.name), reverse=True)
 
 
 def tidy(run: Path, keep: int = KEPT) -> None:

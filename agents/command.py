@@ -25,8 +25,8 @@ def check_threads(threads: int) -> None:
 def run(command: Callable[[], int | None]) -> NoReturn:
     """Exit with what `command` returns: one line and 2 for an error of ours or of the system, as a full disk,
     one line and 130 for Ctrl-C; a warning is one line, too."""
-    hook = threading.excepthook  # TensorBoard's thread fails on a full disk; its caller tells that, too
-    threading.excepthook = lambda told: None if isinstance(told.exc_value, OSError) else hook(told)
+    hook = threading.excepthook  # TensorBoard's thread fails on a full disk; its caller reports that, too
+    threading.excepthook = lambda args: None if isinstance(args.exc_value, OSError) else hook(args)
     warnings.formatwarning = lambda message, *_, **__: f"warning: {message}\n"
     try:
         code = command() or 0

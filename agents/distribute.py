@@ -201,8 +201,8 @@ def prepare(args: Trials) -> dict[str, Any]:
     for name in ("seeds", "samples", "report_every", "cpus_per_trial"):
         check_number(name, getattr(args, name), low=1)
     algorithm_class(args.algo)
-    asked: dict[str, Any] = {"env_id": args.env_id, "algo": args.algo, "torch_threads": args.cpus_per_trial}
-    one = TrainArgs(**asked, steps=args.steps, env_kwargs=args.env_kwargs, params=args.params)
+    fixed: dict[str, Any] = {"env_id": args.env_id, "algo": args.algo, "torch_threads": args.cpus_per_trial}
+    one = TrainArgs(**fixed, steps=args.steps, env_kwargs=args.env_kwargs, params=args.params)
     env_kwargs, settings = checked(one)
     axes = parse_space(args.space)
     check_keys(axes, args.algo, settings)
@@ -214,7 +214,7 @@ def prepare(args: Trials) -> dict[str, Any]:
         for value in axis.values if axis.key.startswith(ENV) else ():
             runs.make_env(args.env_id, **env_kwargs | {axis.key.removeprefix(ENV): value}).close()
     return {
-        "train": asked | {"steps": settings["n_timesteps"]},
+        "train": fixed | {"steps": settings["n_timesteps"]},
         "env_kwargs": env_kwargs,
         "params": parse_pairs("--params", args.params),
         "report_every": args.report_every,
@@ -383,8 +383,8 @@ def fit(args: Cluster, name: str, tuner: dict[str, Any], varied: list[str], **ru
 
     from agents.distribute_trial import Progress, write_table
 
-    asked = {key: value for key, value in asdict(args).items() if key not in Cluster.__dataclass_fields__}
-    digest = hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()[:8]
+    options = {key: value for key, value in asdict(args).items() if key not in Cluster.__dataclass_fields__}
+    digest = hashlib.sha256(json.dumps(options, sort_keys=True).encode()).hexdigest()[:8]
     storage = args.out if "://" in args.out else str(Path(args.out).absolute())
     folder = f"{storage}/{name}-{digest}"
     config = tune.RunConfig(

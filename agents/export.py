@@ -268,7 +268,7 @@ def difference(trained: Any, predict: Any, observations: Any) -> float:
     wanted, _ = trained.predict(observations)
     alone = [predict(row)[0].reshape(-1) for row in observations[:20]]
     both = (predict(observations)[0], np.array(alone))
-    return float(max(np.max(np.abs(found - wanted[: len(found)]) / half) for found in both))
+    return float(max(np.max(np.abs(one - wanted[: len(one)]) / half) for one in both))
 
 
 def main(argv: list[str] | None = None) -> None:

@@ -405,9 +405,9 @@ def earlier(path: Path, about: dict[str, Any]) -> list[dict[str, Any]]:
 
 def file_name(args: Args) -> str:
     """What the file of a search is called."""
-    asked = "" if args.objective == "return" else f"-{args.objective}-{args.speed:g}"
-    asked += "" if args.weight_share is None else f"-share-{args.weight_share:g}"
-    return f"{args.env_id.rpartition('/')[2]}-{args.family}{asked}.json"
+    goal = "" if args.objective == "return" else f"-{args.objective}-{args.speed:g}"
+    goal += "" if args.weight_share is None else f"-share-{args.weight_share:g}"
+    return f"{args.env_id.rpartition('/')[2]}-{args.family}{goal}.json"
 
 
 def main(argv: list[str] | None = None) -> None:

@@ -177,8 +177,10 @@ def ship(choice: Choice, env_id: str, out: Path, seconds: float = 4.0) -> dict[s
         (stage / "score.json").write_text(text + "\n", encoding="utf-8")
         no_name = {"Software": None}  # of the program that drew it
         draw_learning_curve(saved.path.parent, scores, stage / "curve.png", dpi=90, metadata=no_name)
-        where = {"seed": SCORE_SEEDS[0], "seconds": seconds, "fps": 20, "size": (480, 270)}
-        render_episode(stage / "film.gif", str(stage / FILE), env_id, **where)
+        render_episode(
+            stage / "film.gif", str(stage / FILE), env_id,
+            seed=SCORE_SEEDS[0], seconds=seconds, fps=20, size=(480, 270),
+        )  # fmt: skip
         write_card(stage, env_id, record, score, scores, choice)
         size = sum(file.stat().st_size for file in stage.iterdir())
         if size > LIMIT:

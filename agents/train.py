@@ -301,8 +301,9 @@ def make_model(args: Args, settings: dict[str, Any], many: Any) -> Any:
             arguments["buffer_size"] = min(arguments["buffer_size"], most)
         return algorithm_class(args.algo)(env=envs, seed=args.seed, device=args.device, **arguments)
     except (TypeError, ValueError, AssertionError, RuntimeError) as error:  # torch's, for the device
-        said = f"hyperparameters of {args.algo} for {args.env_id} on device {args.device!r}: {error}"
-        raise ParameterError(said) from None
+        raise ParameterError(
+            f"hyperparameters of {args.algo} for {args.env_id} on device {args.device!r}: {error}"
+        ) from None
 
 
 def make_logger(folder: Path, hidden: int) -> Any:
