@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from agents.baselines_run import CURVE, FINAL, Entry, Run, read_curve
 from agents.evaluate import Interval, estimate
-from agents.runs import read_record
+from agents.runs import CONFIG, read_record
 from agents.score import CURVE_SEEDS, FINAL_SEEDS, TRANSPORT, mean_figures, score_vector
 from agents.settings import FOLDER, load_settings
 from hoof_env.errors import DataFileError, HoofEnvError
@@ -97,7 +97,7 @@ class Row:
     @property
     def settings(self) -> dict[str, Any]:
         """The hyperparameters of the trainings."""
-        return load_settings(self.results[0].folder / "config.yml", self.entry.env_id)
+        return load_settings(self.results[0].folder / CONFIG, self.entry.env_id)
 
     @property
     def command(self) -> str:
@@ -128,7 +128,7 @@ def read_result(entry: Entry, folder: Path) -> Result:
         result = Result(folder, json.loads((folder / FINAL).read_text(encoding="utf-8")))
     except (OSError, ValueError) as error:
         raise DataFileError(f"{folder / FINAL}: expected what agents.baselines_run wrote: {error}") from None
-    config = load_settings(folder / "config.yml", entry.env_id)
+    config = load_settings(folder / CONFIG, entry.env_id)
     for used, expected in (
         (result.final["env_kwargs"], entry.env_kwargs),
         (config, expected_settings(entry)),

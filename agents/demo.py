@@ -111,7 +111,7 @@ def demo(args: Args) -> Path:
         with announced(3, f"PPO learns for {budget.steps:,} steps, {budget.max_minutes:g} minutes at most"):
             trained = train_agent(args, budget, stage)
             say(f"{trained.steps:,} steps at {trained.rate:,.0f} steps/s")
-            (score,), setting = evaluate.evaluate(evaluate_args(budget, (str(stage / "model.zip"),)))
+            (score,), setting = evaluate.evaluate(evaluate_args(budget, (str(stage / runs.MODEL),)))
             scores.append(replace(score, policy=TRAINED))
             evaluate.print_table(scores)
 
@@ -170,7 +170,7 @@ def film_all(scores: Sequence[evaluate.Score], budget: Budget, stage: Path) -> l
     clips, size = [], (640, 360)
     first_episodes = {score.policy: score.episodes[0] for score in scores}
     for name in (TRAINED, *GAITS):
-        policy = str(stage / "model.zip") if name == TRAINED else name
+        policy = str(stage / runs.MODEL) if name == TRAINED else name
         path = stage / f"{name.replace(' ', '-')}.mp4"
         render_episode(path, policy, ENV_ID, seed=FIRST_SEED, seconds=budget.film_seconds, size=size)
         first = first_episodes[name]

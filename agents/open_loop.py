@@ -222,11 +222,7 @@ def search(
     """
     import cma
 
-    size, generator, fresh = (
-        SIZES[objective.family],
-        np.random.default_rng([seed, 6]),
-        SEARCH_SEED * (seed + 1),
-    )
+    generator, fresh = np.random.default_rng([seed, 6]), SEARCH_SEED * (seed + 1)
 
     def costs(x: Any, starts: int) -> list[float]:
         nonlocal fresh
@@ -235,12 +231,7 @@ def search(
         tick(ROWS, min(values))
         return values
 
-    if start is None:
-        screened = generator.uniform(-1, 1, (ROWS // 4, size))
-        screened[:, 4:12] *= HARMONIC
-        first, step = screened[np.argmin(costs(screened, 4))], STEP
-    else:
-        first, step = np.array([*start, *[0.0] * (size - 4)]), STEP / 3
+    first, step = first_point(SIZES[objective.family], costs, generator, start)
     options = OPTIONS | {"popsize": POPULATION, "seed": int(generator.integers(1, 2**31))}
     strategy, best, interrupted = cma.CMAEvolutionStrategy(first, step, options), [first], False
     try:
@@ -257,6 +248,20 @@ def search(
     finalists = np.clip(np.round((best * FINALISTS)[:FINALISTS], 5), -1.0, 1.0)
     final = costs(finalists, ROWS // FINALISTS)
     return finalists[np.argmin(final)], min(final), interrupted
+
+
+def first_point(
+    size: int,
+    costs: Callable[[Any, int], list[float]],
+    generator: np.random.Generator,
+    start: Sequence[float] | None,
+) -> tuple[Floats, float]:
+    """Where a search begins, and its first standard deviation."""
+    if start is not None:
+        return np.array([*start, *[0.0] * (size - len(start))]), STEP / 3
+    screened = generator.uniform(-1, 1, (ROWS // 4, size))
+    screened[:, 4:12] *= HARMONIC
+    return screened[np.argmin(costs(screened, 4))], STEP
 
 
 def optimise(args: Args) -> dict[str, Any]:

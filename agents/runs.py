@@ -43,7 +43,8 @@ from hoof_env.saved_policy import describe_env as describe_env
 from hoof_env.saved_policy import describe_spaces as describe_spaces
 from hoof_env.saved_policy import read_record as read_record
 
-FILES = ("model.zip", WEIGHTS, ABOUT, "config.yml", "run.json", "monitor.csv")
+MODEL, CONFIG, RECORD, MONITOR = "model.zip", "config.yml", "run.json", "monitor.csv"
+FILES = (MODEL, WEIGHTS, ABOUT, CONFIG, RECORD, MONITOR)
 """What a run without normalisation leaves, TensorBoard's files aside."""
 
 PACKAGES = ("hoof-env", "numpy", "gymnasium", "numba", "stable-baselines3", "sb3-contrib", "torch")
@@ -143,13 +144,13 @@ def write_text(path: Path, text: str) -> None:
 
 def write_record(folder: Path, record: dict[str, Any]) -> None:
     """Write run.json."""
-    write_text(folder / "run.json", json.dumps(record, indent=2) + "\n")
+    write_text(folder / RECORD, json.dumps(record, indent=2) + "\n")
 
 
 def read_episodes(folder: Path) -> NDArray[np.float64]:
     """The episodes of a training, from monitor.csv: steps of the training when each ended, its return and the
     seconds of the training by then, shape (episodes, 3)."""
-    with (folder / "monitor.csv").open(encoding="utf-8", newline="") as file:
+    with (folder / MONITOR).open(encoding="utf-8", newline="") as file:
         next(file)  # a comment
         rows = [(float(row["l"]), float(row["r"]), float(row["t"])) for row in csv.DictReader(file)]
     episodes = np.array(rows, dtype=float).reshape(-1, 3)
@@ -164,7 +165,7 @@ def save_model(model: Any, path: Path) -> None:
         write_model(model, stage, path.name)
 
 
-def write_model(model: Any, folder: Path, name: str = "model.zip") -> None:
+def write_model(model: Any, folder: Path, name: str = MODEL) -> None:
     """As `save_model`, straight into `folder`."""
     model.save(folder / name)
     save_policy(model, folder)

@@ -201,7 +201,7 @@ def is_model(name: str) -> bool:
     """Whether a policy's name is the path of a model rather than that of a scripted policy or of a gait."""
     if name.endswith(".json"):
         return False
-    return name.endswith((".zip", ".onnx")) or Path(name).name != name or Path(name, "model.zip").is_file()
+    return name.endswith((".zip", ".onnx")) or Path(name).name != name or Path(name, runs.MODEL).is_file()
 
 
 def saved_model(path: Path) -> OnnxPolicy | runs.SavedModel:

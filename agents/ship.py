@@ -63,7 +63,7 @@ GAITS = ("run", "walk", "carrying_walk", "open-loop")
 LIMIT = 1_000_000
 """Bytes of a folder."""
 
-COPIED = (WEIGHTS, ABOUT, "config.yml")
+COPIED = (WEIGHTS, ABOUT, runs.CONFIG)
 NOT_COPIED = ("args",)
 """Of run.json: paths of the machine that trained; the command says the rest."""
 
@@ -82,11 +82,10 @@ class Args:
 
 @dataclass(frozen=True)
 class Choice:
-    """A run, of how many it is the best, and its mean return in `CHOOSING_SEEDS`, None for an only one."""
+    """A run, and of how many it is the best."""
 
     saved: runs.SavedModel
     among: int = 1
-    value: float | None = None
 
 
 def find_runs(folder: Path) -> dict[str, list[runs.SavedModel]]:
@@ -96,12 +95,12 @@ def find_runs(folder: Path) -> dict[str, list[runs.SavedModel]]:
         DataFileError: there is none, or one lacks a file.
     """
     models: dict[str, list[runs.SavedModel]] = {}
-    is_run = (folder / "run.json").is_file()
-    for path in [folder] if is_run else sorted(record.parent for record in folder.rglob("run.json")):
-        if not any((path / name).is_file() for name in ("model.zip", ABOUT)):
+    is_run = (folder / runs.RECORD).is_file()
+    for path in [folder] if is_run else sorted(record.parent for record in folder.rglob(runs.RECORD)):
+        if not any((path / name).is_file() for name in (runs.MODEL, ABOUT)):
             print(f"passed over {path}: it is not through")
             continue
-        needed = ["config.yml", "monitor.csv", *([WEIGHTS] if (path / ABOUT).is_file() else [])]
+        needed = [runs.CONFIG, runs.MONITOR, *([WEIGHTS] if (path / ABOUT).is_file() else [])]
         if missing := [name for name in needed if not (path / name).is_file()]:
             raise DataFileError(f"run {path}: expected all of a training, found no {missing[-1]}")
         saved = runs.SavedModel.find(path)
@@ -123,8 +122,7 @@ def choose(saved: Sequence[runs.SavedModel], env_id: str) -> Choice:
         for one in tqdm(saved, desc=f"runs of {env_id}", leave=False, disable=None):
             episodes = score_vector(one.load(env, env_id), env_id, CHOOSING_SEEDS)
             values.append(float(np.mean([episode["return"] for episode in episodes])))
-    best = int(np.argmax(values))
-    return Choice(saved[best], len(saved), values[best])
+    return Choice(saved[int(np.argmax(values))], len(saved))
 
 
 @contextmanager
@@ -172,7 +170,7 @@ def ship(choice: Choice, env_id: str, out: Path, seconds: float = 4.0) -> dict[s
         for name in COPIED:
             if saved.path.with_name(name).is_file():
                 shutil.copyfile(saved.path.with_name(name), stage / name)
-        (stage / "run.json").write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
+        (stage / runs.RECORD).write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
         text = json.dumps(score, indent=1, allow_nan=False)
         (stage / "score.json").write_text(text + "\n", encoding="utf-8")
         no_name = {"Software": None}  # of the program that drew it
@@ -277,7 +275,7 @@ def write_card(
         record=record,
         steps=steps,
         seconds=seconds,
-        settings=(folder / "config.yml").read_text(encoding="utf-8").strip(),
+        settings=(folder / runs.CONFIG).read_text(encoding="utf-8").strip(),
         score=score,
         spread=float(np.std(score["returns"])),
         titles=[METRICS[key].title.replace("\n", " ") for key in keys],
@@ -295,7 +293,7 @@ def write_index(folder: Path) -> None:
     rows = []
     for path in sorted(folder.glob("*/score.json")):
         score = json.loads(path.read_text(encoding="utf-8"))
-        algo = json.loads(path.with_name("run.json").read_text(encoding="utf-8"))["algo"]
+        algo = json.loads(path.with_name(runs.RECORD).read_text(encoding="utf-8"))["algo"]
         row = [f"`{score['env_id']}`", algo.upper()]
         for name in ("policy", "open-loop", "run"):
             one = score["policies"].get(name)

@@ -135,9 +135,9 @@ def _train(
         envs = model.env
         # Nothing is refused any more
         runs.write_record(folder, record)
-        runs.write_text(folder / "config.yml", config)
+        runs.write_text(folder / runs.CONFIG, config)
         if not resumed:
-            checkpoints.write_episodes(envs, folder / "monitor.csv")
+            checkpoints.write_episodes(envs, folder / runs.MONITOR)
         model.set_logger(make_logger(folder / "tensorboard", model.num_timesteps + 1 if resumed else 0))
         return learn(args, folder, record, settings["n_timesteps"], model, resumed, also)
     finally:
@@ -185,7 +185,7 @@ def learn(
             raise
         trained = Trained(folder, model.num_timesteps, watch.seconds, watch.stopped_by)
         check_divergence(model, folder)
-        runs.save_model(model, folder / "model.zip")
+        runs.save_model(model, folder / runs.MODEL)
         if is_through:
             record["finished"] = {"steps": trained.steps, "seconds": round(trained.seconds, 3)}
             runs.write_record(folder, record)
@@ -255,7 +255,7 @@ def find_earlier(
             f"{folder}: expected a new folder or one of a run, found {', '.join(there)} and no run.json; "
             "choose another folder"
         )
-    held = {"model.zip", WEIGHTS, runs.CHECKPOINTS} & {*there}
+    held = {runs.MODEL, WEIGHTS, runs.CHECKPOINTS} & {*there}
     if held and not args.resume:
         raise OutputError(
             f"{folder} already holds a trained model; choose another folder, remove that one, or go on with "
@@ -266,7 +266,7 @@ def find_earlier(
     keys = ("env_id", "env_kwargs", "settings", "observation_space", "action_space", "algo", "seed")
     pairs = {key: (earlier.get(key), record.get(key)) for key in keys}
     pairs["hoof-env"] = earlier.get("versions", {}).get("hoof-env"), record["versions"].get("hoof-env")
-    used = load_settings(folder / "config.yml", args.env_id)
+    used = load_settings(folder / runs.CONFIG, args.env_id)
     pairs |= {key: (used.get(key), settings.get(key)) for key in {**used, **settings}}
     unlike = [f"{key}: {there!r} there, {now!r} here" for key, (there, now) in pairs.items() if there != now]
     if unlike:
