@@ -23,7 +23,7 @@ from typing import Any
 from tqdm import tqdm
 
 from agents import baselines_report
-from agents.baselines_run import CURVE, FINAL, FOLDERS, Plan, Run, load_plan, read_curve, runs_of
+from agents.baselines_run import FINAL, FOLDERS, Plan, Run, load_plan, runs_of
 from agents.command import run
 from hoof_env._output import check_folder
 from hoof_env.errors import ParameterError, check_number
@@ -80,11 +80,8 @@ def work_off(chosen: Sequence[Run], folder: Path, workers: int) -> list[Run]:
                     if not is_done(one, folder):
                         failed.append(one)
                         tqdm.write(f"{one.name} failed: {last_line(folder / one.name)}")
-                shares = {one.name: share_done(one, folder) for one in running}
-                ended = len(chosen) - len(waiting) - len(running) - len(failed)
-                bar.n = round(ended + sum(shares.values()), 2)
-                line = ", ".join(f"{name} {share:.0%}" for name, share in shares.items())
-                bar.set_postfix_str(f"{line}; {len(waiting)} wait", refresh=False)
+                bar.n = len(chosen) - len(waiting) - len(running) - len(failed)
+                bar.set_postfix_str(", ".join(one.name for one in running), refresh=False)
                 bar.update(0)
         finally:
             stop(running)
@@ -114,13 +111,6 @@ def stop(running: dict[Run, subprocess.Popen[bytes]]) -> None:
         process.terminate()
     for process in running.values():
         process.wait()
-
-
-def share_done(one: Run, folder: Path) -> float:
-    """How much of a training is done, as far as its curve tells."""
-    rows = read_curve(folder / one.name / CURVE)
-    points = (rows[-1]["steps"] / max(rows[1]["steps"], 1.0)) if len(rows) > 1 else 0.0
-    return min(points / one.entry.points, 0.99)
 
 
 def last_line(folder: Path) -> str:

@@ -44,25 +44,6 @@ FIRST_SEED = 1000
 SLOW = 4
 """How many times slower than life the films of the fixed trunk play."""
 
-MARKS = {True: "✓", False: "✗", None: ""}
-GAIT_TITLES = {"walk": "Walking", "run": "Running", "both": "Both gaits"}
-FIGURES = {
-    "figure1": "Figure 1. The linkage: one crank turns fourteen links.",
-    "figure3": "Figure 3. Paths of the hoof and the leg's postures through a stride.",
-    "figure4": "Figure 4. The hoof's angle to the ground, heel up positive.",
-    "figure5": "Figure 5. Normal force on elastic and inelastic ground.",
-    "figure6": "Figure 6. Direction of the ground's force through stance.",
-}
-
-
-@dataclass(frozen=True)
-class Clip:
-    """A film with its title and a line about it."""
-
-    title: str
-    caption: str
-    path: Path
-
 
 @dataclass(frozen=True)
 class Budget:
@@ -165,8 +146,9 @@ def train_agent(args: Args, budget: Budget, stage: Path) -> train.Trained:
     return trained
 
 
-def film_all(scores: Sequence[evaluate.Score], budget: Budget, stage: Path) -> list[Clip]:
-    """Film the gaits and the agent on their own trunk, and the gaits, slowly, on a fixed one."""
+def film_all(scores: Sequence[evaluate.Score], budget: Budget, stage: Path) -> list[dict[str, str]]:
+    """Film gaits and agent on their own trunk, and the gaits, slowly, on a fixed one; returns a title, a
+    caption and the film itself of each."""
     clips, size = [], (640, 360)
     first_episodes = {score.policy: score.episodes[0] for score in scores}
     for name in (TRAINED, *GAITS):
@@ -179,16 +161,21 @@ def film_all(scores: Sequence[evaluate.Score], budget: Budget, stage: Path) -> l
             f"{abs(first['distance_m']):.1f} m {way} in an episode of {first['seconds']:.0f} s, "
             f"return {first['return']:.1f}"
         )
-        clips.append(Clip(f"{name.capitalize()}, moving trunk", caption, path))
+        clips.append(clip(f"{name.capitalize()}, moving trunk", caption, path))
         say(f"filmed {name}")
     for gait in GAITS:
         path = stage / f"{gait}-fixed.mp4"
         seconds = min(1.0, budget.film_seconds)
         render_episode(path, gait, FIXED_ID, (f"gait={gait}",), seconds=seconds, slow=SLOW, size=size)
         caption = f"one cycle of 1 s as in the paper, {SLOW} times slower than life"
-        clips.append(Clip(f"{gait.capitalize()}, fixed trunk", caption, path))
+        clips.append(clip(f"{gait.capitalize()}, fixed trunk", caption, path))
         say(f"filmed {gait} on a fixed trunk")
     return clips
+
+
+def clip(title: str, caption: str, path: Path) -> dict[str, str]:
+    """A film for the page."""
+    return {"title": title, "caption": caption, "film": data_uri(path)}
 
 
 def print_counts(reproduction: Reproduction) -> None:
@@ -202,7 +189,7 @@ def render(
     reproduction: Reproduction,
     scores: Sequence[evaluate.Score],
     trained: train.Trained,
-    clips: Sequence[Clip],
+    clips: Sequence[dict[str, str]],
     folder: Path,
 ) -> str:
     """The report: one HTML page that holds its pictures and films and needs no network.
@@ -233,9 +220,7 @@ def render(
         number=format_number,
         error=format_error,
         solvers=SOLVERS,
-        gait_titles=GAIT_TITLES,
-        marks=MARKS,
-        figures=[(name, caption, data_uri(folder / f"{name}.svg")) for name, caption in FIGURES.items()],
+        figures={path.stem: data_uri(path) for path in folder.glob("figure*.svg")},
         metrics=[evaluate.METRICS[key] for key in keys],
         scores=[
             (score.policy, [evaluate.cell(key, score.estimates[key]) for key in keys]) for score in scores
@@ -248,7 +233,7 @@ def render(
         trained=trained,
         training_seed=args.seed,
         curve=data_uri(folder / "curve.svg"),
-        clips=[(clip, data_uri(clip.path)) for clip in clips],
+        clips=clips,
         command=runs.command(),
         versions=runs.versions(),
     )

@@ -187,7 +187,9 @@ def test_all_are_trained_once_and_failures_are_told(tmp_path, monkeypatch, capsy
 
 def test_an_interrupt_ends_what_runs(tmp_path, monkeypatch):
     _, alive = pretend(monkeypatch, "import time; time.sleep(60)")
-    monkeypatch.setattr(baselines, "share_done", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+    monkeypatch.setattr(
+        baselines.tqdm, "set_postfix_str", lambda *_, **__: (_ for _ in ()).throw(KeyboardInterrupt)
+    )
     began = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
         baselines.work_off(PLAN, tmp_path, workers=2)
