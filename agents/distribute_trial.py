@@ -123,7 +123,7 @@ class Progress(tune.Callback):
         self, iteration: int, trials: list[Any], trial: Any, result: dict[str, Any], **info: Any
     ) -> None:
         score = figures(result)
-        if score["return"] is not None:  # as where no episode of RLlib's ended
+        if score["return"] is not None:  # it is none where no episode of RLlib's ended
             write_line(trial, f"{score['steps']:,.0f} steps, return {score['return']:.2f}")
 
     def on_trial_recover(self, iteration: int, trials: list[Any], trial: Any, **info: Any) -> None:
@@ -135,8 +135,8 @@ class Progress(tune.Callback):
         write_line(trial, f"{last_failure(trial)} No retry is left")
 
     def on_trial_complete(self, iteration: int, trials: list[Any], trial: Any, **info: Any) -> None:
-        ended = sum(trial.status in ("TERMINATED", "ERROR") for trial in trials)
-        write_line(trial, f"done; {ended} of {len(trials)} trials have ended")
+        score = figures(trial.last_result)["return"]
+        write_line(trial, "done" if score is None else f"done, return {score:.2f}")
 
 
 def write_line(trial: Any, what: str) -> None:
