@@ -60,8 +60,8 @@ CHECKED = 20
 GAITS = ("run", "walk", "carrying_walk", "open-loop")
 """Scored beside the policy, where an id has them."""
 
-LIMIT = 1_000_000
-"""Bytes of a folder."""
+LIMIT, FILM_LIMIT = 1_000_000, 750_000
+"""Bytes of a folder and of the film in it, which is made shorter where it is larger."""
 
 COPIED = (WEIGHTS, ABOUT, runs.CONFIG)
 NOT_COPIED = ("args",)
@@ -175,15 +175,20 @@ def ship(choice: Choice, env_id: str, out: Path, seconds: float = 4.0) -> dict[s
         (stage / "score.json").write_text(text + "\n", encoding="utf-8")
         no_name = {"Software": None}  # of the program that drew it
         draw_learning_curve(saved.path.parent, scores, stage / "curve.png", dpi=90, metadata=no_name)
-        render_episode(
-            stage / "film.gif", str(stage / FILE), env_id,
-            seed=SCORE_SEEDS[0], seconds=seconds, fps=20, size=(480, 270),
-        )  # fmt: skip
+        film(stage, env_id, seconds)
         write_card(stage, env_id, record, score, scores, choice)
         size = sum(file.stat().st_size for file in stage.iterdir())
         if size > LIMIT:
-            raise OutputError(f"{folder}: expected at most {LIMIT:,} bytes, got {size:,}; shorten --seconds")
+            raise OutputError(f"{folder}: expected at most {LIMIT:,} bytes, got {size:,}")
     return score
+
+
+def film(folder: Path, env_id: str, seconds: float) -> None:
+    """Write film.gif of the policy in `folder`, shorter where it would be larger than `FILM_LIMIT`."""
+    path, policy = folder / "film.gif", str(folder / FILE)
+    while not path.is_file() or path.stat().st_size > FILM_LIMIT:
+        render_episode(path, policy, env_id, seed=SCORE_SEEDS[0], seconds=seconds, fps=20, size=(480, 270))
+        seconds *= 0.75
 
 
 @cache
