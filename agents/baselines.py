@@ -4,8 +4,8 @@
     python -m agents.baselines --subset nightly       a small one in minutes, into a folder of its own
     python -m agents.baselines --only sac td3         some rows of it
 
-What is trained is in agents/baselines_plan.py. A training that is done is not repeated; Ctrl-C, or kill -9,
-and the same command go on where it was. Each has its log beside its results, RUN/log.txt.
+What is trained is in agents/plans. A training that is done is not repeated; Ctrl-C, or kill -9, and the same
+command go on where it was. Each has its log beside its results, RUN/log.txt.
 """
 
 from __future__ import annotations
@@ -18,10 +18,12 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
-from agents.baselines_plan import FOLDERS, PLANS, Run, runs_of
-from agents.baselines_run import CURVE, FINAL, read_curve
+from tqdm import tqdm
+
+from agents import baselines_report
+from agents.baselines_run import FINAL, FOLDERS, Plan, Run, load_plan, runs_of
 from agents.command import run
 from hoof_env._output import check_folder
 from hoof_env.errors import ParameterError, check_number
@@ -29,7 +31,7 @@ from hoof_env.errors import ParameterError, check_number
 
 @dataclass(frozen=True)
 class Args:
-    subset: Literal["full", "nightly"] = "full"
+    subset: Plan = "full"
     """which plan; the nightly one is written beside its runs and never over the full table"""
     only: tuple[str, ...] = ()
     """only trainings with one of these in their names, which are ALGO-ENV-sSEED or ALGO-ENV-LABEL-sSEED"""
@@ -50,28 +52,22 @@ def train_all(args: Args) -> list[Run]:
     """
     check_number("workers", args.workers, low=1)
     folder = args.out or FOLDERS[args.subset]
-    asked = [
-        one
-        for one in runs_of(PLANS[args.subset])
-        if not args.only or any(text in one.name for text in args.only)
-    ]
-    if not asked:
+    names = args.only or ("",)
+    chosen = [one for one in runs_of(load_plan(args.subset)) if any(text in one.name for text in names)]
+    if not chosen:
         raise ParameterError(f"only: expected a part of a training's name, got {args.only!r}")
     check_folder(folder)
-    return work_off(asked, folder, args.workers)
+    return work_off(chosen, folder, args.workers)
 
 
-def work_off(asked: Sequence[Run], folder: Path, workers: int) -> list[Run]:
+def work_off(chosen: Sequence[Run], folder: Path, workers: int) -> list[Run]:
     """Train so many at a time until all are done; returns those that failed."""
-    from tqdm import tqdm
-
-    waiting = [one for one in asked if not (folder / one.name / FINAL).is_file()]
+    waiting = [one for one in chosen if not is_done(one, folder)]
     running: dict[Run, subprocess.Popen[bytes]] = {}
     failed: list[Run] = []
-    done = len(asked) - len(waiting)
-    rest = 1.0 if sys.stderr.isatty() else 60.0  # seconds between two lines, where each is kept
+    interval = 1.0 if sys.stderr.isatty() else 60.0  # seconds between two lines, where each is kept
     with tqdm(
-        total=len(asked), initial=done, mininterval=rest, bar_format="{l_bar}{bar:20}{r_bar}", unit=" runs"
+        total=len(chosen), mininterval=interval, bar_format="{l_bar}{bar:20}{r_bar}", unit=" runs"
     ) as bar:
         try:
             while waiting or running:
@@ -81,19 +77,20 @@ def work_off(asked: Sequence[Run], folder: Path, workers: int) -> list[Run]:
                 time.sleep(0.5)
                 for one in [one for one, process in running.items() if process.poll() is not None]:
                     running.pop(one)
-                    if (folder / one.name / FINAL).is_file():
-                        done += 1
-                    else:
+                    if not is_done(one, folder):
                         failed.append(one)
                         tqdm.write(f"{one.name} failed: {last_line(folder / one.name)}")
-                now = {one.name: share_done(one, folder) for one in running}
-                bar.n = round(done + sum(now.values()), 2)
-                told = ", ".join(f"{name} {share:.0%}" for name, share in now.items())
-                bar.set_postfix_str(f"{told}; {len(waiting)} wait", refresh=False)
+                bar.n = len(chosen) - len(waiting) - len(running) - len(failed)
+                bar.set_postfix_str(", ".join(one.name for one in running), refresh=False)
                 bar.update(0)
         finally:
             stop(running)
     return failed
+
+
+def is_done(one: Run, folder: Path) -> bool:
+    """Whether a training is through and scored."""
+    return (folder / one.name / FINAL).is_file()
 
 
 def start(one: Run, folder: Path) -> subprocess.Popen[bytes]:
@@ -116,17 +113,10 @@ def stop(running: dict[Run, subprocess.Popen[bytes]]) -> None:
         process.wait()
 
 
-def share_done(one: Run, folder: Path) -> float:
-    """How much of a training is done, as far as its curve tells."""
-    rows = read_curve(folder / one.name / CURVE)
-    points = (rows[-1]["steps"] / max(rows[1]["steps"], 1.0)) if len(rows) > 1 else 0.0
-    return min(points / one.entry.points, 0.99)
-
-
 def last_line(folder: Path) -> str:
-    """What a log says last."""
+    """The last line of a log that is not empty."""
     lines = (folder / "log.txt").read_text(encoding="utf-8", errors="replace").split("\n")
-    return next((line for line in reversed(lines) if line.strip()), "said nothing")
+    return next((line for line in reversed(lines) if line.strip()), "its log is empty")
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -139,15 +129,7 @@ def main(argv: list[str] | None = None) -> int:
     args = tyro.cli(Args, args=argv, prog="python -m agents.baselines", description=__doc__)
     failed = train_all(args)
     if args.report:
-        from agents import baselines_report
-
-        page = baselines_report.report(baselines_report.Args(args.subset, args.out))
-        print(f"written: {page}")
-    return exit_code(failed)
-
-
-def exit_code(failed: Sequence[Run]) -> int:
-    """Name the trainings that failed; 1 if there are any."""
+        print(f"written: {baselines_report.report(baselines_report.Args(args.subset, args.out))}")
     for one in failed:
         print(f"failed: {one.name}", file=sys.stderr)
     return 1 if failed else 0

@@ -1,242 +1,280 @@
 """The page of the baselines from what `agents.baselines` left: tables, curves as CSV and as pictures.
 
-python -m agents.baselines                  trains, then writes docs/baselines.md
-python -m agents.baselines_report           writes it again, from whatever is done
+    python -m agents.baselines                  trains, then writes runs/baselines/report.md
+    python -m agents.baselines_report           writes it again, from whatever is done
+
+docs/baselines.md says what the tables mean and what came of the full plan.
 """
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
+import matplotlib
 import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import EngFormatter, NullFormatter
 
 from agents import runs
-from agents.baselines_figure import draw_curves
-from agents.baselines_matched import COLUMNS as SHOWN
-from agents.baselines_matched import compare
-from agents.baselines_plan import FOLDERS, LEG, PAGES, PLANS
+from agents.baselines_matched import COLUMNS as GAIT_COLUMNS
+from agents.baselines_matched import cells, compare
 from agents.baselines_results import (
     GAITS,
     OPEN_LOOP,
-    Reference,
+    Floats,
     Row,
+    Scored,
+    iqm,
     read_results,
     references,
-    settings_of,
     versions_of,
 )
-from agents.baselines_run import COLUMNS
-from agents.baselines_stats import Interval
-from agents.command import run
-from agents.markdown import put
+from agents.baselines_run import COLUMNS, CURVE, FOLDERS, LEG, Plan, load_plan, read_curve, write_csv
+from agents.command import run, table
+from agents.evaluate import Score
+from hoof_env.paper.figure_style import BLUE, GREEN, GREY, ORANGE, PURPLE, STYLE
 
-QUICK_SECONDS, QUICK_SHARE = 120.0, 0.9
-"""PPO is to beat both gaits so soon in so large a share of its seeds."""
+POINTS = 40
+"""Of a curve."""
 
-MARKS = ("bars", "table", "figures", "matched", "made")
+BINS = 60
+"""Of training episodes in the picture of one training."""
 
-README = Path("README.md")
-"""Its table of baselines is written together with the page."""
+WIDE = 5.0
+"""An axis is logarithmic where the longest training is so many times the shortest."""
+
+References = Mapping[str, Mapping[str, Scored]]
+"""Policies without learning, by id and name."""
 
 
 @dataclass(frozen=True)
 class Args:
-    subset: Literal["full", "nightly"] = "full"
+    subset: Plan = "full"
     """which plan"""
     runs: Path | None = None
     """folder of the trainings; otherwise runs/baselines or runs/baselines-nightly"""
     page: Path | None = None
-    """the page; pictures and CSV go into the folder beside it of the same name; otherwise baselines.md in the
-    folder of the trainings that is given, or docs/baselines.md, or beside the nightly runs"""
+    """the page; pictures and CSV go into the folder beside it of the same name; otherwise report.md in the
+    folder of the trainings"""
 
 
-def results_table(rows: Sequence[Row], gaits: dict[str, dict[str, Reference]]) -> str:
-    """Returns of agents and of what learns nothing, id by id."""
+def unlabelled(rows: Sequence[Row], env_id: str) -> list[Row]:
+    """Entries of an id that are trained for its own reward."""
+    return [row for row in rows if row.entry.env_id == env_id and not row.entry.label]
+
+
+def best_of(rows: Sequence[Row]) -> Row | None:
+    """The entry of HorseLeg-v0 with the highest return."""
+    return max(unlabelled(rows, LEG), key=lambda row: row.scored.intervals["return"].mean, default=None)
+
+
+def results_table(rows: Sequence[Row], gaits: References) -> str:
+    """Returns of agents and of policies without learning, id by id."""
     titles = (
         "id", "policy", "seeds", "steps", "wall s", "processor s", "return: IQM [95 %]", "mean",
         "worst to best seed", "seeds above run", "above open-loop",
         "seeds that beat both gaits: after s, median (slowest)",
     )  # fmt: skip
-    lines = [f"| {' | '.join(titles)} |", "|---|---|" + "---|" * (len(titles) - 2)]
+    lines = []
     for env_id, known in gaits.items():
-        for one in known.values():
-            told = one.intervals["return"].text()
-            lines.append(f"| `{env_id}` | {one.name} | | | | | {told} | | | | | |")
-        for row in (row for row in rows if row.entry.env_id == env_id and not row.entry.label):
-            cells = [f"`{env_id}`", row.title, *row_cells(row, known)]
-            lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join(lines)
+        lines += [
+            [f"`{env_id}`", one.name, "", "", "", "", one.intervals["return"].text()]
+            for one in known.values()
+        ]
+        lines += [[f"`{env_id}`", row.title, *row_cells(row, known)] for row in unlabelled(rows, env_id)]
+    return table(titles, lines)
 
 
-def row_cells(row: Row, known: dict[str, Reference]) -> list[str]:
+def row_cells(row: Row, known: Mapping[str, Scored]) -> list[str]:
     """The cells of an entry from its seeds on."""
     count, returns = len(row.results), np.array([one.figures["return"] for one in row.results])
-    wall, cpu = (np.median([one.final[key] for one in row.results]) for key in ("wall_s", "cpu_s"))
+    steps, wall, cpu = (
+        np.median([one.final[key] for one in row.results]) for key in ("steps", "wall_s", "cpu_s")
+    )
 
     def above(name: str) -> str:
-        return f"{np.sum(returns > known[name].figures['return'])}/{count}" if name in known else ""
+        if name not in known:
+            return ""
+        return f"{np.sum(returns > known[name].intervals['return'].mean)}/{count}"
 
     seconds = times_to_beat(row, known)
     return [
         str(count) if count == row.entry.seeds else f"{count} of {row.entry.seeds}",
-        f"{np.median([one.final['steps'] for one in row.results]):,.0f}", f"{wall:,.0f}", f"{cpu:,.0f}",
-        row.intervals["return"].text(), f"{returns.mean():.1f}",
+        f"{steps:,.0f}", f"{wall:,.0f}", f"{cpu:,.0f}",
+        row.scored.intervals["return"].text(), f"{returns.mean():.1f}",
         f"{returns.min():.1f} to {returns.max():.1f}", above("run"), above(OPEN_LOOP),
         f"{len(seconds)}/{count}" + (f": {np.median(seconds):.0f} ({max(seconds):.0f})" if seconds else ""),
     ]  # fmt: skip
 
 
-def short_table(rows: Sequence[Row], known: Mapping[str, Reference]) -> str:
-    """Returns on HorseLeg-v0 for the README."""
-    titles = "policy", "seeds", "environment steps", "wall s", "processor s", "return: IQM [95 %]"
-    lines = [f"| {' | '.join(titles)} |", "|---" * len(titles) + "|"]
-    lines += [f"| {one.name} | | | | | {one.intervals['return'].text()} |" for one in known.values()]
-    lines += [
-        f"| {row.title} | {' | '.join(row_cells(row, dict(known))[:5])} |"
-        for row in rows
-        if row.entry.env_id == LEG and not row.entry.label
-    ]
-    return "\n".join(lines)
-
-
-def times_to_beat(row: Row, known: dict[str, Reference]) -> list[float]:
+def times_to_beat(row: Row, known: Mapping[str, Scored]) -> list[float]:
     """Wall seconds of training until the curve is above both gaits, of the seeds that get there."""
-    beaten = row.beaten(max(known[name].curve_return for name in GAITS))
-    return [one["wall_s"] for one in beaten if one]
+    return row.times_above(max(known[name].curve_return for name in GAITS))
 
 
-def figures_table(rows: Sequence[Row], gaits: dict[str, dict[str, Reference]]) -> str:
+def figures_table(rows: Sequence[Row], gaits: References) -> str:
     """What the gaits are like, id by id."""
     lines = [
-        f"| id | policy | {' | '.join(title for title, *_ in SHOWN.values())} |",
-        "|---|---|" + "---|" * len(SHOWN),
+        [f"`{env_id}`", one.name, *cells(one)]
+        for env_id, known in gaits.items()
+        for one in (*known.values(), *(row.scored for row in unlabelled(rows, env_id)))
     ]
-    for env_id, known in gaits.items():
-        named: list[tuple[str, Mapping[str, Interval]]] = [
-            (one.name, one.intervals) for one in known.values()
-        ]
-        named += [
-            (row.title, row.intervals) for row in rows if row.entry.env_id == env_id and not row.entry.label
-        ]
-        for name, found in named:
-            cells = [
-                found[key].text(digits, by) if key in found else "" for key, (_, digits, by) in SHOWN.items()
-            ]
-            lines.append(f"| `{env_id}` | {name} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+    return table(["id", "policy", *(title for title, *_ in GAIT_COLUMNS.values())], lines)
 
 
-def best_of(rows: Sequence[Row]) -> Row | None:
-    """The entry of HorseLeg-v0 with the highest return."""
-    asked = [row for row in rows if row.entry.env_id == LEG and not row.entry.label]
-    return max(asked, key=lambda row: row.intervals["return"].mean, default=None)
-
-
-def bars_table(rows: Sequence[Row], known: dict[str, Reference], matched: Mapping[str, str]) -> str:
-    """What was asked of the baselines, and whether they do it."""
-    best, found = best_of(rows), {}
-    if best is not None:
-        told = best.intervals["return"]
-        for name in (name for name in ("run", OPEN_LOOP) if name in known):
-            other = known[name].intervals["return"]
-            word = "met" if told.above(other) else "not met"
-            found[f"the best agent returns more than {name}, intervals apart"] = (
-                f"{word}: {best.title} {told.text()} beside {other.text()}"
-            )
-    found |= matched
-    for row in rows:
-        if row.entry.algo == "ppo" and row.entry.env_id == LEG and not row.entry.label:
-            quick = sum(seconds <= QUICK_SECONDS for seconds in times_to_beat(row, known))
-            word = "met" if quick >= QUICK_SHARE * row.entry.seeds else "not met"
-            found[f"PPO beats both gaits within {QUICK_SECONDS:.0f} s in {QUICK_SHARE:.0%} of its seeds"] = (
-                f"{word}: {quick} of {row.entry.seeds}"
-            )
-    return "\n".join(["| bar | |", "|---|---|", *(f"| {bar} | {said} |" for bar, said in found.items())])
-
-
-def made_table(rows: Sequence[Row]) -> str:
+def made_text(rows: Sequence[Row]) -> str:
     """The command of each entry's first seed, and the versions of all."""
     commands = "\n".join(f"    {row.command}" for row in rows)
     versions = ", ".join(f"{name} {value}" for name, value in versions_of(rows).items())
     return f"The first seed of each:\n\n{commands}\n\nVersions: {versions}.\n"
 
 
-def write_csv(rows: Sequence[Row], folder: Path) -> None:
+def write_data(rows: Sequence[Row], folder: Path) -> None:
     """curves.csv, the learning curves of all, and runs.csv, a line for each training."""
-    name = ("policy", "env_id", "seed")
-    curves, ends = io.StringIO(), io.StringIO()
-    curve = csv.DictWriter(curves, (*name, *COLUMNS), lineterminator="\n")
-    end = csv.DictWriter(ends, (*name, *COLUMNS, "config"), lineterminator="\n")
-    curve.writeheader()
-    end.writeheader()
+    curves, ends = [], []
     for row in rows:
         for one in row.results:
             about = {"policy": row.title, "env_id": row.entry.env_id, "seed": one.final["seed"]}
-            curve.writerows(about | dict(line) for line in one.curve)
-            clock: dict[str, Any] = {key: one.final[key] for key in ("steps", "wall_s", "cpu_s")}
+            curves += [about | line for line in one.curve]
+            clock = {key: one.final[key] for key in ("steps", "wall_s", "cpu_s")}
             numbers = {key: round(value, 4) for key, value in (clock | one.figures).items()}
-            end.writerow(about | numbers | {"config": json.dumps(settings_of(row))})
-    runs.write_text(folder / "curves.csv", curves.getvalue())
-    runs.write_text(folder / "runs.csv", ends.getvalue())
+            ends.append(about | numbers | {"config": json.dumps(row.settings)})
+    columns = ("policy", "env_id", "seed", *COLUMNS)
+    write_csv(folder / "curves.csv", columns, curves)
+    write_csv(folder / "runs.csv", (*columns, "config"), ends)
 
 
-def blank_page(subset: str, pictures: Sequence[str]) -> str:
-    """A page with all marks, for a table that has no prose of its own."""
-    small = "Fewer seeds and far fewer steps than docs/baselines.md has: all works, and this is no result."
-    return "\n\n".join(
-        (
-            "# Baselines" if subset == "full" else "# A small part of the baselines",
-            "docs/baselines.md tells what the tables show." if subset == "full" else small,
-            *(f"<!-- {mark} -->\n<!-- /{mark} -->" for mark in MARKS),
-            *(f"![{name}](baselines/{name}.png)" for name in pictures),
-        )
-    )
+def over_time(row: Row, key: str, is_log: bool) -> tuple[Floats, Floats]:
+    """IQM and interval of the return, shape (3, `POINTS`), over "steps" or "wall_s", shape (`POINTS`,), up to
+    the last score that all seeds have; on a logarithmic axis from the first score of a trained policy."""
+    curves = [one.curve for one in row.results]
+    last = min(curve[-1][key] for curve in curves)
+    first = min(max(curve[1][key] for curve in curves), last)
+    x = np.geomspace(first, last, POINTS) if is_log else np.linspace(0, last, POINTS)
+    each = [np.interp(x, [p[key] for p in curve], [p["return"] for p in curve]) for curve in curves]
+    return x, iqm(each)
+
+
+def draw_curves(rows: Sequence[Row], known: Mapping[str, Scored], path: Path) -> None:
+    """One picture: the return against steps and against wall time, a line and a band for each entry."""
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(9, 3.6), layout="constrained")
+        panels = figure.subplots(1, 2, sharey=True)
+        lowest = known["run"].intervals["return"].mean
+        for axes, key, label in zip(
+            panels, ("steps", "wall_s"), ("environment steps", "wall time of training [s]"), strict=True
+        ):
+            ends = [one.curve[-1][key] for row in rows for one in row.results]
+            is_log = max(ends) > WIDE * min(ends)
+            for row, colour in zip(rows, (BLUE, ORANGE, GREEN, PURPLE), strict=False):
+                x, (mean, low, high) = over_time(row, key, is_log)
+                lowest = min(lowest, float(mean.min()))
+                axes.fill_between(x, low, high, color=colour, alpha=0.2, lw=0)
+                axes.plot(x, mean, color=colour, lw=1.5, label=f"{row.title}, {len(row.results)} seeds")
+            for name, style in ((OPEN_LOOP, "--"), ("run", ":")):
+                if name in known:
+                    level = known[name].intervals["return"].mean
+                    axes.axhline(level, color=GREY, lw=1.2, ls=style, label=name)
+            if is_log:
+                axes.set_xscale("log")
+                axes.xaxis.set_minor_formatter(NullFormatter())
+            axes.xaxis.set_major_formatter(EngFormatter(sep=" " if key == "steps" else ""))
+            axes.set_xlabel(label)
+            axes.grid(axis="y", color=GREY, alpha=0.15)
+        panels[0].set_ylabel("return: IQM, 95 % interval")
+        panels[0].set_ylim(bottom=max(lowest - 2, -25))
+        panels[0].set_title(rows[0].entry.env_id, loc="left")
+        handles, labels = panels[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
+        figure.savefig(path, dpi=130)
+
+
+def draw_learning_curve(folder: Path, scores: Sequence[Score], path: Path, **options: Any) -> None:
+    """Draw the training episodes of a run folder, the scores on the way where it has a curve.csv, the trained
+    policy, which is the first of `scores`, and the means of the others.
+
+    Args:
+        folder: of the run.
+        scores: of the trained policy, and of others to compare it with.
+        path: of the picture.
+        options: of `Figure.savefig`.
+    """
+    episodes = runs.read_episodes(folder)
+    bins = [part for part in np.array_split(episodes, BINS) if len(part)]
+    with matplotlib.rc_context({**STYLE, "font.size": 10}):
+        figure = Figure(figsize=(7, 3.6), layout="constrained")
+        axes = figure.subplots()
+        if bins:
+            steps = [1e-6 * part[:, 0].mean() for part in bins]
+            low, middle, high = np.transpose([np.quantile(part[:, 1], (0.1, 0.5, 0.9)) for part in bins])
+            axes.fill_between(
+                steps, low, high, color=BLUE, alpha=0.2, lw=0, label="80 % of training episodes"
+            )
+            axes.plot(steps, middle, color=BLUE, lw=1.5, label="their median")
+        if curve := read_curve(folder / CURVE):
+            points = [(1e-6 * row["steps"], row["return"]) for row in curve]
+            axes.plot(*zip(*points, strict=True), color=GREEN, lw=1, label="without noise on the way")
+        policy, *others = [(score.policy, score.estimates["return"].mean) for score in scores]
+        label = f"this policy, without noise: {policy[1]:.1f}"
+        axes.plot(1e-6 * training_length(folder)[0], policy[1], "o", color=GREEN, label=label)
+        for name, level in others:
+            axes.axhline(level, color=ORANGE, lw=1, ls="--")
+            axes.annotate(
+                f"{name} {level:.1f}", (1, level), (4, 0), xycoords=axes.get_yaxis_transform(),
+                textcoords="offset points", va="center", color=ORANGE,
+            )  # fmt: skip
+        axes.set(xlabel="environment steps [millions]", ylabel="return of an episode")
+        axes.set_xlim(left=0)
+        axes.grid(axis="y", color=GREY, alpha=0.15)
+        figure.legend(loc="outside upper left", ncols=2)
+        figure.savefig(path, **options)
+
+
+def training_length(folder: Path) -> tuple[int, float]:
+    """Environment steps and seconds of wall time of a training."""
+    if finished := runs.read_record(folder).get("finished"):
+        return int(finished["steps"]), float(finished["seconds"])
+    episodes = runs.read_episodes(folder)
+    return (int(episodes[-1, 0]), float(episodes[:, 2].max())) if len(episodes) else (0, 0.0)
 
 
 def report(args: Args) -> Path:
     """Write page, pictures and CSV; returns the page.
 
     Raises:
-        DataFileError: nothing is done, a result cannot be read, or the page has lost its marks.
+        DataFileError: nothing is done, or a result cannot be read.
     """
-    import matplotlib
-
-    from hoof_env.paper.figure_style import STYLE
-
-    rows = read_results(PLANS[args.subset], args.runs or FOLDERS[args.subset])
-    page = args.page or (args.runs / "baselines.md" if args.runs else PAGES[args.subset])
+    folder = args.runs or FOLDERS[args.subset]
+    rows = read_results(load_plan(args.subset), folder)
+    page = args.page or folder / "report.md"
     beside = page.with_suffix("")
     beside.mkdir(parents=True, exist_ok=True)
-    ids = list(dict.fromkeys(row.entry.env_id for row in rows))
-    gaits = {env_id: references(env_id) for env_id in ids}
-    names = {env_id.rpartition("/")[2]: env_id for env_id in ids}
-    with matplotlib.rc_context(STYLE):
-        for name, env_id in names.items():
-            shown = [row for row in rows if row.entry.env_id == env_id and not row.entry.label]
-            if shown:
-                draw_curves(shown, gaits[env_id], beside / f"{name}.png")
-    write_csv(rows, beside)
+    gaits = {row.entry.env_id: references(row.entry.env_id) for row in rows}
+    pictures = []
+    for env_id, known in gaits.items():
+        if shown := unlabelled(rows, env_id):
+            name = env_id.rpartition("/")[2]
+            draw_curves(shown, known, beside / f"{name}.png")
+            pictures.append(f"![{name}]({beside.name}/{name}.png)")
+    write_data(rows, beside)
     known = gaits.get(LEG) or references(LEG)
-    table, bars = compare(rows, best_of(rows), known)
-    tables = (
-        bars_table(rows, known, bars), results_table(rows, gaits), figures_table(rows, gaits), table,
-        made_table(rows),
-    )  # fmt: skip
-    blank = args.subset == "nightly" or not page.is_file()
-    text = blank_page(args.subset, list(names)) if blank else page.read_text(encoding="utf-8")
-    for mark, content in zip(MARKS, tables, strict=True):
-        text = put(text, mark, content)
-    runs.write_text(page, text)
-    if page == PAGES["full"]:
-        runs.write_text(
-            README, put(README.read_text(encoding="utf-8"), "baselines", short_table(rows, known))
-        )
+    parts = [
+        f"# Baselines: the {args.subset} plan",
+        "## Returns",
+        results_table(rows, gaits),
+        *pictures,
+        "## What the gaits are like",
+        figures_table(rows, gaits),
+        "## At matched speed",
+        compare(rows, best_of(rows), known["run"]),
+        "## How it was made",
+        made_text(rows),
+    ]
+    runs.write_text(page, "\n\n".join(parts) + "\n")
     return page
 
 

@@ -1,8 +1,14 @@
-"""What the trainings of a plan left, entry by entry, and what scripted policies get in the same episodes."""
+"""What the trainings of a plan left, entry by entry, and what policies without learning get in the same
+episodes.
+
+Statistics over seeds: interquartile means with bootstrap 95 % intervals (Agarwal et al. 2021, Deep
+reinforcement learning at the edge of the statistical precipice).
+"""
 
 from __future__ import annotations
 
 import json
+import math
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,20 +17,40 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
+from numpy.typing import ArrayLike, NDArray
 
-from agents.baselines_plan import CURVE_SEEDS, FINAL_SEEDS, TRANSPORT, Entry, Run, figures
-from agents.baselines_run import CURVE, FINAL, read_curve
-from agents.baselines_stats import Interval, over_seeds
-from agents.command import parse_pairs
-from agents.evaluate import estimate
-from agents.score import score_vector
+from agents.baselines_run import CURVE, FINAL, Entry, Run, read_curve
+from agents.evaluate import Interval, estimate
+from agents.runs import CONFIG, read_record
+from agents.score import CURVE_SEEDS, FINAL_SEEDS, TRANSPORT, mean_figures, score_vector
 from agents.settings import FOLDER, load_settings
 from hoof_env.errors import DataFileError, HoofEnvError
+
+Floats = NDArray[np.float64]
 
 GAITS = ("run", "walk")
 OPEN_LOOP = "open-loop"
 """Name of the gait that CMA-ES found for an id, without learning."""
+
+REPS = 5000
+"""Of a bootstrap over seeds."""
+
+
+@dataclass(frozen=True)
+class Scored:
+    """A policy without learning, or the seeds of an entry, on the episodes of the final score.
+
+    Attributes:
+        name: for tables.
+        intervals: figures over episodes or, of an entry, over seeds.
+        seeds: figures of each seed; none without learning.
+        curve_return: without learning, the mean return over the episodes of the learning curves.
+    """
+
+    name: str
+    intervals: Mapping[str, Interval]
+    seeds: Sequence[Mapping[str, float]] = ()
+    curve_return: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -37,18 +63,12 @@ class Result:
     @cached_property
     def figures(self) -> dict[str, float]:
         """Of the last policy on fresh episodes."""
-        return figures(self.final["episodes"])
+        return mean_figures(self.final["episodes"])
 
     @cached_property
     def curve(self) -> list[dict[str, float]]:
         """Rows of its curve.csv."""
         return read_curve(self.folder / CURVE)
-
-    @cached_property
-    def record(self) -> dict[str, Any]:
-        """Its run.json."""
-        found: dict[str, Any] = json.loads((self.folder / "run.json").read_text(encoding="utf-8"))
-        return found
 
 
 @dataclass(frozen=True)
@@ -64,25 +84,25 @@ class Row:
         return " ".join(filter(None, (self.entry.algo.upper(), self.entry.label)))
 
     @cached_property
-    def intervals(self) -> dict[str, Interval]:
+    def scored(self) -> Scored:
         """Figures over seeds, those that the id has."""
-        return over_seeds([one.figures for one in self.results])
+        seeds = [one.figures for one in self.results]
+        return Scored(self.title, over_seeds(seeds), seeds)
 
-    def beaten(self, level: float) -> list[dict[str, float] | None]:
-        """Of each seed the first row of its curve with a return above `level`."""
-        return [first_above(one.curve, level) for one in self.results]
+    def times_above(self, level: float) -> list[float]:
+        """Wall seconds of training until the curve is above a return, of the seeds that get there."""
+        rows = [next((row for row in one.curve if row["return"] > level), None) for one in self.results]
+        return [row["wall_s"] for row in rows if row]
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The hyperparameters of the trainings."""
+        return load_settings(self.results[0].folder / CONFIG, self.entry.env_id)
 
     @property
     def command(self) -> str:
-        """What trains its first seed, without the folder."""
-        told = Run(self.entry, 0).command(Path())
-        cut = told.index("--out")
-        return shlex.join(["python", "-m", "agents.baselines_run", *told[:cut], *told[cut + 2 :]])
-
-
-def first_above(curve: Sequence[dict[str, float]], level: float) -> dict[str, float] | None:
-    """The first row of a learning curve with a return above `level`."""
-    return next((row for row in curve if row["return"] > level), None)
+        """What trains its first seed."""
+        return shlex.join(["python", "-m", "agents.baselines_run", *Run(self.entry, 0).command()])
 
 
 def read_results(plan: Sequence[Entry], folder: Path) -> list[Row]:
@@ -93,109 +113,120 @@ def read_results(plan: Sequence[Entry], folder: Path) -> list[Row]:
     """
     rows = []
     for entry in plan:
-        found = []
-        for one in (folder / Run(entry, seed).name for seed in range(entry.seeds)):
-            if (one / FINAL).is_file():
-                try:
-                    found.append(Result(one, json.loads((one / FINAL).read_text(encoding="utf-8"))))
-                except (OSError, ValueError) as error:
-                    raise DataFileError(
-                        f"{one / FINAL}: expected what agents.baselines_run wrote: {error}"
-                    ) from None
-                check(entry, found[-1])
-        if found:
-            rows.append(Row(entry, tuple(found)))
+        folders = [folder / Run(entry, seed).name for seed in range(entry.seeds)]
+        results = tuple(read_result(entry, one) for one in folders if (one / FINAL).is_file())
+        if results:
+            rows.append(Row(entry, results))
     if not rows:
         raise DataFileError(f"{folder}: expected trainings of agents.baselines, found none that is done")
     return rows
 
 
-def wanted(entry: Entry) -> dict[str, Any]:
-    """The hyperparameters that an entry asks for, with its steps."""
+def read_result(entry: Entry, folder: Path) -> Result:
+    """One training, checked to have the arguments and hyperparameters that its entry has now."""
+    try:
+        result = Result(folder, json.loads((folder / FINAL).read_text(encoding="utf-8")))
+    except (OSError, ValueError) as error:
+        raise DataFileError(f"{folder / FINAL}: expected what agents.baselines_run wrote: {error}") from None
+    config = load_settings(folder / CONFIG, entry.env_id)
+    for used, expected in (
+        (result.final["env_kwargs"], entry.env_kwargs),
+        (config, expected_settings(entry)),
+    ):
+        keys = sorted(key for key in {**used, **expected} if used.get(key) != expected.get(key))
+        if keys:
+            here, there = ({key: some.get(key) for key in keys} for some in (expected, used))
+            raise DataFileError(
+                f"{folder}: expected a training with {here}, got {there}; remove what is outdated"
+            )
+    return result
+
+
+def expected_settings(entry: Entry) -> dict[str, Any]:
+    """The hyperparameters that an entry is trained with now."""
     settings = load_settings(FOLDER / f"{entry.algo}.yml", entry.env_id)
     return settings if entry.steps is None else settings | {"n_timesteps": entry.steps}
 
 
-def check(entry: Entry, one: Result) -> None:
-    """Raise `DataFileError` for a training with other arguments or hyperparameters than its entry has now."""
-    config = load_settings(one.folder / "config.yml", entry.env_id)
-    kwargs = parse_pairs("env_kwargs", entry.env_kwargs)
-    for got, asked in ((one.final["env_kwargs"], kwargs), (config, wanted(entry))):
-        keys = sorted(key for key in {**got, **asked} if got.get(key) != asked.get(key))
-        if keys:
-            here, there = ({key: some.get(key) for key in keys} for some in (asked, got))
-            raise DataFileError(
-                f"{one.folder}: expected a training with {here}, got {there}; remove what is outdated"
-            )
+def versions_of(rows: Sequence[Row]) -> dict[str, str]:
+    """Versions that the trainings were made with; several of one package stand beside each other."""
+    versions: dict[str, set[str]] = {}
+    for one in (one for row in rows for one in row.results):
+        for name, value in read_record(one.folder)["versions"].items():
+            versions.setdefault(name, set()).add(value)
+    return {name: ", ".join(sorted(values)) for name, values in versions.items()}
 
 
-def settings_of(row: Row) -> dict[str, Any]:
-    """The hyperparameters that an entry was trained with."""
-    (found,) = yaml.safe_load((row.results[0].folder / "config.yml").read_text(encoding="utf-8")).values()
-    return dict(found)
-
-
-@dataclass(frozen=True)
-class Reference:
-    """A policy that learns nothing.
-
-    Attributes:
-        figures: means over fresh episodes.
-        intervals: of the means over these episodes.
-        curve_return: mean return over the episodes of the learning curves.
-    """
-
-    name: str
-    figures: dict[str, float]
-    intervals: dict[str, Interval]
-    curve_return: float
-
-
-def references(env_id: str, env_kwargs: dict[str, Any] | None = None) -> dict[str, Reference]:
+def references(env_id: str) -> dict[str, Scored]:
     """The paper's gaits and the open-loop gait of an id on the episodes of the agents; those that it has."""
-    found = {}
+    known = {}
     for name in (*GAITS, OPEN_LOOP):
         try:
-            found[name] = reference(name, name, env_id, env_kwargs or {})
+            known[name] = reference(name, name, env_id)
         except HoofEnvError:
             if name in GAITS:
                 raise
-    return found
+    return known
 
 
-def reference(name: str, policy: Any, env_id: str, env_kwargs: dict[str, Any]) -> Reference:
-    """Score a policy that learns nothing, as `agents.score.score_vector` takes it."""
-    episodes = score_vector(policy, env_id, FINAL_SEEDS, **env_kwargs)
-    means = figures(episodes)
-    intervals = {key: over_episodes(key, mean, episodes) for key, mean in means.items()}
-    curve = score_vector(policy, env_id, CURVE_SEEDS, **env_kwargs)
-    return Reference(name, means, intervals, float(np.mean([one["return"] for one in curve])))
+def reference(name: str, policy: Any, env_id: str) -> Scored:
+    """Score a policy without learning, as `agents.score.score_vector` takes it."""
+    episodes = score_vector(policy, env_id, FINAL_SEEDS)
+    curve = score_vector(policy, env_id, CURVE_SEEDS)
+    return Scored(
+        name, over_episodes(episodes), curve_return=float(np.mean([one["return"] for one in curve]))
+    )
 
 
-def over_episodes(key: str, mean: float, episodes: Sequence[Mapping[str, float]]) -> Interval:
-    """The bootstrap's interval around one of `figures`, a mean over episodes; the cost of transport is one of
-    sums, of which whole episodes are drawn."""
+def over_episodes(episodes: Sequence[Mapping[str, float]]) -> dict[str, Interval]:
+    """The bootstrap's intervals around `mean_figures`; the cost of transport is one of sums, of which whole
+    episodes are drawn."""
     from scipy.stats import bootstrap
 
-    if key != "cost_of_transport" or not np.isfinite(mean):
-        around = estimate([one[key] for one in episodes])
-        low, high = (np.nan if bound is None else bound for bound in (around.low, around.high))
-        return Interval(mean, low, high)
-    parts = np.array([[one[name] for one in episodes] for name in TRANSPORT])
+    means = mean_figures(episodes)
+    intervals = {key: estimate([one[key] for one in episodes]) for key in means if key != "cost_of_transport"}
+    if "cost_of_transport" in means:
+        mean = means["cost_of_transport"]
+        intervals["cost_of_transport"] = Interval(mean)
+        if math.isfinite(mean):
+            parts = np.array([[one[name] for one in episodes] for name in TRANSPORT])
 
-    def cost(drawn: Any, axis: int = -1) -> Any:
-        distance, work, force, share = parts[:, drawn].sum(axis)
-        return work * share / (force * distance)
+            def cost(drawn: Any, axis: int = -1) -> Any:
+                distance, work, force, share = parts[:, drawn].sum(axis)
+                return work * share / (force * distance)
 
-    rng = np.random.default_rng(0)
-    bounds = bootstrap((np.arange(len(episodes)),), cost, vectorized=True, rng=rng).confidence_interval
-    return Interval(mean, float(bounds.low), float(bounds.high))
+            rng, rows = np.random.default_rng(0), np.arange(len(episodes))
+            bounds = bootstrap((rows,), cost, vectorized=True, rng=rng).confidence_interval
+            intervals["cost_of_transport"] = Interval(mean, float(bounds.low), float(bounds.high))
+    return intervals
 
 
-def versions_of(rows: Sequence[Row]) -> dict[str, str]:
-    """Versions that the trainings were made with; several of one package stand beside each other."""
-    found: dict[str, set[str]] = {}
-    for one in (one for row in rows for one in row.results):
-        for name, value in one.record["versions"].items():
-            found.setdefault(name, set()).add(value)
-    return {name: ", ".join(sorted(values)) for name, values in found.items()}
+def iqm(scores: ArrayLike) -> Floats:
+    """Interquartile mean over seeds and the percentile bootstrap's interval of it, which draws whole seeds.
+
+    Args:
+        scores: of each seed, shape (seeds,), or several numbers of each, shape (seeds, n).
+
+    Returns:
+        Mean, low and high, shape (3,) or (3, n); low and high are NaN for one seed. The bootstrap draws the
+        same seeds each time.
+    """
+    from scipy.stats import bootstrap, trim_mean
+
+    def middle(some: Floats, axis: int) -> Floats:
+        return np.asarray(trim_mean(some, 0.25, axis=axis))
+
+    values = np.asarray(scores, np.float64)
+    mean = middle(values, axis=0)
+    if len(values) < 2:
+        return np.stack([mean, *[np.full_like(mean, np.nan)] * 2])
+    options = {"axis": 0, "n_resamples": REPS, "method": "percentile", "rng": np.random.default_rng(0)}
+    bounds = bootstrap((values,), middle, **options).confidence_interval
+    return np.stack([mean, bounds.low, bounds.high])
+
+
+def over_seeds(each: Sequence[Mapping[str, float]]) -> dict[str, Interval]:
+    """`iqm` of every figure that the seeds have in common, by name."""
+    names = [name for name in each[0] if all(name in one for one in each)]
+    columns = iqm([[one[name] for name in names] for one in each]).T
+    return {name: Interval(*map(float, column)) for name, column in zip(names, columns, strict=True)}

@@ -1,4 +1,4 @@
-"""One training of the baselines table, scored as it goes and at its end.
+"""One training of the baselines table, scored as it goes and at its end, and the plans that list all of them.
 
     python -m agents.baselines_run --algo ppo --env-id hoof_env/HorseLeg-v0 --seed 0
 
@@ -17,19 +17,31 @@ import io
 import json
 import os
 import signal
-import time
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any, Literal
 
+import yaml
+
 from agents import runs
-from agents.baselines_plan import CURVE_SEEDS, FIGURES, FINAL_SEEDS, LEG, figures
 from agents.command import parse_pairs, run
-from agents.score import score_vector
-from agents.settings import FOLDER, load_settings
+from agents.score import CURVE_SEEDS, FIGURES, FINAL_SEEDS, mean_figures, score_vector
+from agents.settings import FOLDER, TrainingArgs, load_settings
 from agents.train import Args as TrainArgs
 from agents.train import train
-from hoof_env.errors import check_number
+from agents.watch import Scorer
+from hoof_env.errors import DataFileError, check_number
+
+PLANS = Path(__file__).with_name("plans")
+Plan = Literal["full", "nightly"]
+"""The published table, and a small part of it that runs in minutes: files of `PLANS`."""
+
+FOLDERS = {"full": Path("runs/baselines"), "nightly": Path("runs/baselines-nightly")}
+"""Of the trainings, by plan."""
+
+LEG = "hoof_env/HorseLeg-v0"
 
 COLUMNS = ("steps", "wall_s", "cpu_s", *FIGURES)
 """Of curve.csv; a figure that the id does not have stays empty."""
@@ -38,19 +50,70 @@ CURVE, FINAL = "curve.csv", "final.json"
 
 
 @dataclass(frozen=True)
-class Args:
-    algo: Literal["ppo", "sac", "td3", "tqc"] = "ppo"
-    """algorithm, with its file in agents/hyperparams"""
-    env_id: str = LEG
-    """registered environment"""
-    env_kwargs: tuple[str, ...] = ()
-    """its arguments: key=value ..., or one JSON object"""
+class Entry:
+    """One row of the table; agents/plans/full.yml says what the fields mean."""
+
+    algo: str
+    env_id: str
+    seeds: int
+    steps: int | None = None
+    points: int = 30
+    env_kwargs: Mapping[str, Any] = field(default_factory=dict, hash=False)
+    label: str = ""
+    paid: str = ""
+
+    @property
+    def name(self) -> str:
+        """For folders and tables."""
+        return "-".join(filter(None, (self.algo, self.env_id.rpartition("/")[2], self.label)))
+
+
+@dataclass(frozen=True)
+class Run:
+    """One training of an entry."""
+
+    entry: Entry
+    seed: int
+
+    @property
+    def name(self) -> str:
+        """Of its folder."""
+        return f"{self.entry.name}-s{self.seed}"
+
+    def command(self, folder: Path | None = None) -> list[str]:
+        """Arguments of this command that train it, into a folder of `folder` where that is given."""
+        entry = self.entry
+        words = ["--algo", entry.algo, "--env-id", entry.env_id]
+        words += ["--seed", str(self.seed), "--points", str(entry.points)]
+        words += ["--out", str(folder / self.name)] if folder else []
+        words += ["--steps", str(entry.steps)] if entry.steps is not None else []
+        pairs = [f"{key}={json.dumps(value)}" for key, value in entry.env_kwargs.items()]
+        return words + (["--env-kwargs", *pairs] if pairs else [])
+
+
+def load_plan(name: str) -> tuple[Entry, ...]:
+    """The entries of a plan.
+
+    Raises:
+        DataFileError: there is no such file, or an entry is none.
+    """
+    path = PLANS / f"{name}.yml"
+    try:
+        return tuple(Entry(**entry) for entry in yaml.safe_load(path.read_text(encoding="utf-8")))
+    except (OSError, yaml.YAMLError, TypeError) as error:
+        raise DataFileError(f"plan {path}: expected a list of entries: {error}") from None
+
+
+def runs_of(plan: Sequence[Entry]) -> Iterator[Run]:
+    """All trainings of a plan, first seeds first: a table of whatever is done is fair at any time."""
+    for row in zip_longest(*([Run(entry, seed) for seed in range(entry.seeds)] for entry in plan)):
+        yield from filter(None, row)
+
+
+@dataclass(frozen=True)
+class Args(TrainingArgs):
     seed: int = 0
     """of the training"""
-    steps: int | None = None
-    """environment steps; otherwise n_timesteps of the hyperparameter file"""
-    params: tuple[str, ...] = ()
-    """hyperparameters to change: key=value ..., or one JSON object"""
     points: int = 30
     """scores on the way, at equal distances"""
     out: Path | None = None
@@ -69,81 +132,61 @@ def train_one(args: Args) -> bool:
     folder = args.out or Path("runs/baselines", f"{args.algo}-{name}-s{args.seed}")
     if (folder / FINAL).is_file():
         return True
-    kwargs = parse_pairs("--env-kwargs", args.env_kwargs)
+    env_kwargs = parse_pairs("--env-kwargs", args.env_kwargs)
     settings = load_settings(FOLDER / f"{args.algo}.yml", args.env_id) | parse_pairs("--params", args.params)
     steps = args.steps if args.steps is not None else int(settings["n_timesteps"])
-    scorer = make_scorer(args.env_id, kwargs, folder, every=max(1, steps // args.points))
-    trained = train(
-        TrainArgs(
-            env_id=args.env_id, env_kwargs=args.env_kwargs, algo=args.algo, seed=args.seed, steps=steps,
-            params=args.params, out=folder, resume=True,
-        ),
-        scorer,
+    training = TrainArgs(
+        env_id=args.env_id, env_kwargs=args.env_kwargs, algo=args.algo, seed=args.seed, steps=steps,
+        params=args.params, out=folder, resume=True,
     )  # fmt: skip
+    trained = train(training, CurveScorer(args.env_id, env_kwargs, folder, max(1, steps // args.points)))
     if trained.stopped_by:
         return False
     last = read_curve(folder / CURVE)[-1]
-    found = {
-        "algo": args.algo, "env_id": args.env_id, "env_kwargs": kwargs, "seed": args.seed,
+    final = {
+        "algo": args.algo, "env_id": args.env_id, "env_kwargs": env_kwargs, "seed": args.seed,
         **{key: last[key] for key in ("steps", "wall_s", "cpu_s")},
         "seeds": [FINAL_SEEDS.start, FINAL_SEEDS.stop],
-        "episodes": score_vector(str(folder), args.env_id, FINAL_SEEDS, **kwargs),
+        "episodes": score_vector(str(folder), args.env_id, FINAL_SEEDS, **env_kwargs),
     }  # fmt: skip
-    runs.write_text(folder / FINAL, json.dumps(found) + "\n")
+    runs.write_text(folder / FINAL, json.dumps(final) + "\n")
     return True
 
 
-def policy_of(model: Any) -> runs.TrainedPolicy:
-    """The policy of a model in training, as it will be when it is loaded."""
-    normalize = model.get_vec_normalize_env()
-    return runs.TrainedPolicy(model, normalize.normalize_obs if normalize is not None else None)
+class CurveScorer(Scorer):
+    """Scores the policy before training, too, and into curve.csv of `folder`. Scores that a resumed training
+    has yet to reach again are dropped. Where the process that began the training is gone, it is ended."""
 
+    def __init__(self, env_id: str, env_kwargs: Mapping[str, Any], folder: Path, every: int) -> None:
+        super().__init__(env_id, env_kwargs, CURVE_SEEDS, every)
+        self.path = folder / CURVE
 
-def make_scorer(env_id: str, kwargs: dict[str, Any], folder: Path, every: int) -> Any:
-    """The callback that scores the policy before training, every `every` steps and at the end, into
-    curve.csv. Scores that a resumed training has yet to reach again are dropped."""
-    from stable_baselines3.common.callbacks import BaseCallback
+    def _on_training_start(self) -> None:
+        super()._on_training_start()
+        steps = self.num_timesteps
+        self.rows = [row for row in read_curve(self.path) if row["steps"] <= steps] if steps else []
+        self.starter = os.getppid()
+        if not self.rows:
+            self.score()
+            return
+        last = self.rows[-1]
+        self.scored_at = int(last["steps"])
+        # Seconds from the last score to the checkpoint are not known: as many a step as before
+        self.wall_s, self.cpu_s = (
+            last.get(key, 0.0) * steps / max(last["steps"], 1.0) for key in ("wall_s", "cpu_s")
+        )
 
-    class Scorer(BaseCallback):
-        def _on_training_start(self) -> None:
-            steps = self.num_timesteps
-            earlier = read_curve(folder / CURVE) if steps else []
-            self.rows = [row for row in earlier if row["steps"] <= steps]
-            last = self.rows[-1] if self.rows else {}
-            part = steps / max(last.get("steps", 0.0), 1.0)
-            self.wall, self.cpu = (last.get(key, 0.0) * part for key in ("wall_s", "cpu_s"))
+    def _on_step(self) -> bool:
+        if os.getppid() != self.starter:
+            os.kill(os.getpid(), signal.SIGTERM)
             self.starter = os.getppid()
-            self._clock()
-            if not self.rows:
-                self._score()
+        return True
 
-        def _on_rollout_start(self) -> None:
-            if self.num_timesteps // every > self.rows[-1]["steps"] // every:
-                self._score()
-
-        def _on_training_end(self) -> None:
-            if self.num_timesteps > self.rows[-1]["steps"]:
-                self._score()
-
-        def _on_step(self) -> bool:
-            if os.getppid() != self.starter:  # who started this is gone: end as if told to
-                os.kill(os.getpid(), signal.SIGTERM)
-                self.starter = os.getppid()
-            return True
-
-        def _clock(self) -> None:
-            self.since = time.monotonic(), time.process_time()
-
-        def _score(self) -> None:
-            self.wall += time.monotonic() - self.since[0]
-            self.cpu += time.process_time() - self.since[1]
-            episodes = score_vector(policy_of(self.model), env_id, CURVE_SEEDS, **kwargs)
-            clock = {"steps": self.num_timesteps, "wall_s": self.wall, "cpu_s": self.cpu}
-            self.rows.append({**clock, **figures(episodes)})
-            write_curve(folder / CURVE, self.rows)
-            self._clock()
-
-    return Scorer()
+    def keep(self, episodes: list[dict[str, float]]) -> None:
+        """Add a row and write them all."""
+        clock = {"steps": float(self.num_timesteps), "wall_s": self.wall_s, "cpu_s": self.cpu_s}
+        self.rows.append(clock | mean_figures(episodes))
+        write_csv(self.path, COLUMNS, self.rows, "{:.10g}")
 
 
 def read_curve(path: Path) -> list[dict[str, float]]:
@@ -154,12 +197,14 @@ def read_curve(path: Path) -> list[dict[str, float]]:
         return [{key: float(x) for key, x in row.items() if x} for row in csv.DictReader(file)]
 
 
-def write_curve(path: Path, rows: list[dict[str, float]]) -> None:
-    """Write a curve.csv, whole or not at all."""
+def write_csv(
+    path: Path, columns: Sequence[str], rows: Sequence[Mapping[str, Any]], number: str = "{}"
+) -> None:
+    """Write a CSV file, whole or not at all; `number` formats its cells."""
     text = io.StringIO()
-    writer = csv.DictWriter(text, COLUMNS, lineterminator="\n")
+    writer = csv.DictWriter(text, columns, lineterminator="\n")
     writer.writeheader()
-    writer.writerows({key: f"{value:.10g}" for key, value in row.items()} for row in rows)
+    writer.writerows({key: number.format(value) for key, value in row.items()} for row in rows)
     runs.write_text(path, text.getvalue())
 
 

@@ -65,8 +65,8 @@ def whole(folder: Path) -> Iterator[Path]:
 
 def checkpoints(run: Path) -> list[Path]:
     """The checkpoints of a run, the last one first; whatever else was left half-done is not among them."""
-    found = (path for path in (run / runs.CHECKPOINTS).glob("*") if path.name.isdigit())
-    return sorted(found, key=lambda path: int(path.name), reverse=True)
+    folders = (path for path in (run / runs.CHECKPOINTS).glob("*") if path.name.isdigit())
+    return sorted(folders, key=lambda path: int(path.name), reverse=True)
 
 
 def tidy(run: Path, keep: int = KEPT) -> None:
@@ -93,7 +93,7 @@ def save(model: Any, run: Path, seconds: float) -> None:
         "monitor": {
             name: getattr(monitor, name) for name in ("episode_returns", "episode_lengths", "episode_count")
         },
-        "monitor_bytes": (run / "monitor.csv").stat().st_size,
+        "monitor_bytes": (run / runs.MONITOR).stat().st_size,
         "returns": None if normalize is None else normalize.returns,
         "environments": _environment_states(model.env),
         "generators": {
@@ -152,7 +152,7 @@ class Resumed:
             with warnings.catch_warnings():  # of n_steps without its buffer, which is loaded next
                 warnings.filterwarnings("ignore", "`n_steps=", UserWarning)
                 self.model = algorithm.load(
-                    checkpoint / "model.zip", env=envs, device=device, force_reset=False
+                    checkpoint / runs.MODEL, env=envs, device=device, force_reset=False
                 )
             if (checkpoint / REPLAY).exists():
                 self.model.load_replay_buffer(checkpoint / REPLAY)
@@ -162,7 +162,7 @@ class Resumed:
             raise DataFileError(
                 f"checkpoint {checkpoint}: cannot go on from it ({reason}); without it an earlier one serves"
             ) from None
-        self._continue_monitor(monitor, checkpoint.parents[1] / "monitor.csv")
+        self._continue_monitor(monitor, checkpoint.parents[1] / runs.MONITOR)
         self._noise = copy.deepcopy(getattr(self.model, "action_noise", None))
 
     def _put_back(self, monitor: Any, many: Any) -> None:

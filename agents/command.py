@@ -1,5 +1,5 @@
 """What the commands of this folder share: key=value arguments, threads, one line for an error, 130 for
-Ctrl-C."""
+Ctrl-C, and tables in Markdown."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import os
 import sys
 import threading
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from typing import NoReturn
 
 from hoof_env.errors import HoofEnvError, check_number, parse_pairs
 
-__all__ = ["check_threads", "parse_pairs", "run"]
+__all__ = ["check_threads", "parse_pairs", "run", "table"]
 
 
 def check_threads(threads: int) -> None:
@@ -24,8 +24,8 @@ def check_threads(threads: int) -> None:
 def run(command: Callable[[], int | None]) -> NoReturn:
     """Exit with what `command` returns: one line and 2 for an error of ours or of the system, as a full disk,
     one line and 130 for Ctrl-C; a warning is one line, too."""
-    hook = threading.excepthook  # TensorBoard's thread fails on a full disk; its caller tells that, too
-    threading.excepthook = lambda told: None if isinstance(told.exc_value, OSError) else hook(told)
+    hook = threading.excepthook  # TensorBoard's thread fails on a full disk; its caller reports that, too
+    threading.excepthook = lambda args: None if isinstance(args.exc_value, OSError) else hook(args)
     warnings.formatwarning = lambda message, *_, **__: f"warning: {message}\n"
     try:
         code = command() or 0
@@ -36,3 +36,9 @@ def run(command: Callable[[], int | None]) -> NoReturn:
         print("\ninterrupted", file=sys.stderr)
         code = 130
     sys.exit(code)
+
+
+def table(titles: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table; a row that is shorter than its head ends in empty cells."""
+    lines = [titles, ["---"] * len(titles), *([*row, *[""] * (len(titles) - len(row))] for row in rows)]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)

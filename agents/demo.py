@@ -14,23 +14,26 @@ The folder also holds the reproduction, the figures, the films, the scores and t
 
 from __future__ import annotations
 
+import base64
 import json
 import os
 import shutil
-import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
-from agents import evaluate, page, runs, train, video
+from agents import evaluate, runs, train
+from agents.baselines_report import draw_learning_curve
 from agents.command import run
+from agents.ship import TEMPLATES
 from hoof_env._output import check_folder, staged
-from hoof_env.envs.policies import make_policy
 from hoof_env.errors import check_number
+from hoof_env.film import render_episode
+from hoof_env.paper.report import format_error, format_number
 from hoof_env.paper.reproduce import GAITS, SOLVERS, Reproduction, reproduce, write_reproduction
+from hoof_env.paper.rows import counted
 
 ENV_ID, FIXED_ID = "hoof_env/HorseLeg-v0", "hoof_env/HorseLegFixed-v0"
 SCRIPTED = ("walk", "run", "idle", "random", "bang-bang")
@@ -80,7 +83,7 @@ def demo(args: Args) -> Path:
         with announced(1, "the paper's four conditions, walking and running, elastic and inelastic"):
             reproduction = reproduce(say)
             write_reproduction(reproduction, stage, command=runs.command())
-            print_reproduction(reproduction)
+            print_counts(reproduction)
 
         with announced(2, f"scripted policies in {ENV_ID}, {budget.episodes} episodes each"):
             scores, _ = evaluate.evaluate(evaluate_args(budget, SCRIPTED))
@@ -89,7 +92,7 @@ def demo(args: Args) -> Path:
         with announced(3, f"PPO learns for {budget.steps:,} steps, {budget.max_minutes:g} minutes at most"):
             trained = train_agent(args, budget, stage)
             say(f"{trained.steps:,} steps at {trained.rate:,.0f} steps/s")
-            (score,), setting = evaluate.evaluate(evaluate_args(budget, (str(stage / "model.zip"),)))
+            (score,), setting = evaluate.evaluate(evaluate_args(budget, (str(stage / runs.MODEL),)))
             scores.append(replace(score, policy=TRAINED))
             evaluate.print_table(scores)
 
@@ -98,17 +101,7 @@ def demo(args: Args) -> Path:
             data = evaluate.to_json(scores, **setting, **about)
             runs.write_text(stage / "scores.json", json.dumps(data, indent=1, allow_nan=False) + "\n")
             clips = film_all(scores, budget, stage)
-            html = page.render(
-                reproduction=reproduction,
-                scores=scores,
-                clips=clips,
-                trained=trained,
-                curve=page.read_curve(stage / "monitor.csv"),
-                folder=stage,
-                seeds=(FIRST_SEED, FIRST_SEED + budget.episodes - 1),
-                training_seed=args.seed,
-                quick=args.quick,
-            )
+            html = render(args, reproduction, scores, trained, clips, stage)
             (stage / "report.html").write_text(html, encoding="utf-8")
     return args.out / "report.html"
 
@@ -153,57 +146,103 @@ def train_agent(args: Args, budget: Budget, stage: Path) -> train.Trained:
     return trained
 
 
-def film_all(scores: list[evaluate.Score], budget: Budget, stage: Path) -> list[page.Clip]:
-    """Film the gaits and the agent on their own trunk, and the gaits, slowly, on a fixed one."""
-    clips = []
+def film_all(scores: Sequence[evaluate.Score], budget: Budget, stage: Path) -> list[dict[str, str]]:
+    """Film gaits and agent on their own trunk, and the gaits, slowly, on a fixed one; returns a title, a
+    caption and the film itself of each."""
+    clips, size = [], (640, 360)
     first_episodes = {score.policy: score.episodes[0] for score in scores}
-    with runs.make_env(ENV_ID, render_mode="rgb_array") as env:
-        for name in (TRAINED, *GAITS):
-            model_or_name = str(stage / "model.zip") if name == TRAINED else name
-            policy = evaluate.find_policy(model_or_name, env, ENV_ID)
-            path = stage / f"{name.replace(' ', '-')}.mp4"
-            video.film(env, policy, path, seed=FIRST_SEED, seconds=budget.film_seconds, crf=28)
-            first = first_episodes[name]
-            way = "forward" if first["distance_m"] >= 0 else "backward"
-            caption = (
-                f"{abs(first['distance_m']):.1f} m {way} in an episode of {first['seconds']:.0f} s, "
-                f"return {first['return']:.1f}"
-            )
-            clips.append(page.Clip(f"{name.capitalize()}, moving trunk", caption, path))
-            say(f"filmed {name}")
+    for name in (TRAINED, *GAITS):
+        policy = str(stage / runs.MODEL) if name == TRAINED else name
+        path = stage / f"{name.replace(' ', '-')}.mp4"
+        render_episode(path, policy, ENV_ID, seed=FIRST_SEED, seconds=budget.film_seconds, size=size)
+        first = first_episodes[name]
+        way = "forward" if first["distance_m"] >= 0 else "backward"
+        caption = (
+            f"{abs(first['distance_m']):.1f} m {way} in an episode of {first['seconds']:.0f} s, "
+            f"return {first['return']:.1f}"
+        )
+        clips.append(clip(f"{name.capitalize()}, moving trunk", caption, path))
+        say(f"filmed {name}")
     for gait in GAITS:
-        settings: dict[str, Any] = {"gait": gait, "dt": 0.02 / SLOW, "render_mode": "rgb_array"}
-        with runs.make_env(FIXED_ID, **settings) as env:
-            path = stage / f"{gait}-fixed.mp4"
-            video.film(
-                env, make_policy(gait, env), path, seed=0, seconds=min(1.0, budget.film_seconds),
-                crf=28, speed=1 / SLOW,
-            )  # fmt: skip
+        path = stage / f"{gait}-fixed.mp4"
+        seconds = min(1.0, budget.film_seconds)
+        render_episode(path, gait, FIXED_ID, (f"gait={gait}",), seconds=seconds, slow=SLOW, size=size)
         caption = f"one cycle of 1 s as in the paper, {SLOW} times slower than life"
-        clips.append(page.Clip(f"{gait.capitalize()}, fixed trunk", caption, path))
+        clips.append(clip(f"{gait.capitalize()}, fixed trunk", caption, path))
         say(f"filmed {gait} on a fixed trunk")
     return clips
 
 
-def print_reproduction(reproduction: Reproduction) -> None:
-    """Published beside simulated for every row, and the claims about shape."""
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
+def clip(title: str, caption: str, path: Path) -> dict[str, str]:
+    """A film for the page."""
+    return {"title": title, "caption": caption, "film": data_uri(path)}
 
-    grid = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for title, justify in (
-        ("row", "left"), ("unit", "left"), ("published", "right"), ("bar", "right"),
-        *(column for solver in SOLVERS for column in ((solver, "right"), ("error", "right"))),
-    ):  # fmt: skip
-        grid.add_column(title, justify=justify, no_wrap=True)  # type: ignore[arg-type]
-    for row in page.rows(reproduction):
-        cells = [text for cell in row.cells for text in (cell.value, f"{cell.error} {cell.mark}")]
-        grid.add_row(row.id, row.unit, row.published, row.bar, *cells)
-    for claim in page.claims(reproduction):
-        marks = [text for verdict in claim.verdicts for text in (page.MARKS[verdict["holds"]], "")]
-        grid.add_row(claim.id, "shape", "", "", *marks)
-    Console(width=None if sys.stdout.isatty() else 170).print(grid)
+
+def print_counts(reproduction: Reproduction) -> None:
+    """How many rows are within their bars and how many claims hold, by solver."""
+    for solver in SOLVERS:
+        say(f"{solver} solver: {counted(reproduction.rows, reproduction.shapes, solver)}")
+
+
+def render(
+    args: Args,
+    reproduction: Reproduction,
+    scores: Sequence[evaluate.Score],
+    trained: train.Trained,
+    clips: Sequence[dict[str, str]],
+    folder: Path,
+) -> str:
+    """The report: one HTML page that holds its pictures and films and needs no network.
+
+    Args:
+        args: the command's.
+        reproduction: of the paper. Its figures lie in `folder` as SVG.
+        scores: of the policies, the trained one last; all played the same episodes.
+        trained: the training, whose run folder is `folder`.
+        clips: films to show.
+        folder: see there.
+    """
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    *others, agent = scores
+    keys, episodes = list(agent.estimates), len(agent.episodes)
+    gaits = [score for score in others if score.policy in GAITS]
+    draw_learning_curve(folder, [agent, *gaits], folder / "curve.svg", metadata={"Date": None})
+    template = Environment(
+        loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined,
+        trim_blocks=True, lstrip_blocks=True,
+    ).get_template("report.html.j2")  # fmt: skip
+    return template.render(
+        quick=args.quick,
+        reproduction=reproduction,
+        simulated={(row["id"], row["solver"]): row for row in reproduction.rows},
+        shapes={(shape["id"], shape["solver"]): shape for shape in reproduction.shapes},
+        number=format_number,
+        error=format_error,
+        solvers=SOLVERS,
+        figures={path.stem: data_uri(path) for path in folder.glob("figure*.svg")},
+        metrics=[evaluate.METRICS[key] for key in keys],
+        scores=[
+            (score.policy, [evaluate.cell(key, score.estimates[key]) for key in keys]) for score in scores
+        ],
+        episodes=episodes,
+        seeds=(FIRST_SEED, FIRST_SEED + episodes - 1),
+        by_policy={score.policy: score.estimates for score in scores},
+        agent=agent.policy,
+        gaits=[score.policy for score in gaits],
+        trained=trained,
+        training_seed=args.seed,
+        curve=data_uri(folder / "curve.svg"),
+        clips=clips,
+        command=runs.command(),
+        versions=runs.versions(),
+    )
+
+
+def data_uri(path: Path) -> str:
+    """A picture or film as a link that holds it."""
+    kind = {".svg": "image/svg+xml", ".mp4": "video/mp4"}[path.suffix]
+    return f"data:{kind};base64,{base64.b64encode(path.read_bytes()).decode('ascii')}"
 
 
 def main(argv: list[str] | None = None) -> None:

@@ -7,24 +7,30 @@
 
 Without --address a cluster of this machine's cores is made and ended with the command. A worker that dies is
 replaced and its trial goes on from its last checkpoint. Ctrl-C keeps what is there; the same command, given
-again, runs what is missing. docs/distribute.md tells how to use a real cluster and where results land.
+again, runs what is missing. docs/distribute.md says how to use a real cluster and where results land.
+
+RLlib's settings are those of agents/hyperparams/ppo.yml as far as RLlib has them: it neither scales rewards
+nor lets the first spread of actions be chosen.
 """
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import importlib.util
+import inspect
 import json
 import logging
 import os
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
 from agents import runs
 from agents.command import parse_pairs, run
-from agents.distribute_space import ENV, check_keys, parse_space
-from agents.settings import algorithm_class
+from agents.settings import ENV, FOLDER, TrainingArgs, algorithm_class, load_settings
 from agents.train import Args as TrainArgs
 from agents.train import checked
 from hoof_env.errors import HoofEnvError, OutputError, ParameterError, check_number
@@ -36,6 +42,15 @@ SHIPPED = {
     "excludes": ["/.?*", "/runs", "/docs", "/dist", "/build", "__pycache__", "*.pyc"],
 }
 """Runtime environment of trials on a cluster: the checkout, without what no training needs."""
+
+
+DRAWS = {
+    "choice": 1, "uniform": 2, "loguniform": 2, "randint": 2, "lograndint": 2,
+    "quniform": 3, "qloguniform": 3, "qrandint": 3, "qlograndint": 3,
+}  # fmt: skip
+"""Distributions of ray.tune, with the number of their arguments."""
+
+LISTED = "grid_search"
 
 
 @dataclass(frozen=True)
@@ -54,13 +69,9 @@ class Cluster:
 
 
 @dataclass(frozen=True)
-class Trials(Cluster):
+class Trials(Cluster, TrainingArgs):
     """Trainings of agents.train, each a trial of Ray Tune: seeds, sweeps, searches."""
 
-    env_id: str = "hoof_env/HorseLeg-v0"
-    """registered environment"""
-    algo: str = "ppo"
-    """algorithm of agents.train"""
     seeds: int = 1
     """trainings of each setting, from seed 0 on"""
     space: tuple[str, ...] = ()
@@ -70,12 +81,6 @@ class Trials(Cluster):
     """draws of the distributions in --space; the same for each seed"""
     asha: bool = False
     """give up the worse trials early (asynchronous successive halving)"""
-    steps: int | None = None
-    """of each training; otherwise n_timesteps of the hyperparameter file"""
-    env_kwargs: tuple[str, ...] = ()
-    """arguments of the environment: key=value ..., or one JSON object"""
-    params: tuple[str, ...] = ()
-    """hyperparameters to change: key=value ..., or one JSON object"""
     report_every: int = 100_000
     """steps between two scores, which are checkpoints as well"""
     cpus_per_trial: int = 1
@@ -103,6 +108,90 @@ class Rllib(Cluster):
     the batch, whatever the workers' n_envs"""
 
 
+@dataclass(frozen=True)
+class Axis:
+    """One thing that is varied: `values` to run all of, or a distribution of `DRAWS` with its arguments."""
+
+    key: str
+    draw: str
+    arguments: tuple[Any, ...]
+
+    @property
+    def values(self) -> list[Any]:
+        """Those that are listed, or the arguments of the distribution: something of the right kind to try."""
+        return list(self.arguments[0] if self.draw in (LISTED, "choice") else self.arguments[:2])
+
+    def build(self) -> Any:
+        """The same for Tune.
+
+        Raises:
+            ParameterError: Tune refuses the arguments.
+        """
+        from ray import tune
+
+        try:
+            built = getattr(tune, self.draw)(*self.arguments)
+            if self.draw != LISTED:
+                built.sample()
+        except (TypeError, ValueError, ArithmeticError, AssertionError) as error:
+            reason = f"--space {self.key}: {self.draw}{self.arguments} cannot be drawn from: {error}"
+            raise ParameterError(reason) from None
+        return built
+
+
+def parse_space(items: Sequence[str]) -> list[Axis]:
+    """Read `key=[...]` and `key=distribution(...)`.
+
+    >>> parse_space(["n_steps=[16, 32]", "learning_rate=loguniform(1e-4, 1e-2)"])
+    [Axis(key='n_steps', draw='grid_search', arguments=([16, 32],)), \
+Axis(key='learning_rate', draw='loguniform', arguments=(0.0001, 0.01))]
+
+    Raises:
+        ParameterError: an item is neither, or a key comes twice.
+    """
+    axes: dict[str, Axis] = {}
+    for item in items:
+        key, _, text = item.partition("=")
+        draw, arguments = _read(text)
+        if not key or not draw:
+            known = ", ".join(f"{name}({', '.join('abq'[:count])})" for name, count in DRAWS.items())
+            raise ParameterError(f"--space: expected key=[JSON, ...] or key=draw of {known}; got {item!r}")
+        if key in axes:
+            raise ParameterError(f"--space: {key} is given twice")
+        axes[key] = Axis(key, draw, arguments)
+    return list(axes.values())
+
+
+def _read(text: str) -> tuple[str, tuple[Any, ...]]:
+    """Name and arguments of what stands behind the equals sign; no name where it cannot be read."""
+    values = parse_pairs("--space", [f"values={text}"])["values"]
+    if isinstance(values, list):
+        return (LISTED, (values,)) if values else ("", ())
+    with suppress(SyntaxError, ValueError):
+        match ast.parse(text.strip(), mode="eval").body:
+            case ast.Call(func=ast.Name(id=name), args=nodes, keywords=[]) if len(nodes) == DRAWS.get(name):
+                arguments = tuple(ast.literal_eval(node) for node in nodes)
+                if name != "choice" or (isinstance(arguments[0], list) and arguments[0]):
+                    return name, arguments
+    return "", ()
+
+
+def check_keys(axes: Iterable[Axis], algo: str, settings: Iterable[str]) -> None:
+    """Refuse keys that are neither hyperparameters of `algo`, nor in its `settings`, nor an environment's.
+
+    Raises:
+        ParameterError: an unknown key.
+    """
+    known = {*inspect.signature(algorithm_class(algo)).parameters, *settings, "normalize", "n_envs"}
+    known -= {"env", "seed", "device", "_init_setup_model", "verbose", "tensorboard_log", "n_timesteps"}
+    for axis in axes:
+        if axis.key not in known and not axis.key.startswith(ENV):
+            raise ParameterError(
+                f"--space: expected a hyperparameter of {algo} ({', '.join(sorted(known))}) or {ENV}ARGUMENT "
+                f"of the environment, got {axis.key!r}"
+            )
+
+
 def prepare(args: Trials) -> dict[str, Any]:
     """The parameter space of `args`: constants, an `Axis` for what varies, a list of seeds; all checked.
 
@@ -112,8 +201,8 @@ def prepare(args: Trials) -> dict[str, Any]:
     for name in ("seeds", "samples", "report_every", "cpus_per_trial"):
         check_number(name, getattr(args, name), low=1)
     algorithm_class(args.algo)
-    asked: dict[str, Any] = {"env_id": args.env_id, "algo": args.algo, "torch_threads": args.cpus_per_trial}
-    one = TrainArgs(**asked, steps=args.steps, env_kwargs=args.env_kwargs, params=args.params)
+    fixed: dict[str, Any] = {"env_id": args.env_id, "algo": args.algo, "torch_threads": args.cpus_per_trial}
+    one = TrainArgs(**fixed, steps=args.steps, env_kwargs=args.env_kwargs, params=args.params)
     env_kwargs, settings = checked(one)
     axes = parse_space(args.space)
     check_keys(axes, args.algo, settings)
@@ -125,7 +214,7 @@ def prepare(args: Trials) -> dict[str, Any]:
         for value in axis.values if axis.key.startswith(ENV) else ():
             runs.make_env(args.env_id, **env_kwargs | {axis.key.removeprefix(ENV): value}).close()
     return {
-        "train": asked | {"steps": settings["n_timesteps"]},
+        "train": fixed | {"steps": settings["n_timesteps"]},
         "env_kwargs": env_kwargs,
         "params": parse_pairs("--params", args.params),
         "report_every": args.report_every,
@@ -164,9 +253,74 @@ def run_trials(args: Trials) -> int:
 
 
 def _folder_name(trial: Any, varied: list[str]) -> str:
-    told = ",".join(f"{key}={trial.config[key]}" for key in varied)
+    text = ",".join(f"{key}={trial.config[key]}" for key in varied)
     number = trial.trial_id.rpartition("_")[2]
-    return f"{number}-" + "".join(c if c.isalnum() or c in "=,.-_" else "_" for c in told)[:100]
+    return f"{number}-" + "".join(c if c.isalnum() or c in "=,.-_" else "_" for c in text)[:100]
+
+
+def make_config(args: Rllib) -> Any:
+    """RLlib's `PPOConfig` for `args`.
+
+    Raises:
+        ParameterError, DataFileError: the arguments, the environment or the hyperparameter file do not fit.
+    """
+    from ray.rllib.algorithms.ppo import PPOConfig
+
+    env_kwargs = parse_pairs("--env-kwargs", args.env_kwargs)
+    settings = load_settings(FOLDER / "ppo.yml", args.env_id) | parse_pairs("--params", args.params)
+    rate = settings["learning_rate"]
+    if isinstance(rate, str):  # lin_<x>
+        rate = [[0, float(rate.removeprefix("lin_"))], [args.steps, 0.0]]
+    return (
+        PPOConfig()
+        .environment(f"hoof_env:{args.env_id}", env_config=env_kwargs)
+        .env_runners(
+            num_env_runners=args.workers,
+            num_envs_per_env_runner=args.n_envs,
+            gym_env_vectorize_mode="vector_entry_point",
+        )
+        .training(
+            lr=rate,
+            gamma=settings["gamma"],
+            lambda_=settings["gae_lambda"],
+            clip_param=settings["clip_range"],
+            entropy_coeff=settings["ent_coef"],
+            vf_loss_coeff=settings["vf_coef"],
+            grad_clip=settings["max_grad_norm"],
+            num_epochs=settings["n_epochs"],
+            minibatch_size=settings["batch_size"],
+            train_batch_size_per_learner=settings["n_steps"] * settings["n_envs"],
+        )
+        .rl_module(model_config={"fcnet_hiddens": settings["policy_kwargs"]["net_arch"]})
+        .learners(num_learners=0)  # in the trial's own process
+        .fault_tolerance(restart_failed_env_runners=True)
+        .debugging(seed=args.seed)
+    )
+
+
+def run_rllib(args: Rllib) -> int:
+    """Train as `args` say, or go on; see `fit` for the rest."""
+    for name in ("workers", "n_envs", "steps"):
+        check_number(name, getattr(args, name), low=1)
+    check_number("seed", args.seed, low=0)
+    kwargs = parse_pairs("--env-kwargs", args.env_kwargs)
+    with runs.make_env(args.env_id, **kwargs) as env:
+        if env.spec is None or env.spec.vector_entry_point is None or hasattr(env.unwrapped, "reward_space"):
+            raise ParameterError(f"env_id: expected one with a native vector environment, got {args.env_id}")
+        runs.warm_up(env)
+    start(args)
+    from ray import tune
+
+    # No metric: Tune would refuse iterations in which no episode ended
+    config = tune.TuneConfig(trial_dirname_creator=lambda trial: f"seed={args.seed}")
+    tuner = {"trainable": "PPO", "param_space": make_config(args), "tune_config": config}
+    return fit(
+        args, f"rllib-{args.env_id.rpartition('/')[2]}", tuner, ["seed"],
+        stop={"num_env_steps_sampled_lifetime": args.steps},
+        checkpoint_config=tune.CheckpointConfig(
+            num_to_keep=1, checkpoint_frequency=10, checkpoint_at_end=True
+        ),
+    )  # fmt: skip
 
 
 def start(args: Cluster) -> None:
@@ -175,38 +329,41 @@ def start(args: Cluster) -> None:
     Raises:
         ParameterError: Ray is not installed, or no cluster at that address lets us in.
     """
-    kind = "rllib" if isinstance(args, Rllib) else "tune"
-    needed = {"tune": ("ray", "pandas"), "rllib": ("ray", "pandas", "torch", "dm_tree")}[kind]
-    extra = {"tune": "distribute", "rllib": "ray"}[kind]
-    missing = [name for name in needed if not importlib.util.find_spec("tree" if name == "dm_tree" else name)]
+    check_installed(args)
+    check_number("retries", args.retries, low=0)
+    if args.cpus is not None:
+        check_number("cpus", args.cpus, low=1)
+    os.environ.setdefault("RAY_AIR_NEW_OUTPUT", "0")
+    import ray
+    from ray.exceptions import AuthenticationError
+
+    options: dict[str, Any] = {"num_cpus": args.cpus, "include_dashboard": False}
+    if args.address:
+        # Ray refuses a second working_dir in a job that was submitted with one
+        job = json.loads(os.environ.get("RAY_JOB_CONFIG_JSON_ENV_VAR", "{}")).get("runtime_env", {})
+        sent = {} if "working_dir" in job else SHIPPED
+        options = {"runtime_env": sent | parse_pairs("--runtime-env", args.runtime_env)}
+    # A failure is written in one line by agents.distribute_trial
+    logging.getLogger("ray.tune.execution.tune_controller").setLevel(logging.CRITICAL)
+    try:
+        ray.init(args.address or "local", log_to_driver=False, logging_level=logging.ERROR, **options)
+    except (AuthenticationError, ConnectionError, OSError, RuntimeError, ValueError) as error:
+        lines = str(error).strip().splitlines() or [type(error).__name__]
+        where = f"a Ray cluster at {args.address!r}" if args.address else "a Ray cluster on this machine"
+        raise ParameterError(f"address: expected {where}, cannot reach it: {lines[0]}") from None
+
+
+def check_installed(args: Cluster) -> None:
+    """`ParameterError` that names the extra unless all that the command needs is there."""
+    kind, extra, more = (
+        ("rllib", "ray", ("torch", "tree")) if isinstance(args, Rllib) else ("tune", "distribute", ())
+    )
+    missing = [name for name in ("ray", "pandas", *more) if not importlib.util.find_spec(name)]
     if missing:
         raise ParameterError(
             f"expected ray[{kind}] to be installed, found no {', '.join(missing)}: "
             f"pip install 'hoof-env[{extra}]'"
         )
-    check_number("retries", args.retries, low=0)
-    os.environ.setdefault("RAY_AIR_NEW_OUTPUT", "0")
-    import ray
-    from ray.exceptions import AuthenticationError
-
-    asked: dict[str, Any] = {"address": args.address or "local", "log_to_driver": False}
-    if args.address:
-        # Ray refuses a second working_dir in a job that was submitted with one
-        job = json.loads(os.environ.get("RAY_JOB_CONFIG_JSON_ENV_VAR", "{}")).get("runtime_env", {})
-        sent = {} if "working_dir" in job else SHIPPED
-        asked["runtime_env"] = sent | parse_pairs("--runtime-env", args.runtime_env)
-    else:
-        asked |= {"num_cpus": args.cpus, "include_dashboard": False}
-        if args.cpus is not None:
-            check_number("cpus", args.cpus, low=1)
-    # A failure is told in one line by agents.distribute_report
-    logging.getLogger("ray.tune.execution.tune_controller").setLevel(logging.CRITICAL)
-    try:
-        ray.init(logging_level=logging.ERROR, **asked)
-    except (AuthenticationError, ConnectionError, OSError, RuntimeError, ValueError) as error:
-        said = str(error).strip().splitlines() or [type(error).__name__]
-        where = f"a Ray cluster at {args.address!r}" if args.address else "a Ray cluster on this machine"
-        raise ParameterError(f"address: expected {where}, cannot reach it: {said[0]}") from None
 
 
 def fit(args: Cluster, name: str, tuner: dict[str, Any], varied: list[str], **running: Any) -> int:
@@ -224,10 +381,10 @@ def fit(args: Cluster, name: str, tuner: dict[str, Any], varied: list[str], **ru
     """
     from ray import tune
 
-    from agents.distribute_report import Progress, write_table
+    from agents.distribute_trial import Progress, write_table
 
-    asked = {key: value for key, value in asdict(args).items() if key not in Cluster.__dataclass_fields__}
-    digest = hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()[:8]
+    options = {key: value for key, value in asdict(args).items() if key not in Cluster.__dataclass_fields__}
+    digest = hashlib.sha256(json.dumps(options, sort_keys=True).encode()).hexdigest()[:8]
     storage = args.out if "://" in args.out else str(Path(args.out).absolute())
     folder = f"{storage}/{name}-{digest}"
     config = tune.RunConfig(
@@ -250,8 +407,6 @@ def fit(args: Cluster, name: str, tuner: dict[str, Any], varied: list[str], **ru
 
 def main(argv: list[str] | None = None) -> int:
     import tyro
-
-    from agents.distribute_rllib import run_rllib
 
     choice = (
         Annotated[Trials, tyro.conf.subcommand("trials")] | Annotated[Rllib, tyro.conf.subcommand("rllib")]

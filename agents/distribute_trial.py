@@ -1,24 +1,24 @@
-"""One training as a trial of Ray Tune: what runs on a worker."""
+"""What runs under Ray Tune: a training as a trial on a worker, and what is shown and kept of all trials."""
 
 from __future__ import annotations
 
+import csv
+import io
 import json
+import re
 import shlex
 import shutil
 import sys
-import time
-from contextlib import nullcontext
 from pathlib import Path
-from typing import Any
-from unittest.mock import patch
+from typing import Any, ClassVar
 
-from agents import checkpoints
-from agents.baselines_plan import CURVE_SEEDS
-from agents.baselines_run import policy_of
-from agents.distribute_space import ENV
-from agents.score import score_vector
+from ray import tune
+
+from agents import checkpoints, runs
+from agents.score import CURVE_SEEDS
+from agents.settings import ENV
 from agents.train import Args, train
-from agents.watch import DivergedError
+from agents.watch import DivergedError, Scorer
 from hoof_env.errors import DataFileError, ParameterError
 
 FIXED = ("train", "env_kwargs", "params", "report_every", "seed", "command")
@@ -35,8 +35,6 @@ def train_trial(config: dict[str, Any]) -> None:
             steps; "seed"; "command", for run.json; and what the search chose: hyperparameters, and arguments
             of the environment behind "env.".
     """
-    from ray import tune
-
     chosen = {key: value for key, value in config.items() if key not in FIXED}
     env_kwargs = config["env_kwargs"] | {
         k.removeprefix(ENV): v for k, v in chosen.items() if k.startswith(ENV)
@@ -47,7 +45,7 @@ def train_trial(config: dict[str, Any]) -> None:
     kept = tune.get_checkpoint()
     if kept:
         kept.to_directory(str(folder))
-    reporter = make_reporter(folder, config, env_kwargs, kept.get_metadata() if kept else {})
+    reporter = Reporter(folder, config, env_kwargs, kept.get_metadata() if kept else {})
     # The reporter keeps the checkpoints: two of the same step would not go into one folder
     args = Args(
         **config["train"], seed=config["seed"], out=folder, resume=True, checkpoint_every=0,
@@ -55,57 +53,139 @@ def train_trial(config: dict[str, Any]) -> None:
     )  # fmt: skip
     sys.orig_argv = shlex.split(config["command"])
     try:
-        # A trial is a thread of its worker, where signals cannot be caught; Tune stops it at a report
-        with patch("agents.train.stop_on_signals", lambda watch: nullcontext()):
-            train(args, reporter)
+        train(args, reporter)
     except (ParameterError, DataFileError, DivergedError) as error:
         tune.report({"return": float("nan"), **reporter.last, "failed": str(error)})
     else:
         reporter.report()
 
 
-def make_reporter(folder: Path, config: dict[str, Any], env_kwargs: dict[str, Any], last: Any) -> Any:
-    """The callback that scores the policy, keeps a checkpoint and reports both to Tune. `last` holds the last
-    score: "return", mean over the episodes of `CURVE_SEEDS`; "steps"; "train_s", seconds of training, scores
-    and retried parts aside."""
-    from ray import tune
-    from stable_baselines3.common.callbacks import BaseCallback
+class Reporter(Scorer):
+    """Scores the policy, keeps a checkpoint and reports both to Tune.
 
-    env_id, every = config["train"]["env_id"], config["report_every"]
+    Attributes:
+        last: the last score: "return", mean over the episodes of `CURVE_SEEDS`; "steps"; "train_s", seconds
+            of training, scores and retried parts aside.
+    """
 
-    class Reporter(BaseCallback):
-        last: dict[str, float]
+    def __init__(
+        self, folder: Path, config: dict[str, Any], env_kwargs: dict[str, Any], last: dict[str, float]
+    ) -> None:
+        super().__init__(config["train"]["env_id"], env_kwargs, CURVE_SEEDS, config["report_every"])
+        self.folder, self.last = folder, dict(last)
+        self.wall_s = self.last.get("train_s", 0.0)
 
-        def _on_training_start(self) -> None:
-            self.train_s, self.since = self.last.get("train_s", 0.0), time.monotonic()
-            self.next = self.num_timesteps + every
+    def keep(self, episodes: list[dict[str, float]]) -> None:
+        """Remember the score."""
+        mean = sum(one["return"] for one in episodes) / len(episodes)
+        self.last = {"return": mean, "steps": self.num_timesteps, "train_s": self.wall_s}
 
-        def _on_rollout_start(self) -> None:
-            if self.num_timesteps >= self.next:
-                self.next += every
-                self._score()
-                checkpoints.save(self.model, folder, self.train_s)
-                checkpoints.tidy(folder, keep=1)
-                self.report()
-                self.since = time.monotonic()
+    def _on_rollout_start(self) -> None:
+        before = self.scored_at
+        super()._on_rollout_start()
+        if self.scored_at > before:
+            checkpoints.save(self.model, self.folder, self.wall_s)
+            checkpoints.tidy(self.folder, keep=1)
+            self.report()
+            self._start_clock()
 
-        def _on_training_end(self) -> None:
-            self._score()
+    def report(self) -> None:
+        """Hand the last score and the run folder to Tune."""
+        checkpoint = tune.Checkpoint.from_directory(str(self.folder))
+        checkpoint.set_metadata(self.last)
+        tune.report(self.last, checkpoint=checkpoint)
 
-        def _on_step(self) -> bool:
-            return True
 
-        def _score(self) -> None:
-            self.train_s += time.monotonic() - self.since
-            episodes = score_vector(policy_of(self.model), env_id, CURVE_SEEDS, **env_kwargs)
-            score = sum(one["return"] for one in episodes) / len(episodes)
-            self.last = {"return": score, "steps": self.num_timesteps, "train_s": self.train_s}
+def figures(report: dict[str, Any] | None) -> dict[str, Any]:
+    """Of a report of a `Reporter` or of RLlib: return, steps and seconds of training."""
+    report = report or {}
+    runner = report.get("env_runners", {})
+    return {
+        "return": report.get("return", runner.get("episode_return_mean")),
+        "steps": report.get("steps", report.get("num_env_steps_sampled_lifetime")),
+        "train_s": report.get("train_s", report.get("time_total_s")),
+    }
 
-        def report(self) -> None:
-            checkpoint = tune.Checkpoint.from_directory(str(folder))
-            checkpoint.set_metadata(self.last)
-            tune.report(self.last, checkpoint=checkpoint)
 
-    reporter = Reporter()
-    reporter.last = dict(last)
-    return reporter
+class Progress(tune.Callback):
+    """A line for each score, and when a trial ends, when its worker died and when it goes on.
+
+    Attributes:
+        going: ids of trials that had not ended at the last step; of the class, for Tune works with a copy.
+    """
+
+    going: ClassVar[set[str]] = set()
+
+    def on_step_end(self, iteration: int, trials: list[Any], **info: Any) -> None:
+        Progress.going = {t.trial_id for t in trials if t.status not in ("TERMINATED", "ERROR")}
+
+    def on_trial_result(
+        self, iteration: int, trials: list[Any], trial: Any, result: dict[str, Any], **info: Any
+    ) -> None:
+        score = figures(result)
+        if score["return"] is not None:  # it is none where no episode of RLlib's ended
+            write_line(trial, f"{score['steps']:,.0f} steps, return {score['return']:.2f}")
+
+    def on_trial_recover(self, iteration: int, trials: list[Any], trial: Any, **info: Any) -> None:
+        kept = trial.latest_checkpoint_result
+        steps = figures(kept.metrics)["steps"] if kept else 0
+        write_line(trial, f"{last_failure(trial)} Retry {trial.num_failures}, from step {steps:,.0f}")
+
+    def on_trial_error(self, iteration: int, trials: list[Any], trial: Any, **info: Any) -> None:
+        write_line(trial, f"{last_failure(trial)} No retry is left")
+
+    def on_trial_complete(self, iteration: int, trials: list[Any], trial: Any, **info: Any) -> None:
+        score = figures(trial.last_result)["return"]
+        write_line(trial, "done" if score is None else f"done, return {score:.2f}")
+
+
+def write_line(trial: Any, what: str) -> None:
+    """A line about a trial, at once."""
+    print(f"trial {trial.trial_id.rpartition('_')[2]}: {what}", flush=True)
+
+
+def last_failure(trial: Any) -> str:
+    """Why a trial failed the last time, from the file that Tune writes."""
+    path = Path(trial.error_file or "")
+    return reason(path.read_text() if path.is_file() else "")
+
+
+def reason(error: str) -> str:
+    """The last failure in one line: Ray puts the news first, but behind a traceback that of Python last."""
+    error = re.sub(r"\x1b\[[\d;]*m", "", error)
+    lines = [line.strip() for line in error.rpartition("Failure #")[2].strip().splitlines()]
+    lines = [line for line in lines if "(occurred at" not in line] or ["unknown."]
+    return lines[-1 if any(line.startswith(("Traceback", "ray::")) for line in lines) else 0]
+
+
+def write_table(results: Any, folder: str, varied: list[str]) -> int:
+    """Write `folder`/trials.csv where that is a path, print what came of the trials.
+
+    Returns:
+        The exit code: 0, 1 where a trial failed for good, 130 where one has not ended.
+    """
+    rows, reasons = [], []
+    # Whether a trial is done stands in its status alone; but after Ctrl-C all look as if they were
+    pairs = zip(results, results._experiment_analysis.trials, strict=True)
+    for result, trial in sorted(pairs, key=lambda pair: Path(pair[0].path).name):
+        report, config = result.metrics or {}, result.config or {}
+        kept = result.checkpoint.path if result.checkpoint else ""
+        why = reason(str(result.error)) if result.error else report.get("failed")
+        is_done = trial.status == "TERMINATED" and trial.trial_id not in Progress.going
+        state = "failed" if why else "done" if is_done else "unfinished"
+        reasons += [f"  {kept or 'a trial'}: {why}"] if why else []
+        row = {key: config.get(key) for key in varied} | figures(report)
+        rows.append(row | {"state": state, "run": str(kept).removeprefix(f"{folder}/")})
+    if "://" not in folder and rows:
+        text = io.StringIO()
+        writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+        runs.write_text(Path(folder, "trials.csv"), text.getvalue())
+    counts = {state: sum(row["state"] == state for row in rows) for state in ("done", "failed", "unfinished")}
+    print(", ".join(f"{count} {state}" for state, count in counts.items() if count) + f": {folder}")
+    print("\n".join(reasons), end="\n" if reasons else "")
+    if counts["unfinished"]:
+        print("interrupted; the same command goes on")
+        return 130
+    return 1 if counts["failed"] else 0

@@ -15,7 +15,7 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -23,14 +23,13 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
+from numpy.typing import NDArray
 
 from agents import runs
 from agents.command import parse_pairs, run
-from agents.impact import LoadingRate
+from agents.score import find_policy, play, read_policy_record
 from hoof_env._output import check_folder
-from hoof_env.envs.policies import make_policy, open_loop_record, policy_names, read_open_loop
 from hoof_env.errors import OutputError, ParameterError, check_number
-from hoof_env.onnx_policy import OnnxPolicy
 
 DEFAULT_ENV = "hoof_env/HorseLeg-v0"
 
@@ -57,17 +56,33 @@ METRICS = {
     "loading_rate_n_s": Metric("loading rate\nkN/s", 1e-3, 1),
 }
 """The columns: "return", figures of the episode summary (`hoof_env.envs.summary.summary_of`), and two means
-over the stances of an episode, 0 without a stance: "stance_peak_n", of their highest force, and
-"loading_rate_n_s" (`agents.impact`), of the steepest rise of the force at impact, where it is asked for."""
+over the stances of an episode, 0 without a stance: "stance_peak_n", of their highest force, and, where it is
+asked for, "loading_rate_n_s" (`agents.score.LoadingRate`), of the steepest rise of the force at impact."""
 
 
 @dataclass(frozen=True)
-class Estimate:
-    """A mean over episodes and the bounds of its 95 % interval, None for one episode or an infinite mean."""
+class Interval:
+    """A mean and the bounds of its 95 % interval; NaN where there is none."""
 
     mean: float
-    low: float | None
-    high: float | None
+    low: float = math.nan
+    high: float = math.nan
+
+    def parts(self, digits: int = 1, factor: float = 1.0) -> tuple[str, str]:
+        """Mean and interval as a person reads them; nothing for a mean that is NaN, and no interval where
+        there is none or it has no width."""
+        if not math.isfinite(self.mean):
+            return "" if math.isnan(self.mean) else "∞", ""
+        mean, low, high = (f"{factor * x:.{digits}f}" for x in (self.mean, self.low, self.high))
+        return mean, "" if self.low == self.high or math.isnan(self.low) else f"[{low}, {high}]"
+
+    def text(self, digits: int = 1, factor: float = 1.0) -> str:
+        """The same in one."""
+        return " ".join(filter(None, self.parts(digits, factor)))
+
+    def above(self, other: Interval) -> bool:
+        """Whether the whole interval lies above another; False where one is not known."""
+        return self.low > other.high
 
 
 @dataclass(frozen=True)
@@ -78,107 +93,25 @@ class Score:
     episodes: list[dict[str, float]]
 
     @cached_property
-    def estimates(self) -> dict[str, Estimate]:
+    def estimates(self) -> dict[str, Interval]:
         """By key of `METRICS`, those that the episodes have."""
         return {
             key: estimate([one[key] for one in self.episodes]) for key in METRICS if key in self.episodes[0]
         }
 
 
-def estimate(values: Sequence[float]) -> Estimate:
+def estimate(values: Sequence[float]) -> Interval:
     """The mean of `values` and the bias-corrected bootstrap's 95 % interval of it."""
     from scipy.stats import bootstrap
 
     sample = np.asarray(values, dtype=float)
     mean = float(sample.mean())
     if len(sample) < 2 or not math.isfinite(mean):
-        return Estimate(mean, None, None)
+        return Interval(mean)
     if np.ptp(sample) <= 1e-12 * abs(mean):  # the bootstrap is undefined without variance
-        return Estimate(mean, mean, mean)
+        return Interval(mean, mean, mean)
     bounds = bootstrap((sample,), np.mean, rng=np.random.default_rng(0)).confidence_interval
-    return Estimate(mean, float(bounds.low), float(bounds.high))
-
-
-def play(
-    env: gym.Env[Any, Any],
-    policy: Any,
-    seeds: Sequence[int],
-    tick: Any = lambda: None,
-    *,
-    loading_rate: bool = False,
-) -> list[dict[str, float]]:
-    """One episode per seed; its return and its summary. `tick` is called after each. The loading rate needs
-    an environment of this package, whose substeps it records."""
-    episodes = []
-    for seed in seeds:
-        observation, info = env.reset(seed=seed)
-        rate = LoadingRate(env) if loading_rate else None
-        total, start, done = 0.0, np.ones(1, bool), False
-        while not done:
-            action, _ = policy.predict(observation, episode_start=start, deterministic=True)
-            observation, reward, terminated, truncated, info = env.step(action)
-            total += float(np.asarray(reward).sum())  # of a vector, all objectives
-            if rate:
-                rate.add()
-            start, done = np.zeros(1, bool), terminated or truncated
-        summary = info.get("episode_summary", {})
-        if "stances" in summary:
-            summary["stance_peak_n"] = summary["stance_peak_sum_n"] / max(summary["stances"], 1.0)
-        if rate:
-            summary["loading_rate_n_s"] = rate.mean()
-        episodes.append({"return": total, **summary})
-        tick()
-    return episodes
-
-
-def is_model(name: str) -> bool:
-    """Whether a policy's name is the path of a model rather than that of a scripted policy or of a gait."""
-    if name.endswith(".json"):
-        return False
-    return name.endswith((".zip", ".onnx")) or Path(name).name != name or Path(name, "model.zip").is_file()
-
-
-def saved(path: Path) -> OnnxPolicy | runs.SavedModel:
-    """A policy in a file or a folder: an exported one, or a model of agents.train.
-
-    Raises:
-        DataFileError: there is none.
-    """
-    return OnnxPolicy(path) if OnnxPolicy.stands_at(path) else runs.SavedModel.find(path)
-
-
-def recorded(name: str) -> dict[str, Any]:
-    """What a policy's file says of itself, env_id and env_kwargs among it; empty for a scripted policy.
-
-    Raises:
-        DataFileError: no such model or gait.
-    """
-    if name.endswith(".json"):
-        return open_loop_record(Path(name))
-    return saved(Path(name)).record if is_model(name) else {}
-
-
-def find_policy(name: str, env: gym.Env[Any, Any], env_id: str) -> Any:
-    """A scripted policy by its name, or a trained one or an open-loop gait by its path.
-
-    Raises:
-        ParameterError: unknown name. DataFileError: no such model or gait, or one that does not fit.
-    """
-    if name.endswith(".json"):
-        return read_open_loop(Path(name), env)
-    if is_model(name):
-        return saved(Path(name)).load(env, env_id)
-    names = [*policy_names(env), "open-loop"] if hasattr(env.unwrapped, "gaits") else []
-    if name not in names:
-        known = ", ".join(names) or f"none is scripted for {env_id}"
-        raise ParameterError(
-            f"policy: expected a name ({known}), the path of a trained model or a gait's .json, got {name!r}"
-        )
-    if name == "open-loop":
-        from agents.open_loop import load_open_loop
-
-        return load_open_loop(env_id, env)
-    return make_policy(name, env)
+    return Interval(mean, float(bounds.low), float(bounds.high))
 
 
 def film_paths(video: Path, names: Sequence[str]) -> dict[str, Path]:
@@ -229,21 +162,11 @@ def evaluate(args: Args) -> tuple[list[Score], dict[str, Any]]:
     """
     from tqdm import tqdm
 
-    check_number("episodes", args.episodes, low=1)
-    check_number("seed", args.seed, low=0)
-    if not args.policy:
-        raise ParameterError("policy: expected a name or the path of a trained model, got none")
-    for path in filter(None, (args.json, args.video)):
-        if path.is_dir():
-            raise OutputError(f"cannot write to {str(path)!r}: expected a file, got a folder")
-        check_folder(path.parent)
-    record = next(filter(None, [recorded(name) for name in args.policy]), {})
+    _check(args)
     films = film_paths(args.video, args.policy) if args.video else {}
-    env_id = args.env_id or record.get("env_id", DEFAULT_ENV)
-    own = record.get("env_kwargs", {}) if env_id == record.get("env_id") else {}
-    kwargs = parse_pairs("--env-kwargs", args.env_kwargs) or own
+    env_id, env_kwargs = _environment(args)
     scores = []
-    with runs.make_env(env_id, **kwargs) as env:
+    with runs.make_env(env_id, **env_kwargs) as env:
         if args.loading_rate and not hasattr(env.unwrapped, "record"):
             raise ParameterError(f"--loading-rate: expected an environment of hoof_env, got {env_id}")
         runs.warm_up(env)
@@ -253,27 +176,69 @@ def evaluate(args: Args) -> tuple[list[Score], dict[str, Any]]:
             for name, policy in policies.items():
                 bar.set_description(name)
                 seeds = range(args.seed, args.seed + args.episodes)
-                played = play(env, policy, seeds, bar.update, loading_rate=args.loading_rate)
-                scores.append(Score(name, played))
+                scores.append(
+                    Score(name, play(env, policy, seeds, bar.update, loading_rate=args.loading_rate))
+                )
     if args.video:
-        from agents.video import film
-
-        with runs.make_env(env_id, **{**kwargs, "render_mode": "rgb_array"}) as env:
+        with runs.make_env(env_id, **{**env_kwargs, "render_mode": "rgb_array"}) as env:
             for name, path in films.items():
-                film(env, find_policy(name, env, env_id), path, seed=args.seed)
+                film(env, find_policy(name, env, env_id), path, args.seed)
                 print(f"filmed {name}: {path}")
-    return scores, {"env_id": env_id, "env_kwargs": kwargs}
+    return scores, {"env_id": env_id, "env_kwargs": env_kwargs}
 
 
-def cell(metric: Metric, value: Estimate) -> tuple[str, str]:
-    """Mean and interval as a person reads them; no interval where there is none or all episodes agree."""
-    if not math.isfinite(value.mean):
-        return "∞", ""
-    mean, *bounds = (
-        "" if x is None else f"{x * metric.factor:.{metric.digits}f}"
-        for x in (value.mean, value.low, value.high)
-    )
-    return mean, f"[{bounds[0]}, {bounds[1]}]" if value.low != value.high else ""
+def _check(args: Args) -> None:
+    check_number("episodes", args.episodes, low=1)
+    check_number("seed", args.seed, low=0)
+    if not args.policy:
+        raise ParameterError("policy: expected a name or the path of a trained model, got none")
+    for path in filter(None, (args.json, args.video)):
+        if path.is_dir():
+            raise OutputError(f"cannot write to {str(path)!r}: expected a file, got a folder")
+        check_folder(path.parent)
+
+
+def _environment(args: Args) -> tuple[str, dict[str, Any]]:
+    """The id and the arguments of the environment: those that are given, else those of the first policy that
+    is a file."""
+    record = next(filter(None, [read_policy_record(name) for name in args.policy]), {})
+    env_id = args.env_id or record.get("env_id", DEFAULT_ENV)
+    own = record.get("env_kwargs", {}) if env_id == record.get("env_id") else {}
+    return env_id, parse_pairs("--env-kwargs", args.env_kwargs) or own
+
+
+def film(env: gym.Env[Any, Any], policy: Any, path: Path, seed: int) -> None:
+    """Write one episode to `path`, an MP4; an older file is replaced at the end.
+
+    Args:
+        env: made with render_mode="rgb_array".
+        policy: anything with Stable-Baselines3's `predict`.
+        path: of the film.
+        seed: of the episode.
+
+    Raises:
+        OutputError: the folder cannot be written, or the disk is full.
+    """
+    from hoof_env.film import write_film
+
+    write_film(pictures(env, policy, seed), path, env.metadata["render_fps"])
+
+
+def pictures(env: gym.Env[Any, Any], policy: Any, seed: int) -> Iterator[NDArray[np.uint8]]:
+    """What `env` renders before each step of one episode, shape (height, width, 3)."""
+    observation, _ = env.reset(seed=seed)
+    start, done = np.ones(1, bool), False
+    while not done:
+        picture: Any = env.render()
+        yield picture
+        action, _ = policy.predict(observation, episode_start=start, deterministic=True)
+        observation, _, terminated, truncated, _ = env.step(action)
+        start, done = np.zeros(1, bool), terminated or truncated
+
+
+def cell(key: str, value: Interval) -> tuple[str, str]:
+    """Mean and interval of a figure of `METRICS` as a person reads them."""
+    return value.parts(METRICS[key].digits, METRICS[key].factor)
 
 
 def table(scores: Sequence[Score]) -> Any:
@@ -287,7 +252,7 @@ def table(scores: Sequence[Score]) -> Any:
     for key in columns:
         grid.add_column(METRICS[key].title, justify="right")
     for score in scores:
-        cells = [cell(METRICS[key], score.estimates[key]) for key in columns]
+        cells = [cell(key, score.estimates[key]) for key in columns]
         grid.add_row(score.policy, *("\n".join(pair) for pair in cells))
     return grid
 
@@ -302,8 +267,8 @@ def print_table(scores: Sequence[Score]) -> None:
 def to_json(scores: Sequence[Score], **about: Any) -> dict[str, Any]:
     """The scores as plain data: JSON knows no infinity, so an infinite figure is null."""
 
-    def finite(value: float | None) -> float | None:
-        return value if value is not None and math.isfinite(value) else None
+    def finite(value: float) -> float | None:
+        return value if math.isfinite(value) else None
 
     return {
         **about,

@@ -20,16 +20,16 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import gymnasium as gym
 import numpy as np
+import torch
 from tyro.conf import Positional
 
 import hoof_env
 from agents import runs
 from agents.command import run
-from agents.policy_module import module_of
 from hoof_env._output import check_folder, staged
 from hoof_env.errors import DataFileError, HoofEnvError, OutputError, ParameterError
 from hoof_env.onnx_policy import INPUT, LISTS, OUTPUT, OnnxPolicy, describe, settings_of
@@ -119,6 +119,71 @@ def write_policy(trained: runs.TrainedPolicy, out: Path, metadata: dict[str, Any
     return off
 
 
+class Statistics(NamedTuple):
+    """Observations minus `mean` by `scale`, shape (k,), float64, then within `clip` of 0."""
+
+    mean: Any
+    scale: Any
+    clip: float
+
+
+def statistics_of(normalize: Any) -> Statistics | None:
+    """What the `normalize` of a `TrainedPolicy` does; None for nothing."""
+    from stable_baselines3.common.vec_env import VecNormalize
+
+    source = getattr(normalize, "__self__", normalize)  # it may be a method of `VecNormalize`
+    if source is None or (isinstance(source, VecNormalize) and not source.norm_obs):
+        return None
+    # One array of statistics, for the observation is one array
+    moments: Any = source.obs_rms if isinstance(source, VecNormalize) else source
+    clip = source.clip_obs if isinstance(source, VecNormalize) else source.clip
+    scale = np.sqrt(np.asarray(moments.var) + source.epsilon)
+    return Statistics(np.asarray(moments.mean), scale, float(clip))
+
+
+class Deterministic(torch.nn.Module):
+    """From observations to the deterministic actions of a `TrainedPolicy`, as its `predict` computes them."""
+
+    low: Any
+    high: Any
+    mean: Any
+    scale: Any
+
+    def __init__(self, trained: runs.TrainedPolicy) -> None:
+        super().__init__()
+        self.policy = trained.model.policy
+        space = trained.model.action_space
+        self.register_buffer("low", torch.as_tensor(space.low))
+        self.register_buffer("high", torch.as_tensor(space.high))
+        self.statistics = statistics_of(trained.normalize)
+        if self.statistics is not None:  # in float64, as VecNormalize computes
+            self.register_buffer("mean", torch.as_tensor(self.statistics.mean))
+            self.register_buffer("scale", torch.as_tensor(self.statistics.scale))
+
+    def forward(self, observation: Any) -> Any:
+        """Actions, shape (batch, n), for observations, shape (batch, k)."""
+        if self.statistics is not None:
+            scaled = (observation.double() - self.mean) / self.scale
+            observation = scaled.clamp(-self.statistics.clip, self.statistics.clip).float()
+        action = self.policy._predict(observation, deterministic=True)
+        if self.policy.squash_output:  # in [-1, 1]: to the limits of the space
+            return self.low + 0.5 * (action + 1.0) * (self.high - self.low)
+        return torch.clamp(action, self.low, self.high)
+
+
+def module_of(trained: runs.TrainedPolicy) -> Any:
+    """The policy as a torch module that is ready to be traced.
+
+    Raises:
+        ParameterError: a recurrent policy, or actions that are not vectors.
+    """
+    policy, space = trained.model.policy, trained.model.action_space
+    if not isinstance(space, gym.spaces.Box) or len(space.shape) != 1 or hasattr(policy, "lstm_actor"):
+        raise ParameterError(f"model: expected a memoryless policy with vectors for actions, got {space}")
+    policy.set_training_mode(False)
+    return Deterministic(trained).eval()
+
+
 def some_observations(space: gym.Space[Any]) -> Any:
     """`TRIED` random observations, a few of them far outside of what is usual, shape (TRIED, k), float32.
 
@@ -157,8 +222,6 @@ def write_onnx(module: Any, example: Any, path: Path, metadata: dict[str, Any]) 
     Raises:
         HoofEnvError: a package is missing.
     """
-    import torch
-
     try:
         import onnx  # noqa: F401
         import onnxscript  # noqa: F401
@@ -181,8 +244,6 @@ def write_onnx(module: Any, example: Any, path: Path, metadata: dict[str, Any]) 
 
 def write_torchscript(module: Any, example: Any, path: Path, metadata: dict[str, Any]) -> None:
     """Write a module as TorchScript; the metadata are its extra file metadata.json."""
-    import torch
-
     with _quietly(), torch.no_grad():
         script = torch.jit.trace(module, torch.as_tensor(example))
         torch.jit.save(script, str(path), _extra_files={"metadata.json": json.dumps(metadata).encode()})
@@ -190,8 +251,6 @@ def write_torchscript(module: Any, example: Any, path: Path, metadata: dict[str,
 
 def read_torchscript(path: Path) -> Any:
     """The file as a function of observations, as `predict`."""
-    import torch
-
     with _quietly():
         script = torch.jit.load(str(path))
 
@@ -209,7 +268,7 @@ def difference(trained: Any, predict: Any, observations: Any) -> float:
     wanted, _ = trained.predict(observations)
     alone = [predict(row)[0].reshape(-1) for row in observations[:20]]
     both = (predict(observations)[0], np.array(alone))
-    return float(max(np.max(np.abs(found - wanted[: len(found)]) / half) for found in both))
+    return float(max(np.max(np.abs(one - wanted[: len(one)]) / half) for one in both))
 
 
 def main(argv: list[str] | None = None) -> None:

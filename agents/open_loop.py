@@ -19,6 +19,7 @@ from __future__ import annotations
 import json
 import math
 import time
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -26,17 +27,55 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from agents import runs
 from agents.command import parse_pairs, run
 from agents.evaluate import estimate
-from agents.open_loop_search import ROWS, TEST_SEED, Court, Episodes, decode, search
+from agents.score import make_rows, play_rows
 from hoof_env._output import check_folder
-from hoof_env.envs.policies import GAITS as GAITS
-from hoof_env.envs.policies import load_open_loop as load_open_loop
-from hoof_env.envs.policies import stored as stored
+from hoof_env.envs.policies import open_loop, stored
 from hoof_env.errors import DataFileError, HoofEnvError, ParameterError, check_number
 from hoof_env.gait.gait import PARAMETERS
+
+Floats = NDArray[np.float64]
+Episodes = list[dict[str, float]]
+
+SIZES = {"constant": 4, "clocked": 13}
+"""Numbers of a gait, by family."""
+
+SLOWEST, FASTEST = 0.2, 4.0
+"""Of the clock [Hz]; the crank turns at 2 Hz at most."""
+
+POPULATION, STARTS = 16, 16
+"""Candidates of a generation and random starts that each meets."""
+
+ROWS = POPULATION * STARTS
+
+FINALISTS = 4
+"""Candidates of a search that meet more starts at its end."""
+
+STEP, HARMONIC = 0.3, 0.3
+"""First standard deviation and largest first harmonic; the box of every number is 2 wide."""
+
+TEST_SEED, SEARCH_SEED = 1000, 10_000_000
+"""First seeds of the final score, `agents.evaluate`'s, and of the searches."""
+
+OPTIONS = {
+    "bounds": [-1, 1], "tolx": 1e-3, "tolfun": 0, "tolfunhist": 0, "tolstagnation": 10**9,
+    "verbose": -9, "verb_log": 0,
+}  # fmt: skip
+"""Of CMA-ES: it ends when the steps are small."""
+
+SHORTFALL = 10.0
+"""What 1 m/s or a whole weight too little costs, and failing always: more than it can save."""
+
+
+AVERAGED = (
+    "return", "speed_m_s", "stance_peak_n", "drive_work_j", "distance_m", "weight_share", "failed",
+)  # fmt: skip
+"""Figures of an episode that a cost is made of."""
+
 
 EPISODES = {"constant": 10_240, "clocked": 30_720}
 """Of a search, by family."""
@@ -74,6 +113,157 @@ class Args:
     """file; otherwise runs/open_loop/ENV-FAMILY[-OBJECTIVE-SPEED[-share-SHARE]].json"""
 
 
+def decode(family: str, x: Floats) -> dict[str, Floats]:
+    """Parameters of `open_loop` for points of the box [-1, 1], shape (..., SIZES[family])."""
+    if family == "constant":
+        return {"constant": x}
+    frequency = SLOWEST * (FASTEST / SLOWEST) ** ((x[..., 12] + 1) / 2)
+    return {"constant": x[..., :4], "sin": x[..., 4:8], "cos": x[..., 8:12], "frequency_hz": frequency}
+
+
+def cost(episodes: Episodes, objective: str, weight: float, speed: float = 0.0, share: float = 0.0) -> float:
+    """What a search makes small.
+
+    Args:
+        episodes: of one candidate.
+        objective: "return"; or, under conditions, "peak" or "transport": mean peak force of a stance
+            [weights], and work per weight and distance of all episodes together.
+        weight: of trunk and leg [N].
+        speed, share: conditions: mean speed [m/s] and part of the weight that the leg bears, or more.
+    """
+    mean = {key: float(np.mean([one[key] for one in episodes])) for key in AVERAGED}
+    if objective == "return":
+        return -mean["return"]
+    missing = max(0.0, speed - mean["speed_m_s"]) + max(0.0, share - mean["weight_share"])
+    penalty = SHORTFALL * (missing + mean["failed"])
+    if objective == "peak":
+        return mean["stance_peak_n"] / weight + penalty
+    transport = mean["drive_work_j"] / (weight * max(mean["distance_m"], 0.1))  # who stands is only too slow
+    return min(transport, SHORTFALL) + penalty
+
+
+class Objective:
+    """Scores candidates by episodes in the rows of one vector environment.
+
+    Args:
+        env_id, env_kwargs: the environment.
+        family: of the candidates.
+        objective, speed, share: as of `cost`.
+
+    Attributes:
+        leg: a single environment like the rows.
+        spent: episodes so far.
+
+    Raises:
+        ParameterError: no such environment, or one without many at once.
+    """
+
+    def __init__(
+        self,
+        env_id: str,
+        env_kwargs: dict[str, Any],
+        family: str,
+        objective: str = "return",
+        speed: float | None = None,
+        share: float | None = None,
+    ) -> None:
+        leg: Any = runs.make_env(env_id, **env_kwargs).unwrapped
+        envs = make_rows(env_id, ROWS, **env_kwargs)
+        if envs is None:
+            raise ParameterError(f"env_id: expected an id of this package with many at once, got {env_id!r}")
+        self.leg, self.envs, self.spent = leg, envs, 0
+        self.family = family
+        conditions = {"speed": speed or 0.0, "share": share or 0.0}
+        self._cost: dict[str, Any] = {"objective": objective, "weight": leg.weight, **conditions}
+
+    def costs(self, x: Floats, seeds: Sequence[int]) -> list[float]:
+        """`cost` of candidates, shape (n, size), that meet the same starts; n * len(seeds) is `ROWS`."""
+        episodes = self._play(decode(self.family, np.repeat(x, len(seeds), axis=0)), [*seeds] * len(x))
+        each = [episodes[k : k + len(seeds)] for k in range(0, len(episodes), len(seeds))]
+        return [cost(some, **self._cost) for some in each]
+
+    def test(self, parameters: dict[str, Any], count: int) -> Episodes:
+        """Episodes of the final score of one candidate."""
+        episodes: Episodes = []
+        while len(episodes) < count:
+            first = TEST_SEED + len(episodes)
+            episodes += self._play(parameters, range(first, first + ROWS))
+        return episodes[:count]
+
+    def _play(self, parameters: dict[str, Any], seeds: Sequence[int]) -> Episodes:
+        self.spent += len(seeds)
+        return play_rows(self.envs, open_loop(parameters, self.leg.dt), seeds)
+
+
+def search(
+    objective: Objective,
+    seed: int,
+    episodes: int,
+    tick: Callable[[int, float], Any],
+    start: Sequence[float] | None = None,
+) -> tuple[Floats, float, bool]:
+    """One CMA-ES from the best point of a random screening, or from a constant action.
+
+    All candidates of a generation meet the same starts, those of the next meet others. At the end the mean
+    of the distribution, the luckiest candidate and the best of the last generation meet more.
+
+    Args:
+        objective: what scores candidates.
+        seed: of the search; searches of different seeds share no start.
+        episodes: to spend, about.
+        tick: called with the number of episodes that were added and the lowest cost in them.
+        start: the constant action to begin with, shape (4,); harmonics are none there.
+
+    Returns:
+        The best point, its cost over starts that the search had not met, and whether Ctrl-C ended it.
+
+    Raises:
+        KeyboardInterrupt: Ctrl-C before anything was found.
+    """
+    import cma
+
+    generator, fresh = np.random.default_rng([seed, 6]), SEARCH_SEED * (seed + 1)
+
+    def costs(x: Any, starts: int) -> list[float]:
+        nonlocal fresh
+        values = objective.costs(np.array(x), range(fresh, fresh + starts))
+        fresh += starts
+        tick(ROWS, min(values))
+        return values
+
+    first, step = first_point(SIZES[objective.family], costs, generator, start)
+    options = OPTIONS | {"popsize": POPULATION, "seed": int(generator.integers(1, 2**31))}
+    strategy, best, interrupted = cma.CMAEvolutionStrategy(first, step, options), [first], False
+    try:
+        for _ in range(episodes // ROWS - 2):
+            if strategy.stop():
+                break
+            candidates = strategy.ask()
+            values = costs(candidates, STARTS)
+            strategy.tell(candidates, values)
+            lowest = [candidates[k] for k in np.argsort(values)[: FINALISTS - 2]]
+            best = [strategy.result.xfavorite, strategy.result.xbest, *lowest]
+    except KeyboardInterrupt:
+        interrupted = True
+    finalists = np.clip(np.round((best * FINALISTS)[:FINALISTS], 5), -1.0, 1.0)
+    final = costs(finalists, ROWS // FINALISTS)
+    return finalists[np.argmin(final)], min(final), interrupted
+
+
+def first_point(
+    size: int,
+    costs: Callable[[Any, int], list[float]],
+    generator: np.random.Generator,
+    start: Sequence[float] | None,
+) -> tuple[Floats, float]:
+    """Where a search begins, and its first standard deviation."""
+    if start is not None:
+        return np.array([*start, *[0.0] * (size - len(start))]), STEP / 3
+    screened = generator.uniform(-1, 1, (ROWS // 4, size))
+    screened[:, 4:12] *= HARMONIC
+    return screened[np.argmin(costs(screened, 4))], STEP
+
+
 def optimise(args: Args) -> dict[str, Any]:
     """Search, and write the file after every search; returns what it holds.
 
@@ -82,9 +272,40 @@ def optimise(args: Args) -> dict[str, Any]:
             OutputError: the file is of something else, or cannot be written. KeyboardInterrupt: Ctrl-C; what
             was found is in the file.
     """
+    episodes = check(args)
+    from tqdm import tqdm
+
+    path = args.out or Path("runs/open_loop", file_name(args))
+    about: dict[str, Any] = {
+        "env_id": args.env_id, "env_kwargs": parse_pairs("--env-kwargs", args.env_kwargs),
+        "family": args.family, "objective": args.objective,
+        "speed": args.speed, "weight_share": args.weight_share,
+        "episodes_of_a_search": episodes, "test_episodes": args.test_episodes,
+        "start": stored(args.start)["parameters"]["constant"] if args.start else None,
+    }  # fmt: skip
+    restarts = earlier(path, about)
+    check_folder(path.parent)
+    objective = Objective(
+        args.env_id, about["env_kwargs"], args.family, args.objective, args.speed, args.weight_share
+    )
+    left = [seed for seed in range(args.restarts) if seed not in [one["seed"] for one in restarts]]
+    content: dict[str, Any] = {}
+    with tqdm(total=episodes * len(left), unit=" episodes", leave=False, disable=None) as bar:
+        for k, seed in enumerate(left):
+            bar.set_description(f"{path.stem}, search {seed}")
+            restarts.append(search_once(objective, seed, about, bar))
+            content = write(path, about, objective, restarts, content)
+            if restarts[-1].get("interrupted"):
+                raise KeyboardInterrupt
+            bar.n = (k + 1) * episodes  # a search may have converged before
+    return content or write(path, about, objective, restarts, {})
+
+
+def check(args: Args) -> int:
+    """Refuse what does not fit; returns the episodes of a search."""
     try:
         import cma  # noqa: F401
-        from tqdm import tqdm
+        import tqdm  # noqa: F401
     except ModuleNotFoundError as error:
         raise HoofEnvError(
             f'agents.open_loop needs {error.name}: pip install "hoof-env[train,identify]"'
@@ -96,79 +317,71 @@ def optimise(args: Args) -> dict[str, Any]:
     if (args.objective == "return") != (args.speed is None):
         raise ParameterError(f"speed: expected one for 'peak' and 'transport' alone, got {args.speed!r}")
     if args.objective == "return" and args.weight_share is not None:
-        raise ParameterError("weight_share: expected none for 'return', where nothing is asked for")
-    if args.speed is not None:
-        check_number("speed", args.speed, low=0, high=20)
-    if args.weight_share is not None:
-        check_number("weight_share", args.weight_share, low=0, high=1)
-    kwargs = parse_pairs("--env-kwargs", args.env_kwargs)
-    path = args.out or Path("runs/open_loop", file_name(args))
-    about: dict[str, Any] = {
-        "env_id": args.env_id, "env_kwargs": kwargs, "family": args.family, "objective": args.objective,
-        "speed": args.speed, "weight_share": args.weight_share,
-        "episodes_of_a_search": episodes, "test_episodes": args.test_episodes,
-        "start": stored(args.start)["parameters"]["constant"] if args.start else None,
-    }  # fmt: skip
-    restarts = earlier(path, about)
-    check_folder(path.parent)
-    court = Court(args.env_id, kwargs, args.family, args.objective, args.speed, args.weight_share)
-    left = [seed for seed in range(args.restarts) if seed not in [one["seed"] for one in restarts]]
-    found: dict[str, Any] = {}
-    with tqdm(total=episodes * len(left), unit=" episodes", leave=False, disable=None) as bar:
-        for k, seed in enumerate(left):
-            bar.set_description(f"{path.stem}, search {seed}")
-            began, used, court.spent = time.monotonic(), time.process_time(), 0
+        raise ParameterError("weight_share: expected none for 'return', which has no conditions")
+    for name, high in (("speed", 20), ("weight_share", 1)):
+        if getattr(args, name) is not None:
+            check_number(name, getattr(args, name), low=0, high=high)
+    return episodes
 
-            def tick(count: int, lowest: float) -> None:
-                bar.update(count)
-                bar.set_postfix(cost=f"{lowest:.3f}")
 
-            start = about["start"] if seed % 2 else None
-            x, least, interrupted = search(court, seed, episodes, tick, start)
-            parameters = {key: value.tolist() for key, value in decode(args.family, x).items()}
-            one: dict[str, Any] = {"seed": seed, "cost": least, "parameters": parameters}
-            one |= {"episodes": court.spent, "wall_s": round(time.monotonic() - began, 1)}
-            one["cpu_s"] = round(time.process_time() - used, 1)
-            one["mean"] = means(court.test(parameters, args.test_episodes))
-            restarts.append(one | ({"interrupted": True} if interrupted else {}))
-            found = write(path, about, court, restarts, found)
-            if interrupted:
-                raise KeyboardInterrupt
-            bar.n = (k + 1) * episodes  # a search may have converged before
-    return found or write(path, about, court, restarts, {})
+def search_once(objective: Objective, seed: int, about: dict[str, Any], bar: Any) -> dict[str, Any]:
+    """One search, as the file keeps it."""
+    began, used, objective.spent = time.monotonic(), time.process_time(), 0
+
+    def tick(count: int, lowest: float) -> None:
+        bar.update(count)
+        bar.set_postfix(cost=f"{lowest:.3f}")
+
+    start = about["start"] if seed % 2 else None
+    x, cost, interrupted = search(objective, seed, about["episodes_of_a_search"], tick, start)
+    parameters = {key: value.tolist() for key, value in decode(objective.family, x).items()}
+    return {
+        "seed": seed,
+        "cost": cost,
+        "parameters": parameters,
+        "episodes": objective.spent,
+        "wall_s": round(time.monotonic() - began, 1),
+        "cpu_s": round(time.process_time() - used, 1),
+        "mean": means(objective.test(parameters, about["test_episodes"])),
+        **({"interrupted": True} if interrupted else {}),
+    }
 
 
 def means(episodes: Episodes) -> dict[str, float | None]:
     """Of the figures that are kept; None for an infinite one."""
-    found = {key: float(np.mean([one[key] for one in episodes])) for key in KEPT}
-    return {key: value if math.isfinite(value) else None for key, value in found.items()}
+    figures = {key: float(np.mean([one[key] for one in episodes])) for key in KEPT}
+    return {key: value if math.isfinite(value) else None for key, value in figures.items()}
 
 
 def write(
-    path: Path, about: dict[str, Any], court: Court, restarts: list[dict[str, Any]], before: dict[str, Any]
+    path: Path,
+    about: dict[str, Any],
+    objective: Objective,
+    restarts: list[dict[str, Any]],
+    before: dict[str, Any],
 ) -> dict[str, Any]:
     """Write the best of the searches, scored, and all of them; returns what the file holds.
 
     Args:
         path, about: the file, and what was asked for.
-        court: the judge.
+        objective: what scores a gait.
         restarts: the searches.
         before: what the file held, or nothing.
     """
     best = min(restarts, key=lambda one: one["cost"])
     score = before.get("score")
     if before.get("parameters") != best["parameters"]:
-        episodes = court.test(best["parameters"], about["test_episodes"])
+        episodes = objective.test(best["parameters"], about["test_episodes"])
         score = {"first_seed": TEST_SEED, "mean": means(episodes), "interval95": {}}
         for key, mean in score["mean"].items():
-            found = estimate([one[key] for one in episodes]) if mean is not None else None
-            score["interval95"][key] = [found.low, found.high] if found else None
-    gait = court.leg.command_of(np.array(best["parameters"]["constant"])).tolist()
-    whole = {
+            interval = estimate([one[key] for one in episodes]) if mean is not None else None
+            score["interval95"][key] = [interval.low, interval.high] if interval else None
+    gait = objective.leg.command_of(np.array(best["parameters"]["constant"])).tolist()
+    content = {
         **about,
         "parameters": best["parameters"],
         "gait": dict(zip(PARAMETERS, gait, strict=True)),
-        "dt": court.leg.dt,
+        "dt": objective.leg.dt,
         "score": score,
         "episodes": sum(one["episodes"] for one in restarts),
         **{key: round(sum(one[key] for one in restarts), 1) for key in ("wall_s", "cpu_s")},
@@ -176,8 +389,8 @@ def write(
         "versions": {**runs.versions(), "cma": version("cma")},
         "restarts": restarts,
     }
-    runs.write_text(path, json.dumps(whole, indent=1, allow_nan=False) + "\n")
-    return whole
+    runs.write_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
+    return content
 
 
 def earlier(path: Path, about: dict[str, Any]) -> list[dict[str, Any]]:
@@ -189,33 +402,31 @@ def earlier(path: Path, about: dict[str, Any]) -> list[dict[str, Any]]:
     if not path.is_file():
         return []
     with suppress(OSError, ValueError, KeyError, TypeError, AttributeError):
-        found = json.loads(path.read_text(encoding="utf-8"))
-        if all(found.get(key) == value for key, value in about.items()):
-            return [one for one in found["restarts"] if not one.get("interrupted")]
+        content = json.loads(path.read_text(encoding="utf-8"))
+        if all(content.get(key) == value for key, value in about.items()):
+            return [one for one in content["restarts"] if not one.get("interrupted")]
     raise DataFileError(f"{path}: expected searches with {about} to go on with; name another --out")
 
 
 def file_name(args: Args) -> str:
     """What the file of a search is called."""
-    asked = "" if args.objective == "return" else f"-{args.objective}-{args.speed:g}"
-    asked += "" if args.weight_share is None else f"-share-{args.weight_share:g}"
-    return f"{args.env_id.rpartition('/')[2]}-{args.family}{asked}.json"
+    goal = "" if args.objective == "return" else f"-{args.objective}-{args.speed:g}"
+    goal += "" if args.weight_share is None else f"-share-{args.weight_share:g}"
+    return f"{args.env_id.rpartition('/')[2]}-{args.family}{goal}.json"
 
 
 def main(argv: list[str] | None = None) -> None:
     import tyro
 
     args = tyro.cli(Args, args=argv, prog="python -m agents.open_loop", description=__doc__)
-    found = optimise(args)
-    for one in found["restarts"]:
+    content = optimise(args)
+    for one in content["restarts"]:
         print(
             f"search {one['seed']}: cost {one['cost']:.3f}, {one['episodes']} episodes, {one['wall_s']:.0f} s"
         )
-    for key, mean in found["score"]["mean"].items():
-        low_high = found["score"]["interval95"][key]
-        print(
-            f"{key:18} " + (f"{mean:.3f} [{low_high[0]:.3f}, {low_high[1]:.3f}]" if low_high else "infinite")
-        )
+    for key, mean in content["score"]["mean"].items():
+        bounds = content["score"]["interval95"][key]
+        print(f"{key:18} " + (f"{mean:.3f} [{bounds[0]:.3f}, {bounds[1]:.3f}]" if bounds else "infinite"))
     print(f"written: {args.out or Path('runs/open_loop', file_name(args))}")
 
 

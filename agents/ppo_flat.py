@@ -3,7 +3,7 @@
     python -m agents.ppo_flat                          a million steps of hoof_env/HorseLeg-v0
     python -m agents.ppo_flat --steps 100000 --env-id hoof_env/HorseLegFixed-v0 --out runs/flat
 
-In the form of CleanRL's scripts: arguments, seeds, environments, storage, then the loop from top to bottom.
+Read `learn` first: it plays a rollout, estimates what its actions were worth, improves the agent, reports.
 
 Vector environments restart in Gymnasium's default way, on the next step: the step that ends an episode
 returns its last observation, and the step after it ignores its action and returns the next one's first. So
@@ -175,6 +175,87 @@ def make_envs(args: Args) -> gym.wrappers.vector.RecordEpisodeStatistics:
     return gym.wrappers.vector.RecordEpisodeStatistics(envs)
 
 
+class Rollout:
+    """Steps of all environments, shape (n_steps, n_envs, ...); observations have one row more, for the value
+    after the last step.
+
+    Attributes:
+        restarts: steps that only restart an episode.
+        ended: whether the last step of each environment ended an episode.
+    """
+
+    def __init__(self, args: Args, n_obs: int, n_actions: int, device: torch.device) -> None:
+        shape = (args.n_steps, args.n_envs)
+        self.device = device
+        self.observations = torch.zeros((args.n_steps + 1, args.n_envs, n_obs), device=device)
+        self.actions = torch.zeros((*shape, n_actions), device=device)
+        self.log_probs, self.rewards = torch.zeros(shape, device=device), torch.zeros(shape, device=device)
+        self.terminated = torch.zeros(shape, dtype=torch.bool, device=device)
+        self.truncated, self.restarts = torch.zeros_like(self.terminated), torch.zeros_like(self.terminated)
+        self.ended = torch.zeros(args.n_envs, dtype=torch.bool, device=device)
+
+    def play(self, agent: Agent, envs: gym.vector.VectorEnv) -> None:
+        """Go on from the last observation for as many steps as there are rows."""
+        box: Any = envs.single_action_space
+        self.observations[0] = self.observations[-1]
+        for t in range(len(self.rewards)):
+            with torch.no_grad():
+                policy = agent.policy(self.observations[t])
+                self.actions[t] = policy.sample()
+                self.log_probs[t] = policy.log_prob(self.actions[t]).sum(-1)
+            # A sample outside the box is played at its edge, but learnt from as it was drawn
+            played = np.clip(self.actions[t].cpu().numpy(), box.low, box.high)
+            observation, reward, terminations, truncations, _ = envs.step(played)
+            self.restarts[t] = self.ended
+            self.observations[t + 1] = self._tensor(observation)
+            self.rewards[t] = self._tensor(reward)
+            self.terminated[t] = self._tensor(terminations)
+            self.truncated[t] = self._tensor(truncations)
+            self.ended = self.terminated[t] | self.truncated[t]
+
+    def experience(self, agent: Agent, args: Args) -> dict[str, Tensor]:
+        """The steps that are learnt from, in one row each, with their advantages and the targets of the
+        value."""
+        with torch.no_grad():
+            values = agent.value(self.observations)
+            advantages = estimate_advantages(
+                self.rewards, values, self.terminated, self.truncated, args.gamma, args.gae_lambda
+            )
+        lived = ~self.restarts
+        return {
+            "observation": self.observations[:-1][lived],
+            "action": self.actions[lived],
+            "log_prob": self.log_probs[lived],
+            "advantage": advantages[lived],
+            "target": (advantages + values[:-1])[lived],
+        }
+
+    def _tensor(self, array: Any) -> Tensor:
+        return torch.as_tensor(array, device=self.device)
+
+
+def improve(
+    agent: Agent,
+    optimizer: torch.optim.Optimizer,
+    experience: dict[str, Tensor],
+    shuffle: np.random.Generator,
+    args: Args,
+) -> None:
+    """Gradient steps on shuffled batches; `HoofEnvError` if the training diverges."""
+    for _ in range(args.n_epochs):
+        order = shuffle.permutation(len(experience["target"]))
+        for start in range(0, len(order), args.batch_size):
+            chosen = torch.as_tensor(order[start : start + args.batch_size], device=agent.log_std.device)
+            if len(chosen) > 1:
+                loss = _loss(agent, {key: values[chosen] for key, values in experience.items()}, args)
+                optimizer.zero_grad()
+                loss.backward()
+                norm = nn.utils.clip_grad_norm_(agent.parameters(), args.max_grad_norm)
+                if not norm.isfinite():  # as of a loss that is none
+                    raise HoofEnvError(DIVERGED)
+                optimizer.step()
+
+
 def learn(args: Args) -> Learned:
     """Train as `args` say, with a printed line per rollout. The same arguments give the same agent.
 
@@ -182,6 +263,37 @@ def learn(args: Args) -> Learned:
         ParameterError: the arguments or the environment do not fit.
         OutputError: the folder cannot be written. HoofEnvError: the training diverged.
     """
+    device = check(args)
+    torch.set_num_threads(args.torch_threads)
+    torch.manual_seed(args.seed)
+    shuffle = np.random.default_rng(args.seed)
+    envs = make_envs(args)
+    n_obs = gym.spaces.flatdim(envs.single_observation_space)
+    n_actions = gym.spaces.flatdim(envs.single_action_space)
+    agent = Agent(n_obs, n_actions, args.net_arch, args.log_std_init).to(device)
+    optimizer = torch.optim.Adam(agent.parameters(), lr=args.learning_rate, eps=1e-5)
+    learned, rollout = Learned(agent), Rollout(args, n_obs, n_actions, device)
+
+    n_rollouts = -(-args.steps // (args.n_steps * args.n_envs))
+    started = time.monotonic()
+    first, _ = envs.reset(seed=args.seed)
+    rollout.observations[-1] = torch.as_tensor(first, device=device)
+    try:
+        for number in range(n_rollouts):
+            optimizer.param_groups[0]["lr"] = args.learning_rate * (1 - number / n_rollouts)
+            rollout.play(agent, envs)
+            improve(agent, optimizer, rollout.experience(agent, args), shuffle, args)
+            steps = (number + 1) * args.n_steps * args.n_envs
+            learned.progress.append(report(steps, time.monotonic() - started, envs))
+    finally:
+        envs.close()
+    if args.out:
+        write(learned, args.out)
+    return learned
+
+
+def check(args: Args) -> torch.device:
+    """Refuse what does not fit; returns the device."""
     for name, (low, high) in LIMITS.items():
         check_number(name, getattr(args, name), low=low, high=high)
     check_threads(args.torch_threads)
@@ -189,114 +301,42 @@ def learn(args: Args) -> Learned:
         check_number("net_arch", units, low=1)
     if args.out:
         check_folder(args.out)
-
-    torch.set_num_threads(args.torch_threads)
-    torch.manual_seed(args.seed)
-    shuffle = np.random.default_rng(args.seed)
     try:
         device = torch.device(args.device)
         torch.zeros(1, device=device).item()
     except Exception as error:  # each kind of device raises its own
         reason = str(error).partition("\n")[0]
         raise ParameterError(f"device: expected one that torch has, got {args.device!r}: {reason}") from None
+    return device
 
-    envs = make_envs(args)
-    box: Any = envs.single_action_space
-    n_obs, n_actions = gym.spaces.flatdim(envs.single_observation_space), gym.spaces.flatdim(box)
-    agent = Agent(n_obs, n_actions, args.net_arch, args.log_std_init).to(device)
-    optimizer = torch.optim.Adam(agent.parameters(), lr=args.learning_rate, eps=1e-5)
-    learned = Learned(agent)
 
-    # One rollout; observations have one row more, for the value after the last step
-    shape = (args.n_steps, args.n_envs)
-    observations = torch.zeros((args.n_steps + 1, args.n_envs, n_obs), device=device)
-    actions = torch.zeros((*shape, n_actions), device=device)
-    log_probs, rewards = torch.zeros(shape, device=device), torch.zeros(shape, device=device)
-    terminated = torch.zeros(shape, dtype=torch.bool, device=device)
-    truncated, restarts = torch.zeros_like(terminated), torch.zeros_like(terminated)
+def report(steps: int, seconds: float, envs: gym.wrappers.vector.RecordEpisodeStatistics) -> dict[str, float]:
+    """Print how it goes, and return it as a row of progress.csv."""
+    row = {
+        "steps": steps,
+        "seconds": round(seconds, 3),
+        "sps": round(steps / seconds),
+        "episodes": int(envs.episode_count),
+        "episodic_return": float(np.mean(envs.return_queue)) if envs.return_queue else float("nan"),
+    }
+    print(
+        f"steps {steps:>10,}   SPS {row['sps']:>7,}   episodes {row['episodes']:>6,}   "
+        f"episodic return {row['episodic_return']:.2f}",
+        flush=True,
+    )
+    return row
 
-    n_rollouts = -(-args.steps // (args.n_steps * args.n_envs))
-    started = time.monotonic()
-    first, _ = envs.reset(seed=args.seed)
-    observations[-1] = torch.as_tensor(first, device=device)
-    ended = torch.zeros(args.n_envs, dtype=torch.bool, device=device)
-    try:
-        for rollout in range(n_rollouts):
-            optimizer.param_groups[0]["lr"] = args.learning_rate * (1 - rollout / n_rollouts)
 
-            # Play
-            observations[0] = observations[-1]
-            for t in range(args.n_steps):
-                with torch.no_grad():
-                    policy = agent.policy(observations[t])
-                    actions[t] = policy.sample()
-                    log_probs[t] = policy.log_prob(actions[t]).sum(-1)
-                # A sample outside the box is played at its edge, but learnt from as it was drawn
-                played = np.clip(actions[t].cpu().numpy(), box.low, box.high)
-                observation, reward, terminations, truncations, _ = envs.step(played)
-                restarts[t] = ended
-                observations[t + 1] = torch.as_tensor(observation, device=device)
-                rewards[t] = torch.as_tensor(reward, device=device)
-                terminated[t] = torch.as_tensor(terminations, device=device)
-                truncated[t] = torch.as_tensor(truncations, device=device)
-                ended = terminated[t] | truncated[t]
-
-            # Judge
-            with torch.no_grad():
-                values = agent.value(observations)
-                advantages = estimate_advantages(
-                    rewards, values, terminated, truncated, args.gamma, args.gae_lambda
-                )
-            lived = ~restarts
-            batch = {
-                "observation": observations[:-1][lived],
-                "action": actions[lived],
-                "log_prob": log_probs[lived],
-                "advantage": advantages[lived],
-                "target": (advantages + values[:-1])[lived],
-            }
-
-            # Improve
-            for _ in range(args.n_epochs):
-                order = shuffle.permutation(len(batch["target"]))
-                for start in range(0, len(order), args.batch_size):
-                    chosen = torch.as_tensor(order[start : start + args.batch_size], device=device)
-                    if len(chosen) > 1:
-                        loss = _loss(agent, {key: values[chosen] for key, values in batch.items()}, args)
-                        optimizer.zero_grad()
-                        loss.backward()
-                        norm = nn.utils.clip_grad_norm_(agent.parameters(), args.max_grad_norm)
-                        if not norm.isfinite():  # as of a loss that is none
-                            raise HoofEnvError(DIVERGED)
-                        optimizer.step()
-
-            # Report
-            steps, seconds = (rollout + 1) * args.n_steps * args.n_envs, time.monotonic() - started
-            row = {
-                "steps": steps,
-                "seconds": round(seconds, 3),
-                "sps": round(steps / seconds),
-                "episodes": int(envs.episode_count),
-                "episodic_return": float(np.mean(envs.return_queue)) if envs.return_queue else float("nan"),
-            }
-            learned.progress.append(row)
-            print(
-                f"steps {steps:>10,}   SPS {row['sps']:>7,}   episodes {row['episodes']:>6,}   "
-                f"episodic return {row['episodic_return']:.2f}",
-                flush=True,
-            )
-    finally:
-        envs.close()
-    if args.out:
-        weights = io.BytesIO()
-        torch.save(agent.state_dict(), weights)
-        with staged(args.out) as stage:
-            (stage / "model.pt").write_bytes(weights.getvalue())
-            with (stage / "progress.csv").open("w", newline="") as file:
-                writer = csv.DictWriter(file, list(learned.progress[0]))
-                writer.writeheader()
-                writer.writerows(learned.progress)
-    return learned
+def write(learned: Learned, folder: Path) -> None:
+    """Write model.pt and progress.csv, whole or not at all."""
+    weights = io.BytesIO()
+    torch.save(learned.agent.state_dict(), weights)
+    with staged(folder) as stage:
+        (stage / "model.pt").write_bytes(weights.getvalue())
+        with (stage / "progress.csv").open("w", newline="") as file:
+            writer = csv.DictWriter(file, list(learned.progress[0]))
+            writer.writeheader()
+            writer.writerows(learned.progress)
 
 
 def _loss(agent: Agent, batch: dict[str, Tensor], args: Args) -> Tensor:

@@ -16,6 +16,8 @@ A .zip or .pkl is a pickle and can run any code when it is loaded: load only fil
 
 from __future__ import annotations
 
+import csv
+import json
 import platform
 import shlex
 import subprocess
@@ -28,6 +30,7 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
+from numpy.typing import NDArray
 
 from hoof_env._output import check_folder, staged
 from hoof_env.errors import OutputError, ParameterError
@@ -40,7 +43,8 @@ from hoof_env.saved_policy import describe_env as describe_env
 from hoof_env.saved_policy import describe_spaces as describe_spaces
 from hoof_env.saved_policy import read_record as read_record
 
-FILES = ("model.zip", WEIGHTS, ABOUT, "config.yml", "run.json", "monitor.csv")
+MODEL, CONFIG, RECORD, MONITOR = "model.zip", "config.yml", "run.json", "monitor.csv"
+FILES = (MODEL, WEIGHTS, ABOUT, CONFIG, RECORD, MONITOR)
 """What a run without normalisation leaves, TensorBoard's files aside."""
 
 PACKAGES = ("hoof-env", "numpy", "gymnasium", "numba", "stable-baselines3", "sb3-contrib", "torch")
@@ -120,22 +124,38 @@ def command() -> str:
 
 def versions() -> dict[str, str]:
     """Python, platform, the packages that a result depends on, and the git commit where there is one."""
-    found = {"python": platform.python_version(), "platform": f"{platform.system()} {platform.machine()}"}
+    packages = {"python": platform.python_version(), "platform": f"{platform.system()} {platform.machine()}"}
     for package in PACKAGES:
         with suppress(PackageNotFoundError):
-            found[package] = version(package)
+            packages[package] = version(package)
     with suppress(OSError, subprocess.SubprocessError):
         command = ["git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty", "--abbrev=12"]
-        found["commit"] = subprocess.run(
+        packages["commit"] = subprocess.run(
             command, capture_output=True, text=True, check=True, timeout=10
         ).stdout.strip()
-    return found
+    return packages
 
 
 def write_text(path: Path, text: str) -> None:
     """Write a text file that replaces an older one only when it is complete; `OutputError` if it cannot."""
     with staged(path.parent) as stage:
         (stage / path.name).write_text(text, encoding="utf-8")
+
+
+def write_record(folder: Path, record: dict[str, Any]) -> None:
+    """Write run.json."""
+    write_text(folder / RECORD, json.dumps(record, indent=2) + "\n")
+
+
+def read_episodes(folder: Path) -> NDArray[np.float64]:
+    """The episodes of a training, from monitor.csv: steps of the training when each ended, its return and the
+    seconds of the training by then, shape (episodes, 3)."""
+    with (folder / MONITOR).open(encoding="utf-8", newline="") as file:
+        next(file)  # a comment
+        rows = [(float(row["l"]), float(row["r"]), float(row["t"])) for row in csv.DictReader(file)]
+    episodes = np.array(rows, dtype=float).reshape(-1, 3)
+    episodes[:, 0] = episodes[:, 0].cumsum()
+    return episodes
 
 
 def save_model(model: Any, path: Path) -> None:
@@ -145,7 +165,7 @@ def save_model(model: Any, path: Path) -> None:
         write_model(model, stage, path.name)
 
 
-def write_model(model: Any, folder: Path, name: str = "model.zip") -> None:
+def write_model(model: Any, folder: Path, name: str = MODEL) -> None:
     """As `save_model`, straight into `folder`."""
     model.save(folder / name)
     save_policy(model, folder)

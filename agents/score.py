@@ -1,14 +1,16 @@
-"""Score any policy on many episodes at once: the rows of the native vector environment, one episode each.
+"""Episodes of any policy, one after the other or as rows of the native vector environment.
 
-An episode is that of `agents.evaluate.play` with the same seed, to the bit where the policy acts in a batch
-as alone: scripted policies do, but for "random", which draws for all rows at once; a network does to its
-last bits.
+A row is the episode that `play` gives with the same seed, to the bit where the policy acts in a batch as
+alone: scripted policies do, but for "random", which draws for all rows at once; a network does to its last
+bits. The loading rate of an episode is how steeply the force on the hoof rises when it meets the ground; the
+first seconds, in which a gait settles, are left out.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
@@ -16,12 +18,68 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents import runs
-from agents.evaluate import find_policy, play
+from hoof_env import records
+from hoof_env.envs.policies import open_loop_record
 from hoof_env.envs.vector import HorseLegVectorEnv
 from hoof_env.errors import ParameterError
+from hoof_env.onnx_policy import OnnxPolicy
+
+Floats = NDArray[np.float64]
 
 ROWS = 1024
 """Episodes side by side at most; more are played one batch after the other."""
+
+CURVE_SEEDS = range(1000, 1020)
+"""Episodes of the learning curves; training starts its own from other seeds."""
+
+FINAL_SEEDS = range(1_000_000, 1_000_100)
+"""Episodes of the final scores, on which nothing else is played: no training, curve, tuning or search."""
+
+FIGURES = (
+    "return", "speed_m_s", "peak_grf_n", "stance_peak_n", "cost_of_transport", "weight_share", "failed",
+)  # fmt: skip
+"""Figures whose means `mean_figures` gives."""
+
+TRANSPORT = ("distance_m", "drive_work_j", "mean_grf_n", "weight_share")
+"""What a cost of transport over several episodes is made of; the force by the share is the weight."""
+
+
+SETTLED = 3.0
+"""Seconds of an episode that are left out, where it is at least twice as long."""
+
+WINDOW = 0.005
+"""The loading rate is the steepest rise of the force over so many seconds."""
+
+FORCES = ("toe_normal", "heel_normal", "toe_friction", "heel_friction")
+
+
+def play(
+    env: gym.Env[Any, Any],
+    policy: Any,
+    seeds: Sequence[int],
+    tick: Any = lambda: None,
+    *,
+    loading_rate: bool = False,
+) -> list[dict[str, float]]:
+    """One episode per seed; its return and its summary. `tick` is called after each. The loading rate needs
+    an environment of this package, whose substeps it records."""
+    episodes = []
+    for seed in seeds:
+        observation, info = env.reset(seed=seed)
+        rate = LoadingRate(env) if loading_rate else None
+        total, start, done = 0.0, np.ones(1, bool), False
+        while not done:
+            action, _ = policy.predict(observation, episode_start=start, deterministic=True)
+            observation, reward, terminated, truncated, info = env.step(action)
+            total += float(np.asarray(reward).sum())  # of a vector, all objectives
+            if rate:
+                rate.add()
+            start, done = np.zeros(1, bool), terminated or truncated
+        episodes.append({"return": total, **_with_stance_peak(info.get("episode_summary", {}))})
+        if rate:
+            episodes[-1]["loading_rate_n_s"] = rate.mean()
+        tick()
+    return episodes
 
 
 def score_vector(
@@ -31,11 +89,11 @@ def score_vector(
     tick: Callable[[int], Any] = lambda count: None,
     **env_kwargs: Any,
 ) -> list[dict[str, float]]:
-    """One episode per seed; its return and the figures of its summary, as `agents.evaluate.play` gives them.
+    """One episode per seed; its return and the figures of its summary, as `play` gives them.
 
     Args:
         policy: anything with Stable-Baselines3's `predict` that takes many observations, shape (n, k), and
-            `episode_start`, shape (n,); the name or path of one, as `agents.evaluate` takes them; or actions
+            `episode_start`, shape (n,); the name or path of one, as `find_policy` takes them; or actions
             that are held, shape (4,) for all or (len(seeds), 4).
         env_id: registered environment. One without a native vector environment is played one by one.
         seeds: of the episodes.
@@ -50,20 +108,19 @@ def score_vector(
             policy = find_policy(policy, env, env_id)
         held = None if hasattr(policy, "predict") else _held(policy, len(seeds))
         episodes: list[dict[str, float]] = []
-        batch, envs = min(ROWS, len(seeds)), None
-        while len(episodes) < len(seeds):
-            part = slice(len(episodes), len(episodes) + batch)
-            now = Held(held[part]) if held is not None else policy
-            some = list(seeds[part])
-            if envs is None or envs.num_envs != len(some):
-                envs = make_rows(env_id, len(some), **env_kwargs)
+        envs = None
+        for first in range(0, len(seeds), ROWS):
+            part = slice(first, first + ROWS)
+            batch, acting = list(seeds[part]), policy if held is None else Held(held[part])
+            if envs is None or envs.num_envs != len(batch):
+                envs = make_rows(env_id, len(batch), **env_kwargs)
             if envs is None:
-                for k, seed in enumerate(some):
-                    episodes += play(env, now if held is None else Held(held[part][k]), [seed])
+                for k, seed in enumerate(batch):
+                    episodes += play(env, policy if held is None else Held(held[first + k]), [seed])
                     tick(1)
             else:
-                episodes += play_rows(envs, now, some)
-                tick(len(some))
+                episodes += play_rows(envs, acting, batch)
+                tick(len(batch))
     return episodes
 
 
@@ -114,10 +171,132 @@ def play_rows(envs: HorseLegVectorEnv, policy: Any, seeds: Sequence[int]) -> lis
         total += np.where(going, rewards, 0.0)  # a row that is over starts again; that is not counted
         ended = going & (terminated | truncated)
         for row in np.flatnonzero(ended):
-            figures = infos["episode_summary"]
-            summary = {key: float(x[row]) for key, x in figures.items() if not key.startswith("_")}
-            summary["stance_peak_n"] = summary["stance_peak_sum_n"] / max(summary["stances"], 1.0)
-            episodes[row] = {"return": float(total[row]), **summary}
+            columns = infos["episode_summary"]
+            summary = {key: float(x[row]) for key, x in columns.items() if not key.startswith("_")}
+            episodes[row] = {"return": float(total[row]), **_with_stance_peak(summary)}
         going &= ~ended
         start = terminated | truncated
     return episodes
+
+
+def _with_stance_peak(summary: Mapping[str, float]) -> dict[str, float]:
+    """An episode summary with the mean of the stances' highest forces, where it counts stances."""
+    if "stances" not in summary:
+        return dict(summary)
+    return {**summary, "stance_peak_n": summary["stance_peak_sum_n"] / max(summary["stances"], 1.0)}
+
+
+def mean_figures(episodes: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    """Means over episodes of `FIGURES`, those that an id has; the cost of transport is that of the distance
+    and work of all of them, NaN if they do not get forward."""
+    means = {name: float(np.mean([one[name] for one in episodes])) for name in FIGURES if name in episodes[0]}
+    if "cost_of_transport" in means:
+        distance, work, force, share = (sum(one[name] for one in episodes) for name in TRANSPORT)
+        moved = share and distance > 0
+        means["cost_of_transport"] = work * share / (force * distance) if moved else float("nan")
+    return means
+
+
+def is_model(name: str) -> bool:
+    """Whether a policy's name is the path of a model rather than that of a scripted policy or of a gait."""
+    if name.endswith(".json"):
+        return False
+    return name.endswith((".zip", ".onnx")) or Path(name).name != name or Path(name, runs.MODEL).is_file()
+
+
+def saved_model(path: Path) -> OnnxPolicy | runs.SavedModel:
+    """A policy in a file or a folder: an exported one, or a model of agents.train.
+
+    Raises:
+        DataFileError: there is none.
+    """
+    return OnnxPolicy(path) if OnnxPolicy.stands_at(path) else runs.SavedModel.find(path)
+
+
+def read_policy_record(name: str) -> dict[str, Any]:
+    """What a policy's file says of itself, env_id and env_kwargs among it; empty for a scripted policy.
+
+    Raises:
+        DataFileError: no such model or gait.
+    """
+    if name.endswith(".json"):
+        return open_loop_record(Path(name))
+    return saved_model(Path(name)).record if is_model(name) else {}
+
+
+def find_policy(name: str, env: gym.Env[Any, Any], env_id: str) -> Any:
+    """A policy as `hoof_env.records.find_policy` takes it, or a model of any environment by its path.
+
+    Raises:
+        ParameterError: unknown name. DataFileError: no such model or gait, or one that does not fit.
+    """
+    if is_model(name):
+        return saved_model(Path(name)).load(env, env_id)
+    if not hasattr(env.unwrapped, "gaits"):
+        raise ParameterError(
+            f"policy: expected the path of a trained model, for none is scripted for {env_id}, got {name!r}"
+        )
+    return records.find_policy(name, env, env_id)
+
+
+class LoadingRate:
+    """The mean loading rate of an episode, from the substeps that the environment records.
+
+    Args:
+        env: an environment of this package that was just reset. Call `add` after each step.
+    """
+
+    def __init__(self, env: Any) -> None:
+        self._leg, self._setting = env.unwrapped, records.setting(env)
+        self._parts: list[dict[str, Floats]] = []
+        self._leg.record()  # substeps are kept from here on
+
+    def add(self) -> None:
+        """Keep the substeps of the last step."""
+        record = self._leg.record()
+        self._parts.append({name: record[name].ravel() for name in ("time", *FORCES)})
+
+    def mean(self) -> float:
+        """Mean over the whole stances of the episode [N/s], 0 without a stance."""
+        columns = {name: np.concatenate([part[name] for part in self._parts]) for name in self._parts[0]}
+        is_long = self._leg.settings.episode_seconds >= 2 * SETTLED
+        late = columns["time"] > (SETTLED if is_long else 0.0)
+        toe, heel, toe_friction, heel_friction = (columns[name][late] for name in FORCES)
+        friction = toe_friction + heel_friction
+        rates = loading_rates(toe + heel, friction, self._setting.lift_off_n, self._setting.sim_dt)
+        return float(rates.mean()) if len(rates) else 0.0
+
+
+def loading_rates(normal: Floats, friction: Floats, lift_off: float, dt: float) -> Floats:
+    """Loading rate of each whole stance [N/s], shape (stances,): the steepest rise of the normal force from
+    touch-down to the highest ground reaction force.
+
+    Args:
+        normal, friction: forces on the hoof, `dt` apart, shape (substeps,) [N].
+        lift_off: normal force that separates stance from swing [N].
+        dt: substep [s].
+    """
+    grf = np.hypot(normal, friction)
+    rates = []
+    for first, end in stances(normal, lift_off):
+        top = first + int(np.argmax(grf[first:end]))
+        rates.append(steepest(normal[max(first - 1, 0) : top + 1], dt))
+    return np.array(rates)
+
+
+def stances(normal: Floats, lift_off: float) -> NDArray[np.int64]:
+    """First substep of each whole stance and the first after it, shape (stances, 2)."""
+    loaded = np.concatenate([[True], normal > lift_off, [True]])
+    down, up = (np.flatnonzero(np.diff(loaded.astype(int)) == sign) for sign in (1, -1))
+    return np.stack([down[:-1], up[1:]], 1) if len(down) > 1 else np.zeros((0, 2), np.int64)
+
+
+def steepest(force: Floats, dt: float) -> float:
+    """Steepest rise over `WINDOW` [N/s], or over all of the force where that is shorter.
+
+    Args:
+        force: shape (n,), `dt` [s] apart [N].
+        dt: see there.
+    """
+    width = min(max(1, round(WINDOW / dt)), len(force) - 1)
+    return float((force[width:] - force[:-width]).max() / (width * dt)) if width > 0 else 0.0

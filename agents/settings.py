@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import yaml
@@ -14,7 +15,31 @@ from hoof_env.errors import DataFileError
 from hoof_env.plain_policy import ALGORITHMS as ALGORITHMS
 from hoof_env.plain_policy import algorithm_class as algorithm_class
 
+Algorithm = Literal["ppo", "sac", "td3", "tqc"]
+"""Names of `ALGORITHMS`, for the commands."""
+
+
+@dataclass(frozen=True)
+class TrainingArgs:
+    """What every command that trains takes."""
+
+    env_id: str = "hoof_env/HorseLeg-v0"
+    """registered environment; module:id imports the module first"""
+    algo: Algorithm = "ppo"
+    """algorithm of Stable-Baselines3 or sb3-contrib, with its file in agents/hyperparams"""
+    steps: int | None = None
+    """environment steps of a training, rounded up to whole rollouts (n_steps times n_envs); otherwise
+    n_timesteps of the hyperparameter file"""
+    env_kwargs: tuple[str, ...] = ()
+    """arguments of the environment: key=value ..., or one JSON object"""
+    params: tuple[str, ...] = ()
+    """hyperparameters to change: key=value ..., or one JSON object"""
+
+
 FOLDER = Path(__file__).parent / "hyperparams"
+ENV = "env."
+"""Before the name of an argument of the environment where hyperparameters may stand, too."""
+
 COUNTED = ("n_epochs", "n_steps", "batch_size", "buffer_size", "policy_delay")
 """Keys that hold whole numbers of 1 or more; not all are looked at before they are used."""
 NORMALIZE = {"training": bool, "norm_obs": bool, "norm_reward": bool} | dict.fromkeys(

@@ -31,18 +31,26 @@ import numpy as np
 from tyro.conf import Positional
 
 from agents import runs
-from agents.baselines_plan import FINAL_SEEDS as SCORE_SEEDS
-from agents.command import run
-from agents.evaluate import Score, to_json
+from agents.baselines_report import draw_learning_curve, training_length
+from agents.command import run, table
+from agents.evaluate import METRICS, Interval, Score, cell, to_json
 from agents.export import about, write_policy
+from agents.score import FINAL_SEEDS as SCORE_SEEDS
 from agents.score import score_vector
-from agents.ship_card import write_card, write_curve, write_index
 from hoof_env._output import check_folder, staged
 from hoof_env.envs.policies import STANDS_FOR
+from hoof_env.envs.tasks import TASKS
 from hoof_env.errors import DataFileError, OutputError, ParameterError, check_choice, check_number
+from hoof_env.film import render_episode
 from hoof_env.onnx_policy import FILE, OnnxPolicy
+from hoof_env.plain_policy import ABOUT, WEIGHTS
+from hoof_env.records import setting
 
 POLICIES = Path(__file__).with_name("policies")
+TEMPLATES = Path(__file__).with_name("templates")
+SHOWN = ("return", "distance_m", "stance_peak_n", "weight_share", "cost_of_transport", "failed")
+"""Columns of the card's table, keys of `METRICS`."""
+
 CHOOSING_SEEDS = range(500_000, 500_100)
 """Episodes by which the best of several runs is chosen; no training and no reported score plays them."""
 
@@ -55,7 +63,7 @@ GAITS = ("run", "walk", "carrying_walk", "open-loop")
 LIMIT, FILM_LIMIT = 1_000_000, 750_000
 """Bytes of a folder and of the film in it, which is made shorter where it is larger."""
 
-COPIED = ("policy.safetensors", "policy.json", "config.yml")
+COPIED = (WEIGHTS, ABOUT, runs.CONFIG)
 NOT_COPIED = ("args",)
 """Of run.json: paths of the machine that trained; the command says the rest."""
 
@@ -74,11 +82,10 @@ class Args:
 
 @dataclass(frozen=True)
 class Choice:
-    """A run, of how many it is the best, and its mean return in `CHOOSING_SEEDS`, None for an only one."""
+    """A run, and of how many it is the best."""
 
     saved: runs.SavedModel
     among: int = 1
-    value: float | None = None
 
 
 def find_runs(folder: Path) -> dict[str, list[runs.SavedModel]]:
@@ -87,23 +94,21 @@ def find_runs(folder: Path) -> dict[str, list[runs.SavedModel]]:
     Raises:
         DataFileError: there is none, or one lacks a file.
     """
-    found: dict[str, list[runs.SavedModel]] = {}
-    for record in (
-        [folder / "run.json"] if (folder / "run.json").is_file() else sorted(folder.rglob("run.json"))
-    ):
-        if not any((record.parent / name).is_file() for name in ("model.zip", "policy.json")):
-            print(f"passed over {record.parent}: it is not through")
+    models: dict[str, list[runs.SavedModel]] = {}
+    is_run = (folder / runs.RECORD).is_file()
+    for path in [folder] if is_run else sorted(record.parent for record in folder.rglob(runs.RECORD)):
+        if not any((path / name).is_file() for name in (runs.MODEL, ABOUT)):
+            print(f"passed over {path}: it is not through")
             continue
-        needed = ["config.yml", "monitor.csv"]
-        needed += ["policy.safetensors"] if (record.parent / "policy.json").is_file() else []
-        if missing := [name for name in needed if not (record.parent / name).is_file()]:
-            raise DataFileError(f"run {record.parent}: expected all of a training, found no {missing[-1]}")
-        saved = runs.SavedModel.find(record.parent)
+        needed = [runs.CONFIG, runs.MONITOR, *([WEIGHTS] if (path / ABOUT).is_file() else [])]
+        if missing := [name for name in needed if not (path / name).is_file()]:
+            raise DataFileError(f"run {path}: expected all of a training, found no {missing[-1]}")
+        saved = runs.SavedModel.find(path)
         if not saved.record.get("env_kwargs"):
-            found.setdefault(saved.record["env_id"], []).append(saved)
-    if not found:
+            models.setdefault(saved.record["env_id"], []).append(saved)
+    if not models:
         raise DataFileError(f"runs {folder}: expected a run of agents.train, or a folder with some, got none")
-    return found
+    return models
 
 
 def choose(saved: Sequence[runs.SavedModel], env_id: str) -> Choice:
@@ -117,8 +122,7 @@ def choose(saved: Sequence[runs.SavedModel], env_id: str) -> Choice:
         for one in tqdm(saved, desc=f"runs of {env_id}", leave=False, disable=None):
             episodes = score_vector(one.load(env, env_id), env_id, CHOOSING_SEEDS)
             values.append(float(np.mean([episode["return"] for episode in episodes])))
-    best = int(np.argmax(values))
-    return Choice(saved[best], len(saved), values[best])
+    return Choice(saved[int(np.argmax(values))], len(saved))
 
 
 @contextmanager
@@ -146,9 +150,9 @@ def ship(choice: Choice, env_id: str, out: Path, seconds: float = 4.0) -> dict[s
         DataFileError: the model does not fit. OutputError: the folder cannot be written or gets too large.
         HoofEnvError: a package is missing.
     """
-    from hoof_env.film import render_episode
-
     saved, trained_on = choice.saved, choice.saved.record["env_id"]
+    if not len(runs.read_episodes(saved.path.parent)):
+        raise DataFileError(f"run {saved.path.parent}: expected a training in which episodes end, got none")
     record = {key: value for key, value in saved.record.items() if key not in NOT_COPIED}
     record |= {"command": shown_command(record.get("command", "")), "env_id": env_id}
     with runs.make_env(trained_on) as env:
@@ -163,21 +167,15 @@ def ship(choice: Choice, env_id: str, out: Path, seconds: float = 4.0) -> dict[s
         score = score_record(policy, scores, env_id, trained_on)
         if env_id != trained_on:
             record["trained_on"] = trained_on
-            score["objectives"] = objectives(policy, env_id)
         for name in COPIED:
             if saved.path.with_name(name).is_file():
                 shutil.copyfile(saved.path.with_name(name), stage / name)
-        (stage / "run.json").write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
+        (stage / runs.RECORD).write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
         text = json.dumps(score, indent=1, allow_nan=False)
         (stage / "score.json").write_text(text + "\n", encoding="utf-8")
-        write_curve(saved.path.parent, scores, stage / "curve.png")
-        film = stage / "film.gif"
-        while not film.is_file() or film.stat().st_size > FILM_LIMIT:
-            render_episode(
-                film, str(stage / FILE), env_id,
-                seed=SCORE_SEEDS[0], seconds=seconds, fps=20, size=(480, 270),
-            )  # fmt: skip
-            seconds *= 0.75
+        no_name = {"Software": None}  # of the program that drew it
+        draw_learning_curve(saved.path.parent, scores, stage / "curve.png", dpi=90, metadata=no_name)
+        film(stage, env_id, seconds)
         write_card(stage, env_id, record, score, scores, choice)
         size = sum(file.stat().st_size for file in stage.iterdir())
         if size > LIMIT:
@@ -185,16 +183,22 @@ def ship(choice: Choice, env_id: str, out: Path, seconds: float = 4.0) -> dict[s
     return score
 
 
+def film(folder: Path, env_id: str, seconds: float) -> None:
+    """Write film.gif of the policy in `folder`, shorter where it would be larger than `FILM_LIMIT`."""
+    path, policy = folder / "film.gif", str(folder / FILE)
+    while not path.is_file() or path.stat().st_size > FILM_LIMIT:
+        render_episode(path, policy, env_id, seed=SCORE_SEEDS[0], seconds=seconds, fps=20, size=(480, 270))
+        seconds *= 0.75
+
+
 @cache
 def gaits(env_id: str) -> list[Score]:
     """The scores of those of `GAITS` that an id has."""
-    found = []
+    scores = []
     for name in GAITS:
-        try:
-            found.append(Score(name, score_vector(name, env_id, SCORE_SEEDS)))
-        except (ParameterError, DataFileError):  # it has no such gait
-            continue
-    return found
+        with suppress(ParameterError, DataFileError):  # it has no such gait
+            scores.append(Score(name, score_vector(name, env_id, SCORE_SEEDS)))
+    return scores
 
 
 def score_record(policy: Any, scores: Sequence[Score], env_id: str, played_on: str) -> dict[str, Any]:
@@ -238,21 +242,6 @@ def tolerance(policy: Any, env_id: str, returns: Sequence[float]) -> float:
     return float(4 * np.sqrt(np.mean(off**2) / len(off)) + 0.01 * abs(np.mean(returns)))
 
 
-def objectives(policy: Any, env_id: str) -> dict[str, float]:
-    """Mean return of each objective of a multi-objective id over the checked episodes."""
-    from hoof_env.envs.multi_objective import OBJECTIVES
-
-    sums = np.zeros(len(OBJECTIVES))
-    with runs.make_env(env_id) as env:
-        for seed in SCORE_SEEDS[:CHECKED]:
-            observation, _ = env.reset(seed=seed)
-            done = False
-            while not done:
-                observation, reward, terminated, truncated, _ = env.step(policy.predict(observation)[0])
-                sums, done = sums + np.asarray(reward), terminated or truncated
-    return dict(zip(OBJECTIVES, (sums / CHECKED).round(4).tolist(), strict=True))
-
-
 def shown_command(command: str) -> str:
     """A command without --out and without folders of this machine."""
     words = shlex.split(command)
@@ -263,25 +252,85 @@ def shown_command(command: str) -> str:
     return shlex.join([Path(word).name if Path(word).is_absolute() else word for word in shown])
 
 
+def write_card(
+    folder: Path,
+    env_id: str,
+    record: dict[str, Any],
+    score: dict[str, Any],
+    scores: Sequence[Score],
+    choice: Choice,
+) -> None:
+    """Write card.md into `folder`, from run.json, config.yml and score.json."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    keys = [key for key in SHOWN if key in scores[0].estimates]
+    template = Environment(
+        loader=FileSystemLoader(TEMPLATES), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    ).get_template("model_card.md.j2")
+    with runs.make_env(env_id) as env:
+        is_suspended = setting(env).trunk == "suspended"
+        summaries = {task.id: task.summary for task in TASKS.values()}
+        summary = summaries.get(env_id) or (type(env.unwrapped).__doc__ or "").partition("\n")[0]
+    steps, seconds = training_length(choice.saved.path.parent)
+    text = template.render(
+        env_id=env_id,
+        name=env_id.rpartition("/")[2],
+        summary=summary,
+        trained_on=record.get("trained_on", env_id),
+        record=record,
+        steps=steps,
+        seconds=seconds,
+        settings=(folder / runs.CONFIG).read_text(encoding="utf-8").strip(),
+        score=score,
+        spread=float(np.std(score["returns"])),
+        titles=[METRICS[key].title.replace("\n", " ") for key in keys],
+        rows=[(one.policy, [" ".join(cell(key, one.estimates[key])) for key in keys]) for one in scores],
+        estimates={one.policy: one.estimates for one in scores},
+        choice=choice,
+        suspended=is_suspended,
+        files={file.name for file in folder.iterdir()},
+    )
+    (folder / "card.md").write_text(text, encoding="utf-8")
+
+
+def write_index(folder: Path) -> None:
+    """Write README.md, the table of the policies in `folder`."""
+    rows = []
+    for path in sorted(folder.glob("*/score.json")):
+        score = json.loads(path.read_text(encoding="utf-8"))
+        algo = json.loads(path.with_name(runs.RECORD).read_text(encoding="utf-8"))["algo"]
+        row = [f"`{score['env_id']}`", algo.upper()]
+        for name in ("policy", "open-loop", "run"):
+            one = score["policies"].get(name)
+            row.append(Interval(one["mean"]["return"], *one["interval95"]["return"]).text(2) if one else "")
+        rows.append([*row, f"[card]({path.parent.name}/card.md)"])
+    text = (
+        "# Trained policies\n\n"
+        "One for each id, made by `python -m agents.ship`; docs/policies.md says how to use them.\n"
+        "Mean returns in the same episodes, and the bootstrap's 95 % interval.\n\n"
+    )
+    titles = ["id", "policy", "return", "open-loop", "run", "card"]
+    runs.write_text(folder / "README.md", text + table(titles, rows) + "\n")
+
+
 def main(argv: list[str] | None = None) -> None:
     import tyro
 
     args = tyro.cli(Args, args=argv, prog="python -m agents.ship", description=__doc__)
     check_number("seconds", args.seconds, low=0, exclusive_low=True)
-    found = find_runs(args.runs)
-    sources = {env_id: env_id for env_id in found}
-    sources |= {one: other for one, other in STANDS_FOR.items() if one not in found and other in found}
-    wanted = [check_choice("ids", env_id, sources) for env_id in args.ids]
+    models = find_runs(args.runs)
+    sources = {env_id: env_id for env_id in models}
+    sources |= {one: other for one, other in STANDS_FOR.items() if one not in models and other in models}
+    ids = [check_choice("ids", env_id, sources) for env_id in args.ids] or list(sources)
     check_folder(args.out)
-    choices: dict[str, Choice] = {}
-    for env_id in wanted or sources:
-        source = sources[env_id]
-        if source not in choices:
-            choices[source] = choose(found[source], source)
-        score = ship(choices[source], env_id, args.out, args.seconds)
-        mean = {name: one["mean"]["return"] for name, one in score["policies"].items()}
+    choices = {
+        source: choose(models[source], source) for source in dict.fromkeys(sources[one] for one in ids)
+    }
+    for env_id in ids:
+        score = ship(choices[sources[env_id]], env_id, args.out, args.seconds)
+        means = {name: one["mean"]["return"] for name, one in score["policies"].items()}
         write_index(args.out)
-        print(f"{env_id}: " + ", ".join(f"{name} {value:.2f}" for name, value in mean.items()), flush=True)
+        print(f"{env_id}: " + ", ".join(f"{name} {value:.2f}" for name, value in means.items()), flush=True)
 
 
 if __name__ == "__main__":

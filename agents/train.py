@@ -12,42 +12,36 @@ machine and versions give the same run, resumed or not (agents/checkpoints.py sa
 
 from __future__ import annotations
 
-import json
 import warnings
 from contextlib import closing
 from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import yaml
 
 from agents import checkpoints, runs
 from agents.command import check_threads, parse_pairs, run
-from agents.settings import FOLDER, algorithm_class, load_settings, model_arguments, normalize_arguments
-from agents.watch import EndedError, check_divergence, diverged, make_watch, stop_on_signals
+from agents.settings import (
+    FOLDER,
+    TrainingArgs,
+    algorithm_class,
+    load_settings,
+    model_arguments,
+    normalize_arguments,
+)
 from hoof_env.errors import HoofEnvError, OutputError, ParameterError, check_number
 from hoof_env.plain_policy import WEIGHTS
 
 
 @dataclass(frozen=True)
-class Args:
-    env_id: str = "hoof_env/HorseLeg-v0"
-    """registered environment; module:id imports the module first"""
-    algo: Literal["ppo", "sac", "td3", "tqc"] = "ppo"
-    """algorithm of Stable-Baselines3 or sb3-contrib, with its file in agents/hyperparams"""
+class Args(TrainingArgs):
     seed: int = 0
     """of the environments, the network and the sampling"""
-    steps: int | None = None
-    """environment steps in all, rounded up to whole rollouts (n_steps times n_envs); otherwise n_timesteps
-    of the hyperparameter file"""
     n_envs: int | None = None
     """environments stepped side by side; otherwise n_envs of the hyperparameter file"""
-    env_kwargs: tuple[str, ...] = ()
-    """arguments of the environment: key=value ..., or one JSON object"""
-    params: tuple[str, ...] = ()
-    """hyperparameters to change: key=value ..., or one JSON object"""
     hyperparams: Path | None = None
     """YAML file in rl-baselines3-zoo's format; otherwise agents/hyperparams/ALGO.yml"""
     out: Path | None = None
@@ -121,63 +115,82 @@ def _train(
     also: tuple[Any, ...],
 ) -> Trained:
     """`train` in a folder that nobody else works in."""
-    n_envs, steps = settings["n_envs"], settings["n_timesteps"]
     earlier = find_earlier(args, folder, record, settings)
     if finished := earlier.get("finished"):
         checkpoints.tidy(folder, keep=0)  # of a process that was killed before it did so
         return Trained(folder, finished["steps"], finished["seconds"], None)
     checkpoints.tidy(folder)
-    found = checkpoints.checkpoints(folder) if earlier else []
-    if found:
+    start = next(iter(checkpoints.checkpoints(folder)), None) if earlier else None
+    if start:
         warn_of_bits(folder, earlier, record)
-        record = {**earlier, "resumed": [*earlier.get("resumed", []), int(found[0].name)]}
-
-    # Importing torch takes seconds: only now
-    import torch
-    from stable_baselines3.common.callbacks import CallbackList
-
-    if args.device.startswith("cuda") and not torch.cuda.is_available():  # the library would take the CPU
-        raise ParameterError(f"device: expected one that torch finds here, got {args.device!r}")
-    torch.set_num_threads(args.torch_threads)
+        record = {**earlier, "resumed": [*earlier.get("resumed", []), int(start.name)]}
+    set_up_torch(args)
     config = yaml.safe_dump({args.env_id: settings}, sort_keys=False)  # the library adds to policy_kwargs
-    envs = many = runs.make_vec_env(args.env_id, n_envs, **env_kwargs)
+    envs = many = runs.make_vec_env(args.env_id, settings["n_envs"], **env_kwargs)
     try:
-        algorithm = algorithm_class(args.algo)
-        resumed = checkpoints.Resumed(found[0], algorithm, many, args.device) if found else None
+        resumed = None
+        if start:
+            resumed = checkpoints.Resumed(start, algorithm_class(args.algo), many, args.device)
         model = resumed.model if resumed else make_model(args, settings, many)
         envs = model.env
         # Nothing is refused any more
-        runs.write_text(folder / "run.json", json.dumps(record, indent=2) + "\n")
-        runs.write_text(folder / "config.yml", config)
+        runs.write_record(folder, record)
+        runs.write_text(folder / runs.CONFIG, config)
         if not resumed:
-            checkpoints.write_episodes(envs, folder / "monitor.csv")
+            checkpoints.write_episodes(envs, folder / runs.MONITOR)
         model.set_logger(make_logger(folder / "tensorboard", model.num_timesteps + 1 if resumed else 0))
-        watch = make_watch(folder, steps, args.checkpoint_every, args.max_minutes, resumed)
-        callbacks = CallbackList([watch, *also])
-        through = False
-        with closing(watch), stop_on_signals(watch):
-            try:
-                model.learn(steps - model.num_timesteps, callbacks, reset_num_timesteps=not resumed)
-                through = True
-            except EndedError:
-                callbacks.on_training_end()
-            except (ValueError, RuntimeError) as error:  # of torch or the environment: not finite
-                check_divergence(model, folder)
-                if "of distribution" in str(error):
-                    raise diverged(model, folder, "the policy's actions have no distribution") from None
-                if "without overflow" in str(error):
-                    raise diverged(model, folder, str(error)) from None
-                raise
-            seconds = watch.seconds
-            check_divergence(model, folder)
-            runs.save_model(model, folder / "model.zip")
-            if through:
-                record["finished"] = {"steps": model.num_timesteps, "seconds": round(seconds, 3)}
-                runs.write_text(folder / "run.json", json.dumps(record, indent=2) + "\n")
-                checkpoints.tidy(folder, keep=0)
-        return Trained(folder, model.num_timesteps, seconds, watch.stopped_by)
+        return learn(args, folder, record, settings["n_timesteps"], model, resumed, also)
     finally:
         envs.close()
+
+
+def set_up_torch(args: Args) -> None:
+    """Threads and device of torch, whose import takes seconds; `ParameterError` for a GPU that is not there,
+    where the library would take the CPU."""
+    import torch
+
+    if args.device.startswith("cuda") and not torch.cuda.is_available():
+        raise ParameterError(f"device: expected one that torch finds here, got {args.device!r}")
+    torch.set_num_threads(args.torch_threads)
+
+
+def learn(
+    args: Args,
+    folder: Path,
+    record: dict[str, Any],
+    steps: int,
+    model: Any,
+    resumed: checkpoints.Resumed | None,
+    also: tuple[Any, ...],
+) -> Trained:
+    """Let the model learn until it has `steps`, and write it."""
+    from stable_baselines3.common.callbacks import CallbackList
+
+    from agents.watch import EndedError, Watch, check_divergence, diverged, stop_on_signals
+
+    watch = Watch(folder, steps, args.checkpoint_every, args.max_minutes, resumed)
+    callbacks, is_through = CallbackList([watch, *also]), False
+    with closing(watch), stop_on_signals(watch):
+        try:
+            model.learn(steps - model.num_timesteps, callbacks, reset_num_timesteps=not resumed)
+            is_through = True
+        except EndedError:
+            callbacks.on_training_end()
+        except (ValueError, RuntimeError) as error:  # of torch or the environment: not finite
+            check_divergence(model, folder)
+            if "of distribution" in str(error):
+                raise diverged(model, folder, "the policy's actions have no distribution") from None
+            if "without overflow" in str(error):
+                raise diverged(model, folder, str(error)) from None
+            raise
+        trained = Trained(folder, model.num_timesteps, watch.seconds, watch.stopped_by)
+        check_divergence(model, folder)
+        runs.save_model(model, folder / runs.MODEL)
+        if is_through:
+            record["finished"] = {"steps": trained.steps, "seconds": round(trained.seconds, 3)}
+            runs.write_record(folder, record)
+            checkpoints.tidy(folder, keep=0)
+    return trained
 
 
 def checked(args: Args) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -242,7 +255,7 @@ def find_earlier(
             f"{folder}: expected a new folder or one of a run, found {', '.join(there)} and no run.json; "
             "choose another folder"
         )
-    held = {"model.zip", WEIGHTS, runs.CHECKPOINTS} & {*there}
+    held = {runs.MODEL, WEIGHTS, runs.CHECKPOINTS} & {*there}
     if held and not args.resume:
         raise OutputError(
             f"{folder} already holds a trained model; choose another folder, remove that one, or go on with "
@@ -253,7 +266,7 @@ def find_earlier(
     keys = ("env_id", "env_kwargs", "settings", "observation_space", "action_space", "algo", "seed")
     pairs = {key: (earlier.get(key), record.get(key)) for key in keys}
     pairs["hoof-env"] = earlier.get("versions", {}).get("hoof-env"), record["versions"].get("hoof-env")
-    used = load_settings(folder / "config.yml", args.env_id)
+    used = load_settings(folder / runs.CONFIG, args.env_id)
     pairs |= {key: (used.get(key), settings.get(key)) for key in {**used, **settings}}
     unlike = [f"{key}: {there!r} there, {now!r} here" for key, (there, now) in pairs.items() if there != now]
     if unlike:
@@ -288,8 +301,9 @@ def make_model(args: Args, settings: dict[str, Any], many: Any) -> Any:
             arguments["buffer_size"] = min(arguments["buffer_size"], most)
         return algorithm_class(args.algo)(env=envs, seed=args.seed, device=args.device, **arguments)
     except (TypeError, ValueError, AssertionError, RuntimeError) as error:  # torch's, for the device
-        said = f"hyperparameters of {args.algo} for {args.env_id} on device {args.device!r}: {error}"
-        raise ParameterError(said) from None
+        raise ParameterError(
+            f"hyperparameters of {args.algo} for {args.env_id} on device {args.device!r}: {error}"
+        ) from None
 
 
 def make_logger(folder: Path, hidden: int) -> Any:

@@ -7,58 +7,45 @@ A trial draws settings from agents/studies/spaces.yml, trains by agents.train, a
 64 episodes with which no training starts; a bad one is pruned. Its training has a seed of its own, so that
 no setting wins by a lucky one. Ctrl-C ends the trial in hand; the same command goes on with the study, even
 after kill -9, when the trial that was killed is run again. One process works on a study. Into the folder go
-study.db (Optuna's), best.yml (in rl-baselines3-zoo's format, for --hyperparams of agents.train), trials.csv,
-study.json and trials/N, the run folders.
+study.db (Optuna's), best.yml (in rl-baselines3-zoo's format, for --hyperparams of agents.train) and trials/N,
+the run folders. Optuna shows a study:
+
+    optuna trials --storage sqlite:///runs/tune/ppo-HorseLeg-v0/study.db --study-name study
 """
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import shutil
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
-import numpy as np
 import yaml
 
 from agents import runs
 from agents.command import parse_pairs, run
-from agents.settings import FOLDER, load_settings
+from agents.settings import FOLDER, TrainingArgs, load_settings
 from agents.train import Args as TrainArgs
 from agents.train import checked, make_model, make_record, train
-from agents.watch import DivergedError
+from agents.watch import DivergedError, EndedError, Scorer
 from hoof_env.errors import DataFileError, ParameterError, check_number
 
 SPACES = Path(__file__).parent / "studies" / "spaces.yml"
-EPISODES, FIRST_SEED = 64, 1000
+SEEDS = range(1000, 1064)
 """Scored episodes; trainings start theirs from other seeds."""
 
 
 @dataclass(frozen=True)
-class Args:
-    algo: Literal["ppo", "sac", "td3", "tqc"] = "ppo"
-    """algorithm, with its file in agents/hyperparams"""
-    env_id: str = "hoof_env/HorseLeg-v0"
-    """registered environment; module:id imports the module first"""
-    env_kwargs: tuple[str, ...] = ()
-    """its arguments: key=value ..., or one JSON object"""
+class Args(TrainingArgs):
     trials: int = 20
     """that the study has in the end, those of earlier starts counted"""
-    steps: int | None = None
-    """of each trial; otherwise n_timesteps of the hyperparameter file"""
     scores: int = 10
     """how often a trial is scored, the last time at its end"""
-    params: tuple[str, ...] = ()
-    """settings that are held: key=value ..., or one JSON object; they are not drawn"""
     space: Path = SPACES
-    """YAML file of what is drawn"""
-    pruner: Literal["median", "hyperband", "none"] = "median"
-    """what ends a bad trial early"""
+    """YAML file of what is drawn; settings in --params are held"""
     seed: int = 0
     """of the search; trial n trains with seed + n"""
     out: Path | None = None
@@ -105,51 +92,37 @@ def draw(trial: Any, space: Mapping[str, Any], base: Mapping[str, Any]) -> dict[
     return chosen
 
 
-def make_scorer(env_id: str, env_kwargs: Mapping[str, Any], every: int, report: Any = None) -> Any:
-    """The callback that scores the policy every `every` steps and at the end; `curve` has rows of (steps,
-    mean return). `report(steps, score)` may say after each but the last that the training is to end."""
-    from stable_baselines3.common.callbacks import BaseCallback
+class TrialScorer(Scorer):
+    """Keeps the mean returns; `report(steps, score)` may say after each but the last that the training is to
+    end.
 
-    class Scorer(BaseCallback):
-        curve: list[tuple[int, float]]
-        stopped = False
+    Attributes:
+        curve: rows of (steps, mean return).
+        is_pruned: whether the training was ended.
+    """
 
-        def _on_training_start(self) -> None:
-            self.curve, self.next = [], every
-            self.envs = runs.make_vec_env(env_id, EPISODES, **env_kwargs)
+    def __init__(
+        self,
+        env_id: str,
+        env_kwargs: Mapping[str, Any],
+        every: int,
+        report: Callable[[int, float], bool] = lambda steps, score: False,
+    ) -> None:
+        super().__init__(env_id, env_kwargs, SEEDS, every)
+        self.report, self.is_pruned = report, False
+        self.curve: list[tuple[int, float]] = []
 
-        def _on_step(self) -> bool:
-            if self.num_timesteps >= self.next:
-                self.next += every
-                self._score()
-                self.stopped = bool(report and report(*self.curve[-1]))
-            return not self.stopped
+    def keep(self, episodes: list[dict[str, float]]) -> None:
+        """Add a row."""
+        mean = sum(one["return"] for one in episodes) / len(episodes)
+        self.curve.append((self.num_timesteps, mean))
 
-        def _on_training_end(self) -> None:
-            if not self.stopped:
-                if self.curve and self.curve[-1][0] == self.num_timesteps:
-                    self.curve.pop()  # it is of before the last update
-                self._score()
-            self.envs.close()
-
-        def _score(self) -> None:
-            self.curve.append((self.num_timesteps, mean_return(self.model, self.envs)))
-
-    return Scorer()
-
-
-def mean_return(model: Any, envs: Any) -> float:
-    """Mean return of a model over one episode in each of `envs`, the same episodes each time."""
-    envs.seed(FIRST_SEED)
-    normalize = model.get_vec_normalize_env()
-    observations, going = envs.reset(), np.ones(envs.num_envs, bool)
-    total = np.zeros(envs.num_envs)
-    while going.any():
-        seen = normalize.normalize_obs(observations) if normalize else observations
-        observations, rewards, dones, _ = envs.step(model.predict(seen, deterministic=True)[0])
-        total += np.where(going, rewards, 0.0)
-        going &= ~dones
-    return float(total.mean())
+    def _on_rollout_start(self) -> None:
+        before = len(self.curve)
+        super()._on_rollout_start()
+        if len(self.curve) > before and self.report(*self.curve[-1]):
+            self.is_pruned = True
+            raise EndedError
 
 
 def tune(args: Args) -> Any:
@@ -175,49 +148,55 @@ def tune(args: Args) -> Any:
 
 
 def _tune(
-    args: Args, folder: Path, kwargs: dict[str, Any], base: dict[str, Any], space: dict[str, Any]
+    args: Args, folder: Path, env_kwargs: dict[str, Any], base: dict[str, Any], space: dict[str, Any]
 ) -> Any:
     """`tune` in a folder that nobody else works in."""
-    study = open_study(args, folder, {"env_kwargs": kwargs, "base": base, "space": space})
-
-    def objective(trial: Any) -> float:
-        import optuna
-
-        settings = base | draw(trial, space, base)
-
-        def report(steps: int, score: float) -> bool:
-            trial.report(score, steps)
-            return bool(trial.should_prune())
-
-        out = folder / "trials" / str(trial.number)
-        shutil.rmtree(out, ignore_errors=True)
-        trial.set_user_attr("settings", settings)
-        scorer = make_scorer(args.env_id, kwargs, -(-base["n_timesteps"] // args.scores), report)
-        training = TrainArgs(
-            env_id=args.env_id, algo=args.algo, env_kwargs=args.env_kwargs, out=out,
-            params=(json.dumps(settings),), seed=args.seed + trial.number, checkpoint_every=0,
-        )  # fmt: skip
-        try:
-            trained = train(training, scorer)
-        except DivergedError:  # no settings to go on with
-            raise optuna.TrialPruned from None
-        trial.set_user_attr("curve", scorer.curve)
-        trial.set_user_attr("seconds", round(trained.seconds, 1))
-        if trained.stopped_by:
-            raise KeyboardInterrupt
-        if scorer.stopped:
-            raise optuna.TrialPruned
-        return scorer.curve[-1][1]
+    study = open_study(args, folder, {"env_kwargs": env_kwargs, "base": base, "space": space})
 
     def keep(study: Any, trial: Any) -> None:
         curve = trial.user_attrs.get("curve") or [(0, float("nan"))]
         print(f"trial {trial.number}: {trial.state.name.lower()}, {curve[-1][1]:.1f}", flush=True)
-        write_study(study, folder, args.env_id)
+        write_best(study, folder, args.env_id)
 
     while (left := args.trials - len(finished(study))) > 0:
-        study.optimize(objective, n_trials=left, callbacks=[keep])
-    write_study(study, folder, args.env_id)
+        study.optimize(
+            lambda trial: run_trial(trial, args, folder, env_kwargs, base | draw(trial, space, base)),
+            n_trials=left,
+            callbacks=[keep],
+        )
+    write_best(study, folder, args.env_id)
     return study
+
+
+def run_trial(
+    trial: Any, args: Args, folder: Path, env_kwargs: dict[str, Any], settings: dict[str, Any]
+) -> float:
+    """The last score of a training with `settings`; Optuna's `TrialPruned` for a bad one."""
+    import optuna
+
+    def report(steps: int, score: float) -> bool:
+        trial.report(score, steps)
+        return bool(trial.should_prune())
+
+    out = folder / "trials" / str(trial.number)
+    shutil.rmtree(out, ignore_errors=True)
+    trial.set_user_attr("settings", settings)
+    scorer = TrialScorer(args.env_id, env_kwargs, -(-settings["n_timesteps"] // args.scores), report)
+    training = TrainArgs(
+        env_id=args.env_id, algo=args.algo, env_kwargs=args.env_kwargs, out=out,
+        params=(json.dumps(settings),), seed=args.seed + trial.number, checkpoint_every=0,
+    )  # fmt: skip
+    try:
+        trained = train(training, scorer)
+    except DivergedError:  # no settings to go on with
+        raise optuna.TrialPruned from None
+    trial.set_user_attr("curve", scorer.curve)
+    trial.set_user_attr("seconds", round(trained.seconds, 1))
+    if trained.stopped_by:
+        raise KeyboardInterrupt
+    if scorer.is_pruned:
+        raise optuna.TrialPruned
+    return scorer.curve[-1][1]
 
 
 def finished(study: Any) -> list[Any]:
@@ -226,7 +205,7 @@ def finished(study: Any) -> list[Any]:
 
 
 def open_study(args: Args, folder: Path, about: dict[str, Any]) -> Any:
-    """The study in `folder`, made if need be.
+    """The study in `folder`, made if need be; a trial that was killed is queued to be run again.
 
     Raises:
         ParameterError: Optuna is missing, the settings do not fit the algorithm, or the study was begun with
@@ -235,37 +214,13 @@ def open_study(args: Args, folder: Path, about: dict[str, Any]) -> Any:
     """
     try:
         import optuna
-        from sqlalchemy.exc import SQLAlchemyError
     except ModuleNotFoundError:
         raise ParameterError("agents.tune needs Optuna: pip install 'hoof-env[tune]'") from None
     optuna.logging.set_verbosity(optuna.logging.ERROR)  # what ends a trial is raised, too
-    drawn = about["base"] | draw(optuna.create_study().ask(), about["space"], about["base"])
-    training = TrainArgs(env_id=args.env_id, algo=args.algo, params=(json.dumps(drawn),))
-    _, settings = checked(training)
-    with closing(runs.make_vec_env(args.env_id, settings["n_envs"], **about["env_kwargs"])) as many:
-        make_model(training, settings, many)  # refuses a key that is none
-    steps = about["base"]["n_timesteps"]
-    pruners = {
-        # By the median of five whole trials at the least, and not before a third of a training
-        "median": optuna.pruners.MedianPruner(5, n_warmup_steps=steps // 3),
-        "hyperband": optuna.pruners.HyperbandPruner(max(1, steps // 10), steps),
-        "none": optuna.pruners.NopPruner(),
-    }
-    path = folder / "study.db"
-    try:
-        study = optuna.create_study(
-            storage=f"sqlite:///{path}",
-            study_name="study",
-            pruner=pruners[args.pruner],
-            direction="maximize",
-            load_if_exists=True,
-        )
-        begun_trials = len(study.trials)
-    except (SQLAlchemyError, optuna.exceptions.OptunaError, RuntimeError) as error:
-        reason = str(error).partition("\n")[0]
-        raise DataFileError(f"{path}: expected the database of a study, cannot read it: {reason}") from None
+    check_space(args, about)
+    study = load_study(folder / "study.db", about["base"]["n_timesteps"])
     # Of the same seed a study that goes on would draw again what it has drawn
-    seed = args.seed + begun_trials
+    seed = args.seed + len(study.trials)
     study.sampler = optuna.samplers.TPESampler(seed=seed, multivariate=True, n_startup_trials=8)
     about = {"algo": args.algo, "env_id": args.env_id, **about}
     begun = study.user_attrs.get("about", about)
@@ -273,47 +228,62 @@ def open_study(args: Args, folder: Path, about: dict[str, Any]) -> Any:
         raise ParameterError(
             f"{folder} holds a study with other {', '.join(unlike)}; choose another folder by --out"
         )
-    for trial in study.get_trials(states=[optuna.trial.TrialState.RUNNING]):  # killed: once more
+    for trial in study.get_trials(states=[optuna.trial.TrialState.RUNNING]):
         study.tell(trial.number, state=optuna.trial.TrialState.FAIL)
         study.enqueue_trial(trial.params)
-    study.set_user_attr("about", about)
-    study.set_user_attr("command", runs.command())
-    study.set_user_attr("versions", runs.versions())
+    for key, value in {"about": about, "command": runs.command(), "versions": runs.versions()}.items():
+        study.set_user_attr(key, value)
     return study
 
 
-def write_study(study: Any, folder: Path, env_id: str) -> None:
-    """Write best.yml, trials.csv and study.json."""
-    rows = io.StringIO()
-    names = sorted({name for trial in study.trials for name in trial.params})
-    writer = csv.writer(rows, lineterminator="\n")
-    writer.writerow(["trial", "state", "score", "steps", "seconds", *names])
-    for trial in study.trials:
-        steps, score = (trial.user_attrs.get("curve") or [("", "")])[-1]
-        score = round(score, 3) if score != "" else ""
-        about = [trial.number, trial.state.name.lower(), score, steps, trial.user_attrs.get("seconds", "")]
-        writer.writerow(about + [trial.params.get(name, "") for name in names])
-    runs.write_text(folder / "trials.csv", rows.getvalue())
-    done = [trial for trial in study.trials if trial.state.name == "COMPLETE"]
-    best = max(done, key=lambda trial: trial.value, default=None)
-    found = {
-        **study.user_attrs,
-        "best": best and {"trial": best.number, "score": best.value, **best.user_attrs},
-    }
-    runs.write_text(folder / "study.json", json.dumps(found, indent=1) + "\n")
-    if best:
+def check_space(args: Args, about: dict[str, Any]) -> None:
+    """Build a model with settings that are drawn once, which refuses a key that is none."""
+    import optuna
+
+    drawn = about["base"] | draw(optuna.create_study().ask(), about["space"], about["base"])
+    training = TrainArgs(env_id=args.env_id, algo=args.algo, params=(json.dumps(drawn),))
+    _, settings = checked(training)
+    with closing(runs.make_vec_env(args.env_id, settings["n_envs"], **about["env_kwargs"])) as many:
+        make_model(training, settings, many)
+
+
+def load_study(path: Path, steps: int) -> Any:
+    """Optuna's study in the database at `path`, made if need be, of trainings of so many steps."""
+    import optuna
+    from sqlalchemy.exc import SQLAlchemyError
+
+    try:
+        study = optuna.create_study(
+            storage=f"sqlite:///{path}",
+            study_name="study",
+            # By the median of five whole trials at the least, and not before a third of a training
+            pruner=optuna.pruners.MedianPruner(5, n_warmup_steps=steps // 3),
+            direction="maximize",
+            load_if_exists=True,
+        )
+        len(study.trials)  # reads all of it
+    except (SQLAlchemyError, optuna.exceptions.OptunaError, RuntimeError) as error:
+        reason = str(error).partition("\n")[0]
+        raise DataFileError(f"{path}: expected the database of a study, cannot read it: {reason}") from None
+    return study
+
+
+def write_best(study: Any, folder: Path, env_id: str) -> None:
+    """Write best.yml, once there is a trial that was not pruned."""
+    complete = [trial for trial in study.trials if trial.state.name == "COMPLETE"]
+    if complete:
+        best = max(complete, key=lambda trial: trial.value)
         settings = yaml.safe_dump({env_id: best.user_attrs["settings"]}, sort_keys=False)
-        head = f"# Trial {best.number} of agents.tune: mean return {best.value:.2f} of {EPISODES} episodes\n"
-        runs.write_text(folder / "best.yml", head + settings)
+        score = f"mean return {best.value:.2f} of {len(SEEDS)} episodes"
+        runs.write_text(folder / "best.yml", f"# Trial {best.number} of agents.tune: {score}\n{settings}")
 
 
 def main(argv: list[str] | None = None) -> None:
     import tyro
 
     args = tyro.cli(Args, args=argv, prog="python -m agents.tune", description=__doc__)
-    write = tune(args)
-    best = write.user_attrs["about"]
-    print(f"{best['algo']} on {best['env_id']}: {len(finished(write))} trials")
+    study = tune(args)
+    print(f"{args.algo} on {args.env_id}: {len(finished(study))} trials")
 
 
 if __name__ == "__main__":

@@ -1,20 +1,25 @@
-"""What looks after a training while it runs: progress, checkpoints, signals, the time limit, divergence."""
+"""What looks after a training while it runs: progress, checkpoints, signals, the time limit, divergence, and
+scores on the way."""
 
 from __future__ import annotations
 
 import math
 import signal
 import sys
+import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 from typing import Any
 
 import numpy as np
+from stable_baselines3.common.callbacks import BaseCallback
+from tqdm import tqdm
 
-from agents import checkpoints
+from agents import checkpoints, runs
+from agents.score import score_vector
 from hoof_env.errors import HoofEnvError
 
 
@@ -57,78 +62,88 @@ def diverged(model: Any, folder: Path, reason: str) -> DivergedError:
     )
 
 
-def make_watch(
-    folder: Path,
-    steps: int,
-    checkpoint_every: float,
-    max_minutes: float | None,
-    resumed: checkpoints.Resumed | None,
-) -> Any:
-    """The callback. Between two rollouts it checks the model, keeps a checkpoint when one is due, and ends
-    the training by `EndedError`; it shows progress and logs gait figures."""
-    from stable_baselines3.common.callbacks import BaseCallback
-    from tqdm import tqdm
+class Watch(BaseCallback):
+    """Between two rollouts it checks the model, keeps a checkpoint when one is due, and ends the training by
+    `EndedError`; it shows progress and logs gait figures.
 
-    class Watch(BaseCallback):
-        stopped_by: int | None = None
-        bar: Any = None
-        earlier = resumed.seconds if resumed else 0.0
+    Args:
+        folder: of the run.
+        steps: of the whole training.
+        checkpoint_every: seconds between two checkpoints; 0: none.
+        max_minutes: when to end, or None.
+        resumed: what the training goes on from, or None.
+    """
 
-        @property
-        def seconds(self) -> float:
-            """Of training, before a resume too."""
-            return self.earlier + time.monotonic() - self.started
+    def __init__(
+        self,
+        folder: Path,
+        steps: int,
+        checkpoint_every: float,
+        max_minutes: float | None,
+        resumed: checkpoints.Resumed | None,
+    ) -> None:
+        super().__init__()
+        self.folder, self.steps, self.resumed = folder, steps, resumed
+        self.checkpoint_every = checkpoint_every
+        self.max_seconds = math.inf if max_minutes is None else 60 * max_minutes
+        self.stopped_by: int | None = None
+        self.bar: Any = None
 
-        def _on_training_start(self) -> None:
-            self.started = self.last = time.monotonic()
-            rest = 0.3 if sys.stderr.isatty() else 10.0  # seconds between two lines, where each is kept
-            self.bar = tqdm(
-                total=steps, initial=self.num_timesteps, unit=" steps", unit_scale=True, smoothing=0.1,
-                mininterval=rest,
-            )  # fmt: skip
-            self.summaries: list[dict[str, float]] = []
-            if resumed:
-                resumed.start()
+    @property
+    def seconds(self) -> float:
+        """Of training, before a resume too."""
+        return (self.resumed.seconds if self.resumed else 0.0) + time.monotonic() - self.started
 
-        def _on_rollout_start(self) -> None:
-            if resumed and self.num_timesteps == self.model._num_timesteps_at_start:
-                resumed.start_rollout()
-            check_divergence(self.model, folder)
-            late = max_minutes is not None and time.monotonic() - self.started >= 60 * max_minutes
-            end = self.stopped_by is not None or late
-            due = end or time.monotonic() - self.last >= checkpoint_every
-            if checkpoint_every and due and self.num_timesteps > self.model._num_timesteps_at_start:
-                checkpoints.save(self.model, folder, self.seconds)
-                self.last = time.monotonic()
-            if end:
-                raise EndedError
+    def _on_training_start(self) -> None:
+        self.started = self.last_kept = time.monotonic()
+        interval = 0.3 if sys.stderr.isatty() else 10.0  # seconds between two lines, where each is kept
+        self.bar = tqdm(
+            total=self.steps, initial=self.num_timesteps, unit=" steps", unit_scale=True, smoothing=0.1,
+            mininterval=interval,
+        )  # fmt: skip
+        self.summaries: list[dict[str, float]] = []
+        if self.resumed:
+            self.resumed.start()
 
-        def _on_step(self) -> bool:
-            self.bar.update(self.training_env.num_envs)
-            for index in np.flatnonzero(self.locals["dones"]):
-                self.summaries.append(self.locals["infos"][index].get("episode_summary", {}))
-            return True
+    def _on_rollout_start(self) -> None:
+        is_first = self.num_timesteps == self.model._num_timesteps_at_start
+        if self.resumed and is_first:
+            self.resumed.start_rollout()
+        check_divergence(self.model, self.folder)
+        end = self.stopped_by is not None or time.monotonic() - self.started >= self.max_seconds
+        due = end or time.monotonic() - self.last_kept >= self.checkpoint_every
+        if self.checkpoint_every and due and not is_first:
+            checkpoints.save(self.model, self.folder, self.seconds)
+            self.last_kept = time.monotonic()
+        if end:
+            raise EndedError
 
-        def _on_rollout_end(self) -> None:
-            if self.model.ep_info_buffer:
-                returns = [episode["r"] for episode in self.model.ep_info_buffer]
-                self.bar.set_postfix_str(f"return {np.mean(returns):.1f}", refresh=False)
-            for summary in self.summaries:
-                for key, value in summary.items():
-                    if np.isfinite(value):  # the cost of transport is infinite without progress
-                        self.logger.record_mean(f"gait/{key}", value)
-            self.summaries.clear()
+    def _on_step(self) -> bool:
+        self.bar.update(self.training_env.num_envs)
+        for index in np.flatnonzero(self.locals["dones"]):
+            self.summaries.append(self.locals["infos"][index].get("episode_summary", {}))
+        return True
 
-        def close(self) -> None:
-            if self.bar is not None:
-                self.bar.close()
+    def _on_rollout_end(self) -> None:
+        if self.model.ep_info_buffer:
+            returns = [episode["r"] for episode in self.model.ep_info_buffer]
+            self.bar.set_postfix_str(f"return {np.mean(returns):.1f}", refresh=False)
+        for summary in self.summaries:
+            for key, value in summary.items():
+                if np.isfinite(value):  # the cost of transport is infinite without progress
+                    self.logger.record_mean(f"gait/{key}", value)
+        self.summaries.clear()
 
-    return Watch()
+    def close(self) -> None:
+        """End the bar."""
+        if self.bar is not None:
+            self.bar.close()
 
 
 @contextmanager
-def stop_on_signals(watch: Any) -> Iterator[None]:
-    """Let the first SIGINT or SIGTERM end the training in good order; the second acts as it always does."""
+def stop_on_signals(watch: Watch) -> Iterator[None]:
+    """Let the first SIGINT or SIGTERM end the training in good order; the second acts as it always does. In
+    a thread other than the main one, where signals cannot be caught, nothing changes."""
     previous: dict[int, Any] = {}
 
     def stop(number: int, frame: FrameType | None) -> None:
@@ -139,9 +154,63 @@ def stop_on_signals(watch: Any) -> Iterator[None]:
         for number, handler in previous.items():
             signal.signal(number, handler)
 
-    for number in (signal.SIGINT, signal.SIGTERM):
-        previous[number] = signal.signal(number, stop)
+    if threading.current_thread() is threading.main_thread():
+        for number in (signal.SIGINT, signal.SIGTERM):
+            previous[number] = signal.signal(number, stop)
     try:
         yield
     finally:
         restore()
+
+
+class Scorer(BaseCallback):
+    """Scores the policy in training on the same episodes each time: between two rollouts whenever `every`
+    more steps are done, and at the end. A subclass does something with them in `keep`.
+
+    Args:
+        env_id, env_kwargs: what the episodes are played in.
+        seeds: of the episodes.
+        every: steps between two scores.
+
+    Attributes:
+        wall_s, cpu_s: of training alone, scores left out; a subclass that resumes sets them.
+        scored_at: steps at the last score.
+    """
+
+    def __init__(self, env_id: str, env_kwargs: Mapping[str, Any], seeds: Sequence[int], every: int) -> None:
+        super().__init__()
+        self.env_id, self.env_kwargs, self.seeds, self.every = env_id, env_kwargs, seeds, every
+        self.wall_s = self.cpu_s = 0.0
+
+    def keep(self, episodes: list[dict[str, float]]) -> None:
+        """Do something with a score: `episodes` as of `agents.score.play`."""
+        raise NotImplementedError
+
+    def score(self) -> None:
+        """Play the episodes and keep them."""
+        self.wall_s += time.monotonic() - self._since[0]
+        self.cpu_s += time.process_time() - self._since[1]
+        self.scored_at = self.num_timesteps
+        normalize = self.model.get_vec_normalize_env()
+        # As the policy will act when it is loaded
+        policy = runs.TrainedPolicy(self.model, normalize.normalize_obs if normalize is not None else None)
+        self.keep(score_vector(policy, self.env_id, self.seeds, **self.env_kwargs))
+        self._start_clock()
+
+    def _start_clock(self) -> None:
+        self._since = time.monotonic(), time.process_time()
+
+    def _on_training_start(self) -> None:
+        self.scored_at = self.num_timesteps
+        self._start_clock()
+
+    def _on_rollout_start(self) -> None:
+        if self.num_timesteps // self.every > self.scored_at // self.every:
+            self.score()
+
+    def _on_training_end(self) -> None:
+        if self.num_timesteps > self.scored_at:
+            self.score()
+
+    def _on_step(self) -> bool:
+        return True

@@ -16,23 +16,31 @@ import pytest
 import yaml
 
 import hoof_env  # noqa: F401  registers the ids
-from agents import baselines, baselines_matched, baselines_report, baselines_run, baselines_stats
-from agents.baselines_matched import Compared, dominates, scaled_runs, seeds_that_dominate, told
-from agents.baselines_plan import (
-    CURVE_SEEDS,
-    FINAL_SEEDS,
+from agents import baselines, baselines_matched, baselines_report, baselines_results, baselines_run
+from agents.baselines_matched import MATCHED_SPEED, dominates, scaled_runs, seeds_that_dominate, verdict
+from agents.baselines_results import (
+    Scored,
+    expected_settings,
+    iqm,
+    over_episodes,
+    read_results,
+    references,
+)
+from agents.baselines_run import (
+    CURVE,
+    FINAL,
     LEG,
-    MATCHED,
-    MATCHED_SPEED,
     PLANS,
+    Args,
     Entry,
     Run,
-    figures,
+    load_plan,
+    read_curve,
     runs_of,
+    train_one,
 )
-from agents.baselines_results import Reference, over_episodes, read_results, references, wanted
-from agents.baselines_run import CURVE, FINAL, Args, read_curve, train_one
-from agents.baselines_stats import Interval, iqm
+from agents.evaluate import Interval
+from agents.score import CURVE_SEEDS, FINAL_SEEDS, mean_figures, score_vector
 from agents.settings import FOLDER, load_settings
 from hoof_env.errors import DataFileError, ParameterError
 from tests.agents.conftest import SHORT, TINY
@@ -43,7 +51,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_the_full_plan_is_what_is_asked():
-    counted = {(one.algo, one.env_id): one.seeds for one in PLANS["full"] if not one.label}
+    counted = {(one.algo, one.env_id): one.seeds for one in load_plan("full") if not one.label}
     assert {key: n for key, n in counted.items() if key[1] == LEG} == {
         (algo, LEG): 10 for algo in ("ppo", "sac", "td3", "tqc")
     }
@@ -52,7 +60,7 @@ def test_the_full_plan_is_what_is_asked():
     assert all(counted["ppo", env_id] == 5 for env_id in single - {LEG})
 
 
-@pytest.mark.parametrize("plan", PLANS.values(), ids=PLANS)
+@pytest.mark.parametrize("plan", [load_plan(path.stem) for path in PLANS.glob("*.yml")])
 def test_no_training_starts_from_a_scored_seed_or_shares_a_folder(plan):
     every = list(runs_of(plan))
     assert len({one.name for one in every}) == len(every) == sum(entry.seeds for entry in plan)
@@ -62,17 +70,35 @@ def test_no_training_starts_from_a_scored_seed_or_shares_a_folder(plan):
 
 
 def test_the_matched_speed_is_the_runs_and_no_less():
-    run = references(LEG)["run"]
-    assert run.intervals["speed_m_s"].high < MATCHED_SPEED < 1.1 * run.figures["speed_m_s"]
+    speed = references(LEG)["run"].intervals["speed_m_s"]
+    assert speed.high < MATCHED_SPEED < 1.1 * speed.mean
+    for plan in ("full", "nightly"):
+        (entry,) = (one for one in load_plan(plan) if one.label == "matched")
+        assert entry.env_kwargs == {"target_speed": [MATCHED_SPEED, MATCHED_SPEED]}
+
+
+def test_a_plan_that_is_none(tmp_path, monkeypatch):
+    monkeypatch.setattr(baselines_run, "PLANS", tmp_path)
+    for text in ("- {algo: ppo}", "3", "- {"):
+        (tmp_path / "full.yml").write_text(text)
+        with pytest.raises(DataFileError, match=r"full\.yml: expected a list of entries"):
+            load_plan("full")
+
+
+def test_a_training_is_told_its_arguments_as_the_command_takes_them():
+    entry = Entry("ppo", LEG, 1, env_kwargs={"target_speed": [2.1, 2.1]}, label="matched")
+    words = Run(entry, 3).command(Path("out"))
+    assert words[words.index("--out") + 1] == str(Path("out", "ppo-HorseLeg-v0-matched-s3"))
+    assert words[-2:] == ["--env-kwargs", "target_speed=[2.1, 2.1]"]
 
 
 def test_the_cost_of_transport_is_that_of_the_whole():
     one = {"distance_m": 10.0, "drive_work_j": 800.0, "mean_grf_n": 400.0, "weight_share": 0.5,
            "return": 1.0, "cost_of_transport": 0.1}  # fmt: skip
     back = {**one, "distance_m": -5.0, "cost_of_transport": np.inf}
-    assert figures([one])["cost_of_transport"] == pytest.approx(0.1)
-    assert figures([one, back])["cost_of_transport"] == pytest.approx(1600 / 800 / 5)
-    assert np.isnan(figures([back])["cost_of_transport"])
+    assert mean_figures([one])["cost_of_transport"] == pytest.approx(0.1)
+    assert mean_figures([one, back])["cost_of_transport"] == pytest.approx(1600 / 800 / 5)
+    assert np.isnan(mean_figures([back])["cost_of_transport"])
 
 
 # One training
@@ -95,6 +121,8 @@ def test_a_training_leaves_its_curve_and_its_score(done):
     assert [row["steps"] for row in curve] == [0, 128, 256, 384, 512]
     assert all(a["wall_s"] < b["wall_s"] for a, b in pairwise(curve))
     assert final["steps"] == 512
+    kept = score_vector(str(done), LEG, CURVE_SEEDS, episode_seconds=0.4)
+    assert curve[-1]["return"] == pytest.approx(np.mean([one["return"] for one in kept]))
     assert len(final["episodes"]) == len(FINAL_SEEDS)
 
 
@@ -159,7 +187,9 @@ def test_all_are_trained_once_and_failures_are_told(tmp_path, monkeypatch, capsy
 
 def test_an_interrupt_ends_what_runs(tmp_path, monkeypatch):
     _, alive = pretend(monkeypatch, "import time; time.sleep(60)")
-    monkeypatch.setattr(baselines, "share_done", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+    monkeypatch.setattr(
+        baselines.tqdm, "set_postfix_str", lambda *_, **__: (_ for _ in ()).throw(KeyboardInterrupt)
+    )
     began = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
         baselines.work_off(PLAN, tmp_path, workers=2)
@@ -216,10 +246,10 @@ def test_one_seed_has_no_interval():
 # Matched speed
 
 
-def compared(speed, *lower):
+def scored(speed, *lower):
     keys = ("peak_grf_n", "stance_peak_n", "cost_of_transport")
     around = {key: Interval(x, x - 0.1, x + 0.1) for key, x in zip(keys, lower, strict=True)}
-    return Compared("", {"speed_m_s": Interval(speed, speed, speed), **around})
+    return Scored("", {"speed_m_s": Interval(speed, speed, speed), **around})
 
 
 def test_the_interval_of_the_cost_of_transport_is_around_the_whole():
@@ -228,45 +258,43 @@ def test_the_interval_of_the_cost_of_transport_is_around_the_whole():
            "return": 1.0, "cost_of_transport": 1.0}  # fmt: skip
     short = {**far, "distance_m": 1.0, "drive_work_j": 10.0, "cost_of_transport": 10.0}
     episodes = [far, short] * 20
-    cost = figures(episodes)["cost_of_transport"]
-    found = over_episodes("cost_of_transport", cost, episodes)
-    assert found.low < found.mean == cost < found.high < 2
-    assert np.isnan(
-        over_episodes("cost_of_transport", np.nan, [{**far, "cost_of_transport": np.inf}] * 2).low
-    )
-    assert over_episodes("return", 1.0, episodes).low == 1.0
+    cost = over_episodes(episodes)["cost_of_transport"]
+    assert cost.low < cost.mean == mean_figures(episodes)["cost_of_transport"] < cost.high < 2
+    back = over_episodes([{**far, "distance_m": -1.0, "cost_of_transport": np.inf}] * 2)
+    assert np.isnan(back["cost_of_transport"].low)
+    assert back["return"].low == 1.0
 
 
 def test_seeds_are_counted_one_by_one():
     slow, soft, hard = ({"speed_m_s": v, "peak_grf_n": f, "stance_peak_n": f, "cost_of_transport": f}
                         for v, f in ((1.0, 1.0), (3.0, 1.0), (3.0, 5.0)))  # fmt: skip
-    agent = replace(compared(2.0, 1.0, 1.0, 1.0), seeds=(slow, soft, soft, hard))
-    assert seeds_that_dominate(agent, compared(2.0, 2.0, 2.0, 2.0)) == "2/4"
+    agent = replace(scored(2.0, 1.0, 1.0, 1.0), seeds=(slow, soft, soft, hard))
+    assert seeds_that_dominate(agent, scored(2.0, 2.0, 2.0, 2.0)) == "2/4"
 
 
 @pytest.mark.parametrize(
     ("agent", "is_better"),
     [
-        (compared(2.0, 1.0, 1.0, 1.0), True),
-        (compared(1.9, 1.0, 1.0, 1.0), False),  # slower
-        (compared(2.0, 1.0, 1.0, 1.9), False),  # intervals meet
-        (compared(2.0, 3.0, 1.0, 1.0), False),
+        (scored(2.0, 1.0, 1.0, 1.0), True),
+        (scored(1.9, 1.0, 1.0, 1.0), False),  # slower
+        (scored(2.0, 1.0, 1.0, 1.9), False),  # intervals meet
+        (scored(2.0, 3.0, 1.0, 1.0), False),
     ],
 )
 def test_dominance(agent, is_better):
-    assert dominates(agent, compared(2.0, 2.0, 2.0, 2.0)) == is_better
+    assert dominates(agent, scored(2.0, 2.0, 2.0, 2.0)) == is_better
 
 
-def test_who_bears_less_is_told():
+def test_who_bears_less_is_named():
     light, heavy = (Interval(x, x - 0.01, x + 0.01) for x in (0.2, 0.7))
-    agent, run = compared(2.0, 1.0, 1.0, 1.0), compared(2.0, 2.0, 2.0, 2.0)
+    agent, run = scored(2.0, 1.0, 1.0, 1.0), scored(2.0, 2.0, 2.0, 2.0)
     agent, run = (
         replace(one, intervals={**one.intervals, "weight_share": share})
         for one, share in ((agent, light), (run, heavy))
     )
-    assert told(agent, run) == "yes, bearing less of the weight"
-    assert told(replace(agent, intervals={**agent.intervals, "weight_share": heavy}), run) == "yes"
-    assert told(run, agent) == "no"
+    assert verdict(agent, run) == "yes, bearing less of the weight"
+    assert verdict(replace(agent, intervals={**agent.intervals, "weight_share": heavy}), run) == "yes"
+    assert verdict(run, agent) == "no"
 
 
 def test_scaled_runs_begin_with_the_run_and_stay_what_they_are():
@@ -284,7 +312,11 @@ def test_scaled_runs_begin_with_the_run_and_stay_what_they_are():
 
 # The page
 
-SMALL = (Entry("ppo", LEG, 3), Entry("sac", LEG, 2), Entry("ppo", LEG, 2, label=MATCHED))
+SMALL = (
+    Entry("ppo", LEG, 3),
+    Entry("sac", LEG, 2),
+    Entry("ppo", LEG, 2, label="matched", paid="paid little"),
+)
 
 
 def pretend_results(folder, done):
@@ -295,7 +327,7 @@ def pretend_results(folder, done):
         here.mkdir(parents=True)
         for name in ("run.json", CURVE):
             (here / name).write_text((done / name).read_text())
-        (here / "config.yml").write_text(yaml.safe_dump({one.entry.env_id: wanted(one.entry)}))
+        (here / "config.yml").write_text(yaml.safe_dump({one.entry.env_id: expected_settings(one.entry)}))
         level = 40.0 + one.seed if one.entry.algo == "ppo" else 1.0
         episodes = [{**episode, "return": level} for episode in final["episodes"]]
         (here / FINAL).write_text(
@@ -309,11 +341,11 @@ def page(done, tmp_path, monkeypatch):
     point = {key: Interval(x, x, x) for key, x in (
         ("return", 6.0), ("speed_m_s", 2.0), ("peak_grf_n", 4e3), ("stance_peak_n", 3500.0),
         ("cost_of_transport", 1.3), ("weight_share", 0.7))}  # fmt: skip
-    known = {name: Reference(name, {"return": 6.0}, point, 6.0) for name in ("run", "walk", "open-loop")}
+    known = {name: Scored(name, point, curve_return=6.0) for name in ("run", "walk", "open-loop")}
     monkeypatch.setattr(baselines_report, "references", lambda env_id: known)
     monkeypatch.setattr(baselines_matched, "sped_up", lambda speed: [])
-    monkeypatch.setattr(baselines_stats, "REPS", 100)
-    monkeypatch.setitem(PLANS, "nightly", SMALL)
+    monkeypatch.setattr(baselines_results, "REPS", 100)
+    monkeypatch.setattr(baselines_report, "load_plan", lambda name: SMALL)
     args = baselines_report.Args("nightly", tmp_path / "runs", tmp_path / "page.md")
     return baselines_report.report(args)
 
@@ -324,19 +356,16 @@ def test_the_page_says_what_the_runs_say(page):
     assert "| 41.0 [40" in line  # the IQM of 40, 41 and 42
     assert "| 40.0 to 42.0 | 3/3 | 3/3 |" in line
     assert "| SAC | 2 |" in text
-    assert "apart | met: PPO 41.0" in text
-    assert "is no result" in text.splitlines()[2]
+    assert "| PPO, paid little |" in text
+    assert "python -m agents.baselines_run --algo sac" in text
     with (page.with_suffix("") / "curves.csv").open() as file:
         assert len(list(csv.DictReader(file))) == 5 * 7
     assert (page.with_suffix("") / "HorseLeg-v0.png").stat().st_size > 10_000
 
 
-def test_a_bar_that_is_missed_says_so(page, tmp_path, monkeypatch):
-    for final in (tmp_path / "runs").glob("ppo*/" + FINAL):
-        final.write_text(final.read_text().replace('"return": 4', '"return": -4'))
-    args = baselines_report.Args("nightly", tmp_path / "runs")
-    assert "apart | not met: SAC 1.0" in baselines_report.report(args).read_text()
-    assert (tmp_path / "runs" / "baselines.md").is_file()  # beside the trainings that were given
+def test_a_page_lies_beside_its_trainings(page, tmp_path):
+    assert baselines_report.report(baselines_report.Args("nightly", tmp_path / "runs")).name == "report.md"
+    assert (tmp_path / "runs" / "report.md").read_text().count("|") == page.read_text().count("|")
 
 
 def test_what_the_plan_does_not_ask_for_is_not_shown(page, tmp_path):

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from agents import demo, page
+from agents import demo
 from agents.evaluate import METRICS, Args, evaluate
 from hoof_env.errors import OutputError
 from hoof_env.paper.published import load_published
@@ -120,7 +120,7 @@ def test_scores_on_the_page_are_those_of_the_file(folder, report):
 
 
 def test_pictures_and_films(report):
-    assert {*page.FIGURES, "curve"} <= set(report.ids)
+    assert {"figure1", "figure3", "figure4", "figure5", "figure6", "curve"} <= set(report.ids)
     assert report.tags.count("video") == 5
     assert sum(link.startswith("data:video/mp4;base64,") for link in report.links) == 5
 
@@ -153,7 +153,7 @@ def test_a_failed_run_leaves_the_older_report(folder, monkeypatch, failure):
 
     monkeypatch.setattr(demo, "reproduce", lambda say: None)
     monkeypatch.setattr(demo, "write_reproduction", lambda r, stage, **_: (stage / "walk.mp4").touch())
-    monkeypatch.setattr(demo, "print_reproduction", fail)
+    monkeypatch.setattr(demo, "print_counts", fail)
     with pytest.raises(type(failure)):
         demo.demo(demo.Args(out=folder, quick=True))
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
@@ -163,12 +163,6 @@ def test_unwritable_folder(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(OutputError, match="file"):
         demo.demo(demo.Args(out=tmp_path / "file" / "demo", quick=True))
-
-
-def test_learning_curve_counts_steps(tmp_path):
-    path = tmp_path / "monitor.csv"
-    path.write_text('#{"t_start": 0}\nr,l,t\n-1.5,20,0.1\n2.0,30,0.2\n')
-    np.testing.assert_array_equal(page.read_curve(path), [[20, -1.5], [50, 2.0]])
 
 
 def test_interrupted_from_the_keyboard_says_one_line(tmp_path):

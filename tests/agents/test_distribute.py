@@ -8,8 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from agents.distribute import Rllib, Trials, main, prepare, start
-from agents.distribute_space import Axis, parse_space
+from agents.distribute import Axis, Rllib, Trials, main, parse_space, prepare, start
 from hoof_env.errors import HoofEnvError, ParameterError
 
 ROOT = Path(__file__).parents[2]
@@ -104,6 +103,6 @@ def test_help_names_both(capsys):
 )
 def test_reason(monkeypatch, error, said):
     monkeypatch.setitem(sys.modules, "ray", SimpleNamespace(tune=SimpleNamespace(Callback=object)))
-    report = runpy.run_path(str(ROOT / "agents" / "distribute_report.py"))
+    report = runpy.run_path(str(ROOT / "agents" / "distribute_trial.py"))
     told = f"Failure # 1 (occurred at noon)\nold\nFailure # 2 (occurred at one)\n{error}\n"
     assert report["reason"](told) == said

@@ -14,15 +14,15 @@ from agents.evaluate import (
     Score,
     estimate,
     evaluate,
+    film,
     film_paths,
-    find_policy,
     main,
-    play,
     table,
     to_json,
 )
-from agents.open_loop import GAITS
 from agents.runs import SavedModel, make_env
+from agents.score import find_policy, play
+from hoof_env.envs.policies import GAITS
 from hoof_env.errors import DataFileError, OutputError, ParameterError
 from tests.agents.conftest import SHORT, train_tiny
 
@@ -54,7 +54,9 @@ def test_no_variance_no_width(values):
 @pytest.mark.parametrize("values", [[3.0], [1.0, math.inf]])
 def test_no_interval(values):
     found = estimate(values)
-    assert (found.mean, found.low, found.high) == (values[-1], None, None)
+    assert found.mean == values[-1]
+    assert np.isnan([found.low, found.high]).all()
+    assert found.parts()[1] == ""
 
 
 @pytest.mark.parametrize("name", ["run", "idle"])
@@ -215,12 +217,9 @@ def test_a_film_that_is_no_mp4_is_refused_before_the_first_episode(tmp_path, mon
         evaluate(Args(policy=("run",), video=tmp_path / "film.xyz"))
 
 
-@pytest.mark.parametrize("name", ["film.xyz", "film.mp4"], ids=["at its start", "at its end"])
-def test_a_film_that_cannot_be_written_is_refused_in_one_line(tmp_path, name, capfd):
+def test_a_film_that_cannot_be_written_is_refused_in_one_line(tmp_path, capfd):
     """ffmpeg alone meets the limit of a file's size: it leaves half a file, as on a full disk."""
     resource = pytest.importorskip("resource")
-
-    from agents.video import film
 
     with make_env(ENV_ID, episode_seconds=0.4, render_mode="rgb_array") as env:
         policy = find_policy("run", env, ENV_ID)
@@ -228,7 +227,7 @@ def test_a_film_that_cannot_be_written_is_refused_in_one_line(tmp_path, name, ca
         resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, old[1]))
         try:
             with pytest.raises(OutputError, match=r"^cannot write to .*: ffmpeg could not [^\n]*$"):
-                film(env, policy, tmp_path / name, seed=0)
+                film(env, policy, tmp_path / "film.mp4", seed=0)
         finally:
             resource.setrlimit(resource.RLIMIT_FSIZE, old)
     assert not list(tmp_path.iterdir())

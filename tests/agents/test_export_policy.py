@@ -230,7 +230,7 @@ def test_the_example_plays_a_policy_without_a_learning_library(trained, exported
     assert not done.stderr
     found = [float(value) for value in re.findall(r"return (\S+)", done.stdout)]
     with make_env(ENV_ID, **LEG) as env:
-        from agents.evaluate import play
+        from agents.score import play
 
         episodes = play(env, SavedModel.find(trained.folder).load(env, ENV_ID), range(1000, 1003))
     assert found == pytest.approx([one["return"] for one in episodes], abs=0.01)

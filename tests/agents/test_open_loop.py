@@ -8,13 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from agents import open_loop, open_loop_search
-from agents.evaluate import find_policy, play
-from agents.open_loop import GAITS, Args, load_open_loop, main, optimise
-from agents.open_loop_search import SIZES, cost, decode, search
+from agents import open_loop
+from agents.open_loop import SIZES, Args, cost, decode, main, optimise, search
 from agents.runs import make_env
-from agents.score import score_vector
+from agents.score import find_policy, play, score_vector
 from hoof_env import records
+from hoof_env.envs.policies import GAITS, load_open_loop, stored
 from hoof_env.errors import DataFileError, HoofEnvError, ParameterError
 
 ENV_ID = "hoof_env/HorseLeg-v0"
@@ -25,9 +24,8 @@ SHORT = ("episode_seconds=0.4",)
 @pytest.fixture(autouse=True)
 def small(monkeypatch):
     """Generations of 16 candidates with 4 starts."""
-    monkeypatch.setattr(open_loop_search, "STARTS", 4)
-    for module in (open_loop, open_loop_search):
-        monkeypatch.setattr(module, "ROWS", 64)
+    monkeypatch.setattr(open_loop, "STARTS", 4)
+    monkeypatch.setattr(open_loop, "ROWS", 64)
 
 
 def arguments(path, **changes):
@@ -38,7 +36,7 @@ def arguments(path, **changes):
 
 
 class Bowl:
-    """A court where the distance to a point costs, and starts add noise that all candidates share."""
+    """An objective where the distance to a point costs, and starts add noise that all candidates share."""
 
     family = "constant"
 
@@ -56,35 +54,35 @@ class Bowl:
 
 
 def test_a_search_finds_the_bottom_of_a_bowl_and_never_meets_a_start_twice():
-    court, ticks = Bowl(), []
-    x, _, interrupted = search(court, 0, 64 * 40, lambda count, best: ticks.append(count))
-    np.testing.assert_allclose(x, court.middle, atol=0.05)
+    objective, ticks = Bowl(), []
+    x, _, interrupted = search(objective, 0, 64 * 40, lambda count, best: ticks.append(count))
+    np.testing.assert_allclose(x, objective.middle, atol=0.05)
     assert not interrupted
-    assert sum(map(len, court.met)) == len(set.union(*court.met))
-    assert min(set.union(*court.met)) > open_loop_search.TEST_SEED + 1_000_000
+    assert sum(map(len, objective.met)) == len(set.union(*objective.met))
+    assert min(set.union(*objective.met)) > open_loop.TEST_SEED + 1_000_000
     assert sum(ticks) <= 64 * 40
     other = Bowl()
     search(other, 1, 64 * 40, lambda *_: None)
-    assert not set.union(*court.met) & set.union(*other.met)
+    assert not set.union(*objective.met) & set.union(*other.met)
 
 
 def test_an_interrupted_search_keeps_the_best_so_far():
-    court = Bowl(interrupt_after=12)
-    x, _, interrupted = search(court, 0, 64 * 40, lambda *_: None)
+    objective = Bowl(interrupt_after=12)
+    x, _, interrupted = search(objective, 0, 64 * 40, lambda *_: None)
     assert interrupted
-    assert ((x - court.middle) ** 2).sum() < 0.5
+    assert ((x - objective.middle) ** 2).sum() < 0.5
     with pytest.raises(KeyboardInterrupt):
         search(Bowl(interrupt_after=1), 0, 64 * 40, lambda *_: None)
 
 
 def test_a_start_is_the_first_point(monkeypatch):
-    court = Bowl()
-    x, _, _ = search(court, 0, 64 * 3, lambda *_: None, start=court.middle)
-    assert ((x - court.middle) ** 2).sum() < 0.1
+    objective = Bowl()
+    x, _, _ = search(objective, 0, 64 * 3, lambda *_: None, start=objective.middle)
+    assert ((x - objective.middle) ** 2).sum() < 0.1
 
 
 def test_decoding_reaches_all_frequencies():
-    for end, frequency in ((-1.0, open_loop_search.SLOWEST), (1.0, open_loop_search.FASTEST)):
+    for end, frequency in ((-1.0, open_loop.SLOWEST), (1.0, open_loop.FASTEST)):
         found = decode("clocked", np.r_[np.zeros(12), end])
         assert found["frequency_hz"] == pytest.approx(frequency)
         assert set(found) == {"constant", "sin", "cos", "frequency_hz"}
@@ -131,7 +129,7 @@ def test_searches_that_are_there_are_not_made_again(tmp_path, monkeypatch):
     monkeypatch.setattr(
         open_loop,
         "search",
-        lambda court, seed, *rest: (seed == 1 or pytest.fail("again")) and search(court, seed, *rest),
+        lambda objective, seed, *rest: (seed == 1 or pytest.fail("again")) and search(objective, seed, *rest),
     )
     both = optimise(arguments(tmp_path, restarts=2))
     assert both["restarts"][0] == first["restarts"][0]
@@ -207,7 +205,7 @@ HIGHEST = sorted((*GAITS.glob("*-constant.json"), *GAITS.glob("*-clocked.json"))
 
 @pytest.mark.parametrize("path", HIGHEST, ids=lambda path: path.stem)
 def test_stored_gaits_get_their_scores(path):
-    found = open_loop.stored(path)
+    found = stored(path)
     with make_env(found["env_id"], **found["env_kwargs"]) as env:
         policy = load_open_loop(path, env)
     episodes = score_vector(policy, found["env_id"], range(1000, 1008), **found["env_kwargs"])
@@ -220,7 +218,7 @@ def test_stored_gaits_get_their_scores(path):
 
 def test_stored_gaits_of_the_trade_off_are_what_they_are_called():
     for path in GAITS.glob("*-peak-*.json"):
-        found = open_loop.stored(path)
+        found = stored(path)
         assert path.stem.startswith(f"HorseLeg-v0-constant-peak-{found['speed']:g}")
         assert found["score"]["mean"]["speed_m_s"] > found["speed"] - 0.1
         if found.get("weight_share"):
@@ -230,7 +228,7 @@ def test_stored_gaits_of_the_trade_off_are_what_they_are_called():
 @pytest.mark.parametrize("env_id", [ENV_ID, "hoof_env/HorseLegMO-v0"])
 def test_an_id_names_its_best_stored_gait(env_id):
     files = [GAITS / f"HorseLeg-v0-{family}.json" for family in SIZES]
-    best = max(map(open_loop.stored, files), key=lambda one: one["score"]["mean"]["return"])
+    best = max(map(stored, files), key=lambda one: one["score"]["mean"]["return"])
     with make_env(env_id) as env, warnings.catch_warnings():
         warnings.simplefilter("error", UserWarning)
         for policy in (find_policy("open-loop", env, env_id), records.find_policy("open-loop", env, env_id)):

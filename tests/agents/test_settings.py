@@ -1,6 +1,7 @@
 """Hyperparameters: what our file holds is what rl-baselines3-zoo and Stable-Baselines3 take."""
 
 import inspect
+from typing import get_args
 
 import gymnasium as gym
 import pytest
@@ -10,13 +11,25 @@ from stable_baselines3.common.noise import OrnsteinUhlenbeckActionNoise
 from torch import nn
 
 import hoof_env
-from agents.settings import ALGORITHMS, FOLDER, SCHEDULED, algorithm_class, load_settings, model_arguments
+from agents.settings import (
+    ALGORITHMS,
+    FOLDER,
+    SCHEDULED,
+    Algorithm,
+    algorithm_class,
+    load_settings,
+    model_arguments,
+)
 from hoof_env.errors import DataFileError, ParameterError
 
 FILES = {name: yaml.safe_load((FOLDER / f"{name}.yml").read_text()) for name in ALGORITHMS}
 ENTRIES = FILES["ppo"]
 OF_ZOO = {"n_envs", "n_timesteps", "normalize", "env_wrapper", "frame_stack", "callback", "env_kwargs"}
 """Keys that the zoo keeps to itself; what it leaves goes to the constructor."""
+
+
+def test_the_commands_name_every_algorithm():
+    assert set(get_args(Algorithm)) == set(ALGORITHMS)
 
 
 @pytest.mark.parametrize("entries", FILES.values(), ids=FILES)

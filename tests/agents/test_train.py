@@ -19,7 +19,7 @@ import yaml
 from stable_baselines3 import PPO
 
 from agents.command import parse_pairs, run
-from agents.runs import FILES, STATISTICS, SavedModel, make_env
+from agents.runs import FILES, STATISTICS, SavedModel, make_env, read_episodes
 from agents.train import Args, train
 from hoof_env.errors import DataFileError, OutputError, ParameterError
 from tests.agents.conftest import SHORT, TINY, train_tiny
@@ -63,6 +63,11 @@ def test_every_training_step_is_in_the_curve(trained):
     episodes = curve(trained.folder)
     assert {length for _, length in episodes} == {"20"}
     assert len(episodes) == 4 * (256 // 4 // 20)
+
+
+def test_episodes_count_steps(tmp_path):
+    (tmp_path / "monitor.csv").write_text('#{"t_start": 0}\nr,l,t\n-1.5,20,0.1\n2.0,30,0.2\n')
+    np.testing.assert_array_equal(read_episodes(tmp_path), [[20, -1.5, 0.1], [50, 2.0, 0.2]])
 
 
 def test_model_reloads(trained):

@@ -1,18 +1,15 @@
 """A study of tiny trainings: what it writes, that it goes on, prunes and is refused what misfits."""
 
-import csv
-import json
 import logging
 from pathlib import Path
 
-import numpy as np
 import pytest
 import yaml
 
 from agents.settings import load_settings
 from agents.train import Args as TrainArgs
 from agents.train import train
-from agents.tune import SPACES, Args, draw, finished, load_space, make_scorer, mean_return, tune
+from agents.tune import SPACES, Args, TrialScorer, draw, finished, load_space, tune
 from agents.watch import DivergedError
 from hoof_env.errors import DataFileError, ParameterError
 from tests.agents.conftest import SHORT
@@ -36,42 +33,39 @@ def folder(tmp_path_factory) -> Path:
     return out
 
 
-def rows(folder: Path) -> list[dict[str, str]]:
-    return list(csv.DictReader((folder / "trials.csv").open()))
+def trials(folder: Path) -> list[optuna.trial.FrozenTrial]:
+    return optuna.load_study(study_name="study", storage=f"sqlite:///{folder / 'study.db'}").trials
+
+
+def best(folder: Path) -> optuna.trial.FrozenTrial:
+    complete = [trial for trial in trials(folder) if trial.state.name == "COMPLETE"]
+    return max(complete, key=lambda trial: trial.value)
 
 
 def test_what_a_study_leaves(folder):
-    found = json.loads((folder / "study.json").read_text())
-    trials = rows(folder)
-    assert [row["state"] for row in trials] == ["complete", "complete"]
-    best = max(trials, key=lambda row: float(row["score"]))
-    assert found["best"]["trial"] == int(best["trial"])
-    assert [steps for steps, _ in found["best"]["curve"]] == [128, 256]
+    assert [trial.state.name for trial in trials(folder)] == ["COMPLETE", "COMPLETE"]
+    attributes = best(folder).user_attrs
+    assert [steps for steps, _ in attributes["curve"]] == [128, 256]
     used = load_settings(folder / "best.yml", "hoof_env/HorseLeg-v0")
-    assert used == found["best"]["settings"]
-    assert used["learning_rate"] == f"lin_{float(best['learning_rate']):.3g}"
+    assert used == attributes["settings"]
+    assert used["learning_rate"] == f"lin_{best(folder).params['learning_rate']:.3g}"
     assert used["n_steps"] == 32
-    assert "n_steps" not in best
+    assert "n_steps" not in best(folder).params
 
 
 def test_the_best_settings_give_its_score_again(folder, tmp_path):
-    best = json.loads((folder / "study.json").read_text())["best"]
-    scorer = make_scorer("hoof_env/HorseLeg-v0", {"episode_seconds": 0.4}, 128)
-    train(
-        TrainArgs(
-            hyperparams=folder / "best.yml", seed=best["trial"], env_kwargs=SHORT, out=tmp_path / "run"
-        ),
-        scorer,
-    )
-    assert scorer.curve == [tuple(row) for row in best["curve"]]
+    scorer = TrialScorer("hoof_env/HorseLeg-v0", {"episode_seconds": 0.4}, 128)
+    arguments = {"seed": best(folder).number, "env_kwargs": SHORT, "out": tmp_path / "run"}
+    train(TrainArgs(hyperparams=folder / "best.yml", **arguments), scorer)
+    assert scorer.curve == [tuple(row) for row in best(folder).user_attrs["curve"]]
 
 
 def test_a_study_goes_on(folder):
-    before = rows(folder)
+    before = trials(folder)
     study = tune(tiny(folder, trials=3))
     assert len(finished(study)) == 3
-    assert rows(folder)[:2] == before
-    assert len({row["learning_rate"] for row in rows(folder)}) == 3
+    assert trials(folder)[:2] == before
+    assert len({trial.params["learning_rate"] for trial in trials(folder)}) == 3
 
 
 def test_an_interrupted_trial_does_not_count(tmp_path, monkeypatch):
@@ -107,9 +101,9 @@ def test_a_bad_trial_is_pruned(tmp_path):
         scores.append((steps, score))
         return True
 
-    scorer = make_scorer("hoof_env/HorseLeg-v0", {"episode_seconds": 0.4}, 128, report)
+    scorer = TrialScorer("hoof_env/HorseLeg-v0", {"episode_seconds": 0.4}, 128, report)
     trained = train(TrainArgs(steps=512, params=HELD, env_kwargs=SHORT, out=tmp_path / "run"), scorer)
-    assert scorer.stopped
+    assert scorer.is_pruned
     assert trained.steps < 512
     assert scores == scorer.curve[:1]
 
@@ -124,19 +118,6 @@ def test_every_algorithm_has_a_space(algo):
     assert settings["policy_kwargs"]["kept"] == 1
     assert settings["policy_kwargs"]["net_arch"] != [8]
     assert yaml.safe_load(yaml.safe_dump(settings)) == settings
-
-
-def test_mean_return_is_of_whole_episodes(trained):
-    """Of the same ones each time, where the model never acts better than in one step."""
-    from stable_baselines3 import PPO
-
-    from agents.runs import make_vec_env
-
-    model = PPO.load(trained.folder / "model.zip")
-    envs = make_vec_env("hoof_env/HorseLeg-v0", 3, episode_seconds=0.4)
-    first = mean_return(model, envs)
-    envs.step(np.zeros((3, 4)))
-    assert mean_return(model, envs) == first
 
 
 def test_refusals(folder, tmp_path):
@@ -167,8 +148,8 @@ def test_a_trial_that_diverges_counts_as_pruned(tmp_path, monkeypatch):
     assert not (tmp_path / "best.yml").exists()
 
 
-def test_hyperband_prunes_trials_of_few_steps(tmp_path):
-    study = tune(tiny(tmp_path, trials=1, steps=5, pruner="hyperband"))
+def test_a_trial_shorter_than_a_rollout_is_scored(tmp_path):
+    study = tune(tiny(tmp_path, trials=1, steps=5))
     assert study.trials[0].user_attrs["curve"]
 
 

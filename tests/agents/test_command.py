@@ -1,4 +1,5 @@
-"""Torch's threads: one unless more are asked for, none that spin, no more than there are cores."""
+"""What commands share. Torch's threads: one unless more are asked for, none that spin, no more than there are
+cores; and tables."""
 
 import os
 import subprocess
@@ -46,3 +47,7 @@ def test_more_threads_than_this_process_has_cores_are_refused(monkeypatch):
     for threads in (0, 3):
         with pytest.raises(ParameterError, match=rf"torch_threads: expected .* \[1, 2\], got {threads}"):
             command.check_threads(threads)
+
+
+def test_a_table():
+    assert command.table(["a", "b"], [["1", "2"], ["3"]]) == "| a | b |\n| --- | --- |\n| 1 | 2 |\n| 3 |  |"
