@@ -9,16 +9,11 @@ from __future__ import annotations
 import os
 import shlex
 import sys
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from hoof_env._version import __version__
-from hoof_env.dynamics.advance import LANES
-from hoof_env.envs.horse_leg import HorseLegEnv
-from hoof_env.envs.vector import HorseLegVectorEnv
 from hoof_env.errors import HoofEnvError
-from hoof_env.simd.cache import COMPILED, given_folder
 
 
 def reproduce(out: Path, figures: bool = True, preset: str | None = None) -> None:
@@ -155,7 +150,7 @@ def compile() -> None:
     They are kept in the folder NUMBA_CACHE_DIR. An engine with four legs and `reproduce` have more
     of their own.
     """
-    from hoof_env.cli import compile_kernels
+    from hoof_env.envs.kernels import compile_kernels
 
     compile_kernels(_say)
 
@@ -208,29 +203,3 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 if __name__ == "__main__":
     sys.exit(main())
-
-
-CASES: dict[str, Callable[[], object]] = {
-    "one environment": HorseLegEnv,
-    "many side by side": lambda: HorseLegVectorEnv(LANES),
-    "the paper's solver": lambda: HorseLegEnv(task="fixed", solver="paper"),
-}
-"""What uses kernels of its own; all ids and all settings share these."""
-
-
-def compile_kernels(say: Callable[[str], None]) -> list[str]:
-    """Compile what is not in numba's cache, telling of each of `CASES`; returns the names of those kernels.
-
-    Raises:
-        OutputError: there is something to compile, and the cache folder is not writable.
-    """
-    first = len(COMPILED)
-    for name, make in CASES.items():
-        begun, count = time.monotonic(), len(COMPILED)
-        make()
-        if found := COMPILED[count:]:
-            say(f"{name}: {time.monotonic() - begun:.1f} s for {', '.join(found)}")
-    folder = given_folder() or "numba's own folders; NUMBA_CACHE_DIR names another"
-    compiled = COMPILED[first:]
-    say(f"{f'{len(compiled)} kernels compiled' if compiled else 'nothing to compile'}; they are in {folder}")
-    return compiled

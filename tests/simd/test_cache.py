@@ -229,7 +229,7 @@ except OutputError as error:
 def test_all_kernels_are_told_once_and_then_there_is_nothing_to_compile(start, tmp_path):
     (tmp_path / "go").touch()
     code = """
-        from hoof_env import cli as kernels
+        from hoof_env.envs import kernels
         import tiny
         kernels.CASES = {"two kernels": lambda: tiny.tiny(3.0)}
         kernels.compile_kernels(print)
@@ -247,7 +247,7 @@ def test_an_environment_has_all_its_kernels_once_it_is_made(start):
     code = """
         import numpy as np
         from hoof_env.simd.cache import KernelCache
-        from hoof_env import cli as kernels
+        from hoof_env.envs import kernels
         from hoof_env.envs.horse_leg import HorseLegEnv
         from hoof_env.envs.vector import HorseLegVectorEnv
         wanted, load = [], KernelCache.load_overload
