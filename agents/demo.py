@@ -32,8 +32,8 @@ from hoof_env._output import check_folder, staged
 from hoof_env.errors import check_number
 from hoof_env.film import render_episode
 from hoof_env.paper.report import format_error, format_number
-from hoof_env.paper.reproduce import GAITS, SOLVERS, Reproduction, reproduce, write_reproduction
-from hoof_env.paper.rows import counted
+from hoof_env.paper.reproduce import GAITS, SOLVERS, reproduce, write_reproduction
+from hoof_env.paper.rows import Reproduction, counted
 
 ENV_ID, FIXED_ID = "hoof_env/HorseLeg-v0", "hoof_env/HorseLegFixed-v0"
 SCRIPTED = ("walk", "run", "idle", "random", "bang-bang")

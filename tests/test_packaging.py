@@ -19,6 +19,9 @@ ROOT = Path(__file__).resolve().parent.parent
 HEAVY = {"numba", "torch", "pygame", "matplotlib", "tyro", "stable_baselines3", "scipy", "importlib.metadata"}
 
 
+SHIPPED = {".py", ".json", ".typed", ".toml", ".in", ".md"}
+
+
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> zipfile.ZipFile:
     folder = tmp_path_factory.mktemp("dist")
@@ -29,7 +32,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> zipfile.ZipFile:
 
 def test_wheel_holds_the_package_and_nothing_else(wheel: zipfile.ZipFile) -> None:
     shipped = {name for name in wheel.namelist() if ".dist-info/" not in name}
-    sources = {path for path in (ROOT / "hoof_env").rglob("*") if path.suffix in {".py", ".json", ".typed"}}
+    sources = {path for path in (ROOT / "hoof_env").rglob("*") if path.suffix in SHIPPED}
     sources.add(ROOT / "hoof_env" / "py.typed")
     assert shipped == {path.relative_to(ROOT).as_posix() for path in sources}
     assert any(name.endswith(".json") for name in shipped)
