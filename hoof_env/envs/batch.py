@@ -49,9 +49,9 @@ from hoof_env.ground.contact import Ground
 from hoof_env.ground.preset import load_ground
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.profile import leg_profile
-from hoof_env.simd.compile import what_cannot_be_compiled
 from hoof_env.simd.layout import views
 from hoof_env.simd.memory import COLUMNS
+from hoof_env.simd.user_functions import what_cannot_be_compiled
 
 Floats = NDArray[np.float64]
 
@@ -456,9 +456,10 @@ class EpisodeBatch:
         return {
             key: value
             for key, value in vars(self).items()
-            if key not in ("addresses", "kernel", "now", "_kernels", "_observe")
+            if key not in ("addresses", "entries", "kernel", "now", "_kernels", "_observe")
         }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
+        self.entries = observed(self.groups, self.settings.trunk, self.task.entries)
         self._open()

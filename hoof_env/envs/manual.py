@@ -18,8 +18,8 @@ from hoof_env.envs.grounds import HILLS
 from hoof_env.envs.infos import MEASURED
 from hoof_env.envs.manual_text import PAGE
 from hoof_env.envs.multi_objective import HorseLegMOEnv
-from hoof_env.envs.reward import TERMS, check_weights
-from hoof_env.envs.tasks import PER_EPISODE, TASKS, Settings, to_json
+from hoof_env.envs.reward import Term, check_weights
+from hoof_env.envs.tasks import PER_EPISODE, TASKS, Settings, task_of, to_json
 from hoof_env.errors import OutputError, check_choice
 from hoof_env.gait.motion_law import FilterSettings
 from hoof_env.gait.parameters import LIMITS
@@ -40,15 +40,17 @@ GAIT = [entry for entry in observation.ENTRIES if entry.group == "gait"]
 
 
 def page(task: str) -> str:
-    """The manual page of a task in Markdown; `task` is one of `PAGES`.
+    """The manual page of a task in Markdown; `task` is one of `PAGES`, or an id of one's own.
 
     Raises:
         ParameterError: there is no such page.
     """
-    check_choice("task", task, PAGES)
     if task in _CLASSES:
         return _of_class(task)
-    what, settings = TASKS[task], TASKS[task].settings({})
+    what = task_of(task)
+    settings = what.settings({})
+    groups = observation.groups_of(what.entries)
+    names = [entry.name for entry in observation.observed(settings.observation, settings.trunk, what.entries)]
     text = Template(PAGE).substitute(
         name=what.name,
         id=what.id,
@@ -58,10 +60,10 @@ def page(task: str) -> str:
         action_space=f"Box(-1, 1, ({len(LIMITS)},), float32)",
         actions=_actions(settings),
         offsets=_offsets(settings.gait) if settings.gait else "",
-        observation_space=f"Box(-1, 1, ({len(observed(task))},), float32)",
-        observations=_observations(settings),
-        other_groups=", ".join(f"`{group}`" for group in GROUPS if group not in settings.observation),
-        rewards=_rewards(settings),
+        observation_space=f"Box(-1, 1, ({len(names)},), float32)",
+        observations=_observations(settings, what.entries),
+        other_groups=", ".join(f"`{group}`" for group in groups if group not in settings.observation),
+        rewards=_rewards(settings, what.terms),
         target_reward="Progress counts up to the commanded speed; what goes beyond it is subtracted."
         if settings.target_speed
         else "",
@@ -84,12 +86,14 @@ def page(task: str) -> str:
 
 
 def page_of(id: str) -> str:
-    """The manual page of a registered id.
+    """The manual page of a registered id, of one's own as "module:id", too.
 
     Raises:
-        ParameterError: not an id of this package.
+        ParameterError: not an id of this package, or one's own that is not registered.
     """
     ids = {f"hoof_env/{name}-v0": task for task, name in _NAMES.items()}
+    if isinstance(id, str) and "/" in id and not id.startswith("hoof_env/"):
+        return page(id)
     return page(ids[check_choice("id", id, ids)])
 
 
@@ -160,16 +164,16 @@ def _offsets(gait: str) -> str:
     )
 
 
-def _observations(settings: Settings) -> str:
-    entries = observation.observed(settings.observation, settings.trunk)
+def _observations(settings: Settings, entries: tuple[observation.Entry, ...]) -> str:
+    entries = tuple(observation.observed(settings.observation, settings.trunk, entries))
     rows = [(entry.name, entry.scale.text, entry.unit, entry.group) for entry in entries]
     head = ("Num", "Observation", "Scaling", "Unit before scaling", "Group")
     return _table(head, [(str(k), *row) for k, row in enumerate(rows)])
 
 
-def _rewards(settings: Settings) -> str:
-    weights = check_weights(settings.reward_weights)
-    rows = [(f"`{t.key}`", f"`{t.name}`", f"{weights[t.name]:g}", t.unit, t.meaning) for t in TERMS]
+def _rewards(settings: Settings, terms: tuple[Term, ...]) -> str:
+    weights = check_weights(settings.reward_weights, terms)
+    rows = [(f"`{t.key}`", f"`{t.name}`", f"{weights[t.name]:g}", t.unit, t.meaning) for t in terms]
     return _table(("Term", "Weight", "Default", "Unit", "Meaning"), rows)
 
 
