@@ -98,6 +98,8 @@ class Term:
         scalar: `compute` is a function of ordinary numbers, which may use `if` and `math`; it is called for
             one environment after the other, which takes longer.
 
+    Where the engine fails, a term that is not in `TERMS` by its name counts 0.
+
     Raises:
         ParameterError: no name, a weight out of range, or no function of two arguments.
     """

@@ -60,6 +60,8 @@ ADDRESSES = Addresses(
 
 AT = ADDRESSES.slots
 
+SHIPPED = tuple(term.name for term in TERMS)
+
 
 def task_type(terms: int, entries: int) -> np.dtype[Any]:
     """The record of a task's constants."""
@@ -177,25 +179,23 @@ def outcome_of_one(outcome, lane, trunk, leg, episode):  # type: ignore[no-untyp
     )  # fmt: skip
 
 
-@inlined
-def unless_broken(term, trunk):  # type: ignore[no-untyped-def]
-    """Nothing where the engine failed and its last report is no number: of somebody else's terms, which may
-    read it."""
-    return choose((trunk.result == 0.0) | (term - term == 0.0), term, 0.0)
-
-
 def _with_terms(terms: tuple[Term, ...], k: int = 0) -> Callable[..., Any]:
     """A function that computes the terms from the k-th on, keeps them in `episode.terms` and returns the sum
     of all. numba has no loop over functions, so each calls the next."""
     if k == len(terms):
         return inlined(lambda addresses, lanes, task, outcome, episode, n, total: total)
     compute, rest, is_first = inlined(terms[k].compute), _with_terms(terms, k + 1), k == 0
-    layout, is_own, number = episode_layout(len(terms)), terms[k] not in TERMS, number_of(terms[k].title)
+    layout, is_own, number = (
+        episode_layout(len(terms)),
+        terms[k].name not in SHIPPED,
+        number_of(terms[k].title),
+    )
 
     @inlined
     def add_term(addresses, lanes, task, outcome, episode, n, total):  # type: ignore[no-untyped-def]
         if is_own:
-            episode.terms[k] = unless_broken(episode.terms[k], outcome.trunk)
+            works = outcome.trunk.result == 0.0  # else the reports that it may read are of where it broke
+            episode.terms[k] = choose(works, episode.terms[k], 0.0)
         total = episode.terms[k] if is_first else total + episode.terms[k]
         return rest(addresses, lanes, task, outcome, episode, n, total)
 
@@ -284,7 +284,10 @@ def step_kernels(
     """The kernels of tasks with these terms, entries and law of contact."""
     parts: list[Any] = [term.compute for term in terms]
     parts += [part for entry in entries for part in (entry.measure, entry.scale.apply) if part]
-    flags = ([term.scalar for term in terms], [(e.scalar, e.scale.saturates) for e in entries])
+    flags = (
+        [(term.scalar, term.name in SHIPPED) for term in terms],
+        [(entry.scalar, entry.scale.saturates) for entry in entries],
+    )
     Episode = episode_layout(len(terms))
     identity = fingerprint(*parts, contact_law, flags, Episode.names, (FAILED, TRUNCATED))
     compute_reward = _with_terms(terms)
