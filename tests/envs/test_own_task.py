@@ -383,7 +383,9 @@ def test_a_step_that_could_not_be_simulated_pays_for_nothing_but_the_failure(own
     env.set_state(state)
     observation, reward, terminated, _, info = env.step(np.zeros(4, np.float32))
     assert terminated
-    assert reward == info["reward_failure"] == -60.0
+    assert info["reward_slip"] == info["reward_comfort"] == 0.0
+    assert reward == info["reward_failure"] + info["reward_action"]
+    assert info["reward_failure"] == -60.0
     assert np.isfinite(observation).all()
 
 
