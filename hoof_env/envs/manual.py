@@ -35,7 +35,6 @@ INDEX = "README.md"
 
 MOVES = "The trunk moves by what friction gives it and feels every link swing. "
 
-GROUPS = observation.groups_of(observation.ENTRIES)
 GAIT = [entry for entry in observation.ENTRIES if entry.group == "gait"]
 
 
