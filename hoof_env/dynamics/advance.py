@@ -26,8 +26,9 @@ from hoof_env.dynamics.parts import FIXED
 from hoof_env.dynamics.reactions import LegConstants, Reactions, react
 from hoof_env.dynamics.stepping import begin_step, end_step, next_stage, weigh_stage
 from hoof_env.simd import anywhere, choose, columns, fill, lane_sum, level, nth, rows
-from hoof_env.simd.compile import fingerprint, inlined, kernel, pasted
+from hoof_env.simd.compile import inlined, kernel, pasted
 from hoof_env.simd.memory import address, doubles, offset
+from hoof_env.simd.user_functions import fingerprint
 
 LANES = 8
 """Environments side by side in a batch: one vector of 512 bits."""

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 from hoof_env.ground.laws import friction_part, normal_force
 from hoof_env.ground.terrain import surface
 from hoof_env.simd import across, anywhere, choose, cross, dot, larger, level, plane, size
 from hoof_env.simd.compile import inlined
 from hoof_env.simd.math import root_power
+from hoof_env.simd.user_functions import named, number_of
 
 
 @inlined
@@ -110,22 +111,38 @@ def push_back(ground, stiffness_scale, penetration, rate, inverse_speed, eighths
     return normal_force(spring, ground.chi * rate * inverse_speed, ground.dashpot * rate), spring
 
 
+class GroundHere(NamedTuple):
+    """The ground under a hoof point, for a law of contact.
+
+    Attributes:
+        stiffness: K of Eq. 14, with the terrain's factor there [N/m^n].
+        eighths: the exponent n in eighths, for `root_power`.
+        chi: damping factor, from restitution and `normal_law` [-].
+        dashpot: [N s/m].
+    """
+
+    stiffness: Any
+    eighths: Any
+    chi: Any
+    dashpot: Any
+
+
 def law_of(contact_law: Callable[..., Any] | None) -> Any:
     """What the kernels take for the normal force: `push_back`, or somebody's own law in the same place.
 
     Args:
-        contact_law: function of the penetration [m], its rate [m/s], the inverse of the approach speed [s/m]
-        and
-            the ground's constants (fields as in `layout.TrunkSettings`); returns the normal force [N], of
-            which what pulls is cut off. None of it counts as stored in the ground.
+        contact_law: function of penetration [m], its rate [m/s], the inverse of the approach speed [s/m] and
+            `GroundHere`; returns the normal force [N], of which what pulls is cut off. None of it counts as
+            stored in the ground.
     """
     if contact_law is None:
         return push_back
-    force = inlined(contact_law)
+    force, number = inlined(contact_law), number_of(f"the contact law {named(contact_law)}")
 
     @inlined
     def push(ground, stiffness_scale, penetration, rate, inverse_speed, eighths):  # type: ignore[no-untyped-def]
-        pushed = larger(force(penetration, rate, inverse_speed, ground) * stiffness_scale, 0.0)
+        here = GroundHere(ground.stiffness * stiffness_scale, eighths, ground.chi, ground.dashpot)
+        pushed = larger(number(force(penetration, rate, inverse_speed, here)), 0.0)
         return pushed, 0.0 * pushed
 
     return push

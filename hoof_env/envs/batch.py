@@ -44,9 +44,9 @@ from hoof_env.gait.gait import GaitParameters, gait_names, load_gait
 from hoof_env.ground.contact import Ground, load_ground
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.profile import leg_profile
-from hoof_env.simd.compile import what_cannot_be_compiled
 from hoof_env.simd.layout import views
 from hoof_env.simd.memory import COLUMNS
+from hoof_env.simd.user_functions import what_cannot_be_compiled
 
 Floats = NDArray[np.float64]
 
@@ -456,4 +456,5 @@ class EpisodeBatch:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
+        self.entries = observed(self.groups, self.settings.trunk, self.task.entries)
         self._open()

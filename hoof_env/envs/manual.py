@@ -20,14 +20,12 @@ from hoof_env.dynamics.constrained import INTEGRATORS
 from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.dynamics.parts import ONE_LEG
 from hoof_env.dynamics.stepping import SCHEMES
-from hoof_env.envs import start
+from hoof_env.envs import observation, start
 from hoof_env.envs.infos import MEASURED
 from hoof_env.envs.multi_objective import HorseLegMOEnv
-from hoof_env.envs.observation import ENTRIES, groups_of
-from hoof_env.envs.observation import observed as entries_of
 from hoof_env.envs.parameters import HILLS, SPACING
-from hoof_env.envs.reward import TERMS, check_weights
-from hoof_env.envs.tasks import PER_EPISODE, TASKS, Settings, to_json
+from hoof_env.envs.reward import Term, check_weights
+from hoof_env.envs.tasks import PER_EPISODE, TASKS, Settings, task_of, to_json
 from hoof_env.errors import OutputError, check_choice
 from hoof_env.gait.gait import LIMITS, FilterSettings
 from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS
@@ -45,8 +43,7 @@ PAGES = tuple(_NAMES)
 
 INDEX = "README.md"
 
-GROUPS = groups_of(ENTRIES)
-GAIT = [entry for entry in ENTRIES if entry.group == "gait"]
+GAIT = [entry for entry in observation.ENTRIES if entry.group == "gait"]
 
 
 def tables() -> dict[str, dict[str, list[str]]]:
@@ -70,15 +67,17 @@ MOVES = "The trunk moves by what friction gives it and feels every link swing. "
 
 
 def page(task: str) -> str:
-    """The manual page of a task in Markdown; `task` is one of `PAGES`.
+    """The manual page of a task in Markdown; `task` is one of `PAGES`, or an id of one's own.
 
     Raises:
         ParameterError: there is no such page.
     """
-    check_choice("task", task, PAGES)
     if task in _CLASSES:
         return _of_class(task)
-    what, settings = TASKS[task], TASKS[task].settings({})
+    what = task_of(task)
+    settings = what.settings({})
+    groups = observation.groups_of(what.entries)
+    names = [entry.name for entry in observation.observed(settings.observation, settings.trunk, what.entries)]
     text = Template(PAGE).substitute(
         name=what.name,
         id=what.id,
@@ -88,10 +87,10 @@ def page(task: str) -> str:
         action_space=f"Box(-1, 1, ({len(LIMITS)},), float32)",
         actions=_actions(settings),
         offsets=_offsets(settings.gait) if settings.gait else "",
-        observation_space=f"Box(-1, 1, ({len(observed(task))},), float32)",
-        observations=_observations(settings),
-        other_groups=", ".join(f"`{group}`" for group in GROUPS if group not in settings.observation),
-        rewards=_rewards(settings),
+        observation_space=f"Box(-1, 1, ({len(names)},), float32)",
+        observations=_observations(settings, what.entries),
+        other_groups=", ".join(f"`{group}`" for group in groups if group not in settings.observation),
+        rewards=_rewards(settings, what.terms),
         target_reward="Progress counts up to the commanded speed; what goes beyond it is subtracted."
         if settings.target_speed
         else "",
@@ -114,12 +113,14 @@ def page(task: str) -> str:
 
 
 def page_of(id: str) -> str:
-    """The manual page of a registered id.
+    """The manual page of a registered id, of one's own as "module:id", too.
 
     Raises:
-        ParameterError: not an id of this package.
+        ParameterError: not an id of this package, or one's own that is not registered.
     """
     ids = {f"hoof_env/{name}-v0": task for task, name in _NAMES.items()}
+    if isinstance(id, str) and "/" in id and not id.startswith("hoof_env/"):
+        return page(id)
     return page(ids[check_choice("id", id, ids)])
 
 
@@ -162,7 +163,7 @@ def write_pages(out: Path) -> list[Path]:
 def observed(task: str) -> tuple[str, ...]:
     """Names of the observation's entries of a page's id, by default."""
     settings = TASKS["leg" if task == "mo" else task].settings({})
-    return tuple(entry.name for entry in entries_of(settings.observation, settings.trunk))
+    return tuple(entry.name for entry in observation.observed(settings.observation, settings.trunk))
 
 
 # Parts of a page
@@ -190,16 +191,16 @@ def _offsets(gait: str) -> str:
     )
 
 
-def _observations(settings: Settings) -> str:
-    entries = entries_of(settings.observation, settings.trunk)
+def _observations(settings: Settings, entries: tuple[observation.Entry, ...]) -> str:
+    entries = tuple(observation.observed(settings.observation, settings.trunk, entries))
     rows = [(entry.name, entry.scale.text, entry.unit, entry.group) for entry in entries]
     head = ("Num", "Observation", "Scaling", "Unit before scaling", "Group")
     return markdown_table(head, [(str(k), *row) for k, row in enumerate(rows)])
 
 
-def _rewards(settings: Settings) -> str:
-    weights = check_weights(settings.reward_weights)
-    rows = [(f"`{t.key}`", f"`{t.name}`", f"{weights[t.name]:g}", t.unit, t.meaning) for t in TERMS]
+def _rewards(settings: Settings, terms: tuple[Term, ...]) -> str:
+    weights = check_weights(settings.reward_weights, terms)
+    rows = [(f"`{t.key}`", f"`{t.name}`", f"{weights[t.name]:g}", t.unit, t.meaning) for t in terms]
     return markdown_table(("Term", "Weight", "Default", "Unit", "Meaning"), rows)
 
 
@@ -283,7 +284,7 @@ def _docstring(task: str) -> tuple[str, list[str]]:
 def _of_class(task: str) -> str:
     """The page of a class: its docstring, an example and the table of its observation."""
     name, (head, sections) = _NAMES[task], _docstring(task)
-    entries = {entry.name: entry for entry in ENTRIES}
+    entries = {entry.name: entry for entry in observation.ENTRIES}
     rows = [(str(k), n, entries[n].scale.text, entries[n].unit) for k, n in enumerate(observed(task))]
     table = markdown_table(("Num", "Observation", "Scaling", "Unit before scaling"), rows)
     parts = [f"# {name}", head, PAGE.split("\n\n", 2)[2].split("\n\nenvs = ")[0] + "\n```"]

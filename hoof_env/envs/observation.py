@@ -15,6 +15,7 @@ from hoof_env.ground.terrain import surface
 from hoof_env.simd import choose
 from hoof_env.simd.compile import inlined
 from hoof_env.simd.math import cos_sin
+from hoof_env.simd.user_functions import check_function
 
 LOW, HIGH = (np.array([limit[i] for limit in LIMITS.values()]) for i in (0, 1))
 MIDDLE, HALF_RANGE = (LOW + HIGH) / 2, (HIGH - LOW) / 2
@@ -51,11 +52,18 @@ class Scale:
         text: of the formula, for the manual page.
         apply: function of the number and the `Scene`; None leaves it.
         saturates: the hyperbolic tangent of that is taken.
+
+    Raises:
+        ParameterError: no function of two arguments.
     """
 
     text: str
     apply: Callable[[Any, Any], Any] | None = None
     saturates: bool = False
+
+    def __post_init__(self) -> None:
+        if self.apply is not None:
+            check_function(f"scale {self.text!r}: apply", self.apply, 2)
 
 
 @dataclass(frozen=True)
@@ -68,7 +76,10 @@ class Entry:
         unit: of the number before it is scaled.
         measure: function of a `Scene`: that number. Compiled as `reward.Term.compute` is.
         scale: how it is scaled.
-        scalar: `measure` is a function of ordinary numbers, see `reward.Term`.
+        scalar: `measure` and the scale are functions of ordinary numbers, see `reward.Term`.
+
+    Raises:
+        ParameterError: no name or group, no function of one argument, or no `Scale`.
     """
 
     name: str
@@ -77,6 +88,19 @@ class Entry:
     measure: Callable[[Any], Any]
     scale: Scale
     scalar: bool = False
+
+    def __post_init__(self) -> None:
+        for what in (self.name, self.group):
+            if not isinstance(what, str) or not what:
+                raise ParameterError(f"name and group: expected a text, got {what!r}")
+        check_function(f"{self.title}: measure", self.measure, 1)
+        if not isinstance(self.scale, Scale):
+            raise ParameterError(f"{self.title}: scale: expected a hoof_env.Scale, got {self.scale!r}")
+
+    @property
+    def title(self) -> str:
+        """For people."""
+        return f"entry {self.name!r}"
 
 
 def tanh_of(scale: float, text: str = "") -> Scale:

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 from hoof_env.errors import ParameterError, check_number
 from hoof_env.simd import choose
+from hoof_env.simd.user_functions import check_function
 
 
 class Outcome(NamedTuple):
@@ -96,6 +97,11 @@ class Term:
             side: + - * /, comparisons, and the functions of `hoof_env.simd`; `choose` in the place of `if`.
         scalar: `compute` is a function of ordinary numbers, which may use `if` and `math`; it is called for
             one environment after the other, which takes longer.
+
+    Where the engine fails, a term that is not in `TERMS` by its name counts 0.
+
+    Raises:
+        ParameterError: no name, a weight out of range, or no function of two arguments.
     """
 
     name: str
@@ -104,6 +110,17 @@ class Term:
     meaning: str
     compute: Callable[[Any, Any], Any]
     scalar: bool = False
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name:
+            raise ParameterError(f"name: expected a text, got {self.name!r}")
+        check_number(f"{self.title}: weight", self.weight, low=0, high=1e6)
+        check_function(f"{self.title}: compute", self.compute, 2)
+
+    @property
+    def title(self) -> str:
+        """For people."""
+        return f"term {self.name!r}"
 
     @property
     def key(self) -> str:

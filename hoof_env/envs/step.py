@@ -18,7 +18,7 @@ from hoof_env.dynamics.advance import LANES, MODEL, TRUNK_ROWS, advance_kernels
 from hoof_env.dynamics.layout import LegMemory, TrunkMemory
 from hoof_env.envs.episode import ACTIONS, FAILED, TRUNCATED, episode_layout
 from hoof_env.envs.observation import Entry, Scene
-from hoof_env.envs.reward import Outcome, Term
+from hoof_env.envs.reward import TERMS, Outcome, Term
 from hoof_env.simd import (
     anywhere,
     choose,
@@ -33,7 +33,7 @@ from hoof_env.simd import (
     smaller,
     write,
 )
-from hoof_env.simd.compile import fingerprint, inlined, kernel, pasted
+from hoof_env.simd.compile import inlined, kernel, pasted
 from hoof_env.simd.math import clip, tanh
 from hoof_env.simd.memory import (
     COLUMNS,
@@ -46,6 +46,7 @@ from hoof_env.simd.memory import (
     record_at,
     singles_at,
 )
+from hoof_env.simd.user_functions import fingerprint, number_of
 
 NOT_A_NUMBER, SOME_ENDED, SOME_SWITCHED = -1, 1, 2
 """What a step returns: an action is none, and nothing has happened; else the sum of what happened
@@ -58,6 +59,8 @@ ADDRESSES = Addresses(
 """The arrays of a step, those of the engine first."""
 
 AT = ADDRESSES.slots
+
+SHIPPED = tuple(term.name for term in TERMS)
 
 
 def task_type(terms: int, entries: int) -> np.dtype[Any]:
@@ -182,21 +185,32 @@ def _with_terms(terms: tuple[Term, ...], k: int = 0) -> Callable[..., Any]:
     if k == len(terms):
         return inlined(lambda addresses, lanes, task, outcome, episode, n, total: total)
     compute, rest, is_first = inlined(terms[k].compute), _with_terms(terms, k + 1), k == 0
-    layout = episode_layout(len(terms))
+    layout, is_own, number = (
+        episode_layout(len(terms)),
+        terms[k].name not in SHIPPED,
+        number_of(terms[k].title),
+    )
+
+    @inlined
+    def add_term(addresses, lanes, task, outcome, episode, n, total):  # type: ignore[no-untyped-def]
+        if is_own:
+            works = outcome.trunk.result == 0.0  # else the reports that it may read are of where it broke
+            episode.terms[k] = choose(works, episode.terms[k], 0.0)
+        total = episode.terms[k] if is_first else total + episode.terms[k]
+        return rest(addresses, lanes, task, outcome, episode, n, total)
 
     @inlined
     def compute_term(addresses, lanes, task, outcome, episode, n, total):  # type: ignore[no-untyped-def]
-        episode.terms[k] = compute(outcome, task.weights[k])
-        total = episode.terms[k] if is_first else total + episode.terms[k]
-        return rest(addresses, lanes, task, outcome, episode, n, total)
+        episode.terms[k] = number(compute(outcome, task.weights[k]))
+        return add_term(addresses, lanes, task, outcome, episode, n, total)
 
     @inlined
     def compute_one_by_one(addresses, lanes, task, outcome, episode, n, total):  # type: ignore[no-untyped-def]
         for lane in range(lanes):
             trunk, leg, own = memories(addresses, 0, layout, n + lane)
-            own.terms[k] = compute(outcome_of_one(outcome, lane, trunk, leg, own), task.weights[k])
-        total = episode.terms[k] if is_first else total + episode.terms[k]
-        return rest(addresses, lanes, task, outcome, episode, n, total)
+            one = outcome_of_one(outcome, lane, trunk, leg, own)
+            own.terms[k] = number(compute(one, task.weights[k]))
+        return add_term(addresses, lanes, task, outcome, episode, n, total)
 
     return compute_one_by_one if terms[k].scalar else compute_term
 
@@ -220,11 +234,12 @@ def _with_entries(entries: tuple[Entry, ...], terms: int, scaled: bool, k: int =
     measure, apply, slot = inlined(entries[k].measure), entries[k].scale.apply, slots_of(entries)[0][k]
     rest, layout = _with_entries(entries, terms, scaled, k + 1), episode_layout(terms)
     scale = inlined(apply) if scaled and apply is not None else inlined(lambda x, scene: x)
+    number, scaled_number = number_of(entries[k].title), number_of(f"the scale of {entries[k].title}")
 
     @inlined
     def put_entry(addresses, lanes, scene, numbers, n):  # type: ignore[no-untyped-def]
         if scene.task.places[slot] >= 0:
-            numbers[slot] = scale(measure(scene), scene)
+            numbers[slot] = scaled_number(scale(number(measure(scene)), scene))
         rest(addresses, lanes, scene, numbers, n)
 
     @inlined
@@ -235,7 +250,7 @@ def _with_entries(entries: tuple[Entry, ...], terms: int, scaled: bool, k: int =
                 own = Scene(
                     trunk, leg, episode, scene.task, scene.ground, scene.ground_origin, scene.ground_per_metre
                 )
-                set_lane(numbers, slot, lane, scale(measure(own), own))
+                set_lane(numbers, slot, lane, scaled_number(scale(number(measure(own)), own)))
         rest(addresses, lanes, scene, numbers, n)
 
     return put_one_by_one if entries[k].scalar else put_entry
@@ -269,9 +284,12 @@ def step_kernels(
     """The kernels of tasks with these terms, entries and law of contact."""
     parts: list[Any] = [term.compute for term in terms]
     parts += [part for entry in entries for part in (entry.measure, entry.scale.apply) if part]
-    flags = ([term.scalar for term in terms], [(e.scalar, e.scale.saturates) for e in entries])
-    identity = f"{fingerprint(*parts, contact_law)} {flags}"
+    flags = (
+        [(term.scalar, term.name in SHIPPED) for term in terms],
+        [(entry.scalar, entry.scale.saturates) for entry in entries],
+    )
     Episode = episode_layout(len(terms))
+    identity = fingerprint(*parts, contact_law, flags, Episode.names, (FAILED, TRUNCATED))
     compute_reward = _with_terms(terms)
     put_scaled, put_measured = (_with_entries(entries, len(terms), scaled) for scaled in (True, False))
     _, vectors, slots = slots_of(entries)

@@ -9,8 +9,10 @@ from __future__ import annotations
 import difflib
 import math
 import re
+import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
+from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -19,9 +21,10 @@ import gymnasium as gym
 import numpy as np
 
 from hoof_env.envs.observation import ENTRIES, Entry, check_groups, groups_of
-from hoof_env.envs.reward import TERMS, Term
+from hoof_env.envs.reward import TERMS, Term, check_weights
 from hoof_env.errors import ParameterError, UnknownArgumentError, check_choice
 from hoof_env.leg.geometry import DEFAULT_PRESET, Preset
+from hoof_env.simd.user_functions import check_function, named
 
 PRINTED_BETA = math.sqrt(2 * 15.0)
 """Baumgarte's beta as the paper's Table 1 prints it, sqrt(2 alpha) [1/s]; sqrt(2) alpha = 21.2 is probably
@@ -125,6 +128,7 @@ class Task:
         terms: of the reward.
         entries: all that can be observed.
         contact_law: instead of `normal_law`, see `dynamics.hoof.law_of`.
+        module: that registers it, which other processes import.
     """
 
     name: str
@@ -136,15 +140,31 @@ class Task:
     terms: tuple[Term, ...] = TERMS
     entries: tuple[Entry, ...] = ENTRIES
     contact_law: Callable[..., Any] | None = None
+    module: str = ""
 
     @property
     def id(self) -> str:
         """The registered id."""
         return self.name if "/" in self.name else f"hoof_env/{self.name}-v0"
 
+    @property
+    def key(self) -> str:
+        """What `task_of` takes."""
+        if "/" in self.name:
+            return f"{self.module}:{self.name}" if self.module else self.name
+        return next(key for key, task in TASKS.items() if task.name == self.name)
+
+    def names(self) -> tuple[list[str], ...]:
+        """Of what it is made of."""
+        law = [named(self.contact_law)] if self.contact_law else []
+        return [term.name for term in self.terms], [entry.name for entry in self.entries], law
+
     def __reduce__(self) -> Any:
-        """Copies and pickles are this one: what it is made of may be functions without a name."""
-        return task_of, (next(name for name, task in {**TASKS, **_OWN}.items() if task is self),)
+        """Pickles have its name: functions of terms and entries need not have one."""
+        return _task_like, (self.key, self.names())
+
+    def __deepcopy__(self, memo: Any) -> Task:
+        return self
 
     def settings(self, changes: Mapping[str, Any]) -> Settings:
         """Its settings with some changed; reward weights that are not named keep the task's values.
@@ -173,6 +193,10 @@ class Task:
         for name, value in changes.items():
             if not np.array_equal(_plain(value), _plain(getattr(plain, name))):  # else it asks for nothing
                 check_effect(name, settings)
+        if self.contact_law and settings.solver == "paper":
+            raise ParameterError(
+                f'{self.id}: solver: expected "exact" beside a contact law of one\'s own, got "paper"'
+            )
         return settings
 
 
@@ -247,13 +271,30 @@ _OWN: dict[str, Task] = {}
 
 
 def task_of(name: Any) -> Task:
-    """A task of `TASKS` by its name, or one of `register` by its id.
+    """A task of `TASKS` by its name, or one of `register` by its id; "module:id" imports the module first
+    where the id is not registered yet, as in a process that was spawned.
 
     Raises:
         ParameterError: there is none.
     """
+    module, _, own = name.rpartition(":") if isinstance(name, str) else ("", "", name)
+    if module and own not in _OWN:
+        try:
+            import_module(module)
+        except ModuleNotFoundError as error:
+            raise ParameterError(f"task: {name!r} is not registered here, and {error}") from None
     tasks = {**TASKS, **_OWN}
-    return tasks[check_choice("task", name, tasks)]
+    return tasks[check_choice("task", own if module else name, tasks)]
+
+
+def _task_like(name: str, names: tuple[list[str], ...]) -> Task:
+    """The task of a pickle: that of this process, if it is the same one."""
+    task = task_of(name)
+    if task.names() != names:
+        raise ParameterError(
+            f"{name}: pickled with other terms, entries or law: {names}, here {task.names()}"
+        )
+    return task
 
 
 def register(
@@ -266,48 +307,65 @@ def register(
     **defaults: Any,
 ) -> None:
     """Register an id of one's own: a task of this package with more terms of the reward, more entries of the
-    observation, another law of contact and other settings. It serves `gymnasium.make` and `make_vec`; workers
-    must import the module that registers it, as with `gymnasium.make("my_module:my/Id-v0")`.
+    observation, another law of contact and other settings. It serves `gymnasium.make` and `make_vec`.
+
+    An id that is registered already is replaced, with Gymnasium's warning. Other processes import the module
+    that calls this, so it stands at the top level of one; see docs/own_task.md.
 
     Args:
-        env_id: "namespace/Name-v0". base: a name in `TASKS`, whose settings, terms and entries it begins
-        with. terms: of the reward, behind those of the base; also one with a name that the base has, in its
-        place. entries: that can be observed, behind those of the base; all groups among them are observed by
-        default. contact_law: function of penetration [m], its rate [m/s], inverse approach speed [s/m] and
-        the ground's
-            constants, which returns the normal force [N]; see `dynamics.hoof.law_of`.
+        env_id: "namespace/Name-v0".
+        base: a name in `TASKS` or an id of one's own, whose settings, terms and entries it begins with.
+        terms: of the reward, behind those of the base; one with a name that the base has takes its place.
+        entries: that can be observed, behind those of the base; their groups are observed by default.
+        contact_law: function of penetration [m], its rate [m/s], inverse approach speed [s/m] and the
+            ground's constants, which returns the normal force [N]; see `dynamics.hoof.law_of`.
         defaults: settings, see the manual pages.
 
     Raises:
-        ParameterError: an unknown base, a name twice, or an id that does not read so.
+        ParameterError: an unknown base, a name twice, an id that does not read so, a term, entry or law of
+            another type, or a setting without effect. Nothing is registered then.
         UnknownArgumentError: an unknown setting.
     """
     own, more = tuple(terms), tuple(entries)
-    if not isinstance(env_id, str) or not re.fullmatch(r"[\w-]+/[\w-]+-v\d+", env_id) or env_id in TASKS:
-        raise ParameterError(f"env_id: expected 'namespace/Name-v0', got {env_id!r}")
+    if not isinstance(env_id, str) or not re.fullmatch(r"(?!hoof_env/)[\w-]+/[\w-]+-v\d+", env_id):
+        raise ParameterError(f"env_id: expected 'namespace/Name-v0' of a namespace of yours, got {env_id!r}")
     old = task_of(base)
-    names = [*(term.name for term in own), *(entry.name for entry in more)]
-    known = {entry.name for entry in old.entries}
-    if twice := sorted({name for name in names if names.count(name) > 1 or name in known}):
-        raise ParameterError(f"{env_id}: expected names that differ, got {', '.join(twice)} twice")
+    for kind, given in ((Term, own), (Entry, more)):
+        for one in given:
+            if not isinstance(one, kind):
+                raise ParameterError(f"{env_id}: expected a hoof_env.{kind.__name__}, got {one!r}")
+    if contact_law is not None:
+        check_function(f"{env_id}: contact_law", contact_law, 4)
+    for names in ([term.name for term in own], [entry.name for entry in (*old.entries, *more)]):
+        if twice := sorted({name for name in names if names.count(name) > 1}):
+            raise ParameterError(f"{env_id}: expected names that differ, got {', '.join(twice)} twice")
     mine = {term.name: term for term in own}
     kept = [mine.pop(term.name, term) for term in old.terms]
-    groups = [*old.settings({}).observation, *groups_of(more)]
-    settings = {**old.defaults, "observation": tuple(dict.fromkeys(groups)), **defaults}
     law = contact_law or old.contact_law
-    summary = f"{old.summary} With terms, entries or laws from outside this package."
-    _OWN[env_id] = task = replace(
-        old, name=env_id, summary=summary, defaults=settings, terms=(*kept, *mine.values()),
-        entries=(*old.entries, *more), contact_law=law,
-    )  # fmt: skip
-    task.settings({})
-    check_groups(task.settings({}).observation, groups_of(task.entries))
+    caller = str(sys._getframe(1).f_globals.get("__name__", ""))
+    task = replace(
+        old,
+        name=env_id,
+        module="" if caller in ("__main__", "__mp_main__") else caller,
+        summary=f"{old.summary} With terms, entries or laws from outside this package.",
+        about=old.about + (f" The normal force is that of `{named(contact_law)}`." if contact_law else ""),
+        terms=(*kept, *mine.values()),
+        entries=(*old.entries, *more),
+        contact_law=law,
+    )
+    groups = dict.fromkeys((*old.settings({}).observation, *groups_of(more)))
+    settings = task.settings({"observation": tuple(groups), **defaults})
+    check_groups(settings.observation, groups_of(task.entries))
+    check_weights(settings.reward_weights, task.terms)
+    changed = {name: getattr(settings, name) for name in ("observation", *old.defaults, *defaults)}
+    task = replace(task, defaults=changed)
     gym.register(
         env_id,
         entry_point="hoof_env.envs.horse_leg:HorseLegEnv",
         vector_entry_point="hoof_env.envs.vector:HorseLegVectorEnv",
-        kwargs={"task": env_id},
+        kwargs={"task": task.key},
     )
+    _OWN[env_id] = task
 
 
 def to_json(settings: Settings) -> dict[str, Any]:

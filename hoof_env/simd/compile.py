@@ -6,9 +6,7 @@ that a result does not depend on how the compiler arranged a loop.
 
 from __future__ import annotations
 
-import hashlib
 import os
-import re
 import sys
 import time
 from collections.abc import Callable
@@ -30,7 +28,7 @@ def kernel(function: F, identity: str = "") -> F:
 
     Args:
         function: the kernel.
-        identity: of the functions from outside this package that it contains, see `fingerprint`.
+        identity: of the functions from outside this package that it contains, see `user_functions`.
 
     Of several processes that need it at once one compiles. The first call raises OutputError if the kernel
     has to be compiled and the folder is not writable.
@@ -48,48 +46,6 @@ def kernel(function: F, identity: str = "") -> F:
         raise HoofEnvError("NUMBA_DISABLE_JIT is set, but kernels run compiled only: unset it")
     keep(compiled, _say, identity)
     return cast(F, compiled)
-
-
-def fingerprint(*functions: Callable[..., Any] | None) -> str:
-    """What tells kernels apart that contain different functions: a digest of those from outside this package,
-    with the constants and functions that they name. An edit of any of them changes it."""
-    digest = hashlib.sha256()
-    for function in functions:
-        _add_function(digest, function, set())
-    return digest.hexdigest()
-
-
-def _add_function(digest: Any, function: Any, known: set[int]) -> None:
-    function = getattr(function, "py_func", function)  # of numba's
-    code = getattr(function, "__code__", None)
-    if code is None or id(code) in known:
-        digest.update(repr(function).encode() if isinstance(function, int | float | str | tuple) else b"-")
-        return
-    known.add(id(code))
-    digest.update(f"{function.__module__}.{function.__qualname__}".encode())
-    inside = function.__module__.startswith("hoof_env.")  # whose sources are in every kernel's digest
-    if not inside:
-        digest.update(code.co_code + repr(code.co_consts).encode())
-    cells = [cell.cell_contents for cell in function.__closure__ or ()]
-    named = [] if inside else [function.__globals__.get(name) for name in code.co_names]
-    for part in (*cells, *named, *(function.__defaults__ or ())):
-        _add_function(digest, part, known)
-
-
-def what_cannot_be_compiled(error: Exception) -> str:
-    """What numba does not compile of a function from outside, in a line: the operation, the function and the
-    line."""
-    text = str(error)
-    what = re.search(
-        r"No implementation of function (.*?) found for signature|(Cannot cast .*? to bool\w*)", text
-    )
-    places = [place for place in re.findall(r'File "(.*?)", line (\d+)', text) if "hoof_env" not in place[0]]
-    where = f" in {places[-1][0]}, line {places[-1][1]}" if places else ""
-    found = next((part for part in what.groups() if part), "") if what else text.strip().splitlines()[-1]
-    return (
-        f"cannot compile {found}{where}; expected + - * /, comparisons and the functions of hoof_env.simd "
-        "(`choose` in the place of `if`), or scalar=True"
-    )
 
 
 def inlined(function: F) -> F:

@@ -1,0 +1,162 @@
+"""Plain functions from outside this package inside kernels: what tells them apart, what they may return, and
+what is said of one that cannot be compiled."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import linecache
+import os
+import re
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import CodeType, FunctionType, ModuleType
+from typing import Any
+
+import numpy as np
+
+from hoof_env.simd.cache import MECHANICS
+
+PACKAGE = Path(__file__).parents[1]
+_LIBRARIES = {*sys.stdlib_module_names, "numpy", "numba", "hoof_env"}
+_PLAIN = (bool, int, float, complex, str, bytes, type(None), np.generic)
+
+
+def fingerprint(*values: Any) -> str:
+    """What tells kernels apart that contain different functions: a digest of their code, with the constants
+    and the functions that they name. An edit of any of them changes it; it is the same in every process.
+
+    Functions of the mechanics are named only, for a digest of their sources is in every kernel's stamp.
+    """
+    digest = hashlib.sha256()
+    for value in values:
+        _add(digest, value, set())
+    return digest.hexdigest()
+
+
+def _add(digest: Any, value: Any, known: set[int]) -> None:
+    value = getattr(value, "py_func", value)  # of numba's
+    if isinstance(value, FunctionType):
+        digest.update(f"{value.__module__}.{value.__qualname__}".encode())
+        if id(value) in known:
+            return
+        known.add(id(value))
+        if value.__module__.split(".")[:2] not in [["hoof_env", room] for room in MECHANICS]:
+            _add_code(digest, value.__code__, value.__globals__, known)
+        cells = [cell.cell_contents for cell in value.__closure__ or ()]
+        for part in (*cells, *(value.__defaults__ or ()), *(value.__kwdefaults__ or {}).values()):
+            _add(digest, part, known)
+    elif isinstance(value, np.ndarray):
+        digest.update(f"{value.dtype} {value.shape}".encode() + value.tobytes())
+    elif isinstance(value, _PLAIN):
+        digest.update(f"{type(value).__name__} {value!r};".encode())
+    elif isinstance(value, tuple | list):
+        digest.update(f"{len(value)} of".encode())
+        for part in value:
+            _add(digest, part, known)
+    else:
+        name = getattr(value, "__qualname__", "") or type(value).__qualname__
+        digest.update(f"{name} {getattr(value, '_fields', '')}".encode())
+
+
+def _add_code(digest: Any, code: CodeType, names: dict[str, Any], known: set[int]) -> None:
+    """The code of a function, that of inner ones, and what both name."""
+    digest.update(code.co_code + repr((code.co_names, code.co_varnames, code.co_freevars)).encode())
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            _add_code(digest, constant, names, known)
+        else:
+            _add(digest, sorted(constant, key=repr) if isinstance(constant, frozenset) else constant, known)
+    for name in code.co_names:
+        value = names.get(name)
+        if not isinstance(value, ModuleType):
+            _add(digest, value, known)
+        elif value.__name__.split(".")[0] not in _LIBRARIES:
+            for part in code.co_names:  # `constants.GRIP`
+                _add(digest, getattr(value, part, None), known)
+
+
+def number_of(what: str) -> Any:
+    """For kernels: a function that hands on what `what` returned, and refuses it unless it is a number."""
+    from numba.core import types
+    from numba.core.errors import TypingError
+
+    from hoof_env.simd.memory import intrinsic
+    from hoof_env.simd.types import Mask, Plane, is_real
+
+    names = {Mask: "truths", Plane: "planar vectors", types.Boolean: "a truth", types.NoneType: "nothing"}
+
+    def number(context: Any, x: Any) -> Any:
+        if not is_real(x):
+            kinds = (name for kind, name in names.items() if isinstance(x, kind))
+            given = "nothing in some cases" if isinstance(x, types.Optional) else next(kinds, str(x))
+            raise TypingError(f"{{{what} returns {given}; expected a number}}")
+        return x(x), lambda context, builder, signature, values: values[0]
+
+    return intrinsic(number)
+
+
+def check_function(name: str, function: Any, arguments: int) -> None:
+    """Raise unless something is a plain function of so many arguments.
+
+    Raises:
+        ParameterError: it is not.
+    """
+    from hoof_env.errors import ParameterError
+
+    code = getattr(function, "__code__", None)
+    if not isinstance(function, FunctionType) or code is None or code.co_flags & 0x0C:  # *args, **kwargs
+        raise ParameterError(f"{name}: expected a plain function of {arguments} arguments, got {function!r}")
+    least = code.co_argcount - len(function.__defaults__ or ())
+    if not least <= arguments <= code.co_argcount or code.co_kwonlyargcount:
+        given = ", ".join(code.co_varnames[: code.co_argcount + code.co_kwonlyargcount])
+        raise ParameterError(f"{name}: expected a function of {arguments} arguments, got one of ({given})")
+
+
+def what_cannot_be_compiled(error: Exception) -> str:
+    """What numba does not compile of a function from outside, in a line: the operation, the function and the
+    line."""
+    text = str(error)
+    if refused := re.search(r"\{([^{}]* returns [^{}]*; expected a number)\}", text):
+        return refused[1]
+    where = next((place for place in map(_place, re.findall(r'File "(.*?)", line (\d+)', text)) if place), "")
+    return (
+        f"cannot compile {_operation(text)}{where}; expected + - * /, comparisons and the functions of "
+        "hoof_env.simd (`choose` in the place of `if`), or of a term or entry scalar=True"
+    )
+
+
+def _operation(text: str) -> str:
+    """The innermost cause in a message of numba's."""
+    if found := re.search(r"No implementation of function Function\(<(.+?)(?: at 0x\w+)?>\)", text):
+        name = re.findall(r"[\w.]+", found[1])[-1]
+        return "`if`, `and`, `or` or `not` of numbers" if name == "bool" else f"{name}()"
+    if found := re.search(r"Unknown attribute '(\w+)' of type (\w+)", text):
+        return f".{found[1]}, which {found[2]} has not,"
+    if found := re.search(r"Untyped global name '(\w+)'", text):
+        return f"{found[1]}, a function without @hoof_env.simd.compile.inlined, or no number"
+    causes = re.findall(r"Failed in nopython mode pipeline.*\n\s*(\S.*)", text) or [text.strip()]
+    return causes[-1].splitlines()[0][:200]
+
+
+def _place(found: tuple[str, str]) -> str:
+    """Function and line of a place in somebody else's file; nothing of one in this package's."""
+    path, line = os.path.abspath(found[0]), int(found[1])
+    if Path(path).is_relative_to(PACKAGE):
+        return ""
+    try:
+        tree = ast.parse("".join(linecache.getlines(path)))
+    except SyntaxError:
+        return f" in {path}, line {line}"
+    inside = [
+        node for node in ast.walk(tree)
+        if isinstance(node, ast.FunctionDef) and node.lineno <= line <= (node.end_lineno or line)
+    ]  # fmt: skip
+    name = f"{inside[-1].name} (" if inside else ""
+    return f" in {name}{path}, line {line}{')' if name else ''}"
+
+
+def named(function: Callable[..., Any]) -> str:
+    """Module and name of a function, for people."""
+    return f"{function.__module__}.{function.__qualname__}"

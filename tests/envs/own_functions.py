@@ -1,0 +1,62 @@
+"""An id of one's own for `test_own_task.py`: a user's module, which other processes import too.
+
+Its law is Eq. 14 again, so that what it adds can be compared with the id it begins with.
+"""
+
+import math
+
+from hoof_env import Entry, Scale, Term, register
+from hoof_env.simd import choose, larger
+from hoof_env.simd.compile import inlined
+from hoof_env.simd.math import root_power
+
+ID = "own/Everything-v0"
+MODULE_ID = f"own_functions:{ID}"
+
+
+@inlined
+def friction_power(point):
+    return point.friction * point.slide
+
+
+def slip(step, weight):
+    report = step.leg.report
+    return 0.001 * weight * (friction_power(report.toe) + friction_power(report.heel))
+
+
+def comfort(step, weight):
+    if step.failed:
+        return 0.0
+    return weight * math.exp(-abs(step.trunk.report.acceleration.imag) / 9.81)
+
+
+def rising(scene):
+    return choose(scene.trunk.report.velocity.imag > 0.0, scene.trunk.report.acceleration.imag, 0.0)
+
+
+def load_angle(scene):
+    toe = scene.leg.report.toe
+    if toe.normal > 0.0:
+        return math.atan2(toe.friction, toe.normal)
+    return 0.0
+
+
+def equation_14(penetration, rate, inverse_approach_speed, ground):
+    spring = ground.stiffness * root_power(penetration, ground.eighths)
+    damping = ground.chi * rate * inverse_approach_speed
+    return larger(spring * (1.0 + damping) + ground.dashpot * rate, 0.0)
+
+
+TERMS = (
+    Term("slip", 0.5, "1/kJ", "power of friction", slip),
+    Term("comfort", 0.1, "-", "per step without acceleration", comfort, scalar=True),
+)
+ENTRIES = (
+    Entry(
+        "rising", "feel", "m/s^2", rising, Scale("tanh(x / 9.81)", lambda x, scene: x / 9.81, saturates=True)
+    ),
+    Entry("load angle", "feel", "rad", load_angle, Scale("/ pi", lambda x, s: x / math.pi), scalar=True),
+    Entry("episode seconds", "watch", "s", lambda s: s.episode.time, Scale("/ 10", lambda x, s: 0.1 * x)),
+)
+
+register(ID, terms=TERMS, entries=ENTRIES, contact_law=equation_14, episode_seconds=2.0)

@@ -1,0 +1,530 @@
+"""Ids of one's own: the same bits alone and among many, whole in every front door, exact refusals."""
+
+from __future__ import annotations
+
+import copy
+import os
+import pickle
+import re
+import subprocess
+import sys
+import textwrap
+from dataclasses import replace
+from pathlib import Path
+from types import FunctionType
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from family import actions, roll, same
+
+import hoof_env
+from hoof_env import Entry, Scale, Term, register
+from hoof_env.cli import main
+from hoof_env.dynamics.hoof import GroundHere
+from hoof_env.dynamics.layout import TRUNK_STATE, LegMemory, TrunkMemory
+from hoof_env.envs import tasks
+from hoof_env.envs.episode import Episode
+from hoof_env.envs.manual import page_of
+from hoof_env.envs.observation import Scene
+from hoof_env.envs.reward import Outcome
+from hoof_env.errors import ParameterError, UnknownArgumentError
+from hoof_env.simd.user_functions import fingerprint, what_cannot_be_compiled
+
+PAGE = (Path(__file__).parents[2] / "docs" / "own_task.md").read_text(encoding="utf-8")
+LEG = "hoof_env/HorseLeg-v0"
+HILLS = {"kind": "hills", "seed": 3, "stiffness": [0.25, 2.0]}
+NAMES = ("rising", "load angle", "episode seconds")
+PLAIN = Scale("none")
+
+
+@pytest.fixture(autouse=True)
+def registered():
+    """What a test registers is gone after it."""
+    known, own = dict(gym.registry), dict(tasks._OWN)
+    yield
+    for registry, before in ((gym.registry, known), (tasks._OWN, own)):
+        registry.clear()
+        registry.update(before)
+
+
+@pytest.fixture(scope="module")
+def own():
+    """The module with an id of its own, imported."""
+    import own_functions
+
+    yield own_functions
+    tasks._OWN.pop(own_functions.ID)
+    gym.registry.pop(own_functions.ID)
+
+
+def rows_of(infos, env):
+    """The terms and measurements of one of many."""
+    return {k: infos[k][env] for k in infos if k.startswith("reward_")}, np.asarray(infos["measured"][env])
+
+
+@pytest.mark.parametrize("count", [1, 7, 9])
+@pytest.mark.parametrize("settings", [{}, {"terrain": HILLS, "observation": ["trunk", "feel", "watch"]}])
+def test_one_and_many_have_the_same_bits(own, count, settings):
+    """1 and 7 go one by one, 9 side by side, seven of its sixteen lanes idle."""
+    envs = gym.make_vec(own.ID, num_envs=count, autoreset_mode="DISABLED", **settings)
+    env = gym.make(own.ID, **settings)
+    observed = envs.reset(seed=5)[0]
+    last = count - 1
+    same(env.reset(seed=5 + last)[0], observed[last])
+    for acts in actions(2, 60, count):
+        observations, rewards, *_, infos = envs.step(acts)
+        observation, reward, *_, info = env.step(acts[last])
+        same(observation, observations[last])
+        assert reward == rewards[last]
+        same(({k: info[k] for k in info if k.startswith("reward_")}, np.asarray(info["measured"])),
+             rows_of(infos, last))  # fmt: skip
+    same(
+        {name: values[last] for name, values in envs.unwrapped.raw_observation().items()},
+        env.unwrapped.raw_observation(),
+    )
+
+
+@pytest.mark.parametrize("settings", [{}, {"terrain": HILLS}, {"exponent": 1.25}], ids=str)
+@pytest.mark.parametrize(
+    "make", [gym.make, lambda *a, **k: gym.make_vec(*a, num_envs=9, **k)], ids=["1", "9"]
+)
+def test_a_law_that_states_equation_14_has_the_bits_of_the_built_in_one(own, make, settings):
+    mine, plain = make(own.ID, **settings), make(LEG, episode_seconds=2.0, **settings)
+    shape = mine.action_space.shape[:-1]
+    mine.reset(seed=1)
+    plain.reset(seed=1)
+    for acts in actions(4, 60, *shape):
+        (one, *_, info), (two, *_, other) = mine.step(acts), plain.step(acts)
+        same(one[..., :-3], two)
+        same(np.asarray(info["measured"]), np.asarray(other["measured"]))
+        for key in (key for key in other if key.startswith("reward_")):
+            same(info[key], other[key])
+
+
+def test_infos_sums_weights_names_and_units(own):
+    env = gym.make(own.ID, reward_weights={"slip": 2.0}).unwrapped
+    observation, info = env.reset(seed=0)
+    terms = [key for key in info if key.startswith("reward_")]
+    assert terms[-2:] == ["reward_slip", "reward_comfort"]
+    assert env.observation_names[-3:] == NAMES
+    assert env.observation_units[-3:] == ("m/s^2", "rad", "s")
+    assert env.observation_space.shape == observation.shape == (len(env.observation_names),)
+    slipped = set()
+    for action in actions(1, 60):
+        observation, reward, *_, info = env.step(action)
+        assert [key for key in info if key.startswith("reward_")] == terms
+        assert reward == sum(info[key] for key in terms)
+        record = {name: values.ravel()[-1] for name, values in env.record().items()}
+        power = sum(record[f"{p}_friction"] * record[f"{p}_slide"] for p in ("toe", "heel"))
+        assert info["reward_slip"] == pytest.approx(0.001 * 2.0 * power, rel=1e-12)
+        slipped.add(info["reward_slip"])
+        assert info["reward_comfort"] == pytest.approx(0.1 * np.exp(-abs(record["ay"]) / 9.81), rel=1e-12)
+        raw = env.raw_observation()
+        assert raw["rising"] == (record["ay"] if record["vy"] > 0 else 0.0)
+        assert observation[-3] == pytest.approx(np.tanh(raw["rising"] / 9.81), abs=1e-6)
+        assert observation[-2] == pytest.approx(raw["load angle"] / np.pi, abs=1e-6)
+        assert observation[-1] == pytest.approx(raw["episode seconds"] / 10, abs=1e-6)
+    assert len(slipped) > 10
+    with pytest.raises(ParameterError, match=r"some of .*support, slip, comfort, got \{'slop': 1\}"):
+        gym.make(own.ID, reward_weights={"slop": 1})
+
+
+@pytest.mark.parametrize("make", [gym.make, lambda id: gym.make_vec(id, num_envs=9)], ids=["1", "9"])
+def test_states_and_copies_go_on_with_the_same_bits(own, make):
+    env = make(own.ID).unwrapped
+    env.reset(seed=3)
+    several = env.action_space.shape[:-1]
+    for acts in actions(0, 10, *several):
+        env.step(acts)
+    state, other = env.get_state(), make(own.ID).unwrapped
+    other.set_state(pickle.loads(pickle.dumps(state)))
+    copies = [other, copy.deepcopy(env), pickle.loads(pickle.dumps(env))]
+    for acts in actions(1, 10, *several):
+        expected = env.step(acts)
+        for twin in copies:
+            same(twin.step(acts)[:4], expected[:4])
+    with pytest.raises(ParameterError, match=f"expected one of {LEG}, got one of {own.ID}"):
+        gym.make(LEG).unwrapped.set_state(state)
+
+
+def test_a_pickle_of_another_registration_is_refused(own):
+    pickled = pickle.dumps(gym.make(own.ID).unwrapped.batch.task)
+    assert pickle.loads(pickled) is tasks._OWN[own.ID]
+    tasks._OWN[own.ID] = replace(tasks._OWN[own.ID], terms=own.TERMS)
+    with pytest.raises(ParameterError, match="pickled with other terms, entries or law"):
+        pickle.loads(pickled)
+
+
+def test_spawned_workers_import_the_module(own):
+    """Twice: named by "module:id", and by the id alone, whose spec names the module."""
+    settings = {"num_envs": 1, "vectorization_mode": "async", "vector_kwargs": {"context": "spawn"}}
+    env = gym.make(own.ID)
+    expected = env.reset(seed=0)[0], env.step(actions(0, 1)[0])[0]
+    for name in (own.MODULE_ID, own.ID):
+        envs = gym.make_vec(name, **settings)
+        try:
+            same(envs.reset(seed=0)[0][0], expected[0])
+            same(envs.step(actions(0, 1))[0][0], expected[1])
+        finally:
+            envs.close()
+
+
+def test_stable_baselines_sees_it(own):
+    pytest.importorskip("stable_baselines3")
+    envs = hoof_env.Sb3VecEnv(own.MODULE_ID, num_envs=9)
+    plain = gym.make(own.ID)
+    same(plain.reset(seed=0)[0], (envs.seed(0), envs.reset())[1][0])
+    _, rewards, *_ = envs.step(np.zeros((9, 4), np.float32))
+    assert np.float32(plain.step(np.zeros(4, np.float32))[1]) == rewards[0]
+    assert {"reward_slip", "reward_comfort"} < set(envs.terms)
+
+
+def test_a_spec_makes_it_again(own):
+    env = gym.make(own.ID, stiffness=3e4, trunk_share=0.7)
+    assert env.spec.kwargs["task"] == own.MODULE_ID
+    again = gym.make(gym.envs.registration.EnvSpec.from_json(env.spec.to_json()))
+    for twin in (env, again):
+        twin.reset(seed=0)
+    for one, two in zip(roll(env, 5), roll(again, 5), strict=True):
+        same(one, two)
+    tasks._OWN.pop(own.ID)
+    with pytest.raises(ParameterError, match=r"task: expected one of .*, got 'own/Everything-v0'"):
+        gym.make(own.ID)  # its module is imported, but registers it no more
+    with pytest.raises(ParameterError, match="No module named 'nobody'"):
+        hoof_env.HorseLegEnv(task="nobody:own/Nothing-v0")
+
+
+def test_settings_without_effect_are_refused_as_of_any_id(own):
+    with pytest.raises(ParameterError, match="motor_gain: expected drive='motor' beside it"):
+        gym.make(own.ID, motor_gain=50.0)
+    with pytest.raises(
+        UnknownArgumentError, match=r"own/Everything-v0: .*'stiffnes'; did you mean stiffness"
+    ):
+        gym.make(own.ID, stiffnes=1.0)
+
+
+def test_its_manual_page_has_its_rows(own, capsys):
+    page = page_of(own.ID)
+    assert page == page_of(own.MODULE_ID) == gym.make(own.ID).unwrapped.manual
+    assert page == gym.make_vec(own.ID, num_envs=9).unwrapped.manual
+    assert "| `reward_slip` | `slip` | 0.5 | 1/kJ | power of friction |" in page
+    assert re.search(r"\| \d+ \| load angle \| / pi \| rad \| feel \|", page)
+    assert "`own_functions.equation_14`" in page
+    assert f'gym.make("{own.ID}"' in page
+    assert main(["manual", "--id", own.MODULE_ID]) == 0
+    assert "reward_comfort" in capsys.readouterr().out
+    with pytest.raises(ParameterError, match=r"expected one of .*, got 'own/Nothing-v0'"):
+        page_of("own/Nothing-v0")
+
+
+# Refusals
+
+
+def term(compute, name="mine", **kwargs):
+    return Term(name, 1.0, "-", "a test's", compute, **kwargs)
+
+
+def entry(measure, name="mine"):
+    return Entry(name, "mine", "-", measure, PLAIN)
+
+
+def sine(step, weight):
+    import math
+
+    return weight * math.sin(step.progress)
+
+
+def uses_if(step, weight):
+    if step.progress > 0.0:
+        return weight
+    return 0.0
+
+
+def sometimes(step, weight):
+    if step.progress > 0.0:
+        return 1.0
+
+
+def powers(penetration, rate, inverse_approach_speed, ground):
+    return ground.stiffness * penetration**1.5
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (
+            {"terms": [term(uses_if)]},
+            r"cannot compile `if`, .* of numbers in uses_if \(.*test_own_task.py, line",
+        ),
+        ({"terms": [term(sometimes, scalar=True)]}, "term 'mine' returns nothing in some cases; expected a"),
+        ({"entries": [entry(lambda s: s.leg.command)]}, r"entry 'mine' returns .*; expected a number"),
+        (
+            {"contact_law": powers},
+            r"cannot compile pow\(\) in powers \(.*test_own_task.py, line \d+\); expected",
+        ),
+    ],
+    ids=["if", "sometimes", "block", "pow"],
+)
+def test_what_cannot_be_compiled_is_refused_with_operation_and_place(given, message):
+    register("own/Bad-v0", **given)
+    with pytest.raises(ParameterError, match=rf"own/Bad-v0: {message}"):
+        gym.make("own/Bad-v0")
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("No implementation of function Function(<built-in function sin>) found for signature", "sin()"),
+        ("No implementation of function Function(<ufunc 'exp'>) found", "exp()"),
+        ("No implementation of function Function(<function max at 0x7f>) found", "max()"),
+        (
+            "No implementation of function Function(<class 'bool'>) found",
+            "`if`, `and`, `or` or `not` of numbers",
+        ),
+        (
+            "Untyped global name 'f': Cannot determine Numba type of <class 'function'>",
+            "f, a function without",
+        ),
+        (
+            "Failed in nopython mode pipeline (step: x)\nCannot unify int64 and none\n\nDuring: y",
+            "Cannot unify",
+        ),
+        ("Unknown attribute 'pace' of type Columns(1, x.LegMemory)", ".pace, which Columns has not,"),
+        ("something else", "something else"),
+    ],
+)
+def test_the_operation_is_that_of_numbas_message(text, found):
+    assert f"cannot compile {found}" in what_cannot_be_compiled(Exception(text))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (
+            lambda: {"env_id": "Turf-v0"},
+            "env_id: expected 'namespace/Name-v0' of a namespace of yours, got 'Turf-v0'",
+        ),
+        (lambda: {"env_id": "hoof_env/HorseLeg-v0"}, "of a namespace of yours"),
+        (lambda: {"env_id": 3}, "env_id: expected"),
+        (lambda: {"base": "pony"}, r"task: expected one of fixed, leg, .*rail, speed, terrain, got 'pony'"),
+        (lambda: {"terms": [term(sine), term(sine)]}, "expected names that differ, got mine twice"),
+        (
+            lambda: {"entries": [entry(len), entry(len)]},
+            "expected a plain function of 1 arguments, got <built-in",
+        ),
+        (
+            lambda: {"entries": [entry(lambda s: 0.0), entry(lambda s: 1.0)]},
+            "names that differ, got mine twice",
+        ),
+        (lambda: {"entries": [entry(lambda s: 0.0, "height")]}, "names that differ, got height twice"),
+        (lambda: {"terms": [sine]}, "own/Bad-v0: expected a hoof_env.Term, got <function"),
+        (lambda: {"entries": ["speed"]}, "own/Bad-v0: expected a hoof_env.Entry, got 'speed'"),
+        (
+            lambda: {"terms": [term(lambda step: 0.0)]},
+            r"compute: expected a function of 2 arguments, got one of \(step\)",
+        ),
+        (
+            lambda: {"contact_law": sine},
+            r"contact_law: expected a function of 4 arguments, got one of \(step, weight\)",
+        ),
+        (
+            lambda: {"stiffnes": 1.0},
+            "own/Bad-v0: unexpected keyword argument 'stiffnes'; did you mean stiffness",
+        ),
+        (
+            lambda: {"motor_gain": 1.0},
+            "motor_gain: expected drive='motor' beside it, without which it has no effect",
+        ),
+        (
+            lambda: {"reward_weights": {"slop": 1.0}},
+            r"reward_weights: expected a mapping with some of progress, .*slop",
+        ),
+        (
+            lambda: {"observation": ["crank", "smell"]},
+            "observation: expected a list of some of crank, .*smell",
+        ),
+        (
+            lambda: {"base": "fixed", "solver": "paper", "contact_law": powers},
+            'solver: expected "exact" beside a contact law of one\'s own, got "paper"',
+        ),
+    ],
+)
+def test_a_refused_registration_registers_nothing(change, message):
+    before = dict(gym.registry), dict(tasks._OWN)
+    with pytest.raises(ParameterError, match=message):
+        register(**{"env_id": "own/Bad-v0", **change()})
+    assert (dict(gym.registry), dict(tasks._OWN)) == before
+
+
+def test_the_same_id_again_replaces_it_with_gymnasiums_warning(own):
+    register("own/Again-v0", episode_seconds=3.0)
+    with pytest.warns(UserWarning, match="Overriding environment own/Again-v0 already in registry"):
+        register("own/Again-v0", base=own.ID, episode_seconds=4.0)
+    env = gym.make("own/Again-v0").unwrapped
+    assert env.settings.episode_seconds == 4.0
+    assert env.observation_names[-3:] == NAMES, "one may begin with an id of one's own"
+
+
+def test_a_term_takes_the_place_of_one_of_the_base(own):
+    mine = Term("progress", 2.0, "1/m", "of x", lambda step, weight: weight * step.progress)
+    register("own/Instead-v0", base="speed", terms=[mine], reward_weights={"peak": 0.5})
+    task = tasks._OWN["own/Instead-v0"]
+    assert [term.name for term in task.terms] == [term.name for term in tasks.TASKS["speed"].terms]
+    assert task.terms[0] is mine
+    assert task.settings({}).reward_weights == {"progress": 2.0, "peak": 0.5}, "those of the base stay"
+
+
+def test_a_step_that_could_not_be_simulated_pays_for_nothing_but_the_failure(own):
+    env = gym.make(own.ID).unwrapped
+    env.reset(seed=0)
+    state = env.get_state()
+    state["engine"]["trunk"][TRUNK_STATE.index("momentum_x")] = 1e308
+    env.set_state(state)
+    observation, reward, terminated, _, info = env.step(np.zeros(4, np.float32))
+    assert terminated
+    assert info["reward_slip"] == info["reward_comfort"] == 0.0
+    assert reward == info["reward_failure"] + info["reward_action"]
+    assert info["reward_failure"] == -60.0
+    assert np.isfinite(observation).all()
+
+
+# What is compiled, and when
+
+
+def function_of(text, **names):
+    """The last function of some source, whose module has other names too."""
+    space = {"__name__": "mine", **names}
+    exec(compile(text, "mine.py", "exec"), space)
+    return [value for value in space.values() if isinstance(value, FunctionType)][-1]
+
+
+BEFORE = textwrap.dedent("""
+    GRIP, TABLE = 0.5, (1, 2)
+    def helper(x):
+        return 2.0 * x
+    def compute(step, weight=1.0):
+        inner = lambda x: x + 1.0
+        return GRIP * helper(step.progress) + inner(TABLE[0]) + np.float64(3.0) + constants.LIMIT
+""")
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        ("0.5", "0.6"), ("2.0 * x", "3.0 * x"), ("step.progress", "step.weight"), ("x + 1.0", "x + 2.0"),
+        ("(1, 2)", "(1, 3)"), ("weight=1.0", "weight=2.0"), ("+ inner", "- inner"),
+    ],
+    ids=" to ".join,
+)  # fmt: skip
+def test_an_edit_changes_the_fingerprint(edit):
+    def digest(text, limit=1.0):
+        constants = type(np)("mine_too")
+        constants.LIMIT = limit
+        return fingerprint(function_of(text, np=np, constants=constants))
+
+    assert digest(BEFORE) == digest(BEFORE)
+    assert digest(BEFORE) == digest("\n\n# moved\n" + BEFORE)
+    assert digest(BEFORE.replace(*edit)) != digest(BEFORE)
+    assert digest(BEFORE, limit=2.0) != digest(BEFORE)
+
+
+def test_what_a_function_encloses_is_in_the_fingerprint():
+    def made(x):
+        return lambda step, weight: x
+
+    values = (1.0, 2.0, 1, True, "a", np.zeros(2), np.ones(2), np.zeros(2, np.float32), made(1.0), (1.0, 2.0))
+    assert len({fingerprint(made(value)) for value in values}) == len(values)
+
+
+USER = """
+    import math
+    import hoof_env
+    from hoof_env.simd.compile import inlined
+
+    PAY = 1.0
+
+    @inlined
+    def helper(x):
+        return 2.0 * x
+
+    def made(factor):
+        def mine(step, weight):
+            return factor * weight * PAY * helper(step.seconds)
+        return mine
+
+    for name, factor in (("A", 1.0), ("B", 10.0)):
+        term = hoof_env.Term("mine", 1.0, "-", "a test's", made(factor))
+        hoof_env.register(f"own/{name}-v0", terms=[term])
+"""
+
+CALL = """
+    import sys
+    import gymnasium as gym, numpy as np
+    from hoof_env.simd.cache import COMPILED
+    for id in sys.argv[1:]:
+        env = gym.make(f"mine:own/{id}-v0")
+        env.reset(seed=0)
+        print(env.step(np.zeros(4, np.float32))[4]["reward_mine"], "step_one" in COMPILED)
+        COMPILED.clear()
+"""
+
+
+def test_an_edit_of_the_users_file_compiles_anew_and_nothing_else_does(tmp_path):
+    """Two ids, whose functions have one name, keep a kernel each."""
+
+    def rewards(*ids):
+        environment = {
+            **os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONDONTWRITEBYTECODE": "1",
+            "PYTHONPATH": os.pathsep.join([str(tmp_path), str(Path(hoof_env.__file__).parents[1])]),
+        }  # fmt: skip
+        command = [sys.executable, "-c", textwrap.dedent(CALL), *ids]
+        done = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        return [
+            (round(float(x), 9), compiled == "True")
+            for x, compiled in map(str.split, done.stdout.splitlines())
+        ]
+
+    (tmp_path / "mine.py").write_text(textwrap.dedent(USER))
+    assert rewards("A", "B") == [(0.04, True), (0.4, True)]
+    assert rewards("A", "B") == [(0.04, False), (0.4, False)]
+    edited = USER.replace("PAY = 1.0", "PAY = 3.0").replace("2.0 * x", "5.0 * x")
+    (tmp_path / "mine.py").write_text(textwrap.dedent(edited))
+    assert rewards("A") == [(0.3, True)]
+
+
+# The page
+
+
+def rows_under(heading):
+    """Names in the first column of the tables of a section."""
+    part = PAGE.split(heading, 1)[1].split("\n## ", 1)[0]
+    cells = re.findall(r"^\| (`.*?) \|", part, re.MULTILINE)
+    return [name for cell in cells for name in re.findall(r"`([\w.]+)`", cell)]
+
+
+def test_the_page_has_every_name_that_functions_reach():
+    """What environments keep no account of, and what is the engine's own, is left out."""
+    assert rows_under("## What `step` has") == list(Outcome._fields)
+    assert rows_under("## What `scene` has") == list(Scene._fields)
+    assert rows_under("## What `ground` has") == list(GroundHere._fields)
+    reached = set(rows_under("## What the memory has"))
+    expected = set()
+    for name, layout, hidden in (
+        ("trunk", TrunkMemory, {"account"}), ("leg", LegMemory, set()), ("episode", Episode, set())
+    ):  # fmt: skip
+        for key, field in layout.fields.items():
+            if key not in hidden:
+                inner = getattr(field.kind, "fields", None)
+                expected |= {f"{name}.{key}.{k}" for k in inner} if inner else {f"{name}.{key}"}
+    assert reached == expected
+
+
+def test_the_page_shows_the_example():
+    example = (Path(__file__).parents[2] / "examples" / "own_task.py").read_text(encoding="utf-8")
+    blocks = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    assert blocks
+    for block in blocks:
+        assert block in example
+    assert len([line for line in example.splitlines() if line.strip()]) <= 75
