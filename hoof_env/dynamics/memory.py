@@ -117,24 +117,18 @@ def new_memory(engine: TrunkEngine, columns: int) -> Memory:
 
 
 def new_model(engine: TrunkEngine) -> tuple[NDArray[Any], Floats, Floats]:
-    """What does not change while it runs: a record of dtype `MODEL`, the legs' tables, the terrain's cells.
-
-    Raises:
-        ParameterError: the ground's exponent is not a multiple of 1/8.
-    """
+    """What does not change while it runs: a record of dtype `MODEL`, the legs' tables, the terrain's cells."""
     ground, terrain = engine.ground, engine.terrain
-    eighths = ground.exponent * EXPONENT_UNIT
-    if eighths != round(eighths):
-        raise ParameterError(
-            f"exponent: this engine takes multiples of 1/{EXPONENT_UNIT}, got {ground.exponent!r}"
-        )
     cells = max(profile.cells for profile in engine.profiles)
     tables = [profile.with_cells(cells).table for profile in dict.fromkeys(engine.profiles)]
     scheme, grid = SCHEMES[engine.integrator], terrain.to_grid()
     model = np.zeros(1, MODEL)
     record = model[0]
     record["legs"], record["cells"] = len(engine.limbs), cells
-    record["kind"], record["eighths"] = TRUNKS.index(engine.trunk.kind), int(eighths)
+    record["kind"], record["eighths"] = (
+        TRUNKS.index(engine.trunk.kind),
+        round(ground.exponent * EXPONENT_UNIT),
+    )
     record["friction_law"] = FRICTION_LAWS.index(ground.friction_law)
     record["interpolated"] = ground.approach == "interpolated"
     record["is_terrain"], record["new_rates"] = terrain != Terrain.flat(), scheme.new_rates

@@ -15,6 +15,7 @@ from hoof_env.errors import DataFileError, ParameterError, check_choice, check_n
 from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS, damping, friction_part, normal_force
 from hoof_env.leg.geometry import DEFAULT_PRESET, Preset, named, read_preset, wrong
 from hoof_env.simd.compile import kernel
+from hoof_env.simd.math import EXPONENT_UNIT
 
 CONTACT = np.dtype(
     [
@@ -54,7 +55,8 @@ class Ground:
 
     Attributes:
         stiffness: K [N/m^n]; the paper's 2e4 ('no smaller than').
-        exponent: n [-]; 1.5 is Hertz's and Lankarani-Nikravesh's, the paper does not print it.
+        exponent: n [-], a multiple of 1/8; 1.5 is Hertz's and Lankarani-Nikravesh's. The paper does not print
+            it.
         normal_law: one of `NORMAL_LAWS`.
         restitution: nominal coefficient of restitution cr, 0 ('inelastic') to 1 ('elastic').
         approach_floor: smallest approach speed [m/s] that Eq. 14 divides by.
@@ -85,6 +87,11 @@ class Ground:
     def __post_init__(self) -> None:
         check_number("stiffness", self.stiffness, low=0, high=1e12, exclusive_low=True)
         check_number("exponent", self.exponent, low=1, high=3)
+        if self.exponent * EXPONENT_UNIT % 1:
+            raise ParameterError(
+                f"exponent: expected a multiple of 1/{EXPONENT_UNIT}, whose power is made of square roots and"
+                f" so has the same bits alone and in a batch, got {self.exponent!r}"
+            )
         check_choice("normal_law", self.normal_law, NORMAL_LAWS)
         check_number("approach_floor", self.approach_floor, low=0, high=1e6, exclusive_low=True)
         check_choice("approach", self.approach, ("interpolated", "sampled"))

@@ -40,7 +40,6 @@ def engine(trunk=FREE, n=3, ground=None):
         ({"trunk": "free"}, "trunk: expected Trunk, got 'free'"),
         ({"trunk": None}, "trunk: expected Trunk, got None"),
         ({"ground": 2e4}, "ground: expected Ground, got 20000"),
-        ({"ground": Ground(exponent=1.4)}, "exponent: .* multiples of 1/8, got 1.4"),
         ({"terrain": 0.1}, "terrain: expected Terrain, got 0.1"),
         ({"filters": {"gain": 3}}, "filters: expected FilterSettings, got {'gain': 3}"),
         ({"integrator": "rk5"}, "integrator: expected one of .*midpoint.*, got 'rk5'"),

@@ -54,7 +54,7 @@ ARGUMENTS = [
     ({"restitution": 1.1}, "restitution: expected.*got 1.1"),
     ({"restitution": 0.0, "normal_law": "flores"}, "restitution: expected a number in .0.01, 1."),
     ({"exponent": 0.0}, "exponent: expected.*got 0.0"),
-    ({"exponent": 1.51}, "exponent: .*multiples of 1/8, got 1.51"),
+    ({"exponent": 1.51}, "exponent: expected a multiple of 1/8, .*, got 1.51"),
     ({"friction": -0.1}, "friction: expected.*got -0.1"),
     ({"friction_fast": 1e-4}, "friction_fast: expected more than friction_slow"),
     ({"drive": "motor", "motor_gain": -1.0}, "motor_gain: expected.*got -1.0"),

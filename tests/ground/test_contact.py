@@ -95,6 +95,7 @@ def test_touch_is_the_two_laws_at_the_place_of_the_point(x, y, vx, vy):
     ("settings_", "message"),
     [
         ({"stiffness": 0.0}, "stiffness: expected"),
+        ({"exponent": 1.4}, "exponent: expected a multiple of 1/8, .* got 1.4"),
         ({"exponent": 0.5}, r"exponent: expected a finite number in \[1, 3\], got 0.5"),
         ({"normal_law": "hertz"}, "normal_law: expected one of"),
         ({"restitution": -0.1}, "restitution: expected"),

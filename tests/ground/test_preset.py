@@ -37,8 +37,8 @@ def test_what_is_given_is_taken_and_the_rest_is_the_default(preset):
 
 def test_an_override_replaces_and_none_keeps(preset):
     path = preset({"exponent": 1.375})
-    assert load_ground(path, exponent=1.2, stiffness=None, restitution=0.0) == Ground(
-        exponent=1.2, restitution=0.0
+    assert load_ground(path, exponent=1.25, stiffness=None, restitution=0.0) == Ground(
+        exponent=1.25, restitution=0.0
     )
     assert load_ground(path, exponent=None) == Ground(exponent=1.375)
     with pytest.raises(ParameterError, match=r"exponent: expected .*got 9"):
