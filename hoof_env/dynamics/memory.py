@@ -52,7 +52,7 @@ class Memory(NamedTuple):
         command: shape (legs, 4, n).
         account: shape (9, n), added to.
         trunk_report, limb_report: at the end, shapes (8, n) and (legs, 18, n).
-        result: how it ended, shape (n,), values of `result.Result`; where it is not OK the state is left as
+        result: how it ended, shape (n,), values of `parts.Result`; where it is not OK the state is left as
             it was.
         constants, reactions: of `reactions`, shapes (legs, LegConstants.size) and (legs, Reactions.size,
             columns).

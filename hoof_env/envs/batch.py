@@ -2,7 +2,7 @@
 
 `EpisodeBatch` knows arrays and generators and nothing of Gymnasium. A row has the same bits whatever the
 number of its neighbours: starts are drawn from a generator of its own, and the kernels are those of
-`episode`, compiled for one environment or for several side by side.
+`step`, compiled for one environment or for several side by side.
 """
 
 from __future__ import annotations
@@ -370,7 +370,7 @@ class EpisodeBatch:
         return found
 
     def summary(self, env: int) -> dict[str, float]:
-        """Figures of an episode, see `summary.summary_of`."""
+        """Figures of an episode, see `episode.summary_of`."""
         return summary_of(self.now, env, self.dt)
 
     def failure(self, env: int) -> str:

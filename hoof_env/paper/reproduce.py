@@ -75,7 +75,8 @@ def run_cycle(gait: str, solver: str, **settings: Any) -> Trace:
     """One cycle of a gait on a fixed trunk under the zero action.
 
     Args:
-        gait: as `hoof_env/HorseLegFixed-v0` takes it. solver: one of `SOLVERS`.
+        gait: as `hoof_env/HorseLegFixed-v0` takes it.
+        solver: one of `SOLVERS`.
         settings: further arguments of that environment.
 
     Returns:
