@@ -42,7 +42,7 @@ from hoof_env.paper.figure_style import (
 from hoof_env.paper.measure import POINTS
 
 if TYPE_CHECKING:
-    from hoof_env.paper.reproduce import Reproduction
+    from hoof_env.paper.rows import Reproduction
 
 Point = NDArray[np.float64]
 

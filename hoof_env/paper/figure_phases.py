@@ -12,7 +12,7 @@ from hoof_env.paper.measure import POINTS, Stance
 from hoof_env.paper.published import PublishedRow
 
 if TYPE_CHECKING:
-    from hoof_env.paper.reproduce import Reproduction
+    from hoof_env.paper.rows import Reproduction
 
 BOTH = {"walk": "flat", "run": "roll-over"}
 """What the paper calls the part of the stance in which toe and heel both bear."""

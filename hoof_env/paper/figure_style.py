@@ -18,7 +18,7 @@ from hoof_env.paper.measure import Stance, measure_stance
 from hoof_env.paper.published import PublishedRow
 
 if TYPE_CHECKING:
-    from hoof_env.paper.reproduce import Reproduction
+    from hoof_env.paper.rows import Reproduction
 
 BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER, GREY, SOIL = (
     "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#666666", "#EFE6D8",

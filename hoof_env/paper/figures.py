@@ -53,7 +53,7 @@ from hoof_env.paper.measure import Stance, measure_stance
 from hoof_env.paper.shapes import find_peaks
 
 if TYPE_CHECKING:
-    from hoof_env.paper.reproduce import Reproduction
+    from hoof_env.paper.rows import Reproduction
 
 HOOVES = 8
 """The hoof is drawn at this many equally spaced instants of the cycle."""

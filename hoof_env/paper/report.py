@@ -27,7 +27,7 @@ from hoof_env.paper.rows import (
 )  # fmt: skip
 
 if TYPE_CHECKING:
-    from hoof_env.paper.reproduce import Reproduction
+    from hoof_env.paper.rows import Reproduction
 
 WORST = 3
 """How many rows of each solver are named as its worst."""

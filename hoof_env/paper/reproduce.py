@@ -8,24 +8,23 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import gymnasium
 import numpy as np
-from numpy.typing import NDArray
 
 import hoof_env  # noqa: F401  (registers the environments)
 from hoof_env._output import staged
 from hoof_env.errors import HoofEnvError
 from hoof_env.ground.contact import Ground
-from hoof_env.leg.geometry import Geometry
 from hoof_env.paper import report
 from hoof_env.paper.measure import cycle_of, measure_stance, replay
 from hoof_env.paper.published import CONDITIONS, Published, load_published
-from hoof_env.paper.rows import EXACT, compare, counted, settings_of
+from hoof_env.paper.rows import EXACT, Trace, compare, counted, settings_of
 from hoof_env.paper.rows import SOLVERS as SOLVERS
+from hoof_env.paper.rows import Reproduction as Reproduction
 from hoof_env.paper.shapes import DEPTHS, judge, sole_velocity, walk_brakes
 
 ENVIRONMENT = "hoof_env/HorseLegFixed-v0"
@@ -43,32 +42,6 @@ FIGURES = {
     "run.walks": "figure3",
 }
 """The picture that shows each claim about shape."""
-
-Trace = NDArray[np.void]
-
-
-@dataclass(frozen=True)
-class Reproduction:
-    """What the four conditions gave.
-
-    Attributes:
-        rows: one dictionary for each published row and solver, see `hoof_env.paper.rows.compare`.
-        shapes: one dictionary for each claim about shape and solver: kind ("shape"), id, claim, reading,
-            solver, holds, evidence, readings (verdict by reading, where there are several), used (the reading
-            that holds is of), figure.
-        traces: one cycle of dtype `hoof_env.paper.measure.CYCLE`, its first row at t = 0, by (gait,
-            condition, solver).
-        geometry: the leg, identified and not published.
-        published: what was compared with.
-        ground: the preset's, elastic, the approach speed interpolated.
-    """
-
-    rows: list[dict[str, Any]]
-    shapes: list[dict[str, Any]]
-    traces: dict[tuple[str, str, str], Trace]
-    geometry: Geometry
-    published: Published
-    ground: Ground = field(default_factory=Ground)
 
 
 def run_cycle(gait: str, solver: str, **settings: Any) -> Trace:

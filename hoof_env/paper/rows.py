@@ -11,11 +11,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from hoof_env.ground.contact import Ground
+from hoof_env.leg.geometry import Geometry
 from hoof_env.paper.measure import Stance
 from hoof_env.paper.published import Published, PublishedRow, load_published
 
@@ -35,6 +38,33 @@ loop samples touch-down (docs/evidence/conditions.md has how far they move)."""
 
 REPORTED, ILL = "reported", "ill-conditioned"
 """Why a row is spared."""
+
+Trace = NDArray[np.void]
+"""One cycle of dtype `measure.CYCLE`."""
+
+
+@dataclass(frozen=True)
+class Reproduction:
+    """What the four conditions gave.
+
+    Attributes:
+        rows: one dictionary for each published row and solver, see `compare`.
+        shapes: one dictionary for each claim about shape and solver: kind ("shape"), id, claim, reading,
+            solver, holds, evidence, readings (verdict by reading, where there are several), used (the reading
+            that holds is of), figure.
+        traces: one cycle of dtype `hoof_env.paper.measure.CYCLE`, its first row at t = 0, by (gait,
+            condition, solver).
+        geometry: the leg, identified and not published.
+        published: what was compared with.
+        ground: the preset's, elastic, the approach speed interpolated.
+    """
+
+    rows: list[dict[str, Any]]
+    shapes: list[dict[str, Any]]
+    traces: dict[tuple[str, str, str], Trace]
+    geometry: Geometry
+    published: Published
+    ground: Ground = field(default_factory=Ground)
 
 
 @dataclass(frozen=True)
