@@ -45,7 +45,7 @@ def vector_bits() -> int:
 
     @numba.njit
     def add(x):  # type: ignore[no-untyped-def]
-        row = rows(doubles(8), 8)
+        row = rows(doubles(8), 8, None)
         one = read(row, address(x), 0, 1)
         write(one + one, address(x), 0, 1)
 
