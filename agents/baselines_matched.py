@@ -24,8 +24,8 @@ import numpy as np
 from agents import runs
 from agents.baselines_results import Row, Scored, over_seeds, reference
 from agents.baselines_run import LEG
-from agents.command import table
 from agents.score import CURVE_SEEDS, FINAL_SEEDS, mean_figures, score_vector
+from hoof_env._output import markdown_table
 from hoof_env.envs.policies import GAITS
 from hoof_env.gait.gait import LIMITS, GaitParameters
 
@@ -172,4 +172,4 @@ def compare(rows: Sequence[Row], best: Row | None, run: Scored) -> str:
             [one.name, *cells(one), verdict(one, other), seeds_that_dominate(one, other)] for one in beside
         ]
     titles = [title for title, *_ in COLUMNS.values()]
-    return table(["", *titles, "dominates", "seeds that do, by their means"], lines)
+    return markdown_table(["", *titles, "dominates", "seeds that do, by their means"], lines)

@@ -34,8 +34,9 @@ from agents.baselines_results import (
     versions_of,
 )
 from agents.baselines_run import COLUMNS, CURVE, FOLDERS, LEG, Plan, load_plan, read_curve, write_csv
-from agents.command import run, table
+from agents.command import run
 from agents.evaluate import Score
+from hoof_env._output import markdown_table
 from hoof_env.paper.figure_style import BLUE, GREEN, GREY, ORANGE, PURPLE, STYLE
 
 POINTS = 40
@@ -86,7 +87,7 @@ def results_table(rows: Sequence[Row], gaits: References) -> str:
             for one in known.values()
         ]
         lines += [[f"`{env_id}`", row.title, *row_cells(row, known)] for row in unlabelled(rows, env_id)]
-    return table(titles, lines)
+    return markdown_table(titles, lines)
 
 
 def row_cells(row: Row, known: Mapping[str, Scored]) -> list[str]:
@@ -123,7 +124,7 @@ def figures_table(rows: Sequence[Row], gaits: References) -> str:
         for env_id, known in gaits.items()
         for one in (*known.values(), *(row.scored for row in unlabelled(rows, env_id)))
     ]
-    return table(["id", "policy", *(title for title, *_ in GAIT_COLUMNS.values())], lines)
+    return markdown_table(["id", "policy", *(title for title, *_ in GAIT_COLUMNS.values())], lines)
 
 
 def made_text(rows: Sequence[Row]) -> str:

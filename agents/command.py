@@ -7,12 +7,12 @@ import os
 import sys
 import threading
 import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable
 from typing import NoReturn
 
 from hoof_env.errors import HoofEnvError, check_number, parse_pairs
 
-__all__ = ["check_threads", "parse_pairs", "run", "table"]
+__all__ = ["check_threads", "parse_pairs", "run"]
 
 
 def check_threads(threads: int) -> None:
@@ -36,9 +36,3 @@ def run(command: Callable[[], int | None]) -> NoReturn:
         print("\ninterrupted", file=sys.stderr)
         code = 130
     sys.exit(code)
-
-
-def table(titles: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table; a row that is shorter than its head ends in empty cells."""
-    lines = [titles, ["---"] * len(titles), *([*row, *[""] * (len(titles) - len(row))] for row in rows)]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)

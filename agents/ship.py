@@ -32,12 +32,12 @@ from tyro.conf import Positional
 
 from agents import runs
 from agents.baselines_report import draw_learning_curve, training_length
-from agents.command import run, table
+from agents.command import run
 from agents.evaluate import METRICS, Interval, Score, cell, to_json
 from agents.export import about, write_policy
 from agents.score import FINAL_SEEDS as SCORE_SEEDS
 from agents.score import score_vector
-from hoof_env._output import check_folder, staged
+from hoof_env._output import check_folder, markdown_table, staged
 from hoof_env.envs.policies import STANDS_FOR
 from hoof_env.envs.tasks import TASKS
 from hoof_env.errors import DataFileError, OutputError, ParameterError, check_choice, check_number
@@ -310,7 +310,7 @@ def write_index(folder: Path) -> None:
         "Mean returns in the same episodes, and the bootstrap's 95 % interval.\n\n"
     )
     titles = ["id", "policy", "return", "open-loop", "run", "card"]
-    runs.write_text(folder / "README.md", text + table(titles, rows) + "\n")
+    runs.write_text(folder / "README.md", text + markdown_table(titles, rows) + "\n")
 
 
 def main(argv: list[str] | None = None) -> None:

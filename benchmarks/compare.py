@@ -23,7 +23,8 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.rounds import describe, spread, table
+from benchmarks.rounds import describe, spread
+from hoof_env._output import markdown_table
 
 ROOT = Path(__file__).resolve().parents[1]
 CASES = Path(__file__).with_name("compare_cases.py")
@@ -95,7 +96,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     spreads = {case: spread(np.array(r)) for case, r in compare(base, ROOT, given.rounds).items()}
     slower = {case for case, s in spreads.items() if s["median"] < LOWEST}
     rows = [[case, describe(s), "slower" if case in slower else ""] for case, s in spreads.items()]
-    print(table(["case", f"speed over that of {base.name}", f"below {LOWEST}"], rows))
+    print(markdown_table(["case", f"speed over that of {base.name}", f"below {LOWEST}"], rows))
     return 1 if slower else 0
 
 

@@ -26,7 +26,8 @@ import hoof_env  # noqa: F401  registers the ids
 from benchmarks.compare_cases import step, step_many
 from benchmarks.history import RESULTS, write
 from benchmarks.machine import machine, vector_bits
-from benchmarks.rounds import bar_text, describe, interleave, spread, table, timed
+from benchmarks.rounds import bar_text, describe, interleave, spread, timed
+from hoof_env._output import markdown_table
 
 BARRED = ("HorseLeg", "HorseLegRail", "HorseLegSpeed", "HorseLegTerrain")
 IDS = (*BARRED, "HorseLegFixed")
@@ -91,8 +92,8 @@ def page(result: dict[str, Any]) -> str:
         for row in result["rows"]
     ]
     head = ["case", "bits", "environment steps/s", "beside", "ratio", "bars"]
-    about = table(["", ""], [[key, value] for key, value in result["machine"].items()])
-    return "\n\n".join((INTRO.format(**result), about, table(head, lines))) + "\n"
+    about = markdown_table(["", ""], [[key, value] for key, value in result["machine"].items()])
+    return "\n\n".join((INTRO.format(**result), about, markdown_table(head, lines))) + "\n"
 
 
 def main() -> None:

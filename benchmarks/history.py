@@ -11,8 +11,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from benchmarks.rounds import bar_text, table
-from hoof_env._output import staged
+from benchmarks.rounds import bar_text
+from hoof_env._output import markdown_table, staged
 
 RESULTS = Path(__file__).parent / "results"
 """Holds a folder for each vector width, and the history of all."""
@@ -87,4 +87,4 @@ def page(rows: list[dict[str, str]], folder: Path) -> str:
             "required": bar_text(float(row["required"]), {"median": float(row["ratio"])}),
         }
         lines.append([shown[name] for name in head])
-    return "\n\n".join([INTRO, "\n".join(listed), table(head, lines)]) + "\n"
+    return "\n\n".join([INTRO, "\n".join(listed), markdown_table(head, lines)]) + "\n"

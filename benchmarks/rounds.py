@@ -54,8 +54,3 @@ def bar_text(bar: float, s: Mapping[str, float] | None) -> str:
     if s is None:
         return f"{bar:g}: not measured"
     return f"{bar:g}: {'met' if s['median'] >= bar else 'not met'}"
-
-
-def table(head: list[str], rows: list[list[str]]) -> str:
-    """A Markdown table."""
-    return "\n".join("| " + " | ".join(row) + " |" for row in (head, ["---"] * len(head), *rows))

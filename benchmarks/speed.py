@@ -26,8 +26,9 @@ import numpy as np
 from benchmarks.common import ALL, RIGID, GroundForces
 from benchmarks.history import RESULTS, write
 from benchmarks.machine import machine, vector_bits
-from benchmarks.rounds import bar_text, describe, interleave, spread, table, timed
+from benchmarks.rounds import bar_text, describe, interleave, spread, timed
 from benchmarks.scenes import DT, Scene, engine, scenes
+from hoof_env._output import markdown_table
 from hoof_env.ground.contact import load_ground
 
 ROUNDS = 40
@@ -237,20 +238,20 @@ def speed_table(rows: list[dict[str, Any]]) -> str:
                 *(bar_text(row[bar], ratios.get("ALL")) if row[bar] else "" for bar in ("required", "aimed")),
             ]
         )
-    return table(head, lines)
+    return markdown_table(head, lines)
 
 
 def page(result: dict[str, Any]) -> str:
     """The whole result as Markdown."""
     about = [["leg and ground", result["preset"]], *([k, v] for k, v in result["machine"].items())]
-    parts = [INTRO.format(**result), table(["", ""], about), RATIOS, speed_table(result["cases"])]
+    parts = [INTRO.format(**result), markdown_table(["", ""], about), RATIOS, speed_table(result["cases"])]
     parts += [f"- {note}" for note in result["notes"]]
     if seconds := result["start"]:
         rows = [
             [what, f"{seconds[what]:.2f}", f"under {bar:g}: {'met' if seconds[what] < bar else 'not met'}"]
             for what, bar in START_BARS.items()
         ]
-        parts += ["## Start", table(["in a fresh process", "wall s", "bar"], rows)]
+        parts += ["## Start", markdown_table(["in a fresh process", "wall s", "bar"], rows)]
     return "\n\n".join(parts) + "\n"
 
 

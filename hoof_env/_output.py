@@ -70,6 +70,9 @@ def new_file(path: Path, overwrite: bool) -> Iterator[str]:
 
 
 def markdown_table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
-    """A table in Markdown from the cells of its head and of its rows."""
-    first, *rest = (f"| {' | '.join(cells)} |" for cells in (head, *rows))
-    return "\n".join([first, "|" + "---|" * (first.count(" | ") + 1), *rest])
+    """A table in Markdown from the cells of its head and of its rows; a row that is shorter than the head
+    ends in empty cells."""
+    titles = list(head)
+    lines = [[*row, *[""] * (len(titles) - len(row))] for row in map(list, rows)]
+    first, *rest = (f"| {' | '.join(line)} |" for line in (titles, *lines))
+    return "\n".join([first, "|" + "---|" * len(titles), *rest])

@@ -121,7 +121,8 @@ def describe(env: Any) -> dict[str, Any]:
 
 
 def settings_of(env: Any) -> dict[str, Any]:
-    """All settings of an environment of this package, as JSON gives them back; none of somebody else's."""
+    """All settings of an environment of this package, as JSON gives them back; empty for another
+    package's."""
     settings = getattr(env.unwrapped, "settings", None)
     if not is_dataclass(settings) or isinstance(settings, type):
         return {}

@@ -135,7 +135,7 @@ def play(
 
     Raises:
         ParameterError: as `records.make_env`, or a value out of range.
-        HoofEnvError: no pygame, or no display (`rendering.open_window`).
+        HoofEnvError: no pygame, or no display (`renderer.open_window`).
     """
     check_number("slow", slow, low=0.1, high=100)
     check_number("seed", seed, low=0)

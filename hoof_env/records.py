@@ -37,7 +37,7 @@ def setting(env: Any) -> Setting:
     """The setting of an environment of this package, wrapped or not.
 
     Raises:
-        ParameterError: an environment of somebody else.
+        ParameterError: not an environment of this package.
     """
     leg = env.unwrapped
     try:
@@ -61,7 +61,7 @@ def substeps(env: Any, command: NDArray[np.float64] | None = None) -> Columns:
 
     Args:
         env: an environment of this package.
-        command: gait parameters that were commanded, shape (4,); None if nobody knows.
+        command: gait parameters that were commanded, shape (4,); None if unknown.
 
     Returns:
         Arrays by the fields of `Instant`.
@@ -75,7 +75,7 @@ def make_env(env_id: str, arguments: Mapping[str, Any] | None = None) -> gym.Env
 
     Raises:
         ParameterError: unknown id, an argument that the environment does not take, or an environment of
-            somebody else.
+            another package.
     """
     arguments = dict(arguments or {})
     if "render_mode" in arguments:

@@ -6,7 +6,7 @@ four lanes that are the legs of one trunk, and for `LANES` environments side by 
 the stack, where the compiler keeps what it can in registers.
 
 An engine's memory is one matrix `data`, a column for each environment: the rows of the trunk, then those of
-each leg, as `TRUNK` and `LIMB` have them.
+each leg, fields as in `layout.TrunkMemory` and `LegMemory`.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ LANES = 8
 """Environments side by side in a batch: one vector of 512 bits."""
 
 OK, NOT_FINITE, DEAD_POINT, FALLEN = 0, 1, 3, 4
-"""As in `result.Result`."""
+"""As in `parts.Result`."""
 
 STARTS = -1.0
 """Stands in the place of a result where an environment is to start."""
@@ -51,7 +51,7 @@ MODEL = np.dtype(
     [
         ("legs", "i8"), ("cells", "i8"),  # how many; cells of a leg's table
         ("kind", "i8"), ("eighths", "i8"), ("friction_law", "i8"),  # of trunk, contact exponent, friction
-        ("interpolated", "?"), ("is_terrain", "?"), ("new_rates", "?"),  # see `Ground`, `Terrain`, `schemes`
+        ("interpolated", "?"), ("is_terrain", "?"), ("new_rates", "?"),  # see `Ground`, `Terrain`, `Scheme`
         ("strides", "?"),  # whether to count them
         ("stages", "i8"), ("fractions", "f8", (4,)), ("weights", "f8", (4,)),  # of the scheme
         ("settings", "f8", (12,)),  # of the filters
@@ -133,7 +133,7 @@ def read_leg(leg, memory):  # type: ignore[no-untyped-def]
 
 @inlined
 def find_result(trunk, legs, leg_count, together):  # type: ignore[no-untyped-def]
-    """How the environments ended, numbers of `result.Result`."""
+    """How the environments ended, numbers of `parts.Result`."""
     total, stuck = level(trunk, 0.0), trunk.at_dead_point
     for k in range(TRUNK_STATE_SIZE):
         total = total + trunk.state[k]

@@ -75,8 +75,10 @@ class ConstrainedState:
     """Everything that changes: copying its arrays copies the state.
 
     Attributes:
-        body: record of dtype `BODY`. motion: record of dtype `MOTION`.
-        filters: shape (4,). contacts: shape (2,), toe first.
+        body: record of dtype `BODY`.
+        motion: record of dtype `MOTION`.
+        filters: shape (4,).
+        contacts: shape (2,), toe first.
         q, qd: coordinates and their rates in the frame of the paper's drawing, shape (42,) each.
     """
 
@@ -123,7 +125,7 @@ class ConstrainedLeg:
         filters: bounds of the command filters.
         alpha, beta: Baumgarte's parameters [1/s]; the paper's 15 and sqrt(2 * 15). A closure error decays by
             the roots of s^2 + 2 alpha s + beta^2.
-        integrator: one of `integrators.INTEGRATORS`.
+        integrator: one of `INTEGRATORS`.
         height: of O above the ground [m]; the geometry's own if None.
 
     Raises:

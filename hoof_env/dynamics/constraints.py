@@ -35,7 +35,8 @@ class Closure(NamedTuple):
     """The constraint equations at one instant, 42 rows (joint rows in m, lock and driver in rad).
 
     Attributes:
-        error: Phi(q, t). error_rate: its rate Phi_q qd + Phi_t.
+        error: Phi(q, t).
+        error_rate: its rate Phi_q qd + Phi_t.
         jacobian: Phi_q, shape (42, 42) (Eq. 3).
         by_phi: d Phi / d phi, shape (42,). (d Phi / d theta is 1 in the driver's row and 0 elsewhere.)
         gamma: what Phi_q qdd must be, -(Phi_q qd)_q qd - 2 Phi_qt qd - Phi_tt, shape (42,).

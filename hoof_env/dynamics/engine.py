@@ -2,8 +2,8 @@
 
 What can move is integrated: the trunk, as momentum and centre of mass of all bodies together, and the crank
 of every leg whose drive is a motor. Everything inside a leg follows from its crank angle in closed form, so
-loops are closed to round-off at every step of any run. `lanes` holds the mechanics, `advance` runs it; this
-module is the border: checks and state. A number has the same bits alone and in a batch of any size.
+loops are closed to round-off at every step of any run. `mechanics` has the equations, `advance` runs them;
+this module checks arguments and keeps the state. A number has the same bits alone and in a batch of any size.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ class TrunkEngine:
         ground: laws of contact. Its exponent must be a multiple of 1/8, so that square roots are enough.
         terrain: heights, and where the ground is softer or more slippery; level if None.
         sim_dt: the step [s] after which results can be read.
-        integrator: one of `schemes.SCHEMES`.
+        integrator: one of `stepping.SCHEMES`.
         substeps: parts of `sim_dt` that are integrated, contacts remembered after each; None chooses as many
             as ground, motors and support ask, up to `step_length.MOST_SUBSTEPS`.
         num_envs: environments side by side, which share all of the above.
@@ -207,7 +207,7 @@ class TrunkEngine:
 
     @property
     def results(self) -> NDArray[np.int64]:
-        """How the last call ended in each environment, values of `result.Result`, shape (num_envs,)."""
+        """How the last call ended in each environment, values of `parts.Result`, shape (num_envs,)."""
         return self._memory.result.astype(np.int64)
 
     def column(self, env: int) -> Floats:
@@ -267,7 +267,7 @@ class TrunkEngine:
 
         Raises:
             ParameterError: a value is not finite, of the wrong shape or forbidden by the trunk's kind, an
-                angle, place or rate is beyond `trunk_start.FARTHEST`, or a leg's links have no place there.
+                angle, place or rate is beyond `layout.FARTHEST`, or a leg's links have no place there.
         """
         where, a = which(envs, self.num_envs), self._memory
         values = gaits_of(gaits, len(self.limbs), where.size)
@@ -330,7 +330,7 @@ class TrunkEngine:
             account: whether to keep `account`.
 
         Returns:
-            How each environment ended, shape (num_envs,), values of `result.Result`. One that did not end OK
+            How each environment ended, shape (num_envs,), values of `parts.Result`. One that did not end OK
             is left in its last good state, from which this call began; the report is of there.
 
         Raises:

@@ -71,7 +71,7 @@ def start(
     """State of `n` environments with filters at rest: of the trunk, shape (7, n), and legs, (legs, 16, n).
 
     In the place of centre of mass, momentum and spin of all are the trunk's place, velocity and rate of
-    pitch: the kernels make the one of the other (`lanes.settle`).
+    pitch: the kernels make the one of the other (`mechanics.settle`).
 
     Args:
         engine: that is to start.

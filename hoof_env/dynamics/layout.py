@@ -126,7 +126,7 @@ class TrunkMemory(Layout):
     settings: TrunkSettings
     account: Account
     report: TrunkReport
-    result: Row  # of the last call, see `result.Result`
+    result: Row  # of the last call, see `parts.Result`
 
 
 # A leg

@@ -11,8 +11,8 @@ side phi(theta, t) of its frame, the velocity v of O and w = theta_t, its kineti
 
     T = m |v|^2 / 2 + v . e^(i beta) (s' w + i s beta_t) + (a w^2 + 2 b w beta_t + c beta_t^2) / 2,
 
-and Lagrange's equations follow (docs/engine.md). The trunk's state is the momentum, linear and angular, of
-all bodies together: in flight it is kept to round-off, whatever the scheme.
+and Lagrange's equations follow: (E1) to (E9) in docs/engine.md. The trunk's state is the momentum, linear
+and angular, of all bodies together: in flight it is kept to round-off, whatever the scheme.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def evaluate(trunk, legs, leg_count, model, elapsed):  # type: ignore[no-untyped
     for i in range(leg_count):
         leg = nth(legs, i, LegRows)
         meet_ground(trunk, leg, model)
-        feel_leg(trunk, leg, elapsed)
+        set_up_crank(trunk, leg, elapsed)
         if model.kind != FIXED:
             load_trunk(trunk, leg, model.kind, model.together)
     if model.kind != FIXED:
@@ -74,8 +74,8 @@ def look_up_functions(trunk, leg, model):  # type: ignore[no-untyped-def]
 
 @inlined
 def place_frame(trunk, leg, elapsed):  # type: ignore[no-untyped-def]
-    """The leg's frame: its turn, how that changes with crank angle and time, and first moment and inertia in
-    the world.
+    """The leg's frame (E1): its turn, how that changes with crank angle and time, and first moment and
+    inertia in the world.
 
     The swing is phi = offset + A sin(theta) + B cos(theta), each parameter moving as its filter does.
     """
@@ -127,7 +127,7 @@ def keep_still(trunk):  # type: ignore[no-untyped-def]
 
 @inlined
 def clear_trunk(trunk, kind):  # type: ignore[no-untyped-def]
-    """Before the leg_count are gathered."""
+    """Before the legs are gathered."""
     if kind == FREE:
         cosine, sine = cos_sin(trunk.stage.pitch)
         trunk.turn = plane(cosine, sine)
@@ -139,7 +139,8 @@ def clear_trunk(trunk, kind):  # type: ignore[no-untyped-def]
 
 @inlined
 def gather_leg(trunk, leg, kind, together):  # type: ignore[no-untyped-def]
-    """Add a leg to the first moment, momentum, inertia and spin of all about the trunk's centre of mass."""
+    """Add a leg to the first moment, momentum, inertia and spin of all about the trunk's centre of mass
+    (E6)."""
     s, w, sway = leg.first_moment, leg.theta_rate, leg.swing_rate
     drift = w * leg.moment_by_crank + sway * across(s)
     if kind == FREE:
@@ -159,16 +160,12 @@ def gather_leg(trunk, leg, kind, together):  # type: ignore[no-untyped-def]
 
 @inlined
 def move_trunk(trunk, kind):  # type: ignore[no-untyped-def]
-    """Place and velocity of the trunk from centre of mass and momentum of all; what acts on it but its
-    leg_count.
+    """Place and velocity of the trunk from centre of mass and momentum of all (E7); what acts on it
+    besides its legs.
 
     On a rail the place along y is given and the velocity along y 0.
     """
-    centre, moment, momentum = (
-        trunk.stage.centre,
-        trunk.first_moment,
-        trunk.stage.momentum,
-    )
+    centre, moment, momentum = trunk.stage.centre, trunk.first_moment, trunk.stage.momentum
     drift, per_mass = trunk.relative_momentum, trunk.settings.inverse_mass
     place = centre - per_mass * moment
     velocity = per_mass * (momentum - drift)
@@ -226,80 +223,81 @@ def settle(trunk, legs, leg_count, model, starts):  # type: ignore[no-untyped-de
 
 
 @inlined
-def feel_leg(trunk, leg, elapsed):  # type: ignore[no-untyped-def]
-    """A crank's equation of motion: INERTIA theta_tt + U . a + LEVER pitch_tt = torque + ground - rest.
+def set_up_crank(trunk, leg, elapsed):  # type: ignore[no-untyped-def]
+    """A crank's equation of motion (E5), with the trunk's acceleration a,
 
-    a is the trunk's acceleration. Here a motor's crank is solved for theta_tt as if the trunk kept still; a
+        crank_inertia theta_tt + moment_by_crank . a + crank_pitch_coupling pitch_tt = torque + ground - rest.
+
+    Here a motor's crank is solved for theta_tt as if the trunk kept still; a
     prescribed one's is given.
     """
     w, frame_rate, k = leg.theta_rate, leg.beta_rate, leg.beta_by_theta
     hip, frame, coupling = leg.hip, leg.frame_inertia, leg.crank_coupling
-    pitch_rate, sway_rate, dc = (
-        trunk.rates.pitch_rate,
-        leg.swing_acceleration,
-        leg.functions.frame_inertia_slope,
-    )
-    da, db = leg.slopes.crank_inertia, leg.slopes.coupling
+    pitch_rate, swing_acceleration = trunk.rates.pitch_rate, leg.swing_acceleration
+    da, db, dc = leg.slopes.crank_inertia, leg.slopes.coupling, leg.functions.frame_inertia_slope
     weight = plane(level(trunk, 0.0), trunk.settings.gravity) - pitch_rate * pitch_rate * hip  # a + g of O
     rest_theta = (
-        (coupling - k * frame) * sway_rate
+        (coupling - k * frame) * swing_acceleration
         + 0.5 * (da * (w * w) - dc * (frame_rate * frame_rate))
         + dot(weight, leg.moment_by_theta)
     )
-    rest_beta = frame * sway_rate + (db * w + dc * frame_rate) * w + dot(weight, across(leg.first_moment))
+    rest_beta = (
+        frame * swing_acceleration + (db * w + dc * frame_rate) * w + dot(weight, across(leg.first_moment))
+    )
     leg.rest_moment_theta, leg.rest_moment_beta = rest_theta, rest_beta
     leg.crank_pitch_coupling = coupling + cross(hip, leg.moment_by_crank)
     wanted, wanted_rate, _ = filtered(leg, SPEED, elapsed)
     torque = clip(leg.settings.speed_gain * (wanted - w), leg.settings.torque_limit)
-    softness, is_motor = 1.0 / leg.crank_inertia, leg.settings.is_motor > 0.0
-    free = softness * (
+    mobility, is_motor = 1.0 / leg.crank_inertia, leg.settings.is_motor > 0.0
+    free = mobility * (
         torque + leg.ground_moment_theta - rest_theta + k * (leg.ground_moment_beta - rest_beta)
     )
     leg.crank_torque = torque
-    leg.crank_mobility = choose(is_motor, softness, 0.0)
+    leg.crank_mobility = choose(is_motor, mobility, 0.0)
     leg.free_theta_acceleration = choose(is_motor, free, wanted_rate)
 
 
 @inlined
 def load_trunk(trunk, leg, kind, together):  # type: ignore[no-untyped-def]
-    """A leg's part in the trunk's equations, its crank eliminated, and in the outer force and moment."""
+    """A leg's part in the trunk's equations, its crank eliminated (E8), and in the outer force and
+    moment."""
     w, frame_rate, pitch_rate = leg.theta_rate, leg.beta_rate, trunk.rates.pitch_rate
-    s, hip, u, push = leg.first_moment, leg.hip, leg.moment_by_crank, leg.ground_force
-    mass, lever, free, softness = (
-        leg.settings.mass,
-        leg.crank_pitch_coupling,
-        leg.free_theta_acceleration,
-        leg.crank_mobility,
-    )
+    s, hip, u, ground_force = leg.first_moment, leg.hip, leg.moment_by_crank, leg.ground_force
+    mass, coupling = leg.settings.mass, leg.crank_pitch_coupling
+    free, mobility = leg.free_theta_acceleration, leg.crank_mobility
     slope = leg.turn * leg.slopes.moment_slope
-    throw = (  # what the first moment does at rest of all accelerations
+    moment_acceleration = (  # of the first moment, where theta_tt, pitch_tt and a are 0
         leg.swing_acceleration * across(s)
         + w * w * slope
         + frame_rate * (2.0 * w * across(leg.moment_by_theta) - frame_rate * s)
     )
-    sling = pitch_rate * pitch_rate * hip  # less O's acceleration
-    soft_u = softness * u
-    trunk.load = add(trunk.load, mass * sling - throw - free * u, together)
-    trunk.mass_xx = add(trunk.mass_xx, -soft_u.real * u.real, together)
-    trunk.mass_xy = add(trunk.mass_xy, -soft_u.real * u.imag, together)
-    trunk.mass_yy = add(trunk.mass_yy, -soft_u.imag * u.imag, together)
-    trunk.rates.force = add(trunk.rates.force, push, together)
+    centripetal = pitch_rate * pitch_rate * hip  # minus O's acceleration there
+    mobile_u = mobility * u
+    trunk.load = add(trunk.load, mass * centripetal - moment_acceleration - free * u, together)
+    trunk.mass_xx = add(trunk.mass_xx, -mobile_u.real * u.real, together)
+    trunk.mass_xy = add(trunk.mass_xy, -mobile_u.real * u.imag, together)
+    trunk.mass_yy = add(trunk.mass_yy, -mobile_u.imag * u.imag, together)
+    trunk.rates.force = add(trunk.rates.force, ground_force, together)
     if kind == FREE:
-        heavy = mass * (plane(level(trunk, 0.0), trunk.settings.gravity) - sling)
+        rest_force = mass * (plane(level(trunk, 0.0), trunk.settings.gravity) - centripetal)
         by_frame = leg.ground_moment_beta - leg.rest_moment_beta
         trunk.load_moment = add(
-            trunk.load_moment, by_frame + cross(hip, push - heavy - throw) - lever * free, together
+            trunk.load_moment,
+            by_frame + cross(hip, ground_force - rest_force - moment_acceleration) - coupling * free,
+            together,
         )
-        trunk.mass_xp = add(trunk.mass_xp, -soft_u.real * lever, together)
-        trunk.mass_yp = add(trunk.mass_yp, -soft_u.imag * lever, together)
-        trunk.mass_pp = add(trunk.mass_pp, -softness * lever * lever, together)
+        trunk.mass_xp = add(trunk.mass_xp, -mobile_u.real * coupling, together)
+        trunk.mass_yp = add(trunk.mass_yp, -mobile_u.imag * coupling, together)
+        trunk.mass_pp = add(trunk.mass_pp, -mobility * coupling * coupling, together)
         off = hip + trunk.place - trunk.stage.centre
-        trunk.rates.moment = add(trunk.rates.moment, leg.ground_moment_beta + cross(off, push), together)
+        trunk.rates.moment = add(
+            trunk.rates.moment, leg.ground_moment_beta + cross(off, ground_force), together
+        )
 
 
 @inlined
 def accelerate_trunk(trunk, kind):  # type: ignore[no-untyped-def]
-    """Solve the trunk's equations for its accelerations, by Cramer's rule."""
+    """Solve the trunk's equations (E8) for its accelerations, by Cramer's rule."""
     load = trunk.rates.force + trunk.load
     xx, xy, yy = trunk.mass_xx, trunk.mass_xy, trunk.mass_yy
     pitch_acc = level(trunk, 0.0)
@@ -327,6 +325,6 @@ def accelerate_trunk(trunk, kind):  # type: ignore[no-untyped-def]
 
 @inlined
 def accelerate_crank(trunk, leg):  # type: ignore[no-untyped-def]
-    """The crank's acceleration: a motor's gives way to the trunk's."""
+    """The crank's acceleration: a motor's gives way to the trunk's (E9)."""
     pull = dot(leg.moment_by_crank, trunk.acceleration) + leg.crank_pitch_coupling * trunk.pitch_acceleration
     leg.theta_acceleration = leg.free_theta_acceleration - leg.crank_mobility * pull

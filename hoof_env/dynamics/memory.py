@@ -52,7 +52,7 @@ class Memory(NamedTuple):
         command: shape (legs, 4, n).
         account: shape (9, n), added to.
         trunk_report, limb_report: at the end, shapes (8, n) and (legs, 18, n).
-        result: how it ended, shape (n,), values of `result.Result`; where it is not OK the state is left as
+        result: how it ended, shape (n,), values of `parts.Result`; where it is not OK the state is left as
             it was.
         constants, reactions: of `reactions`, shapes (legs, LegConstants.size) and (legs, Reactions.size,
             columns).
@@ -117,7 +117,8 @@ def new_memory(engine: TrunkEngine, columns: int) -> Memory:
 
 
 def new_model(engine: TrunkEngine) -> tuple[NDArray[Any], Floats, Floats]:
-    """What does not change while it runs: a record of dtype `MODEL`, the legs' tables, the terrain's cells."""
+    """What does not change while it runs: a record of dtype `MODEL`, the legs' tables, the terrain's
+    cells."""
     ground, terrain = engine.ground, engine.terrain
     cells = max(profile.cells for profile in engine.profiles)
     tables = [profile.with_cells(cells).table for profile in dict.fromkeys(engine.profiles)]

@@ -31,7 +31,7 @@ REVOLUTION = 2 * math.pi
 
 @inlined
 def find_drives(trunk, leg):  # type: ignore[no-untyped-def]
-    """Torques and powers of crank and swing from the accelerations (Lagrange's equations)."""
+    """Torques and powers of crank and swing from the accelerations (E2 to E4 in docs/engine.md)."""
     w, acc, k, sway = leg.theta_rate, leg.theta_acceleration, leg.beta_by_theta, leg.swing_rate
     frame, pitch_acc = leg.frame_inertia, trunk.pitch_acceleration
     coupling = leg.crank_coupling - k * frame
@@ -162,7 +162,7 @@ class StanceCounter:
             By how much the running peak has grown [N]; over a stance these add up to its peak.
         """
         loaded = normal > self.threshold
-        goes_on = loaded and self.is_open and theta - self.began < 2 * math.pi
+        goes_on = loaded and self.is_open and theta - self.began < REVOLUTION
         before = self.peak if goes_on else 0.0
         if loaded and not goes_on:
             self.began, self.count = theta, self.count + 1

@@ -41,7 +41,7 @@ def drawn_of(rendered: Any, n: int, most: int) -> int:
     """How many of `n` environments are drawn; None is all, if they are at most `most`.
 
     Raises:
-        ParameterError: more than there are, or nobody said how many of more than `most`.
+        ParameterError: more than there are, or more than `most` and `rendered` is None.
     """
     if rendered is None and n > most:
         raise ParameterError(
@@ -81,7 +81,7 @@ def mask_of(given: Any, n: int) -> NDArray[np.bool_]:
     """The reset option "reset_mask", shape (n,); None is all.
 
     Raises:
-        ParameterError: another shape or type, or nobody's.
+        ParameterError: another shape or type, or all False.
     """
     if given is None:
         return np.ones(n, bool)
@@ -177,7 +177,7 @@ class Made:
     Attributes:
         batch: the episodes.
         spec: what Gymnasium made it from. `max_episode_steps` is the environment's own limit, which
-            `episode_seconds` and `dt` give, unless somebody else's is there already.
+            `episode_seconds` and `dt` give, unless it has one already.
     """
 
     batch: EpisodeBatch

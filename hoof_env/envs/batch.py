@@ -2,7 +2,7 @@
 
 `EpisodeBatch` knows arrays and generators and nothing of Gymnasium. A row has the same bits whatever the
 number of its neighbours: starts are drawn from a generator of its own, and the kernels are those of
-`episode`, compiled for one environment or for several side by side.
+`step`, compiled for one environment or for several side by side.
 """
 
 from __future__ import annotations
@@ -188,13 +188,13 @@ class EpisodeBatch:
     def _compile(self) -> None:
         """Have every kernel of a step compiled, or loaded, by running it on no environment: what a parent
         makes warms the cache for its workers."""
-        nobody, gait = self.addresses.copy(), GaitParameters.from_array(MIDDLE)
-        nobody[kernels.AT.data + COLUMNS] = 0
+        idle, gait = self.addresses.copy(), GaitParameters.from_array(MIDDLE)
+        idle[kernels.AT.data + COLUMNS] = 0
         for run in (self._kernels.apply_one, self._kernels.finish_one) if self.paper else (self.kernel,):
-            run(nobody)
+            run(idle)
         if self.paper:
             self.paper.compile(gait)
-        self._observe(nobody)
+        self._observe(idle)
         self.engine.reset(gait, envs=[])
 
     def _step_paper(self, addresses: NDArray[np.int64]) -> int:
@@ -370,7 +370,7 @@ class EpisodeBatch:
         return found
 
     def summary(self, env: int) -> dict[str, float]:
-        """Figures of an episode, see `summary.summary_of`."""
+        """Figures of an episode, see `episode.summary_of`."""
         return summary_of(self.now, env, self.dt)
 
     def failure(self, env: int) -> str:

@@ -30,7 +30,7 @@ BEGUN = len(START) + len(PARAMETERS)
 """How many numbers these are; those drawn follow."""
 
 MEASURED = (*TRUNK_REPORT, "result", *LEG_STATE, *STRIDES, *STRIDE_SUMS)
-"""What an info measures, neighbours in the engine's memory: one copy, whoever looks at it."""
+"""What an info measures, neighbours in the engine's memory: read with one copy."""
 
 AT_MEASURED = slice(TrunkMemory.rows("report").start, TrunkMemory.size + LegMemory.rows("sums").stop)
 LAST_STEP = slice(-len(STRIDE_SUMS), None)

@@ -21,9 +21,9 @@ def vector_reward(terms: Mapping[str, Any]) -> NDArray[np.float32]:
     """The reward of each objective, shape (3,), from the terms that `info` holds.
 
     Energy takes the charge for changing the action, which is effort too, and progress what is paid for
-    bearing weight, nothing by default. A failure is charged to all three in equal parts: whoever weighs
-    objectives by numbers that sum to 1 loses the same by a fall, whatever the numbers, so that falling early
-    to spare force or energy pays for nobody.
+    bearing weight, nothing by default. A failure is charged to all three in equal parts: under
+    preference weights that sum to 1 a fall costs the same, whatever the weights, so that falling early to
+    save force or energy pays under none.
     """
     progress, peak = terms["reward_progress"] + terms["reward_support"], terms["reward_peak"]
     energy = terms["reward_energy"] + terms["reward_action"]

@@ -152,6 +152,11 @@ def _cosine(scene):  # type: ignore[no-untyped-def]
 
 
 @inlined
+def _contact(memory):  # type: ignore[no-untyped-def]
+    return choose(memory.penetration > 0.0, 1.0, 0.0)
+
+
+@inlined
 def _approach_speed(memory):  # type: ignore[no-untyped-def]
     inverse = memory.inverse_approach_speed
     return choose(inverse > 0.0, 1.0 / choose(inverse > 0.0, inverse, 1.0), 0.0)
@@ -182,16 +187,20 @@ ENTRIES = (
     Entry(
         "height", "trunk", "m", lambda s: s.trunk.report.place.imag,
         Scale("tanh((x - hip height) / 0.3)", _height, True),
-    ), Entry("toe contact", "hoof", "-", lambda s: choose(s.leg.state.toe.penetration > 0.0, 1.0, 0.0),
-    TRUTH), Entry("heel contact", "hoof", "-", lambda s: choose(s.leg.state.heel.penetration > 0.0, 1.0, 0.0),
-    TRUTH), Entry("toe load", "hoof", "N", lambda s: s.leg.report.toe.normal, IN_WEIGHTS), Entry("heel load",
-    "hoof", "N", lambda s: s.leg.report.heel.normal, IN_WEIGHTS), Entry("toe approach speed", "hoof", "m/s",
-    lambda s: _approach_speed(s.leg.state.toe), tanh_of(2.0)), Entry("heel approach speed", "hoof", "m/s",
-    lambda s: _approach_speed(s.leg.state.heel), tanh_of(2.0)), Entry("running peak force", "hoof", "N",
-    lambda s: s.leg.strides.stance_peak, IN_WEIGHTS), *(Entry(f"previous action: {name}", "action", "-",
-    _action(k), PLAIN) for k, name in enumerate(_PARAMETERS)), Entry("commanded speed", "target", "m/s",
-    lambda s: s.episode.target, tanh_of(5.0)), *(Entry(f"height of the ground {x:g} m ahead", "ground", "m",
-    _ahead(x), tanh_of(0.5)) for x in AHEAD),
+    ),
+    Entry("toe contact", "hoof", "-", lambda s: _contact(s.leg.state.toe), TRUTH),
+    Entry("heel contact", "hoof", "-", lambda s: _contact(s.leg.state.heel), TRUTH),
+    Entry("toe load", "hoof", "N", lambda s: s.leg.report.toe.normal, IN_WEIGHTS),
+    Entry("heel load", "hoof", "N", lambda s: s.leg.report.heel.normal, IN_WEIGHTS),
+    Entry("toe approach speed", "hoof", "m/s", lambda s: _approach_speed(s.leg.state.toe), tanh_of(2.0)),
+    Entry("heel approach speed", "hoof", "m/s", lambda s: _approach_speed(s.leg.state.heel), tanh_of(2.0)),
+    Entry("running peak force", "hoof", "N", lambda s: s.leg.strides.stance_peak, IN_WEIGHTS),
+    *(
+        Entry(f"previous action: {name}", "action", "-", _action(k), PLAIN)
+        for k, name in enumerate(_PARAMETERS)
+    ),
+    Entry("commanded speed", "target", "m/s", lambda s: s.episode.target, tanh_of(5.0)),
+    *(Entry(f"height of the ground {x:g} m ahead", "ground", "m", _ahead(x), tanh_of(0.5)) for x in AHEAD),
 )  # fmt: skip
 """All that can be observed, by group, in the order of the observation; the height of the ground is that above
 the ground under O."""

@@ -29,8 +29,8 @@ Records = NDArray[np.void]
 ACCOUNT = np.dtype(
     [("open", "?"), ("began", "f8"), ("peak", "f8"), ("count", "i8"), ("impulse", "f8"), ("loaded", "f8")]
 )
-"""A stance as `dynamics.stance.StanceCounter` has it, and over the episode the impulse of the normal force
-[N s] and the time under load [s]."""
+"""A stance as `dynamics.observables.StanceCounter` has it, and over the episode the impulse of the normal
+force [N s] and the time under load [s]."""
 
 APART = 1.0
 """A linkage that violates its constraints by more [m, rad] has diverged, though its numbers may still be

@@ -9,7 +9,7 @@ import json
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,15 +20,6 @@ from hoof_env.gait.gait import paper_gaits
 from hoof_env.leg.profile import leg_profile
 
 Action = NDArray[np.float32]
-
-
-class Policy(Protocol):
-    """Anything with Stable-Baselines3's `predict`."""
-
-    def predict(
-        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
-    ) -> tuple[Any, Any]:
-        """Action for an observation, and the next recurrent state (None)."""
 
 
 class Scripted:

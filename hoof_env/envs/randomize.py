@@ -15,9 +15,9 @@ from hoof_env.errors import ParameterError, flag
 class RandomizeParameters(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
     """Draws physical parameters at each reset, from the environment's own generator.
 
-    They go to `reset(options={"parameters": ...})`, and whoever names one there has the last word. What was
-    drawn is in the info of the reset, under "parameters". Many environments at once have the argument
-    `randomize` instead.
+    They go to `reset(options={"parameters": ...})`, where a parameter that the caller names takes precedence.
+    What was drawn is in the info of the reset, under "parameters". Many environments at once have the
+    argument `randomize` instead.
 
     Args:
         env: an environment of this family, wrapped or not.
@@ -25,7 +25,7 @@ class RandomizeParameters(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         enabled: False leaves the parameters as the environment was made with; can be set at any time.
 
     Raises:
-        ParameterError: somebody else's environment, an unknown parameter, or one out of range.
+        ParameterError: not an environment of this package, an unknown parameter, or one out of range.
     """
 
     def __init__(self, env: gym.Env[Any, Any], ranges: Mapping[str, Any], enabled: bool = True) -> None:

@@ -52,7 +52,7 @@ class Sb3VecEnv(VecEnv):
             envs = gym.make_vec(env_id, num_envs, **many).unwrapped
         except ParameterError:
             raise
-        except (gym.error.Error, ModuleNotFoundError, TypeError):  # nobody's, or somebody else's
+        except (gym.error.Error, ModuleNotFoundError, TypeError):  # an unknown id, or one of another package
             envs = None
         if not isinstance(envs, HorseLegVectorEnv):
             raise ParameterError(f"env_id: expected an id of this package with many at once, got {env_id!r}")

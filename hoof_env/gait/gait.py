@@ -131,7 +131,7 @@ INNER = 5.0
 """How many times faster a filter's rate follows than its value; above 4 the approach does not oscillate."""
 
 SPEED, OFFSET, SIN, COS = range(4)
-"""Order of the four filters, as in `gait.parameters.PARAMETERS`."""
+"""Order of the four filters, as in `PARAMETERS`."""
 
 MOTION = np.dtype(
     [(name, "f8") for name in ("theta", "theta_rate", "theta_acc", "phi", "phi_rate", "phi_acc")]

@@ -165,10 +165,10 @@ def friction_part(speed, law, slow, fast):  # type: ignore[no-untyped-def]
     """Friction coefficient over its kinetic value, mu(|v|) / mu_k [-], 0 to 1; 0 at rest.
 
     Args:
-        speed: sliding speed |v| [m/s]. law: index into `FRICTION_LAWS`, the same in all lanes. Ambrosio: c_d
-        = 0 below `slow`, 1 above `fast`,
-            linear between. Threlfall: 1 - exp(-3 |v| / v0) up to v0 = `fast`, constant above. The last:
-            tanh(|v| / `fast`).
+        speed: sliding speed |v| [m/s].
+        law: index into `FRICTION_LAWS`, the same in all lanes. Ambrosio: c_d = 0 below `slow`, 1 above
+            `fast`, linear between. Threlfall: 1 - exp(-3 |v| / v0) up to v0 = `fast`, constant above. The
+            last: tanh(|v| / `fast`).
         slow, fast: threshold speeds v0 and v1 [m/s]; the paper does not print them.
     """
     if law == AMBROSIO:

@@ -172,8 +172,10 @@ def draw_contact(
 
     Args:
         ax: axes of `size` [mm].
-        at: points by name [m]. sole: names of the points that are "toe" and "heel".
-        tip: "toe" or "heel", which of them presses. row: of the trace at this instant.
+        at: points by name [m].
+        sole: names of the points that are "toe" and "heel".
+        tip: "toe" or "heel", which of them presses.
+        row: of the trace at this instant.
     """
     toe, heel, press = at[sole["toe"]], at[sole["heel"]], at[sole[tip]]
     corners = np.array([at["G"], toe, heel])

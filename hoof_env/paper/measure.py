@@ -101,7 +101,8 @@ class Stance:
         angle_range_deg: largest minus smallest hoof angle in contact [deg].
         peak, peak_time: maximum over the cycle of the normal force summed over both points [N], and when [s].
         peak_resultant: the same maximum of the resultant sqrt(Fn^2 + Ft^2) [N].
-        mean: time average of the normal force over the whole cycle [N]. mean_stance: over stance alone [N].
+        mean: time average of the normal force over the whole cycle [N].
+        mean_stance: over stance alone [N].
     """
 
     period: float

@@ -72,9 +72,11 @@ class PublishedRow:
     """One number of the paper.
 
     Attributes:
-        id: "gait.quantity". gait: "walk", "run" or "both".
+        id: "gait.quantity".
+        gait: "walk", "run" or "both".
         quantity, unit: what it is, and in which unit it is printed.
-        printed: the number in print. value: the number as read; the two differ where the print is a slip.
+        printed: the number in print.
+        value: the number as read; the two differ where the print is a slip.
         bar: margin of its reproduction, and `bar_text` as written.
         condition: "elastic", "inelastic" or None where the contact law does not matter.
         reading: which of several readings is taken, or "".

@@ -14,7 +14,6 @@ from typing import Any
 
 import gymnasium
 import numpy as np
-from numpy.typing import NDArray
 
 import hoof_env  # noqa: F401  (registers the environments)
 from hoof_env._output import staged
@@ -23,8 +22,9 @@ from hoof_env.ground.contact import Ground
 from hoof_env.paper import report
 from hoof_env.paper.measure import cycle_of, measure_stance, replay
 from hoof_env.paper.published import CONDITIONS, Published, load_published
-from hoof_env.paper.rows import EXACT, Reproduction, compare, counted, settings_of
+from hoof_env.paper.rows import EXACT, Trace, compare, counted, settings_of
 from hoof_env.paper.rows import SOLVERS as SOLVERS
+from hoof_env.paper.rows import Reproduction as Reproduction
 from hoof_env.paper.shapes import DEPTHS, judge, sole_velocity, walk_brakes
 
 ENVIRONMENT = "hoof_env/HorseLegFixed-v0"
@@ -43,14 +43,13 @@ FIGURES = {
 }
 """The picture that shows each claim about shape."""
 
-Trace = NDArray[np.void]
-
 
 def run_cycle(gait: str, solver: str, **settings: Any) -> Trace:
     """One cycle of a gait on a fixed trunk under the zero action.
 
     Args:
-        gait: as `hoof_env/HorseLegFixed-v0` takes it. solver: one of `SOLVERS`.
+        gait: as `hoof_env/HorseLegFixed-v0` takes it.
+        solver: one of `SOLVERS`.
         settings: further arguments of that environment.
 
     Returns:

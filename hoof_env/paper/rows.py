@@ -39,6 +39,33 @@ loop samples touch-down (docs/evidence/conditions.md has how far they move)."""
 REPORTED, ILL = "reported", "ill-conditioned"
 """Why a row is spared."""
 
+Trace = NDArray[np.void]
+"""One cycle of dtype `measure.CYCLE`."""
+
+
+@dataclass(frozen=True)
+class Reproduction:
+    """What the four conditions gave.
+
+    Attributes:
+        rows: one dictionary for each published row and solver, see `compare`.
+        shapes: one dictionary for each claim about shape and solver: kind ("shape"), id, claim, reading,
+            solver, holds, evidence, readings (verdict by reading, where there are several), used (the reading
+            that holds is of), figure.
+        traces: one cycle of dtype `hoof_env.paper.measure.CYCLE`, its first row at t = 0, by (gait,
+            condition, solver).
+        geometry: the leg, identified and not published.
+        published: what was compared with.
+        ground: the preset's, elastic, the approach speed interpolated.
+    """
+
+    rows: list[dict[str, Any]]
+    shapes: list[dict[str, Any]]
+    traces: dict[tuple[str, str, str], Trace]
+    geometry: Geometry
+    published: Published
+    ground: Ground = field(default_factory=Ground)
+
 
 @dataclass(frozen=True)
 class Quantity:
@@ -193,27 +220,3 @@ def settings_of(solver: str) -> dict[str, Any]:
     if solver == PROBABLE:
         return {"solver": "paper", "baumgarte_beta": betas(load_published())["probable"]}
     return {"solver": solver}
-
-
-@dataclass(frozen=True)
-class Reproduction:
-    """What the four conditions gave.
-
-    Attributes:
-        rows: one dictionary for each published row and solver, see `hoof_env.paper.rows.compare`.
-        shapes: one dictionary for each claim about shape and solver: kind ("shape"), id, claim, reading,
-            solver, holds, evidence, readings (verdict by reading, where there are several), used (the reading
-            that holds is of), figure.
-        traces: one cycle of dtype `hoof_env.paper.measure.CYCLE`, its first row at t = 0, by (gait,
-            condition, solver).
-        geometry: the leg, identified and not published.
-        published: what was compared with.
-        ground: the preset's, elastic, the approach speed interpolated.
-    """
-
-    rows: list[dict[str, Any]]
-    shapes: list[dict[str, Any]]
-    traces: dict[tuple[str, str, str], NDArray[np.void]]
-    geometry: Geometry
-    published: Published
-    ground: Ground = field(default_factory=Ground)

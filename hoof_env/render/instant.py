@@ -1,7 +1,7 @@
 """What a picture, or a record of forces, needs of one instant.
 
 `columns_of_engine` gives columns by name from what `TrunkEngine` says; `instants` turns them into records for
-the renderer. Nothing behind this boundary knows an engine.
+the renderer. Nothing behind this boundary refers to an engine.
 """
 
 from __future__ import annotations

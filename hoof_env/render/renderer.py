@@ -169,7 +169,7 @@ class Renderer:
         if self._closed:
             return
         display = self._pygame.display
-        if display.get_surface() is None:  # at the first frame, or after somebody else's pygame.quit()
+        if display.get_surface() is None:  # at the first frame, or after a pygame.quit() elsewhere
             open_window(self.size, "hoof-env", may_be_unseen=True)
             self._window_open = True
         if any(event.type == self._pygame.QUIT for event in self._pygame.event.get()):
@@ -184,7 +184,7 @@ class Renderer:
 def open_window(size: tuple[int, int], title: str, *, may_be_unseen: bool = False) -> Any:
     """Open pygame's window; returns its surface.
 
-    Without a display SDL falls back to a driver that draws where nobody sees it. That counts as a window if
+    Without a display SDL falls back to a driver that shows nothing. That counts as a window if
     SDL_VIDEODRIVER asks for it; otherwise it is warned of where the window `may_be_unseen`, and refused
     elsewhere.
 

@@ -101,5 +101,5 @@ def _announce_compiling() -> None:
 
 def _say(text: str) -> None:
     if os.environ.get(QUIET, "") in ("", "0"):
-        with suppress(OSError, ValueError):  # nobody listens
+        with suppress(OSError, ValueError):  # stderr is closed
             print(f"hoof-env: {text}", file=sys.stderr, flush=True)

@@ -2,7 +2,7 @@
 
 A subclass of `Layout` says which fields lie one after the other, each a `Row`, a planar `Vector`, a `Block`
 of rows or another layout. Positions follow from the order, here and nowhere else. Kernels reach the fields as
-attributes, of `Rows` on the stack and of `Columns` in an array; Python reaches them by `slices` and `names`.
+attributes, of `Rows` on the stack and of `Columns` in an array; Python reaches them by `rows` and `names`.
 """
 
 from __future__ import annotations

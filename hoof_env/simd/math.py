@@ -17,7 +17,7 @@ from hoof_env.simd import choose, larger, quarter_turns, root, size, smaller
 from hoof_env.simd.compile import inlined
 
 EXPONENT_UNIT = 8
-"""`root_power` knows the exponents that are whole multiples of 1 / EXPONENT_UNIT."""
+"""`root_power` takes the exponents that are whole multiples of 1 / EXPONENT_UNIT."""
 
 LOWEST_EXPONENT = -40.0
 """Below this `exp_of_negative` stays at exp(-40) = 4e-18."""

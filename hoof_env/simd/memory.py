@@ -2,7 +2,7 @@
 
 numba counts references to every array that a kernel slices, with atomic instructions; in a step of a
 hundred nanoseconds that is most of the time. Arrays made by `numba.carray` from these pointers are not
-counted. Memory on the stack is also known to be nobody else's, so that loops over it become vector code,
+counted. Memory on the stack cannot be aliased, so that loops over it become vector code,
 and where every index is a constant it becomes registers.
 """
 

@@ -79,7 +79,8 @@ class Task:
     """An attempt to be made.
 
     Attributes:
-        round, index: its place. seed: of its random numbers, with its place.
+        round, index: its place.
+        seed: of its random numbers, with its place.
         start: name of the start that it goes back to.
         y: the leg that it goes on from, as a search by touch-down has it; for a start x.
         direction: unit vector, shape as y, in a search's scales; empty for a start.

@@ -68,7 +68,8 @@ def collect(
 
     Args:
         starts: legs x to begin with, by name; each is first brought within the bar, and may be a member.
-        aim: what a member must meet. state: where finished attempts lie.
+        aim: what a member must meet.
+        state: where finished attempts lie.
         say: takes a line for each round.
         size: members wanted; there may be fewer.
         attempts: beside the starts; the last round is made whole.

@@ -110,7 +110,8 @@ def accelerate(pivot, values, motion, damping, spring, bodies, points):  # type:
     """Fill `bodies.qdd` by the second row of Eq. 8, and `points`; returns False where it is singular.
 
     Args:
-        pivot: C relative to O, complex [m]. values: as from `geometry.tables`.
+        pivot: C relative to O, complex [m].
+        values: as from `geometry.tables`.
         motion: (theta, its rate, phi, its rate, its acceleration); the crank's acceleration is 0.
         damping, spring: 2 alpha [1/s] and beta^2 [1/s^2].
     """
@@ -161,7 +162,7 @@ def accelerate(pivot, values, motion, damping, spring, bodies, points):  # type:
 
 @kernel
 def swing_motion(theta, gait):  # type: ignore[no-untyped-def]
-    """(theta, its rate, phi, its rate, its acceleration) of a steady gait: `motion_law.evaluate_motion`."""
+    """(theta, its rate, phi, its rate, its acceleration) of a steady gait: `gait.evaluate_motion`."""
     w, s, c = gait[0], np.sin(theta), np.cos(theta)
     wave, slope = gait[2] * s + gait[3] * c, gait[2] * c - gait[3] * s
     return theta, w, gait[1] + wave, slope * w, -wave * w * w
@@ -191,10 +192,13 @@ def euler_cycle(crank, pivot, values, setup, gait, theta, h, bodies, at, velocit
     """Integrate one steady gait by explicit Euler from closed loops; returns whether all stayed finite.
 
     Args:
-        crank: OP [m]. pivot: C relative to O, complex [m]. values: as from `geometry.tables`.
+        crank: OP [m].
+        pivot: C relative to O, complex [m].
+        values: as from `geometry.tables`.
         setup: the leg and its solver, see `measure.Setup`.
         gait: (crank speed [rad/s], offset, sine and cosine coefficient of the swing [rad]).
-        theta: crank angle at the start [rad]. h: time step [s].
+        theta: crank angle at the start [rad].
+        h: time step [s].
         bodies: output, the state at the end.
         at, velocity: outputs, complex, shape (2, n): toe and heel relative to O at n instants, the first at
             the start, in world axes [m, m/s].

@@ -70,7 +70,8 @@ class Cycle(NamedTuple):
     Attributes:
         at, velocity: from `motion.swing_hoof`, or a simulation: complex, shape (2, n) [m, m/s].
         ankle: shape (n,) [m].
-        height: of the swing's centre above the ground [m]. h: time between two instants [s].
+        height: of the swing's centre above the ground [m].
+        h: time between two instants [s].
         sampled: as the paper's solver does it, the approach speed is that of the first sample inside, not of
             the crossing, and the highest force that of a sample.
         stiffness, exponent: K [N/m^n] and n [-] of Eq. 14.
@@ -346,7 +347,8 @@ def measure_gait(cycle, work, out):  # type: ignore[no-untyped-def]
     """Fill `out` from one revolution of toe and heel; returns whether there is a stance.
 
     Args:
-        work: scratch, shape (6, n). out: record of dtype `FEATURES`.
+        work: scratch, shape (6, n).
+        out: record of dtype `FEATURES`.
     """
     at, h, n = cycle.at, cycle.h, cycle.at.shape[1]
     enter, leave = press(cycle, work, out)

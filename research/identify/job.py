@@ -67,7 +67,8 @@ class Result:
     """What a job found.
 
     Attributes:
-        id: round and index. phase: its name.
+        id: round and index.
+        phase: its name.
         root: id of the independent start that it goes back to.
         x: the best leg, see `leg`.
         evaluations, seconds: spent.

@@ -98,7 +98,8 @@ def to_preset(x: Any, choice: Choice, provenance: str) -> dict[str, Any]:
     """The content of a preset file, as those in `hoof_env/data`.
 
     Args:
-        x, choice: the leg. provenance: where its numbers come from.
+        x, choice: the leg.
+        provenance: where its numbers come from.
 
     Raises:
         ParameterError: x has another length, or a gait is outside its limits. GeometryError: the leg cannot

@@ -129,7 +129,8 @@ def offset_at(z, dz, gait, toe, t, speed):  # type: ignore[no-untyped-def]
     nearest it can.
 
     Args:
-        z, dz: from `leg_paths`. gait: as in `swing_hoof`, its offset ignored.
+        z, dz: from `leg_paths`.
+        gait: as in `swing_hoof`, its offset ignored.
     """
     h = 2.0 * np.pi / (z.shape[1] - 1)
     theta = min(max(gait[0] * t, 0.0), 6.28)
@@ -150,7 +151,8 @@ def height_at(at, velocity, h, t):  # type: ignore[no-untyped-def]
     """Height [m] of the swing's centre above a ground that the toe crosses at time t [s].
 
     Args:
-        at, velocity: from `swing_hoof`. h: time between two samples [s].
+        at, velocity: from `swing_hoof`.
+        h: time between two samples [s].
     """
     part = min(max(t / h, 0.0), at.shape[1] - 1.001)
     k = int(part)

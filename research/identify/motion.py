@@ -47,7 +47,9 @@ def leg_paths(crank, pivot, values, z, dz):  # type: ignore[no-untyped-def]
     Column k stands at theta = 2 pi k / (n - 1); lengths in m, derivatives by theta.
 
     Args:
-        crank: OP [m]. pivot: C relative to O, complex [m]. values: as from `geometry.tables`.
+        crank: OP [m].
+        pivot: C relative to O, complex [m].
+        values: as from `geometry.tables`.
 
     Returns:
         miss: largest gap over the revolution of a dyad that does not close, over the dyad's reach [-].

@@ -104,7 +104,9 @@ def plan(
     """The jobs of a round: none if it refines and there is nothing to refine.
 
     Args:
-        number: of the round. results: of all earlier rounds. left: of the budget.
+        number: of the round.
+        results: of all earlier rounds.
+        left: of the budget.
     """
     origins = [(result.x, result.root) for result in elite(phase, results)] if phase.elite else [(start, "")]
     evaluations = max(1, min(phase.evaluations, left // (phase.weight * phase.jobs)))

@@ -65,7 +65,8 @@ def open_state(out: Path, problem: Mapping[str, Any], *, resume: bool, product: 
     Args:
         out: the search's output folder, made if need be.
         problem: JSON object, what tells this search from another.
-        resume: go on with a search rather than begin one. product: the file that it ends with.
+        resume: go on with a search rather than begin one.
+        product: the file that it ends with.
 
     Raises:
         DataFileError: nothing to resume, or a search for something else, or a damaged file.

@@ -47,7 +47,3 @@ def test_more_threads_than_this_process_has_cores_are_refused(monkeypatch):
     for threads in (0, 3):
         with pytest.raises(ParameterError, match=rf"torch_threads: expected .* \[1, 2\], got {threads}"):
             command.check_threads(threads)
-
-
-def test_a_table():
-    assert command.table(["a", "b"], [["1", "2"], ["3"]]) == "| a | b |\n| --- | --- |\n| 1 | 2 |\n| 3 |  |"

@@ -131,7 +131,8 @@ class Step:
     """A run on stiff ground.
 
     Attributes:
-        substeps: that were taken. warned: what the engine said, if anything.
+        substeps: that were taken.
+        warned: what the engine said, if anything.
         trunk, crank: largest error of the trunk's place [m] and of crank angle or pitch [rad] at `TIMES`.
     """
 

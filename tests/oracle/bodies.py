@@ -25,7 +25,8 @@ class PlainBodies:
     """What moves: a trunk, N legs of 14 links and a rotor for each.
 
     Args:
-        trunk: what the legs hang from. limbs: the legs, where they hang and what turns them.
+        trunk: what the legs hang from.
+        limbs: the legs, where they hang and what turns them.
 
     Raises:
         ParameterError: no leg.

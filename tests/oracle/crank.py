@@ -1,4 +1,4 @@
-"""One motor-driven leg on a fixed trunk, as exact as `plain_run` and quick enough for many starts.
+"""One motor-driven leg on a fixed trunk, as exact as `run` and quick enough for many starts.
 
 A reference for the crank angle under load: what the accuracy of a fixed-step scheme is measured against.
 """
@@ -28,8 +28,10 @@ class PlainCrank:
     points are the plain horse's, at the nodes of Chebyshev polynomials on equal pieces of a revolution.
 
     Args:
-        limb: its drive a `Motor`. gait: steady; its swing is in the tables.
-        ground: what it stands on. height: of the crank centre above it [m].
+        limb: its drive a `Motor`.
+        gait: steady; its swing is in the tables.
+        ground: what it stands on.
+        height: of the crank centre above it [m].
         pieces, order: of the tables.
 
     Raises:

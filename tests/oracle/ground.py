@@ -18,7 +18,8 @@ class PlainGround:
     """The laws of a `Ground` (Eqs. 10-15) on a terrain, or on the level y = 0.
 
     Args:
-        ground: laws and their constants. terrain: heights and factors along x.
+        ground: laws and their constants.
+        terrain: heights and factors along x.
     """
 
     def __init__(self, ground: Ground, terrain: Terrain | None = None) -> None:

@@ -2,7 +2,7 @@
 
 The oracle of the fast engine; it shares neither that engine's formulas nor its kernels. Accelerations are
 affine in the generalised accelerations, so a body's partial velocity by a coordinate is what its acceleration
-(`plain_bodies`) gains when that coordinate's is raised by one. With these, J for centres and W for turns,
+(`bodies`) gains when that coordinate's is raised by one. With these, J for centres and W for turns,
 
     sum over bodies of J . m (a + g) + W J_c alpha = generalised force of ground, drives, support and drag
 
@@ -44,7 +44,8 @@ class Moment:
         trunk_acc: of x, y and pitch, shape (3,) [m/s^2, rad/s^2].
         theta_acc, phi, phi_rate, phi_acc: of each crank and swing, shape (N,) [rad, s].
         mass_matrix, load: M and f of M qdd = f for what is free, trunk first, then the motors' cranks.
-        centre, momentum: of the whole [m, kg m/s], complex. angular_momentum: about `centre` [kg m^2/s].
+        centre, momentum: of the whole [m, kg m/s], complex.
+        angular_momentum: about `centre` [kg m^2/s].
         kinetic, potential: energies [J]; the potential is of weight, support's spring and weight share.
         crank_torque, hip_torque: along theta and phi, shape (N,) [N m]. A motor's crank torque is the
             servo's; its hip torque is what the gearing between crank and swing carries.
@@ -78,7 +79,8 @@ class PlainHorse(PlainBodies):
     """N legs on one trunk over the ground.
 
     Args:
-        trunk: what the legs hang from. limbs: the legs, where they hang and what turns them.
+        trunk: what the legs hang from.
+        limbs: the legs, where they hang and what turns them.
         ground: what they stand on, on y = 0 or on `terrain`; where None, nothing.
 
     Raises:
@@ -114,7 +116,7 @@ class PlainHorse(PlainBodies):
             trunk, trunk_rate: x, y, pitch and their rates, shape (3,) [m, rad, s].
             theta, theta_rate: of each crank, shape (N,) [rad, rad/s]; a prescribed rate is the filter's.
             filters: value, rate and acceleration of each leg's gait parameters, shape (N, 4, 3) in the order
-                of `gait.parameters.PARAMETERS`; shape (N, 4) where they are steady.
+                of `gait.gait.PARAMETERS`; shape (N, 4) where they are steady.
             approach: v0 of each hoof point in the ground, NaN of one that is not, shape (N, 2) [m/s]; None
                 where all are in the air.
         """

@@ -36,7 +36,8 @@ class Run:
     """A horse at K times.
 
     Attributes:
-        t: shape (K,) [s]. trunk, trunk_rate: x, y, pitch, shape (K, 3) [m, rad, s].
+        t: shape (K,) [s].
+        trunk, trunk_rate: x, y, pitch, shape (K, 3) [m, rad, s].
         theta, theta_rate: of each crank, shape (K, N) [rad, s].
         work: since the start, of each of `WORKS`, shape (K,) each [J].
         approach: v0 of each hoof point in the ground at each time, else NaN, shape (K, N, 2) [m/s].
@@ -70,7 +71,8 @@ def follow(
         state: at the start; a point in the ground has entered it at its present rate.
         times: increasing, shape (K,) [s].
         floor: of the approach speed [m/s].
-        tolerance: relative and absolute. longest: bound on a step [s], so that no brief touch is missed.
+        tolerance: relative and absolute.
+        longest: bound on a step [s], so that no brief touch is missed.
 
     Returns:
         States, shape (K, ...), approach speeds, shape (K, P), and the touches.

@@ -34,7 +34,8 @@ class Case:
         kind, legs, drive: of the trunk, how many, of the cranks.
         swung: whether phi follows the crank, as in the preset's run; else it is held as amid its walk.
         ground: whether there is any in reach.
-        duration: [s]. samples: instants at which the engines are compared, besides the beginning.
+        duration: [s].
+        samples: instants at which the engines are compared, besides the beginning.
     """
 
     kind: str
