@@ -62,6 +62,7 @@ from hoof_env.gait.gait import FilterSettings, GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.profile import leg_profile
+from hoof_env.simd.user_functions import check_function
 
 FEW = 6
 """Up to so many environments of one leg or four are run one by one: eight lanes would be mostly empty."""
@@ -139,6 +140,8 @@ class TrunkEngine:
         strides: bool = False,
         contact_law: Callable[..., Any] | None = None,
     ) -> None:
+        if contact_law is not None:
+            check_function("contact_law", contact_law, 4)
         self.contact_law = contact_law
         self.limbs = all_of("limbs", limbs, Limb)
         if len(self.limbs) > MOST_LEGS:

@@ -15,7 +15,7 @@ from dataclasses import asdict, dataclass, field, fields, replace
 from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeVar
 
 import gymnasium as gym
 import numpy as np
@@ -267,6 +267,8 @@ TASKS: Mapping[str, Task] = MappingProxyType(
 """The tasks by name."""
 
 
+Part = TypeVar("Part", Term, Entry)
+
 _OWN: dict[str, Task] = {}
 
 
@@ -295,6 +297,15 @@ def _task_like(name: str, names: tuple[list[str], ...]) -> Task:
             f"{name}: pickled with other terms, entries or law: {names}, here {task.names()}"
         )
     return task
+
+
+def _several(name: str, values: Any, kind: type[Part]) -> tuple[Part, ...]:
+    """Some terms or entries, perhaps none."""
+    parts = tuple(values) if isinstance(values, Iterable) else (values,)
+    for part in parts:
+        if not isinstance(values, Iterable) or not isinstance(part, kind):
+            raise ParameterError(f"{name}: expected a list of hoof_env.{kind.__name__}, got {part!r}")
+    return parts
 
 
 def register(
@@ -326,14 +337,11 @@ def register(
             another type, or a setting without effect. Nothing is registered then.
         UnknownArgumentError: an unknown setting.
     """
-    own, more = tuple(terms), tuple(entries)
+    own = _several(f"{env_id}: terms", terms, Term)
+    more = _several(f"{env_id}: entries", entries, Entry)
     if not isinstance(env_id, str) or not re.fullmatch(r"(?!hoof_env/)[\w-]+/[\w-]+-v\d+", env_id):
         raise ParameterError(f"env_id: expected 'namespace/Name-v0' of a namespace of yours, got {env_id!r}")
     old = task_of(base)
-    for kind, given in ((Term, own), (Entry, more)):
-        for one in given:
-            if not isinstance(one, kind):
-                raise ParameterError(f"{env_id}: expected a hoof_env.{kind.__name__}, got {one!r}")
     if contact_law is not None:
         check_function(f"{env_id}: contact_law", contact_law, 4)
     for names in ([term.name for term in own], [entry.name for entry in (*old.entries, *more)]):

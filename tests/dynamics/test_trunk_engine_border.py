@@ -39,6 +39,8 @@ def engine(trunk=FREE, n=3, ground=None):
         ({"limbs": 3}, "limbs: expected Limb, one or more, got 3"),
         ({"trunk": "free"}, "trunk: expected Trunk, got 'free'"),
         ({"trunk": None}, "trunk: expected Trunk, got None"),
+        ({"contact_law": 3}, "contact_law: expected a plain function of 4 arguments, got 3"),
+        ({"contact_law": lambda d: d}, "contact_law: expected a function of 4 arguments, got one of"),
         ({"ground": 2e4}, "ground: expected Ground, got 20000"),
         ({"terrain": 0.1}, "terrain: expected Terrain, got 0.1"),
         ({"filters": {"gain": 3}}, "filters: expected FilterSettings, got {'gain': 3}"),

@@ -318,8 +318,13 @@ def test_the_operation_is_that_of_numbas_message(text, found):
             "names that differ, got mine twice",
         ),
         (lambda: {"entries": [entry(lambda s: 0.0, "height")]}, "names that differ, got height twice"),
-        (lambda: {"terms": [sine]}, "own/Bad-v0: expected a hoof_env.Term, got <function"),
-        (lambda: {"entries": ["speed"]}, "own/Bad-v0: expected a hoof_env.Entry, got 'speed'"),
+        (lambda: {"terms": [sine]}, "own/Bad-v0: terms: expected a list of hoof_env.Term, got <function"),
+        (lambda: {"terms": None}, "own/Bad-v0: terms: expected a list of hoof_env.Term, got None"),
+        (lambda: {"entries": 3}, "own/Bad-v0: entries: expected a list of hoof_env.Entry, got 3"),
+        (
+            lambda: {"entries": ["speed"]},
+            "own/Bad-v0: entries: expected a list of hoof_env.Entry, got 'speed'",
+        ),
         (
             lambda: {"terms": [term(lambda step: 0.0)]},
             r"compute: expected a function of 2 arguments, got one of \(step\)",
