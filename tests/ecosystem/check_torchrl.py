@@ -92,7 +92,9 @@ def test_many_of_its_own(env_id, settings):
     """`GymEnv(id, num_envs=2)` over the ends of episodes, infos included."""
     if settings is FALLS and gym.make(env_id).unwrapped.settings.trunk != "suspended":
         pytest.skip("nothing falls")
+    torch.manual_seed(0)
     env = GymEnv(f"hoof_env:{env_id}", num_envs=2, device="cpu", **settings)  # for workers that are new
+    env.set_seed(0)
     steps = env.rollout(300, break_when_any_done=False)
     assert steps["next", "terminated" if settings is FALLS else "truncated"].sum() >= 2
     assert torch.isfinite(steps["measured"]).all()
