@@ -19,6 +19,7 @@ from hoof_env.envs.batch import EpisodeBatch
 from hoof_env.envs.episode import ACTIONS, FAILED
 from hoof_env.envs.infos import AT_MEASURED, BEGUN, LAST_STEP, MEASURED, START, named
 from hoof_env.envs.recording import Recording
+from hoof_env.envs.reward import failure
 from hoof_env.envs.start import check_seed
 from hoof_env.envs.tasks import task_of, to_json
 from hoof_env.errors import ParameterError, check_choice
@@ -75,7 +76,9 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         """Views of the batch that every step reads or writes."""
         batch = self.batch
         self._terms, self._reward = batch.now.terms[:, 0], memoryview(batch.rewards)  # type: ignore[arg-type]
-        self._paid = [(key, k) for k, key in enumerate(batch.terms) if batch.weights[key[len("reward_") :]]]
+        weighed = [(k, term) for k, term in enumerate(batch.task.terms) if batch.weights[term.name]]
+        self._paid = [(term.key, k) for k, term in weighed if term.compute is not failure]  # 0 before the end
+        self._draws = bool(batch.randomize)
         self._action, self._observation = batch.actions[0], batch.observations[0]
         self._action_buffer: Any = memoryview(self._action)
         self._measured = named(batch.engine.arrays[0][AT_MEASURED, 0], MEASURED)
@@ -241,12 +244,13 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         ended = happened != 0 and self.batch.follow(happened, (self.np_random,))
         terms, info = self._terms, self._begun.copy()  # all keys are there, and stay in their places
         info["gait"], info["measured"] = info["gait"].copy(), self._measured.copy()
-        if self.batch.randomize:
+        if self._draws:
             info["parameters"] = info["parameters"].copy()
         for key, k in self._paid:
             info[key] = terms[k]
         failed = truncated = False
         if ended:
+            info.update(zip(self.batch.terms, terms, strict=True))
             failed = bool(self.batch.now.ended[0] == FAILED)
             truncated = not failed
             if self._state == "running":
@@ -375,8 +379,8 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     def __getstate__(self) -> dict[str, Any]:
         """Copies and pickles leave the window behind; it belongs to this process and this environment."""
         views = (
-            "_terms", "_reward", "_paid", "_action", "_action_buffer", "_observation", "_measured", "_kernel",
-            "_addresses",
+            "_terms", "_reward", "_paid", "_draws", "_action", "_action_buffer", "_observation", "_measured",
+            "_kernel", "_addresses",
         )  # fmt: skip
         return {**{k: v for k, v in vars(self).items() if k not in views}, "_renderer": None}
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.errors import ParameterError, check_number
-from hoof_env.simd import floor, gather, larger, smaller
+from hoof_env.simd import floor, gather_eight, larger, smaller
 from hoof_env.simd.compile import inlined
 from hoof_env.simd.memory import address
 
@@ -257,18 +257,9 @@ def surface(x, cells, origin, per_metre):  # type: ignore[no-untyped-def]
         cells, origin, per_metre: a `TerrainGrid`.
     """
     place = (x - origin) * per_metre
-    cell = floor(
-        smaller(larger(0.0, place), cells.shape[0] - 1.0)
-    )  # this order of arguments sends NaN to cell 0
-    at, part, first = (
-        address(cells),
-        place - cell,
-        8.0 * cell,
-    )  # the level cells at the ends have no rises: any part will do
-    return (
-        gather(at, first) + part * gather(at, first + 1.0),
-        gather(at, first + 2.0),
-        gather(at, first + 3.0),
-        gather(at, first + 4.0) + part * gather(at, first + 5.0),
-        gather(at, first + 6.0) + part * gather(at, first + 7.0),
+    cell = floor(smaller(larger(0.0, place), cells.shape[0] - 1.0))  # this order sends NaN to cell 0
+    part = place - cell  # the level cells at the ends have no rises: any part will do
+    height, rise, normal_x, normal_y, stiffness, firmer, friction, rougher = gather_eight(
+        address(cells), 8.0 * cell
     )
+    return height + part * rise, normal_x, normal_y, stiffness + part * firmer, friction + part * rougher

@@ -25,6 +25,7 @@ from hoof_env.leg.geometry import Geometry, tables
 from hoof_env.leg.kinematics import solve_points
 from hoof_env.leg.linkage import BODIES, POINTS
 from hoof_env.simd.compile import kernel
+from hoof_env.simd.functions import transposed
 from hoof_env.simd.layout import Block, Layout, Row, Vector
 from hoof_env.simd.math import ROUNDER
 from hoof_env.simd.memory import intrinsic
@@ -246,34 +247,6 @@ def _polynomials(builder: Any, first: Any, x: Any, sloped: bool) -> tuple[Any, A
     return value, plus(plus(low_slope, times(cubed, high)), times(x4, high_slope))
 
 
-def _shuffle(builder: Any, one: Any, two: Any, mask: list[int]) -> Any:
-    return builder.shuffle_vector(one, two, ir.Constant(ir.VectorType(ir.IntType(32), len(mask)), mask))
-
-
-def _columns(builder: Any, rows: list[Any]) -> list[Any]:
-    """The columns of `_HALF` wide rows, one a lane: squares are transposed in log2 steps of exchanging
-    blocks between pairs of rows."""
-    n = len(rows)
-    if n == 1:
-        return [pick(builder, rows[0], k, _HALF) for k in range(_HALF)]
-    found = []
-    for begin in range(0, _HALF, n):
-        square = [_shuffle(builder, row, row, list(range(begin, begin + n))) for row in rows]
-        block = 1
-        while block < n:
-            swapped = list(square)
-            low = [i + (n - block if i & block else 0) for i in range(n)]
-            high = [i + block if not i & block else n + i for i in range(n)]
-            for i in range(n):
-                if not i & block:
-                    one, two = square[i], square[i + block]
-                    swapped[i] = _shuffle(builder, one, two, low)
-                    swapped[i + block] = _shuffle(builder, one, two, high)
-            square, block = swapped, 2 * block
-        found += square
-    return found
-
-
 @intrinsic
 def look_up(context: Any, functions: Any, slopes: Any, table: Any, first: Any, cells: Any, theta: Any) -> Any:
     """Look up all functions and derivatives.
@@ -310,7 +283,7 @@ def look_up(context: Any, functions: Any, slopes: Any, table: Any, first: Any, c
             other = builder.gep(place, [INDEX(_HALF)])
             high.append(_polynomials(builder, other, angle, sloped=False)[0])
         for rows, begin, lanes in ((functions, 0, low), (functions, _HALF, high), (slopes, 0, derivatives)):
-            for k, column in enumerate(_columns(builder, lanes)):
+            for k, column in enumerate(transposed(builder, lanes, _HALF)):
                 store_row(builder, column, rows, INDEX(begin + k), count)
         return context.get_dummy_value()
 

@@ -9,11 +9,11 @@ from numba.core import cgutils, types
 
 from hoof_env.simd.memory import intrinsic
 from hoof_env.simd.types import (
+    DOUBLE,
     INDEX,
     Lanes,
     Plane,
     count_of,
-    gathered,
     join,
     number,
     pick,
@@ -204,15 +204,45 @@ def anywhere(context: Any, condition: Any) -> Any:
     return types.boolean(condition), emit
 
 
+def _shuffle(builder: Any, one: Any, two: Any, mask: list[int]) -> Any:
+    return builder.shuffle_vector(one, two, ir.Constant(ir.VectorType(ir.IntType(32), len(mask)), mask))
+
+
+def transposed(builder: Any, rows: list[Any], width: int) -> list[Any]:
+    """The columns of rows of so many numbers, one row a lane: squares are transposed in log2 steps of
+    exchanging blocks between pairs of rows."""
+    n = len(rows)
+    if n == 1:
+        return [pick(builder, rows[0], k, width) for k in range(width)]
+    found = []
+    for begin in range(0, width, n):
+        square = [_shuffle(builder, row, row, list(range(begin, begin + n))) for row in rows]
+        block = 1
+        while block < n:
+            swapped = list(square)
+            low = [i + (n - block if i & block else 0) for i in range(n)]
+            high = [i + block if not i & block else n + i for i in range(n)]
+            for i in range(n):
+                if not i & block:
+                    one, two = square[i], square[i + block]
+                    swapped[i] = _shuffle(builder, one, two, low)
+                    swapped[i + block] = _shuffle(builder, one, two, high)
+            square, block = swapped, 2 * block
+        found += square
+    return found
+
+
 @intrinsic
-def gather(context: Any, pointer: Any, index: Any) -> Any:
-    """pointer[index] in every lane; the index is a double that holds a whole number."""
+def gather_eight(context: Any, pointer: Any, index: Any) -> Any:
+    """pointer[index] to pointer[index + 7] in every lane, eight results; the index is a double that holds a
+    whole number. One conversion and one load of a vector a lane."""
 
     def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        count, found = getattr(signature.return_type, "count", 1), []
+        count, found = getattr(signature.args[1], "count", 1), []
         for lane in range(count):
             at = builder.fptosi(pick(builder, values[1], lane, count), INDEX)
-            found.append(builder.load(builder.gep(values[0], [at])))
-        return gathered(builder, found)
+            place = builder.bitcast(builder.gep(values[0], [at]), ir.VectorType(DOUBLE, 8).as_pointer())
+            found.append(builder.load(place, align=8))
+        return context.make_tuple(builder, signature.return_type, transposed(builder, found, 8))
 
-    return index(pointer, index), emit
+    return types.UniTuple(index, 8)(pointer, index), emit

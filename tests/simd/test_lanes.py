@@ -16,7 +16,7 @@ from hoof_env.simd import (
     dot,
     fill,
     floor,
-    gather,
+    gather_eight,
     lane_sum,
     larger,
     level,
@@ -159,13 +159,14 @@ def test_memory_is_read_and_written_apart(stride):
         row = rows(doubles(4), 4, None)
         x = read(row, address(table), 2, stride)
         write(x, address(found), 1, stride)
-        row[0] = gather(address(table), read(row, address(index), 0, 1))
-        write(row[0], address(found), 20, 1)
+        many = gather_eight(address(table), read(row, address(index), 0, 1))
+        for k in range(8):
+            write(many[k], address(found), 20 + 4 * k, 1)
 
-    table, found = np.arange(20.0), np.full(24, -1.0)
+    table, found = np.arange(30.0), np.full(52, -1.0)
     copy(table, np.array([3.0, 0.0, 19.0, 7.0]), found)
     np.testing.assert_array_equal(found[1 : 1 + 4 * stride : stride], table[2 : 2 + 4 * stride : stride])
-    np.testing.assert_array_equal(found[20:], [3, 0, 19, 7])
+    np.testing.assert_array_equal(found[20:].reshape(8, 4), np.arange(8)[:, None] + [3, 0, 19, 7])
 
 
 def test_lanes_of_different_counts_do_not_mix():
