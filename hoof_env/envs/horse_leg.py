@@ -78,6 +78,7 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._terms, self._reward = batch.now.terms[:, 0], memoryview(batch.rewards)  # type: ignore[arg-type]
         weighed = [(k, term) for k, term in enumerate(batch.task.terms) if batch.weights[term.name]]
         self._paid = [(term.key, k) for k, term in weighed if term.compute is not failure]  # 0 before the end
+        self._draws = bool(batch.randomize)
         self._action, self._observation = batch.actions[0], batch.observations[0]
         self._action_buffer: Any = memoryview(self._action)
         self._measured = named(batch.engine.arrays[0][AT_MEASURED, 0], MEASURED)
@@ -242,7 +243,9 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         happened = self._kernel(self._addresses)  # not through the batch: a call costs as much as a substep
         ended = happened != 0 and self.batch.follow(happened, (self.np_random,))
         terms, info = self._terms, self._begun.copy()  # all keys are there, and stay in their places
-        info["measured"] = self._measured.copy()
+        info["gait"], info["measured"] = info["gait"].copy(), self._measured.copy()
+        if self._draws:
+            info["parameters"] = info["parameters"].copy()
         for key, k in self._paid:
             info[key] = terms[k]
         failed = truncated = False
@@ -274,7 +277,6 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     def _begin(self) -> None:
         """What each info of this episode says of its start, and the keys of what a step fills in."""
         row, n = self.batch.begun[:, 0].copy(), len(START)
-        row.flags.writeable = False  # all infos of the episode share it
         self._begun: dict[str, Any] = dict(zip(START, row, strict=False))
         self._begun["gait"] = named(row[n:BEGUN], PARAMETERS)
         if self.batch.randomize:
@@ -377,7 +379,7 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     def __getstate__(self) -> dict[str, Any]:
         """Copies and pickles leave the window behind; it belongs to this process and this environment."""
         views = (
-            "_terms", "_reward", "_paid", "_action", "_action_buffer", "_observation", "_measured",
+            "_terms", "_reward", "_paid", "_draws", "_action", "_action_buffer", "_observation", "_measured",
             "_kernel", "_addresses",
         )  # fmt: skip
         return {**{k: v for k, v in vars(self).items() if k not in views}, "_renderer": None}
