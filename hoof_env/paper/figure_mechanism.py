@@ -32,12 +32,10 @@ from hoof_env.paper.figure_style import (
     draw_ground,
     head,
     name_height,
-    name_travel,
     panel,
+    panel_title,
     points_at,
-    set_size,
     text_size,
-    write,
 )
 from hoof_env.paper.measure import POINTS
 
@@ -142,14 +140,9 @@ class Scene:
         self.ax.text(*place, text, ha="center", va="center", zorder=9, **settings)
 
     def _put(self, candidates: Point, size: tuple[float, float], costs: Point, drawn: Point) -> Point:
-        """Where a label goes [m]: the candidate that covers least of what is drawn and of other labels.
-
-        Args:
-            candidates: possible centres, shape (k, 2) [mm].
-            size: width and height of the label [mm].
-            costs: what each candidate costs beforehand, shape (k,); covering a dot costs 1.
-            drawn: dots that the label must not cover, shape (j, 2) [mm].
-        """
+        """Where a label of `size` [mm] goes [m]: the candidate centre, shape (k, 2) [mm], that covers least
+        of the dots `drawn`, shape (j, 2) [mm], and of other labels; to cover one costs 1, and `costs` are
+        those of each candidate beforehand."""
         half = np.array(size) / 2
         near = np.abs(np.concatenate([drawn, self._labels]) - candidates[:, None])
         outside = np.clip(half - candidates, 0, None) + np.clip(candidates + half - self._size, 0, None)
@@ -166,15 +159,12 @@ class Scene:
 def draw_contact(
     ax: Any, size: tuple[float, float], at: dict[str, Point], sole: dict[str, str], tip: str, row: np.void
 ) -> None:
-    """Forces, slip, penetration and hoof angle at one instant.
-
-    Arrows and the ground's spring and damper are drawn in parts of the hoof's longest side.
+    """Forces, slip, penetration and hoof angle at one instant, in parts of the hoof's longest side.
 
     Args:
         ax: axes of `size` [mm].
         at: points by name [m].
-        sole: names of the points that are "toe" and "heel".
-        tip: "toe" or "heel", which of them presses.
+        sole: names of the points that are "toe" and "heel"; `tip` is the one that presses.
         row: of the trace at this instant.
     """
     toe, heel, press = at[sole["toe"]], at[sole["heel"]], at[sole[tip]]
@@ -198,8 +188,10 @@ def draw_contact(
     for start, vector, _, colour in arrows:
         draw_arrow(ax, start, start + vector, colour)
     gauge = np.array([[press[0] + 0.5 * side, 0], press + np.array([0.5 * side, 0])])
-    level, arc = _angle(toe, heel, row["hoof_angle"])
-    lines = [level, np.array([press, gauge[1]])]
+    length = float(np.linalg.norm(heel - toe))
+    turn = np.linspace(np.pi - row["hoof_angle"], np.pi, 30)
+    arc = toe + 0.75 * length * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    lines = [np.array([toe - (length, 0), toe]), np.array([press, gauge[1]])]
     for line in lines:
         ax.plot(*line.T, color="black", lw=0.6, ls=":", zorder=4)
     ax.plot(*gauge.T, color="black", lw=0.8, marker="_", ms=5)
@@ -218,14 +210,6 @@ def draw_contact(
     scene.name(gauge.mean(axis=0), r"$\delta$", 0.8, fontsize=8)
 
 
-def _angle(toe: Point, heel: Point, angle: float) -> tuple[Point, Point]:
-    """The level through the toe, and the arc from it to the sole: the hoof angle, heel up positive [rad]."""
-    sole = float(np.linalg.norm(heel - toe))
-    turn = np.linspace(np.pi - angle, np.pi, 30)
-    arc = toe + 0.75 * sole * np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    return np.array([toe - (sole, 0), toe]), arc
-
-
 def _ground_element(top: Point, depth: float) -> list[Point]:
     """The spring and the damper of Eq. 14 from a point down, as polylines."""
     zigzag = np.array([[0, 0], [0, -2], [1, -3], [-1, -4], [1, -5], [-1, -6], [1, -7], [0, -8], [0, -10]])
@@ -236,11 +220,8 @@ def _ground_element(top: Point, depth: float) -> list[Point]:
     return [top + depth / 10 * np.array(line) for line in (spring, *damper, *ends)]
 
 
-LEG, PANEL = 66.0, 92.0
-"""Width of the panel with the whole leg, height of both panels [mm]."""
-
-BADGE, NUMBER = 3.4, 6.0
-"""Diameter of the circle around a link's number [mm], size of the number [points]."""
+LEG, PANEL = 66.0, 92.0  # width of the panel with the whole leg, height of both panels [mm]
+BADGE, NUMBER = 3.4, 6.0  # diameter of the circle around a link's number [mm], size of the number [points]
 
 
 def draw_mechanism(figure: Any, reproduction: Reproduction) -> None:
@@ -249,9 +230,9 @@ def draw_mechanism(figure: Any, reproduction: Reproduction) -> None:
     gait, tip, row = _instant(reproduction)
     geometry = reproduction.geometry
     at = points_at(geometry, row)
-    set_size(figure, HEAD + 5 + PANEL + 22)
     head(
-        figure, reproduction, "Figure 1. Mechanism of the leg and its contact with the ground", "elastic",
+        figure, HEAD + 5 + PANEL + 22, reproduction,
+        "Figure 1. Mechanism of the leg and its contact with the ground", "elastic",
         f"{GAITS[gait]} at {row['time']:.3f} s. Bodies numbered as in Eq. 2.",
     )  # fmt: skip
     close = LEFT + LEG + GAP
@@ -259,14 +240,13 @@ def draw_mechanism(figure: Any, reproduction: Reproduction) -> None:
     titles = ("(a) the leg", f"(b) its hoof, the {tip} in the ground")
     panels = []
     for title, (left, width) in zip(titles, widths.items(), strict=True):
-        write(figure, left, HEAD, title)
-        name_travel(figure, left, HEAD, width)
+        panel_title(figure, left, title, width)
         panels.append(panel(figure, left, HEAD + 5, width, PANEL))
     name_height(panels[0], "height above the ground [m]", LEG)
     sole = {"toe": geometry.toe, "heel": geometry.heel}
     _draw_whole(panels[0], at, sole)
     draw_contact(panels[1], (widths[close], PANEL), at, sole, tip, row)
-    figure.legend(*_role_legend(), loc="lower center", ncols=4, borderaxespad=0.2)
+    _explain_roles(figure)
 
 
 def _instant(reproduction: Reproduction) -> tuple[str, str, np.void]:
@@ -281,15 +261,16 @@ def _instant(reproduction: Reproduction) -> tuple[str, str, np.void]:
     return gait, point, trace[int(np.argmax(weight))]
 
 
-def _role_legend() -> tuple[list[Any], list[str]]:
-    """A line and the name of each role, with the numbers of its bodies."""
+def _explain_roles(figure: Any) -> None:
+    """A legend with the line and the name of each role and the numbers of its bodies."""
     from matplotlib.lines import Line2D
 
     roles: dict[str, list[int]] = {}
     for number, body in enumerate(BODIES, start=1):
         roles.setdefault(body.role, []).append(number)
     lines = [Line2D([], [], color=ROLE_COLOURS[role], lw=1.8) for role in roles]
-    return lines, [f"{', '.join(map(str, numbers))}  {role}" for role, numbers in roles.items()]
+    names = [f"{', '.join(map(str, numbers))}  {role}" for role, numbers in roles.items()]
+    figure.legend(lines, names, loc="lower center", ncols=4, borderaxespad=0.2)
 
 
 def _draw_whole(ax: Any, at: dict[str, Point], sole: dict[str, str]) -> None:

@@ -1,20 +1,22 @@
-"""What the redrawn figures share: colours, type, published values, ground, poses and layout.
+"""What the redrawn figures share: colours, type, layout, ground, poses, published values and sub-phases.
 
 Panels and lines of text stand in millimetres from the upper left corner of the figure.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.leg.geometry import Geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
-from hoof_env.leg.linkage import POINTS
-from hoof_env.paper.measure import Stance, measure_stance
+from hoof_env.leg.linkage import POINTS as JOINTS
+from hoof_env.paper.measure import POINTS, Stance, measure_stance
 from hoof_env.paper.published import PublishedRow
 
 if TYPE_CHECKING:
@@ -73,12 +75,12 @@ PRINT: dict[Any, Any] = {
 def points_at(geometry: Geometry, row: np.void) -> dict[str, NDArray[np.float64]]:
     """World position (x, y) [m] of every named point at one row of a trace."""
     frame = FrameMotion(phi=float(row["phi"]), position=(float(row["x"]), float(row["y"])))
-    return dict(zip(POINTS, pose(geometry, float(row["theta"]), frame=frame).points, strict=True))
+    return dict(zip(JOINTS, pose(geometry, float(row["theta"]), frame=frame).points, strict=True))
 
 
-def row_at(trace: NDArray[np.void], t: float) -> np.void:
-    """The row of a trace nearest to an instant [s]."""
-    return trace[int(np.argmin(np.abs(trace["time"] - t)))]
+def leg_at(reproduction: Reproduction, trace: NDArray[np.void], t: float) -> dict[str, NDArray[np.float64]]:
+    """`points_at` the row of a trace nearest to an instant [s]."""
+    return points_at(reproduction.geometry, trace[int(np.argmin(np.abs(trace["time"] - t)))])
 
 
 def elastic_cycles(reproduction: Reproduction) -> dict[str, tuple[NDArray[np.void], Stance]]:
@@ -107,23 +109,10 @@ def half_bar(row: PublishedRow) -> float:
     return abs(row.value) * limit / 100 if row.bar.measure == "%" else limit
 
 
-WIDTH = 175.0
-"""Two columns of a journal [mm]."""
-
-LEFT, GAP = 14.0, 13.0
-"""Room for the vertical axis of the first panel and of the second [mm]."""
-
-HEAD = 13.0
-"""Height of the lines above the panels [mm]."""
-
-INCH = 25.4
-"""[mm]"""
-
-
-def set_size(figure: Any, height: float) -> None:
-    """Make the figure `WIDTH` wide and `height` high [mm]; its axes stand where `panel` puts them."""
-    figure.set_layout_engine("none")
-    figure.set_size_inches(WIDTH / INCH, height / INCH)
+WIDTH = 175.0  # two columns of a journal [mm]
+LEFT, GAP = 14.0, 13.0  # room for the vertical axis of the first panel and of the second [mm]
+HEAD = 13.0  # height of the lines above the panels [mm]
+INCH = 25.4  # [mm]
 
 
 def _place(figure: Any, left: float, top: float) -> tuple[float, float]:
@@ -145,8 +134,11 @@ def write(figure: Any, left: float, top: float, text: str, **settings: Any) -> N
     figure.text(*_place(figure, left, top), text, va="top", parse_math=False, **settings)
 
 
-def head(figure: Any, reproduction: Reproduction, title: str, ground: str, note: str) -> None:
-    """What the figure shows; below, that the leg is identified, its preset, solver and ground; a note."""
+def head(figure: Any, height: float, reproduction: Reproduction, title: str, ground: str, note: str) -> None:
+    """Make the figure `WIDTH` wide and `height` high [mm] and head it: what it shows; that the leg is
+    identified, its preset, solver and ground; a note."""
+    figure.set_layout_engine("none")
+    figure.set_size_inches(WIDTH / INCH, height / INCH)
     write(figure, 1, 1, title, weight="bold")
     preset = Path(reproduction.geometry.name).name
     leg = f"Identified leg, not published (preset {preset}); {SOLVER} solver; {ground} ground."
@@ -154,17 +146,18 @@ def head(figure: Any, reproduction: Reproduction, title: str, ground: str, note:
     write(figure, 1, 8.4, note, fontsize=SMALL, color=GREY)
 
 
+def panel_title(figure: Any, left: float, text: str, width: float) -> None:
+    """Name a panel `width` [mm], with the direction of travel at the right end of the line."""
+    write(figure, left, HEAD, text)
+    write(figure, left + width - 17.5, HEAD + 0.3, "travel", fontsize=SMALL, color=GREY)
+    start, end = (_place(figure, left + width - off, HEAD + 1.7) for off in (8, 0))
+    draw_arrow(figure, start, end, GREY, transform=figure.transFigure, lw=0.9)
+
+
 def name_height(ax: Any, text: str, width: float) -> None:
     """Name the vertical axis of a panel `width` [mm], clear of the numbers whatever their length."""
     ax.set_ylabel(text, va="bottom")
     ax.yaxis.set_label_coords(-9.5 / width, 0.5)
-
-
-def name_travel(figure: Any, left: float, top: float, width: float) -> None:
-    """The direction of travel at the right end of the line that names a panel [mm]."""
-    write(figure, left + width - 17.5, top + 0.3, "travel", fontsize=SMALL, color=GREY)
-    start, end = (_place(figure, left + width - off, top + 1.7) for off in (8, 0))
-    draw_arrow(figure, start, end, GREY, transform=figure.transFigure, lw=0.9)
 
 
 def draw_arrow(where: Any, start: Any, end: Any, colour: str, **settings: Any) -> None:
@@ -191,3 +184,102 @@ def text_size(text: str, size: float, weight: str = "normal") -> tuple[float, fl
 
     box = TextPath((0, 0), text, size=size, prop=FontProperties(weight=weight)).get_extents()
     return box.width * INCH / 72, size * INCH / 72
+
+
+BOTH = {"walk": "flat", "run": "roll-over"}
+"""What the paper calls the part of the stance in which toe and heel both bear."""
+
+TINTS = {("toe",): "#F6E4EE", ("heel",): "#D5EEE5", ("toe", "heel"): "#FBF2D3", (): "white"}
+"""Light colours by the points that bear."""
+
+STRIP = 2.0
+"""Height of the strip that names the sub-phases [mm]."""
+
+
+class Phase(NamedTuple):
+    """One sub-phase of a stance: its name, start and end [s], and the hoof points that bear in it."""
+
+    name: str
+    start: float
+    end: float
+    bearing: tuple[str, ...]
+
+
+def sub_phases(stance: Stance, gait: str) -> tuple[Phase, ...]:
+    """The stance cut where toe or heel enters or leaves the ground.
+
+    One point bearing alone is its strike at the start of the stance, its off at the end and otherwise
+    'alone'; both bearing have the paper's name for the gait (`BOTH`).
+    """
+    instants = sorted({t for name in POINTS for interval in getattr(stance, name) for t in interval})
+    pieces = list(pairwise(instants))
+    phases = []
+    for place, (start, end) in enumerate(pieces):
+        bearing = tuple(
+            name
+            for name in POINTS
+            if any(enter <= start and end <= leave for enter, leave in getattr(stance, name))
+        )
+        if len(bearing) == 1:
+            part = " alone"
+            if len(pieces) > 1:
+                part = {0: "-strike", len(pieces) - 1: "-off"}.get(place, part)
+            name = bearing[0] + part
+        else:
+            name = BOTH[gait] if bearing else "in the air"
+        phases.append(Phase(name, start, end, bearing))
+    return tuple(phases)
+
+
+def shade(ax: Any, phases: tuple[Phase, ...]) -> None:
+    """Shade the sub-phases behind curves over time [s]."""
+    for phase in phases:
+        ax.axvspan(phase.start, phase.end, fc=TINTS[phase.bearing], lw=0, zorder=0)
+
+
+def time_limits(reproduction: Reproduction, gait: str, stance: Stance, margin: float) -> tuple[float, float]:
+    """Interval [s] of the stance and the published instants of contact, and `margin` of it either side."""
+    published = [row.value for row in _contact_rows(reproduction, gait)]
+    start, end = min(stance.start, *published), max(stance.end, *published)
+    return start - margin * (end - start), end + margin * (end - start)
+
+
+def mark_contacts(ax: Any, reproduction: Reproduction, gait: str, y: float) -> None:
+    """The published instants of contact on an axis of time [s]."""
+    for row in _contact_rows(reproduction, gait):
+        mark_published(ax, row.value, y, xerr=half_bar(row))
+
+
+def _contact_rows(reproduction: Reproduction, gait: str) -> list[PublishedRow]:
+    return [reproduction.published.row(f"{gait}.{name}") for name in ("contact_start", "contact_end")]
+
+
+def spread(centres: Sequence[float], widths: Sequence[float], low: float, high: float) -> list[float]:
+    """Centres of labels of these widths [mm], in order, moved as little as keeps them apart and, if they fit,
+    within [low, high]."""
+    placed = []
+    for centre, width in zip(centres, widths, strict=True):
+        placed.append(max(centre, low + width / 2))
+        low = placed[-1] + width / 2
+    for k in reversed(range(len(placed))):
+        placed[k] = min(placed[k], high - widths[k] / 2)
+        high = placed[k] - widths[k] / 2
+    return placed
+
+
+def name_phases(
+    figure: Any, left: float, top: float, width: float, limits: tuple[float, float], phases: tuple[Phase, ...]
+) -> None:
+    """A strip of the sub-phases, `limits` [s] at its ends, with their names above it."""
+    ax = panel(figure, left, top, width, STRIP, xlim=limits, ylim=(0, 1))
+    ax.axis("off")
+    shade(ax, phases)
+    scale = width / (limits[1] - limits[0])
+    sizes = [text_size(phase.name, SMALL)[0] + 1.5 for phase in phases]
+    middles = [(phase.start + phase.end) / 2 for phase in phases]
+    wanted = [scale * (middle - limits[0]) for middle in middles]
+    for phase, middle, place in zip(phases, middles, spread(wanted, sizes, 0, width), strict=True):
+        ax.plot([phase.start] * 2, [0, 1], color=GREY, lw=0.5)
+        ax.plot([phase.end] * 2, [0, 1], color=GREY, lw=0.5)
+        ax.plot([middle, limits[0] + place / scale], [0.9, 1.6], color=GREY, lw=0.5, clip_on=False)
+        ax.text(limits[0] + place / scale, 1.7, phase.name, fontsize=SMALL, ha="center", va="bottom")

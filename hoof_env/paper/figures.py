@@ -17,7 +17,6 @@ from hoof_env._output import staged
 from hoof_env.errors import HoofEnvError
 from hoof_env.leg.linkage import BODIES
 from hoof_env.paper.figure_mechanism import draw_mechanism
-from hoof_env.paper.figure_phases import STRIP, mark_contacts, name_phases, shade, sub_phases, time_limits
 from hoof_env.paper.figure_style import (
     BLUE,
     CONDITION_COLOURS,
@@ -32,6 +31,7 @@ from hoof_env.paper.figure_style import (
     SKY,
     SMALL,
     SOLVER,
+    STRIP,
     TOE,
     WIDTH,
     draw_arrow,
@@ -39,14 +39,17 @@ from hoof_env.paper.figure_style import (
     elastic_cycles,
     half_bar,
     head,
+    leg_at,
     legend_below,
+    mark_contacts,
     mark_published,
     name_height,
-    name_travel,
+    name_phases,
     panel,
-    points_at,
-    row_at,
-    set_size,
+    panel_title,
+    shade,
+    sub_phases,
+    time_limits,
     write,
 )
 from hoof_env.paper.measure import Stance, measure_stance
@@ -55,11 +58,8 @@ from hoof_env.paper.shapes import find_peaks
 if TYPE_CHECKING:
     from hoof_env.paper.rows import Reproduction
 
-HOOVES = 8
-"""The hoof is drawn at this many equally spaced instants of the cycle."""
-
-TALLEST, NEAR = 110.0, 26.0
-"""Most height for the whole leg, height near the ground [mm]."""
+HOOVES = 8  # the hoof is drawn at this many equally spaced instants of the cycle
+TALLEST, NEAR = 110.0, 26.0  # most height for the whole leg, height near the ground [mm]
 
 Trace = NDArray[np.void]
 
@@ -78,9 +78,8 @@ def draw_paths(figure: Any, reproduction: Reproduction) -> None:
     room = WIDTH - LEFT - GAP - 2
     scale = min(room / sum(spans.values()), TALLEST / rise)
     tall = scale * rise
-    set_size(figure, HEAD + 5 + tall + 4 + NEAR + 19)
     head(
-        figure, reproduction, "Figure 3. Paths of the hoof", "elastic",
+        figure, HEAD + 5 + tall + 4 + NEAR + 19, reproduction, "Figure 3. Paths of the hoof", "elastic",
         "Marks lie on the paths at the published instants of contact. Below, heights are stretched.",
     )  # fmt: skip
     left = LEFT
@@ -88,8 +87,7 @@ def draw_paths(figure: Any, reproduction: Reproduction) -> None:
         width = room * spans[gait] / sum(spans.values())
         middle = boxes[gait][:, 0].mean()
         across = (middle - width / scale / 2, middle + width / scale / 2)
-        write(figure, left, HEAD, f"({letter}) {GAITS[gait]}")
-        name_travel(figure, left, HEAD, width)
+        panel_title(figure, left, f"({letter}) {GAITS[gait]}", width)
         whole = panel(
             figure, left, HEAD + 5, width, tall, xlim=across, ylim=(low, low + rise), xticklabels=[]
         )
@@ -100,7 +98,7 @@ def draw_paths(figure: Any, reproduction: Reproduction) -> None:
         deepest = max(trace["toe_penetration"].max(), trace["heel_penetration"].max())
         near.set_ylim(-1.15 * deepest, max(0.6 * deepest, 1.15 * contacts[:, 1].max()))
         near.locator_params(axis="y", nbins=4)
-        _draw_leg(whole, points_at(reproduction.geometry, row_at(trace, stance.middle)))
+        _draw_leg(whole, leg_at(reproduction, trace, stance.middle))
         _draw_hooves(whole, reproduction, trace, stance)
         for ax in (whole, near):
             draw_ground(ax, -2)
@@ -116,8 +114,8 @@ def draw_paths(figure: Any, reproduction: Reproduction) -> None:
 
 def _extent(reproduction: Reproduction, trace: Trace, stance: Stance) -> NDArray[np.float64]:
     """Lower left and upper right corner [m] of what is drawn of a gait, with a margin."""
-    leg = points_at(reproduction.geometry, row_at(trace, stance.middle)).values()
-    hooves = [points_at(reproduction.geometry, row_at(trace, t))["G"] for t in _instants(stance)]
+    leg = leg_at(reproduction, trace, stance.middle).values()
+    hooves = [leg_at(reproduction, trace, t)["G"] for t in _instants(stance)]
     paths = [np.stack([trace[f"{name}_x"], -trace[f"{name}_penetration"]], 1) for name in ("toe", "heel")]
     shown = np.concatenate([*paths, np.array([*leg, *hooves])])
     return np.array([shown.min(axis=0) - 0.1, shown.max(axis=0) + 0.1])
@@ -138,7 +136,7 @@ def _draw_leg(ax: Any, at: dict[str, NDArray[np.float64]]) -> None:
 
 def _draw_hooves(ax: Any, reproduction: Reproduction, trace: Trace, stance: Stance) -> None:
     for t in _instants(stance):
-        at = points_at(reproduction.geometry, row_at(trace, t))
+        at = leg_at(reproduction, trace, t)
         bears = stance.start <= t <= stance.end
         look = {"fc": SKY, "alpha": 0.6, "label": "hoof in stance"} if bears else {"fc": "#CCCCCC"}
         look = {"alpha": 0.5, "label": "hoof in swing", "ec": GREY, "lw": 0.4, "zorder": 3} | look
@@ -169,11 +167,8 @@ def _published_contacts(
     return np.array(places)
 
 
-SKETCHES = 7
-"""The hoof is sketched at this many equally spaced instants of the stance, its ends included."""
-
-TALLEST_SKETCH, ANGLE = 24.0, 52.0
-"""Most height for the sketches, height of the angle [mm]."""
+SKETCHES = 7  # the hoof is sketched at this many equally spaced instants of the stance, its ends included
+TALLEST_SKETCH, ANGLE = 24.0, 52.0  # most height for the sketches, height of the angle [mm]
 
 
 def draw_angles(figure: Any, reproduction: Reproduction) -> None:
@@ -192,13 +187,14 @@ def draw_angles(figure: Any, reproduction: Reproduction) -> None:
     )
     span = scale * extent[..., 1].min() - 5, scale * extent[..., 1].max() + 1.5  # around the ground [mm]
     tall = span[1] - span[0]
-    set_size(figure, HEAD + 23 + tall + ANGLE + 14)
-    head(figure, reproduction, "Figure 4. Hoof angle over the cycle", "elastic", _readings(reproduction))
+    head(
+        figure, HEAD + 23 + tall + ANGLE + 14, reproduction, "Figure 4. Hoof angle over the cycle", "elastic",
+        _readings(reproduction),
+    )  # fmt: skip
     for place, (gait, (trace, stance)) in enumerate(cycles.items()):
         left, top = LEFT + place * (width + GAP), HEAD
         phases = sub_phases(stance, gait)
-        write(figure, left, top, f"({'ab'[place]}) {GAITS[gait]}")
-        name_travel(figure, left, top, width)
+        panel_title(figure, left, f"({'ab'[place]}) {GAITS[gait]}", width)
         half = (stance.end - stance.start) / (SKETCHES - 1) / 2
         limits = stance.start - half, stance.end + half
         name_phases(figure, left, top + 8, width, limits, phases)
@@ -236,7 +232,7 @@ def _sketch_shapes(reproduction: Reproduction, trace: Any, stance: Stance) -> ND
     geometry = reproduction.geometry
     shapes = []
     for t in np.linspace(stance.start, stance.end, SKETCHES):
-        at = points_at(geometry, row_at(trace, t))
+        at = leg_at(reproduction, trace, t)
         shape = np.array([at["G"], at[geometry.toe], at[geometry.heel]])
         shape[:, 0] -= (shape[:, 0].min() + shape[:, 0].max()) / 2
         shapes.append(shape)
@@ -277,9 +273,7 @@ def _mark_angles(ax: Any, reproduction: Reproduction, gait: str, stance: Stance)
         mark_published(ax, middle, rows["angle_flat"].value, yerr=half_bar(rows["angle_flat"]))
 
 
-MEAN, FORCE, CONTACT = 12.0, 56.0, 7.0
-"""Width of the means, height of the forces and of the contacts [mm]."""
-
+MEAN, FORCE, CONTACT = 12.0, 56.0, 7.0  # width of the means, height of forces and contacts [mm]
 DASHED = (0, (3, 2))
 
 
@@ -288,9 +282,9 @@ def draw_forces(figure: Any, reproduction: Reproduction) -> None:
     published peaks at the times of the simulated ones, published instants of contact on the time axis; means
     over the cycle at the side; below, when toe and heel are in the ground."""
     width = (WIDTH - LEFT - GAP - 3) / 2
-    set_size(figure, HEAD + 10 + FORCE + CONTACT + 23)
     head(
-        figure, reproduction, "Figure 5. Ground reaction force", "elastic and inelastic",
+        figure, HEAD + 10 + FORCE + CONTACT + 23, reproduction,
+        "Figure 5. Ground reaction force", "elastic and inelastic",
         "Bars: margin of each row. Peaks have no time in print; marks stand at that of the simulated one.",
     )  # fmt: skip
     for place, gait in enumerate(GAITS):
@@ -359,29 +353,24 @@ def _draw_contact(ax: Any, stance: Stance) -> None:
     ax.spines["left"].set_visible(False)
 
 
-ARROWS = 36
-"""Equal parts of the stance; an arrow in the middle of each."""
-
-BRIGHTEST = 1.1 * ARROWS
-"""End of the colours, beyond the last arrow: the palest are hard to see on white."""
-
-MARGIN, BETWEEN, HIGH, LONGEST = 5.0, 12.0, 43.0, 36.0
-"""Margin, room between the gaits, height of the vectors' panel, length of the longest vector [mm]."""
+ARROWS = 36  # equal parts of the stance; an arrow in the middle of each
+BRIGHTEST = 1.1 * ARROWS  # end of the colours, beyond the last arrow: the palest are hard to see on white
+MARGIN, BETWEEN, HIGH = 5.0, 12.0, 43.0  # margin, room between the gaits, height of the vectors' panel [mm]
+LONGEST = 36.0  # length of the longest vector [mm]
 
 
 def draw_vectors(figure: Any, reproduction: Reproduction) -> None:
     """Figure 6: the ground reaction force at the centre of pressure at equal steps of the stance, elastic,
     lengths to scale and directions true; below, the colours' times, sub-phases, published contact times."""
     width = (WIDTH - 2 * MARGIN - BETWEEN) / 2
-    set_size(figure, HEAD + 5 + HIGH + 31)
     head(
-        figure, reproduction, "Figure 6. Ground reaction force on the leg along the stance", "elastic",
+        figure, HEAD + 5 + HIGH + 31, reproduction,
+        "Figure 6. Ground reaction force on the leg along the stance", "elastic",
         "A vector that leans forward propels, one that leans back brakes. Marks: published contact times.",
     )  # fmt: skip
     for place, (gait, (trace, stance)) in enumerate(elastic_cycles(reproduction).items()):
         left = MARGIN + place * (width + BETWEEN)
-        write(figure, left, HEAD, f"({'ab'[place]}) {GAITS[gait]}")
-        name_travel(figure, left, HEAD, width)
+        panel_title(figure, left, f"({'ab'[place]}) {GAITS[gait]}", width)
         ax = panel(figure, left, HEAD + 5, width, HIGH, xlabel="centre of pressure, x forward of O [m]")
         edges = np.linspace(stance.start, stance.end, ARROWS + 1)
         _draw_arrows(ax, trace, (edges[1:] + edges[:-1]) / 2, width)
@@ -438,14 +427,7 @@ def check_matplotlib() -> None:
 
 
 def draw_all(reproduction: Reproduction, folder: Path | str) -> list[Path]:
-    """Draw figures 1 and 3 to 6 as PNG and SVG, the same bytes for the same reproduction.
-
-    Args:
-        reproduction: what to draw.
-        folder: made if need be.
-
-    Returns:
-        The paths of the files.
+    """Draw figures 1 and 3 to 6 as PNG and SVG, the same bytes for the same reproduction; returns the paths.
 
     Raises:
         HoofEnvError: matplotlib is missing. OutputError: the folder cannot be written.
@@ -467,13 +449,7 @@ def draw_all(reproduction: Reproduction, folder: Path | str) -> list[Path]:
         for name, draw in drawings.items():
             figure = Figure()
             draw(figure, reproduction)
-            paths += [folder / file.name for file in save(figure, stage / name)]
+            for file, metadata in ((f"{name}.png", {}), (f"{name}.svg", {"Date": None})):
+                figure.savefig(stage / file, metadata=metadata)
+                paths.append(folder / file)
     return paths
-
-
-def save(figure: Any, path: Path) -> list[Path]:
-    """Save a figure as `path` with suffixes .png and .svg, without the date; returns the two paths."""
-    files = [path.with_suffix(suffix) for suffix in (".png", ".svg")]
-    for file, metadata in zip(files, ({}, {"Date": None}), strict=True):
-        figure.savefig(file, metadata=metadata)
-    return files

@@ -53,15 +53,11 @@ def add_sums(cycle: NDArray[np.void]) -> NDArray[np.void]:
 
 
 def replay(cycle: NDArray[np.void], ground: Ground, rise: float = 0.0) -> NDArray[np.void]:
-    """The cycle on another ground, which lies higher by `rise` [m]: the trunk stands lower by as much.
+    """A cycle of dtype `CYCLE` on another ground, which lies higher by `rise` [m]: the trunk stands lower by
+    as much.
 
     On a fixed trunk the ground changes forces only, so the leg need not move again: contact and forces are
     computed anew, and torques and powers of the drives become NaN.
-
-    Args:
-        cycle: dtype `CYCLE`, on a fixed trunk.
-        ground: the other ground.
-        rise: how much higher it lies [m].
     """
     result = cycle.copy()
     for drive in ("crank", "hip"):
@@ -184,18 +180,12 @@ def integral(trace: NDArray[np.void], values: NDArray[np.float64], start: float,
     t = trace["time"]
     inner = (t > start) & (t < end)
     times = np.concatenate(([start], t[inner], [end]))
-    return float(np.sum(np.diff(times) * _midpoints(np.interp(times, t, values))))
-
-
-def _midpoints(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    return (values[1:] + values[:-1]) / 2
+    sampled = np.interp(times, t, values)
+    return float(np.sum(np.diff(times) * ((sampled[1:] + sampled[:-1]) / 2)))
 
 
 def measure_stance(trace: NDArray[np.void]) -> Stance:
-    """Measure one cycle.
-
-    Args:
-        trace: dtype `hoof_env.paper.measure.CYCLE`, from the start of the cycle to its end, both included.
+    """Measure one cycle of dtype `CYCLE`, from its start to its end, both included.
 
     Raises:
         ParameterError: no contact, or a contact that the cycle cuts in two.
@@ -234,10 +224,8 @@ def hoof_error(trace: NDArray[np.void], exact: NDArray[np.void]) -> NDArray[np.f
     Shape of `trace`, at whose instants the other cycle is interpolated.
     """
     t = trace["time"]
-    apart = {
-        name: [trace[f"{name}_{part}"] - np.interp(t, exact["time"], exact[f"{name}_{part}"])
-               for part in ("x", "penetration")]
-        for name in POINTS
-    }  # fmt: skip
-    distances = [np.hypot(x, depth) for x, depth in apart.values()]
+    distances = []
+    for name in POINTS:
+        columns = f"{name}_x", f"{name}_penetration"
+        distances.append(np.hypot(*(trace[c] - np.interp(t, exact["time"], exact[c]) for c in columns)))
     return np.maximum(*distances)

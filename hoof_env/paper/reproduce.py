@@ -1,7 +1,6 @@
 """The paper's four conditions, walking and running, elastic and inelastic, through the public environment.
 
-Every solver of `hoof_env.paper.rows` runs them: the paper's, with either beta, and the exact one. The
-trunk is fixed and the action is zero, which is exactly the gait.
+The trunk is fixed and the action is zero, which is exactly the gait.
 """
 
 from __future__ import annotations
@@ -18,7 +17,6 @@ import numpy as np
 import hoof_env  # noqa: F401  (registers the environments)
 from hoof_env._output import staged
 from hoof_env.errors import HoofEnvError
-from hoof_env.ground.contact import Ground
 from hoof_env.paper import report
 from hoof_env.paper.measure import cycle_of, measure_stance, replay
 from hoof_env.paper.published import CONDITIONS, Published, load_published
@@ -45,21 +43,16 @@ FIGURES = {
 
 
 def run_cycle(gait: str, solver: str, **settings: Any) -> Trace:
-    """One cycle of a gait on a fixed trunk under the zero action.
+    """One cycle of a gait on a fixed trunk under the zero action: one row a substep and one for t = 0.
 
     Args:
-        gait: as `hoof_env/HorseLegFixed-v0` takes it.
+        gait, settings: as `hoof_env/HorseLegFixed-v0` takes them.
         solver: one of `SOLVERS`.
-        settings: further arguments of that environment.
-
-    Returns:
-        One row a substep and one before them for t = 0.
 
     Raises:
         ParameterError: what the environment refuses. HoofEnvError: the simulation stopped before its end.
     """
-    env = gymnasium.make(ENVIRONMENT, gait=gait, **settings_of(solver) | settings)
-    try:
+    with gymnasium.make(ENVIRONMENT, gait=gait, **settings_of(solver) | settings) as env:
         env.reset(seed=0)
         action = np.zeros(env.action_space.shape or (), np.float32)
         leg: Any = env.unwrapped
@@ -71,8 +64,6 @@ def run_cycle(gait: str, solver: str, **settings: Any) -> Trace:
                     f"{gait} with solver {solver!r}: the simulation failed before the end of its cycle"
                 )
             parts.append(cycle_of(leg.record()))
-    finally:
-        env.close()
     return np.concatenate(parts)
 
 
@@ -86,7 +77,7 @@ def reproduce(progress: Callable[[str], None] | None = None, *, preset: str | No
     Raises:
         HoofEnvError: a preset that is unknown or does not walk and run.
     """
-    tell = progress or _silent
+    tell = progress or (lambda line: None)
     settings: dict[str, Any] = {} if preset is None else {"preset": preset}
     leg: Any = gymnasium.make(ENVIRONMENT, **settings).unwrapped
     geometry, ground, published = leg.geometry, leg.engine.ground, load_published()
@@ -101,7 +92,11 @@ def reproduce(progress: Callable[[str], None] | None = None, *, preset: str | No
                 traces[gait, condition, solver] = trace
                 stance = stances[gait, condition] = measure_stance(trace)
                 tell(f"{solver}, {gait}, {condition}: peak {stance.peak:.1f} N, mean {stance.mean:.1f} N")
-            by_depth = medians[solver][gait] = _sole_velocities(traces[gait, "elastic", solver], ground)
+            walked = traces[
+                gait, "elastic", solver
+            ]  # whose motion, on a fixed trunk, any ground leaves alone
+            by_depth = {depth: sole_velocity(replay(walked, ground, depth)) for depth in DEPTHS}
+            medians[solver][gait] = by_depth
             values = ", ".join(f"{value:+.2f}" for value in by_depth.values())
             tell(f"{solver}, {gait}, 0, 5, 10 cm deep: sole moves at {values} m/s")
         rows += compare(published, stances, solver)
@@ -109,10 +104,6 @@ def reproduce(progress: Callable[[str], None] | None = None, *, preset: str | No
     for solver in SOLVERS:
         tell(f"{solver}: {counted(rows, shapes, solver)}")
     return Reproduction(rows, shapes, traces, geometry, published, ground)
-
-
-def _silent(line: str) -> None:
-    pass
 
 
 def _judge_all(
@@ -142,11 +133,6 @@ def _judge_all(
     return shapes
 
 
-def _sole_velocities(trace: Trace, ground: Ground) -> dict[float, float]:
-    """`sole_velocity` [m/s] by depth [m]: on a fixed trunk the motion is the same on every ground."""
-    return {depth: sole_velocity(replay(trace, ground, depth)) for depth in DEPTHS}
-
-
 def write_reproduction(
     reproduction: Reproduction,
     out_dir: Path | str,
@@ -154,15 +140,8 @@ def write_reproduction(
     figures: bool = True,
     command: str = "hoof-env reproduce --out DIR",
 ) -> list[Path]:
-    """Write `reproduction.json`, `reproduction.md` and the figures; returns their paths.
-
-    Nothing replaces an older result unless everything could be written.
-
-    Args:
-        reproduction: what to write.
-        out_dir: folder, made if need be.
-        figures: draw figures 1 and 3 to 6 too.
-        command: what the report names as the command that wrote it.
+    """Write `reproduction.json`, `reproduction.md`, which names `command` as what wrote it, and the figures
+    into a folder; returns their paths. An older result is replaced only when all of them could be written.
 
     Raises:
         OutputError: the folder cannot be written. HoofEnvError: figures without matplotlib.

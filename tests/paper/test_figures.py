@@ -9,8 +9,7 @@ from hoof_env.errors import HoofEnvError
 from hoof_env.leg.linkage import BODIES, POINTS
 from hoof_env.paper import figures
 from hoof_env.paper.figure_mechanism import draw_mechanism
-from hoof_env.paper.figure_phases import spread, sub_phases
-from hoof_env.paper.figure_style import PRINT, SOLVER, points_at
+from hoof_env.paper.figure_style import PRINT, SOLVER, points_at, spread, sub_phases
 from hoof_env.paper.figures import draw_angles, draw_forces, draw_paths, draw_vectors
 from hoof_env.paper.measure import measure_stance
 from hoof_env.paper.reproduce import run_cycle
