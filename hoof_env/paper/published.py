@@ -44,11 +44,7 @@ class Bar:
 
 
 def parse_bar(text: str, unit: str) -> Bar:
-    """Read a bar: "0.005 s", "1 deg", "2 %", "1 point", "0.01" or "reported".
-
-    Args:
-        text: the bar.
-        unit: of the row that it belongs to: "s", "deg", "N", "%" or "-".
+    """Read the bar of a row in a unit: "0.005 s", "1 deg", "2 %", "1 point", "0.01" or "reported".
 
     Raises:
         ParameterError: another form, or a measure that does not fit the unit.
@@ -118,11 +114,7 @@ class Published:
 
 
 def load_published(path: Path | None = None) -> Published:
-    """Read the published numbers, by default those of this package.
-
-    Raises:
-        DataFileError: the file is missing, does not parse or has an incomplete or contradictory entry.
-    """
+    """Read the published numbers, by default those of this package; `DataFileError` if they are not whole."""
     file: Any = path or resources.files("hoof_env.paper").joinpath("published.json")
     try:
         data = json.loads(file.read_text(encoding="utf-8"))
@@ -147,11 +139,7 @@ def load_published(path: Path | None = None) -> Published:
 
 
 def read_row(entry: dict[str, Any]) -> PublishedRow:
-    """A row from its JSON object.
-
-    Raises:
-        ParameterError: a bar or condition that is none. KeyError, ValueError, TypeError: an incomplete entry.
-    """
+    """A row from its JSON object; `ParameterError` for a bar or condition that is none."""
     condition = entry.get("condition")
     if condition not in (None, *CONDITIONS):
         raise ParameterError(f"condition: expected one of {', '.join(CONDITIONS)} or none, got {condition!r}")

@@ -14,40 +14,20 @@ from hoof_env import __version__
 from hoof_env._output import markdown_table
 from hoof_env.ground.contact import HERTZ
 from hoof_env.paper.measure import hoof_error, measure_stance
-from hoof_env.paper.rows import (
-    EULER,
-    EXACT,
-    ILL,
-    PRINTED,
-    PROBABLE,
-    betas,
-    counted,
-    severity,
-    slowest_root,
-)  # fmt: skip
+from hoof_env.paper.rows import EULER, EXACT, ILL, PRINTED, PROBABLE, betas, counted, severity, slowest_root
 
 if TYPE_CHECKING:
     from hoof_env.paper.rows import Reproduction
 
-WORST = 3
-"""How many rows of each solver are named as its worst."""
-
+WORST = 3  # how many rows of each solver are named as its worst
 FIGURES = ("figure1", "figure3", "figure4", "figure5", "figure6")
-PAGE = Path(__file__).with_name("report.md.in")
-"""The page, whose numbers and tables begin with $."""
-
+PAGE = Path(__file__).with_name("report.md.in")  # its numbers and tables begin with $
 _DIGITS = {"s": 4, "deg": 2, "N": 1, "%": 2, "-": 3, "point": 2, "": 3}
 _PACKAGES = ("gymnasium", "numpy", "numba")
 
 
 def markdown(reproduction: Reproduction, *, command: str, figures: bool) -> str:
-    """The whole page.
-
-    Args:
-        reproduction: what the page shows.
-        command: named as what wrote the page.
-        figures: whether pictures lie beside it.
-    """
+    """The whole page; it names `command` as what wrote it, and shows pictures if `figures` lie beside it."""
     solvers = list(dict.fromkeys(row["solver"] for row in reproduction.rows))
     geometry, published = reproduction.geometry, reproduction.published
     page = Template(PAGE.read_text(encoding="utf-8")).substitute(
@@ -114,21 +94,14 @@ def _rows_table(reproduction: Reproduction, solvers: list[str]) -> str:
     worst = {(row["id"], solver) for solver in solvers for row in _worst(reproduction, solver)}
     lines = []
     for published in reproduction.published.rows:
-        line = [
-            f"`{published.id}`",
-            published.quantity,
-            published.unit,
-            format_number(published.value, published.unit),
-            published.bar_text,
-        ]
+        value = format_number(published.value, published.unit)
+        line = [f"`{published.id}`", published.quantity, published.unit, value, published.bar_text]
         for solver in solvers:
             (row,) = _of(reproduction.rows, id=published.id, solver=solver)
             mark = " ✗" if row["within_bar"] is False else " †" if row["spared"] == ILL else ""
             error = format_error(row, reproduction) + mark
-            line += [
-                format_number(row["simulated"], row["unit"]),
-                f"**{error}**" if (row["id"], solver) in worst else error,
-            ]
+            error = f"**{error}**" if (row["id"], solver) in worst else error
+            line += [format_number(row["simulated"], row["unit"]), error]
         lines.append(line)
     head = ["row", "quantity", "unit", "published", "bar"]
     head += [text for solver in solvers for text in (f"solver {solver}", "error")]
@@ -136,7 +109,7 @@ def _rows_table(reproduction: Reproduction, solvers: list[str]) -> str:
 
 
 def _ill_conditioned(reproduction: Reproduction) -> str:
-    """Section on the rows that a solver is spared for being ill-conditioned, if there are any."""
+    """A section, if there are such rows."""
     spared = dict.fromkeys(row["id"] for row in _of(reproduction.rows, spared=ILL))
     if not spared:
         return ""
@@ -168,19 +141,11 @@ def _resultants(reproduction: Reproduction, solvers: list[str]) -> str:
 def _beside_table(reproduction: Reproduction, solvers: list[str]) -> str:
     lines = []
     for published in reproduction.published.rows:
-        by_solver = [
-            _of(reproduction.rows, id=published.id, solver=solver)[0]["beside"] for solver in solvers
-        ]
+        by_solver = [row["beside"] for row in _of(reproduction.rows, id=published.id)]
         for name in sorted(by_solver[0].keys() - {"printed"}):
-            values = [format_number(beside.get(name), published.unit) for beside in by_solver]
-            lines.append(
-                [
-                    f"`{published.id}`",
-                    name.replace("_", " "),
-                    format_number(published.printed, published.unit),
-                    *values,
-                ]
-            )
+            values = [published.printed, *(beside.get(name) for beside in by_solver)]
+            numbers = [format_number(value, published.unit) for value in values]
+            lines.append([f"`{published.id}`", name.replace("_", " "), *numbers])
     return markdown_table(["row", "reading", "in print", *(f"solver {solver}" for solver in solvers)], lines)
 
 
@@ -220,8 +185,11 @@ def which_beta(reproduction: Reproduction) -> dict[str, str]:
     seconds = published.parameters["duration_s"]
     roots = {name: slowest_root(alpha, beta) for name, beta in by_name.items()}
     drifts = {name: largest_drift(reproduction, solver) for solver, name in EULER.items()}
-    within = {EULER[solver]: _within(reproduction, solver) for solver in EULER}
-    met = [name for name, (inside, barred) in within.items() if inside == barred]
+    judged = {
+        name: [row["within_bar"] for row in _of(reproduction.rows, solver=solver, spared="")]
+        for solver, name in EULER.items()
+    }
+    met = [name for name, verdicts in judged.items() if all(verdicts)]
     return {
         "printed_beta": f"{by_name['printed']:.2f}",
         "probable_beta": f"{by_name['probable']:.1f}",
@@ -235,7 +203,7 @@ def which_beta(reproduction: Reproduction) -> dict[str, str]:
         "drift": listed(
             f"{1e3 * a:.2f} mm, {1e3 * b:.2f} mm in stance ({name} β)," for name, (a, b) in drifts.items()
         ),
-        "within": listed(f"{inside} of {barred} ({name} β)" for name, (inside, barred) in within.items()),
+        "within": listed(f"{sum(rows)} of {len(rows)} ({name} β)" for name, rows in judged.items()),
         "verdict": {
             0: "This leg meets all of them with neither",
             1: f"This leg meets all of them with the {met[0] if met else ''} β only",
@@ -254,9 +222,3 @@ def largest_drift(reproduction: Reproduction, solver: str) -> tuple[float, float
         cycle.append(float(error.max()))
         stance.append(float(error[inside].max()))
     return max(cycle), max(stance)
-
-
-def _within(reproduction: Reproduction, solver: str) -> tuple[int, int]:
-    """Rows within their bar, and rows that have one."""
-    judged = [row["within_bar"] for row in reproduction.rows if row["solver"] == solver]
-    return judged.count(True), len(judged) - judged.count(None)

@@ -49,14 +49,10 @@ class Reproduction:
 
     Attributes:
         rows: one dictionary for each published row and solver, see `compare`.
-        shapes: one dictionary for each claim about shape and solver: kind ("shape"), id, claim, reading,
-            solver, holds, evidence, readings (verdict by reading, where there are several), used (the reading
-            that holds is of), figure.
-        traces: one cycle of dtype `hoof_env.paper.measure.CYCLE`, its first row at t = 0, by (gait,
-            condition, solver).
-        geometry: the leg, identified and not published.
+        shapes: one for each claim and solver: a `shapes.Verdict`, what it is of, and its figure.
+        traces: one cycle of dtype `measure.CYCLE`, its first row at t = 0, by (gait, condition, solver).
+        geometry, ground: the preset's leg, identified and not published, and its elastic ground.
         published: what was compared with.
-        ground: the preset's, elastic, the approach speed interpolated.
     """
 
     rows: list[dict[str, Any]]
@@ -129,14 +125,9 @@ QUANTITIES = {
 
 
 def compare(published: Published, stances: Stances, solver: str) -> list[dict[str, Any]]:
-    """One row for each published number, measured with one solver.
-
-    Returns:
-        Dictionaries with kind ("row"), id, gait, quantity, unit, condition, reading, definition,
-        published (as read), bar, solver, simulated, error (signed, in the bar's measure), spared (why the row
-        has no bar with this solver, or ""), within_bar (None where it is spared) and beside (other readings
-        by name).
-    """
+    """One dictionary for each published number, measured with one solver: what is published, definition,
+    simulated, error (signed, in the bar's measure), spared (why the row has no bar with this solver, or ""),
+    within_bar (None where it is spared) and beside (other readings by name)."""
     return [_compare(row, stances, solver) for row in published.rows]
 
 

@@ -1,15 +1,13 @@
 """The paper's claims about shape, each decided by numbers: pure functions of measured cycles.
 
-Every function returns a `Verdict`; its thresholds are the constants below.
-
 `walk.direction` has two readings. Figure 6 shows a 'braking force' in walking, the ground reaction force
 'directed to the against moving direction'. Literally (`BRAKING`) the ground pushes the leg back throughout
 its stance. Under Coulomb friction that takes a hoof that slides forward under load, and such a walk cannot
 move an animal forward: it contradicts `walk.walks`. The arrows may also be the force of the hoof on the
 ground (`HOOF_ON_GROUND`): they point back while the ground pushes the leg forward. Both readings get a
-verdict, and the claim is counted by one of them, the same for every solver, which `walk_brakes` chooses from
-the leg: the net impulse of its walking stance leaves only that one possible. A leg whose walk brakes in one
-half of stance and propels in the other fulfils neither.
+verdict, and the claim is counted by the one that the net impulse of the walking stance leaves possible
+(`walk_brakes`), the same for every solver. A walk that brakes in one half of stance and propels in the other
+fulfils neither.
 """
 
 from __future__ import annotations
@@ -22,23 +20,12 @@ from numpy.typing import NDArray
 
 from hoof_env.paper.measure import POINTS, Stance, integral, measure_stance
 
-PROMINENCE = 0.1
-"""A force peak counts if it stands out by this part of the highest force [-]."""
-
-PEAK_GAP = 0.01
-"""Two peaks are apart in time if at least this far [s], ten time steps of the paper."""
-
-FLAT_DEG = 3.0
-"""A hoof is flat within this angle [deg]: the bar of the published angle at mid-stance."""
-
-DEPTHS = (0.0, 0.05, 0.1)
-"""How much deeper than the identified level the leg is put for `walk.walks` and `run.walks` [m]."""
-
-BACKWARD = 0.3
-"""How fast the sole must go back there under load [m/s]."""
-
-BRAKING, HOOF_ON_GROUND = "braking", "hoof on ground"
-"""Readings of `walk.direction`, see above."""
+PROMINENCE = 0.1  # a force peak counts if it stands out by this part of the highest force [-]
+PEAK_GAP = 0.01  # two peaks are apart in time if at least this far [s], ten time steps of the paper
+FLAT_DEG = 3.0  # a hoof is flat within this angle [deg]: the bar of the published angle at mid-stance
+DEPTHS = (0.0, 0.05, 0.1)  # how much deeper than the identified level a leg must walk and run, too [m]
+BACKWARD = 0.3  # how fast the sole must go back there under load [m/s]
+BRAKING, HOOF_ON_GROUND = "braking", "hoof on ground"  # readings of `walk.direction`
 
 
 @dataclass(frozen=True)
@@ -79,27 +66,28 @@ def find_peaks(force: NDArray[np.float64]) -> list[int]:
     return found
 
 
-def _describe(points: set[str]) -> str:
-    return " and ".join(sorted(points))
+def _first(stance: Stance) -> str:
+    points = " and ".join(sorted(stance.first_points))
+    return f"first in: {points} at {stance.start:.3f} s, {stance.angle_start_deg:.1f} deg"
 
 
-def _phase(interval: tuple[float, float] | None) -> str:
-    return f"both bear {interval[0]:.3f}-{interval[1]:.3f} s" if interval else "never both in the ground"
+def _last(stance: Stance) -> str:
+    points = " and ".join(sorted(stance.last_points))
+    return f"last out: {points} at {stance.end:.3f} s, {stance.angle_end_deg:.1f} deg"
 
 
 def walk_order(walk: Stance, trace: Trace) -> Verdict:
     """Heel-strike, flat, toe-off: the heel touches first, then both bear with the sole flat within
     `FLAT_DEG` at some instant, and the toe leaves last."""
-    smallest = float("inf")
+    smallest, phase = float("inf"), "never both in the ground"
     if walk.double:
-        t = trace["time"]
-        both = np.degrees(trace["hoof_angle"][(t >= walk.double[0]) & (t <= walk.double[1])])
+        start, end = walk.double
+        phase = f"both bear {start:.3f}-{end:.3f} s"
+        both = np.degrees(trace["hoof_angle"][(trace["time"] >= start) & (trace["time"] <= end)])
         smallest = float(np.abs(both).min()) if both.size else smallest
     return Verdict(
         walk.first_points == {"heel"} and smallest <= FLAT_DEG and walk.last_points == {"toe"},
-        f"first in: {_describe(walk.first_points)} at {walk.start:.3f} s, {walk.angle_start_deg:.1f} deg; "
-        f"{_phase(walk.double)}, smallest |angle| there {smallest:.1f} deg; "
-        f"last out: {_describe(walk.last_points)} at {walk.end:.3f} s, {walk.angle_end_deg:.1f} deg",
+        f"{_first(walk)}; {phase}, smallest |angle| there {smallest:.1f} deg; {_last(walk)}",
     )
 
 
@@ -127,16 +115,11 @@ def run_order(run: Stance, walk: Stance, run_trace: Trace, walk_trace: Trace) ->
         for s, tr in ((run, run_trace), (walk, walk_trace))
     ]
     rolls = run.first_points == {"toe"} and bool(run.heel) and run.last_points == {"toe"}
-    heel = (
-        f"heel in the ground {run.heel[0][0]:.3f}-{run.heel[-1][1]:.3f} s"
-        if run.heel
-        else "heel never in the ground"
-    )
+    never = "never in the ground"
+    heel = f"in the ground {run.heel[0][0]:.3f}-{run.heel[-1][1]:.3f} s" if run.heel else never
     return Verdict(
         rolls and gaps[0] > gaps[1],
-        f"first in: {_describe(run.first_points)} at {run.start:.3f} s, {run.angle_start_deg:.1f} deg; "
-        f"{heel}; "
-        f"last out: {_describe(run.last_points)} at {run.end:.3f} s, {run.angle_end_deg:.1f} deg; "
+        f"{_first(run)}; heel {heel}; {_last(run)}; "
         f"heel {100 * gaps[0]:.1f} cm above the ground then, walking {100 * gaps[1]:.1f} cm",
     )
 
@@ -189,11 +172,8 @@ def walk_brakes(walk: Stance, trace: Trace) -> bool:
 
 
 def walk_direction(walk: Stance, trace: Trace, brakes: bool) -> Verdict:
-    """Braking through the walking stance: the force points back in both halves, under either reading.
-
-    Args:
-        brakes: what `walk_brakes` says of the leg; `BRAKING` is used if so, else `HOOF_ON_GROUND`.
-    """
+    """Braking through the walking stance: the force points back in both halves, under either reading; of a
+    leg that `walk_brakes` `BRAKING` is used, else `HOOF_ON_GROUND`."""
     (first, _), (second, _) = half_impulses(trace, walk)
     readings = {BRAKING: first < 0 and second < 0, HOOF_ON_GROUND: first > 0 and second > 0}
     used, why = (
@@ -237,12 +217,8 @@ def sole_velocity(trace: Trace) -> float:
 
 
 def gait_walks(medians: Mapping[float, float]) -> Verdict:
-    """A gait must move its animal: the load-weighted median velocity of the sole is backward by `BACKWARD` or
-    more, at the ground level and deeper, where a trunk with weight would settle.
-
-    Args:
-        medians: `sole_velocity` [m/s] by depth [m].
-    """
+    """A gait must move its animal: `sole_velocity` [m/s], given by depth [m], is backward by `BACKWARD` or
+    more, at the ground level and deeper, where a trunk with weight would settle."""
     values = ", ".join(
         f"{v:+.2f} m/s" + (f" {100 * depth:.0f} cm deeper" if depth else "") for depth, v in medians.items()
     )
@@ -255,13 +231,8 @@ def gait_walks(medians: Mapping[float, float]) -> Verdict:
 def judge(
     traces: Mapping[tuple[str, str], Trace], medians: Mapping[str, Mapping[float, float]], brakes: bool
 ) -> dict[str, Verdict]:
-    """Every claim by id.
-
-    Args:
-        traces: one cycle for each (gait, condition).
-        medians: by gait, see `gait_walks`.
-        brakes: see `walk_direction`.
-    """
+    """Every claim by id, from a cycle for each (gait, condition), `gait_walks`'s medians by gait, and whether
+    the leg `walk_brakes`."""
     walk_trace, run_trace = traces["walk", "elastic"], traces["run", "elastic"]
     walk, run = measure_stance(walk_trace), measure_stance(run_trace)
     return {
