@@ -11,35 +11,22 @@ from hoof_env import __version__, cli
 HOOF_ENV = [sys.executable, "-m", "hoof_env.cli"]
 
 
-def hoof_env(*arguments):
-    return subprocess.run(
-        [*HOOF_ENV, *map(str, arguments)], capture_output=True, text=True, timeout=300, check=False
-    )
-
-
-def test_help_lists_the_sub_commands():
-    done = hoof_env("--help")
-    assert done.returncode == 0
-    assert all(name in done.stdout for name in cli.COMMANDS)
-
-
 @pytest.mark.parametrize("module", ["hoof_env", "hoof_env.cli"])
 def test_the_package_runs_as_the_command(module):
-    done = subprocess.run(
-        [sys.executable, "-m", module, "--version"], capture_output=True, text=True, timeout=300, check=False
-    )
-    assert (done.returncode, done.stdout, done.stderr) == (
-        0,
-        f"hoof-env {__version__}\n",
-        "",
-    )
+    command = [sys.executable, "-m", module, "--version"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, f"hoof-env {__version__}\n", "")
 
 
-def test_help_of_a_sub_command_explains_its_options(capsys):
+@pytest.mark.parametrize(
+    ("arguments", "words"), [(["--help"], cli.COMMANDS), (["reproduce", "--help"], ["--no-figures"])]
+)
+def test_help_lists_the_sub_commands_and_explains_their_options(arguments, words, capsys):
     with pytest.raises(SystemExit) as stop:
-        cli.main(["reproduce", "--help"])
+        cli.main(arguments)
     assert stop.value.code == 0
-    assert "--no-figures" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert all(word in said for word in words)
 
 
 @pytest.mark.parametrize(
@@ -52,28 +39,23 @@ def test_wrong_arguments_exit_with_2(arguments, capsys):
     assert "Traceback" not in capsys.readouterr().err
 
 
-def test_reproduce_writes_its_results(tmp_path):
-    done = hoof_env("reproduce", "--out", tmp_path / "new" / "folder", "--no-figures")
-    assert done.returncode == 0, done.stderr
-    assert "exact, run, inelastic: peak" in done.stdout
-    assert {file.name for file in (tmp_path / "new" / "folder").iterdir()} == {
-        "reproduction.json",
-        "reproduction.md",
-    }
-    assert (
-        len(json.loads((tmp_path / "new" / "folder" / "reproduction.json").read_text(encoding="utf-8"))) == 99
-    )
-    page = (tmp_path / "new" / "folder" / "reproduction.md").read_text(encoding="utf-8")
-    assert f"hoof-env reproduce --out {tmp_path / 'new' / 'folder'} --no-figures" in page
+def test_reproduce_writes_its_results(tmp_path, capsys):
+    folder = tmp_path / "new" / "folder"
+    assert cli.main(["reproduce", "--out", str(folder), "--no-figures"]) == 0
+    assert "exact, run, inelastic: peak" in capsys.readouterr().out
+    assert {file.name for file in folder.iterdir()} == {"reproduction.json", "reproduction.md"}
+    assert len(json.loads((folder / "reproduction.json").read_text(encoding="utf-8"))) == 99
+    page = (folder / "reproduction.md").read_text(encoding="utf-8")
+    assert f"hoof-env reproduce --out {folder} --no-figures" in page
 
 
-def test_a_folder_that_cannot_be_written_is_one_line_before_anything_runs(tmp_path):
+def test_a_folder_that_cannot_be_written_is_one_line_before_anything_runs(tmp_path, capsys):
     (tmp_path / "file").write_text("mine", encoding="utf-8")
-    done = hoof_env("reproduce", "--out", tmp_path / "file")
-    assert done.returncode == 2
-    assert done.stdout == ""
-    assert done.stderr.startswith("hoof-env: error: cannot write to")
-    assert done.stderr.count("\n") == 1
+    assert cli.main(["reproduce", "--out", str(tmp_path / "file")]) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.startswith("hoof-env: error: cannot write to")
+    assert said.err.count("\n") == 1
     assert (tmp_path / "file").read_text(encoding="utf-8") == "mine"
 
 
@@ -91,12 +73,8 @@ def test_figures_without_matplotlib_are_one_line(tmp_path, capsys, monkeypatch):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT to another process")
 def test_an_interrupt_is_one_line_and_leaves_nothing_behind(tmp_path):
-    with subprocess.Popen(
-        [*HOOF_ENV, "reproduce", "--out", str(tmp_path)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    ) as process:
+    command, pipe = [*HOOF_ENV, "reproduce", "--out", str(tmp_path)], subprocess.PIPE
+    with subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True) as process:
         process.stdout.readline()  # the first condition is done, the others remain
         process.send_signal(signal.SIGINT)
         _, errors = process.communicate(timeout=300)

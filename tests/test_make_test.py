@@ -31,16 +31,8 @@ def test_a_lost_worker_ends_the_run(what: str, tmp_path: Path) -> None:
     (tmp_path / "tests").mkdir()
     (tmp_path / "tests" / "test_bad.py").write_text(TESTS[what] + "\n")
     (tmp_path / "tests" / "test_good.py").write_text("def test_it(): pass\n")
-    command = [
-        sys.executable,
-        "-m",
-        "pytest",
-        *options(),
-        "-p",
-        "no:cacheprovider",
-        "-o",
-        "faulthandler_timeout=3",
-    ]
+    quick = ["-p", "no:cacheprovider", "-o", "faulthandler_timeout=3"]
+    command = [sys.executable, "-m", "pytest", *options(), *quick]
     started = time.monotonic()
     ended = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=200)
     assert ended.returncode == 1, ended.stdout + ended.stderr

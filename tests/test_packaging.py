@@ -79,26 +79,17 @@ def test_every_dependency_has_a_tested_version() -> None:
         assert requirement.specifier.contains(tested[canonicalize_name(requirement.name)]), requirement
 
 
-def test_a_task_of_ones_own_runs_with_the_package_from_the_wheel(
-    wheel: zipfile.ZipFile, tmp_path: Path
-) -> None:
+def test_a_task_of_ones_own_runs_with_the_package_from_the_wheel(wheel, tmp_path):
     """In another project's folder: `examples/own_task.py` compiles its functions and steps alone and among
     many, which have the same bits."""
     wheel.extractall(tmp_path / "site")
     example = tmp_path / "own_task.py"
     example.write_text((ROOT / "examples" / "own_task.py").read_text(encoding="utf-8"), encoding="utf-8")
-    program = (
-        "import hoof_env, runpy; print(hoof_env.__file__);"
-        f"runpy.run_path({str(example)!r}, run_name='__main__')"
-    )
-    environment = {"PYTHONPATH": str(tmp_path / "site"), "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
-    run = subprocess.run(
-        [sys.executable, "-c", program],
-        cwd=tmp_path,
-        env={**os.environ, **environment},
-        capture_output=True,
-        text=True,
-    )
+    program = "import hoof_env, runpy; print(hoof_env.__file__);"
+    program += f"runpy.run_path({str(example)!r}, run_name='__main__')"
+    own = {"PYTHONPATH": str(tmp_path / "site"), "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    command, env = [sys.executable, "-c", program], os.environ | own
+    run = subprocess.run(command, cwd=tmp_path, env=env, capture_output=True, text=True)
     assert run.returncode == 0, run.stderr
     package, paid = run.stdout.splitlines()
     assert Path(package).is_relative_to(tmp_path / "site")

@@ -10,6 +10,7 @@ import pytest
 
 from hoof_env import cli
 from hoof_env.errors import HoofEnvError, ParameterError
+from hoof_env.gait.gait import PARAMETERS
 from hoof_env.play import HELD, HELP, RATE, Game, play
 from hoof_env.records import make_env
 
@@ -24,6 +25,13 @@ def env():
         yield env
 
 
+def spy_on(env):
+    """The rewards of the steps from here on."""
+    rewards, step = [], env.unwrapped.step
+    env.unwrapped.step = lambda action: rewards.append((result := step(action))[1]) or result
+    return rewards
+
+
 @pytest.mark.parametrize("key", HELD)
 def test_a_held_key_moves_its_command_and_no_other(env, key):
     game = Game(env)
@@ -34,10 +42,7 @@ def test_a_held_key_moves_its_command_and_no_other(env, key):
     expected = np.zeros(4)
     expected[entry] = 5 * way * RATE * game.dt
     np.testing.assert_allclose(game.action, expected, atol=1e-6)
-    last = game.news[-1]
-    commanded = (
-        last.command_crank_speed, last.command_swing_offset, last.command_swing_sin, last.command_swing_cos,
-    )  # fmt: skip
+    commanded = [getattr(game.news[-1], f"command_{name}") for name in PARAMETERS]
     np.testing.assert_allclose(commanded, env.unwrapped.command_of(game.action))
 
 
@@ -68,16 +73,7 @@ def test_the_leg_starts_in_its_gait_and_a_digit_commands_another(env):
 
 
 def test_the_score_is_the_return_and_the_end_is_told(env):
-    game = Game(env, seed=1)
-    rewards = []
-    step = env.unwrapped.step
-
-    def spy(action):
-        result = step(action)
-        rewards.append(result[1])
-        return result
-
-    env.unwrapped.step = spy
+    game, rewards = Game(env, seed=1), spy_on(env)
     for _ in range(30):
         game.tick(["up"])
     assert len(rewards) == 20  # 0.4 s
@@ -114,10 +110,7 @@ def test_the_fixed_leg_is_played_by_offsets():
 
 def test_a_vector_reward_scores_by_its_sum():
     with make_env("hoof_env/HorseLegMO-v0", {"episode_seconds": 0.1}) as env:
-        game = Game(env)
-        rewards = []
-        step = env.unwrapped.step
-        env.unwrapped.step = lambda action: rewards.append((result := step(action))[1]) or result
+        game, rewards = Game(env), spy_on(env)
         for _ in range(5):
             game.tick()
         assert game.score == pytest.approx(np.sum(rewards))

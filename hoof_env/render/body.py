@@ -34,14 +34,8 @@ HORN_SHARE = 0.45
 
 
 class Body:
-    """Draws trunk and leg.
-
-    Args:
-        brush: the paint box.
-        geometry: the leg.
-        scale: pixels per metre.
-        trunk: its kind: on a spring, on wheels under a rail, or bolted to a plate.
-    """
+    """Draws trunk and leg, `scale` pixels per metre; by its kind the trunk is on a spring, on wheels under a
+    rail, or bolted to a plate."""
 
     def __init__(self, brush: Brush, geometry: Geometry, scale: float, trunk: str) -> None:
         self._brush, self._scale, self._kind = brush, scale, trunk
@@ -204,13 +198,10 @@ class Brush:
         margin: float,
         paint: Callable[[Any, Callable[[complex], Position]], None],
     ) -> None:
-        """Paint at `FINE` times the resolution into the box around `points`, then scale down onto `canvas`.
+        """Paint at `FINE` times the resolution into the box around pixels (complex), `margin` wider on every
+        side, then scale down onto `canvas`; what lies outside the picture is left out.
 
-        Args:
-            canvas: the picture.
-            points: pixels (complex) that the box must hold; what lies outside the picture is left out.
-            margin: added on every side [pixels].
-            paint: called with the fine surface and the map from a pixel (complex) to a position on it.
+        `paint` is called with the fine surface and the map from a pixel (complex) to a position on it.
         """
         x, y = np.real(points), np.imag(points)
         left, top = int(np.floor(x.min() - margin)), int(np.floor(y.min() - margin))

@@ -19,28 +19,15 @@ STIFFER, SOFTER = (150, 152, 158), (238, 226, 170)
 SLIPPERY, ROUGHER = (86, 180, 233), (90, 50, 20)
 """Body of the soil where it is stiffer or softer; its skin where it is more slippery or rougher."""
 
-STRONG = 4.0
-"""A factor of stiffness or friction of this, or its inverse, has the full colour [-]."""
-
-ALIKE = 0.02
-"""Relative difference of a factor from 1 below which the ground counts as usual [-]."""
-
-FLANK_M = 0.09
-"""How far from the hoof the ground is drawn down by the footprint; the model has no width [m]."""
-
-
+STRONG = 4.0  # a factor of stiffness or friction of this, or its inverse, has the full colour [-]
+ALIKE = 0.02  # relative difference of a factor from 1 below which the ground counts as usual [-]
+FLANK_M = 0.09  # how far from the hoof the footprint draws the ground down; the model has no width [m]
 PRESSED = ((0.5, 0.12), (0.33, 0.24), (0.17, 0.36))
 """How far below the footprint the soil is darker, in parts of its depth, and how much."""
 
-
-COLUMN = 6
-"""Distance of the places where the surface is drawn [pixels of the usual picture]."""
-
-MOST_EDGES = 60
-"""Up to so many changes of kind in the picture are drawn where they are; more are drawn to the next place."""
-
-LABEL = 90
-"""Least width of a patch that is labelled [pixels of the usual picture]."""
+COLUMN = 6  # distance of the places where the surface is drawn [pixels of the usual picture]
+MOST_EDGES = 60  # so many changes of kind are drawn where they are; of more, each at the next place
+LABEL = 90  # least width of a patch that is labelled [pixels of the usual picture]
 
 Point = tuple[float, float]
 
@@ -55,15 +42,7 @@ class Patch(NamedTuple):
 
 
 class GroundPainter:
-    """Draws a terrain.
-
-    Args:
-        brush: the paint box.
-        terrain: what to draw.
-        size: of the picture [pixels].
-        scale: pixels per metre.
-        clear: width on the left where labels go [pixels].
-    """
+    """Draws a terrain into pictures of `size`, `scale` pixels per metre; labels go left of pixel `clear`."""
 
     def __init__(
         self, brush: Brush, terrain: Terrain, size: tuple[int, int], scale: float, clear: float
@@ -92,13 +71,7 @@ class GroundPainter:
         return [(name, colour) for name, colour, there in all_kinds if there]
 
     def draw(self, canvas: Any, now: Instant, corner: complex) -> None:
-        """Draw the ground.
-
-        Args:
-            canvas: the picture.
-            now: where the hoof is and what it bears.
-            corner: place in the world of the picture's left edge at pixel row 0 [m].
-        """
+        """Draw the ground; `corner` is the place in the world of the picture's upper left corner [m]."""
         x = self._places(now, corner.real)
         free = (corner.imag - self.height(x)) * self._scale
         if self._level:
@@ -237,8 +210,7 @@ def shade(factor: Any) -> Any:
     return np.where(usual, 0, steps).astype(int) + SHADES
 
 
-SHADES = 5
-"""Shades of a colour between the usual and the full one."""
+SHADES = 5  # of a colour between the usual and the full one
 
 BODY: tuple[Colour | None, ...] = tuple(
     mix(SOIL, SOFTER if k < 0 else STIFFER, abs(k) / SHADES) for k in range(-SHADES, SHADES + 1)

@@ -1,12 +1,8 @@
-"""What a picture, or a record of forces, needs of one instant.
-
-`columns_of_engine` gives columns by name from what `TrunkEngine` says; `instants` turns them into records for
-the renderer. Nothing behind this boundary refers to an engine.
-"""
+"""What a picture, or a record of forces, needs of one instant; nothing behind it refers to an engine."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Annotated, Any, NamedTuple, get_type_hints
 
 import numpy as np
@@ -120,32 +116,23 @@ def columns_of_engine(
     record: Mapping[str, NDArray[Any]],
     terrain: Terrain | None = None,
     *,
-    hip: Sequence[float] = (0.0, 0.0),
     command: ArrayLike | None = None,
-    leg: int = 0,
-    env: int = 0,
 ) -> Columns:
-    """Columns from what `TrunkEngine` says of one leg of one environment.
+    """Columns from what `TrunkEngine` says of an environment with one leg, whose O is the trunk's own place.
 
     Args:
         record: `engine.state | engine.report`, for one instant, or what `engine.run` returns.
         terrain: what the engine stands on; level if None.
-        hip: where O sits on the trunk, `Limb.hip` [m].
         command: gait parameters commanded, shape (4,); None if not known.
-        leg, env: which.
     """
     ground = Terrain.flat() if terrain is None else terrain
-    of_trunk = {name: np.atleast_1d(record[name][..., env]).astype(float) for name in _TRUNK}
-    of_leg = {name: np.atleast_1d(record[name][..., leg, env]).astype(float) for name in _LEG}
+    of_trunk = {name: np.atleast_1d(record[name][..., 0]).astype(float) for name in _TRUNK}
+    of_leg = {name: np.atleast_1d(record[name][..., 0, 0]).astype(float) for name in _LEG}
     n = len(of_trunk["time"])
-    arm = complex(*hip) * np.exp(1j * of_trunk["pitch"])
-    place = of_trunk["x"] + 1j * of_trunk["y"] + arm
-    velocity = of_trunk["vx"] + 1j * of_trunk["vy"] + 1j * of_trunk["pitch_rate"] * arm
     wanted = np.full(4, np.nan) if command is None else np.asarray(command, float)
     columns = {
         "time": of_trunk["time"],
-        "trunk_x": place.real, "trunk_y": place.imag, "trunk_vx": velocity.real, "trunk_vy": velocity.imag,
-        "pitch": of_trunk["pitch"],
+        **{f"trunk_{name}": of_trunk[name] for name in ("x", "y", "vx", "vy")}, "pitch": of_trunk["pitch"],
         "crank_angle": of_leg["theta"], "crank_speed": of_leg["theta_rate"], "swing_angle": of_leg["phi"],
         **{name: of_leg[name] for name in PARAMETERS[1:]},
         **{f"command_{name}": np.full(n, value)
@@ -163,7 +150,7 @@ def columns_of_engine(
     return columns | _together(columns)
 
 
-_TRUNK = ("time", "x", "y", "vx", "vy", "pitch", "pitch_rate")
+_TRUNK = ("time", "x", "y", "vx", "vy", "pitch")
 _LEG = (
     "theta", "theta_rate", "phi", *PARAMETERS[1:],
     *(f"{point}_{name}" for point in POINTS for name in ("x", "y", "normal", "friction")),

@@ -16,15 +16,9 @@ from hoof_env.gait.gait import LIMITS
 from hoof_env.render.body import CRANK, FAINT, FINE, FORCE, GREY, INK, PAPER, Brush
 from hoof_env.render.instant import Instant
 
-SECONDS = 3
-"""Time shown [s]."""
-
-RESOLUTION = 0.01
-"""The curve keeps the largest force of every such interval [s]."""
-
-SMALLEST_SCALE = 200.0
-"""Least full scale of the curve [N]."""
-
+SECONDS = 3  # time shown [s]
+RESOLUTION = 0.01  # the curve keeps the largest force of every such interval [s]
+SMALLEST_SCALE = 200.0  # least full scale of the curve [N]
 UNDER_CURVE = (252, 230, 214)
 
 NUMBERS = (
@@ -52,10 +46,7 @@ class Peak(NamedTuple):
 
 
 class Stances:
-    """Stances and their peaks from a stream of instants.
-
-    Args:
-        threshold: normal force that tells stance from swing [N].
+    """Stances, in which the normal force exceeds `threshold` [N], and their peaks from a stream of instants.
 
     Attributes:
         opened: when the open stance began [s]; None between stances.
@@ -89,11 +80,9 @@ class Stances:
 
 
 class Panel:
-    """Numbers, gait and force curve in one box of the picture.
+    """Numbers, gait and force curve in one box (left, top, width, height) of the picture.
 
     Args:
-        brush: the paint box.
-        box: left, top, width and height [pixels].
         weight_n: weight of trunk and leg [N], a line in the curve; or None.
         lift_off_n: normal force that tells stance from swing [N].
 
@@ -126,14 +115,10 @@ class Panel:
         curve = self._curve
         for now in instants:
             self.stances.add(now)
-            force = now.grf
-            if curve and math.floor(curve[-1][0] / RESOLUTION + 1e-6) == math.floor(
-                now.time / RESOLUTION + 1e-6
-            ):
-                if force > curve[-1][1]:
-                    curve[-1] = now.time, force
-            else:
-                curve.append((now.time, force))
+            if not curve or _interval(curve[-1][0]) != _interval(now.time):
+                curve.append((now.time, now.grf))
+            elif now.grf > curve[-1][1]:
+                curve[-1] = now.time, now.grf
         self.full_scale = max(self.full_scale, _nice(max(self.stances.highest, SMALLEST_SCALE)))
         while curve[0][0] < instants[-1].time - SECONDS:
             curve.popleft()
@@ -258,6 +243,10 @@ class Panel:
             )
         above = min(x, plot.right - 10 * unit), y - 6 * unit
         self._brush.write(canvas, f"{seen[-1].force / 1000:.2f}", above, 20, FORCE, "midbottom")
+
+
+def _interval(time: float) -> int:
+    return math.floor(time / RESOLUTION + 1e-6)
 
 
 def _nice(force: float) -> float:

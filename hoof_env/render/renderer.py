@@ -26,13 +26,8 @@ if TYPE_CHECKING:
     from hoof_env.render.panel import Stances
 
 MODES = ("rgb_array", "human")
-"""Render modes."""
-
-SMALLEST_SIZE = (480, 270)
-"""Below this the lettering is not readable [pixels]."""
-
-LARGEST_SIDE = 8192
-"""Largest width and height [pixels]; a canvas of both takes 270 MB."""
+SMALLEST_SIZE = (480, 270)  # below this the lettering is not readable [pixels]
+LARGEST_SIDE = 8192  # largest width and height [pixels]; a canvas of both takes 270 MB
 
 
 class Renderer:
@@ -103,7 +98,9 @@ class Renderer:
     @property
     def latest(self) -> Instant:
         """The instant that is drawn next; `ResetNeeded` if there is none."""
-        return self._check_seen()
+        if self._now is None:
+            raise ResetNeeded("nothing to draw yet: reset the environment first")
+        return self._now
 
     @property
     def is_empty(self) -> bool:
@@ -134,12 +131,11 @@ class Renderer:
         Raises:
             ResetNeeded: there is none yet. HoofEnvError: "human" where there is no display.
         """
-        self._check_seen()
+        picture = self.draw()
         if self.mode == "human":
-            self._show()
+            self._show(picture)
             return None
-        self.draw()
-        self._packed.blit(self._canvas, (0, 0))
+        self._packed.blit(picture, (0, 0))
         return self._pygame.surfarray.pixels3d(self._packed).transpose(1, 0, 2).copy()
 
     def close(self) -> None:
@@ -155,17 +151,12 @@ class Renderer:
         Raises:
             ResetNeeded: as `frame`.
         """
-        now = self._check_seen()
+        now = self.latest
         self._scene.draw(self._canvas, now, self._panel.full_scale)
         self._panel.draw(self._canvas, now)
         return self._canvas
 
-    def _check_seen(self) -> Instant:
-        if self._now is None:
-            raise ResetNeeded("nothing to draw yet: reset the environment first")
-        return self._now
-
-    def _show(self) -> None:
+    def _show(self, picture: Any) -> None:
         if self._closed:
             return
         display = self._pygame.display
@@ -175,8 +166,7 @@ class Renderer:
         if any(event.type == self._pygame.QUIT for event in self._pygame.event.get()):
             self.close()
             return
-        self.draw()
-        display.get_surface().blit(self._canvas, (0, 0))
+        display.get_surface().blit(picture, (0, 0))
         display.flip()
         self._clock.tick(self.fps)
 
@@ -214,21 +204,9 @@ def open_window(size: tuple[int, int], title: str, *, may_be_unseen: bool = Fals
 
 
 def new_renderer(here: Setting, fps: float, size: tuple[int, int] = (960, 540)) -> Renderer:
-    """An off-screen renderer for an environment with this setting.
-
-    Raises:
-        ParameterError, DependencyNotInstalled: as `Renderer`.
-    """
-    return Renderer(
-        here.geometry,
-        "rgb_array",
-        fps,
-        size,
-        trunk=here.trunk,
-        weight_n=here.weight_n,
-        lift_off_n=here.lift_off_n,
-        terrain=here.terrain,
-    )
+    """An off-screen renderer for an environment with this setting; errors are those of `Renderer`."""
+    force = {"weight_n": here.weight_n, "lift_off_n": here.lift_off_n}
+    return Renderer(here.geometry, "rgb_array", fps, size, here.trunk, **force, terrain=here.terrain)
 
 
 def _check_size(size: Any) -> tuple[int, int]:

@@ -31,7 +31,6 @@ from hoof_env.render.body import (
     TOE,
     Body,
     Brush,
-    Colour,
     arrow,
     bar,
     mix,
@@ -41,42 +40,18 @@ from hoof_env.render.instant import Instant
 
 SKY_TOP, SKY_BOTTOM = (219, 231, 242), (249, 250, 252)
 
-HEIGHT_SLACK_M = 0.2
-"""How far O may rise or sink from the paper's hip height before the camera follows [m]."""
-
-SOIL_M = 0.4
-"""Least depth of soil in the picture [m]."""
-
-MARGIN_M = 0.1
-"""Room around the leg at its furthest reach [m]."""
-
-PATH_SECONDS = 1.0
-"""Length of the paths of toe and heel [s]."""
-
-PATH_STEP = 0.01
-"""Time between two places of a path [s]."""
-
-ARROW_M = 1.3
-"""Length in the scene of an arrow for the panel's full scale [m]."""
-
-LEAST_FORCE = 0.004
-"""Part of the full scale below which a force is not drawn [-]."""
-
-AROUND_M = np.linspace(-1.5, 1.5, 31)
-"""Where the ground is looked at, from O, to find the camera's level [m]."""
+HEIGHT_SLACK_M = 0.2  # how far O may rise or sink from the paper's hip height before the camera follows [m]
+SOIL_M = 0.4  # least depth of soil in the picture [m]
+MARGIN_M = 0.1  # room around the leg at its furthest reach [m]
+PATH_SECONDS = 1.0  # length of the paths of toe and heel [s]
+PATH_STEP = 0.01  # time between two places of a path [s]
+ARROW_M = 1.3  # length in the scene of an arrow for the panel's full scale [m]
+LEAST_FORCE = 0.004  # part of the full scale below which a force is not drawn [-]
+AROUND_M = np.linspace(-1.5, 1.5, 31)  # where, from O, the ground is looked at for the camera's level [m]
 
 
 class Scene:
-    """Draws one instant; see the module docstring.
-
-    Args:
-        brush: the paint box.
-        geometry: the leg.
-        terrain: the ground.
-        size: of the picture [pixels].
-        right: width on the right that the leg leaves free [pixels].
-        trunk: its kind, which says what holds it.
-    """
+    """Draws one instant into a picture of `size`, whose `right` pixels the leg leaves free."""
 
     def __init__(
         self,
@@ -96,10 +71,8 @@ class Scene:
         self._scale = min(size[1] / (soil + sky), self._centre / (out + MARGIN_M))
         self._level = size[1] - soil * self._scale  # of the ground [pixels] while the camera keeps its height
         self._camera = 0j
-        self._paths: tuple[tuple[Colour, deque[tuple[float, complex]]], ...] = (
-            (HEEL, deque()),
-            (TOE, deque()),
-        )
+        self._heel: deque[tuple[float, complex]] = deque()  # its path
+        self._toe: deque[tuple[float, complex]] = deque()
         self._leg = tables(geometry)
         self._ground = GroundPainter(brush, terrain, size, self._scale, 2 * self._centre)
         self._body = Body(brush, geometry, self._scale, trunk)
@@ -108,13 +81,13 @@ class Scene:
 
     def reset(self) -> None:
         """Forget the paths."""
-        for _, path in self._paths:
+        for path in (self._heel, self._toe):
             path.clear()
 
     def add(self, instants: Sequence[Instant]) -> None:
         """Lengthen the paths of toe and heel by instants in the order of time."""
         now = instants[-1].time
-        toe, heel = self._paths[1][1], self._paths[0][1]
+        toe, heel = self._toe, self._heel
         for instant in instants:
             if not toe or instant.time >= toe[-1][0] + PATH_STEP * (1 - 1e-6):
                 toe.append((instant.time, complex(instant.toe_x, instant.toe_y)))
@@ -166,12 +139,14 @@ class Scene:
         return pygame.transform.smoothscale(ramp, self._size)
 
     def _draw_paths(self, canvas: Any, pixels: dict[str, complex]) -> None:
-        ends = pixels[self._geometry.heel], pixels[self._geometry.toe]
-        for (colour, path), end in zip(self._paths, ends, strict=True):
+        for colour, path, point in (
+            (HEEL, self._heel, self._geometry.heel),
+            (TOE, self._toe, self._geometry.toe),
+        ):
             if len(path) < 2:
                 continue
             times, places = zip(*path, strict=True)
-            line = np.append(self._pixels(np.array(places)), end)
+            line = np.append(self._pixels(np.array(places)), pixels[point])
             points = list(zip(line.real.tolist(), line.imag.tolist(), strict=True))
             for first in range(0, len(points) - 1, 10):  # older parts fade into the sky
                 part = points[first : first + 11]

@@ -10,28 +10,15 @@ from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
-from hoof_env.render.instant import (
-    POINTS,
-    UNITS,
-    Instant,
-    columns_of_engine,
-    ground_at,
-    instants,
-)
+from hoof_env.render.instant import POINTS, UNITS, Instant, columns_of_engine, ground_at, instants
 
 LEG, RUN = load_geometry("first_fit"), load_gait("run", "first_fit")
 HILLS = Terrain.through([-1.0, 0.4, 1.0, 2.0], [0.0, 0.0, 0.1, -0.05], friction=[1.0, 1.0, 0.5, 2.0])
 
 
-def roll(
-    terrain: Terrain, trunk: str = "suspended", hip=(0.0, 0.0), drive=None, seconds: float = 1.0, **start
-):
-    engine = TrunkEngine(
-        Limb(LEG, hip=hip, drive=drive or Prescribed()),
-        Trunk(trunk, height=LEG.hip_height, pitch_inertia=30.0),
-        Ground(),
-        terrain,
-    )
+def roll(terrain, trunk="suspended", seconds=1.0, **start):
+    trunk = Trunk(trunk, height=LEG.hip_height, pitch_inertia=30.0)
+    engine = TrunkEngine(Limb(LEG, drive=Prescribed()), trunk, Ground(), terrain)
     engine.reset(RUN, **start)
     return engine, engine.run(RUN.to_array(), round(seconds * 1000))
 
@@ -74,10 +61,8 @@ def test_the_hoof_has_no_moment_about_its_centre_of_pressure():
 def test_with_equal_friction_the_centre_is_the_mean_weighted_by_load():
     found = columns_of_engine(roll(Terrain.flat(), seconds=1.5)[1])
     both = (found["toe_normal"] > 0) & (found["heel_normal"] > 0)
-    ratio = [
-        np.where(both, found[f"{p}_friction"] / np.where(both, found[f"{p}_normal"], 1), 0) for p in POINTS
-    ]
-    equal = both & (np.abs(ratio[0] - ratio[1]) < 1e-12)
+    toe, heel = (found[f"{p}_friction"] / np.where(both, found[f"{p}_normal"], 1) for p in POINTS)
+    equal = both & (np.abs(toe - heel) < 1e-12)
     assert equal.sum() > 10
     load = {p: found[f"{p}_normal"][equal] for p in POINTS}
     mean = sum(load[p] * found[f"{p}_x"][equal] for p in POINTS) / sum(load.values())
@@ -88,11 +73,8 @@ def test_with_equal_friction_the_centre_is_the_mean_weighted_by_load():
 
 
 def test_a_pitching_trunk_carries_its_leg_where_the_engine_has_it():
-    hip = (0.3, -0.1)
-    _, record = roll(
-        HILLS, "free", hip, seconds=0.2, pitch=0.2, pitch_rate=-0.5, y=LEG.hip_height + 0.15, vx=1.0
-    )
-    found = columns_of_engine(record, HILLS, hip=hip)
+    _, record = roll(HILLS, "free", 0.2, pitch=0.2, pitch_rate=-0.5, y=LEG.hip_height + 0.15, vx=1.0)
+    found = columns_of_engine(record, HILLS)
     for now in instants(found)[::20]:
         points = pose(LEG, now.crank_angle, frame=FrameMotion(phi=now.swing_angle))
         for point, corner in (("toe", LEG.toe), ("heel", LEG.heel)):
@@ -106,18 +88,15 @@ def test_a_pitching_trunk_carries_its_leg_where_the_engine_has_it():
 def test_forces_in_the_world_add_up_to_the_engine_s_impulse_on_hills():
     engine, record = roll(HILLS, vx=1.0)
     found = columns_of_engine(record, HILLS)
-    assert (
-        np.abs(found["force_x"] - found["toe_friction"] - found["heel_friction"]).max() > 10
-    )  # hills matter
+    level = found["toe_friction"] + found["heel_friction"]
+    assert np.abs(found["force_x"] - level).max() > 10  # hills matter
     for axis in "xy":
         force = found[f"force_{axis}"]
         impulse = 0.5e-3 * (force[1:] + force[:-1]).sum()
         assert impulse == pytest.approx(engine.account[f"impulse_{axis}"][0], abs=0.5)
     assert abs(engine.account["impulse_y"][0]) > 100
-    inside = found["toe_depth"] > 0
-    np.testing.assert_allclose(
-        found["toe_depth"][inside], record["toe_penetration"][inside, 0, 0], atol=1e-12
-    )
+    depth, inside = found["toe_depth"], found["toe_depth"] > 0
+    np.testing.assert_allclose(depth[inside], record["toe_penetration"][inside, 0, 0], atol=1e-12)
 
 
 def test_one_instant_and_a_run_are_read_alike():
