@@ -6,7 +6,7 @@ A checkpoint stands between two rollouts. `checkpoints/N/`, after N steps, holds
     vecnormalize.pkl  statistics, where there is normalisation
     replay.pkl        replay buffer, where there is one
     state.pkl         environments, generators, where monitor.csv stood
-    policy.*          the policy as hoof_env/plain_policy.py writes it
+    policy.*          the policy as hoof_env/saved_policy.py writes it
 
 What goes on from there has the bits of a run that was never stopped: on the same machine, on the CPU, with
 the same number of threads, with environments that have `get_state` and `set_state`, and without

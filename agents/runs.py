@@ -1,6 +1,6 @@
 """The folder of one training run: what stands in it, how it is written and how a model is read back.
 
-    policy.*          the trained policy as plain data (hoof_env/plain_policy.py): this is what is loaded
+    policy.*          the trained policy as plain data (hoof_env/saved_policy.py): this is what is loaded
     model.zip         the trained model (Stable-Baselines3)
     vecnormalize.pkl  statistics, only where the hyperparameters ask for normalisation
     config.yml        the hyperparameters that were used, in rl-baselines3-zoo's form
@@ -34,13 +34,12 @@ from numpy.typing import NDArray
 
 from hoof_env._output import check_folder, staged
 from hoof_env.errors import OutputError, ParameterError
-from hoof_env.plain_policy import ABOUT, WEIGHTS, save_policy
+from hoof_env.saved_policy import ABOUT, WEIGHTS, save_policy
 from hoof_env.saved_policy import CHECKPOINTS as CHECKPOINTS
 from hoof_env.saved_policy import STATISTICS as STATISTICS
 from hoof_env.saved_policy import SavedModel as SavedModel
 from hoof_env.saved_policy import TrainedPolicy as TrainedPolicy
 from hoof_env.saved_policy import describe_env as describe_env
-from hoof_env.saved_policy import describe_spaces as describe_spaces
 from hoof_env.saved_policy import read_record as read_record
 
 MODEL, CONFIG, RECORD, MONITOR = "model.zip", "config.yml", "run.json", "monitor.csv"

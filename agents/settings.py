@@ -12,8 +12,8 @@ import numpy as np
 import yaml
 
 from hoof_env.errors import DataFileError
-from hoof_env.plain_policy import ALGORITHMS as ALGORITHMS
-from hoof_env.plain_policy import algorithm_class as algorithm_class
+from hoof_env.saved_policy import ALGORITHMS as ALGORITHMS
+from hoof_env.saved_policy import algorithm_class as algorithm_class
 
 Algorithm = Literal["ppo", "sac", "td3", "tqc"]
 """Names of `ALGORITHMS`, for the commands."""

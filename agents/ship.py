@@ -7,7 +7,7 @@ The best of an id is that with the highest mean return in episodes on which noth
 agents/policies/NAME is written whole or not at all:
 
     policy.onnx         the policy, as agents.export writes it; agents.evaluate and hoof-env render play it
-    policy.safetensors  the weights, with policy.json, for Stable-Baselines3 (hoof_env/plain_policy.py)
+    policy.safetensors  the weights, with policy.json, for Stable-Baselines3 (hoof_env/saved_policy.py)
     run.json, config.yml   how it was trained
     score.json          returns in fixed episodes beside those of gaits, and how far other machines may be off
     card.md, curve.png, film.gif   the model card and its pictures
@@ -43,8 +43,8 @@ from hoof_env.envs.tasks import TASKS
 from hoof_env.errors import DataFileError, OutputError, ParameterError, check_choice, check_number
 from hoof_env.film import render_episode
 from hoof_env.onnx_policy import FILE, OnnxPolicy
-from hoof_env.plain_policy import ABOUT, WEIGHTS
 from hoof_env.records import setting
+from hoof_env.saved_policy import ABOUT, WEIGHTS
 
 POLICIES = Path(__file__).with_name("policies")
 TEMPLATES = Path(__file__).with_name("templates")

@@ -1,4 +1,4 @@
-"""CSV, Parquet and OpenSim's .mot, one function each; `write` chooses by the suffix.
+"""Records of forces as CSV, Parquet and OpenSim's .mot, one function each; `write` chooses by the suffix.
 
 In swing, force and centre of pressure are 0 in all of them, as force plates and gait-lab tools have it.
 """
@@ -71,12 +71,8 @@ def write_mot(record: Record, about: Mapping[str, Any], path: Path) -> None:
     )
 
 
-WRITERS: dict[str, Callable[[Record, Mapping[str, Any], Path], None]] = {
-    ".csv": write_csv,
-    ".parquet": write_parquet,
-    ".mot": write_mot,
-}
-"""The writer for each suffix."""
+WRITERS: dict[str, Callable[[Record, Mapping[str, Any], Path], None]]
+WRITERS = {".csv": write_csv, ".parquet": write_parquet, ".mot": write_mot}
 
 
 def check_export(path: Path) -> None:
@@ -94,16 +90,8 @@ def check_export(path: Path) -> None:
 
 
 def write(record: Record, about: Mapping[str, Any], path: Path) -> Path:
-    """Write a record to `path`, in the format of its suffix; an older file is replaced when this is complete.
-
-    Args:
-        record: as `records.record_episode` returns it.
-        about: as `records.describe` returns it.
-        path: ends in .csv, .parquet or .mot.
-
-    Raises:
-        ParameterError, OutputError, HoofEnvError: as `check_export`.
-    """
+    """Write what `records.record_episode` and `records.describe` return, in the format of the path's suffix;
+    an older file is replaced when this is complete. Errors are those of `check_export`."""
     check_export(path)
     with staged(path.parent) as stage:
         WRITERS[path.suffix.lower()](record, about, stage / path.name)

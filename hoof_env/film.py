@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hoof_env import records
 from hoof_env._output import staged
 from hoof_env.errors import HoofEnvError, ParameterError, check_number, parse_pairs
 from hoof_env.render.instant import Columns, Instant, instants
@@ -40,18 +41,17 @@ FFMPEG: dict[str, dict[str, Any]] = {
 """How ffmpeg writes each kind of film."""
 
 NOT_WHOLE = "ffmpeg could not write the whole film; is the disk full?"
-
-TELL_SECONDS = 5.0
-"""Time between two lines about how far a film is, where there is no bar [s]."""
+TELL_SECONDS = 5.0  # time between two lines about how far a film is, where there is no bar [s]
 
 
 def check_film(path: Path, fps: float) -> None:
     """Raise unless a film of this kind and pace can be written here.
 
     Raises:
-        ParameterError: a GIF whose frames are not whole hundredths of a second apart.
+        ParameterError: `fps` out of range, or frames of a GIF not whole hundredths of a second apart.
         HoofEnvError: a package is missing.
     """
+    check_number("fps", fps, low=0, high=1000, exclusive_low=True)
     for name, package, extra in (
         ("pygame", "pygame-ce", "render"),
         ("imageio_ffmpeg", "imageio-ffmpeg", "video"),
@@ -92,18 +92,14 @@ def frames(
 
 
 def write_film(pictures: Iterable[NDArray[np.uint8]], path: Path, fps: float) -> int:
-    """Write pictures of one size to `path` and return how many; an older file is replaced when this is whole.
-
-    Args:
-        pictures: arrays of shape (height, width, 3).
-        path: ends in .mp4 or .gif.
-        fps: frames a second.
+    """Write pictures of one shape (height, width, 3) to an .mp4 or a .gif and return how many; an older file
+    is replaced when this is whole.
 
     Raises:
         ParameterError, HoofEnvError: as `check_film`.
         OutputError: the folder cannot be written, or the disk is full.
     """
-    check_film(path, check_number("fps", fps, low=0, high=1000, exclusive_low=True))
+    check_film(path, fps)
     with staged(path.parent) as stage:
         writer: Any = None
         count = 0
@@ -111,34 +107,26 @@ def write_film(pictures: Iterable[NDArray[np.uint8]], path: Path, fps: float) ->
             for picture in pictures:
                 if writer is None:
                     writer = _writer(stage / path.name, picture.shape, fps)
-                send(writer, picture)
+                try:
+                    writer.send(np.ascontiguousarray(picture))
+                except OSError:  # in many lines
+                    raise OSError(NOT_WHOLE) from None
                 count += 1
         finally:
             if writer is not None:
                 writer.close()
-        if count:
-            check_whole(stage / path.name, count)
+        if count and _count_frames(stage / path.name) < count:  # ffmpeg may fail after it took the last one
+            raise OSError(NOT_WHOLE)
     return count
 
 
-def send(writer: Any, picture: NDArray[np.uint8]) -> None:
-    """Hand a picture to ffmpeg; `OSError` in one line if it has given up."""
-    try:
-        writer.send(np.ascontiguousarray(picture))
-    except OSError:  # in many lines
-        raise OSError(NOT_WHOLE) from None
-
-
-def check_whole(path: Path, count: int) -> None:
-    """Raise `OSError` if fewer frames were written: ffmpeg may fail after it took the last one."""
+def _count_frames(path: Path) -> int:
     import imageio_ffmpeg
 
     try:
-        written, _ = imageio_ffmpeg.count_frames_and_secs(str(path))
+        return int(imageio_ffmpeg.count_frames_and_secs(str(path))[0])
     except RuntimeError:
-        written = 0
-    if written < count:
-        raise OSError(NOT_WHOLE)
+        return 0
 
 
 def _writer(path: Path, shape: tuple[int, ...], fps: float) -> Any:
@@ -170,11 +158,10 @@ def render_episode(
         ParameterError, DataFileError: as `records.make_env` and `records.find_policy`, or a value is out of
             range. OutputError, HoofEnvError: as `write_film`, and before the episode is played.
     """
-    from hoof_env import records
     from hoof_env.render.renderer import new_renderer
 
     records.check_place(path, FFMPEG)
-    check_film(path, check_number("fps", fps, low=0, high=1000, exclusive_low=True))
+    check_film(path, fps)
     check_number("slow", slow, low=1e-3, high=1e3)
     check_number("seed", seed, low=0)
     check_number("seconds", seconds, low=0, exclusive_low=True)

@@ -19,9 +19,7 @@ from numpy.typing import NDArray
 from hoof_env._version import __version__
 from hoof_env.errors import DataFileError, HoofEnvError
 
-FILE = "policy.onnx"
-"""Name of the file in a policy's folder."""
-
+FILE = "policy.onnx"  # in a policy's folder
 INPUT, OUTPUT = "observation", "action"
 """Names of the graph's input, shape (batch, k), and output, shape (batch, n), float32 both."""
 
@@ -89,15 +87,9 @@ class OnnxPolicy:
                     f"policy {self.path}: made for {key} {self.record[key]}, expected {value}"
                 )
         there, here = self.record.get("settings", self.record.get("env_kwargs", {})), settings_of(env)
-        unlike = [
-            f"{key}={there[key]!r}, here {here[key]!r}"
-            for key in sorted(there.keys() & here.keys())
-            if there[key] != here[key]
-        ]
-        if (made_with := self.record.get("hoof_env", __version__)) != __version__:
-            unlike.append(f"hoof-env {made_with}, here {__version__}")
-        if unlike:
-            warnings.warn(f"policy {self.path}: trained with {'; '.join(unlike)}", stacklevel=2)
+        alike = {key: here[key] for key in there.keys() & here.keys()}
+        there = {key: there[key] for key in alike}
+        warn_of_differences(f"policy {self.path}", there, alike, self.record.get("hoof_env"))
         return self
 
     def predict(
@@ -113,11 +105,16 @@ def describe(env: Any) -> dict[str, Any]:
     """What an environment says of what it takes and gives: spaces, and names where it has them."""
     from hoof_env.gait.gait import PARAMETERS
 
-    found = {"observation_space": str(env.observation_space), "action_space": str(env.action_space)}
+    found: dict[str, Any] = dict(describe_spaces(env))
     names = getattr(env.unwrapped, "observation_names", None)
-    return found | (
-        {"observation_names": list(names), "action_names": list(PARAMETERS)} if names is not None else {}
-    )
+    if names is not None:
+        found |= {"observation_names": list(names), "action_names": list(PARAMETERS)}
+    return found
+
+
+def describe_spaces(env: Any) -> dict[str, str]:
+    """Both spaces of an environment or a model as text, to be kept beside a model and compared."""
+    return {"observation_space": str(env.observation_space), "action_space": str(env.action_space)}
 
 
 def settings_of(env: Any) -> dict[str, Any]:
@@ -128,3 +125,15 @@ def settings_of(env: Any) -> dict[str, Any]:
         return {}
     plain: dict[str, Any] = json.loads(json.dumps(asdict(settings), default=str))
     return plain
+
+
+def warn_of_differences(
+    policy: str, there: dict[str, Any], here: dict[str, Any], made_with: str | None
+) -> None:
+    """Warn of settings, or a version of hoof-env, that were others where a policy was trained."""
+    names = sorted(key for key in {*there, *here} if there.get(key) != here.get(key))
+    unlike = [f"{key}={there.get(key)!r}, here {here.get(key)!r}" for key in names]
+    if made_with not in (None, __version__):
+        unlike.append(f"hoof-env {made_with}, here {__version__}")
+    if unlike:
+        warnings.warn(f"{policy}: trained with {'; '.join(unlike)}", stacklevel=3)

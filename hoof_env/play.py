@@ -23,8 +23,7 @@ HELD = {
 }  # fmt: skip
 """What a key does while it is held: which entry of the action it moves, and which way."""
 
-RATE = 0.8
-"""How fast a held key moves its entry of the action [1/s]; the whole range is 2."""
+RATE = 0.8  # how fast a held key moves its entry of the action [1/s]; the whole range is 2
 
 HELP = (
     (("up, down", "crank faster, slower"), ("left, right", "swing offset"), ("w, s", "swing sine")),
@@ -65,7 +64,7 @@ class Game:
         self.action: NDArray[np.float32] = np.zeros(4, np.float32)
         if gait:
             self.action = self._leg.action_for(GaitParameters(**gait))
-        self.news: list[Instant] = instants(records.substeps(self._env, self._command()))
+        self.news = self._happened()
         self.score = 0.0
         self.distance_from = self.news[0].trunk_x
         self.ended, self.why = False, ""
@@ -95,7 +94,7 @@ class Game:
                 self.action[entry] = np.clip(self.action[entry] + way * RATE * self.dt, -1.0, 1.0)
         _, reward, failed, truncated, info = self._env.step(self.action.copy())
         self.score += float(np.sum(reward))
-        self.news = instants(records.substeps(self._env, self._command()))
+        self.news = self._happened()
         self.ended = failed or truncated
         if self.ended:
             self.why = str(info.get("failure", "time is up"))
@@ -107,13 +106,11 @@ class Game:
             return f"over: {self.why}; r starts again"
         return "paused; space goes on" if self.paused else ""
 
-    def _command(self) -> NDArray[np.float64]:
-        command: NDArray[np.float64] = self._leg.command_of(self.action)
-        return command
+    def _happened(self) -> list[Instant]:
+        return instants(records.substeps(self._env, self._leg.command_of(self.action)))
 
 
-STRIP = 96
-"""Height of the strip with keys and score below a picture of 540 pixels [pixels]."""
+STRIP = 96  # height of the strip with keys and score below a picture of 540 pixels [pixels]
 
 
 def play(
@@ -124,14 +121,8 @@ def play(
     size: tuple[int, int] = (960, 540),
     most_ticks: int | None = None,
 ) -> Game:
-    """Open a window and let a person play; returns the game when it is left.
-
-    Args:
-        env_id, arguments: the environment, its arguments as `parse_pairs` reads them.
-        seed: of the first episode.
-        slow: how many times slower than life it runs.
-        size: of the picture [pixels].
-        most_ticks: leave after so many control steps; None lets the person decide.
+    """Open a window and let a person play, `slow` times slower than life and `most_ticks` control steps at
+    most; returns the game when it is left.
 
     Raises:
         ParameterError: as `records.make_env`, or a value out of range.

@@ -57,15 +57,8 @@ def setting(env: Any) -> Setting:
 
 
 def substeps(env: Any, command: NDArray[np.float64] | None = None) -> Columns:
-    """What happened in the last control step, one row a substep, or the start after a reset.
-
-    Args:
-        env: an environment of this package.
-        command: gait parameters that were commanded, shape (4,); None if unknown.
-
-    Returns:
-        Arrays by the fields of `Instant`.
-    """
+    """What happened in the last control step of an environment of this package, one row a substep, or the
+    start after a reset; `command`, shape (4,), is what was commanded, if known."""
     leg = env.unwrapped
     return columns_of_engine(leg.record(), leg.terrain, command=command)
 
@@ -116,9 +109,8 @@ def find_policy(name: str, env: gym.Env[Any, Any], env_id: str, seed: int = 0) -
     if name == "open-loop":
         return load_open_loop(env_id, env)
     if name.endswith(".zip") or Path(name, "model.zip").is_file():
-        saved = SavedModel.find(Path(name))
         try:
-            return saved.load(env, env_id)
+            return SavedModel.find(Path(name)).load(env, env_id)
         except ModuleNotFoundError as error:
             raise MissingExtraError(
                 f'policy {name}: reading it needs pip install "hoof-env[train]" ({error})'
@@ -151,9 +143,8 @@ def episode(
     Args:
         env: an environment of this package, wrapped or not.
         policy: anything with Stable-Baselines3's `predict`.
-        seed: of the episode.
+        seed, options: of `reset`.
         seconds: when to stop; None for its own end.
-        options: of `reset`.
 
     Raises:
         ParameterError: as `reset` and `step` do, or `seconds` is not positive.
@@ -162,7 +153,8 @@ def episode(
         check_number("seconds", seconds, low=0, exclusive_low=True)
     leg: Any = env.unwrapped
     observation, info = env.reset(seed=seed, options=dict(options or {}))
-    here = substeps(env, _start_gait(info))
+    gait = info.get("gait")
+    here = substeps(env, np.array([gait[name] for name in PARAMETERS]) if gait else None)
     yield here
     start, ended = np.ones(1, bool), False
     while not ended and (seconds is None or here["time"][-1] < seconds - 1e-9):
@@ -173,11 +165,6 @@ def episode(
         here = substeps(env, leg.command_of(np.asarray(action, np.float32)))
         if here["time"][-1] > before:  # else the simulation failed and nothing happened
             yield here
-
-
-def _start_gait(info: Mapping[str, Any]) -> NDArray[np.float64] | None:
-    gait = info.get("gait")
-    return np.array([gait[name] for name in PARAMETERS]) if gait else None
 
 
 def record_episode(
@@ -199,6 +186,7 @@ def record_episode(
 def describe(env: gym.Env[Any, Any], **about: Any) -> dict[str, Any]:
     """What a file says about its record, JSON-serialisable: version, units, leg, ground and `about`."""
     here = setting(env)
+    ground = asdict(env.unwrapped.engine.ground).items()  # type: ignore[attr-defined]
     return {
         "hoof_env": hoof_env.__version__,
         **about,
@@ -207,13 +195,9 @@ def describe(env: gym.Env[Any, Any], **about: Any) -> dict[str, Any]:
         "axes": "x forward, y up, z to the right; angles counter-clockwise",
         "units": RECORD,
         "geometry": here.geometry.to_dict(),
-        "ground": _plain(asdict(env.unwrapped.engine.ground)),  # type: ignore[attr-defined]
+        "ground": {name: value.item() if isinstance(value, np.generic) else value for name, value in ground},
         "terrain": here.terrain.to_dict(),
     }
-
-
-def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: value.item() if isinstance(value, np.generic) else value for name, value in values.items()}
 
 
 def check_place(path: Path, suffixes: Iterable[str]) -> None:

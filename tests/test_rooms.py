@@ -19,7 +19,7 @@ FLOORS = (
     ("hoof_env/dynamics",),
     ("hoof_env/render",),
     ("hoof_env/envs", "hoof_env/__init__.py"),
-    ("hoof_env/paper", "hoof_env/onnx_policy.py", "hoof_env/plain_policy.py"),
+    ("hoof_env/paper", "hoof_env/onnx_policy.py"),
     ("hoof_env/saved_policy.py",),
     ("hoof_env/records.py",),
     ("hoof_env/export.py", "hoof_env/film.py", "hoof_env/play.py"),

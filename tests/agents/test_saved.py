@@ -15,7 +15,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 from agents.runs import STATISTICS, SavedModel, make_env, save_model
 from agents.settings import algorithm_class
 from hoof_env.errors import DataFileError
-from hoof_env.plain_policy import ABOUT, WEIGHTS
+from hoof_env.saved_policy import ABOUT, WEIGHTS
 
 ENV_ID, SHORT = "hoof_env/HorseLeg-v0", {"episode_seconds": 0.4}
 
