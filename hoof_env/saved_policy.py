@@ -30,7 +30,9 @@ CHECKPOINTS = "checkpoints"
 WEIGHTS, ABOUT = "policy.safetensors", "policy.json"
 FORMAT = 1
 
-ALGORITHMS = dict.fromkeys(("ppo", "sac", "td3"), "stable_baselines3") | {"tqc": "sb3_contrib"}
+ALGORITHMS = {
+    "ppo": "stable_baselines3", "sac": "stable_baselines3", "td3": "stable_baselines3", "tqc": "sb3_contrib",
+}  # fmt: skip
 """Where each algorithm lives; each has its file in agents/hyperparams."""
 
 
