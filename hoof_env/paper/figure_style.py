@@ -17,7 +17,7 @@ from hoof_env.leg.geometry import Geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
 from hoof_env.leg.linkage import POINTS as JOINTS
 from hoof_env.paper.measure import POINTS, Stance, measure_stance
-from hoof_env.paper.published import PublishedRow
+from hoof_env.paper.rows import PublishedRow
 
 if TYPE_CHECKING:
     from hoof_env.paper.rows import Reproduction

@@ -19,8 +19,16 @@ from hoof_env._output import staged
 from hoof_env.errors import HoofEnvError
 from hoof_env.paper import report
 from hoof_env.paper.measure import cycle_of, measure_stance, replay
-from hoof_env.paper.published import CONDITIONS, Published, load_published
-from hoof_env.paper.rows import EXACT, Trace, compare, counted, settings_of
+from hoof_env.paper.rows import (
+    CONDITIONS,
+    EXACT,
+    Published,
+    Trace,
+    compare,
+    counted,
+    load_published,
+    settings_of,
+)
 from hoof_env.paper.rows import SOLVERS as SOLVERS
 from hoof_env.paper.rows import Reproduction as Reproduction
 from hoof_env.paper.shapes import DEPTHS, judge, sole_velocity, walk_brakes

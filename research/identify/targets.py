@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from hoof_env.errors import DataFileError, ParameterError, check_number
-from hoof_env.paper.published import PublishedRow, load_published, read_row
+from hoof_env.paper.rows import PublishedRow, load_published, read_row
 from research.identify.state import read_json
 
 Rows = tuple[PublishedRow, ...]

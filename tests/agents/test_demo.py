@@ -14,8 +14,8 @@ import pytest
 from agents import demo
 from agents.evaluate import METRICS, Args, evaluate
 from hoof_env.errors import OutputError
-from hoof_env.paper.published import load_published
 from hoof_env.paper.reproduce import SOLVERS
+from hoof_env.paper.rows import load_published
 
 ROOT = Path(__file__).parents[2]
 

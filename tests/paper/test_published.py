@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hoof_env.errors import DataFileError, ParameterError
-from hoof_env.paper.published import load_published, parse_bar
+from hoof_env.paper.rows import load_published, parse_bar
 
 
 @pytest.fixture(scope="module")

@@ -15,15 +15,16 @@ from hoof_env.leg.kinematics import FrameMotion, pose
 from hoof_env.leg.linkage import POINTS
 from hoof_env.paper import report
 from hoof_env.paper.measure import integral, measure_stance
-from hoof_env.paper.published import CONDITIONS, load_published
 from hoof_env.paper.report import largest_drift, which_beta
 from hoof_env.paper.reproduce import ENVIRONMENT, GAITS, SOLVERS, reproduce, run_cycle, write_reproduction
 from hoof_env.paper.rows import (
+    CONDITIONS,
     EULER,
     ILL_CONDITIONED,
     betas,
     compare,
     counted,
+    load_published,
     settings_of,
     severity,
     slowest_root,

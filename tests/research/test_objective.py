@@ -13,9 +13,8 @@ import pytest
 from hoof_env.errors import HoofEnvError, ParameterError
 from hoof_env.paper import shapes
 from hoof_env.paper.measure import measure_stance
-from hoof_env.paper.published import CONDITIONS, load_published
 from hoof_env.paper.reproduce import run_cycle
-from hoof_env.paper.rows import ILL_CONDITIONED, compare
+from hoof_env.paper.rows import CONDITIONS, ILL_CONDITIONED, compare, load_published
 from hoof_env.paper.shapes import PROMINENCE, find_peaks, half_impulses, sole_velocity, step_length
 from research.identify.confirm import COUNTED
 from research.identify.demands import DEMANDS, MEASURED

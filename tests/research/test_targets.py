@@ -4,7 +4,7 @@ from importlib import resources
 import pytest
 
 from hoof_env.errors import DataFileError
-from hoof_env.paper.published import load_published
+from hoof_env.paper.rows import load_published
 from research.identify.targets import load_targets
 
 
