@@ -100,3 +100,67 @@ def test_an_interrupt_while_kernels_compile_is_one_line(tmp_path, monkeypatch, c
     monkeypatch.setattr("hoof_env.paper.reproduce.reproduce", compiling)
     assert cli.main(["reproduce", "--out", str(tmp_path), "--no-figures"]) == 130
     assert capsys.readouterr().err == "interrupted\n"
+
+
+BAD_REQUESTS = {
+    "export": [
+        (["--out", "{}/x.txt"], "expected a file that ends in .csv, .mot, .parquet"),
+        (["--out", "{}/x.csv", "--policy", "gallop"], "policy: expected a name"),
+        (["--out", "{}/x.csv", "--policy", "1,0.2,0.3,nan"], "swing_cos: expected"),
+        (["--out", "{}/x.csv", "--policy", "99,0,0,0"], "crank_speed: expected"),
+        (["--out", "{}/x.csv", "--policy", "no.zip"], "model no.zip"),
+        (["--out", "{}/x.csv", "--id", "hoof_env/Nobody-v0"], "environment 'hoof_env/Nobody-v0'"),
+        (["--out", "{}/x.csv", "--id", "CartPole-v1"], "expected one leg of this package"),
+        (["--out", "{}/x.csv", "--args", "wings=2"], "wings"),
+        (["--out", "{}/x.csv", "--args", "trunk"], "--args: expected a JSON object or key=value"),
+        (["--out", "{}/x.csv", "--args", "trunk=cloud"], "trunk: expected one of"),
+        (["--out", "{}/x.csv", "--seconds", "0"], "seconds: expected"),
+        (["--out", "{}/x.csv", "--seed", "-1"], "seed: expected"),
+        (["--out", "{}"], "expected a file that ends in"),
+        (["--out", "{}/taken/x.csv"], "cannot write to"),
+    ],
+    "render": [
+        (["--out", "{}/x.avi"], "expected a file that ends in .gif, .mp4"),
+        (["--out", "{}/x.gif", "--fps", "60"], "fps: expected 50, 25"),
+        (["--out", "{}/x.mp4", "--fps", "0"], "fps: expected"),
+        (["--out", "{}/x.mp4", "--slow", "0"], "slow: expected"),
+        (["--out", "{}/x.mp4", "--seconds", "-1"], "seconds: expected"),
+        (["--out", "{}/x.mp4", "--seconds", "nan"], "seconds: expected"),
+        (["--out", "{}/x.mp4", "--size", "10", "10"], "size: expected"),
+        (["--out", "{}/x.mp4", "--policy", "gallop"], "policy: expected"),
+        (["--out", "{}/a/b/x.mp4", "--policy", "gallop"], "policy: expected"),
+        (["--out", "{}/x.mp4", "--args", "render_mode=human"], "render_mode: expected"),
+    ],
+}
+
+
+@pytest.mark.parametrize(
+    ("command", "options", "words"), [(name, *row) for name, rows in BAD_REQUESTS.items() for row in rows]
+)
+def test_a_bad_request_is_one_line_and_leaves_nothing(command, options, words, tmp_path, capsys):
+    (tmp_path / "taken").write_text("mine", encoding="utf-8")
+    assert cli.main([command, *(text.format(tmp_path) for text in options)]) == 2
+    said = capsys.readouterr().err
+    assert words in said
+    assert said.count("\n") == 1
+    assert [file.name for file in tmp_path.iterdir()] == ["taken"]
+
+
+@pytest.mark.parametrize(
+    ("command", "name"), [(["export"], "x.csv"), (["render", "--size", "480", "270"], "x.mp4")]
+)
+def test_a_file_is_replaced_on_demand_only_and_its_folder_is_told(command, name, tmp_path, capsys):
+    out = tmp_path / "new" / name
+    command = [*command, "--out", str(out), "--seconds", "0.1"]
+    assert cli.main(command) == 0
+    said = capsys.readouterr().out
+    assert said.startswith(f"{out}: ")
+    assert said.endswith(f"B; made the folder {out.parent}\n")
+    first = out.read_bytes()
+    assert cli.main([*command, "--seed", "1"]) == 2
+    refusal = f"hoof-env: error: {str(out)!r} exists already; name another file, or add --overwrite\n"
+    assert capsys.readouterr().err == refusal
+    assert out.read_bytes() == first
+    assert cli.main([*command, "--seed", "1", "--overwrite"]) == 0
+    assert out.read_bytes() != first
+    assert "folder" not in capsys.readouterr().out

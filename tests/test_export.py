@@ -149,34 +149,6 @@ def test_a_step_that_failed_is_not_recorded():
     assert (np.diff(record["time"]) > 0).all()
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["--out", "{}/x.txt"], "expected a file that ends in .csv, .mot, .parquet"),
-        (["--out", "{}/x.csv", "--policy", "gallop"], "policy: expected a name"),
-        (["--out", "{}/x.csv", "--policy", "1,0.2,0.3,nan"], "swing_cos: expected"),
-        (["--out", "{}/x.csv", "--policy", "99,0,0,0"], "crank_speed: expected"),
-        (["--out", "{}/x.csv", "--policy", "no.zip"], "model no.zip"),
-        (["--out", "{}/x.csv", "--id", "hoof_env/Nobody-v0"], "environment 'hoof_env/Nobody-v0'"),
-        (["--out", "{}/x.csv", "--id", "CartPole-v1"], "expected one leg of this package"),
-        (["--out", "{}/x.csv", "--args", "wings=2"], "wings"),
-        (["--out", "{}/x.csv", "--args", "trunk"], "--args: expected a JSON object or key=value"),
-        (["--out", "{}/x.csv", "--args", "trunk=cloud"], "trunk: expected one of"),
-        (["--out", "{}/x.csv", "--seconds", "0"], "seconds: expected"),
-        (["--out", "{}/x.csv", "--seed", "-1"], "seed: expected"),
-        (["--out", "{}"], "expected a file that ends in"),
-        (["--out", "{}/taken/x.csv"], "cannot write to"),
-    ],
-)
-def test_a_bad_request_is_one_line_and_leaves_nothing(arguments, words, tmp_path, capsys):
-    (tmp_path / "taken").write_text("mine", encoding="utf-8")
-    assert cli.main(["export", *(text.format(tmp_path) for text in arguments)]) == 2
-    said = capsys.readouterr().err
-    assert words in said
-    assert said.count("\n") == 1
-    assert [file.name for file in tmp_path.iterdir()] == ["taken"]
-
-
 def test_a_folder_in_the_file_s_place_is_refused(tmp_path, episode):
     (tmp_path / "x.csv").mkdir()
     with pytest.raises(OutputError, match="got a folder"):
@@ -204,21 +176,6 @@ def test_the_commands_play_the_gait_of_a_file_and_the_best_of_the_repository(tmp
         out = str(tmp_path / f"{name}.csv")
         assert cli.main(["export", "--out", out, "--policy", policy, "--seconds", "0.1"]) == 0
     assert (tmp_path / "file.csv").read_bytes() == (tmp_path / "name.csv").read_bytes()
-
-
-def test_a_record_is_replaced_on_demand_only_and_its_folder_is_told(tmp_path, capsys):
-    out = tmp_path / "new" / "x.csv"
-    command = ["export", "--out", str(out), "--seconds", "0.1"]
-    assert cli.main(command) == 0
-    said = capsys.readouterr().out
-    assert said.startswith(f"{out}: 101 rows, ")
-    assert said.endswith(f" kB; made the folder {out.parent}\n")
-    first = out.read_bytes()
-    assert cli.main([*command, "--seed", "1"]) == 2
-    assert f"{str(out)!r} exists already" in capsys.readouterr().err
-    assert out.read_bytes() == first
-    assert cli.main([*command, "--seed", "1", "--overwrite"]) == 0
-    assert out.read_bytes() != first
 
 
 def test_a_trained_model_without_its_library_is_one_line(tmp_path, capsys, monkeypatch):

@@ -250,37 +250,34 @@ def test_the_lock_is_what_its_command_writes(ours):
 # Nothing twice
 
 
-def test_second_run_does_nothing(setup, installs):
-    assert [setup.main(), setup.main()] == [0, 0]
-    assert installs == ["all anew"]
+def lose_python(setup):
+    setup.venv("bin/python").unlink()
+
+
+def add_a_pin(setup):
+    with (setup.ROOT / "constraints.txt").open("a") as pins:
+        pins.write("another==1.0\n")
+
+
+def move(setup):
+    setup.ROOT = setup.ROOT.rename(setup.ROOT.with_name("moved"))
+
+
+@pytest.mark.parametrize(
+    ("change", "second"),
+    [(lambda setup: None, []), (lose_python, ["all anew"]), (add_a_pin, ["all more"]), (move, ["all anew"])],
+)
+def test_a_second_run_does_what_a_change_asks_for(setup, installs, change, second):
+    assert setup.main() == 0
+    change(setup)
+    assert setup.main() == 0
+    assert installs == ["all anew", *second]
 
 
 def test_what_the_tests_need_is_added_to_the_demos(setup, installs):
     assert [setup.main(purpose) for purpose in ("demo", "demo", "all", "demo", "all")] == [0] * 5
     assert installs == ["demo anew", "all more"]
     assert set(setup.requirements("demo")) < set(setup.requirements("all"))
-
-
-def test_a_venv_whose_python_has_gone_is_made_anew(setup, installs):
-    setup.main()
-    setup.venv("bin/python").unlink()
-    setup.main()
-    assert installs == ["all anew"] * 2
-
-
-def test_changed_pins_update_what_is_there(setup, installs):
-    setup.main()
-    with (setup.ROOT / "constraints.txt").open("a") as pins:
-        pins.write("another==1.0\n")
-    assert setup.main() == 0
-    assert installs == ["all anew", "all more"]
-
-
-def test_moved_checkout_is_set_up_anew(setup, installs):
-    setup.main()
-    setup.ROOT = setup.ROOT.rename(setup.ROOT.with_name("moved"))
-    assert setup.main() == 0
-    assert installs == ["all anew", "all anew"]
 
 
 def test_interrupted_setup_is_made_anew(setup, installs, monkeypatch, capsys):

@@ -310,17 +310,6 @@ def test_a_trunk_is_drawn_as_it_is_held(run, trunk, held):
     assert [(above[:, column] != sky).any() for column in (5, 260, 312)] == held
 
 
-def test_the_running_peak_is_of_the_open_stance(run):
-    picture = renderer(lift_off_n=40.0)
-    for step in run:
-        picture.add(step)
-        stances = picture.stances
-        now = step[-1]
-        assert (stances.opened is None) == (now.normal <= 40.0)
-        assert stances.running_peak >= now.grf * (now.normal > 40.0)
-    assert 1000 < stances.highest < 2000 == picture._panel.full_scale  # of 1, 2, 5 kN the first above it
-
-
 def test_rows_that_are_not_finite_are_left_out(run):
     *good, one, other = run[1]
     broken = [*good, one._replace(force_y=np.inf), other._replace(crank_angle=np.nan)]
