@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,9 +38,7 @@ from hoof_env.paper.figure_style import (
     text_size,
 )
 from hoof_env.paper.measure import POINTS
-
-if TYPE_CHECKING:
-    from hoof_env.paper.rows import Reproduction
+from hoof_env.paper.rows import Reproduction
 
 Point = NDArray[np.float64]
 

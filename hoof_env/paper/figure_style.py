@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +17,7 @@ from hoof_env.leg.geometry import Geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
 from hoof_env.leg.linkage import POINTS as JOINTS
 from hoof_env.paper.measure import POINTS, Stance, measure_stance
-from hoof_env.paper.rows import PublishedRow
-
-if TYPE_CHECKING:
-    from hoof_env.paper.rows import Reproduction
+from hoof_env.paper.rows import PublishedRow, Reproduction
 
 BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER, GREY, SOIL = (
     "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#666666", "#EFE6D8",

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,16 +52,12 @@ from hoof_env.paper.figure_style import (
     time_limits,
     write,
 )
-from hoof_env.paper.measure import Stance, measure_stance
+from hoof_env.paper.measure import Stance, Trace, measure_stance
+from hoof_env.paper.rows import Reproduction
 from hoof_env.paper.shapes import find_peaks
-
-if TYPE_CHECKING:
-    from hoof_env.paper.rows import Reproduction
 
 HOOVES = 8  # the hoof is drawn at this many equally spaced instants of the cycle
 TALLEST, NEAR = 110.0, 26.0  # most height for the whole leg, height near the ground [mm]
-
-Trace = NDArray[np.void]
 
 
 def draw_paths(figure: Any, reproduction: Reproduction) -> None:

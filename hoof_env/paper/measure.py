@@ -30,8 +30,10 @@ load), and the hoof's angle, heel up positive [rad]."""
 CYCLE = np.dtype([(name, "f8") for name in (*(TRACE.names or ()), *SUMS)])
 """A cycle: a row for every substep, what the engine reports of one leg and the sums over its hoof points."""
 
+Trace = NDArray[np.void]  # one cycle of dtype `CYCLE`
 
-def cycle_of(record: Mapping[str, Any]) -> NDArray[np.void]:
+
+def cycle_of(record: Mapping[str, Any]) -> Trace:
     """Rows of dtype `CYCLE`, shape (n,), from what an environment's `record` gives."""
     cycle = np.zeros(len(record["time"]), CYCLE)
     for name in TRACE.names or ():
@@ -39,7 +41,7 @@ def cycle_of(record: Mapping[str, Any]) -> NDArray[np.void]:
     return add_sums(cycle)
 
 
-def add_sums(cycle: NDArray[np.void]) -> NDArray[np.void]:
+def add_sums(cycle: Trace) -> Trace:
     """Fill `SUMS` of a cycle on a fixed trunk over level ground; returns it."""
     c = cycle
     for name in ("normal", "friction"):
@@ -52,7 +54,7 @@ def add_sums(cycle: NDArray[np.void]) -> NDArray[np.void]:
     return cycle
 
 
-def replay(cycle: NDArray[np.void], ground: Ground, rise: float = 0.0) -> NDArray[np.void]:
+def replay(cycle: Trace, ground: Ground, rise: float = 0.0) -> Trace:
     """A cycle of dtype `CYCLE` on another ground, which lies higher by `rise` [m]: the trunk stands lower by
     as much.
 
@@ -175,7 +177,7 @@ def overlap(one: tuple[Interval, ...], two: tuple[Interval, ...]) -> Interval | 
     return longest if longest[1] > longest[0] else None
 
 
-def integral(trace: NDArray[np.void], values: NDArray[np.float64], start: float, end: float) -> float:
+def integral(trace: Trace, values: NDArray[np.float64], start: float, end: float) -> float:
     """Integral over [start, end] [s] of `values` sampled with the trace, linear between samples."""
     t = trace["time"]
     inner = (t > start) & (t < end)
@@ -184,7 +186,7 @@ def integral(trace: NDArray[np.void], values: NDArray[np.float64], start: float,
     return float(np.sum(np.diff(times) * ((sampled[1:] + sampled[:-1]) / 2)))
 
 
-def measure_stance(trace: NDArray[np.void]) -> Stance:
+def measure_stance(trace: Trace) -> Stance:
     """Measure one cycle of dtype `CYCLE`, from its start to its end, both included.
 
     Raises:
@@ -218,7 +220,7 @@ def measure_stance(trace: NDArray[np.void]) -> Stance:
     )
 
 
-def hoof_error(trace: NDArray[np.void], exact: NDArray[np.void]) -> NDArray[np.float64]:
+def hoof_error(trace: Trace, exact: Trace) -> NDArray[np.float64]:
     """How far toe or heel, whichever is further, is from where another cycle of the motion has it [m].
 
     Shape of `trace`, at whose instants the other cycle is interpolated.

@@ -8,16 +8,24 @@ from collections.abc import Iterable, Mapping
 from importlib.metadata import version
 from pathlib import Path
 from string import Template
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from hoof_env import __version__
 from hoof_env._output import markdown_table
 from hoof_env.ground.contact import HERTZ
 from hoof_env.paper.measure import hoof_error, measure_stance
-from hoof_env.paper.rows import EULER, EXACT, ILL, PRINTED, PROBABLE, betas, counted, severity, slowest_root
-
-if TYPE_CHECKING:
-    from hoof_env.paper.rows import Reproduction
+from hoof_env.paper.rows import (
+    EULER,
+    EXACT,
+    ILL,
+    PRINTED,
+    PROBABLE,
+    Reproduction,
+    betas,
+    counted,
+    severity,
+    slowest_root,
+)
 
 WORST = 3  # how many rows of each solver are named as its worst
 FIGURES = ("figure1", "figure3", "figure4", "figure5", "figure6")

@@ -18,12 +18,11 @@ import hoof_env  # noqa: F401  (registers the environments)
 from hoof_env._output import staged
 from hoof_env.errors import HoofEnvError
 from hoof_env.paper import report
-from hoof_env.paper.measure import cycle_of, measure_stance, replay
+from hoof_env.paper.measure import Trace, cycle_of, measure_stance, replay
 from hoof_env.paper.rows import (
     CONDITIONS,
     EXACT,
     Published,
-    Trace,
     compare,
     counted,
     load_published,

@@ -19,18 +19,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import Geometry
-from hoof_env.paper.measure import Stance
+from hoof_env.paper.measure import Stance, Trace
 
 CONDITIONS = {"elastic": 1.0, "inelastic": 0.0}
 """Coefficient of restitution cr of each condition of the paper [-]."""
 
 _BAR = re.compile(r"(\d+(?:\.\d+)?)(?: (s|deg|%|point))?")
-_BAR_OF_UNIT = {"s": ("s",), "deg": ("deg",), "N": ("%",), "%": ("point",), "-": ("",)}
+_BAR_OF_UNIT = {"s": "s", "deg": "deg", "N": "%", "%": "point", "-": ""}
 
 
 @dataclass(frozen=True)
@@ -64,18 +63,18 @@ def parse_bar(text: str, unit: str) -> Bar:
     Raises:
         ParameterError: another form, or a measure that does not fit the unit.
     """
-    allowed = _BAR_OF_UNIT.get(unit)
-    if allowed is None:
+    measure = _BAR_OF_UNIT.get(unit)
+    if measure is None:
         raise ParameterError(f"unit: expected one of {', '.join(_BAR_OF_UNIT)}, got {unit!r}")
     if text == "reported":
-        return Bar(None, allowed[0])
+        return Bar(None, measure)
     match = _BAR.fullmatch(text) if isinstance(text, str) else None
-    if match is None or (match[2] or "") not in allowed:
-        form = f"0.5 {allowed[0]}".strip()
+    if match is None or (match[2] or "") != measure:
+        form = f"0.5 {measure}".strip()
         raise ParameterError(
             f"bar: expected 'reported' or a number like {form!r} for unit {unit!r}, got {text!r}"
         )
-    return Bar(float(match[1]), match[2] or "")
+    return Bar(float(match[1]), measure)
 
 
 @dataclass(frozen=True)
@@ -188,9 +187,6 @@ loop samples touch-down (docs/evidence/conditions.md has how far they move)."""
 
 REPORTED, ILL = "reported", "ill-conditioned"
 """Why a row is spared."""
-
-Trace = NDArray[np.void]
-"""One cycle of dtype `measure.CYCLE`."""
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.paper.measure import POINTS, Stance, integral, measure_stance
+from hoof_env.paper.measure import POINTS, Stance, Trace, integral, measure_stance
 
 PROMINENCE = 0.1  # a force peak counts if it stands out by this part of the highest force [-]
 PEAK_GAP = 0.01  # two peaks are apart in time if at least this far [s], ten time steps of the paper
@@ -40,9 +40,6 @@ class Verdict:
     evidence: str
     readings: dict[str, bool] = field(default_factory=dict)
     used: str = ""
-
-
-Trace = NDArray[np.void]
 
 
 def find_peaks(force: NDArray[np.float64]) -> list[int]:
