@@ -25,12 +25,9 @@ from hoof_env.onnx_policy import OnnxPolicy
 from hoof_env.render.instant import UNITS, Columns, Setting, columns_of_engine
 from hoof_env.saved_policy import SavedModel
 
-NOT_RECORDED = ("swing_offset", "swing_sin", "swing_cos")
-"""Fields of `Instant` that a record lacks: they are known at the end of a control step only."""
-
-RECORD = {name: unit for name, unit in UNITS.items() if name not in NOT_RECORDED} | {"free_moment": "N m"}
-"""Columns of a record and their units. They mean what `Instant` says; the free moment is 0, for the centre of
-pressure is where the ground's forces have no moment."""
+RECORD = {name: unit for name, unit in UNITS.items() if name not in PARAMETERS[1:]} | {"free_moment": "N m"}
+"""Columns of a record and their units: fields of `Instant` but for the swing's parameters, which are known at
+the end of a control step only. The free moment about the centre of pressure is 0."""
 
 
 def setting(env: Any) -> Setting:

@@ -256,9 +256,8 @@ def load_policy(folder: Path) -> tuple[Any, Any]:
         if not all(bool(one.isfinite().all()) for one in weights.values()):
             raise ValueError(f"{WEIGHTS} holds numbers that are not finite")
         model.policy.load_state_dict(weights)
-        normalize = _Normalizer(**about["normalize"]) if about["normalize"] else None
-        if normalize is not None:
-            normalize.check(model.observation_space.shape)
+        shape = model.observation_space.shape
+        normalize = _Normalizer(shape, **about["normalize"]) if about["normalize"] else None
     except ParameterError as error:
         raise DataFileError(f"model {folder / ABOUT}: {error}") from None
     except Exception as error:  # a damaged description may raise anything
@@ -271,14 +270,13 @@ def load_policy(folder: Path) -> tuple[Any, Any]:
 
 
 class _Normalizer:
-    """Observations as `VecNormalize` shows them; its formula."""
+    """Observations of a shape as `VecNormalize` shows them; its formula; `ValueError` for others."""
 
-    def __init__(self, mean: list[float], var: list[float], epsilon: float, clip: float) -> None:
+    def __init__(
+        self, shape: tuple[int, ...], mean: list[float], var: list[float], epsilon: float, clip: float
+    ) -> None:
         self.mean, self.var = np.array(mean, np.float64), np.array(var, np.float64)
         self.epsilon, self.clip = float(epsilon), float(clip)
-
-    def check(self, shape: tuple[int, ...]) -> None:
-        """`ValueError` unless these are statistics of observations of that shape."""
         sound = all(one.shape == shape and np.isfinite(one).all() for one in (self.mean, self.var))
         if not sound or not (self.var + self.epsilon > 0).all() or not self.clip > 0:
             raise ValueError(f"expected statistics of observations of shape {shape}")

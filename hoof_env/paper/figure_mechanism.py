@@ -43,12 +43,12 @@ from hoof_env.paper.rows import Reproduction
 Point = NDArray[np.float64]
 
 
-def dots_along(lines: Sequence[Point], step: float = 0.4) -> Point:
-    """Points every `step` [mm] along polylines of shape (k, 2), shape (j, 2)."""
+def dots_along(lines: Sequence[Point]) -> Point:
+    """Points every 0.4 mm along polylines of shape (k, 2), shape (j, 2)."""
     dots = []
     for line in lines:
         for one, two in pairwise(line):
-            count = max(int(np.hypot(*(two - one)) / step), 1)
+            count = max(int(np.hypot(*(two - one)) / 0.4), 1)
             dots.append(one + np.linspace(0, 1, count + 1)[:, None] * (two - one))
     return np.concatenate(dots) if dots else np.empty((0, 2))
 

@@ -92,6 +92,7 @@ class Stance:
 
     Attributes:
         period: length of the cycle [s].
+        start, end: first and last contact [s].
         toe, heel: intervals in which each point is in the ground [s].
         double: the longest interval in which both are [s], or None.
         angle_start_deg, angle_end_deg: hoof angle at first and last contact, heel up positive [deg].
@@ -104,6 +105,8 @@ class Stance:
     """
 
     period: float
+    start: float
+    end: float
     toe: tuple[Interval, ...]
     heel: tuple[Interval, ...]
     double: Interval | None
@@ -116,16 +119,6 @@ class Stance:
     peak_resultant: float
     mean: float
     mean_stance: float
-
-    @property
-    def start(self) -> float:
-        """First contact [s]."""
-        return min(enter for enter, _ in self.toe + self.heel)
-
-    @property
-    def end(self) -> float:
-        """Last contact [s]."""
-        return max(leave for _, leave in self.toe + self.heel)
 
     @property
     def middle(self) -> float:
@@ -205,6 +198,8 @@ def measure_stance(trace: Trace) -> Stance:
     period, top = float(t[-1] - t[0]), int(np.argmax(trace["normal"]))
     return Stance(
         period=period,
+        start=start,
+        end=end,
         toe=toe,
         heel=heel,
         double=double,

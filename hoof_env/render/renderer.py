@@ -92,8 +92,7 @@ class Renderer:
     @property
     def stances(self) -> Stances:
         """Stances of the episode and their peaks."""
-        stances: Stances = self._panel.stances
-        return stances
+        return self._panel.stances
 
     @property
     def latest(self) -> Instant:
