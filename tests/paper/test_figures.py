@@ -1,11 +1,9 @@
 import dataclasses
-import sys
 from itertools import combinations
 
 import numpy as np
 import pytest
 
-from hoof_env.errors import HoofEnvError
 from hoof_env.leg.linkage import BODIES, POINTS
 from hoof_env.paper import figures
 from hoof_env.paper.figure_mechanism import draw_mechanism
@@ -229,9 +227,3 @@ def test_every_axis_with_numbers_has_a_unit(draw, function):
         assert not numbered(ax.xaxis) or "[" in ax.get_xlabel()
         beside = [other for other in axes if np.isclose(other.get_position().y0, ax.get_position().y0)]
         assert not numbered(ax.yaxis) or any("[" in other.get_ylabel() for other in beside)
-
-
-def test_without_matplotlib_the_way_out_is_named(monkeypatch, reproduction, tmp_path):
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
-    with pytest.raises(HoofEnvError, match=r'pip install "hoof-env\[plot\]".*--no-figures'):
-        figures.draw_all(reproduction, tmp_path)

@@ -23,9 +23,7 @@ def test_both_points_at_once_are_first_and_last_together(cycle):
 
 def test_every_touch_of_a_bouncing_point_counts():
     t = np.linspace(0, 1, 1001)
-    penetration = np.minimum(
-        np.abs(t - 0.5) - 0.1, 0.2 - np.abs(t - 0.5)
-    )  # in at 0.3 and 0.6, out at 0.4 and 0.7
+    penetration = np.minimum(np.abs(t - 0.5) - 0.1, 0.2 - np.abs(t - 0.5))
     assert np.array(contact_intervals(t, penetration)) == pytest.approx(np.array([(0.3, 0.4), (0.6, 0.7)]))
 
 
