@@ -1,23 +1,18 @@
-"""What callers give environments, alone or many at once: the keywords and their types, checks that name what
-was given and what was expected, states, and specs that say how long an episode lasts."""
+"""What callers give environments: the keywords and their types, and checks of what many take at once, which
+name what was given and what was expected."""
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
 from typing import Any, TypedDict
 
 import numpy as np
-from gymnasium.envs.registration import EnvSpec
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from hoof_env.envs.batch import EpisodeBatch
 from hoof_env.envs.episode import ACTIONS
 from hoof_env.envs.start import check_seed
-from hoof_env.envs.tasks import PER_EPISODE, Settings
-from hoof_env.errors import FixedSettingError, ParameterError, count
+from hoof_env.errors import ParameterError, count
 from hoof_env.leg.geometry import Preset
 
 
@@ -126,92 +121,6 @@ def seeds_of(seed: Any, n: int) -> list[int | None]:
         return [None] * n
     first = count("seed", seed, low=0)
     return [first + env for env in range(n)]
-
-
-def check_state(state: Any, env_id: str, settings: Mapping[str, Any], parts: Sequence[str] = ()) -> None:
-    """Raise unless `state` is one that `get_state` of such an environment gave.
-
-    Raises:
-        ParameterError: it lacks a part, or is of another id or of other settings.
-    """
-    names = ("id", "settings", "engine", "episode", "generator", *parts)
-    missing = [name for name in names if not isinstance(state, Mapping) or name not in state]
-    if missing:
-        raise ParameterError(f"state: expected what get_state gives, but {', '.join(missing)} is missing")
-    if state["id"] != env_id:
-        raise ParameterError(f"state: expected one of {env_id}, got one of {state['id']}")
-    there = state["settings"] if isinstance(state["settings"], Mapping) else {}
-    unlike = [f"{k}: {v!r} here, {there.get(k)!r} there" for k, v in settings.items() if there.get(k) != v]
-    if unlike:
-        raise ParameterError(f"state: of other settings; {'; '.join(unlike)}")
-
-
-def generator_of(state: Any) -> np.random.Generator:
-    """A generator in the state that a `PCG64` had.
-
-    Raises:
-        ParameterError: no such state.
-    """
-    generator = np.random.Generator(np.random.PCG64())
-    try:
-        generator.bit_generator.state = state
-    except (TypeError, ValueError, KeyError):
-        raise ParameterError(f"state['generator']: expected the state of a PCG64, got {state!r}") from None
-    return generator
-
-
-SETTINGS = frozenset(item.name for item in fields(Settings))
-
-
-def fixed_setting(name: str) -> FixedSettingError:
-    """The error of an assignment to a setting, or to what follows from the settings."""
-    how = "gymnasium.make(id, ...)" if name in SETTINGS else "the arguments of gymnasium.make"
-    if name in PER_EPISODE:
-        how += f", or reset(options={{'parameters': {{{name!r}: ...}}}}) for an episode"
-    return FixedSettingError(f"{name}: expected no assignment, which would change nothing; set it by {how}")
-
-
-class Made:
-    """Refuses assignments that would look like a setting and change nothing; completes the spec.
-
-    Attributes:
-        batch: the episodes.
-        spec: what Gymnasium made it from. `max_episode_steps` is the environment's own limit, which
-            `episode_seconds` and `dt` give, unless it has one already.
-    """
-
-    batch: EpisodeBatch
-    _spec: EnvSpec | None = None
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        """As of any object, but for settings and what follows from them.
-
-        Raises:
-            FixedSettingError: a setting, or a property that cannot be set.
-        """
-        fixed = getattr(type(self), name, None)
-        if name in SETTINGS or (isinstance(fixed, property) and fixed.fset is None):
-            raise fixed_setting(name)
-        super().__setattr__(name, value)
-
-    def set_wrapper_attr(self, name: str, value: Any, *, force: bool = True) -> bool:
-        """As Gymnasium's, which would otherwise set a setting that the environment lacks on a wrapper."""
-        if force or name in SETTINGS or hasattr(self, name):
-            setattr(self, name, value)
-            return True
-        return False
-
-    @property
-    def spec(self) -> EnvSpec | None:
-        """The specification, None for an environment that Gymnasium did not make."""
-        return self._spec
-
-    @spec.setter
-    def spec(self, spec: EnvSpec | None) -> None:
-        if spec is not None and spec.max_episode_steps is None:
-            spec = copy.copy(spec)  # it may be the registered one
-            spec.max_episode_steps = self.batch.steps_per_episode
-        self._spec = spec
 
 
 Range = float | Sequence[float]

@@ -11,10 +11,10 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
-from hoof_env.envs.arguments import SETTINGS, VectorKeywords, fixed_setting
+from hoof_env.envs.arguments import VectorKeywords
+from hoof_env.envs.base import SETTINGS, fixed_setting
 from hoof_env.envs.infos import row_of
-from hoof_env.envs.rows import OWN
-from hoof_env.envs.vector import HorseLegVectorEnv
+from hoof_env.envs.vector import OWN, HorseLegVectorEnv
 from hoof_env.errors import ParameterError
 
 
