@@ -1,5 +1,5 @@
 """What callers give environments: the keywords and their types, and checks of what many take at once, which
-name what was given and what was expected."""
+name what was given and what was expected: all raise ParameterError."""
 
 from __future__ import annotations
 
@@ -11,17 +11,12 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from hoof_env.envs.episode import ACTIONS
-from hoof_env.envs.start import check_seed
 from hoof_env.errors import ParameterError, count
 from hoof_env.leg.geometry import Preset
 
 
 def mode_of(value: Any) -> AutoresetMode:
-    """An `AutoresetMode`, given as such, by its name or by its value.
-
-    Raises:
-        ParameterError: none of these.
-    """
+    """An `AutoresetMode`, given as such, by its name or by its value."""
     if isinstance(value, AutoresetMode):
         return value
     known = {mode.value: mode for mode in AutoresetMode} | {mode.name: mode for mode in AutoresetMode}
@@ -33,11 +28,7 @@ def mode_of(value: Any) -> AutoresetMode:
 
 
 def drawn_of(rendered: Any, n: int, most: int) -> int:
-    """How many of `n` environments are drawn; None is all, if they are at most `most`.
-
-    Raises:
-        ParameterError: more than there are, or more than `most` and `rendered` is None.
-    """
+    """How many of `n` environments are drawn; None is all, if they are at most `most`."""
     if rendered is None and n > most:
         raise ParameterError(
             f"rendered: expected how many of the {n} environments to draw, as they are more than {most}; for"
@@ -50,11 +41,7 @@ def drawn_of(rendered: Any, n: int, most: int) -> int:
 
 
 def actions_of(actions: Any, n: int) -> NDArray[np.float32]:
-    """Finite actions, shape (n, 4).
-
-    Raises:
-        ParameterError: of a wrong shape or type, or not finite.
-    """
+    """Finite actions, shape (n, 4)."""
     try:
         given = np.asarray(actions)
     except ValueError:
@@ -73,11 +60,7 @@ def actions_of(actions: Any, n: int) -> NDArray[np.float32]:
 
 
 def mask_of(given: Any, n: int) -> NDArray[np.bool_]:
-    """The reset option "reset_mask", shape (n,); None is all.
-
-    Raises:
-        ParameterError: another shape or type, or all False.
-    """
+    """The reset option "reset_mask", bool of shape (n,), not all False; None is all."""
     if given is None:
         return np.ones(n, bool)
     good = isinstance(given, np.ndarray) and given.dtype == bool and given.shape == (n,)
@@ -91,11 +74,7 @@ def mask_of(given: Any, n: int) -> NDArray[np.bool_]:
 
 
 def ended_of(given: Any, n: int) -> NDArray[np.bool_]:
-    """A copy of which episodes of a state had ended, shape (n,).
-
-    Raises:
-        ParameterError: another shape or type.
-    """
+    """A copy of which episodes of a state had ended, bool of shape (n,)."""
     try:
         ended = np.array(given)
     except ValueError:
@@ -107,20 +86,20 @@ def ended_of(given: Any, n: int) -> NDArray[np.bool_]:
     return ended
 
 
-def seeds_of(seed: Any, n: int) -> list[int | None]:
-    """A seed for each of `n` environments: `seed` + i, or as given; None goes on with the generator there is.
+def seed_of(seed: Any) -> int | None:
+    """A seed as Gymnasium takes it, a whole number from 0 or None."""
+    return None if seed is None else count("seed", seed, low=0)
 
-    Raises:
-        ParameterError: not whole numbers from 0, or too few.
-    """
+
+def seeds_of(seed: Any, n: int) -> list[int | None]:
+    """A seed for each of `n` environments: `seed` + i, or as given; None goes on with its generator."""
     if isinstance(seed, (list, tuple, np.ndarray)):
         if len(seed) != n:
             raise ParameterError(f"seed: expected one number or {n}, got {len(seed)}")
-        return [check_seed(value) for value in seed]
+        return [seed_of(value) for value in seed]
     if seed is None:
         return [None] * n
-    first = count("seed", seed, low=0)
-    return [first + env for env in range(n)]
+    return [count("seed", seed, low=0) + env for env in range(n)]
 
 
 Range = float | Sequence[float]

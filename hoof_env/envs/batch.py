@@ -188,14 +188,29 @@ class EpisodeBatch:
     def _compile(self) -> None:
         """Have every kernel of a step compiled, or loaded, by running it on no environment: what a parent
         makes warms the cache for its workers."""
-        idle, gait = self.addresses.copy(), GaitParameters.from_array(MIDDLE)
-        idle[kernels.AT.data + COLUMNS] = 0
-        for run in (self._kernels.apply_one, self._kernels.finish_one) if self.paper else (self.kernel,):
-            run(idle)
+        gait = GaitParameters.from_array(MIDDLE)
         if self.paper:
+            self._run_idle(self._kernels.apply_one, self._kernels.finish_one)
             self.paper.compile(gait)
-        self._observe(idle)
+        else:
+            self._run_idle(self.kernel)
+        self._run_idle(self._observe)
         self.engine.reset(gait, envs=[])
+
+    def _run_idle(self, *step_kernels: Any) -> None:
+        idle = self.addresses.copy()
+        idle[kernels.AT.data + COLUMNS] = 0
+        for run in step_kernels:
+            run(idle)
+
+    def direct_kernel(self) -> Any:
+        """`kernel` without numba's choice by types, a hundredth of a single step: only for `addresses`."""
+        if self.paper:
+            return self.kernel
+        if not self.kernel.overloads:  # as in a process that unpickled this
+            self._run_idle(self.kernel)
+        (compiled,) = self.kernel.overloads.values()
+        return compiled.entry_point
 
     def _step_paper(self, addresses: NDArray[np.int64]) -> int:
         """As `StepKernels.step_one`, with the paper's solver."""

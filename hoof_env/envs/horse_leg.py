@@ -11,14 +11,13 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from hoof_env.envs.arguments import Keywords
+from hoof_env.envs.arguments import Keywords, seed_of
 from hoof_env.envs.base import LegBase, generator_of
 from hoof_env.envs.batch import EpisodeBatch
 from hoof_env.envs.episode import ACTIONS, FAILED
 from hoof_env.envs.infos import AT_MEASURED, BEGUN, LAST_STEP, MEASURED, START, named
 from hoof_env.envs.recording import Recording
 from hoof_env.envs.reward import failure
-from hoof_env.envs.start import check_seed
 from hoof_env.envs.tasks import task_of
 from hoof_env.errors import ParameterError, check_choice
 from hoof_env.gait.gait import PARAMETERS
@@ -65,16 +64,15 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._attach()
 
     def _attach(self) -> None:
-        """Views of the batch that every step reads or writes."""
-        batch = self.batch
-        self._terms, self._reward = batch.now.terms[:, 0], memoryview(batch.rewards)  # type: ignore[arg-type]
-        weighed = [(k, term) for k, term in enumerate(batch.task.terms) if batch.weights[term.name]]
-        self._paid = [(term.key, k) for k, term in weighed if term.compute is not failure]  # 0 before the end
-        self._draws = bool(batch.randomize)
-        self._action, self._observation = batch.actions[0], batch.observations[0]
-        self._action_buffer: Any = memoryview(self._action)
-        self._measured = named(batch.engine.arrays[0][AT_MEASURED, 0], MEASURED)
-        self._kernel, self._addresses = batch.kernel, batch.addresses
+        """What every step reads, writes or calls, found once."""
+        batch, terms = self.batch, self.task.terms
+        weighed = [(k, term) for k, term in enumerate(terms) if batch.weights[term.name]]
+        paid = [(term.key, k) for k, term in weighed if term.compute is not failure]  # 0 before the end
+        self._views: tuple[Any, ...] = (
+            batch.actions[0].data, batch.direct_kernel(), batch.addresses, bool(batch.randomize), paid,
+            batch.now.terms[:, 0], batch.rewards.data, batch.observations[0].copy,
+            named(batch.engine.arrays[0][AT_MEASURED, 0], MEASURED).copy,
+        )  # fmt: skip
 
     # What pictures, records and policies read
 
@@ -134,7 +132,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         """
         self._check_open("reset")
         checked = self.batch.check_options(options)  # before the generator is touched
-        super().reset(seed=check_seed(seed))
+        super().reset(seed=seed_of(seed))
         if self._recording is not None:
             self._recording.start()
         start = self.batch.reset([0], [self.np_random], checked)
@@ -142,10 +140,10 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self._recording is not None:
             self._show(restart=True)
         self._begin()
-        info = copy.deepcopy(self._begun) | {"measured": self._measured.copy()}
+        info = copy.deepcopy(self._begun[0]()) | {"measured": self._views[-1]()}
         if start["parameters"]:
             info["parameters"] = named([v[0] for v in start["parameters"].values()], [*start["parameters"]])
-        return self._observation.copy(), info
+        return self.batch.observations[0].copy(), info
 
     def step(
         self, action: NDArray[np.float32]
@@ -165,19 +163,20 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self._phase != "running":
             self._check_started("step")
             self._warn_ended()
+        buffer, kernel, addresses, draws, paid, terms, rewards, observe, measure = self._views
         try:
-            self._action_buffer[:] = action  # four float32, the cheapest way
+            buffer[:] = action  # four float32, the cheapest way
         except (TypeError, ValueError, BufferError):
             self._read_action(action)
-        if self._recording is not None and np.isfinite(self._action).all():  # else nothing will happen
+        if self._recording is not None and np.isfinite(buffer).all():  # else nothing will happen
             self._recording.start()
-        happened = self._kernel(self._addresses)  # not through the batch: a call costs as much as a substep
+        happened = kernel(addresses)  # not through the batch: a call costs as much as a substep
         ended = happened != 0 and self.batch.follow(happened, (self.np_random,))
-        terms, info = self._terms, self._begun.copy()  # all keys are there, and stay in their places
-        info["gait"], info["measured"] = info["gait"].copy(), self._measured.copy()
-        if self._draws:
+        info, gait = self._begun[0](), self._begun[1]()  # all keys are there, and stay in their places
+        info["gait"], info["measured"] = gait, measure()
+        if draws:
             info["parameters"] = info["parameters"].copy()
-        for key, k in self._paid:
+        for key, k in paid:
             info[key] = terms[k]
         failed = truncated = False
         if ended:
@@ -193,7 +192,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
                 info["measured"][LAST_STEP] = 0.0
         if self._recording is not None:
             self._show()
-        return self._observation.copy(), self._reward[0], failed, truncated, info
+        return observe(), rewards[0], failed, truncated, info
 
     def _warn_ended(self) -> None:
         """As Gymnasium's own environments do, once after each end."""
@@ -208,11 +207,12 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     def _begin(self) -> None:
         """What each info of this episode says of its start, and the keys of what a step fills in."""
         row, n = self.batch.begun[:, 0].copy(), len(START)
-        self._begun: dict[str, Any] = dict(zip(START, row, strict=False))
-        self._begun["gait"] = named(row[n:BEGUN], PARAMETERS)
+        gait, info = named(row[n:BEGUN], PARAMETERS), dict[str, Any](zip(START, row, strict=False))
+        info["gait"] = gait
         if self.batch.randomize:
-            self._begun["parameters"] = named(row[BEGUN:], [*self.batch.randomize])
-        self._begun |= {"measured": None, **dict.fromkeys(self.batch.terms, np.float64(0.0))}
+            info["parameters"] = named(row[BEGUN:], [*self.batch.randomize])
+        info |= {"measured": None, **dict.fromkeys(self.batch.terms, np.float64(0.0))}
+        self._begun = info.copy, gait.copy
 
     def _read_action(self, action: Any) -> None:
         """Put an action where the kernel finds it."""
@@ -223,7 +223,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         if given.shape != _SHAPE or given.dtype.kind not in "fiu":
             raise ParameterError(f"action: expected 4 finite numbers in [-1, 1], got {action!r}")
         with np.errstate(over="ignore"):  # to infinity, which is refused
-            self._action[:] = given
+            self.batch.actions[0] = given
 
     def render(self) -> NDArray[np.uint8] | None:
         """Draw the present state: an (H, W, 3) uint8 array for "rgb_array", a window for "human"; None
@@ -275,15 +275,12 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._begin()
         if self._recording is not None:
             self._recording.forget()
-        return self._observation.copy()
+        return self.batch.observations[0].copy()
 
     def __getstate__(self) -> dict[str, Any]:
-        views = (
-            "_terms", "_reward", "_paid", "_draws", "_action", "_action_buffer", "_observation", "_measured",
-            "_kernel", "_addresses",
-        )  # fmt: skip
-        return {k: v for k, v in vars(self).items() if k not in views}
+        return {k: v for k, v in vars(self).items() if k not in ("_views", "_begun")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
         self._attach()
+        self._begin()
