@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -15,13 +14,11 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.envs.batch import EpisodeBatch
-from hoof_env.envs.tasks import PER_EPISODE, Settings, Task, to_json
+from hoof_env.envs.tasks import PER_EPISODE, SETTINGS, Settings, Task, to_json
 from hoof_env.errors import FixedSettingError, ParameterError
 from hoof_env.gait.gait import GaitParameters
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
-
-SETTINGS = frozenset(item.name for item in fields(Settings))
 
 
 def fixed_setting(name: str) -> FixedSettingError:
