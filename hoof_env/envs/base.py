@@ -8,14 +8,16 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from gymnasium import spaces
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.envs.batch import EpisodeBatch
-from hoof_env.envs.tasks import PER_EPISODE, SETTINGS, Settings, Task, to_json
-from hoof_env.errors import FixedSettingError, ParameterError
+from hoof_env.envs.episode import ACTIONS
+from hoof_env.envs.tasks import PER_EPISODE, SETTINGS, Settings, Task, task_of, to_json
+from hoof_env.errors import FixedSettingError, ParameterError, check_choice
 from hoof_env.gait.gait import GaitParameters
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
@@ -56,9 +58,21 @@ class LegBase:
     task: Task
     settings: Settings
     batch: EpisodeBatch
+    metadata: dict[str, Any]
+    render_mode: str | None
     _spec: EnvSpec | None = None
     _phase = "new"
     """Then "running", and "closed"; a single environment also has "ended" and "warned"."""
+
+    def _make(self, task: str, given: Mapping[str, Any], n: int, render_mode: str | None) -> list[Any]:
+        """Make `n` environments; returns the space of an observation and of an action."""
+        if render_mode is not None:
+            check_choice("render_mode", render_mode, self.metadata["render_modes"])
+        self.task, self.render_mode = task_of(task), render_mode
+        self.settings = self.task.settings(given)
+        self.batch = EpisodeBatch(self.task, self.settings, n)
+        self.metadata = {**self.metadata, "render_fps": max(1, round(1 / self.batch.dt))}
+        return [spaces.Box(-1.0, 1.0, (size,), np.float32) for size in (len(self.batch.names), ACTIONS)]
 
     def __setattr__(self, name: str, value: Any) -> None:
         """As of any object, but for settings and what follows from them.

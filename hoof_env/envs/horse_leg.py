@@ -8,21 +8,17 @@ from typing import Any, ClassVar, Unpack
 
 import gymnasium as gym
 import numpy as np
-from gymnasium import spaces
 from numpy.typing import NDArray
 
 from hoof_env.envs.arguments import Keywords, seed_of
 from hoof_env.envs.base import LegBase, generator_of
-from hoof_env.envs.batch import EpisodeBatch
 from hoof_env.envs.episode import ACTIONS, FAILED
 from hoof_env.envs.infos import AT_MEASURED, BEGUN, LAST_STEP, MEASURED, START, named
 from hoof_env.envs.recording import Recording
 from hoof_env.envs.reward import failure
-from hoof_env.envs.tasks import task_of
-from hoof_env.errors import ParameterError, check_choice
+from hoof_env.errors import ParameterError
 from hoof_env.gait.gait import PARAMETERS
 
-RENDER_MODES = ("human", "rgb_array")
 _SHAPE = (ACTIONS,)
 
 
@@ -46,20 +42,12 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         ClosedEnvironmentError: anything after `close`.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": list(RENDER_MODES), "render_fps": 50}  # type: ignore[misc]
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}  # type: ignore[misc]
 
     def __init__(
         self, *, task: str = "leg", render_mode: str | None = None, **settings: Unpack[Keywords]
     ) -> None:
-        if render_mode is not None:
-            check_choice("render_mode", render_mode, RENDER_MODES)
-        self.task = task_of(task)
-        self.settings = self.task.settings(settings)
-        self.batch = EpisodeBatch(self.task, self.settings, 1)
-        self.observation_space = spaces.Box(-1.0, 1.0, (len(self.batch.names),), np.float32)
-        self.action_space = spaces.Box(-1.0, 1.0, (ACTIONS,), np.float32)
-        self.render_mode = render_mode
-        self.metadata = {**type(self).metadata, "render_fps": max(1, round(1 / self.batch.dt))}  # type: ignore[misc]
+        self.observation_space, self.action_space = self._make(task, settings, 1, render_mode)
         self._recording: Recording | None = Recording(self.batch) if render_mode else None
         self._attach()
 

@@ -13,7 +13,6 @@ from typing import Any, ClassVar, Unpack
 
 import gymnasium as gym
 import numpy as np
-from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
@@ -22,12 +21,10 @@ from numpy.typing import NDArray
 
 from hoof_env.envs.arguments import Keywords, actions_of, drawn_of, ended_of, mask_of, mode_of, seeds_of
 from hoof_env.envs.base import LegBase, fixed_setting, generator_of
-from hoof_env.envs.batch import EpisodeBatch
-from hoof_env.envs.episode import ACTIONS, FAILED, TRUNCATED
+from hoof_env.envs.episode import FAILED, TRUNCATED
 from hoof_env.envs.infos import named
 from hoof_env.envs.recording import Recording
-from hoof_env.envs.tasks import task_of
-from hoof_env.errors import ParameterError, check_choice, count
+from hoof_env.errors import ParameterError, count
 
 Floats = NDArray[np.float64]
 
@@ -80,23 +77,14 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
     ) -> None:
         self.num_envs = count("num_envs", num_envs, most=MOST_ENVS)
         self.autoreset_mode = mode_of(autoreset_mode)
-        if render_mode is not None:
-            check_choice("render_mode", render_mode, self.metadata["render_modes"])
-        self.task = task_of(task)
-        self.settings = self.task.settings(settings)
-        self.batch = EpisodeBatch(self.task, self.settings, self.num_envs)
+        one = self._make(task, settings, self.num_envs, render_mode)
         if max_episode_steps is not None:
             self.batch.limit(count("max_episode_steps", max_episode_steps))
-        self.single_observation_space = spaces.Box(-1.0, 1.0, (len(self.batch.names),), np.float32)
-        self.single_action_space = spaces.Box(-1.0, 1.0, (ACTIONS,), np.float32)
+        self.single_observation_space, self.single_action_space = one
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self.metadata = {  # type: ignore[misc]
-            **type(self).metadata,
-            "render_fps": max(1, round(1 / self.batch.dt)),
-            "autoreset_mode": self.autoreset_mode,
-        }
-        self.render_mode, self.spec = render_mode, None
+        self.metadata["autoreset_mode"] = self.autoreset_mode
+        self.spec = None
         if rendered is not None and render_mode is None:
             raise ParameterError(f"rendered: expected none without a render_mode, got {rendered!r}")
         drawn = drawn_of(rendered, self.num_envs, MOST_DRAWN) if render_mode else 0
