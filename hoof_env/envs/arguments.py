@@ -1,32 +1,22 @@
-"""What callers give environments, alone or many at once: the keywords and their types, checks that name what
-was given and what was expected, states, and specs that say how long an episode lasts."""
+"""What callers give environments: the keywords and their types, and checks of what many take at once, which
+name what was given and what was expected: all raise ParameterError."""
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
 from typing import Any, TypedDict
 
 import numpy as np
-from gymnasium.envs.registration import EnvSpec
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from hoof_env.envs.batch import EpisodeBatch
 from hoof_env.envs.episode import ACTIONS
-from hoof_env.envs.start import check_seed
-from hoof_env.envs.tasks import PER_EPISODE, Settings
-from hoof_env.errors import FixedSettingError, ParameterError, count
+from hoof_env.errors import ParameterError, count
 from hoof_env.leg.geometry import Preset
 
 
 def mode_of(value: Any) -> AutoresetMode:
-    """An `AutoresetMode`, given as such, by its name or by its value.
-
-    Raises:
-        ParameterError: none of these.
-    """
+    """An `AutoresetMode`, given as such, by its name or by its value."""
     if isinstance(value, AutoresetMode):
         return value
     known = {mode.value: mode for mode in AutoresetMode} | {mode.name: mode for mode in AutoresetMode}
@@ -38,11 +28,7 @@ def mode_of(value: Any) -> AutoresetMode:
 
 
 def drawn_of(rendered: Any, n: int, most: int) -> int:
-    """How many of `n` environments are drawn; None is all, if they are at most `most`.
-
-    Raises:
-        ParameterError: more than there are, or more than `most` and `rendered` is None.
-    """
+    """How many of `n` environments are drawn; None is all, if they are at most `most`."""
     if rendered is None and n > most:
         raise ParameterError(
             f"rendered: expected how many of the {n} environments to draw, as they are more than {most}; for"
@@ -55,11 +41,7 @@ def drawn_of(rendered: Any, n: int, most: int) -> int:
 
 
 def actions_of(actions: Any, n: int) -> NDArray[np.float32]:
-    """Finite actions, shape (n, 4).
-
-    Raises:
-        ParameterError: of a wrong shape or type, or not finite.
-    """
+    """Finite actions, shape (n, 4)."""
     try:
         given = np.asarray(actions)
     except ValueError:
@@ -78,11 +60,7 @@ def actions_of(actions: Any, n: int) -> NDArray[np.float32]:
 
 
 def mask_of(given: Any, n: int) -> NDArray[np.bool_]:
-    """The reset option "reset_mask", shape (n,); None is all.
-
-    Raises:
-        ParameterError: another shape or type, or all False.
-    """
+    """The reset option "reset_mask", bool of shape (n,), not all False; None is all."""
     if given is None:
         return np.ones(n, bool)
     good = isinstance(given, np.ndarray) and given.dtype == bool and given.shape == (n,)
@@ -96,11 +74,7 @@ def mask_of(given: Any, n: int) -> NDArray[np.bool_]:
 
 
 def ended_of(given: Any, n: int) -> NDArray[np.bool_]:
-    """A copy of which episodes of a state had ended, shape (n,).
-
-    Raises:
-        ParameterError: another shape or type.
-    """
+    """A copy of which episodes of a state had ended, bool of shape (n,)."""
     try:
         ended = np.array(given)
     except ValueError:
@@ -112,106 +86,20 @@ def ended_of(given: Any, n: int) -> NDArray[np.bool_]:
     return ended
 
 
-def seeds_of(seed: Any, n: int) -> list[int | None]:
-    """A seed for each of `n` environments: `seed` + i, or as given; None goes on with the generator there is.
+def seed_of(seed: Any) -> int | None:
+    """A seed as Gymnasium takes it, a whole number from 0 or None."""
+    return None if seed is None else count("seed", seed, low=0)
 
-    Raises:
-        ParameterError: not whole numbers from 0, or too few.
-    """
+
+def seeds_of(seed: Any, n: int) -> list[int | None]:
+    """A seed for each of `n` environments: `seed` + i, or as given; None goes on with its generator."""
     if isinstance(seed, (list, tuple, np.ndarray)):
         if len(seed) != n:
             raise ParameterError(f"seed: expected one number or {n}, got {len(seed)}")
-        return [check_seed(value) for value in seed]
+        return [seed_of(value) for value in seed]
     if seed is None:
         return [None] * n
-    first = count("seed", seed, low=0)
-    return [first + env for env in range(n)]
-
-
-def check_state(state: Any, env_id: str, settings: Mapping[str, Any], parts: Sequence[str] = ()) -> None:
-    """Raise unless `state` is one that `get_state` of such an environment gave.
-
-    Raises:
-        ParameterError: it lacks a part, or is of another id or of other settings.
-    """
-    names = ("id", "settings", "engine", "episode", "generator", *parts)
-    missing = [name for name in names if not isinstance(state, Mapping) or name not in state]
-    if missing:
-        raise ParameterError(f"state: expected what get_state gives, but {', '.join(missing)} is missing")
-    if state["id"] != env_id:
-        raise ParameterError(f"state: expected one of {env_id}, got one of {state['id']}")
-    there = state["settings"] if isinstance(state["settings"], Mapping) else {}
-    unlike = [f"{k}: {v!r} here, {there.get(k)!r} there" for k, v in settings.items() if there.get(k) != v]
-    if unlike:
-        raise ParameterError(f"state: of other settings; {'; '.join(unlike)}")
-
-
-def generator_of(state: Any) -> np.random.Generator:
-    """A generator in the state that a `PCG64` had.
-
-    Raises:
-        ParameterError: no such state.
-    """
-    generator = np.random.Generator(np.random.PCG64())
-    try:
-        generator.bit_generator.state = state
-    except (TypeError, ValueError, KeyError):
-        raise ParameterError(f"state['generator']: expected the state of a PCG64, got {state!r}") from None
-    return generator
-
-
-SETTINGS = frozenset(item.name for item in fields(Settings))
-
-
-def fixed_setting(name: str) -> FixedSettingError:
-    """The error of an assignment to a setting, or to what follows from the settings."""
-    how = "gymnasium.make(id, ...)" if name in SETTINGS else "the arguments of gymnasium.make"
-    if name in PER_EPISODE:
-        how += f", or reset(options={{'parameters': {{{name!r}: ...}}}}) for an episode"
-    return FixedSettingError(f"{name}: expected no assignment, which would change nothing; set it by {how}")
-
-
-class Made:
-    """Refuses assignments that would look like a setting and change nothing; completes the spec.
-
-    Attributes:
-        batch: the episodes.
-        spec: what Gymnasium made it from. `max_episode_steps` is the environment's own limit, which
-            `episode_seconds` and `dt` give, unless it has one already.
-    """
-
-    batch: EpisodeBatch
-    _spec: EnvSpec | None = None
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        """As of any object, but for settings and what follows from them.
-
-        Raises:
-            FixedSettingError: a setting, or a property that cannot be set.
-        """
-        fixed = getattr(type(self), name, None)
-        if name in SETTINGS or (isinstance(fixed, property) and fixed.fset is None):
-            raise fixed_setting(name)
-        super().__setattr__(name, value)
-
-    def set_wrapper_attr(self, name: str, value: Any, *, force: bool = True) -> bool:
-        """As Gymnasium's, which would otherwise set a setting that the environment lacks on a wrapper."""
-        if force or name in SETTINGS or hasattr(self, name):
-            setattr(self, name, value)
-            return True
-        return False
-
-    @property
-    def spec(self) -> EnvSpec | None:
-        """The specification, None for an environment that Gymnasium did not make."""
-        return self._spec
-
-    @spec.setter
-    def spec(self, spec: EnvSpec | None) -> None:
-        if spec is not None and spec.max_episode_steps is None:
-            spec = copy.copy(spec)  # it may be the registered one
-            spec.max_episode_steps = self.batch.steps_per_episode
-        self._spec = spec
+    return [count("seed", seed, low=0) + env for env in range(n)]
 
 
 Range = float | Sequence[float]

@@ -18,7 +18,7 @@ from hoof_env.dynamics.advance import TRUNK_ROWS
 from hoof_env.dynamics.constrained import INTEGRATORS
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.layout import LegMemory, TrunkMemory
-from hoof_env.dynamics.parts import GRAVITY, LARGEST, ONE_LEG, Drive, Limb, Result, Trunk
+from hoof_env.dynamics.parts import GRAVITY, LARGEST, ONE_LEG, Limb, Result
 from hoof_env.dynamics.step_length import StepLength
 from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.envs import step as kernels
@@ -41,7 +41,7 @@ from hoof_env.envs.start import HIGHEST, LOWEST, check_options, draw_starts
 from hoof_env.envs.tasks import Settings, Task
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait.gait import GaitParameters, gait_names, load_gait
-from hoof_env.ground.contact import Ground, load_ground
+from hoof_env.ground.contact import load_ground
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.profile import leg_profile
 from hoof_env.simd.layout import views
@@ -118,7 +118,7 @@ class EpisodeBatch:
                 raise ParameterError(
                     f"observation: {group!r} is constant without {needed}, got {needed}={given!r}"
                 )
-        trunk, ground, drive = self._physics({})
+        trunk, ground, drive = physics(s, self.height, {})
         substeps = None
         if self.randomize:
             substeps = max(self._parts(corner, None) for corner in ({}, *extremes(self.randomize)))
@@ -145,10 +145,6 @@ class EpisodeBatch:
             self._compile()
         except NumbaError as error:
             raise ParameterError(f"{task.id}: {what_cannot_be_compiled(error)}") from error
-
-    def _physics(self, changes: Mapping[str, float]) -> tuple[Trunk, Ground, Drive]:
-        """Trunk, ground and drive with some settings changed."""
-        return physics(self.settings, self.height, changes)
 
     def _task_record(self) -> NDArray[Any]:
         slots, _, count = kernels.slots_of(self.task.entries)
@@ -188,14 +184,29 @@ class EpisodeBatch:
     def _compile(self) -> None:
         """Have every kernel of a step compiled, or loaded, by running it on no environment: what a parent
         makes warms the cache for its workers."""
-        idle, gait = self.addresses.copy(), GaitParameters.from_array(MIDDLE)
-        idle[kernels.AT.data + COLUMNS] = 0
-        for run in (self._kernels.apply_one, self._kernels.finish_one) if self.paper else (self.kernel,):
-            run(idle)
+        gait = GaitParameters.from_array(MIDDLE)
         if self.paper:
+            self._run_idle(self._kernels.apply_one, self._kernels.finish_one)
             self.paper.compile(gait)
-        self._observe(idle)
+        else:
+            self._run_idle(self.kernel)
+        self._run_idle(self._observe)
         self.engine.reset(gait, envs=[])
+
+    def _run_idle(self, *step_kernels: Any) -> None:
+        idle = self.addresses.copy()
+        idle[kernels.AT.data + COLUMNS] = 0
+        for run in step_kernels:
+            run(idle)
+
+    def direct_kernel(self) -> Any:
+        """`kernel` without numba's choice by types, a hundredth of a single step: only for `addresses`."""
+        if self.paper:
+            return self.kernel
+        if not self.kernel.overloads:  # as in a process that unpickled this
+            self._run_idle(self.kernel)
+        (compiled,) = self.kernel.overloads.values()
+        return compiled.entry_point
 
     def _step_paper(self, addresses: NDArray[np.int64]) -> int:
         """As `StepKernels.step_one`, with the paper's solver."""
@@ -244,7 +255,7 @@ class EpisodeBatch:
 
     def _parts(self, changes: Mapping[str, float], asked: int | None) -> int:
         """Into how many parts `sim_dt` is cut with some settings changed, see `StepLength.choose`."""
-        trunk, ground, drive = self._physics(changes)
+        trunk, ground, drive = physics(self.settings, self.height, changes)
         limb, s = Limb(self.geometry, drive=drive), self.settings
         profiles = [leg_profile(self.geometry)]
         length = StepLength((limb,), profiles, trunk, ground, self._terrain, s.integrator)
@@ -276,7 +287,7 @@ class EpisodeBatch:
                 values = draw_parameters(parameters, generator)
                 for name, value in values.items():
                     drawn[name][k] = value
-                trunk, ground, drive = self._physics(values)
+                trunk, ground, drive = physics(self.settings, self.height, values)
                 self.engine.vary(int(env), trunk, ground, drive)
                 now.weight[env] = (trunk.mass + self.geometry.mass) * GRAVITY
             self._varied[which] = bool(parameters)
@@ -285,13 +296,9 @@ class EpisodeBatch:
             self.gait,
         )  # fmt: skip
         self.engine.reset(
-            start.gaits.T[None],
-            start.crank_angle[None],
-            x=start.x,
-            y=start.height,
-            vx=start.speed,
-            envs=which,
-        )
+            start.gaits.T[None], start.crank_angle[None],
+            x=start.x, y=start.height, vx=start.speed, envs=which,
+        )  # fmt: skip
         begun = [*(getattr(start, name) for name in START), *start.gaits.T]
         self.begun[:, which] = [*begun, *(drawn[name] for name in self.randomize)]
         now.action[:, which] = self.action_for(start.gaits).T
@@ -448,13 +455,9 @@ class EpisodeBatch:
         self._observe(self.addresses)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {
-            key: value
-            for key, value in vars(self).items()
-            if key not in ("addresses", "entries", "kernel", "now", "_kernels", "_observe")
-        }
+        found_again = ("addresses", "entries", "kernel", "now", "_kernels", "_observe")
+        return {key: value for key, value in vars(self).items() if key not in found_again}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
-        self.entries = observed(self.groups, self.settings.trunk, self.task.entries)
         self._open()

@@ -8,30 +8,21 @@ from typing import Any, ClassVar, Unpack
 
 import gymnasium as gym
 import numpy as np
-from gymnasium import spaces
-from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.dynamics.memory import LIFT_OFF
-from hoof_env.envs.arguments import Keywords, Made, check_state, generator_of
-from hoof_env.envs.batch import EpisodeBatch
+from hoof_env.envs.arguments import Keywords, seed_of
+from hoof_env.envs.base import LegBase, generator_of
 from hoof_env.envs.episode import ACTIONS, FAILED
 from hoof_env.envs.infos import AT_MEASURED, BEGUN, LAST_STEP, MEASURED, START, named
 from hoof_env.envs.recording import Recording
 from hoof_env.envs.reward import failure
-from hoof_env.envs.start import check_seed
-from hoof_env.envs.tasks import task_of, to_json
-from hoof_env.errors import ParameterError, check_choice
-from hoof_env.gait.gait import PARAMETERS, GaitParameters
-from hoof_env.ground.terrain import Terrain
-from hoof_env.leg.geometry import Geometry
+from hoof_env.errors import ParameterError
+from hoof_env.gait.gait import PARAMETERS
 
-RENDER_MODES = ("human", "rgb_array")
 _SHAPE = (ACTIONS,)
 
 
-class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
+class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     """A horse's leg: commands of its gait in, a trunk that moves, a ground reaction force that costs.
 
     Args:
@@ -42,7 +33,6 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     Attributes:
         task, settings: the task and its settings.
         batch: the episode, a batch of one.
-        observation_names: of the observation's entries.
         action_space, observation_space: boxes from -1 to 1, float32, of shapes (4,) and
             (len(observation_names),).
 
@@ -52,96 +42,32 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         ClosedEnvironmentError: anything after `close`.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": list(RENDER_MODES), "render_fps": 50}  # type: ignore[misc]
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}  # type: ignore[misc]
 
     def __init__(
         self, *, task: str = "leg", render_mode: str | None = None, **settings: Unpack[Keywords]
     ) -> None:
-        if render_mode is not None:
-            check_choice("render_mode", render_mode, RENDER_MODES)
-        self.task = task_of(task)
-        self.settings = self.task.settings(settings)
-        self.batch = EpisodeBatch(self.task, self.settings, 1)
-        self.observation_names = tuple(self.batch.names)
-        self.observation_space = spaces.Box(-1.0, 1.0, (len(self.observation_names),), np.float32)
-        self.action_space = spaces.Box(-1.0, 1.0, (ACTIONS,), np.float32)
-        self.render_mode = render_mode
-        self.metadata = {**type(self).metadata, "render_fps": max(1, round(1 / self.batch.dt))}  # type: ignore[misc]
+        self.observation_space, self.action_space = self._make(task, settings, 1, render_mode)
         self._recording: Recording | None = Recording(self.batch) if render_mode else None
-        self._renderer: Any = None
-        self._state = "new"
         self._attach()
 
     def _attach(self) -> None:
-        """Views of the batch that every step reads or writes."""
-        batch = self.batch
-        self._terms, self._reward = batch.now.terms[:, 0], memoryview(batch.rewards)  # type: ignore[arg-type]
-        weighed = [(k, term) for k, term in enumerate(batch.task.terms) if batch.weights[term.name]]
-        self._paid = [(term.key, k) for k, term in weighed if term.compute is not failure]  # 0 before the end
-        self._draws = bool(batch.randomize)
-        self._action, self._observation = batch.actions[0], batch.observations[0]
-        self._action_buffer: Any = memoryview(self._action)
-        self._measured = named(batch.engine.arrays[0][AT_MEASURED, 0], MEASURED)
-        self._kernel, self._addresses = batch.kernel, batch.addresses
+        """What every step reads, writes or calls, found once."""
+        batch, terms = self.batch, self.task.terms
+        weighed = [(k, term) for k, term in enumerate(terms) if batch.weights[term.name]]
+        paid = [(term.key, k) for k, term in weighed if term.compute is not failure]  # 0 before the end
+        self._views: tuple[Any, ...] = (
+            batch.actions[0].data, batch.direct_kernel(), batch.addresses, bool(batch.randomize), paid,
+            batch.now.terms[:, 0], batch.rewards.data, batch.observations[0].copy,
+            named(batch.engine.arrays[0][AT_MEASURED, 0], MEASURED).copy,
+        )  # fmt: skip
 
     # What pictures, records and policies read
-
-    @property
-    def manual(self) -> str:
-        """The manual page of the id, Markdown."""
-        from hoof_env.envs.manual import page_of
-
-        return page_of(self.task.id)
-
-    @property
-    def geometry(self) -> Geometry:
-        """The leg."""
-        return self.batch.geometry
-
-    @property
-    def gaits(self) -> dict[str, GaitParameters]:
-        """Gaits of the preset by name."""
-        return self.batch.gaits
-
-    @property
-    def engine(self) -> TrunkEngine:
-        """The mechanics."""
-        return self.batch.engine
-
-    @property
-    def terrain(self) -> Terrain:
-        """What it stands on."""
-        return self.batch.engine.terrain
 
     @property
     def weight(self) -> float:
         """Weight of trunk and leg [N]."""
         return float(self.batch.now.weight[0])
-
-    @property
-    def dt(self) -> float:
-        """Control step [s]."""
-        return self.batch.dt
-
-    @property
-    def sim_dt(self) -> float:
-        """Substep [s]."""
-        return self.batch.settings.sim_dt
-
-    def command_of(self, action: Any) -> NDArray[np.float64]:
-        """Gait parameters that an action commands, shape (4,); the action is clipped to [-1, 1]."""
-        return self.batch.command_of(action)
-
-    def action_for(self, gait: str | GaitParameters | NDArray[np.float64]) -> NDArray[np.float32]:
-        """The action that commands a gait, to float32 precision; the nearest one if it is out of reach.
-
-        Args:
-            gait: the name of one of `gaits`, or its four parameters; as an array also many, shape (n, 4).
-
-        Raises:
-            ParameterError: an unknown name, or not four parameters.
-        """
-        return self.batch.action_for(gait)
 
     def episode_summary(self) -> dict[str, float]:
         """Figures of the episode so far, those of `info["episode_summary"]`. That is missing where a wrapper
@@ -150,14 +76,8 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         Raises:
             ResetNeeded: there is no episode yet.
         """
-        self._refuse_closed("episode_summary")
-        self._refuse_new("episode_summary")
+        self._check_started("episode_summary")
         return self.batch.summary(0)
-
-    @property
-    def observation_units(self) -> tuple[str, ...]:
-        """Of what `raw_observation` gives, in the observation's order."""
-        return tuple(entry.unit for entry in self.batch.entries)
 
     def raw_observation(self) -> dict[str, np.float64]:
         """What is observed now, before it is scaled: by name, in `observation_units`.
@@ -165,8 +85,7 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         Raises:
             ResetNeeded: there is no episode yet.
         """
-        self._refuse_closed("raw_observation")
-        self._refuse_new("raw_observation")
+        self._check_started("raw_observation")
         return {name: values[0] for name, values in self.batch.measured().items()}
 
     def record(self) -> dict[str, NDArray[np.float64]]:
@@ -176,8 +95,7 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         Raises:
             ResetNeeded: there is no episode yet.
         """
-        self._refuse_closed("record")
-        self._refuse_new("record")
+        self._check_started("record")
         if self._recording is None:
             self._recording = Recording(self.batch)
         return self._recording.last()
@@ -200,20 +118,20 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         Raises:
             ParameterError: a bad seed or option; nothing has changed then.
         """
-        self._refuse_closed("reset")
+        self._check_open("reset")
         checked = self.batch.check_options(options)  # before the generator is touched
-        super().reset(seed=check_seed(seed))
+        super().reset(seed=seed_of(seed))
         if self._recording is not None:
             self._recording.start()
         start = self.batch.reset([0], [self.np_random], checked)
-        self._state = "running"
+        self._phase = "running"
         if self._recording is not None:
             self._show(restart=True)
         self._begin()
-        info = copy.deepcopy(self._begun) | {"measured": self._measured.copy()}
+        info = copy.deepcopy(self._begun[0]()) | {"measured": self._views[-1]()}
         if start["parameters"]:
             info["parameters"] = named([v[0] for v in start["parameters"].values()], [*start["parameters"]])
-        return self._observation.copy(), info
+        return self.batch.observations[0].copy(), info
 
     def step(
         self, action: NDArray[np.float32]
@@ -230,31 +148,31 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         Raises:
             ParameterError: the action has a wrong shape or is not finite; nothing has happened then.
         """
-        if self._state != "running":
-            self._refuse_closed("step")
-            self._refuse_new("step")
+        if self._phase != "running":
+            self._check_started("step")
             self._warn_ended()
+        buffer, kernel, addresses, draws, paid, terms, rewards, observe, measure = self._views
         try:
-            self._action_buffer[:] = action  # four float32, the cheapest way
+            buffer[:] = action  # four float32, the cheapest way
         except (TypeError, ValueError, BufferError):
             self._read_action(action)
-        if self._recording is not None and np.isfinite(self._action).all():  # else nothing will happen
+        if self._recording is not None and np.isfinite(buffer).all():  # else nothing will happen
             self._recording.start()
-        happened = self._kernel(self._addresses)  # not through the batch: a call costs as much as a substep
+        happened = kernel(addresses)  # not through the batch: a call costs as much as a substep
         ended = happened != 0 and self.batch.follow(happened, (self.np_random,))
-        terms, info = self._terms, self._begun.copy()  # all keys are there, and stay in their places
-        info["gait"], info["measured"] = info["gait"].copy(), self._measured.copy()
-        if self._draws:
+        info, gait = self._begun[0](), self._begun[1]()  # all keys are there, and stay in their places
+        info["gait"], info["measured"] = gait, measure()
+        if draws:
             info["parameters"] = info["parameters"].copy()
-        for key, k in self._paid:
+        for key, k in paid:
             info[key] = terms[k]
         failed = truncated = False
         if ended:
             info.update(zip(self.batch.terms, terms, strict=True))
             failed = bool(self.batch.now.ended[0] == FAILED)
             truncated = not failed
-            if self._state == "running":
-                self._state = "ended"
+            if self._phase == "running":
+                self._phase = "ended"
             info["episode_summary"] = self.batch.summary(0)
             if failed:
                 info["failure"] = self.batch.failure(0)
@@ -262,12 +180,12 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
                 info["measured"][LAST_STEP] = 0.0
         if self._recording is not None:
             self._show()
-        return self._observation.copy(), self._reward[0], failed, truncated, info
+        return observe(), rewards[0], failed, truncated, info
 
     def _warn_ended(self) -> None:
         """As Gymnasium's own environments do, once after each end."""
-        if self._state == "ended":
-            self._state = "warned"
+        if self._phase == "ended":
+            self._phase = "warned"
             gym.logger.warn(
                 "You are calling 'step()' even though this environment has already returned terminated = True"
                 " or truncated = True. You should always call 'reset()' once you receive either -- any"
@@ -277,11 +195,12 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     def _begin(self) -> None:
         """What each info of this episode says of its start, and the keys of what a step fills in."""
         row, n = self.batch.begun[:, 0].copy(), len(START)
-        self._begun: dict[str, Any] = dict(zip(START, row, strict=False))
-        self._begun["gait"] = named(row[n:BEGUN], PARAMETERS)
+        gait, info = named(row[n:BEGUN], PARAMETERS), dict[str, Any](zip(START, row, strict=False))
+        info["gait"] = gait
         if self.batch.randomize:
-            self._begun["parameters"] = named(row[BEGUN:], [*self.batch.randomize])
-        self._begun |= {"measured": None, **dict.fromkeys(self.batch.terms, np.float64(0.0))}
+            info["parameters"] = named(row[BEGUN:], [*self.batch.randomize])
+        info |= {"measured": None, **dict.fromkeys(self.batch.terms, np.float64(0.0))}
+        self._begun = info.copy, gait.copy
 
     def _read_action(self, action: Any) -> None:
         """Put an action where the kernel finds it."""
@@ -292,15 +211,7 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         if given.shape != _SHAPE or given.dtype.kind not in "fiu":
             raise ParameterError(f"action: expected 4 finite numbers in [-1, 1], got {action!r}")
         with np.errstate(over="ignore"):  # to infinity, which is refused
-            self._action[:] = given
-
-    def _refuse_closed(self, name: str) -> None:
-        if self._state == "closed":
-            raise gym.error.ClosedEnvironmentError(f"{name}() was called after close(): make a new one")
-
-    def _refuse_new(self, name: str) -> None:
-        if self._state == "new":
-            raise ResetNeeded(f"{name}() was called before reset(): expected reset() first")
+            self.batch.actions[0] = given
 
     def render(self) -> NDArray[np.uint8] | None:
         """Draw the present state: an (H, W, 3) uint8 array for "rgb_array", a window for "human"; None
@@ -308,43 +219,25 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self.render_mode is None:
             gym.logger.warn("render() was called without a render_mode: pass 'rgb_array' or 'human'")
             return None
-        self._refuse_closed("render")
-        self._refuse_new("render")
-        frame: NDArray[np.uint8] | None = self._get_renderer().frame()
+        self._check_started("render")
+        assert self._recording is not None
+        frame: NDArray[np.uint8] | None = self._recording.frame(self.render_mode, self.metadata["render_fps"])
         return frame
 
     def close(self) -> None:
         """Close the window, if any."""
-        self._state = "closed"
-        if self._renderer is not None:
-            self._renderer.close()
-            self._renderer = None
+        self._phase = "closed"
+        if self._recording is not None:
+            self._recording.close()
 
     def _show(self, restart: bool = False) -> None:
-        """Tell the renderer what happened, if there is one; in a window at once."""
+        """Keep what happened for the next picture; in a window at once."""
         if self.render_mode is None:
             return
         assert self._recording is not None
         self._recording.keep(restart)
         if self.render_mode == "human":
             self.render()
-
-    def _get_renderer(self) -> Any:
-        from hoof_env.render.renderer import Renderer
-
-        assert self._recording is not None
-        if self._renderer is None:
-            self._renderer = Renderer(
-                self.geometry,
-                str(self.render_mode),
-                self.metadata["render_fps"],
-                trunk=self.settings.trunk,
-                weight_n=self.weight,
-                lift_off_n=LIFT_OFF * self.weight,
-                terrain=self.terrain,
-            )
-        self._recording.draw(self._renderer)
-        return self._renderer
 
     # State
 
@@ -354,10 +247,7 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         Raises:
             ResetNeeded: there is no episode yet.
         """
-        self._refuse_closed("get_state")
-        self._refuse_new("get_state")
-        about = {"id": self.task.id, "settings": to_json(self.settings)}
-        return {**about, **self.batch.get_state(), "generator": self.np_random.bit_generator.state}
+        return {**self._state_of_batch(), "generator": self.np_random.bit_generator.state}
 
     def set_state(self, state: Mapping[str, Any]) -> NDArray[np.float32]:
         """Put back what `get_state` gave; returns the observation there.
@@ -365,25 +255,20 @@ class HorseLegEnv(Made, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         Raises:
             ParameterError: a state of another id, version, geometry or setting, or one that lacks a part.
         """
-        self._refuse_closed("set_state")
-        check_state(state, self.task.id, to_json(self.settings))
+        self._check_state(state)
         generator = generator_of(state["generator"])
         self.batch.set_state(state)
         self.np_random = generator
-        self._state = "ended" if self.batch.now.ended[0] else "running"
+        self._phase = "ended" if self.batch.now.ended[0] else "running"
         self._begin()
         if self._recording is not None:
             self._recording.forget()
-        return self._observation.copy()
+        return self.batch.observations[0].copy()
 
     def __getstate__(self) -> dict[str, Any]:
-        """Copies and pickles leave the window behind; it belongs to this process and this environment."""
-        views = (
-            "_terms", "_reward", "_paid", "_draws", "_action", "_action_buffer", "_observation", "_measured",
-            "_kernel", "_addresses",
-        )  # fmt: skip
-        return {**{k: v for k, v in vars(self).items() if k not in views}, "_renderer": None}
+        return {k: v for k, v in vars(self).items() if k not in ("_views", "_begun")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
         self._attach()
+        self._begin()

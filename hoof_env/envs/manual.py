@@ -25,21 +25,22 @@ from hoof_env.envs.infos import MEASURED
 from hoof_env.envs.multi_objective import HorseLegMOEnv
 from hoof_env.envs.parameters import HILLS, SPACING
 from hoof_env.envs.reward import Term, check_weights
-from hoof_env.envs.tasks import PER_EPISODE, TASKS, Settings, task_of, to_json
+from hoof_env.envs.tasks import PER_EPISODE, TASKS, Settings, Task, task_of, to_json
 from hoof_env.errors import OutputError, check_choice
 from hoof_env.gait.gait import LIMITS, FilterSettings
 from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS
 from hoof_env.leg.geometry import load_geometry, preset_names
 
 HERE = Path(__file__).parent
-PAGE = (HERE / "manual.md.in").read_text(encoding="utf-8")
-"""The page of a task; `page` fills in what begins with $."""
+PAGE, MO_PAGE = (
+    (HERE / f"{name}.md.in").read_text(encoding="utf-8") for name in ("manual", "multi_objective")
+)
+"""The page of a task, and that of the id with three rewards; `page` fills in what begins with $."""
 
-_CLASSES: Mapping[str, Any] = {"mo": HorseLegMOEnv}
 _NAMES = {name: task.name for name, task in TASKS.items()} | {"mo": "HorseLegMO"}
 
 PAGES = tuple(_NAMES)
-"""The tasks, and an id whose page is the docstring of its class."""
+"""The tasks, and the id with three rewards."""
 
 INDEX = "README.md"
 
@@ -72,12 +73,11 @@ def page(task: str) -> str:
     Raises:
         ParameterError: there is no such page.
     """
-    if task in _CLASSES:
-        return _of_class(task)
-    what = task_of(task)
+    what = task_of("leg" if task == "mo" else task)
     settings = what.settings({})
+    if task == "mo":
+        return Template(MO_PAGE).substitute(observations=_observations(what))
     groups = observation.groups_of(what.entries)
-    names = [entry.name for entry in observation.observed(settings.observation, settings.trunk, what.entries)]
     text = Template(PAGE).substitute(
         name=what.name,
         id=what.id,
@@ -87,8 +87,8 @@ def page(task: str) -> str:
         action_space=f"Box(-1, 1, ({len(LIMITS)},), float32)",
         actions=_actions(settings),
         offsets=_offsets(settings.gait) if settings.gait else "",
-        observation_space=f"Box(-1, 1, ({len(names)},), float32)",
-        observations=_observations(settings, what.entries),
+        observation_space=f"Box(-1, 1, ({len(_observed(what))},), float32)",
+        observations=_observations(what),
         other_groups=", ".join(f"`{group}`" for group in groups if group not in settings.observation),
         rewards=_rewards(settings, what.terms),
         target_reward="Progress counts up to the commanded speed; what goes beyond it is subtracted."
@@ -128,13 +128,10 @@ def index() -> str:
     """All ids in one table, in Markdown."""
     rows = []
     for task, name in _NAMES.items():
-        what = TASKS.get(task)
-        summary = what.summary if what else _docstring(task)[0]
-        reference = what.reference if what else "run"
-        native = "yes" if what else "no"
-        rows.append(
-            (f"[`hoof_env/{name}-v0`]({name}.md)", summary, str(len(observed(task))), reference, native)
-        )
+        what, native = TASKS.get(task, TASKS["leg"]), "yes" if task in TASKS else "no"
+        summary = what.summary if task in TASKS else str(HorseLegMOEnv.__doc__).splitlines()[0]
+        link = f"[`hoof_env/{name}-v0`]({name}.md)"
+        rows.append((link, summary, str(len(_observed(what))), what.reference, native))
     head = ("id", "what it is", "observation", "reference gait", "native vector environment")
     return (
         "# Environments\n\nWritten by `hoof-env manual --out docs/environments`.\n\n"
@@ -160,13 +157,12 @@ def write_pages(out: Path) -> list[Path]:
     return [out / name for name in texts]
 
 
-def observed(task: str) -> tuple[str, ...]:
-    """Names of the observation's entries of a page's id, by default."""
-    settings = TASKS["leg" if task == "mo" else task].settings({})
-    return tuple(entry.name for entry in observation.observed(settings.observation, settings.trunk))
-
-
 # Parts of a page
+
+
+def _observed(what: Task) -> list[observation.Entry]:
+    settings = what.settings({})
+    return observation.observed(settings.observation, settings.trunk, what.entries)
 
 
 def _actions(settings: Settings) -> str:
@@ -191,9 +187,8 @@ def _offsets(gait: str) -> str:
     )
 
 
-def _observations(settings: Settings, entries: tuple[observation.Entry, ...]) -> str:
-    entries = tuple(observation.observed(settings.observation, settings.trunk, entries))
-    rows = [(entry.name, entry.scale.text, entry.unit, entry.group) for entry in entries]
+def _observations(what: Task) -> str:
+    rows = [(e.name, e.scale.text, e.unit, e.group) for e in _observed(what)]
     head = ("Num", "Observation", "Scaling", "Unit before scaling", "Group")
     return markdown_table(head, [(str(k), *row) for k, row in enumerate(rows)])
 
@@ -270,30 +265,6 @@ def _terrain() -> str:
         " patches of random stiffness and friction. They take:\n\n"
         f"{markdown_table(('Name', 'Default', 'Unit', 'Meaning'), rows)}"
     )
-
-
-# Pages from docstrings
-
-
-def _docstring(task: str) -> tuple[str, list[str]]:
-    """First line and sections of a class."""
-    head, *sections = re.split(r"\n(?=## )", inspect.getdoc(_CLASSES[task]) or "")
-    return head.strip(), sections
-
-
-def _of_class(task: str) -> str:
-    """The page of a class: its docstring, an example and the table of its observation."""
-    name, (head, sections) = _NAMES[task], _docstring(task)
-    entries = {entry.name: entry for entry in observation.ENTRIES}
-    rows = [(str(k), n, entries[n].scale.text, entries[n].unit) for k, n in enumerate(observed(task))]
-    table = markdown_table(("Num", "Observation", "Scaling", "Unit before scaling"), rows)
-    parts = [f"# {name}", head, PAGE.split("\n\n", 2)[2].split("\n\nenvs = ")[0] + "\n```"]
-    for section in sections:
-        title, text = section.split("\n", 1)
-        parts += [title.title(), text.strip()]
-        parts += [table] if title.lower() == "## observation space" else []
-    linked = re.sub("`hoof_env/HorseLeg-v0`", "[HorseLeg](HorseLeg.md)", "\n\n".join(parts))
-    return linked.replace("$id", f"hoof_env/{name}-v0") + "\n"
 
 
 # Markdown

@@ -45,43 +45,11 @@ def refuse_many(**kwargs: Any) -> NoReturn:
 class HorseLegMOEnv(HorseLegEnv):
     """A horse's leg that must carry and move its trunk, judged by three objectives.
 
-    ## Description
+    `hoof_env/HorseLeg-v0` with a vector for a reward, shape (3,), in the form of MO-Gymnasium; its page in
+    docs/environments says how it is made and what the three are.
 
-    `hoof_env/HorseLeg-v0` with a vector for a reward, in the form of MO-Gymnasium. Make it with
-    `mo_gymnasium.make`, or with `gymnasium.make(..., disable_env_checker=True)`: the checker wants a number.
-
-    Many at once, rewards of shape (num_envs, 3), come from MO-Gymnasium:
-    `mo_gymnasium.wrappers.vector.MOSyncVectorEnv([lambda: mo_gymnasium.make("hoof_env/HorseLegMO-v0")] * 4)`.
-    `gymnasium.make_vec` refuses by default, for Gymnasium's own keep one number for a reward.
-
-    ## Action space
-
-    As in `hoof_env/HorseLeg-v0`.
-
-    ## Observation space
-
-    As in `hoof_env/HorseLeg-v0`.
-
-    ## Rewards
-
-    `reward_space` is `Box((3,), float32)`. The three add up to the reward of `hoof_env/HorseLeg-v0`, and
-    `reward_weights` scales them in the same way.
-
-    | Num | Objective | Terms | Unit by default |
-    |---|---|---|---|
-    | 0 | progress | `reward_progress` + `reward_support` | m |
-    | 1 | peak force | `reward_peak` | 0.3 per kN |
-    | 2 | energy | `reward_energy` + `reward_action` | 0.1 per kJ, 0.03 per squared change |
-
-    Each also bears a third of `reward_failure`. The terms themselves stay in `info`.
-
-    ## Starting state, episode end, arguments
-
-    As in `hoof_env/HorseLeg-v0`.
-
-    ## Version history
-
-    * v0: first version.
+    Attributes:
+        reward_space, reward_dim: of the reward.
     """
 
     def __init__(

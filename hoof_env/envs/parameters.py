@@ -3,7 +3,7 @@ each."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -20,11 +20,7 @@ MOST_SUBSTEPS = 100_000
 
 
 def resolved(settings: Settings) -> Settings:
-    """The settings with values for None: the ground of the preset, the solver's own scheme and step.
-
-    Raises:
-        ParameterError, DataFileError: an unknown solver, or a preset that cannot be read.
-    """
+    """The settings with values for None: the ground of the preset, the solver's own scheme and step."""
     is_paper = check_choice("solver", settings.solver, SOLVERS) == "paper"
     s: Any = settings
     if s.stiffness is None or s.exponent is None:
@@ -39,11 +35,7 @@ def resolved(settings: Settings) -> Settings:
 
 
 def pair(name: str, value: Any, low: float) -> tuple[float, float]:
-    """A range, or one number as one, from `low` on.
-
-    Raises:
-        ParameterError: not two numbers, or not in this order.
-    """
+    """A range, or one number as one, from `low` on; ParameterError of anything else."""
     two = value if isinstance(value, (list, tuple)) else (value, value)
     if len(two) != 2:
         raise ParameterError(f"{name}: expected two numbers, got {value!r}")
@@ -52,11 +44,7 @@ def pair(name: str, value: Any, low: float) -> tuple[float, float]:
 
 
 def substeps_of(dt: float, sim_dt: float) -> int:
-    """How many substeps [s] make a control step [s].
-
-    Raises:
-        ParameterError: no whole number, or more than `MOST_SUBSTEPS`.
-    """
+    """How many substeps [s] make a control step [s]; ParameterError if no whole number does, or too many."""
     check_number("sim_dt", sim_dt, low=0, exclusive_low=True)
     check_number("dt", dt, low=0, exclusive_low=True)
     ratio = dt / sim_dt
@@ -114,17 +102,15 @@ def check_parameters(name: str, given: Any, settings: Settings) -> dict[str, flo
 def extremes(given: Mapping[str, float | tuple[float, float]]) -> list[dict[str, float]]:
     """Corners of what can be drawn: all lowest, all highest, closest friction thresholds, and what asks for
     the shortest steps under a light and a heavy trunk."""
-    low, high = (
-        {name: value[end] if isinstance(value, tuple) else value for name, value in given.items()}
-        for end in (0, 1)
-    )
+    pairs = {name: value if isinstance(value, tuple) else (value, value) for name, value in given.items()}
+    low, high = ({name: ends[k] for name, ends in pairs.items()} for k in (0, 1))
 
-    def mixed(names: Sequence[str], base: dict[str, float], other: dict[str, float]) -> dict[str, float]:
+    def mixed(base: dict[str, float], other: dict[str, float], *names: str) -> dict[str, float]:
         return base | {name: other[name] for name in names if name in other}
 
-    close = mixed(("friction_slow",), low, high)
-    hard = mixed(("restitution", "approach_floor", "trunk_mass"), high, low)
-    corners = (low, high, close, hard, mixed(("trunk_mass",), hard, high))
+    close = mixed(low, high, "friction_slow")
+    hard = mixed(high, low, "restitution", "approach_floor", "trunk_mass")
+    corners = (low, high, close, hard, mixed(hard, high, "trunk_mass"))
     return [corner for k, corner in enumerate(corners) if corner not in corners[:k]]
 
 

@@ -217,8 +217,6 @@ def read_open_loop(path: Path, env: Any = None) -> Scripted:
 GAITS = Path(__file__).parents[1] / "data" / "gaits"
 """Open-loop gaits that come with the package, as `agents.open_loop` found them."""
 
-FAMILIES = ("constant", "clocked")
-
 
 def load_open_loop(path_or_env_id: str | Path, env: Any = None) -> Scripted:
     """The policy of a gait file; or, for the id of an environment, of the best gait that is stored.
@@ -233,7 +231,8 @@ def load_open_loop(path_or_env_id: str | Path, env: Any = None) -> Scripted:
     path = Path(path_or_env_id)
     if path.suffix != ".json":
         name = STANDS_FOR.get(str(path_or_env_id), str(path_or_env_id)).rpartition("/")[2]
-        files = [file for family in FAMILIES if (file := GAITS / f"{name}-{family}.json").is_file()]
+        both = (GAITS / f"{name}-{family}.json" for family in ("constant", "clocked"))
+        files = [file for file in both if file.is_file()]
         if not files:
             known = ", ".join(sorted(file.name for file in GAITS.glob("*.json"))) or "none"
             raise DataFileError(f"open-loop gait of {name}: expected one of those in {GAITS.name}/: {known}")

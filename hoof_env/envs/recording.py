@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.dynamics.parts import Result
 from hoof_env.envs.batch import EpisodeBatch
 from hoof_env.render.instant import columns_of_engine, instants
@@ -22,7 +23,7 @@ SHOWN = 4.0
 
 
 class Recording:
-    """Substeps of one environment of a batch."""
+    """Substeps of one environment of a batch, and pictures of them."""
 
     def __init__(self, batch: EpisodeBatch, env: int = 0) -> None:
         self.batch, self.env = batch, env
@@ -30,6 +31,7 @@ class Recording:
         self._before: NDArray[np.float64] | None = None
         self._waiting: deque[Any] = deque(maxlen=round(SHOWN / batch.dt) + 1)
         self._restarted = False
+        self.renderer: Any = None
 
     def start(self) -> None:
         """Before a step or a reset: remember where it begins."""
@@ -69,15 +71,33 @@ class Recording:
             self._restarted = True
         self._waiting.append(self.last())
 
-    def draw(self, renderer: Any) -> None:
-        """Give a renderer what was kept, or where it is if it has seen nothing yet."""
-        engine = self.batch.engine
+    def frame(self, mode: str, fps: float) -> Any:
+        """A picture of what was kept, or of where it is if nothing was; None of a window."""
+        engine, weight = self.batch.engine, float(self.batch.now.weight[self.env])
+        if self.renderer is None:
+            from hoof_env.render.renderer import Renderer
+
+            self.renderer = Renderer(
+                self.batch.geometry, mode, fps, trunk=self.batch.settings.trunk, weight_n=weight,
+                lift_off_n=LIFT_OFF * weight, terrain=engine.terrain,
+            )  # fmt: skip
         if self._restarted:
-            renderer.reset()
+            self.renderer.reset()
             self._restarted = False
-        if renderer.is_empty and not self._waiting:
+        if self.renderer.is_empty and not self._waiting:
             self._waiting.append(self.last())
         while self._waiting:
             command = engine.command_in(engine.column(self.env))[0]
             columns = columns_of_engine(self._waiting.popleft(), engine.terrain, command=command)
-            renderer.add(instants(columns))
+            self.renderer.add(instants(columns))
+        return self.renderer.frame()
+
+    def close(self) -> None:
+        """Close the window, if any."""
+        if self.renderer is not None:
+            self.renderer.close()
+            self.renderer = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Copies and pickles leave the window behind; it belongs to this process and this environment."""
+        return {**vars(self), "renderer": None}

@@ -11,10 +11,11 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
-from hoof_env.envs.arguments import SETTINGS, VectorKeywords, fixed_setting
+from hoof_env.envs.arguments import VectorKeywords
+from hoof_env.envs.base import fixed_setting
 from hoof_env.envs.infos import row_of
-from hoof_env.envs.rows import OWN
-from hoof_env.envs.vector import HorseLegVectorEnv
+from hoof_env.envs.tasks import SETTINGS
+from hoof_env.envs.vector import OWN, HorseLegVectorEnv
 from hoof_env.errors import ParameterError
 
 
@@ -116,30 +117,16 @@ class Sb3VecEnv(VecEnv):
         return list(self.envs.render() or ())[: self.envs.drawn]
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """An attribute of each environment, as `HorseLegVectorEnv.get_attr`.
-
-        Raises:
-            AttributeError: they have none of that name.
-        """
+        """As `HorseLegVectorEnv.get_attr`."""
         return self.envs.ask(attr_name, self._get_indices(indices))
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Remember something for `get_attr`, as `HorseLegVectorEnv.set_attr`.
-
-        Raises:
-            ParameterError: a setting or another attribute, or only some of the environments are meant.
-        """
+        """As `HorseLegVectorEnv.set_attr`, of all environments."""
         self._whole("set_attr", indices)
         self.envs.set_attr(attr_name, [value] * self.num_envs)
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
-        """Call a method of each environment, as `HorseLegVectorEnv.call`.
-
-        Raises:
-            AttributeError: they have none of that name.
-            ParameterError: "reset" or "step", or only some of the environments are meant by a method that is
-                of all together.
-        """
+        """As `HorseLegVectorEnv.call`; ParameterError where some are meant by a method of all together."""
         if method_name not in OWN:
             self._whole("env_method", indices)
         return self.envs.ask(method_name, self._get_indices(indices), *args, **kwargs)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from hoof_env.dynamics.parts import Trunk
 from hoof_env.envs.parameters import check_parameters
 from hoof_env.envs.tasks import Settings
-from hoof_env.errors import ParameterError, check_choice, check_number, count
+from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait.gait import GaitParameters, paper_gaits
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.profile import LegProfile, by_name
@@ -44,18 +44,13 @@ MOST_TRIES = 100
 
 @dataclass
 class Starts:
-    """Starts of n episodes.
+    """Starts of n episodes."""
 
-    Attributes:
-        gaits: shape (n, 4).
-        crank_angle, speed, height, x: shape (n,) [rad, m/s, m, m].
-    """
-
-    gaits: Floats
-    crank_angle: Floats
-    speed: Floats
-    height: Floats
-    x: Floats
+    gaits: Floats  # shape (n, 4)
+    crank_angle: Floats  # shape (n,) [rad]
+    speed: Floats  # [m/s]
+    height: Floats  # [m]
+    x: Floats  # [m]
 
 
 def hoof_height(profile: LegProfile, gaits: Floats, theta: Floats) -> Floats:
@@ -115,23 +110,10 @@ def draw_starts(
     return Starts(chosen, theta, speed, height, x)
 
 
-def check_seed(seed: Any) -> int | None:
-    """A seed as Gymnasium takes it.
-
-    Raises:
-        ParameterError: not a whole number from 0.
-    """
-    return None if seed is None else count("seed", seed, low=0)
-
-
 def check_options(
     options: Any, gaits: Mapping[str, GaitParameters], trunk: Trunk, settings: Settings
 ) -> dict[str, Any]:
-    """Reset options with their values checked and the gait as `GaitParameters`.
-
-    Raises:
-        ParameterError: an unknown option, or a value out of range or that the trunk cannot have.
-    """
+    """Reset options with their values checked and the gait as `GaitParameters`; ParameterError of others."""
     known = ("gait", "parameters", *OPTIONS)
     if options is None:
         return {}

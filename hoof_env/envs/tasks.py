@@ -75,6 +75,8 @@ class Settings:
     randomize: Mapping[str, Any] | None = None
 
 
+SETTINGS = tuple(item.name for item in fields(Settings))
+
 PER_EPISODE = (
     "trunk_mass", "trunk_share", "trunk_stiffness", "trunk_damping", "trunk_drag",
     "stiffness", "restitution", "approach_floor", "friction", "friction_slow", "friction_fast",
@@ -173,11 +175,10 @@ class Task:
             UnknownArgumentError: an unknown setting.
             ParameterError: one is not the task's own and has no effect beside the others.
         """
-        known = [item.name for item in fields(Settings)]
         for name in changes:
-            if name not in known:
-                near = difflib.get_close_matches(name, known, 1)
-                hint = f"; did you mean {near[0]}?" if near else f" (known: {', '.join(known)})"
+            if name not in SETTINGS:
+                near = difflib.get_close_matches(name, SETTINGS, 1)
+                hint = f"; did you mean {near[0]}?" if near else f" (known: {', '.join(SETTINGS)})"
                 raise UnknownArgumentError(f"{self.id}: unexpected keyword argument {name!r}{hint}")
         weights, own = changes.get("reward_weights"), self.defaults.get("reward_weights", {})
         if own and (weights is None or isinstance(weights, Mapping)):
@@ -185,8 +186,7 @@ class Task:
         for name, value in changes.items():  # as JSON holds it, and a copy
             if isinstance(value, (Path, Mapping)):
                 changes = {**changes, name: str(value) if isinstance(value, Path) else _plain(value)}
-        unknown = sorted(set(self.defaults) - {item.name for item in fields(Settings)})
-        if unknown:
+        if unknown := sorted(set(self.defaults) - set(SETTINGS)):
             raise UnknownArgumentError(f"{self.id}: unknown settings {', '.join(unknown)}")
         plain = replace(Settings(), **self.defaults)
         settings = replace(plain, **changes)

@@ -1,52 +1,45 @@
 """The family as a native vector environment: all episodes in one call, time limit and autoreset its own.
 
 Row i has the bits of the single environment that was seeded alike: with `reset(seed=s)` row i draws from the
-generator that `gym.make(id).reset(seed=s + i)` would have.
+generator that `gym.make(id).reset(seed=s + i)` would have. What one may ask of each environment is what
+Gymnasium's own vector environments let one ask.
 """
 
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, ClassVar, Unpack
 
 import gymnasium as gym
 import numpy as np
-from gymnasium import spaces
-from gymnasium.error import ClosedEnvironmentError, ResetNeeded
+from gymnasium.error import ResetNeeded
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.memory import LIFT_OFF
-from hoof_env.envs.arguments import (
-    Keywords,
-    Made,
-    actions_of,
-    check_state,
-    drawn_of,
-    ended_of,
-    generator_of,
-    mask_of,
-    mode_of,
-    seeds_of,
-)
-from hoof_env.envs.batch import EpisodeBatch
-from hoof_env.envs.episode import ACTIONS, FAILED, TRUNCATED
+from hoof_env.envs.arguments import Keywords, actions_of, drawn_of, ended_of, mask_of, mode_of, seeds_of
+from hoof_env.envs.base import LegBase, fixed_setting, generator_of
+from hoof_env.envs.episode import FAILED, TRUNCATED
 from hoof_env.envs.infos import named
 from hoof_env.envs.recording import Recording
-from hoof_env.envs.rows import Rows
-from hoof_env.envs.tasks import task_of, to_json
-from hoof_env.errors import ParameterError, check_choice, count
+from hoof_env.errors import ParameterError, count
+
+Floats = NDArray[np.float64]
 
 MOST_ENVS = 1_000_000
 
 MOST_DRAWN = 16
 """So many are drawn by default; a picture takes as long as some hundred steps."""
 
+OWN = ("weight", "render", "episode_summary", "raw_observation", "record", "np_random")
+"""What each environment has of its own; the rest is of all."""
 
-class HorseLegVectorEnv(Made, Rows, VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]):
+SINGLE = {"action_space": "single_action_space", "observation_space": "single_observation_space"}
+
+
+class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]):
     """`num_envs` environments of a task, stepped together.
 
     Args:
@@ -84,29 +77,20 @@ class HorseLegVectorEnv(Made, Rows, VectorEnv[NDArray[np.float32], NDArray[np.fl
     ) -> None:
         self.num_envs = count("num_envs", num_envs, most=MOST_ENVS)
         self.autoreset_mode = mode_of(autoreset_mode)
-        if render_mode is not None:
-            check_choice("render_mode", render_mode, self.metadata["render_modes"])
-        self.task = task_of(task)
-        self.settings = self.task.settings(settings)
-        self.batch = EpisodeBatch(self.task, self.settings, self.num_envs)
+        one = self._make(task, settings, self.num_envs, render_mode)
         if max_episode_steps is not None:
             self.batch.limit(count("max_episode_steps", max_episode_steps))
-        self.single_observation_space = spaces.Box(-1.0, 1.0, (len(self.batch.names),), np.float32)
-        self.single_action_space = spaces.Box(-1.0, 1.0, (ACTIONS,), np.float32)
+        self.single_observation_space, self.single_action_space = one
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self.metadata = {  # type: ignore[misc]
-            **type(self).metadata,
-            "render_fps": max(1, round(1 / self.batch.dt)),
-            "autoreset_mode": self.autoreset_mode,
-        }
-        self.render_mode, self.spec = render_mode, None
+        self.metadata["autoreset_mode"] = self.autoreset_mode
+        self.spec = None
         if rendered is not None and render_mode is None:
             raise ParameterError(f"rendered: expected none without a render_mode, got {rendered!r}")
         drawn = drawn_of(rendered, self.num_envs, MOST_DRAWN) if render_mode else 0
-        self._recordings = [Recording(self.batch, env) for env in range(drawn)]
-        self._renderers: list[Any] = []
-        Rows.__init__(self)
+        self._drawn = [Recording(self.batch, env) for env in range(drawn)]
+        self._watched: dict[int, Recording] = {recording.env: recording for recording in self._drawn}
+        self._marks: dict[str, list[Any]] = {}
         self._generators: list[np.random.Generator] = []
         self._ended = np.zeros(self.num_envs, bool)
         self._started = np.zeros(self.num_envs, bool)
@@ -128,7 +112,7 @@ class HorseLegVectorEnv(Made, Rows, VectorEnv[NDArray[np.float32], NDArray[np.fl
         Raises:
             ParameterError: a bad seed, option or mask.
         """
-        self._refuse_closed("reset")
+        self._check_open("reset")
         rest: Any = dict(options) if isinstance(options, Mapping) else options
         mask = mask_of(rest.pop("reset_mask", None) if isinstance(rest, dict) else None, self.num_envs)
         checked = self.batch.check_options(rest)
@@ -152,9 +136,7 @@ class HorseLegVectorEnv(Made, Rows, VectorEnv[NDArray[np.float32], NDArray[np.fl
             ParameterError: actions of a wrong shape or type, or not finite.
             ResetNeeded: `reset` was not called, or with autoreset disabled an episode that ended.
         """
-        self._refuse_closed("step")
-        if not self._started.all():
-            raise ResetNeeded("step() was called before reset(): expected reset() of all environments first")
+        self._check_started("step")
         batch, n, before = self.batch, self.num_envs, self._ended
         again = before if before.any() else None
         if again is not None and self.autoreset_mode == AutoresetMode.DISABLED:
@@ -163,7 +145,7 @@ class HorseLegVectorEnv(Made, Rows, VectorEnv[NDArray[np.float32], NDArray[np.fl
                 "expected reset(options={'reset_mask': ...})"
             )
         batch.actions[:n] = actions_of(actions, n)
-        for recording in (*self._recordings, *self._watched.values()):
+        for recording in self._watched.values():
             recording.start()
         some_ended = batch.step(self._generators, again)
         how = batch.now.ended[:n]
@@ -203,43 +185,131 @@ class HorseLegVectorEnv(Made, Rows, VectorEnv[NDArray[np.float32], NDArray[np.fl
         if self.render_mode is None:
             gym.logger.warn("render() was called without a render_mode: pass render_mode='rgb_array'")
             return None
-        self._refuse_closed("render")
-        if not self._started.all():
-            raise ResetNeeded("render() was called before reset(): expected reset() first")
-        from hoof_env.render.renderer import Renderer
-
-        engine, weight = self.batch.engine, self.batch.engine.weight
-        while len(self._renderers) < len(self._recordings):
-            self._renderers.append(
-                Renderer(
-                    self.batch.geometry, "rgb_array", self.metadata["render_fps"],
-                    trunk=self.settings.trunk, weight_n=weight, lift_off_n=LIFT_OFF * weight,
-                    terrain=engine.terrain,
-                )
-            )  # fmt: skip
-        for recording, renderer in zip(self._recordings, self._renderers, strict=True):
-            recording.draw(renderer)
-        frames = [renderer.frame() for renderer in self._renderers]
+        self._check_started("render")
+        frames = [recording.frame("rgb_array", self.metadata["render_fps"]) for recording in self._drawn]
         black = np.broadcast_to(np.uint8(0), frames[0].shape)
         return (*frames, *[black] * (self.num_envs - len(frames)))
 
     def close_extras(self, **kwargs: Any) -> None:
         """Give the renderers back."""
-        for renderer in self._renderers:
-            renderer.close()
-        self._renderers = []
+        self._phase = "closed"
+        for recording in self._drawn:
+            recording.close()
+
+    # What one may ask of each
+
+    @property
+    def drawn(self) -> int:
+        """How many are drawn, the first ones."""
+        return len(self._drawn)
+
+    @property
+    def weight(self) -> Floats:
+        """Weight of trunk and leg [N], shape (num_envs,)."""
+        return self.batch.now.weight[: self.num_envs].copy()
+
+    def raw_observation(self) -> dict[str, Floats]:
+        """What is observed now, before it is scaled: by name, shape (num_envs,), in `observation_units`.
+
+        Raises:
+            ResetNeeded: an environment has no episode yet.
+        """
+        self._check_started("raw_observation")
+        return self.batch.measured()
+
+    def episode_summary(self) -> dict[str, Floats]:
+        """Figures of the episodes so far by name, shape (num_envs,); those of `infos["episode_summary"]`.
+
+        Raises:
+            ResetNeeded: an environment has no episode yet.
+        """
+        self._check_started("episode_summary")
+        each = [self.batch.summary(env) for env in range(self.num_envs)]
+        return {name: np.array([summary[name] for summary in each]) for name in each[0]}
+
+    def record(self, env: int = 0) -> dict[str, Floats]:
+        """State and report of an environment at every substep of the last control step, see
+        `HorseLegEnv.record`. From the first call on its substeps are kept, which takes time in every step.
+
+        Raises:
+            ResetNeeded: an environment has no episode yet.
+            ParameterError: there is no such environment.
+        """
+        self._check_started("record")
+        count("env", env, low=0, most=self.num_envs - 1)
+        if env not in self._watched:
+            self._watched[env] = Recording(self.batch, env)
+        return self._watched[env].last()
+
+    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
+        """What a method or attribute of each environment gives, as of Gymnasium's `SyncVectorEnv`.
+
+        Args:
+            name: of `HorseLegEnv`, or set by `set_attr`. What belongs to all together, as `get_state`, is
+                asked once, and there for each.
+            args, kwargs: of the method.
+
+        Raises:
+            AttributeError: there is none of that name.
+            ParameterError: "reset" or "step", which take arrays of all.
+        """
+        return tuple(self.ask(name, range(self.num_envs), *args, **kwargs))
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """An attribute of each environment; as `call`."""
+        return self.call(name)
+
+    def set_attr(self, name: str, values: Any) -> None:
+        """Remember something for `get_attr`: a list or tuple has a value for each, anything else is for all.
+
+        Raises:
+            FixedSettingError: a setting or another attribute that the environments have.
+            ParameterError: not one value each.
+        """
+        each = list(values) if isinstance(values, (list, tuple)) else [values] * self.num_envs
+        if len(each) != self.num_envs:
+            raise ParameterError(f"values: expected one or {self.num_envs}, got {len(each)}")
+        if hasattr(self.batch.settings, name) or hasattr(self, name) or hasattr(self.batch, name):
+            raise fixed_setting(name)
+        self._marks[name] = each
+
+    def ask(self, name: str, envs: Iterable[int], *args: Any, **kwargs: Any) -> list[Any]:
+        """`call` of some environments."""
+        chosen = list(envs)
+        if name in self._marks:
+            return [self._marks[name][env] for env in chosen]
+        if name in ("reset", "step"):
+            raise ParameterError(f"call: {name!r} is of all together; expected envs.{name}(...)")
+        if name == "record":
+            return [self.record(env) for env in chosen]
+        if name == "np_random":
+            self._check_started(name)
+            return [self._generators[env] for env in chosen]
+        name = SINGLE.get(name, name)
+        owner: Any = self if hasattr(self, name) else self.batch
+        if name.startswith("_") or not hasattr(owner, name):
+            raise AttributeError(f"{type(self).__name__}: the environments have no attribute {name!r}")
+        found = getattr(owner, name)
+        found = found(*args, **kwargs) if callable(found) else found
+        if name not in OWN or found is None:
+            return [found] * len(chosen)
+        if isinstance(found, dict):
+            return [{key: values[env] for key, values in found.items()} for env in chosen]
+        return [found[env] for env in chosen]
 
     # Parts of it
 
     def _start(self, envs: NDArray[np.int64], options: Mapping[str, Any]) -> dict[str, Any]:
         """Start episodes; the parameters that were set or drawn for them, by name."""
-        drawn = [recording for recording in self._recordings if recording.env in envs]
-        for recording in (*drawn, *(self._watched[env] for env in self._watched if env in envs)):
-            recording.start()
+        for env in set(self._watched).intersection(envs.tolist()):
+            self._watched[env].start()
         start = self.batch.reset(envs, [self._generators[env] for env in envs], options)
         self._started[envs] = True
-        for recording in drawn:
-            recording.keep(True)
+        if self._phase == "new" and self._started.all():
+            self._phase = "running"
+        for recording in self._drawn:
+            if recording.env in envs:
+                recording.keep(True)
         found: dict[str, Any] = start["parameters"]
         return found
 
@@ -267,7 +337,7 @@ class HorseLegVectorEnv(Made, Rows, VectorEnv[NDArray[np.float32], NDArray[np.fl
             infos["failure"][failed] = [self.batch.failure(int(env)) for env in failed]
 
     def _show(self) -> None:
-        for recording in self._recordings:
+        for recording in self._drawn:
             if not self._ended[recording.env]:
                 recording.keep(False)
 
@@ -284,10 +354,6 @@ class HorseLegVectorEnv(Made, Rows, VectorEnv[NDArray[np.float32], NDArray[np.fl
             if seeds[env] is not None:
                 self._generators[env] = seeding.np_random(seeds[env])[0]
 
-    def _refuse_closed(self, name: str) -> None:
-        if self.closed:
-            raise ClosedEnvironmentError(f"{name}() was called after close(): make a new one")
-
     # State
 
     def get_state(self) -> dict[str, Any]:
@@ -296,12 +362,8 @@ class HorseLegVectorEnv(Made, Rows, VectorEnv[NDArray[np.float32], NDArray[np.fl
         Raises:
             ResetNeeded: there are no episodes yet.
         """
-        self._refuse_closed("get_state")
-        if not self._started.all():
-            raise ResetNeeded("get_state() was called before reset(): expected reset() first")
-        about = {"id": self.task.id, "settings": to_json(self.settings), "ended": self._ended.copy()}
         generators = [generator.bit_generator.state for generator in self._generators]
-        return {**about, **self.batch.get_state(), "generator": generators}
+        return {**self._state_of_batch(), "ended": self._ended.copy(), "generator": generators}
 
     def set_state(self, state: Mapping[str, Any]) -> NDArray[np.float32]:
         """Put back what `get_state` gave; returns the observations there.
@@ -309,8 +371,7 @@ class HorseLegVectorEnv(Made, Rows, VectorEnv[NDArray[np.float32], NDArray[np.fl
         Raises:
             ParameterError: a state of another id, geometry, setting or number of environments.
         """
-        self._refuse_closed("set_state")
-        check_state(state, self.task.id, to_json(self.settings), ("ended",))
+        self._check_state(state, "ended")
         n, states = self.num_envs, state["generator"]
         ended = ended_of(state["ended"], n)
         if not isinstance(states, (list, tuple)) or len(states) != n:
@@ -318,9 +379,7 @@ class HorseLegVectorEnv(Made, Rows, VectorEnv[NDArray[np.float32], NDArray[np.fl
         generators = [generator_of(values) for values in states]
         self.batch.set_state(state)
         self._ended, self._started, self._generators = ended, np.ones(n, bool), generators
-        for recording in (*self._recordings, *self._watched.values()):
+        self._phase = "running"
+        for recording in self._watched.values():
             recording.forget()
         return self._observed()
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {**vars(self), "_renderers": []}

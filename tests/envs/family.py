@@ -2,18 +2,29 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import gymnasium as gym
 import numpy as np
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from hoof_env.envs.tasks import TASKS, Settings, check_effect
 from hoof_env.errors import ParameterError
+from hoof_env.gait.gait import LIMITS
 
 IDS = sorted(
     name for name, spec in gym.registry.items() if str(spec.entry_point).endswith("horse_leg:HorseLegEnv")
 )
 """All ids of one environment class."""
+
+OTHER = {
+    "trunk_mass": 120.0, "trunk_share": 0.5, "trunk_stiffness": 6000.0, "trunk_damping": 900.0,
+    "trunk_drag": 60.0, "stiffness": 4e4, "restitution": 0.9, "approach_floor": 2.0, "friction": 0.1,
+    "friction_slow": 0.04, "friction_fast": 0.2, "motor_gain": 30.0, "motor_torque": 100.0,
+    "motor_inertia": 2.0, "target_seconds": (0.02, 0.1), "exponent": 1.25,
+}  # fmt: skip
+"""Values of settings that are not the defaults."""
 
 FALLS = {"trunk_share": 1.0, "trunk_stiffness": 0.0, "trunk_damping": 0.0}
 """A suspended trunk that nothing else holds up: episodes end by failure."""
@@ -56,9 +67,19 @@ def same(one, two) -> None:
         assert a.tobytes() == b.tobytes(), (one, two)
 
 
+def make(env_id, n=0, **settings):
+    """The environment of an id, or `n` of them side by side."""
+    return (gym.make_vec(env_id, num_envs=n, **settings) if n else gym.make(env_id, **settings)).unwrapped
+
+
+def steps(env, count: int, seed: int = 5):
+    """What `count` random actions lead to, of one environment or many."""
+    return [env.step(action) for action in actions(seed, count, *env.action_space.shape[:-1])]
+
+
 def roll(env, count: int, seed: int = 5):
-    """What random actions lead to: a list of (observation, reward, terminated, truncated)."""
-    return [env.step(action)[:4] for action in actions(seed, count)]
+    """The same without infos."""
+    return [step[:4] for step in steps(env, count, seed)]
 
 
 def together(records):
@@ -77,3 +98,26 @@ def substeps(env, action) -> dict[str, np.ndarray]:
         records.append(env.unwrapped.record())
         done = terminated or truncated
     return together(records[1:])
+
+
+MODES = list(AutoresetMode)
+
+
+def both(env_id, n, mode=AutoresetMode.NEXT_STEP, **settings):
+    """Our vector environment, and Gymnasium's over single environments."""
+    ours = gym.make_vec(env_id, num_envs=n, autoreset_mode=mode, **settings)
+    theirs = SyncVectorEnv([lambda: gym.make(env_id, **settings)] * n, autoreset_mode=mode)
+    return ours.unwrapped, theirs
+
+
+def scaled(scaling, x, leg):
+    """What the manual page says that becomes of a measured number, or of a row of them."""
+    if scaling in ("none", "0 or 1"):
+        return x
+    if action := re.fullmatch(r"as action (\d)", scaling):
+        low, high = list(LIMITS.values())[int(action[1])]
+        return (2 * x - low - high) / (high - low)
+    if part := re.fullmatch(r"/ ([\d.]+)", scaling):
+        return np.clip(x / float(part[1]), -1, 1)
+    formula = scaling.replace("3 weights", "(3 * weight)").replace("hip height", f"{leg.batch.height}")
+    return eval(formula, {"tanh": np.tanh, "x": x, "weight": leg.weight})

@@ -9,7 +9,7 @@ import warnings
 import gymnasium as gym
 import numpy as np
 import pytest
-from family import FALLS, IDS, actions, effective, roll, same
+from family import FALLS, IDS, actions, effective, make, roll, same, steps
 from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 from stable_baselines3.common.env_checker import check_env as sb3_check_env
@@ -75,16 +75,11 @@ def test_observations_stay_in_the_box_and_none_is_constant(setup):
 
 def test_every_call_returns_fresh_data():
     env = gym.make("hoof_env/HorseLeg-v0")
-    first, info = env.reset(seed=1)
-    record = env.unwrapped.record()
-    kept = copy.deepcopy((first, info, record))
-    second, *_ = env.step(np.ones(4, np.float32))
-    assert not np.shares_memory(first, second)
-    later = env.unwrapped.record()
-    kept_too = copy.deepcopy((second, later))
+    given = [*env.reset(seed=1), env.unwrapped.record()]
+    given += [*env.step(np.ones(4, np.float32)), env.unwrapped.record()]
+    kept = copy.deepcopy(given)
     env.step(-np.ones(4, np.float32))
-    for now, before in zip((first, info, record, second, later), kept + kept_too, strict=True):
-        same(now, before)
+    same(given, kept)
 
 
 @pytest.mark.parametrize("env_id", IDS)
@@ -97,9 +92,7 @@ def test_types_and_infos_of_a_step(env_id, settings):
     while not done:
         _, reward, terminated, truncated, info = env.step(env.action_space.sample())
         assert (type(reward), type(terminated), type(truncated)) == (float, bool, bool)
-        terms = [value for key, value in info.items() if key.startswith("reward_")]
-        assert [type(term) for term in terms] == [np.float64] * len(NAMES)
-        assert reward == sum(terms)
+        assert reward == sum(value for key, value in info.items() if key.startswith("reward_"))
         assert len(info) <= 14
         done = terminated or truncated
         assert set(started) <= set(info)
@@ -107,9 +100,6 @@ def test_types_and_infos_of_a_step(env_id, settings):
             ({"episode_summary", "failure"} if terminated else {"episode_summary"}) if done else set()
         )
     assert all(type(value) is float for value in info["episode_summary"].values())
-
-
-NAMES = ("progress", "peak", "energy", "action", "failure", "support")
 
 
 @pytest.mark.parametrize("env_id", IDS)
@@ -147,46 +137,26 @@ def test_recording_changes_nothing_and_says_what_is_observed():
         assert seen["toe load"] == pytest.approx(np.tanh(load), abs=1e-6)
 
 
-def test_time_limit_truncates_in_seconds():
-    env = gym.make("hoof_env/HorseLeg-v0", episode_seconds=0.5, dt=0.05)
-    env.reset(seed=0)
-    flags = [env.step(np.zeros(4, np.float32))[2:4] for _ in range(10)]
-    assert flags == [(False, False)] * 9 + [(False, True)]
-
-
 def test_an_episode_that_a_wrapper_ends_has_its_figures_on_demand():
     """What the environment's own limit puts in `info` after as many steps."""
     limited, own = gym.make(IDS[0], max_episode_steps=8), gym.make(IDS[0], episode_seconds=0.16)
     with pytest.raises(ResetNeeded, match="episode_summary"):
         limited.unwrapped.episode_summary()
-    ends = []
     for env in (limited, own):
         env.reset(seed=3)
-        ends.append([env.step(np.ones(4, np.float32)) for _ in range(8)][-1])
-    (*_, truncated, info), (*_, info_of_own) = ends
-    assert truncated
-    assert "episode_summary" not in info
-    assert limited.unwrapped.episode_summary() == info_of_own["episode_summary"]
-
-
-def test_ids_work_in_a_fresh_process_by_module_prefix():
-    assert gym.make("hoof_env:hoof_env/HorseLeg-v0").spec.id == "hoof_env/HorseLeg-v0"
-    assert len(IDS) == 5
-
-
-def test_spec_is_json_serialisable():
-    env = gym.make("hoof_env/HorseLeg-v0", trunk="rail", reward_weights={"peak": 0.5})
-    again = gym.make(gym.envs.registration.EnvSpec.from_json(env.spec.to_json()))
-    assert again.unwrapped.batch.weights["peak"] == 0.5
-    assert again.unwrapped.engine.trunk.kind == "rail"
+    ends = [[env.step(np.ones(4, np.float32)) for _ in range(8)][-1] for env in (limited, own)]
+    assert ends[0][3]
+    assert "episode_summary" not in ends[0][4]
+    assert limited.unwrapped.episode_summary() == ends[1][4]["episode_summary"]
 
 
 def test_a_state_fits_the_environment_that_a_json_spec_makes():
     """Where tuples have become lists."""
     settings = {"randomize": {"friction": (0.2, 0.8)}, "terrain": {"kind": "hills", "friction": (0.5, 1.5)}}
-    env = gym.make(IDS[0], target_speed=(0.5, 2.0), **settings)
+    env = gym.make(IDS[0], target_speed=(0.5, 2.0), reward_weights={"peak": 0.5}, **settings)
     env.reset(seed=0)
     again = gym.make(gym.envs.registration.EnvSpec.from_json(env.spec.to_json())).unwrapped
+    assert again.batch.weights["peak"] == 0.5
     same(again.set_state(env.unwrapped.get_state()), env.unwrapped.batch.observations[0])
     again.reset()
 
@@ -210,35 +180,40 @@ COPIES = {"deepcopy": copy.deepcopy, "pickle": lambda env: pickle.loads(pickle.d
 
 
 @pytest.mark.parametrize("copied", COPIES)
+@pytest.mark.parametrize("n", [0, 3, 9])
 @pytest.mark.parametrize("env_id", IDS)
-def test_a_copy_goes_on_identically_and_apart(env_id, copied):
-    env = gym.make(env_id, randomize={"friction": (0.2, 0.8)}, episode_seconds=1.0).unwrapped
+def test_a_copy_goes_on_alike_and_apart(env_id, n, copied):
+    settings = {"randomize": {"friction": (0.2, 0.8), "trunk_mass": (70.0, 90.0)}, "episode_seconds": 0.5}
+    env = make(env_id, n, **settings)
     env.reset(seed=2)
-    roll(env, 30)
+    steps(env, 20)
     twin, kept = COPIES[copied](env), env.get_state()
-    one = roll(env, 30)
+    one = steps(env, 40)
     same(twin.get_state(), kept)
-    for a, b in zip(one, roll(twin, 30), strict=True):
-        same(a, b)
+    same(one, steps(twin, 40))
     same(env.reset(), twin.reset())
 
 
+@pytest.mark.parametrize("mode", ["NEXT_STEP", "SAME_STEP"])
+@pytest.mark.parametrize("n", [0, 3, 9])
 @pytest.mark.parametrize("env_id", IDS)
-def test_a_state_goes_on_identically_also_elsewhere(env_id):
-    settings = {"episode_seconds": 1.0, "randomize": {"trunk_mass": (60.0, 120.0)}}
-    env, other = (gym.make(env_id, **settings).unwrapped for _ in range(2))
+def test_a_state_goes_on_alike_also_elsewhere(env_id, n, mode):
+    """After 15 steps the next call of NEXT_STEP starts new episodes."""
+    settings = {"episode_seconds": 0.3, "randomize": {"friction": (0.2, 0.8), "trunk_mass": (60.0, 120.0)}}
+    settings |= {"autoreset_mode": mode} if n else {}
+    env, other = (make(env_id, n, **settings) for _ in range(2))
     env.reset(seed=2)
-    roll(env, 30)
+    steps(env, 15)
     state = env.get_state()
-    kept = pickle.dumps(state)
-    first = roll(env, 20), env.reset(), roll(env, 5)
+    kept, observed = (
+        pickle.dumps(state),
+        env.batch.observations[: max(n, 1)].reshape(env.observation_space.shape),
+    )
+    observed, first = observed.copy(), [steps(env, 20), env.reset(), steps(env, 5)]
     assert pickle.dumps(state) == kept
     for one in (env, other):
-        same(one.set_state(pickle.loads(kept)), one.batch.observations[0])
-        again = roll(one, 20), one.reset(), roll(one, 5)
-        for a, b in zip(first[0] + first[2], again[0] + again[2], strict=True):
-            same(a, b)
-        same(first[1], again[1])
+        same(one.set_state(pickle.loads(kept)), observed)
+        same([steps(one, 20), one.reset(), steps(one, 5)], first)
 
 
 @pytest.mark.parametrize("copied", COPIES)

@@ -72,21 +72,22 @@ def test_bad_values_are_refused(soft, tmp_path):
 PAPER = {"solver": "paper", "gait": "run", "autoreset_mode": "DISABLED"}
 
 
-def elsewhere(env):
-    """Another environment in the same state, which was pickled meanwhile."""
-    other = gym.make_vec(FIXED, num_envs=env.num_envs, **PAPER)
-    other.set_state(pickle.loads(pickle.dumps(env.get_state())))
-    return other
+def elsewhere(copied):
+    """Another environment in the same state, which was copied meanwhile."""
+
+    def make(env):
+        other = gym.make_vec(FIXED, num_envs=env.num_envs, **PAPER)
+        other.set_state(copied(env.get_state()))
+        return other
+
+    return make
 
 
-def in_a_copy(env):
-    """The same with a state that was copied."""
-    other = gym.make_vec(FIXED, num_envs=env.num_envs, **PAPER)
-    other.set_state(copy.deepcopy(env.get_state()))
-    return other
+def pickled(given):
+    return pickle.loads(pickle.dumps(given))
 
 
-COPIES = [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env)), elsewhere, in_a_copy]
+COPIES = [copy.deepcopy, pickled, elsewhere(pickled), elsewhere(copy.deepcopy)]
 
 
 @pytest.mark.parametrize("copied", COPIES, ids=["deepcopy", "pickle", "state", "copied state"])

@@ -12,6 +12,7 @@ from pathlib import Path
 import gymnasium as gym
 import numpy as np
 import pytest
+from family import scaled
 
 from hoof_env import cli
 from hoof_env.envs import manual
@@ -141,19 +142,6 @@ def test_observations_are_scaled_as_the_table_says(page):
     assert len(table) - len(checked) <= 3
 
 
-def scaled(scaling, x, leg):
-    """What a cell of the table makes of a number."""
-    if scaling in ("none", "0 or 1"):
-        return x
-    if action := re.fullmatch(r"as action (\d)", scaling):
-        low, high = list(LIMITS.values())[int(action[1])]
-        return (2 * x - low - high) / (high - low)
-    if part := re.fullmatch(r"/ ([\d.]+)", scaling):
-        return np.clip(x / float(part[1]), -1, 1)
-    formula = scaling.replace("3 weights", f"(3 * {leg.weight})").replace("hip height", f"{leg.batch.height}")
-    return eval(formula, {"tanh": math.tanh, "x": x})
-
-
 @pytest.mark.parametrize("page", TASKS)
 def test_every_setting_is_documented_with_its_default(page):
     made = gym.make(IDS[page]).unwrapped.settings
@@ -213,15 +201,6 @@ def test_settings_survive_json(page):
     assert to_json(again.unwrapped.settings) == plain
     seen = [made.reset(seed=3)[0].tobytes() for made in (env, again, gym.make(IDS[page]))]
     assert len(set(seen)) == 1
-
-
-def test_links_lead_somewhere():
-    for file in DOCS.glob("*.md"):
-        for target, _, anchor in re.findall(r"\]\(([^)#]+)(#([\w-]+))?\)", file.read_text("utf-8")):
-            there = DOCS / target
-            assert there.exists(), f"{file.name}: {target}"
-            headings = [line.lstrip("# ").lower() for line in there.read_text("utf-8").splitlines()]
-            assert not anchor or anchor in headings, f"{file.name}: {target}#{anchor}"
 
 
 @pytest.mark.parametrize("page", list(TASKS))

@@ -3,6 +3,7 @@
 import gymnasium as gym
 import numpy as np
 import pytest
+from family import FALLS
 
 from hoof_env.envs.horse_leg import HorseLegEnv
 from hoof_env.envs.multi_objective import OBJECTIVES, HorseLegMOEnv, vector_reward
@@ -24,9 +25,6 @@ def test_each_objective_has_its_terms():
 def test_a_fall_costs_every_preference_the_same(weights):
     fell, stood = (vector_reward({**TERMS, "reward_failure": failure}) for failure in (-300.0, 0.0))
     assert np.dot(weights, fell - stood) == pytest.approx(-100.0, rel=1e-6)
-
-
-FALLS = {"trunk_share": 1.0, "trunk_stiffness": 0.0, "trunk_damping": 0.0}
 
 
 @pytest.mark.parametrize("kwargs", [{}, {"reward_weights": {"peak": 2.0}}, FALLS])

@@ -250,112 +250,75 @@ def powers(penetration, rate, inverse_approach_speed, ground):
     return ground.stiffness * penetration**1.5
 
 
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        (
-            {"terms": [term(uses_if)]},
-            r"cannot compile `if`, .* of numbers in uses_if \(.*test_own_task.py, line",
-        ),
-        ({"terms": [term(sometimes, scalar=True)]}, "term 'mine' returns nothing in some cases; expected a"),
-        ({"entries": [entry(lambda s: s.leg.command)]}, r"entry 'mine' returns .*; expected a number"),
-        (
-            {"contact_law": powers},
-            r"cannot compile pow\(\) in powers \(.*test_own_task.py, line \d+\); expected",
-        ),
-    ],
-    ids=["if", "sometimes", "block", "pow"],
-)
-def test_what_cannot_be_compiled_is_refused_with_operation_and_place(given, message):
-    register("own/Bad-v0", **given)
+HERE = r"\(.*test_own_task.py, line"
+NOT_COMPILED = {
+    f"cannot compile `if`, .* of numbers in uses_if {HERE}": {"terms": [term(uses_if)]},
+    "term 'mine' returns nothing in some cases; expected a": {"terms": [term(sometimes, scalar=True)]},
+    "entry 'mine' returns .*; expected a number": {"entries": [entry(lambda s: s.leg.command)]},
+    rf"cannot compile pow\(\) in powers {HERE} \d+\); expected": {"contact_law": powers},
+}
+
+
+@pytest.mark.parametrize("message", NOT_COMPILED)
+def test_what_cannot_be_compiled_is_refused_with_operation_and_place(message):
+    register("own/Bad-v0", **NOT_COMPILED[message])
     with pytest.raises(ParameterError, match=rf"own/Bad-v0: {message}"):
         gym.make("own/Bad-v0")
 
 
-@pytest.mark.parametrize(
-    ("text", "found"),
-    [
-        ("No implementation of function Function(<built-in function sin>) found for signature", "sin()"),
-        ("No implementation of function Function(<ufunc 'exp'>) found", "exp()"),
-        ("No implementation of function Function(<function max at 0x7f>) found", "max()"),
-        (
-            "No implementation of function Function(<class 'bool'>) found",
-            "`if`, `and`, `or` or `not` of numbers",
-        ),
-        (
-            "Untyped global name 'f': Cannot determine Numba type of <class 'function'>",
-            "f, a function without",
-        ),
-        (
-            "Failed in nopython mode pipeline (step: x)\nCannot unify int64 and none\n\nDuring: y",
-            "Cannot unify",
-        ),
-        ("Unknown attribute 'pace' of type Columns(1, x.LegMemory)", ".pace, which Columns has not,"),
-        ("something else", "something else"),
-    ],
-)
+NO_FUNCTION = "No implementation of function Function"
+OF_NUMBA = {
+    f"{NO_FUNCTION}(<built-in function sin>) found for signature": "sin()",
+    f"{NO_FUNCTION}(<ufunc 'exp'>) found": "exp()",
+    f"{NO_FUNCTION}(<function max at 0x7f>) found": "max()",
+    f"{NO_FUNCTION}(<class 'bool'>) found": "`if`, `and`, `or` or `not` of numbers",
+    "Untyped global name 'f': Cannot determine Numba type of <class 'function'>": "f, a function without",
+    "Failed in nopython mode pipeline (step: x)\nCannot unify int64 and none\n\nDuring: y": "Cannot unify",
+    "Unknown attribute 'pace' of type Columns(1, x.LegMemory)": ".pace, which Columns has not,",
+    "something else": "something else",
+}
+
+
+@pytest.mark.parametrize(("text", "found"), OF_NUMBA.items())
 def test_the_operation_is_that_of_numbas_message(text, found):
     assert f"cannot compile {found}" in what_cannot_be_compiled(Exception(text))
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (
-            lambda: {"env_id": "Turf-v0"},
-            "env_id: expected 'namespace/Name-v0' of a namespace of yours, got 'Turf-v0'",
-        ),
-        (lambda: {"env_id": "hoof_env/HorseLeg-v0"}, "of a namespace of yours"),
-        (lambda: {"env_id": 3}, "env_id: expected"),
-        (lambda: {"base": "pony"}, r"task: expected one of fixed, leg, .*rail, speed, terrain, got 'pony'"),
-        (lambda: {"terms": [term(sine), term(sine)]}, "expected names that differ, got mine twice"),
-        (
-            lambda: {"entries": [entry(len), entry(len)]},
-            "expected a plain function of 1 arguments, got <built-in",
-        ),
-        (
-            lambda: {"entries": [entry(lambda s: 0.0), entry(lambda s: 1.0)]},
-            "names that differ, got mine twice",
-        ),
-        (lambda: {"entries": [entry(lambda s: 0.0, "height")]}, "names that differ, got height twice"),
-        (lambda: {"terms": [sine]}, "own/Bad-v0: terms: expected a list of hoof_env.Term, got <function"),
-        (lambda: {"terms": None}, "own/Bad-v0: terms: expected a list of hoof_env.Term, got None"),
-        (lambda: {"entries": 3}, "own/Bad-v0: entries: expected a list of hoof_env.Entry, got 3"),
-        (
-            lambda: {"entries": ["speed"]},
-            "own/Bad-v0: entries: expected a list of hoof_env.Entry, got 'speed'",
-        ),
-        (
-            lambda: {"terms": [term(lambda step: 0.0)]},
-            r"compute: expected a function of 2 arguments, got one of \(step\)",
-        ),
-        (
-            lambda: {"contact_law": sine},
-            r"contact_law: expected a function of 4 arguments, got one of \(step, weight\)",
-        ),
-        (
-            lambda: {"stiffnes": 1.0},
-            "own/Bad-v0: unexpected keyword argument 'stiffnes'; did you mean stiffness",
-        ),
-        (
-            lambda: {"motor_gain": 1.0},
-            "motor_gain: expected drive='motor' beside it, without which it has no effect",
-        ),
-        (
-            lambda: {"reward_weights": {"slop": 1.0}},
-            r"reward_weights: expected a mapping with some of progress, .*slop",
-        ),
-        (
-            lambda: {"observation": ["crank", "smell"]},
-            "observation: expected a list of some of crank, .*smell",
-        ),
-        (
-            lambda: {"base": "fixed", "solver": "paper", "contact_law": powers},
-            'solver: expected "exact" beside a contact law of one\'s own, got "paper"',
-        ),
-    ],
-)
-def test_a_refused_registration_registers_nothing(change, message):
+NOT_REGISTERED = {
+    "env_id: expected 'namespace/Name-v0' of a namespace of yours, got 'Turf'": lambda: {"env_id": "Turf"},
+    "of a namespace of yours": lambda: {"env_id": "hoof_env/HorseLeg-v0"},
+    "env_id: expected": lambda: {"env_id": 3},
+    r"task: expected one of fixed, leg, .*rail, speed, terrain, got 'pony'": lambda: {"base": "pony"},
+    "expected names that differ, got mine twice": lambda: {"terms": [term(sine), term(sine)]},
+    "expected a plain function of 1 arguments, got <built-in": lambda: {"entries": [entry(len), entry(len)]},
+    "names that differ, got mine twice": lambda: {"entries": [entry(lambda s: 0.0), entry(lambda s: 1.0)]},
+    "names that differ, got height twice": lambda: {"entries": [entry(lambda s: 0.0, "height")]},
+    "own/Bad-v0: terms: expected a list of hoof_env.Term, got <function": lambda: {"terms": [sine]},
+    "own/Bad-v0: terms: expected a list of hoof_env.Term, got None": lambda: {"terms": None},
+    "own/Bad-v0: entries: expected a list of hoof_env.Entry, got 3": lambda: {"entries": 3},
+    "own/Bad-v0: entries: expected a list of hoof_env.Entry, got 'speed'": lambda: {"entries": ["speed"]},
+    r"compute: expected a function of 2 arguments, got one of \(step\)": lambda: {
+        "terms": [term(lambda step: 0.0)]
+    },
+    r"contact_law: expected a function of 4 arguments, got one of \(step, weight\)": lambda: {
+        "contact_law": sine
+    },
+    "own/Bad-v0: unexpected keyword argument 'stiffnes'; did you mean stiffness": lambda: {"stiffnes": 1.0},
+    "motor_gain: expected drive='motor' beside it, without which it has no effect": lambda: {
+        "motor_gain": 1.0
+    },
+    r"reward_weights: expected a mapping with some of progress, .*slop": lambda: {
+        "reward_weights": {"slop": 1.0}
+    },
+    "observation: expected a list of some of crank, .*smell": lambda: {"observation": ["crank", "smell"]},
+    'solver: expected "exact" beside a contact law of one\'s own, got "paper"': lambda: {
+        "base": "fixed", "solver": "paper", "contact_law": powers
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("message", "change"), NOT_REGISTERED.items())
+def test_a_refused_registration_registers_nothing(message, change):
     before = dict(gym.registry), dict(tasks._OWN)
     with pytest.raises(ParameterError, match=message):
         register(**{"env_id": "own/Bad-v0", **change()})

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import copy
-import pickle
 
 import gymnasium as gym
 import numpy as np
 import pytest
-from family import FALLS, IDS, actions, same
+from family import FALLS, IDS, MODES, actions, both, same, steps
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from gymnasium.wrappers.vector import NormalizeReward, RecordEpisodeStatistics, RecordVideo
 
-MODES = list(AutoresetMode)
 SHORT = {"episode_seconds": 0.3}
 TARGETS = {"target_speed": (0.5, 3.0), "target_seconds": (0.02, 0.1)}
 """Commands that change every few steps, also in the step after the last of an episode."""
@@ -24,13 +22,6 @@ SETTINGS = {
     "randomized": {**SHORT, "randomize": {"trunk_mass": (60.0, 120.0), "friction": (0.2, 0.8)}},
     "motor": {**SHORT, "drive": "motor"},
 }
-
-
-def both(env_id, n, mode=AutoresetMode.NEXT_STEP, **settings):
-    """Ours, and Gymnasium's over single environments."""
-    ours = gym.make_vec(env_id, num_envs=n, autoreset_mode=mode, **settings)
-    theirs = SyncVectorEnv([lambda: gym.make(env_id, **settings)] * n, autoreset_mode=mode)
-    return ours, theirs
 
 
 def check_infos(ours, theirs):
@@ -193,55 +184,17 @@ def test_an_idle_row_draws_nothing():
         check_step(ours, theirs, taken)
 
 
-def finals(env, count=40, seed=4):
-    return [env.step(taken) for taken in actions(seed, count, env.num_envs)]
-
-
-@pytest.mark.parametrize("copied", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
-@pytest.mark.parametrize("n", [3, 9])
-@pytest.mark.parametrize("env_id", IDS)
-def test_a_copy_goes_on_alike_and_apart(env_id, n, copied):
-    env = gym.make_vec(env_id, num_envs=n, **SHORT, randomize={"trunk_mass": (70.0, 90.0)}).unwrapped
-    env.reset(seed=1)
-    finals(env, 20)
-    twin = copied(env)
-    for one, two in zip(finals(env), finals(twin), strict=True):
-        for a, b in zip(one, two, strict=True):
-            same(a, b)
-
-
-@pytest.mark.parametrize("mode", MODES[:2], ids=lambda mode: mode.name)
-@pytest.mark.parametrize("n", [3, 9])
-@pytest.mark.parametrize("env_id", IDS)
-def test_a_state_goes_on_alike_also_elsewhere(env_id, n, mode):
-    settings = {**SHORT, "randomize": {"friction": (0.2, 0.8)}, "autoreset_mode": mode}
-    env, other = (gym.make_vec(env_id, num_envs=n, **settings).unwrapped for _ in range(2))
-    env.reset(seed=1)
-    finals(env, 15)  # the next call starts new episodes
-    state = env.get_state()
-    kept = pickle.dumps(state)
-    first = finals(env)
-    assert pickle.dumps(state) == kept
-    observed = env.set_state(state)
-    again = finals(env)
-    same(other.set_state(pickle.loads(kept)), observed)
-    for one, two, three in zip(first, again, finals(other), strict=True):
-        for a, b, c in zip(one, two, three, strict=True):
-            same(a, b)
-            same(a, c)
-
-
 def test_frames_of_the_first_environments_and_two_closes():
     pytest.importorskip("pygame")
     env = gym.make_vec(IDS[0], num_envs=8, render_mode="rgb_array", rendered=2, **SHORT)
     env.reset(seed=0)
-    finals(env, 17)
+    steps(env, 17, seed=4)
     frames = env.render()
     assert [frame.shape for frame in frames] == [(540, 960, 3)] * 8
     assert [bool(frame.any()) for frame in frames] == [True] * 2 + [False] * 6
     single = gym.make(IDS[0], render_mode="rgb_array", **SHORT)
     twin = copy.deepcopy(env)
-    finals(twin, 3)
+    steps(twin, 3)
     assert (twin.render()[0] != frames[0]).any()
     same(env.render()[0], frames[0])
     single.reset(seed=1)

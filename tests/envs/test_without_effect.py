@@ -8,7 +8,7 @@ from dataclasses import replace
 import gymnasium as gym
 import numpy as np
 import pytest
-from family import IDS, actions, same
+from family import IDS, OTHER, actions, same
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 from hoof_env import RandomizeParameters, Sb3VecEnv
@@ -20,13 +20,6 @@ from hoof_env.errors import FixedSettingError, ParameterError
 from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS
 
 LEG, RAIL, FIXED = (f"hoof_env/{name}-v0" for name in ("HorseLeg", "HorseLegRail", "HorseLegFixed"))
-OTHER = {
-    "trunk_mass": 120.0, "trunk_share": 0.5, "trunk_stiffness": 6000.0, "trunk_damping": 900.0,
-    "trunk_drag": 60.0, "stiffness": 4e4, "restitution": 0.9, "approach_floor": 2.0, "friction": 0.1,
-    "friction_slow": 0.04, "friction_fast": 0.2, "motor_gain": 30.0, "motor_torque": 100.0,
-    "motor_inertia": 2.0, "target_seconds": (0.02, 0.1), "exponent": 1.25,
-}  # fmt: skip
-"""Values that are not the defaults."""
 
 
 def episode(settings, steps=150):
@@ -73,6 +66,7 @@ def test_refused_is_what_changes_no_bit(context):
 def test_all_are_tried():
     papers_own = {"baumgarte_alpha", "baumgarte_beta"}
     assert set(PER_EPISODE) | set(NEEDED) <= set(OTHER) | papers_own
+    assert all(getattr(Settings(), name) != value for name, value in OTHER.items())
 
 
 @pytest.mark.parametrize(

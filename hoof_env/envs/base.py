@@ -1,0 +1,200 @@
+"""What the environment and the vector environment share: what they say of themselves, and the refusal of
+calls at the wrong time and of assignments that would change nothing."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from gymnasium.envs.registration import EnvSpec
+from gymnasium.error import ClosedEnvironmentError, ResetNeeded
+from numpy.typing import NDArray
+
+from hoof_env.dynamics.engine import TrunkEngine
+from hoof_env.envs.batch import EpisodeBatch
+from hoof_env.envs.episode import ACTIONS
+from hoof_env.envs.tasks import PER_EPISODE, SETTINGS, Settings, Task, task_of, to_json
+from hoof_env.errors import FixedSettingError, ParameterError, check_choice
+from hoof_env.gait.gait import GaitParameters
+from hoof_env.ground.terrain import Terrain
+from hoof_env.leg.geometry import Geometry
+
+
+def fixed_setting(name: str) -> FixedSettingError:
+    """The error of an assignment to a setting, or to what follows from the settings."""
+    how = "gymnasium.make(id, ...)" if name in SETTINGS else "the arguments of gymnasium.make"
+    if name in PER_EPISODE:
+        how += f", or reset(options={{'parameters': {{{name!r}: ...}}}}) for an episode"
+    return FixedSettingError(f"{name}: expected no assignment, which would change nothing; set it by {how}")
+
+
+def generator_of(state: Any) -> np.random.Generator:
+    """A generator in the state that a `PCG64` had.
+
+    Raises:
+        ParameterError: no such state.
+    """
+    generator = np.random.Generator(np.random.PCG64())
+    try:
+        generator.bit_generator.state = state
+    except (TypeError, ValueError, KeyError):
+        raise ParameterError(f"state['generator']: expected the state of a PCG64, got {state!r}") from None
+    return generator
+
+
+class LegBase:
+    """One environment of a task, or many.
+
+    Attributes:
+        task, settings: the task and its settings.
+        batch: the episodes.
+        spec: what Gymnasium made it from. `max_episode_steps` is the environment's own limit, which
+            `episode_seconds` and `dt` give, unless it has one already.
+    """
+
+    task: Task
+    settings: Settings
+    batch: EpisodeBatch
+    metadata: dict[str, Any]
+    render_mode: str | None
+    _spec: EnvSpec | None = None
+    _phase = "new"
+    """Then "running", and "closed"; a single environment also has "ended" and "warned"."""
+
+    def _make(self, task: str, given: Mapping[str, Any], n: int, render_mode: str | None) -> list[Any]:
+        """Make `n` environments; returns the space of an observation and of an action."""
+        if render_mode is not None:
+            check_choice("render_mode", render_mode, self.metadata["render_modes"])
+        self.task, self.render_mode = task_of(task), render_mode
+        self.settings = self.task.settings(given)
+        self.batch = EpisodeBatch(self.task, self.settings, n)
+        self.metadata = {**self.metadata, "render_fps": max(1, round(1 / self.batch.dt))}
+        return [spaces.Box(-1.0, 1.0, (size,), np.float32) for size in (len(self.batch.names), ACTIONS)]
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """As of any object, but for settings and what follows from them.
+
+        Raises:
+            FixedSettingError: a setting, or a property that cannot be set.
+        """
+        fixed = getattr(type(self), name, None)
+        if name in SETTINGS or (isinstance(fixed, property) and fixed.fset is None):
+            raise fixed_setting(name)
+        super().__setattr__(name, value)
+
+    def set_wrapper_attr(self, name: str, value: Any, *, force: bool = True) -> bool:
+        """As Gymnasium's, which would otherwise set a setting that the environment lacks on a wrapper."""
+        if force or name in SETTINGS or hasattr(self, name):
+            setattr(self, name, value)
+            return True
+        return False
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """The specification, None for an environment that Gymnasium did not make."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        if spec is not None and spec.max_episode_steps is None:
+            spec = copy.copy(spec)  # it may be the registered one
+            spec.max_episode_steps = self.batch.steps_per_episode
+        self._spec = spec
+
+    @property
+    def manual(self) -> str:
+        """The manual page of the id, Markdown."""
+        from hoof_env.envs.manual import page_of
+
+        return page_of(self.task.id)
+
+    @property
+    def geometry(self) -> Geometry:
+        """The leg."""
+        return self.batch.geometry
+
+    @property
+    def gaits(self) -> dict[str, GaitParameters]:
+        """Gaits of the preset by name."""
+        return self.batch.gaits
+
+    @property
+    def engine(self) -> TrunkEngine:
+        """The mechanics."""
+        return self.batch.engine
+
+    @property
+    def terrain(self) -> Terrain:
+        """What the legs stand on."""
+        return self.batch.engine.terrain
+
+    @property
+    def dt(self) -> float:
+        """Control step [s]."""
+        return self.batch.dt
+
+    @property
+    def sim_dt(self) -> float:
+        """Substep [s]."""
+        return self.batch.settings.sim_dt
+
+    @property
+    def observation_names(self) -> tuple[str, ...]:
+        """Of the observation's entries."""
+        return tuple(self.batch.names)
+
+    @property
+    def observation_units(self) -> tuple[str, ...]:
+        """Of what `raw_observation` gives, in the observation's order."""
+        return tuple(entry.unit for entry in self.batch.entries)
+
+    def command_of(self, action: Any) -> NDArray[np.float64]:
+        """Gait parameters that an action commands, shape (4,); the action is clipped to [-1, 1]."""
+        return self.batch.command_of(action)
+
+    def action_for(self, gait: str | GaitParameters | NDArray[np.float64]) -> NDArray[np.float32]:
+        """The action that commands a gait, to float32 precision; the nearest one if it is out of reach.
+
+        Args:
+            gait: the name of one of `gaits`, or its four parameters; as an array also many, shape (n, 4).
+
+        Raises:
+            ParameterError: an unknown name, or not four parameters.
+        """
+        return self.batch.action_for(gait)
+
+    def _check_open(self, call: str) -> None:
+        if self._phase == "closed":
+            raise ClosedEnvironmentError(f"{call}() was called after close(): make a new one")
+
+    def _check_started(self, call: str) -> None:
+        self._check_open(call)
+        if self._phase == "new":
+            raise ResetNeeded(f"{call}() was called before reset(): expected reset() first")
+
+    def _check_state(self, state: Any, *parts: str) -> None:
+        """Raise unless `state` is one that `get_state` of such an environment gave.
+
+        Raises:
+            ParameterError: it lacks a part, or is of another id or of other settings.
+        """
+        self._check_open("set_state")
+        names = ("id", "settings", "engine", "episode", "generator", *parts)
+        missing = [name for name in names if not isinstance(state, Mapping) or name not in state]
+        if missing:
+            raise ParameterError(f"state: expected what get_state gives, but {', '.join(missing)} is missing")
+        if state["id"] != self.task.id:
+            raise ParameterError(f"state: expected one of {self.task.id}, got one of {state['id']}")
+        there = state["settings"] if isinstance(state["settings"], Mapping) else {}
+        here = to_json(self.settings)
+        unlike = [f"{k}: {v!r} here, {there.get(k)!r} there" for k, v in here.items() if there.get(k) != v]
+        if unlike:
+            raise ParameterError(f"state: of other settings; {'; '.join(unlike)}")
+
+    def _state_of_batch(self) -> dict[str, Any]:
+        """What `get_state` gives but for the generators."""
+        self._check_started("get_state")
+        return {"id": self.task.id, "settings": to_json(self.settings), **self.batch.get_state()}
