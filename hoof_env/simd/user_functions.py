@@ -82,19 +82,22 @@ def number_of(what: str) -> Any:
     from numba.core import types
     from numba.core.errors import TypingError
 
-    from hoof_env.simd.memory import intrinsic
-    from hoof_env.simd.types import Mask, Plane, is_real
+    from hoof_env.simd.types import Code, Mask, Plane, instruction, is_real
 
     names = {Mask: "truths", Plane: "planar vectors", types.Boolean: "a truth", types.NoneType: "nothing"}
 
-    def number(context: Any, x: Any) -> Any:
+    def typed(x: Any) -> Any:
         if not is_real(x):
             kinds = (name for kind, name in names.items() if isinstance(x, kind))
             given = "nothing in some cases" if isinstance(x, types.Optional) else next(kinds, str(x))
             raise TypingError(f"{{{what} returns {given}; expected a number}}")
-        return x(x), lambda context, builder, signature, values: values[0]
+        return x(x)
 
-    return intrinsic(number)
+    @instruction(typed)
+    def number(code: Code, x: Any) -> Any:
+        return x
+
+    return number
 
 
 def check_function(name: str, function: Any, arguments: int) -> None:
