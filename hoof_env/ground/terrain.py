@@ -160,11 +160,10 @@ class Terrain:
         Raises:
             ParameterError: an unknown entry or a bad value.
         """
-        names = ", ".join(field.name for field in fields(cls))
-        if not isinstance(data, Mapping) or set(data) - set(names.split(", ")):
-            raise ParameterError(
-                f"terrain: expected an object with no other entries than {names}, got {_short(data)}"
-            )
+        names = [field.name for field in fields(cls)]
+        if not isinstance(data, Mapping) or set(data) - set(names):
+            wanted = f"an object with no other entries than {', '.join(names)}"
+            raise ParameterError(f"terrain: expected {wanted}, got {_short(data)}")
         return cls(**data)
 
     def to_dict(self) -> dict[str, Any]:
@@ -175,11 +174,13 @@ class Terrain:
     @cached_property
     def x(self) -> NDArray[np.float64]:
         """Where the knots are [m]; read-only."""
-        return _frozen(self.start + self.spacing * np.arange(len(self.height), dtype=np.float64))
+        knots = self.start + self.spacing * np.arange(len(self.height), dtype=np.float64)
+        knots.flags.writeable = False
+        return knots
 
     @cached_property
     def _heights(self) -> NDArray[np.float64]:
-        return _frozen(np.array(self.height))
+        return np.array(self.height)
 
     def height_at(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Height [m] at `x` [m], same shape."""
@@ -195,11 +196,6 @@ class Terrain:
         (height, stiffness, friction), (rise, harder, rougher) = rows[:, :-1], rises
         cells = np.column_stack([height, rise, 0.0 - slope * ny, ny, stiffness, harder, friction, rougher])
         return TerrainGrid(np.ascontiguousarray(cells), self.start - self.spacing, 1 / self.spacing)
-
-
-def _frozen(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    values.flags.writeable = False
-    return values
 
 
 def _knots(start: float, end: float, spacing: float) -> NDArray[np.float64]:

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from hoof_env.errors import GeometryError
 from hoof_env.leg.geometry import Geometry, tables
 from hoof_env.leg.kinematics import solve_points
-from hoof_env.leg.linkage import BODIES, POINTS
+from hoof_env.leg.linkage import HEADS, NUMBER, POINTS, TAILS
 from hoof_env.simd.compile import kernel
 from hoof_env.simd.functions import transposed
 from hoof_env.simd.layout import Block, Layout, Row, Vector
@@ -78,10 +78,6 @@ CELLS = (256, 512, 1024, 2048)
 DERIVATIVE_ERROR = 1e-9
 """The number of cells is the smallest that keeps derivatives this good, relative to their largest value."""
 
-_NUMBER = {name: i for i, name in enumerate(POINTS)}
-_TAIL = np.array([_NUMBER[body.tail] for body in BODIES])
-_HEAD = np.array([_NUMBER[body.head] for body in BODIES])
-
 
 @kernel
 def _solve_all(theta, crank, pivot, steps, values, z, dz, ddz):  # type: ignore[no-untyped-def]
@@ -101,11 +97,11 @@ def functions(
     if geometry.travel < 0:
         z, dz, ddz = (-w.conj() for w in (z, dz, ddz))  # the mirror
     m, inertia = geometry.body_masses, geometry.body_inertias
-    r, v, acc = ((w[:, _TAIL] + w[:, _HEAD]) / 2 for w in (z, dz, ddz))
-    link, dlink, ddlink = (w[:, _HEAD] - w[:, _TAIL] for w in (z, dz, ddz))
+    r, v, acc = ((w[:, TAILS] + w[:, HEADS]) / 2 for w in (z, dz, ddz))
+    link, dlink, ddlink = (w[:, HEADS] - w[:, TAILS] for w in (z, dz, ddz))
     length2 = geometry.body_lengths**2
     turn, dturn = _cross(link, dlink) / length2, _cross(link, ddlink) / length2
-    toe, heel = _NUMBER[geometry.toe], _NUMBER[geometry.heel]
+    toe, heel = NUMBER[geometry.toe], NUMBER[geometry.heel]
     s, ds, dds = r @ m, v @ m, acc @ m
     value = [
         z[:, toe].real, z[:, toe].imag, z[:, heel].real, z[:, heel].imag, ds.real, ds.imag,

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from hoof_env.errors import DataFileError, ParameterError
-from hoof_env.ground.contact import Ground, load_ground, read_ground, write_ground
+from hoof_env.ground.contact import Ground, load_ground, write_ground
 from hoof_env.leg.geometry import preset_names, read_preset
 
 
@@ -67,7 +67,7 @@ def test_a_ground_that_is_none_is_refused_with_the_file(preset, ground, message)
 
 def test_what_is_written_is_read_again():
     ground = Ground(stiffness=3e4, exponent=1.375)
-    assert read_ground({"ground": write_ground(ground)}, "here") == ground
+    assert load_ground({"ground": write_ground(ground)}) == ground
 
 
 @pytest.mark.parametrize("name", preset_names())

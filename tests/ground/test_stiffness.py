@@ -206,7 +206,6 @@ def test_rates_follow_their_formulas():
     assert rates.elastic == pytest.approx(math.sqrt(8e4 / 8))
     assert rates.damping == pytest.approx(dashpot / 8)
     assert rates.friction == pytest.approx(0.8 * 8e4 * depth / 0.01 / 2)
-    assert rates.fastest == rates.friction
     free = ContactRates(0.0, 0.0, 0.0, 1.5)
     assert set(free.longest_steps("rk4").values()) == {math.inf}
 
