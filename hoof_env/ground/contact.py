@@ -88,13 +88,12 @@ class Ground:
         check_choice("approach", self.approach, ("interpolated", "sampled"))
         check_choice("friction_law", self.friction_law, FRICTION_LAWS)
         check_number("friction", self.friction, low=0, high=10)
-        check_number("friction_slow", self.friction_slow, low=0)
-        check_number("friction_fast", self.friction_fast, low=0, exclusive_low=True)
-        check_number("reference_mass", self.reference_mass, low=0, exclusive_low=True)
-        if self.friction_law == "ambrosio" and self.friction_fast <= self.friction_slow:
+        slow, fast = check_number("friction_slow", self.friction_slow, low=0), self.friction_fast
+        for name in ("friction_fast", "reference_mass"):
+            check_number(name, getattr(self, name), low=0, exclusive_low=True)
+        if self.friction_law == "ambrosio" and fast <= slow:
             raise ParameterError(
-                f"friction_fast: expected more than friction_slow = {self.friction_slow:g} m/s, "
-                f"got {self.friction_fast:g}"
+                f"friction_fast: expected more than friction_slow = {slow:g} m/s, got {fast:g}"
             )
         _ = self.damping  # refuses a restitution that the law cannot represent
 

@@ -1,8 +1,7 @@
 """What a leg is: its lengths, pivot, assembly, masses and how it stands in the world.
 
-A `Geometry` is a frozen value; building one checks it. A leg that cannot turn through a full crank revolution
-is refused with the dyad, the crank angle and the missing length. Presets are JSON files with a provenance
-line in `hoof_env/data`. Both are *identified* from the paper's results, for the paper prints no lengths: the
+A `Geometry` is a frozen value; building one checks it. Presets are JSON files with a provenance line in
+`hoof_env/data`. Both are *identified* from the paper's results, for the paper prints no lengths: the
 default, `identified`, meets them, and `first_fit`, from which the search for it set out, nearly does.
 """
 
@@ -83,23 +82,21 @@ class Geometry:
         lengths = {k: check_number(f"lengths[{k!r}]", self.lengths[k], low=1e-3, high=1e3) for k in LENGTHS}
         points = [dyad.point for dyad in DYADS]
         _check_keys("assembly", self.assembly, points)
-        for point in points:
-            if not _is_sign(self.assembly[point]):
-                raise ParameterError(f"assembly[{point!r}]: expected +1 or -1, got {self.assembly[point]!r}")
+        signs = {f"assembly[{point!r}]": self.assembly[point] for point in points}
+        for name, sign in {**signs, "travel": self.travel}.items():
+            if np.ndim(sign) or sign not in (1, -1):
+                raise ParameterError(f"{name}: expected +1 or -1, got {sign!r}")
         if (self.toe, self.heel) not in (("I", "J"), ("J", "I")):
-            raise ParameterError(
-                f"toe and heel: expected I and J, one each, got {self.toe!r} and {self.heel!r}"
-            )
-        if not _is_sign(self.travel):
-            raise ParameterError(f"travel: expected +1 or -1, got {self.travel!r}")
+            given = f"{self.toe!r} and {self.heel!r}"
+            raise ParameterError(f"toe and heel: expected I and J, one each, got {given}")
         for name, text in (("name", self.name), ("provenance", self.provenance)):
             if not isinstance(text, str):
                 raise ParameterError(f"{name}: expected a text, got {text!r}")
         if _count(self.pivot) != 2:
             raise ParameterError(f"pivot: expected two numbers (C_x, C_y) in metres, got {self.pivot!r}")
         pivot = tuple(check_number(f"pivot[{i}]", c) for i, c in enumerate(self.pivot))
-        check_number("hip_height", self.hip_height, low=0, exclusive_low=True)
-        check_number("linear_density", self.linear_density, low=0, exclusive_low=True)
+        for name in ("hip_height", "linear_density"):
+            check_number(name, getattr(self, name), low=0, exclusive_low=True)
         check_choice("inertia", self.inertia, ("uniform_rod", "paper"))
         if self.masses is not None:
             if _count(self.masses) != len(BODIES):
@@ -220,10 +217,6 @@ def _numbers(what: str, given: Any) -> dict[str, float]:
     return {name: check_number(f"{what}[{name!r}]", value) for name, value in found.items()}
 
 
-def _is_sign(value: Any) -> bool:
-    return np.ndim(value) == 0 and value in (1, -1)
-
-
 def _check_keys(what: str, given: Any, expected: Sequence[str], optional: Sequence[str] = ()) -> None:
     if not isinstance(given, Mapping):
         raise ParameterError(f"{what}: expected a mapping with {', '.join(expected)}, got {given!r}")
@@ -321,9 +314,8 @@ def read_preset(source: Preset) -> dict[str, Any]:
     """
     data = source if isinstance(source, Mapping) else _read_file(source)
     if unknown := sorted(str(name) for name in data if name not in PARTS):
-        raise wrong(source)(
-            f"{named(source)}: unknown entries {', '.join(unknown)}; expected some of {', '.join(PARTS)}"
-        )
+        said = f"unknown entries {', '.join(unknown)}; expected some of {', '.join(PARTS)}"
+        raise wrong(source)(f"{named(source)}: {said}")
     return dict(data)
 
 
@@ -340,9 +332,8 @@ def _read_file(source: str | Path) -> dict[str, Any]:
     except (ValueError, RecursionError) as error:
         raise DataFileError(f"{path}: expected a JSON preset file, but it does not parse: {error}") from None
     if not isinstance(data, dict):
-        raise DataFileError(
-            f"{path}: expected a JSON object with 'geometry' and 'gaits', got {type(data).__name__}"
-        )
+        got = type(data).__name__
+        raise DataFileError(f"{path}: expected a JSON object with 'geometry' and 'gaits', got {got}")
     return data
 
 
@@ -354,23 +345,21 @@ def load_geometry(source: Preset = DEFAULT_PRESET) -> Geometry:
         DataFileError: the file is unreadable, lacks a part or has unknown entries.
         GeometryError: the leg cannot turn.
     """
-    data = read_preset(source)
-    for part, kind, what in (
-        ("provenance", str, "a text that says where the numbers come from"),
-        ("geometry", Mapping, "an object"),
-    ):
+    data, from_where = read_preset(source), "a text that says where the numbers come from"
+    for part, kind, what in (("provenance", str, from_where), ("geometry", Mapping, "an object")):
         if not isinstance(data.get(part), kind):
             got = f"got {data[part]!r:.60}" if part in data else f"found {', '.join(data) or 'nothing'}"
             raise wrong(source)(
                 f"{named(source)}: expected an entry {part!r} beside the others, {what}; {got}"
             )
-    name = {} if isinstance(source, Mapping) else {"name": str(source)}
-    values = {**name, "provenance": data["provenance"], **data["geometry"]}
+    values = {"provenance": data["provenance"], **data["geometry"]}
+    if not isinstance(source, Mapping):
+        values = {"name": str(source), **values}
     try:
         _check_entries(values)
     except ParameterError as error:
         raise wrong(source)(f"{named(source)}: {error}") from None
-    return Geometry.from_dict(values)
+    return Geometry(**values)
 
 
 def tables(geometry: Geometry) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

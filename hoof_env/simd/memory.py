@@ -75,12 +75,9 @@ def offset(code: Code, pointer: Any, count: Any) -> Any:
 
 def _pointer_to(kind: Any) -> Any:
     """A function for kernels that makes a pointer to numba's type `kind` of an address, a whole number."""
-
-    @instruction(lambda number: types.CPointer(kind)(types.int64))
-    def pointer(code: Code, number: Any) -> Any:
-        return code.builder.inttoptr(number, code.context.get_value_type(code.result))
-
-    return pointer
+    return instruction(lambda number: types.CPointer(kind)(types.int64))(
+        lambda code, number: code.builder.inttoptr(number, code.context.get_value_type(code.result))
+    )
 
 
 doubles_at, singles_at = _pointer_to(types.float64), _pointer_to(types.float32)
