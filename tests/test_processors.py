@@ -23,10 +23,8 @@ from hoof_env.simd import math as exact_math
 from hoof_env.simd.memory import address, doubles
 
 LANES, OUTPUTS, NUMBERS = 8, 8, 64
-
-needs_x86 = pytest.mark.skipif(
-    platform.machine() not in ("x86_64", "AMD64"), reason="numba is told of lesser x86 processors"
-)
+IS_X86 = platform.machine() in ("x86_64", "AMD64")
+needs_x86 = pytest.mark.skipif(not IS_X86, reason="numba is told of lesser x86 processors")
 
 
 @njit(error_model="numpy")
@@ -63,10 +61,6 @@ def engine_bits():
     return found
 
 
-def report(engines):
-    return {"bits": vector_bits(), "lanes": lane_bits(), "engines": engine_bits() if engines else {}}
-
-
 def on(processor, *arguments):
     """What this script prints where numba is told that it compiles for `processor`."""
     if processor == "haswell" and not llvm.get_host_cpu_features().get("avx2"):
@@ -96,4 +90,5 @@ def test_engines_have_the_same_bits_on_every_processor(processor):
 
 
 if __name__ == "__main__":
-    json.dump(report("engines" in sys.argv), sys.stdout)
+    engines = engine_bits() if "engines" in sys.argv else {}
+    json.dump({"bits": vector_bits(), "lanes": lane_bits(), "engines": engines}, sys.stdout)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.errors import DataFileError, ParameterError, check_choice, check_number
+from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS, damping, friction_part, normal_force
 from hoof_env.leg.geometry import DEFAULT_PRESET, Preset, named, read_preset, wrong
 from hoof_env.simd.compile import kernel
@@ -33,20 +33,11 @@ CONTACT = np.dtype(
 
 TOE, HEEL = 0, 1
 
+_COPIED = ("stiffness", "exponent", "approach_floor", "friction", "friction_slow", "friction_fast")
 GROUND = np.dtype(
-    [
-        ("stiffness", "f8"),
-        ("exponent", "f8"),
-        ("chi", "f8"),
-        ("dashpot", "f8"),
-        ("approach_floor", "f8"),
-        ("friction", "f8"),
-        ("friction_slow", "f8"),
-        ("friction_fast", "f8"),
-        ("friction_law", "i8"),
-        ("interpolated", "b1"),
-    ]
+    [(name, "f8") for name in (*_COPIED, "chi", "dashpot")] + [("friction_law", "i8"), ("interpolated", "b1")]
 )
+"""Settings of a `Ground`, for the kernels."""
 
 
 @dataclass(frozen=True)
@@ -97,23 +88,26 @@ class Ground:
         check_choice("approach", self.approach, ("interpolated", "sampled"))
         check_choice("friction_law", self.friction_law, FRICTION_LAWS)
         check_number("friction", self.friction, low=0, high=10)
-        check_number("friction_slow", self.friction_slow, low=0)
-        check_number("friction_fast", self.friction_fast, low=0, exclusive_low=True)
-        check_number("reference_mass", self.reference_mass, low=0, exclusive_low=True)
-        if self.friction_law == "ambrosio" and self.friction_fast <= self.friction_slow:
+        slow, fast = check_number("friction_slow", self.friction_slow, low=0), self.friction_fast
+        for name in ("friction_fast", "reference_mass"):
+            check_number(name, getattr(self, name), low=0, exclusive_low=True)
+        if self.friction_law == "ambrosio" and fast <= slow:
             raise ParameterError(
-                f"friction_fast: expected more than friction_slow = {self.friction_slow:g} m/s, "
-                f"got {self.friction_fast:g}"
+                f"friction_fast: expected more than friction_slow = {slow:g} m/s, got {fast:g}"
             )
-        damping(self.normal_law, self.restitution, self.stiffness, self.reference_mass)
+        _ = self.damping  # refuses a restitution that the law cannot represent
+
+    @property
+    def damping(self) -> tuple[float, float]:
+        """Damping factor chi [-] and dashpot coefficient c [N s/m], see `laws.damping`."""
+        return damping(self.normal_law, self.restitution, self.stiffness, self.reference_mass)
 
     def to_record(self) -> Any:
         """The settings as one record of dtype `GROUND` for the kernels."""
-        chi, dashpot = damping(self.normal_law, self.restitution, self.stiffness, self.reference_mass)
         record = np.zeros(1, dtype=GROUND)[0]
-        for name in ("stiffness", "exponent", "approach_floor", "friction", "friction_slow", "friction_fast"):
+        record["chi"], record["dashpot"] = self.damping
+        for name in _COPIED:
             record[name] = getattr(self, name)
-        record["chi"], record["dashpot"] = chi, dashpot
         record["friction_law"] = FRICTION_LAWS.index(self.friction_law)
         record["interpolated"] = self.approach == "interpolated"
         return record
@@ -184,31 +178,19 @@ def load_ground(preset: Preset = DEFAULT_PRESET, **overrides: Any) -> Ground:
         ParameterError: unknown preset name, an override out of range, or content that is wrong as below.
         DataFileError: the file is unreadable, or its ground has unknown entries or bad values.
     """
-    try:
-        ground = read_ground(read_preset(preset), named(preset))
-    except DataFileError as error:
-        raise wrong(preset)(error) from None
-    return replace(ground, **{name: value for name, value in overrides.items() if value is not None})
-
-
-def read_ground(data: Mapping[str, Any], source: str) -> Ground:
-    """The ground in the content of a file; `source` is how an error names the file.
-
-    Raises:
-        DataFileError: unknown entries or bad values.
-    """
-    section = data.get("ground", {})
+    section = read_preset(preset).get("ground", {})
     if not isinstance(section, Mapping) or set(section) - set(SETTINGS):
-        raise DataFileError(
-            f"{source}: ground: expected an object with no other entries than {', '.join(SETTINGS)}, "
+        raise wrong(preset)(
+            f"{named(preset)}: ground: expected an object with no other entries than {', '.join(SETTINGS)}, "
             f"got {section!r}"
         )
     try:
-        return Ground(**section)
+        ground = Ground(**section)
     except ParameterError as error:
-        raise DataFileError(f"{source}: ground: {error}") from None
+        raise wrong(preset)(f"{named(preset)}: ground: {error}") from None
+    return replace(ground, **{name: value for name, value in overrides.items() if value is not None})
 
 
 def write_ground(ground: Ground) -> dict[str, float]:
-    """The section of a file that `read_ground` reads."""
+    """The section of a preset that `load_ground` reads."""
     return {name: getattr(ground, name) for name in SETTINGS}

@@ -31,46 +31,21 @@ from hoof_env.simd.compile import inlined
 from hoof_env.simd.math import exp_of_negative
 
 
-def lankarani_nikravesh(cr: float) -> float:
-    """Damping factor chi = 3 (1 - cr^2) / 4 [-], Eq. 14."""
-    return 3 * (1 - cr**2) / 4
-
-
-def hunt_crossley(cr: float) -> float:
-    """Damping factor chi = 3 (1 - cr) / 2 [-]."""
-    return 3 * (1 - cr) / 2
-
-
-def flores(cr: float) -> float:
-    """Damping factor chi = 8 (1 - cr) / (5 cr) [-]."""
-    return 8 * (1 - cr) / (5 * cr)
-
-
-def gonthier(cr: float) -> float:
-    """Damping factor chi = (1 - cr^2) / cr [-]."""
-    return (1 - cr**2) / cr
-
-
-def hu_guo(cr: float) -> float:
-    """Damping factor chi = 3 (1 - cr) / (2 cr) [-]."""
-    return 3 * (1 - cr) / (2 * cr)
-
-
 def exact(cr: float) -> float:
     """Damping factor [-] for which a free impact returns exactly cr."""
-    if cr == 1.0:
-        return 0.0
-    return _bisect(lambda chi: restitution_of_factor(chi) - cr, 1e-12, 1e6)
+    return 0.0 if cr == 1.0 else _bisect(lambda chi: restitution_of_factor(chi) - cr, 1e-12, 1e6)
 
 
 FACTORS: dict[str, Callable[[float], float]] = {
-    "lankarani-nikravesh": lankarani_nikravesh,
-    "hunt-crossley": hunt_crossley,
-    "flores": flores,
-    "gonthier": gonthier,
-    "hu-guo": hu_guo,
+    "lankarani-nikravesh": lambda cr: 3 * (1 - cr**2) / 4,
+    "hunt-crossley": lambda cr: 3 * (1 - cr) / 2,
+    "flores": lambda cr: 8 * (1 - cr) / (5 * cr),
+    "gonthier": lambda cr: (1 - cr**2) / cr,
+    "hu-guo": lambda cr: 3 * (1 - cr) / (2 * cr),
     "exact": exact,
 }
+"""Damping factor chi [-] of each law by the coefficient of restitution cr."""
+
 NORMAL_LAWS = (*FACTORS, "kelvin-voigt")
 """Names of the normal laws."""
 

@@ -34,7 +34,6 @@ import numpy as np
 
 from hoof_env.errors import check_choice, check_number
 from hoof_env.ground.contact import Ground
-from hoof_env.ground.laws import damping
 from hoof_env.ground.terrain import Terrain
 
 
@@ -74,11 +73,6 @@ class ContactRates:
     damping: float
     friction: float
     exponent: float
-
-    @property
-    def fastest(self) -> float:
-        """The largest of them [1/s]."""
-        return max(self.elastic, self.damping, self.friction)
 
     def longest_steps(self, scheme: str, tolerance: float = 1e-2) -> dict[str, float]:
         """Longest step [s] that each of the three allows; infinite for a rate of zero.
@@ -130,7 +124,7 @@ def contact_rates(
     terrain = terrain or Terrain()
     n, stiffness = ground.exponent, ground.stiffness * float(np.max(terrain.stiffness))
     mu = ground.friction * float(np.max(terrain.friction))
-    chi, dashpot = damping(ground.normal_law, ground.restitution, ground.stiffness, ground.reference_mass)
+    chi, dashpot = ground.damping
     # K d^(n+1) / (n+1) = m v^2 / 2 + load d; the sum of the two depths alone is not less than d
     depth = ((n + 1) * mass * speed**2 / (2 * stiffness)) ** (1 / (n + 1))
     depth += ((n + 1) * load / stiffness) ** (1 / n)

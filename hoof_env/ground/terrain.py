@@ -58,8 +58,9 @@ class Terrain:
         for name, low in (("stiffness", 1e-6), ("friction", 0.0)):
             row = _row(f"terrain.{name}", getattr(self, name), low, 1e6, len(height))
             object.__setattr__(self, name, row)
-        object.__setattr__(self, "start", check_number("terrain.start", self.start, low=-1e6, high=1e6))
-        object.__setattr__(self, "spacing", check_number("terrain.spacing", self.spacing, low=1e-4, high=1e6))
+        for name, low in (("start", -1e6), ("spacing", 1e-4)):
+            number = check_number(f"terrain.{name}", getattr(self, name), low=low, high=1e6)
+            object.__setattr__(self, name, number)
 
     @classmethod
     def flat(cls) -> Terrain:
@@ -104,13 +105,11 @@ class Terrain:
         if points.size < 2 or np.diff(points).min() <= 0:
             raise ParameterError(f"x: expected two or more increasing numbers, got {_short(x)}")
         knots = _knots(points[0], points[-1], spacing)
-        rows = {
-            name: np.interp(knots, points, _row(name, values, -np.inf, np.inf, points.size))
-            for name, values in (("height", height), ("stiffness", stiffness), ("friction", friction))
-        }
-        return cls(
-            **{name: tuple(row.tolist()) for name, row in rows.items()}, start=points[0], spacing=spacing
-        )
+        rows: dict[str, Any] = {}
+        for name, values in (("height", height), ("stiffness", stiffness), ("friction", friction)):
+            given = _row(name, values, -np.inf, np.inf, points.size)
+            rows[name] = tuple(np.interp(knots, points, given).tolist())
+        return cls(**rows, start=points[0], spacing=spacing)
 
     @classmethod
     def patches(cls, patches: Iterable[Sequence[float]], spacing: float = 0.01) -> Terrain:
@@ -132,19 +131,16 @@ class Terrain:
         for number, patch in enumerate(patches):
             values = _row(f"patches[{number}]", patch, -1e6, 1e6, None)
             if len(values) != 4 or values[0] >= values[1]:
-                raise ParameterError(
-                    f"patches[{number}]: expected (x0, x1, stiffness, friction) with x0 < x1, "
-                    f"got {_short(patch)}"
-                )
+                wanted = "(x0, x1, stiffness, friction) with x0 < x1"
+                raise ParameterError(f"patches[{number}]: expected {wanted}, got {_short(patch)}")
             rows.append(values)
         rows.sort()
         if not rows:
             return cls()
         for before, after in pairwise(rows):
             if before[1] > after[0]:
-                raise ParameterError(
-                    f"patches: expected patches apart from each other, got {before} and {after}"
-                )
+                wanted = "patches apart from each other"
+                raise ParameterError(f"patches: expected {wanted}, got {before} and {after}")
         start = rows[0][0] - spacing
         factors = np.ones((2, _knots(start, rows[-1][1] + spacing, spacing).size))
         for x0, x1, *pair in rows:
@@ -160,11 +156,10 @@ class Terrain:
         Raises:
             ParameterError: an unknown entry or a bad value.
         """
-        names = ", ".join(field.name for field in fields(cls))
-        if not isinstance(data, Mapping) or set(data) - set(names.split(", ")):
-            raise ParameterError(
-                f"terrain: expected an object with no other entries than {names}, got {_short(data)}"
-            )
+        names = [field.name for field in fields(cls)]
+        if not isinstance(data, Mapping) or set(data) - set(names):
+            wanted = f"an object with no other entries than {', '.join(names)}"
+            raise ParameterError(f"terrain: expected {wanted}, got {_short(data)}")
         return cls(**data)
 
     def to_dict(self) -> dict[str, Any]:
@@ -175,11 +170,13 @@ class Terrain:
     @cached_property
     def x(self) -> NDArray[np.float64]:
         """Where the knots are [m]; read-only."""
-        return _frozen(self.start + self.spacing * np.arange(len(self.height), dtype=np.float64))
+        knots = self.start + self.spacing * np.arange(len(self.height), dtype=np.float64)
+        knots.flags.writeable = False
+        return knots
 
     @cached_property
     def _heights(self) -> NDArray[np.float64]:
-        return _frozen(np.array(self.height))
+        return np.array(self.height)
 
     def height_at(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Height [m] at `x` [m], same shape."""
@@ -197,20 +194,13 @@ class Terrain:
         return TerrainGrid(np.ascontiguousarray(cells), self.start - self.spacing, 1 / self.spacing)
 
 
-def _frozen(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    values.flags.writeable = False
-    return values
-
-
 def _knots(start: float, end: float, spacing: float) -> NDArray[np.float64]:
     """From `start` to `end` or just beyond it [m]."""
     check_number("terrain.spacing", spacing, low=1e-4, high=1e6)
     count = math.ceil((end - start) / spacing - 1e-6) + 1
     if count > MOST_KNOTS:
-        raise ParameterError(
-            f"terrain.spacing: expected at most {MOST_KNOTS} knots from {start:g} to {end:g} m, "
-            f"got {spacing!r} m"
-        )
+        wanted = f"at most {MOST_KNOTS} knots from {start:g} to {end:g} m"
+        raise ParameterError(f"terrain.spacing: expected {wanted}, got {spacing!r} m")
     return start + spacing * np.arange(count, dtype=np.float64)
 
 

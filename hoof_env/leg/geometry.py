@@ -1,8 +1,7 @@
 """What a leg is: its lengths, pivot, assembly, masses and how it stands in the world.
 
-A `Geometry` is a frozen value; building one checks it. A leg that cannot turn through a full crank revolution
-is refused with the dyad, the crank angle and the missing length. Presets are JSON files with a provenance
-line in `hoof_env/data`. Both are *identified* from the paper's results, for the paper prints no lengths: the
+A `Geometry` is a frozen value; building one checks it. Presets are JSON files with a provenance line in
+`hoof_env/data`. Both are *identified* from the paper's results, for the paper prints no lengths: the
 default, `identified`, meets them, and `first_fit`, from which the search for it set out, nearly does.
 """
 
@@ -22,7 +21,7 @@ from numpy.typing import NDArray
 
 from hoof_env._output import staged
 from hoof_env.errors import DataFileError, GeometryError, ParameterError, check_choice, check_number
-from hoof_env.leg.linkage import BODIES, BODY_LENGTHS, CONSTRUCTION, DYADS, LENGTHS, POINTS, Dyad
+from hoof_env.leg.linkage import BODIES, BODY_LENGTHS, CONSTRUCTION, DYADS, LENGTHS, NUMBER, Dyad
 
 DEFAULT_PRESET = "identified"
 """The leg of the paper's reproduction."""
@@ -32,11 +31,6 @@ Preset = str | Path | Mapping[str, Any]
 
 PARTS = ("provenance", "units", "geometry", "ground", "gaits", "gait_provenance")
 """What a preset holds; docs/own_leg.md says what stands in each."""
-
-INERTIA_RULES = ("uniform_rod", "paper")
-
-UNITS = "m, kg, kg/m, rad, rad/s"
-"""Of a preset, for people."""
 
 LINEAR_DENSITY = 1.0
 """Default mass per length of a link [kg/m]. The paper prints no masses. One kilogram a metre gives the
@@ -88,24 +82,22 @@ class Geometry:
         lengths = {k: check_number(f"lengths[{k!r}]", self.lengths[k], low=1e-3, high=1e3) for k in LENGTHS}
         points = [dyad.point for dyad in DYADS]
         _check_keys("assembly", self.assembly, points)
-        for point in points:
-            if not _is_sign(self.assembly[point]):
-                raise ParameterError(f"assembly[{point!r}]: expected +1 or -1, got {self.assembly[point]!r}")
+        signs = {f"assembly[{point!r}]": self.assembly[point] for point in points}
+        for name, sign in {**signs, "travel": self.travel}.items():
+            if np.ndim(sign) or sign not in (1, -1):
+                raise ParameterError(f"{name}: expected +1 or -1, got {sign!r}")
         if (self.toe, self.heel) not in (("I", "J"), ("J", "I")):
-            raise ParameterError(
-                f"toe and heel: expected I and J, one each, got {self.toe!r} and {self.heel!r}"
-            )
-        if not _is_sign(self.travel):
-            raise ParameterError(f"travel: expected +1 or -1, got {self.travel!r}")
+            given = f"{self.toe!r} and {self.heel!r}"
+            raise ParameterError(f"toe and heel: expected I and J, one each, got {given}")
         for name, text in (("name", self.name), ("provenance", self.provenance)):
             if not isinstance(text, str):
                 raise ParameterError(f"{name}: expected a text, got {text!r}")
         if _count(self.pivot) != 2:
             raise ParameterError(f"pivot: expected two numbers (C_x, C_y) in metres, got {self.pivot!r}")
         pivot = tuple(check_number(f"pivot[{i}]", c) for i, c in enumerate(self.pivot))
-        check_number("hip_height", self.hip_height, low=0, exclusive_low=True)
-        check_number("linear_density", self.linear_density, low=0, exclusive_low=True)
-        check_choice("inertia", self.inertia, INERTIA_RULES)
+        for name in ("hip_height", "linear_density"):
+            check_number(name, getattr(self, name), low=0, exclusive_low=True)
+        check_choice("inertia", self.inertia, ("uniform_rod", "paper"))
         if self.masses is not None:
             if _count(self.masses) != len(BODIES):
                 raise ParameterError(f"masses: expected {len(BODIES)} link masses, got {self.masses!r}")
@@ -151,26 +143,19 @@ class Geometry:
     @cached_property
     def transmission_margin(self) -> float:
         """Smallest |sine| of the angle between a dyad's two links over a revolution (0: a dead point) [-]."""
-        sines = _dyad_sines(self, np.linspace(0, 2 * np.pi, 3600)).values()
-        return min(float(np.min(np.nan_to_num(s))) for s in sines)
+        z, _ = _solve(self, np.linspace(0, 2 * np.pi, 3600))
+        arms = [(z[dyad.point] - z[dyad.first], z[dyad.point] - z[dyad.second]) for dyad in DYADS]
+        sines = [np.abs((np.conj(one) * two).imag) / (np.abs(one) * np.abs(two)) for one, two in arms]
+        return min(float(np.min(np.nan_to_num(sine))) for sine in sines)
 
     def to_dict(self) -> dict[str, Any]:
         """Everything that `from_dict` needs, JSON-serialisable."""
-        return {
-            "lengths": dict(self.lengths),
-            "pivot": list(self.pivot),
-            "assembly": dict(self.assembly),
-            "toe": self.toe,
-            "heel": self.heel,
-            "travel": self.travel,
-            "hip_height": self.hip_height,
-            "linear_density": self.linear_density,
-            "masses": None if self.masses is None else list(self.masses),
-            "inertia": self.inertia,
-            "name": self.name,
-            "provenance": self.provenance,
-            **({} if self.full_turn else {"full_turn": False}),
-        }
+        found = {item.name: getattr(self, item.name) for item in fields(self)}
+        found |= {name: dict(found[name]) for name in ("lengths", "assembly")}
+        found |= {"pivot": list(self.pivot), "masses": None if self.masses is None else list(self.masses)}
+        if found.pop("full_turn"):
+            return found
+        return {**found, "full_turn": False}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Geometry:
@@ -204,11 +189,8 @@ class Geometry:
         if path.suffix != ".json":
             raise ParameterError(f"path: expected a file that ends in .json, got {str(path)!r}")
         geometry = self.to_dict()
-        content: dict[str, Any] = {
-            "provenance": geometry.pop("provenance"),
-            "units": UNITS,
-            "geometry": geometry,
-        }
+        content: dict[str, Any] = {"provenance": geometry.pop("provenance")}
+        content |= {"units": "m, kg, kg/m, rad, rad/s", "geometry": geometry}
         if ground is not None:
             _check_keys("ground", ground, (), ("stiffness", "exponent"))
             content["ground"] = _numbers("ground", ground)
@@ -235,10 +217,6 @@ def _numbers(what: str, given: Any) -> dict[str, float]:
     return {name: check_number(f"{what}[{name!r}]", value) for name, value in found.items()}
 
 
-def _is_sign(value: Any) -> bool:
-    return np.ndim(value) == 0 and value in (1, -1)
-
-
 def _check_keys(what: str, given: Any, expected: Sequence[str], optional: Sequence[str] = ()) -> None:
     if not isinstance(given, Mapping):
         raise ParameterError(f"{what}: expected a mapping with {', '.join(expected)}, got {given!r}")
@@ -246,15 +224,15 @@ def _check_keys(what: str, given: Any, expected: Sequence[str], optional: Sequen
     if missing or unknown:
         parts = [f"missing {', '.join(sorted(missing))}"] if missing else []
         parts += [f"unknown {', '.join(sorted(map(str, unknown)))}"] if unknown else []
-        wanted = (
-            f"{', '.join(expected)}, and perhaps {', '.join(optional)}" if optional else ", ".join(expected)
-        )
+        wanted = ", ".join(expected) + (f", and perhaps {', '.join(optional)}" if optional else "")
         raise ParameterError(f"{what}: expected exactly {wanted}; {'; '.join(parts)}")
 
 
 def _check_entries(data: Any) -> None:
-    required = [item.name for item in fields(Geometry) if item.default is MISSING]
-    optional = [item.name for item in fields(Geometry) if item.default is not MISSING]
+    has_default = {item.name: item.default is not MISSING for item in fields(Geometry)}
+    required, optional = (
+        [name for name, has in has_default.items() if has is kind] for kind in (False, True)
+    )
     _check_keys("geometry", data, required, optional)
 
 
@@ -283,24 +261,15 @@ def _solve(geometry: Geometry, theta: NDArray[np.floating[Any]]) -> tuple[dict[s
     return z, spans
 
 
-def _dyad_sines(geometry: Geometry, theta: NDArray[np.float64]) -> dict[str, Any]:
-    z, _ = _solve(geometry, theta)
-    sines = {}
-    for dyad in DYADS:
-        one, two = z[dyad.point] - z[dyad.first], z[dyad.point] - z[dyad.second]
-        sines[dyad.point] = np.abs((np.conj(one) * two).imag) / (np.abs(one) * np.abs(two))
-    return sines
-
-
-def check_full_revolution(geometry: Geometry, samples: int = 3600) -> None:
+def check_full_revolution(geometry: Geometry) -> None:
     """Raise `GeometryError` unless every dyad closes at every crank angle.
 
     The distance between a dyad's centres must stay strictly between the difference and the sum of its two
-    lengths. A grid of `samples` angles is refined three times around the tightest one.
+    lengths. A grid of 3600 angles is refined three times around the tightest one.
     """
-    step = 2 * np.pi / samples
+    grid = np.arange(3600) * (2 * np.pi / 3600)
     for index, dyad in enumerate(DYADS):
-        theta = np.arange(samples) * step
+        theta = grid
         for _ in range(4):
             _, spans = _solve(geometry, theta)
             d, r1, r2 = spans[dyad.point]
@@ -345,9 +314,8 @@ def read_preset(source: Preset) -> dict[str, Any]:
     """
     data = source if isinstance(source, Mapping) else _read_file(source)
     if unknown := sorted(str(name) for name in data if name not in PARTS):
-        raise wrong(source)(
-            f"{named(source)}: unknown entries {', '.join(unknown)}; expected some of {', '.join(PARTS)}"
-        )
+        said = f"unknown entries {', '.join(unknown)}; expected some of {', '.join(PARTS)}"
+        raise wrong(source)(f"{named(source)}: {said}")
     return dict(data)
 
 
@@ -364,9 +332,8 @@ def _read_file(source: str | Path) -> dict[str, Any]:
     except (ValueError, RecursionError) as error:
         raise DataFileError(f"{path}: expected a JSON preset file, but it does not parse: {error}") from None
     if not isinstance(data, dict):
-        raise DataFileError(
-            f"{path}: expected a JSON object with 'geometry' and 'gaits', got {type(data).__name__}"
-        )
+        got = type(data).__name__
+        raise DataFileError(f"{path}: expected a JSON object with 'geometry' and 'gaits', got {got}")
     return data
 
 
@@ -378,23 +345,21 @@ def load_geometry(source: Preset = DEFAULT_PRESET) -> Geometry:
         DataFileError: the file is unreadable, lacks a part or has unknown entries.
         GeometryError: the leg cannot turn.
     """
-    data = read_preset(source)
-    for part, kind, what in (
-        ("provenance", str, "a text that says where the numbers come from"),
-        ("geometry", Mapping, "an object"),
-    ):
+    data, from_where = read_preset(source), "a text that says where the numbers come from"
+    for part, kind, what in (("provenance", str, from_where), ("geometry", Mapping, "an object")):
         if not isinstance(data.get(part), kind):
             got = f"got {data[part]!r:.60}" if part in data else f"found {', '.join(data) or 'nothing'}"
             raise wrong(source)(
                 f"{named(source)}: expected an entry {part!r} beside the others, {what}; {got}"
             )
-    name = {} if isinstance(source, Mapping) else {"name": str(source)}
-    values = {**name, "provenance": data["provenance"], **data["geometry"]}
+    values = {"provenance": data["provenance"], **data["geometry"]}
+    if not isinstance(source, Mapping):
+        values = {"name": str(source), **values}
     try:
         _check_entries(values)
     except ParameterError as error:
         raise wrong(source)(f"{named(source)}: {error}") from None
-    return Geometry.from_dict(values)
+    return Geometry(**values)
 
 
 def tables(geometry: Geometry) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
@@ -404,17 +369,15 @@ def tables(geometry: Geometry) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         steps: shape (8, 5), rows (is_dyad, point, first, second, origin) as indices into `linkage.POINTS`.
         values: shape (8, 3), rows (r1, r2, side) for a dyad, (distance / span, 0, 0) for an extension.
     """
-    number = {name: i for i, name in enumerate(POINTS)}
     lengths = geometry.lengths
     steps, values = [], []
     for step in CONSTRUCTION:
-        first, second = number[step.first], number[step.second]
         if isinstance(step, Dyad):
-            steps.append((1, number[step.point], first, second, first))
-            values.append(
-                (lengths[step.from_first], lengths[step.from_second], float(geometry.assembly[step.point]))
-            )
+            origin, side = step.first, float(geometry.assembly[step.point])
+            values.append((lengths[step.from_first], lengths[step.from_second], side))
         else:
-            steps.append((0, number[step.point], first, second, number[step.origin]))
+            origin = step.origin
             values.append((lengths[step.distance] / lengths[step.span], 0.0, 0.0))
+        points = [NUMBER[name] for name in (step.point, step.first, step.second, origin)]
+        steps.append((isinstance(step, Dyad), *points))
     return np.array(steps, dtype=np.int64), np.array(values)

@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 
 from hoof_env.errors import check_number
 from hoof_env.leg.geometry import Geometry, tables
-from hoof_env.leg.linkage import BODIES, POINTS
+from hoof_env.leg.linkage import HEADS, NUMBER, POINTS, TAILS
 from hoof_env.simd.compile import kernel
 
-_NUMBER = {name: i for i, name in enumerate(POINTS)}
-_O, _C, _P = _NUMBER["O"], _NUMBER["C"], _NUMBER["P"]
+_O, _C, _P = NUMBER["O"], NUMBER["C"], NUMBER["P"]
 
 
 @kernel
@@ -154,7 +153,7 @@ class Pose:
 
     def point(self, name: str) -> NDArray[np.float64]:
         """Position (x, y) of a named point [m]."""
-        return self.points[_NUMBER[name]]
+        return self.points[NUMBER[name]]
 
 
 def pose(
@@ -189,17 +188,15 @@ def pose(
     r = np.array([m[0] for m in motion]) + complex(*frame.position)
     v = np.array([m[1] for m in motion]) + complex(*frame.velocity)
     a = np.array([m[2] for m in motion]) + complex(*frame.acceleration)
-    tail = np.array([_NUMBER[body.tail] for body in BODIES])
-    head = np.array([_NUMBER[body.head] for body in BODIES])
-    link, dlink, ddlink = r[head] - r[tail], v[head] - v[tail], a[head] - a[tail]
+    link, dlink, ddlink = (w[HEADS] - w[TAILS] for w in (r, v, a))
     length2 = np.abs(link) ** 2
     return Pose(
         points=_xy(r),
         point_velocities=_xy(v),
         point_accelerations=_xy(a),
-        centres=_xy((r[head] + r[tail]) / 2),
-        centre_velocities=_xy((v[head] + v[tail]) / 2),
-        centre_accelerations=_xy((a[head] + a[tail]) / 2),
+        centres=_xy((r[HEADS] + r[TAILS]) / 2),
+        centre_velocities=_xy((v[HEADS] + v[TAILS]) / 2),
+        centre_accelerations=_xy((a[HEADS] + a[TAILS]) / 2),
         angles=np.angle(link),
         angular_velocities=(np.conj(link) * dlink).imag / length2,
         angular_accelerations=(np.conj(link) * ddlink).imag / length2,

@@ -17,6 +17,9 @@ from dataclasses import dataclass
 POINTS = ("O", "C", "P", "B", "D", "F", "E", "G", "A", "J", "I")
 """Every named point, in the order in which the closed form finds them."""
 
+NUMBER = {name: number for number, name in enumerate(POINTS)}
+"""Of each point, its place in `POINTS`."""
+
 FRAME = -1
 """Stands for 'the leg's frame' where a joint needs a body index."""
 
@@ -49,6 +52,9 @@ BODIES = (
 """Bodies 1 to 14 of Eq. 2; index 0 here is the paper's body 1."""
 
 CRANK = 0
+
+TAILS, HEADS = [NUMBER[body.tail] for body in BODIES], [NUMBER[body.head] for body in BODIES]
+"""Numbers of the points at the bodies' ends."""
 
 
 @dataclass(frozen=True)

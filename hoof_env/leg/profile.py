@@ -23,14 +23,13 @@ from numpy.typing import NDArray
 from hoof_env.errors import GeometryError
 from hoof_env.leg.geometry import Geometry, tables
 from hoof_env.leg.kinematics import solve_points
-from hoof_env.leg.linkage import BODIES, POINTS
+from hoof_env.leg.linkage import HEADS, NUMBER, POINTS, TAILS
 from hoof_env.simd.compile import kernel
 from hoof_env.simd.functions import transposed
 from hoof_env.simd.layout import Block, Layout, Row, Vector
 from hoof_env.simd.math import ROUNDER
-from hoof_env.simd.memory import intrinsic
-from hoof_env.simd.rows import store_row
-from hoof_env.simd.types import DOUBLE, INDEX, pick, spread, wide
+from hoof_env.simd.memory import write_row
+from hoof_env.simd.types import DOUBLE, INDEX, Code, instruction, pick, spread, wide
 
 _HALF = 8
 """Functions that are looked up together: one vector of 512 bits."""
@@ -79,10 +78,6 @@ CELLS = (256, 512, 1024, 2048)
 DERIVATIVE_ERROR = 1e-9
 """The number of cells is the smallest that keeps derivatives this good, relative to their largest value."""
 
-_NUMBER = {name: i for i, name in enumerate(POINTS)}
-_TAIL = np.array([_NUMBER[body.tail] for body in BODIES])
-_HEAD = np.array([_NUMBER[body.head] for body in BODIES])
-
 
 @kernel
 def _solve_all(theta, crank, pivot, steps, values, z, dz, ddz):  # type: ignore[no-untyped-def]
@@ -102,11 +97,11 @@ def functions(
     if geometry.travel < 0:
         z, dz, ddz = (-w.conj() for w in (z, dz, ddz))  # the mirror
     m, inertia = geometry.body_masses, geometry.body_inertias
-    r, v, acc = ((w[:, _TAIL] + w[:, _HEAD]) / 2 for w in (z, dz, ddz))
-    link, dlink, ddlink = (w[:, _HEAD] - w[:, _TAIL] for w in (z, dz, ddz))
+    r, v, acc = ((w[:, TAILS] + w[:, HEADS]) / 2 for w in (z, dz, ddz))
+    link, dlink, ddlink = (w[:, HEADS] - w[:, TAILS] for w in (z, dz, ddz))
     length2 = geometry.body_lengths**2
     turn, dturn = _cross(link, dlink) / length2, _cross(link, ddlink) / length2
-    toe, heel = _NUMBER[geometry.toe], _NUMBER[geometry.heel]
+    toe, heel = NUMBER[geometry.toe], NUMBER[geometry.heel]
     s, ds, dds = r @ m, v @ m, acc @ m
     value = [
         z[:, toe].real, z[:, toe].imag, z[:, heel].real, z[:, heel].imag, ds.real, ds.imag,
@@ -247,8 +242,12 @@ def _polynomials(builder: Any, first: Any, x: Any, sloped: bool) -> tuple[Any, A
     return value, plus(plus(low_slope, times(cubed, high)), times(x4, high_slope))
 
 
-@intrinsic
-def look_up(context: Any, functions: Any, slopes: Any, table: Any, first: Any, cells: Any, theta: Any) -> Any:
+@instruction(
+    lambda functions, slopes, table, first, cells, theta: types.void(
+        functions, slopes, table, first, types.int64, theta
+    )
+)
+def look_up(code: Code, functions: Any, slopes: Any, table: Any, first: Any, cells: Any, theta: Any) -> None:
     """Look up all functions and derivatives.
 
     Args:
@@ -258,33 +257,30 @@ def look_up(context: Any, functions: Any, slopes: Any, table: Any, first: Any, c
         cells: of a table.
         theta: `Lanes`, crank angle; what is not a number gives values that are none [rad].
     """
-
-    def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        functions, slopes, table, first, cells, theta = values
-        count = signature.args[0].count
-        whole = wide(INDEX, count)
-        # The sum's last bits are the number of the cell, turns included: those of one turn are its row.
-        per_cell = builder.uitofp(cells, DOUBLE)
-        scaled = builder.fmul(theta, spread(builder, builder.fmul(per_cell, DOUBLE(1 / (2 * np.pi))), count))
-        rounder = spread(builder, DOUBLE(ROUNDER), count)
-        shifted = builder.fadd(scaled, rounder)
-        mask = spread(builder, builder.sub(cells, INDEX(1)), count)
-        row = builder.and_(builder.bitcast(shifted, whole), mask)
-        row = builder.add(row, builder.fptosi(first, whole))
-        cell, width = builder.fsub(shifted, rounder), builder.fdiv(DOUBLE(2 * np.pi), per_cell)
-        x = builder.fsub(theta, builder.fmul(cell, spread(builder, width, count)))
-        low, high, derivatives = [], [], []
-        for lane in range(count):
-            at = builder.mul(pick(builder, row, lane, count), INDEX(WIDTH * (DEGREE + 1)))
-            angle, place = pick(builder, x, lane, count), builder.gep(table, [at])
-            value, slope = _polynomials(builder, place, angle, sloped=True)
-            low.append(value)
-            derivatives.append(slope)
-            other = builder.gep(place, [INDEX(_HALF)])
-            high.append(_polynomials(builder, other, angle, sloped=False)[0])
-        for rows, begin, lanes in ((functions, 0, low), (functions, _HALF, high), (slopes, 0, derivatives)):
-            for k, column in enumerate(transposed(builder, lanes, _HALF)):
-                store_row(builder, column, rows, INDEX(begin + k), count)
-        return context.get_dummy_value()
-
-    return types.void(functions, slopes, table, first, types.int64, theta), emit
+    builder, count = code.builder, code.args[0].count
+    whole = wide(INDEX, count)
+    # The sum's last bits are the number of the cell, turns included: those of one turn are its row.
+    per_cell = builder.uitofp(cells, DOUBLE)
+    scaled = builder.fmul(theta, spread(builder, builder.fmul(per_cell, DOUBLE(1 / (2 * np.pi))), count))
+    rounder = spread(builder, DOUBLE(ROUNDER), count)
+    shifted = builder.fadd(scaled, rounder)
+    mask = spread(builder, builder.sub(cells, INDEX(1)), count)
+    row = builder.and_(builder.bitcast(shifted, whole), mask)
+    row = builder.add(row, builder.fptosi(first, whole))
+    cell, width = builder.fsub(shifted, rounder), builder.fdiv(DOUBLE(2 * np.pi), per_cell)
+    x = builder.fsub(theta, builder.fmul(cell, spread(builder, width, count)))
+    low, high, derivatives = [], [], []
+    for lane in range(count):
+        at = builder.mul(pick(builder, row, lane, count), INDEX(WIDTH * (DEGREE + 1)))
+        angle, place = pick(builder, x, lane, count), builder.gep(table, [at])
+        value, slope = _polynomials(builder, place, angle, sloped=True)
+        low.append(value)
+        derivatives.append(slope)
+        other = builder.gep(place, [INDEX(_HALF)])
+        high.append(_polynomials(builder, other, angle, sloped=False)[0])
+    for memory, rows, begin, lanes in (
+        (code.args[0], functions, 0, low), (code.args[0], functions, _HALF, high),
+        (code.args[1], slopes, 0, derivatives),
+    ):  # fmt: skip
+        for k, column in enumerate(transposed(builder, lanes, _HALF)):
+            write_row(code, memory, rows, INDEX(begin + k), column)

@@ -1,12 +1,7 @@
 """Numbers side by side: types for kernels that work on many environments, or many legs, in one instruction.
 
-A `Lanes(n)` is n doubles, one for each environment; arithmetic on it is one vector instruction, or for n = 1
-an ordinary one. The mechanics is written once, for a single leg, and compiled for one lane, four or eight:
-no loop to vectorise, and a number has the same bits in each. `Plane(n)` is a planar vector of lanes, which
-multiplies like a complex number; `Mask(n)` is truths, for `choose`; `Rows(n)` is memory, a row of lanes for
-each name. Floats mix with lanes and are the same in each.
-
-Lanes live inside kernels only: they come from `rows` and go back into them.
+README.md says why, and has the types, the rules and an example. Lanes live inside kernels only: they come
+from `rows` and go back into them.
 """
 
 import hoof_env.simd.layout
@@ -27,31 +22,21 @@ from hoof_env.simd.functions import (
     size,
     smaller,
 )
-from hoof_env.simd.rows import columns, fill, lane_of, level, nth, read, rows, set_lane, store_vectors, write
+from hoof_env.simd.memory import (
+    columns,
+    fill,
+    lane_of,
+    level,
+    nth,
+    read,
+    rows,
+    set_lane,
+    store_vectors,
+    write,
+)
 
 __all__ = [
-    "across",
-    "anywhere",
-    "choose",
-    "columns",
-    "cross",
-    "dot",
-    "fill",
-    "floor",
-    "gather_eight",
-    "lane_of",
-    "lane_sum",
-    "larger",
-    "level",
-    "nth",
-    "plane",
-    "quarter_turns",
-    "read",
-    "root",
-    "rows",
-    "set_lane",
-    "size",
-    "smaller",
-    "store_vectors",
-    "write",
-]
+    "across", "anywhere", "choose", "columns", "cross", "dot", "fill", "floor", "gather_eight", "lane_of",
+    "lane_sum", "larger", "level", "nth", "plane", "quarter_turns", "read", "root", "rows", "set_lane",
+    "size", "smaller", "store_vectors", "write",
+]  # fmt: skip

@@ -19,6 +19,7 @@ from typing import Any, ClassVar
 
 import numba.core.caching
 import numba.core.config
+from filelock import FileLock, Timeout
 from numba.core.compiler_lock import global_compiler_lock
 
 from hoof_env.errors import OutputError
@@ -89,27 +90,21 @@ class KernelCache(_caching.FunctionCache):
         Raises:
             OutputError: nothing can be written to the cache folder.
         """
-        found = self._load(sig, target_context)
-        if found is None:
-            try:
-                os.makedirs(self.cache_path, exist_ok=True)
-                tempfile.TemporaryFile(dir=self.cache_path).close()
-            except OSError as error:
-                raise _no_folder(given_folder() or self.cache_path, error) from None
-            if self._take_lock():
-                found = self._load(sig, target_context)
-        return found
+        if (found := self._load(sig, target_context)) is not None:
+            return found
+        try:
+            os.makedirs(self.cache_path, exist_ok=True)
+            tempfile.TemporaryFile(dir=self.cache_path).close()
+        except OSError as error:
+            raise _no_folder(given_folder() or self.cache_path, error) from None
+        return self._load(sig, target_context) if self._take_lock() else None
 
     def _load(self, sig: Any, target_context: Any) -> Any:
         with suppress(OSError):  # no such folder
             return super().load_overload(sig, target_context)
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """As numba's.
-
-        Raises:
-            OutputError: the cache folder cannot be written, or the disk is full.
-        """
+        """As numba's. Raises OutputError: the cache folder cannot be written, or the disk is full."""
         COMPILED.append(self._kernel)
         try:
             super().save_overload(sig, data)
@@ -118,22 +113,20 @@ class KernelCache(_caching.FunctionCache):
 
     def _take_lock(self) -> bool:
         """Wait until no other process compiles this kernel; False where files cannot be locked."""
-        from filelock import FileLock, Timeout
-
         lock = FileLock(os.path.join(self.cache_path, f"{self._impl.filename_base}.lock"))
-        try:
+        waiting = f"waiting for another process, which compiles {self._kernel} ..."
+        gave_up = f"waited {LONGEST_WAIT:.0f} s for {self._kernel}: compiling it here, too"
+        for timeout, said in ((1.0, waiting), (LONGEST_WAIT, gave_up)):
             try:
-                lock.acquire(timeout=1.0)
+                lock.acquire(timeout=timeout)
             except Timeout:
-                self._say(f"waiting for another process, which compiles {self._kernel} ...")
-                lock.acquire(timeout=LONGEST_WAIT)
-        except Timeout:
-            self._say(f"waited {LONGEST_WAIT:.0f} s for {self._kernel}: compiling it here, too")
-            return False
-        except (OSError, NotImplementedError):
-            return False
-        self._lock = lock
-        return True
+                self._say(said)
+            except (OSError, NotImplementedError):
+                return False
+            else:
+                self._lock = lock
+                return True
+        return False
 
     def release(self) -> None:
         """Let other processes have the kernel, whether or not it could be compiled."""

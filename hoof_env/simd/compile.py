@@ -1,8 +1,5 @@
-"""The one place where kernels are compiled: numba, serial, cached, without fast-math.
-
-Kernels are plain functions over NumPy records and arrays, or over lanes (`simd`). Fast-math stays off, so
-that a result does not depend on how the compiler arranged a loop.
-"""
+"""The one place where kernels are compiled: numba, serial, cached, and without fast-math, so that a result
+does not depend on how the compiler arranged a loop."""
 
 from __future__ import annotations
 
@@ -11,10 +8,13 @@ import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from functools import cache
 from typing import Any, TypeVar, cast
 
+import numba
+from numba.core import event
+
 from hoof_env.errors import HoofEnvError
+from hoof_env.simd.cache import keep
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -36,11 +36,6 @@ def kernel(function: F, identity: str = "") -> F:
     Raises:
         HoofEnvError: numba is told not to compile.
     """
-    import numba
-
-    from hoof_env.simd.cache import keep
-
-    _announce_compiling()
     compiled: Any = numba.njit(error_model="numpy")(function)
     if not hasattr(compiled, "_cache"):  # records have no attributes outside compiled code
         raise HoofEnvError("NUMBA_DISABLE_JIT is set, but kernels run compiled only: unset it")
@@ -51,8 +46,6 @@ def kernel(function: F, identity: str = "") -> F:
 def inlined(function: F) -> F:
     """A part of a kernel that is compiled into whatever calls it, so that the shapes of the caller's arrays
     are known there."""
-    import numba
-
     options: Any = {"error_model": "numpy", "forceinline": True}
     options |= {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # a third of the time to compile
     return cast(F, numba.njit(**options)(function))
@@ -64,42 +57,38 @@ def pasted(function: F) -> F:
     For the large parts that call `inlined` ones: those would be optimised by themselves first, which takes
     seconds, and then again inside the kernel.
     """
-    import numba
-
     return cast(F, numba.njit(error_model="numpy", inline="always")(function))
-
-
-@cache
-def _announce_compiling() -> None:
-    """From now on, say on stderr that kernels of this package are compiled, not read from the cache, and how
-    long the long ones took. numba tells when it compiles; it costs nothing when it does not."""
-    from numba.core import event
-
-    class Announcer(event.Listener):
-        depth, started, is_told = 0, 0.0, False
-
-        def on_start(self, event: Any) -> None:
-            function = getattr(event.data["dispatcher"], "py_func", None)
-            if self.depth or str(getattr(function, "__module__", "")).startswith("hoof_env."):
-                self.depth += 1  # a kernel compiles those that it calls
-            if self.depth == 1:
-                self.started = time.monotonic()
-                if not self.is_told:
-                    _say("compiling kernels for this machine, once (about half a minute) ...")
-                self.is_told = True
-
-        def on_end(self, event: Any) -> None:
-            if not self.depth:
-                return  # not ours
-            self.depth -= 1
-            seconds = time.monotonic() - self.started
-            if not self.depth and seconds > 1:
-                _say(f"{event.data['dispatcher'].py_func.__name__} compiled in {seconds:.1f} s")
-
-    event.register("numba:compile", Announcer())
 
 
 def _say(text: str) -> None:
     if os.environ.get(QUIET, "") in ("", "0"):
         with suppress(OSError, ValueError):  # stderr is closed
             print(f"hoof-env: {text}", file=sys.stderr, flush=True)
+
+
+class _Announcer(event.Listener):
+    """Says on stderr that kernels of this package are compiled, not read from the cache, and how long the
+    long ones took. numba tells when it compiles; it costs nothing when it does not."""
+
+    depth, started, is_told = 0, 0.0, False
+
+    def on_start(self, event: Any) -> None:
+        function = getattr(event.data["dispatcher"], "py_func", None)
+        if self.depth or str(getattr(function, "__module__", "")).startswith("hoof_env."):
+            self.depth += 1  # a kernel compiles those that it calls
+        if self.depth == 1:
+            self.started = time.monotonic()
+            if not self.is_told:
+                _say("compiling kernels for this machine, once (about half a minute) ...")
+            self.is_told = True
+
+    def on_end(self, event: Any) -> None:
+        if not self.depth:
+            return  # not ours
+        self.depth -= 1
+        seconds = time.monotonic() - self.started
+        if not self.depth and seconds > 1:
+            _say(f"{event.data['dispatcher'].py_func.__name__} compiled in {seconds:.1f} s")
+
+
+event.register("numba:compile", _Announcer())

@@ -7,201 +7,147 @@ from typing import Any
 from llvmlite import ir
 from numba.core import cgutils, types
 
-from hoof_env.simd.memory import intrinsic
-from hoof_env.simd.types import (
-    DOUBLE,
-    INDEX,
-    Lanes,
-    Plane,
-    count_of,
-    join,
-    number,
-    pick,
-    split,
-    spread,
-    wide,
-)
+from hoof_env.simd.types import DOUBLE, INDEX, Code, Lanes, Plane, count_of, instruction, pick, spread, wide
 
 
-def _result(*kinds: Any) -> Any:
-    """The type of a real result: lanes, or float64 if none of the arguments has lanes."""
+def _real(*kinds: Any) -> Any:
+    """The signature of a real result: lanes, or float64 if none of the arguments has lanes."""
     count = count_of(*kinds)
-    return Lanes(count) if count else types.float64
+    return (Lanes(count) if count else types.float64)(*kinds)
 
 
-def _reals(context: Any, builder: Any, signature: Any, values: Any) -> list[Any]:
-    count = getattr(signature.return_type, "count", 1)
-    return [
-        number(context, builder, kind, value, count)
-        for kind, value in zip(signature.args, values, strict=True)
-    ]
+def _real_of_planes(*kinds: Any) -> Any:
+    return Lanes(kinds[0].count)(*kinds)
 
 
-@intrinsic
-def plane(context: Any, x: Any, y: Any) -> Any:
+def _like_the_first(*kinds: Any) -> Any:
+    return kinds[0](*kinds)
+
+
+@instruction(lambda x, y: Plane(count_of(x, y))(x, y))
+def plane(code: Code, x: Any, y: Any) -> Any:
     """The planar vector (x, y)."""
-
-    def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        return join(context, builder, signature.return_type, *_reals(context, builder, signature, values))
-
-    return Plane(count_of(x, y))(x, y), emit
+    return code.join(*code.reals(x, y))
 
 
-@intrinsic
-def across(context: Any, z: Any) -> Any:
+@instruction(_like_the_first)
+def across(code: Code, z: Any) -> Any:
     """A planar vector turned left by a right angle."""
-
-    def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        x, y = split(context, builder, signature.args[0], values[0])
-        return join(context, builder, signature.args[0], builder.fneg(y), x)
-
-    return z(z), emit
+    ((x, y),) = code.planes(z)
+    return code.join(code.builder.fneg(y), x)
 
 
-@intrinsic
-def dot(context: Any, z: Any, w: Any) -> Any:
+@instruction(_real_of_planes)
+def dot(code: Code, z: Any, w: Any) -> Any:
     """Scalar product of planar vectors."""
-
-    def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        (a, b), (c, d) = (split(context, builder, *pair) for pair in zip(signature.args, values, strict=True))
-        return builder.fadd(builder.fmul(a, c), builder.fmul(b, d))
-
-    return Lanes(z.count)(z, w), emit
+    (a, b), (c, d) = code.planes(z, w)
+    return code.builder.fadd(code.builder.fmul(a, c), code.builder.fmul(b, d))
 
 
-@intrinsic
-def cross(context: Any, z: Any, w: Any) -> Any:
+@instruction(_real_of_planes)
+def cross(code: Code, z: Any, w: Any) -> Any:
     """z x w, positive if w is to the left of z."""
-
-    def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        (a, b), (c, d) = (split(context, builder, *pair) for pair in zip(signature.args, values, strict=True))
-        return builder.fsub(builder.fmul(a, d), builder.fmul(b, c))
-
-    return Lanes(z.count)(z, w), emit
+    (a, b), (c, d) = code.planes(z, w)
+    return code.builder.fsub(code.builder.fmul(a, d), code.builder.fmul(b, c))
 
 
-@intrinsic
-def choose(context: Any, condition: Any, yes: Any, no: Any) -> Any:
+@instruction(lambda *kinds: kinds[1](*kinds) if isinstance(kinds[1], Plane) else _real(*kinds))
+def choose(code: Code, condition: Any, yes: Any, no: Any) -> Any:
     """`yes` where the condition holds, else `no`, lane by lane; both real, or both planar vectors."""
-
-    def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        result, truth = signature.return_type, values[0]
-        if isinstance(result, Plane):
-            (a, b), (c, d) = (split(context, builder, result, value) for value in values[1:])
-            x, y = builder.select(truth, a, c), builder.select(truth, b, d)
-            return join(context, builder, result, x, y)
-        yes, no = (
-            number(context, builder, kind, value, getattr(result, "count", 1))
-            for kind, value in zip(signature.args[1:], values[1:], strict=True)
-        )
-        return builder.select(truth, yes, no)
-
-    result = yes if isinstance(yes, Plane) else _result(condition, yes, no)
-    return result(condition, yes, no), emit
+    select, both = code.builder.select, code._replace(args=code.args[1:])
+    if isinstance(code.result, Plane):
+        (a, b), (c, d) = both.planes(yes, no)
+        return code.join(select(condition, a, c), select(condition, b, d))
+    return select(condition, *both.reals(yes, no))
 
 
-@intrinsic
-def larger(context: Any, x: Any, y: Any) -> Any:
+@instruction(_real)
+def larger(code: Code, x: Any, y: Any) -> Any:
     """y if it is larger, else x: what is not a number stays so if it comes first."""
-
-    def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        x, y = _reals(context, builder, signature, values)
-        return builder.select(builder.fcmp_ordered(">", y, x), y, x)
-
-    return _result(x, y)(x, y), emit
+    x, y = code.reals(x, y)
+    return code.builder.select(code.builder.fcmp_ordered(">", y, x), y, x)
 
 
-@intrinsic
-def smaller(context: Any, x: Any, y: Any) -> Any:
+@instruction(_real)
+def smaller(code: Code, x: Any, y: Any) -> Any:
     """y if it is smaller, else x: what is not a number stays so if it comes first."""
-
-    def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        x, y = _reals(context, builder, signature, values)
-        return builder.select(builder.fcmp_ordered("<", y, x), y, x)
-
-    return _result(x, y)(x, y), emit
+    x, y = code.reals(x, y)
+    return code.builder.select(code.builder.fcmp_ordered("<", y, x), y, x)
 
 
-def _of_llvm(name: str, text: str) -> Any:
-    def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        (x,) = _reals(context, builder, signature, values)
-        count = getattr(signature.return_type, "count", 1)
-        full = f"{name}.{'f64' if count == 1 else f'v{count}f64'}"
-        function = cgutils.get_or_insert_function(builder.module, ir.FunctionType(x.type, [x.type]), full)
-        return builder.call(function, [x])
-
-    def function(context: Any, x: Any) -> Any:
-        return _result(x)(x), emit
-
-    function.__doc__ = text
-    return intrinsic(function)
+def _call(code: Code, name: str, x: Any) -> Any:
+    """LLVM's own function of that name."""
+    (x,) = code.reals(x)
+    count = getattr(code.result, "count", 1)
+    full = f"llvm.{name}.{'f64' if count == 1 else f'v{count}f64'}"
+    kind = ir.FunctionType(x.type, [x.type])
+    return code.builder.call(cgutils.get_or_insert_function(code.builder.module, kind, full), [x])
 
 
-root = _of_llvm("llvm.sqrt", "The square root, rounded correctly.")
-size = _of_llvm("llvm.fabs", "The absolute value.")
-floor = _of_llvm("llvm.floor", "The largest whole number that is not above it.")
+@instruction(_real)
+def root(code: Code, x: Any) -> Any:
+    """The square root, rounded correctly."""
+    return _call(code, "sqrt", x)
 
 
-@intrinsic
-def quarter_turns(context: Any, cosine: Any, sine: Any, shifted: Any) -> Any:
+@instruction(_real)
+def size(code: Code, x: Any) -> Any:
+    """The absolute value."""
+    return _call(code, "fabs", x)
+
+
+@instruction(_real)
+def floor(code: Code, x: Any) -> Any:
+    """The largest whole number that is not above it."""
+    return _call(code, "floor", x)
+
+
+@instruction(lambda *kinds: types.UniTuple(kinds[0], 2)(*kinds))
+def quarter_turns(code: Code, cosine: Any, sine: Any, shifted: Any) -> Any:
     """(cosine, sine) of an angle plus as many quarter turns as the last two bits of `shifted` say, a whole
     number to which 3 2^51 was added. Bits are moved, nothing is rounded or compared."""
+    builder, count, double = code.builder, getattr(code.args[0], "count", 1), cosine.type
+    cosine, sine, quarters = (builder.bitcast(value, wide(INDEX, count)) for value in (cosine, sine, shifted))
 
-    def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        count = getattr(signature.args[0], "count", 1)
-        whole = wide(INDEX, count)
-        cosine, sine, quarters = (builder.bitcast(value, whole) for value in values)
+    def constant(number: int) -> Any:
+        return spread(builder, INDEX(number), count)
 
-        def constant(number: int) -> Any:
-            return spread(builder, INDEX(number), count)
-
-        odd = builder.sub(constant(0), builder.and_(quarters, constant(1)))  # all bits or none
-        swap = builder.and_(builder.xor(cosine, sine), odd)
-        top = constant(-(2**63))
-        sine_sign = builder.and_(builder.shl(quarters, constant(62)), top)
-        cosine_sign = builder.and_(builder.shl(builder.add(quarters, constant(1)), constant(62)), top)
-        x = builder.xor(builder.xor(cosine, swap), cosine_sign)
-        y = builder.xor(builder.xor(sine, swap), sine_sign)
-        both = [builder.bitcast(bits, values[0].type) for bits in (x, y)]
-        return context.make_tuple(builder, signature.return_type, both)
-
-    return types.UniTuple(cosine, 2)(cosine, sine, shifted), emit
+    odd = builder.sub(constant(0), builder.and_(quarters, constant(1)))  # all bits or none
+    swap = builder.and_(builder.xor(cosine, sine), odd)
+    top = constant(-(2**63))
+    sine_sign = builder.and_(builder.shl(quarters, constant(62)), top)
+    cosine_sign = builder.and_(builder.shl(builder.add(quarters, constant(1)), constant(62)), top)
+    x = builder.xor(builder.xor(cosine, swap), cosine_sign)
+    y = builder.xor(builder.xor(sine, swap), sine_sign)
+    return code.context.make_tuple(builder, code.result, [builder.bitcast(bits, double) for bits in (x, y)])
 
 
-@intrinsic
-def lane_sum(context: Any, start: Any, x: Any) -> Any:
+@instruction(_like_the_first)
+def lane_sum(code: Code, start: Any, x: Any) -> Any:
     """start + x_0 + x_1 + ..., added in this order, in every lane; `start` is the same in all. Of lanes or of
     planar vectors."""
+    builder, count = code.builder, code.result.count
 
-    def total(builder: Any, start: Any, x: Any, count: Any) -> Any:
+    def total(start: Any, x: Any) -> Any:
         found = pick(builder, start, 0, count)
         for lane in range(count):
             found = builder.fadd(found, pick(builder, x, lane, count))
         return spread(builder, found, count)
 
-    def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        kind = signature.return_type
-        if isinstance(kind, Lanes):
-            return total(builder, values[0], values[1], kind.count)
-        (a, b), (c, d) = (split(context, builder, kind, value) for value in values)
-        x, y = total(builder, a, c, kind.count), total(builder, b, d, kind.count)
-        return join(context, builder, kind, x, y)
-
-    return start(start, x), emit
+    if isinstance(code.result, Lanes):
+        return total(start, x)
+    (a, b), (c, d) = code.planes(start, x)
+    return code.join(total(a, c), total(b, d))
 
 
-@intrinsic
-def anywhere(context: Any, condition: Any) -> Any:
+@instruction(types.boolean)
+def anywhere(code: Code, condition: Any) -> Any:
     """Whether a condition holds in any lane."""
-
-    def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        count = signature.args[0].count
-        if count == 1:
-            return values[0]
-        bits = ir.IntType(count)
-        return builder.icmp_unsigned("!=", builder.bitcast(values[0], bits), bits(0))
-
-    return types.boolean(condition), emit
+    count = code.args[0].count
+    if count == 1:
+        return condition
+    bits = ir.IntType(count)
+    return code.builder.icmp_unsigned("!=", code.builder.bitcast(condition, bits), bits(0))
 
 
 def _shuffle(builder: Any, one: Any, two: Any, mask: list[int]) -> Any:
@@ -232,17 +178,13 @@ def transposed(builder: Any, rows: list[Any], width: int) -> list[Any]:
     return found
 
 
-@intrinsic
-def gather_eight(context: Any, pointer: Any, index: Any) -> Any:
+@instruction(lambda pointer, index: types.UniTuple(index, 8)(pointer, index))
+def gather_eight(code: Code, pointer: Any, index: Any) -> Any:
     """pointer[index] to pointer[index + 7] in every lane, eight results; the index is a double that holds a
     whole number. One conversion and one load of a vector a lane."""
-
-    def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        count, found = getattr(signature.args[1], "count", 1), []
-        for lane in range(count):
-            at = builder.fptosi(pick(builder, values[1], lane, count), INDEX)
-            place = builder.bitcast(builder.gep(values[0], [at]), ir.VectorType(DOUBLE, 8).as_pointer())
-            found.append(builder.load(place, align=8))
-        return context.make_tuple(builder, signature.return_type, transposed(builder, found, 8))
-
-    return types.UniTuple(index, 8)(pointer, index), emit
+    builder, count, found = code.builder, getattr(code.args[1], "count", 1), []
+    for lane in range(count):
+        at = builder.fptosi(pick(builder, index, lane, count), INDEX)
+        place = builder.bitcast(builder.gep(pointer, [at]), ir.VectorType(DOUBLE, 8).as_pointer())
+        found.append(builder.load(place, align=8))
+    return code.context.make_tuple(builder, code.result, transposed(builder, found, 8))

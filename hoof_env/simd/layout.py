@@ -17,8 +17,8 @@ from numba.core.imputils import lower_constant, lower_getattr_generic, lower_set
 from numba.core.typing.templates import AttributeTemplate
 from numpy.typing import NDArray
 
-from hoof_env.simd.rows import part_of, read_row, row_type, write_row
-from hoof_env.simd.types import INDEX, Columns, Plane, Rows, join, split
+from hoof_env.simd.memory import part_of, read_row, row_type, write_row
+from hoof_env.simd.types import INDEX, Code, Columns, Plane, Rows
 
 
 class Row:
@@ -114,6 +114,10 @@ def _no_value(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     return context.get_dummy_value()
 
 
+def _vector_type(memory: Any) -> Any:
+    return Plane(memory.count) if memory.count else types.complex128
+
+
 class _FieldsOfMemory(AttributeTemplate):
     def generic_resolve(self, memory: Any, name: str) -> Any:  # type: ignore[override]
         field = memory.layout and memory.layout.fields.get(name)
@@ -122,31 +126,27 @@ class _FieldsOfMemory(AttributeTemplate):
         if field.kind is Row:
             return row_type(memory)
         if field.kind is Vector:
-            return Plane(memory.count) if memory.count else types.complex128
+            return _vector_type(memory)
         return type(memory)(memory.count, field.kind if isinstance(field.kind, _Named) else None)
 
 
 def _get_field(context: Any, builder: Any, memory: Any, value: Any, name: str) -> Any:
-    start, _, kind = memory.layout.fields[name]
-    first = INDEX(start)
+    (start, _, kind), code = memory.layout.fields[name], Code(context, builder)
     if kind is Row:
-        return read_row(context, builder, memory, value, first)
+        return read_row(code, memory, value, INDEX(start))
     if kind is Vector:
-        x, y = (read_row(context, builder, memory, value, INDEX(start + k)) for k in range(2))
-        return join(context, builder, Plane(memory.count) if memory.count else types.complex128, x, y)
-    return part_of(context, builder, memory, value, first)
+        x, y = (read_row(code, memory, value, INDEX(start + k)) for k in range(2))
+        return code.join(x, y, _vector_type(memory))
+    return part_of(code, memory, value, INDEX(start))
 
 
 def _set_field(context: Any, builder: Any, signature: Any, values: Any, name: str) -> Any:
     (memory, given), (place, value) = signature.args, values
-    start, _, kind = memory.layout.fields[name]
-    if kind is Row:
-        write_row(context, builder, memory, place, INDEX(start), value)
-    elif kind is Vector:
-        for k, x in enumerate(split(context, builder, given, value)):
-            write_row(context, builder, memory, place, INDEX(start + k), x)
-    else:
+    (start, _, kind), code = memory.layout.fields[name], Code(context, builder)
+    if kind not in (Row, Vector):
         raise TypeError(f"{name}: the rows of a block or a layout are set one by one")
+    for k, x in enumerate([value] if kind is Row else code.split(given, value)):
+        write_row(code, memory, place, INDEX(start + k), x)
 
 
 for _memory in (Rows, Columns):

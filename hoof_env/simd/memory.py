@@ -1,4 +1,4 @@
-"""Memory for kernels without reference counts: the stack, and the addresses of a caller's arrays.
+"""Memory for kernels without reference counts: the stack, addresses of a caller's arrays, and rows of lanes.
 
 numba counts references to every array that a kernel slices, with atomic instructions; in a step of a
 hundred nanoseconds that is most of the time. Arrays made by `numba.carray` from these pointers are not
@@ -9,14 +9,32 @@ and where every index is a constant it becomes registers.
 from __future__ import annotations
 
 import math
+import operator
 from collections import namedtuple
 from typing import Any
 
 import numpy as np
-from llvmlite import ir
 from numba import carray, from_dtype  # type: ignore[attr-defined]
-from numba.core import cgutils, extending, types
+from numba.core import cgutils, types
+from numba.core.extending import lower_builtin, lower_cast
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numpy.typing import NDArray
+
+from hoof_env.simd.compile import inlined
+from hoof_env.simd.types import (
+    DOUBLE,
+    INDEX,
+    SINGLE,
+    Code,
+    Columns,
+    Lanes,
+    Rows,
+    gathered,
+    instruction,
+    is_real,
+    pick,
+    wide,
+)
 
 LINE = 64
 """Bytes of a line of the cache, and of the widest vector."""
@@ -31,53 +49,35 @@ def aligned(*shape: int) -> NDArray[np.float64]:
     return room[first : first + size].reshape(shape)
 
 
-intrinsic: Any = extending.intrinsic
-"""numba's decorator for functions that write their own instructions; it adds their first argument."""
+# Pointers
 
 
-@intrinsic
-def doubles(context: Any, count: Any) -> Any:
+@instruction(lambda count: types.CPointer(types.float64)(count))
+def doubles(code: Code, count: Any) -> Any:
     """A pointer to `count` doubles on the stack of the function that calls it, gone when that returns, an
     inlined one included; not for use in a loop."""
-
-    def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        place = builder.alloca(ir.DoubleType(), size=values[0])
-        place.align = LINE
-        return place
-
-    return types.CPointer(types.float64)(count), emit
+    place = code.builder.alloca(DOUBLE, size=count)
+    place.align = LINE
+    return place
 
 
-@intrinsic
-def address(context: Any, array: Any) -> Any:
+@instruction(lambda array: types.CPointer(array.dtype)(array))
+def address(code: Code, array: Any) -> Any:
     """A pointer to the first element of a C-contiguous array; the caller keeps the array alive."""
-
-    def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        return cgutils.create_struct_proxy(signature.args[0])(context, builder, value=values[0]).data
-
-    return types.CPointer(array.dtype)(array), emit
+    return cgutils.create_struct_proxy(code.args[0])(code.context, code.builder, value=array).data
 
 
-@intrinsic
-def offset(context: Any, pointer: Any, count: Any) -> Any:
+@instruction(lambda pointer, count: pointer(pointer, count))
+def offset(code: Code, pointer: Any, count: Any) -> Any:
     """The pointer `count` elements further on."""
-
-    def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        return builder.gep(values[0], [values[1]])
-
-    return pointer(pointer, count), emit
+    return code.builder.gep(pointer, [count])
 
 
 def _pointer_to(kind: Any) -> Any:
     """A function for kernels that makes a pointer to numba's type `kind` of an address, a whole number."""
-
-    def pointer(context: Any, number: Any) -> Any:
-        def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-            return builder.inttoptr(values[0], context.get_value_type(signature.return_type))
-
-        return types.CPointer(kind)(types.int64), emit
-
-    return intrinsic(pointer)
+    return instruction(lambda number: types.CPointer(kind)(types.int64))(
+        lambda code, number: code.builder.inttoptr(number, code.context.get_value_type(code.result))
+    )
 
 
 doubles_at, singles_at = _pointer_to(types.float64), _pointer_to(types.float32)
@@ -110,32 +110,223 @@ class Addresses:
         return np.array(rows, np.int64).ravel()
 
 
-def _array_at(axes: int) -> Any:
-    from hoof_env.simd.compile import inlined
+@inlined
+def matrix_at(addresses, slot):  # type: ignore[no-untyped-def]
+    """The array of doubles, of two axes, whose slot in an array of `Addresses` is given."""
+    return carray(doubles_at(addresses[slot]), (addresses[slot + 1], addresses[slot + 2]))
 
-    if axes == 2:
 
-        @inlined
-        def array(addresses, slot):  # type: ignore[no-untyped-def]
-            return carray(doubles_at(addresses[slot]), (addresses[slot + 1], addresses[slot + 2]))
-
-        return array
-
-    @inlined
-    def cube(addresses, slot):  # type: ignore[no-untyped-def]
-        shape = (addresses[slot + 1], addresses[slot + 2], addresses[slot + 3])
-        return carray(doubles_at(addresses[slot]), shape)
-
-    return cube
+@inlined
+def cube_at(addresses, slot):  # type: ignore[no-untyped-def]
+    """The same of three axes."""
+    shape = (addresses[slot + 1], addresses[slot + 2], addresses[slot + 3])
+    return carray(doubles_at(addresses[slot]), shape)
 
 
 def record_at(kind: np.dtype[Any]) -> Any:
     """For kernels: the array of one record of a type at an address."""
-    from hoof_env.simd.compile import inlined
-
     pointer = _pointer_to(from_dtype(kind))
     return inlined(lambda number: carray(pointer(number), (1,)))
 
 
-matrix_at, cube_at = _array_at(2), _array_at(3)
-"""For kernels: the array of doubles whose slot in an array of `Addresses` is given."""
+# Rows of lanes: on the stack, and in columns of an array
+
+
+def _layout(constant: Any) -> Any:
+    return getattr(constant, "layout", None)
+
+
+@instruction(lambda *kinds: Rows(kinds[1].literal_value, _layout(kinds[2]))(*kinds), literal=True)
+def rows(code: Code, pointer: Any, count: Any, layout: Any) -> Any:
+    """The memory at a pointer to doubles, aligned to 64 bytes, as rows of `count` lanes, a constant, with the
+    names of a layout, or None."""
+    return pointer
+
+
+@instruction(
+    lambda pointer, count, layout, start, row, stride: Columns(count.literal_value, _layout(layout))(
+        pointer, count, layout, types.intp, types.intp, types.intp
+    ),
+    literal=True,
+)
+def columns(code: Code, pointer: Any, count: Any, layout: Any, start: Any, row: Any, stride: Any) -> Any:
+    """Columns of an array of doubles, `stride` apart; its rows are `row` apart, and the first number of the
+    first one is pointer[start]. They have the names of a layout, or None."""
+    found = code.context.make_helper(code.builder, code.result)
+    found.first, found.row, found.stride = code.builder.gep(pointer, [start]), row, stride
+    return found._getvalue()
+
+
+@instruction(lambda rows, number, layout: type(rows)(rows.count, layout.layout)(rows, types.intp, layout))
+def nth(code: Code, rows: Any, number: Any, layout: Any) -> Any:
+    """The rows of the `number`-th layout of several one after the other."""
+    return part_of(code, code.args[0], rows, code.builder.mul(number, INDEX(code.args[2].layout.size)))
+
+
+def part_of(code: Code, memory: Any, value: Any, first: Any) -> Any:
+    """Rows or columns from row `first` on."""
+    builder = code.builder
+    if isinstance(memory, Rows):
+        return builder.gep(value, [builder.mul(first, INDEX(memory.count))], inbounds=True)
+    found = code.context.make_helper(builder, memory, value=value)
+    found.first = builder.gep(found.first, [builder.mul(first, found.row)])
+    return found._getvalue()
+
+
+def row_type(memory: Any) -> Any:
+    """The type of a row."""
+    return Lanes(memory.count) if memory.count else types.float64
+
+
+def read_row(code: Code, memory: Any, value: Any, row: Any) -> Any:
+    """The lanes of a row."""
+    if isinstance(memory, Rows):
+        return code.builder.load(_place(code.builder, value, row, memory.count), align=8 * memory.count)
+    found = code.context.make_helper(code.builder, memory, value=value)
+    at = code.builder.mul(row, found.row)
+    return _read(code.builder, found.first, at, found.stride, max(memory.count, 1))
+
+
+def write_row(code: Code, memory: Any, value: Any, row: Any, x: Any) -> None:
+    """Put lanes into a row."""
+    if isinstance(memory, Rows):
+        code.builder.store(x, _place(code.builder, value, row, memory.count), align=8 * memory.count)
+        return
+    found = code.context.make_helper(code.builder, memory, value=value)
+    at = code.builder.mul(row, found.row)
+    _write(code.builder, x, found.first, at, found.stride, max(memory.count, 1))
+
+
+def _place(builder: Any, rows: Any, row: Any, count: int) -> Any:
+    first = builder.gep(rows, [builder.mul(row, INDEX(count))], inbounds=True)
+    return builder.bitcast(first, wide(DOUBLE, count).as_pointer())
+
+
+def _read(builder: Any, pointer: Any, at: Any, stride: Any, count: int) -> Any:
+    """`count` doubles from pointer[at] on, `stride` apart: one load if they are neighbours."""
+    first, element = builder.gep(pointer, [at]), pointer.type.pointee
+    if count == 1:
+        found = builder.load(first)
+    else:
+        with builder.if_else(builder.icmp_signed("==", stride, INDEX(1))) as (near, far):
+            with near:
+                one = builder.load(builder.bitcast(first, wide(element, count).as_pointer()), align=4)
+                after_near = builder.block
+            with far:
+                places = [builder.add(at, builder.mul(stride, INDEX(lane))) for lane in range(count)]
+                many = gathered(builder, [builder.load(builder.gep(pointer, [place])) for place in places])
+                after_far = builder.block
+        found = builder.phi(one.type)
+        found.add_incoming(one, after_near)
+        found.add_incoming(many, after_far)
+    return builder.fpext(found, wide(DOUBLE, count)) if element == SINGLE else found
+
+
+def _write(builder: Any, x: Any, pointer: Any, at: Any, stride: Any, count: int) -> None:
+    first = builder.gep(pointer, [at])
+    if pointer.type.pointee == SINGLE:
+        x = builder.fptrunc(x, wide(SINGLE, count))
+    if count == 1:
+        builder.store(x, first)
+        return
+    with builder.if_else(builder.icmp_signed("==", stride, INDEX(1))) as (near, far):
+        with near:
+            builder.store(x, builder.bitcast(first, x.type.as_pointer()), align=4)
+        with far:
+            for lane in range(count):
+                place = builder.add(at, builder.mul(stride, INDEX(lane)))
+                builder.store(pick(builder, x, lane, count), builder.gep(pointer, [place]))
+
+
+@instruction(lambda rows, pointer, start, stride: Lanes(rows.count)(rows, pointer, types.intp, types.intp))
+def read(code: Code, rows: Any, pointer: Any, start: Any, stride: Any) -> Any:
+    """pointer[start], pointer[start + stride], ...: as many as the rows have lanes. Singles are widened."""
+    return _read(code.builder, pointer, start, stride, code.result.count)
+
+
+@instruction(lambda x, pointer, start, stride: types.void(x, pointer, types.intp, types.intp))
+def write(code: Code, x: Any, pointer: Any, start: Any, stride: Any) -> None:
+    """Put lanes at pointer[start], pointer[start + stride], ...; rounded if singles are there."""
+    _write(code.builder, x, pointer, start, stride, code.args[0].count)
+
+
+def _same_layout(rows: Any, columns: Any) -> Any:
+    if rows.layout is not columns.layout:
+        raise TypeError(f"fill: expected one layout, got {rows} and {columns}")
+    return types.void(rows, columns)
+
+
+@instruction(_same_layout)
+def fill(code: Code, rows: Any, columns: Any) -> None:
+    """Read columns into rows of the same layout."""
+    to, start = code.args
+    for k in range(to.layout.size):
+        write_row(code, to, rows, INDEX(k), read_row(code, start, columns, INDEX(k)))
+
+
+@instruction(lambda rows, value: Lanes(rows.count)(rows, value))
+def level(code: Code, rows: Any, value: Any) -> Any:
+    """The same value in every lane of what these rows hold."""
+    return code.number(code.args[1], value, code.result.count)
+
+
+@instruction(lambda x, lane: types.float64(x, types.intp))
+def lane_of(code: Code, x: Any, lane: Any) -> Any:
+    """One lane as an ordinary number."""
+    return x if code.args[0].count == 1 else code.builder.extract_element(x, lane)
+
+
+@instruction(lambda rows, row, lane, x: types.void(rows, types.intp, types.intp, types.float64))
+def set_lane(code: Code, rows: Any, row: Any, lane: Any, x: Any) -> None:
+    """Put an ordinary number into one lane of a row."""
+    at = code.builder.add(code.builder.mul(row, INDEX(code.args[0].count)), lane)
+    code.builder.store(x, code.builder.gep(rows, [at], inbounds=True))
+
+
+@instruction(types.void)
+def store_vectors(code: Code, rows: Any, vectors: Any) -> None:
+    """Put a tuple of planar vectors into rows, two rows each."""
+    memory, kind = code.args
+    for k in range(kind.count):
+        for part, x in enumerate(code.split(kind.dtype, code.builder.extract_value(vectors, k))):
+            write_row(code, memory, rows, INDEX(2 * k + part), x)
+
+
+@lower_cast(types.Number, Lanes)
+def _to_lanes(context: Any, builder: Any, given: Any, kind: Any, value: Any) -> Any:
+    return Code(context, builder).number(given, value, kind.count)
+
+
+def _is_row(args: Any) -> bool:
+    return isinstance(args[0], Rows | Columns) and isinstance(args[1], types.Integer)
+
+
+@infer_global(operator.getitem)
+class _GetRow(AbstractTemplate):
+    def generic(self, args: Any, kws: Any) -> Any:
+        return signature(row_type(args[0]), *args) if _is_row(args) else None
+
+
+@infer_global(operator.setitem)
+class _SetRow(AbstractTemplate):
+    def generic(self, args: Any, kws: Any) -> Any:
+        return signature(types.none, *args) if _is_row(args) and is_real(args[2]) else None
+
+
+def _get_row(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+    row = context.cast(builder, values[1], signature.args[1], types.intp)
+    return read_row(Code(context, builder), signature.args[0], values[0], row)
+
+
+def _set_row(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+    (memory, place, given), code = signature.args, Code(context, builder)
+    row = context.cast(builder, values[1], place, types.intp)
+    x = code.number(given, values[2], max(memory.count, 1))
+    write_row(code, memory, values[0], row, x)
+    return context.get_dummy_value()
+
+
+for _memory in (Rows, Columns):
+    lower_builtin(operator.getitem, _memory, types.Integer)(_get_row)
+    for _kind in (Lanes, types.Number):
+        lower_builtin(operator.setitem, _memory, types.Integer, _kind)(_set_row)

@@ -7,13 +7,13 @@ from collections.abc import Callable
 from typing import Any
 
 from numba.core import types
-from numba.core.extending import infer_getattr, lower_builtin, lower_getattr
-from numba.core.typing.templates import AbstractTemplate, AttributeTemplate, infer_global, signature
+from numba.core.extending import lower_builtin, make_attribute_wrapper
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 
-from hoof_env.simd.types import Lanes, Mask, Plane, count_of, is_real, join, number, split
+from hoof_env.simd.types import Code, Lanes, Mask, Plane, count_of, is_real
 
 
-def _operation(function: Any, typed: Callable[..., Any], lowered: Callable[..., Any], arity: int) -> None:
+def _operation(function: Any, typed: Callable[..., Any], lowered: Callable[..., Any], arity: int = 2) -> None:
     """Teach numba an operator: `typed` gives the result's type or None, `lowered` the code."""
 
     class Template(AbstractTemplate):
@@ -26,7 +26,7 @@ def _operation(function: Any, typed: Callable[..., Any], lowered: Callable[..., 
     infer_global(function)(Template)
 
     def lower(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        return lowered(context, builder, signature, *values)
+        return lowered(Code(context, builder, signature.args, signature.return_type), *values)
 
     kinds = (Lanes, Plane, Mask)
     patterns: list[Any] = [(kind,) for kind in kinds]
@@ -37,115 +37,81 @@ def _operation(function: Any, typed: Callable[..., Any], lowered: Callable[..., 
         lower_builtin(function, *pattern)(lower)
 
 
-def _alike(one: Any, two: Any) -> Any:
-    if isinstance(one, Plane) and isinstance(two, Plane):
-        return one
-    return Lanes(count_of(one, two)) if is_real(one) and is_real(two) else None
+def _of_reals(kind: Any) -> Callable[..., Any]:
+    return lambda one, two: kind(count_of(one, two)) if is_real(one) and is_real(two) else None
 
 
-def _elementwise(instruction: str) -> Callable[..., Any]:
-    def lowered(context: Any, builder: Any, signature: Any, one: Any, two: Any) -> Any:
-        emit, (left, right), result = (
-            getattr(builder, instruction),
-            signature.args,
-            signature.return_type,
-        )
-        if isinstance(result, Lanes):
-            n = result.count
-            return emit(number(context, builder, left, one, n), number(context, builder, right, two, n))
-        (a, b), (c, d) = split(context, builder, left, one), split(context, builder, right, two)
-        return join(context, builder, result, emit(a, c), emit(b, d))
-
-    return lowered
+def _sum_type(one: Any, two: Any) -> Any:
+    both_planes = isinstance(one, Plane) and isinstance(two, Plane)
+    return one if both_planes else _of_reals(Lanes)(one, two)
 
 
 def _product_type(one: Any, two: Any) -> Any:
     if isinstance(one, Plane) or isinstance(two, Plane):
         fits = all(isinstance(kind, Plane) or is_real(kind) for kind in (one, two))
         return Plane(count_of(one, two)) if fits else None
-    return _alike(one, two)
-
-
-def _product(context: Any, builder: Any, signature: Any, one: Any, two: Any) -> Any:
-    (left, right), result = signature.args, signature.return_type
-    n, times = result.count, builder.fmul
-    if isinstance(result, Lanes):
-        return times(number(context, builder, left, one, n), number(context, builder, right, two, n))
-    if isinstance(left, Plane) and isinstance(right, Plane):
-        (a, b), (c, d) = split(context, builder, left, one), split(context, builder, right, two)
-        x, y = builder.fsub(times(a, c), times(b, d)), builder.fadd(times(a, d), times(b, c))
-        return join(context, builder, result, x, y)
-    if isinstance(left, Plane):
-        left, one, right, two = right, two, left, one
-    factor, (x, y) = number(context, builder, left, one, n), split(context, builder, right, two)
-    return join(context, builder, result, times(factor, x), times(factor, y))
-
-
-def _quotient_type(one: Any, two: Any) -> Any:
-    return _alike(one, two) if is_real(one) and is_real(two) else None
-
-
-def _negative(context: Any, builder: Any, signature: Any, z: Any) -> Any:
-    kind = signature.return_type
-    if isinstance(kind, Lanes):
-        return builder.fneg(z)
-    x, y = split(context, builder, kind, z)
-    return join(context, builder, kind, builder.fneg(x), builder.fneg(y))
-
-
-def _comparison(symbol: str) -> Callable[..., Any]:
-    def lowered(context: Any, builder: Any, signature: Any, one: Any, two: Any) -> Any:
-        n, (left, right) = signature.return_type.count, signature.args
-        compare = builder.fcmp_unordered if symbol == "!=" else builder.fcmp_ordered
-        return compare(
-            symbol, number(context, builder, left, one, n), number(context, builder, right, two, n)
-        )
-
-    return lowered
-
-
-def _logic(instruction: str) -> Callable[..., Any]:
-    return lambda context, builder, signature, one, two: getattr(builder, instruction)(one, two)
+    return _of_reals(Lanes)(one, two)
 
 
 def _both_masks(one: Any, two: Any) -> Any:
     return one if isinstance(one, Mask) and isinstance(two, Mask) else None
 
 
-def _mask_of(one: Any, two: Any) -> Any:
-    return Mask(count_of(one, two)) if is_real(one) and is_real(two) else None
+def _elementwise(instruction: str) -> Callable[..., Any]:
+    def lowered(code: Code, one: Any, two: Any) -> Any:
+        emit = getattr(code.builder, instruction)
+        if isinstance(code.result, Lanes):
+            return emit(*code.reals(one, two))
+        (a, b), (c, d) = code.planes(one, two)
+        return code.join(emit(a, c), emit(b, d))
+
+    return lowered
 
 
-for _function, _instruction in ((operator.add, "fadd"), (operator.sub, "fsub")):
-    _operation(_function, _alike, _elementwise(_instruction), 2)
-_operation(operator.mul, _product_type, _product, 2)
-_operation(operator.truediv, _quotient_type, _elementwise("fdiv"), 2)
-_operation(operator.neg, lambda z: None if isinstance(z, Mask) else z, _negative, 1)
+def _product(code: Code, one: Any, two: Any) -> Any:
+    (left, right), builder, times = code.args, code.builder, code.builder.fmul
+    if isinstance(code.result, Lanes):
+        return times(*code.reals(one, two))
+    if isinstance(left, Plane) and isinstance(right, Plane):
+        (a, b), (c, d) = code.planes(one, two)
+        x, y = builder.fsub(times(a, c), times(b, d)), builder.fadd(times(a, d), times(b, c))
+        return code.join(x, y)
+    if isinstance(left, Plane):
+        left, one, right, two = right, two, left, one
+    factor, (x, y) = code.number(left, one, code.result.count), code.split(right, two)
+    return code.join(times(factor, x), times(factor, y))
+
+
+def _negative(code: Code, z: Any) -> Any:
+    if isinstance(code.result, Lanes):
+        return code.builder.fneg(z)
+    ((x, y),) = code.planes(z)
+    return code.join(code.builder.fneg(x), code.builder.fneg(y))
+
+
+def _comparison(symbol: str) -> Callable[..., Any]:
+    def lowered(code: Code, one: Any, two: Any) -> Any:
+        compare = code.builder.fcmp_unordered if symbol == "!=" else code.builder.fcmp_ordered
+        return compare(symbol, *code.reals(one, two))
+
+    return lowered
+
+
+def _logic(instruction: str) -> Callable[..., Any]:
+    return lambda code, one, two: getattr(code.builder, instruction)(one, two)
+
+
+_operation(operator.add, _sum_type, _elementwise("fadd"))
+_operation(operator.sub, _sum_type, _elementwise("fsub"))
+_operation(operator.mul, _product_type, _product)
+_operation(operator.truediv, _of_reals(Lanes), _elementwise("fdiv"))
+_operation(operator.neg, lambda z: None if isinstance(z, Mask) else z, _negative, arity=1)
 for _function, _symbol in (
     (operator.lt, "<"), (operator.le, "<="), (operator.gt, ">"), (operator.ge, ">="),
     (operator.eq, "=="), (operator.ne, "!="),
 ):  # fmt: skip
-    _operation(_function, _mask_of, _comparison(_symbol), 2)
-_operation(operator.and_, _both_masks, _logic("and_"), 2)
-_operation(operator.or_, _both_masks, _logic("or_"), 2)
-
-
-@infer_getattr
-class _PlaneParts(AttributeTemplate):
-    key = Plane
-
-    def resolve_real(self, kind: Plane) -> Lanes:
-        return Lanes(kind.count)
-
-    def resolve_imag(self, kind: Plane) -> Lanes:
-        return Lanes(kind.count)
-
-
-@lower_getattr(Plane, "real")
-def _real(context: Any, builder: Any, kind: Any, value: Any) -> Any:
-    return split(context, builder, kind, value)[0]
-
-
-@lower_getattr(Plane, "imag")
-def _imag(context: Any, builder: Any, kind: Any, value: Any) -> Any:
-    return split(context, builder, kind, value)[1]
+    _operation(_function, _of_reals(Mask), _comparison(_symbol))
+_operation(operator.and_, _both_masks, _logic("and_"))
+_operation(operator.or_, _both_masks, _logic("or_"))
+for _part in ("real", "imag"):
+    make_attribute_wrapper(Plane, _part, _part)

@@ -1,11 +1,13 @@
-"""The types of lanes, and their values in LLVM's terms."""
+"""The types of lanes, their values in LLVM's terms, and how a function writes its own instructions."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, NamedTuple
 
 from llvmlite import ir
-from numba.core import types
+from numba.core import extending, types
 from numba.core.datamodel import models
 from numba.core.extending import register_model
 
@@ -56,27 +58,22 @@ def wide(element: Any, count: int) -> Any:
 
 
 @register_model(Lanes)
-class _LanesModel(models.PrimitiveModel):
-    def __init__(self, manager: Any, kind: Lanes) -> None:
-        super().__init__(manager, kind, wide(DOUBLE, kind.count))
-
-
 @register_model(Mask)
-class _MaskModel(models.PrimitiveModel):
-    def __init__(self, manager: Any, kind: Mask) -> None:
-        super().__init__(manager, kind, wide(TRUTH, kind.count))
-
-
-@register_model(Plane)
-class _PlaneModel(models.StructModel):
-    def __init__(self, manager: Any, kind: Plane) -> None:
-        super().__init__(manager, kind, [("real", Lanes(kind.count)), ("imag", Lanes(kind.count))])
+class _VectorModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, kind: Any) -> None:
+        super().__init__(manager, kind, wide(DOUBLE if isinstance(kind, Lanes) else TRUTH, kind.count))
 
 
 @register_model(Rows)
 class _RowsModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Rows) -> None:
         super().__init__(manager, kind, DOUBLE.as_pointer())
+
+
+@register_model(Plane)
+class _PlaneModel(models.StructModel):
+    def __init__(self, manager: Any, kind: Plane) -> None:
+        super().__init__(manager, kind, [("real", Lanes(kind.count)), ("imag", Lanes(kind.count))])
 
 
 @register_model(Columns)
@@ -112,24 +109,6 @@ def gathered(builder: Any, scalars: list[Any]) -> Any:
     return found
 
 
-def number(context: Any, builder: Any, kind: Any, value: Any, count: int) -> Any:
-    """Lanes, or a Python number in every lane."""
-    if isinstance(kind, Lanes):
-        return value
-    return spread(builder, context.cast(builder, value, kind, types.float64), count)
-
-
-def split(context: Any, builder: Any, kind: Plane, value: Any) -> tuple[Any, Any]:
-    found = context.make_helper(builder, kind, value=value)
-    return found.real, found.imag
-
-
-def join(context: Any, builder: Any, kind: Any, x: Any, y: Any) -> Any:
-    found = context.make_helper(builder, kind)
-    found.real, found.imag = x, y
-    return found._getvalue()
-
-
 def count_of(*kinds: Any) -> int:
     """Of lanes in an operation, 0 if it is not one on lanes."""
     counts = {kind.count for kind in kinds if isinstance(kind, _Counted)}
@@ -138,3 +117,57 @@ def count_of(*kinds: Any) -> int:
 
 def is_real(kind: Any) -> bool:
     return isinstance(kind, Lanes | types.Float | types.Integer)
+
+
+class Code(NamedTuple):
+    """Where instructions are written: numba's context, LLVM's builder, types of arguments and result."""
+
+    context: Any
+    builder: Any
+    args: Any = ()
+    result: Any = None
+
+    def number(self, kind: Any, value: Any, count: int) -> Any:
+        """Lanes, or a Python number in every lane."""
+        if isinstance(kind, Lanes):
+            return value
+        return spread(self.builder, self.context.cast(self.builder, value, kind, types.float64), count)
+
+    def reals(self, *values: Any) -> list[Any]:
+        """The arguments as lanes of the result."""
+        count = getattr(self.result, "count", 1)
+        return [self.number(kind, value, count) for kind, value in zip(self.args, values, strict=True)]
+
+    def split(self, kind: Any, value: Any) -> tuple[Any, Any]:
+        """x and y of planar vectors."""
+        found = self.context.make_helper(self.builder, kind, value=value)
+        return found.real, found.imag
+
+    def planes(self, *values: Any) -> list[tuple[Any, Any]]:
+        """x and y of each argument."""
+        return [self.split(kind, value) for kind, value in zip(self.args, values, strict=True)]
+
+    def join(self, x: Any, y: Any, kind: Any = None) -> Any:
+        """Planar vectors, of the result's type unless `kind` is given."""
+        found = self.context.make_helper(self.builder, kind or self.result)
+        found.real, found.imag = x, y
+        return found._getvalue()
+
+
+def instruction(typed: Callable[..., Any], literal: bool = False) -> Callable[[Callable[..., Any]], Any]:
+    """Decorator of a function for kernels that writes its own instructions: it takes a `Code` and LLVM's
+    values. `typed` makes numba's signature from the types of the arguments, of which constants are
+    `literal`."""
+
+    def decorate(write: Callable[..., Any]) -> Any:
+        @wraps(write)
+        def intrinsic(context: Any, *kinds: Any) -> Any:
+            def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+                found = write(Code(context, builder, signature.args, signature.return_type), *values)
+                return context.get_dummy_value() if found is None else found
+
+            return typed(*kinds), emit
+
+        return extending.intrinsic(prefer_literal=literal)(intrinsic)
+
+    return decorate

@@ -15,8 +15,12 @@ from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
 import numpy as np
+from numba.core import types
+from numba.core.errors import TypingError
 
+from hoof_env.errors import ParameterError
 from hoof_env.simd.cache import MECHANICS
+from hoof_env.simd.types import Mask, Plane, instruction, is_real
 
 PACKAGE = Path(__file__).parents[1]
 _LIBRARIES = {*sys.stdlib_module_names, "numpy", "numba", "hoof_env"}
@@ -79,22 +83,16 @@ def _add_code(digest: Any, code: CodeType, names: dict[str, Any], known: set[int
 
 def number_of(what: str) -> Any:
     """For kernels: a function that hands on what `what` returned, and refuses it unless it is a number."""
-    from numba.core import types
-    from numba.core.errors import TypingError
-
-    from hoof_env.simd.memory import intrinsic
-    from hoof_env.simd.types import Mask, Plane, is_real
-
     names = {Mask: "truths", Plane: "planar vectors", types.Boolean: "a truth", types.NoneType: "nothing"}
 
-    def number(context: Any, x: Any) -> Any:
+    def typed(x: Any) -> Any:
         if not is_real(x):
             kinds = (name for kind, name in names.items() if isinstance(x, kind))
             given = "nothing in some cases" if isinstance(x, types.Optional) else next(kinds, str(x))
             raise TypingError(f"{{{what} returns {given}; expected a number}}")
-        return x(x), lambda context, builder, signature, values: values[0]
+        return x(x)
 
-    return intrinsic(number)
+    return instruction(typed)(lambda code, x: x)
 
 
 def check_function(name: str, function: Any, arguments: int) -> None:
@@ -103,11 +101,9 @@ def check_function(name: str, function: Any, arguments: int) -> None:
     Raises:
         ParameterError: it is not.
     """
-    from hoof_env.errors import ParameterError
-
-    code = getattr(function, "__code__", None)
-    if not isinstance(function, FunctionType) or code is None or code.co_flags & 0x0C:  # *args, **kwargs
+    if not isinstance(function, FunctionType) or function.__code__.co_flags & 0x0C:  # *args, **kwargs
         raise ParameterError(f"{name}: expected a plain function of {arguments} arguments, got {function!r}")
+    code = function.__code__
     least = code.co_argcount - len(function.__defaults__ or ())
     if not least <= arguments <= code.co_argcount or code.co_kwonlyargcount:
         given = ", ".join(code.co_varnames[: code.co_argcount + code.co_kwonlyargcount])
@@ -145,16 +141,11 @@ def _place(found: tuple[str, str]) -> str:
     path, line = os.path.abspath(found[0]), int(found[1])
     if Path(path).is_relative_to(PACKAGE):
         return ""
-    try:
-        tree = ast.parse("".join(linecache.getlines(path)))
-    except SyntaxError:
-        return f" in {path}, line {line}"
     inside = [
-        node for node in ast.walk(tree)
+        node.name for node in ast.walk(ast.parse("".join(linecache.getlines(path))))
         if isinstance(node, ast.FunctionDef) and node.lineno <= line <= (node.end_lineno or line)
     ]  # fmt: skip
-    name = f"{inside[-1].name} (" if inside else ""
-    return f" in {name}{path}, line {line}{')' if name else ''}"
+    return f" in {inside[-1]} ({path}, line {line})" if inside else f" in {path}, line {line}"
 
 
 def named(function: Callable[..., Any]) -> str:

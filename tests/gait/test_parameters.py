@@ -24,6 +24,8 @@ def test_an_array_and_back(values):
 
 @pytest.mark.parametrize("name", PARAMETERS)
 def test_each_limit_is_kept(name):
+    with pytest.raises(ParameterError, match=r"expected 4 values .*crank_speed.*, got shape \(3,\)"):
+        GaitParameters.from_array([1.0, 0.5, 0.0])
     low, high = LIMITS[name]
     gait = dict(zip(PARAMETERS, (1.0, 0.5, 0.0, 0.0), strict=True))
     for value in (low, high):
@@ -31,11 +33,6 @@ def test_each_limit_is_kept(name):
     for value in (low - 1e-6, high + 1e-6, np.nan, np.inf, "fast", None, True):
         with pytest.raises(ParameterError, match=f"{name}: expected a finite number in"):
             GaitParameters(**{**gait, name: value})
-
-
-def test_an_array_of_another_shape():
-    with pytest.raises(ParameterError, match=r"expected 4 values .*crank_speed.*, got shape \(3,\)"):
-        GaitParameters.from_array([1.0, 0.5, 0.0])
 
 
 @pytest.mark.parametrize(
@@ -67,7 +64,6 @@ def test_an_unknown_gait():
     [
         (None, DataFileError, "expected an object 'gaits' with at least one gait, got None"),
         ({}, DataFileError, "expected an object 'gaits' with at least one gait"),
-        ([1], DataFileError, "expected an object 'gaits' with at least one gait"),
         ({"walk": 3}, DataFileError, "gait 'walk': expected crank_speed"),
         ({"walk": {"crank_speed": 6.0}}, DataFileError, "gait 'walk': expected crank_speed"),
         ({"walk": {"crank_speed": 99, "swing_offset": 0, "swing_sin": 0, "swing_cos": 0}},
@@ -100,7 +96,6 @@ def test_a_preset_holds_more_gaits_than_the_papers(tmp_path):
 @pytest.mark.parametrize(
     ("gaits", "names"),
     [
-        ("walk run", ["run", "walk"]),
         ("walk zigzag run carrying_walk", ["run", "walk"]),
         ("run amble", ["run"]),
         ("trot amble", ["amble", "trot"]),

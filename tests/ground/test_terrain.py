@@ -21,13 +21,8 @@ def terrains(draw):
     def row(low, high):
         return st.lists(st.floats(low, high), min_size=count, max_size=count).map(tuple)
 
-    return Terrain(
-        draw(row(-2, 2)),
-        draw(row(0.1, 10)),
-        draw(row(0, 3)),
-        draw(st.floats(-20, 20)),
-        draw(st.floats(0.01, 5)),
-    )
+    start, spacing = draw(st.floats(-20, 20)), draw(st.floats(0.01, 5))
+    return Terrain(draw(row(-2, 2)), draw(row(0.1, 10)), draw(row(0, 3)), start, spacing)
 
 
 @njit(error_model="numpy")
@@ -46,6 +41,7 @@ def test_it_is_linear_between_the_knots_and_level_beyond(terrain, x):
     for found, knots in ((height, "height"), (stiffness, "stiffness"), (friction, "friction")):
         assert found == pytest.approx(np.interp(x, terrain.x, getattr(terrain, knots)), rel=1e-9, abs=1e-9)
     np.testing.assert_array_equal(terrain.height_at(np.array(x)), np.interp(x, terrain.x, terrain.height))
+    assert Terrain.from_dict(json.loads(json.dumps(terrain.to_dict()))) == terrain
     assert nx**2 + ny**2 == pytest.approx(np.ones(len(x)))
     assert (ny > 0).all()
 
@@ -83,16 +79,14 @@ def test_slopes_and_ramps(angle):
         assert (nx, ny) == pytest.approx((-math.sin(angle), math.cos(angle)))
     assert surface(2 * LONG_WAY, *Terrain.slope(angle).to_grid())[2] == 1
     ramp = Terrain.ramp(angle, start=1.0, length=2.0)
-    assert ramp.height_at(np.array([0.0, 1.0, 2.0, 3.0, 9.0])) == pytest.approx(
-        np.tan(angle) * np.array([0, 0, 1, 2, 2])
-    )
+    heights = ramp.height_at(np.array([0.0, 1.0, 2.0, 3.0, 9.0]))
+    assert heights == pytest.approx(np.tan(angle) * np.array([0, 0, 1, 2, 2]))
 
 
 def test_patches():
     soft_then_ice = Terrain.patches([(2.0, 3.0, 1.0, 0.1), (0.5, 1.5, 0.2, 1.5)], spacing=0.05)
-    _, _, _, stiffness, friction = at(
-        soft_then_ice, [0.0, 0.45, 0.5, 1.0, 1.5, 1.55, 1.8, 2.0, 2.99, 3.05, 9.0]
-    )
+    x = [0.0, 0.45, 0.5, 1.0, 1.5, 1.55, 1.8, 2.0, 2.99, 3.05, 9.0]
+    _, _, _, stiffness, friction = at(soft_then_ice, x)
     assert stiffness == pytest.approx([1, 1, 0.2, 0.2, 0.2, 1, 1, 1, 1, 1, 1])
     assert friction == pytest.approx([1, 1, 1.5, 1.5, 1.5, 1, 1, 0.1, 0.1, 1, 1])
     assert set(soft_then_ice.height) == {0}
@@ -104,12 +98,6 @@ def test_lines_through_uneven_points():
     x = np.linspace(-1, 2, 301)
     assert hill.height_at(x) == pytest.approx(np.interp(x, [0, 0.3, 1.0], [0, 0.1, 0.0]), abs=1e-12)
     assert at(hill, 0.15)[4] == pytest.approx([0.75])
-
-
-@given(terrains())
-@settings(deadline=None, max_examples=100)
-def test_it_comes_back_from_json(terrain):
-    assert Terrain.from_dict(json.loads(json.dumps(terrain.to_dict()))) == terrain
 
 
 def test_what_is_not_a_number_stays_so():
@@ -125,20 +113,14 @@ def test_what_is_not_a_number_stays_so():
         (lambda: Terrain(3.0), "terrain.height: expected a row of numbers, got 3.0"),
         (lambda: Terrain("012"), "terrain.height"),
         (lambda: Terrain((0, math.nan)), r"terrain.height\[1\]: expected a finite number"),
-        (
-            lambda: Terrain((0, 1), stiffness=(1, 1, 1)),
-            r"terrain.stiffness: expected 2 numbers, got \(1, 1, 1\)",
-        ),
+        (lambda: Terrain((0, 1), (1, 1, 1)), r"terrain.stiffness: expected 2 numbers, got \(1, 1, 1\)"),
         (lambda: Terrain((0, 1), stiffness=0), "terrain.stiffness: expected .*got 0"),
         (lambda: Terrain((0, 1), friction=(1, -1)), r"terrain.friction\[1\]: expected .*got -1"),
         (lambda: Terrain((0, 1), spacing=0), "terrain.spacing: expected .*got 0"),
         (lambda: Terrain((0, 1), start=math.inf), "terrain.start: expected a finite number"),
         (lambda: Terrain.slope(1.6), "angle: expected .*got 1.6"),
         (lambda: Terrain.ramp(0.1, length=-1), "length: expected .*got -1"),
-        (
-            lambda: Terrain.through([0, 0], [1, 1]),
-            r"x: expected two or more increasing numbers, got \[0, 0\]",
-        ),
+        (lambda: Terrain.through([0, 0], [1, 1]), r"x: expected two or more increasing .*got \[0, 0\]"),
         (lambda: Terrain.through([0, 1], [1]), "height: expected 2 numbers"),
         (lambda: Terrain.through([0, 1e6], [1, 1]), "terrain.spacing: expected at most .* knots"),
         (lambda: Terrain.patches([(1, 0, 1, 1)]), r"patches\[0\]: expected \(x0, x1, .*got \(1, 0, 1, 1\)"),

@@ -20,14 +20,7 @@ UPPER = {
     "CD": 40.1, "CF": 39.3, "DE": 39.4, "EF": 36.7,
 }  # fmt: skip
 EDGE_E, EDGE_F = 65.7, 49.0  # h and i: foot to E and foot to F
-LOWER = {
-    "FG": 20.0,
-    "CA": 10.0,
-    "GJ": 45.0,
-    "AJ": 45.0,
-    "GI": 40.0,
-    "IJ": 30.0,
-}  # any that turns: not looked at
+LOWER = {"FG": 20.0, "CA": 10.0, "GJ": 45.0, "AJ": 45.0, "GI": 40.0, "IJ": 30.0}  # any that turns
 
 
 @pytest.fixture(scope="module")
@@ -47,12 +40,9 @@ def foot():
     return np.array(path)
 
 
-def test_stroke_and_lift(foot):
+def test_stroke_lift_and_height_below_the_crank(foot):
     assert np.ptp(foot[:, 0]) == pytest.approx(67.9, abs=0.05)
     assert np.ptp(foot[:, 1]) == pytest.approx(22.5, abs=0.05)
-
-
-def test_height_below_the_crank(foot):
     assert foot[:, 1].min() == pytest.approx(-91.8, abs=0.05)
     assert foot[:, 1].max() == pytest.approx(-69.4, abs=0.05)
 

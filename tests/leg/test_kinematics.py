@@ -64,10 +64,7 @@ def test_every_dyad_is_assembled_on_its_side():
     for theta in THETAS:
         at = pose(plain, theta)
         for dyad in (step for step in CONSTRUCTION if isinstance(step, Dyad)):
-            base, arm = (
-                at.point(dyad.second) - at.point(dyad.first),
-                at.point(dyad.point) - at.point(dyad.first),
-            )
+            base, arm = (at.point(end) - at.point(dyad.first) for end in (dyad.second, dyad.point))
             assert np.sign(base[0] * arm[1] - base[1] * arm[0]) == LEG.assembly[dyad.point]
 
 
@@ -134,16 +131,15 @@ def test_every_body_moves_rigidly(motion):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "name"),
-    [((np.nan,), "theta"), ((0.0, np.inf), "theta_rate"), ((0.0, 0.0, "fast"), "theta_acc")],
+    ("make", "name"),
+    [
+        (lambda: pose(LEG, np.nan), "theta"),
+        (lambda: pose(LEG, 0.0, np.inf), "theta_rate"),
+        (lambda: pose(LEG, 0.0, 0.0, "fast"), "theta_acc"),
+        (lambda: FrameMotion(phi_rate=np.nan), r"frame\.phi_rate"),
+        (lambda: FrameMotion(position=(0.0, np.inf)), r"frame\.position"),
+    ],
 )
-def test_a_pose_refuses_what_is_not_finite(arguments, name):
+def test_what_is_not_finite_is_refused(make, name):
     with pytest.raises(ParameterError, match=f"{name}: expected a finite number"):
-        pose(LEG, *arguments)
-
-
-def test_a_frame_refuses_what_is_not_finite():
-    with pytest.raises(ParameterError, match=r"frame\.phi_rate: expected a finite number"):
-        FrameMotion(phi_rate=np.nan)
-    with pytest.raises(ParameterError, match=r"frame\.position: expected a finite number"):
-        FrameMotion(position=(0.0, np.inf))
+        make()

@@ -18,7 +18,7 @@ def test_the_paper_counts_42_rows_and_nothing_is_left_free():
     assert 2 * len(JOINTS) + 1 + 1 == 3 * len(BODIES) == 42  # joints, lock and driver
 
 
-def test_a_joint_ties_bodies_that_share_its_point():
+def test_joints_tie_bodies_that_share_their_points_and_hold_every_body():
     for joint in JOINTS:
         for number in (joint.i, joint.j):
             if number == FRAME:
@@ -27,12 +27,9 @@ def test_a_joint_ties_bodies_that_share_its_point():
             ends = {BODIES[number].tail, BODIES[number].head}
             # A is the one joint that is not at the end of a link: a point of the rocker C-F
             assert joint.point in ends or (joint.point == "A" and ends == {"C", "F"})
-
-
-def test_every_body_is_held_by_two_joints_or_by_one_and_the_lock():
-    for number in range(len(BODIES)):
-        joints = [joint for joint in JOINTS if number in (joint.i, joint.j)]
-        assert len({joint.point for joint in joints}) + (number in LOCK) >= 2
+    for number in range(len(BODIES)):  # two joints hold a body, or one and the lock
+        points = {joint.point for joint in JOINTS if number in (joint.i, joint.j)}
+        assert len(points) + (number in LOCK) >= 2
 
 
 def test_the_construction_finds_each_point_from_points_known_before_it():
@@ -45,8 +42,5 @@ def test_the_construction_finds_each_point_from_points_known_before_it():
     assert tuple(known) == POINTS
     assert used == set(LENGTHS)
     assert set(BODY_LENGTHS) == set(LENGTHS) - {"CA"}  # A divides the rocker: no link of its own
-
-
-def test_a_body_has_the_length_between_its_ends():
     for body, name in zip(BODIES, BODY_LENGTHS, strict=True):
         assert {body.tail, body.head} == set(name)

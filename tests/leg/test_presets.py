@@ -54,10 +54,7 @@ def test_a_missing_file_and_an_unknown_name(tmp_path):
         ('{"geometry": {}, "provenance": 3}', "expected an entry 'provenance' .*; got 3"),
         ('{"provenance": ""}', "expected an entry 'geometry' .*, an object; found provenance"),
         ('{"provenance": "", "geometry": 3}', "expected an entry 'geometry' .*, an object; got 3"),
-        (
-            '{"provenance": "", "geometry": {"pivot": 3}}',
-            r"leg\.json: geometry: .*; missing assembly, heel, hip",
-        ),
+        ('{"provenance": "", "geometry": {"pivot": 3}}', r"leg\.json: geometry: .*; missing assembly, heel,"),
         ('{"provenance": "", "colour": "bay"}', r"leg\.json: unknown entries colour; expected some of prov"),
     ],
 )
@@ -66,14 +63,10 @@ def test_a_corrupt_file_is_named(tmp_path, text, message):
         load_geometry(preset_file(tmp_path, text=text))
 
 
-def test_a_file_that_is_not_text(tmp_path):
-    path = tmp_path / "leg.json"
-    path.write_bytes(b"\xff\xfe\x00\x80")
-    with pytest.raises(DataFileError, match="does not parse"):
-        load_geometry(path)
-
-
 def test_a_file_with_an_unknown_entry_or_a_bad_value(tmp_path):
+    (tmp_path / "bytes.json").write_bytes(b"\xff\xfe\x00\x80")
+    with pytest.raises(DataFileError, match="does not parse"):
+        load_geometry(tmp_path / "bytes.json")
     with pytest.raises(DataFileError, match=r"leg\.json: geometry: expected exactly .*; unknown colour$"):
         load_geometry(preset_file(tmp_path, lambda data: data["geometry"].update(colour="bay")))
     with pytest.raises(ParameterError, match=r"lengths\['FG'\]"):
@@ -89,9 +82,7 @@ def test_content_is_taken_as_a_file_is_and_its_errors_are_those_of_an_argument()
     assert (leg.name, leg.provenance) == ("custom", LEG.provenance)
     with pytest.raises(ParameterError, match="preset: unknown entries colour; expected some of provenance, "):
         load_geometry({**content, "colour": "bay"})
-    with pytest.raises(
-        ParameterError, match=r"preset: expected an entry 'provenance' .* found geometry, gaits$"
-    ):
+    with pytest.raises(ParameterError, match=r"preset: expected an entry 'provenance' .*geometry, gaits$"):
         load_geometry({"geometry": content["geometry"], "gaits": content["gaits"]})
     with pytest.raises(ParameterError, match="gaits: expected names that are texts"):
         load_gait("walk", {**content, "gaits": {5: content["gaits"]["walk"]}})
@@ -125,7 +116,5 @@ def test_a_geometry_goes_through_a_dictionary_and_a_file(tmp_path):
     for name, value in (("toe", ["I"]), ("name", ["l"]), ("travel", [1, 1]), ("provenance", 3)):
         with pytest.raises(ParameterError, match=f"{name}.*: expected"):
             Geometry.from_dict({**own.to_dict(), name: value})
-    with pytest.raises(
-        ParameterError, match=r"geometry: expected exactly lengths, .* and perhaps .*; missing toe"
-    ):
+    with pytest.raises(ParameterError, match=r"geometry: expected exactly .* and perhaps .*; missing toe"):
         Geometry.from_dict({name: value for name, value in own.to_dict().items() if name != "toe"})

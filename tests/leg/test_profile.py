@@ -53,7 +53,7 @@ def test_a_leg_that_cannot_turn_may_be_asked_for():
         LEG.replace(lengths=SHORT)
     assert not ROCKER.full_turn
     assert ROCKER != LEG
-    assert Geometry(**json.loads(json.dumps(ROCKER.to_dict()))) == ROCKER
+    assert Geometry.from_dict(json.loads(json.dumps(ROCKER.to_dict()))) == ROCKER
     assert pickle.loads(pickle.dumps(ROCKER)) == ROCKER
     assert "full_turn" not in LEG.to_dict()
     assert ROCKER.transmission_margin == 0.0

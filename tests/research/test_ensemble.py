@@ -237,7 +237,7 @@ def test_the_command_writes_an_ensemble_says_how_it_was_found_and_overwrites_not
 ):
     monkeypatch.setattr(command, "Aim", partial(Aim, steps=1))
     out, preset = tmp_path / "out", tmp_path / "leg.json"
-    preset.write_text(json.dumps(to_preset(start, CHOICE, "a test")))
+    preset.write_text(json.dumps(to_preset(np.array(start), CHOICE, "a test")))
     given = ["--out", str(out), "--preset", str(preset), "--size", "2", "--bar", "20", "--attempts", "1"]
     given += ["--workers", "1"]
     assert command.main(given) == 0

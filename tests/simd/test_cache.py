@@ -1,6 +1,9 @@
-"""Compiled kernels among processes: one compiles, others wait; folders without write access or locks."""
+"""Compiled kernels: one process compiles and others wait; where they are kept, when they are made anew, and
+what is said; folders without write access or locks."""
 
 import os
+import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -18,18 +21,18 @@ MODULE = """
 import os, sys, time
 from hoof_env.simd.compile import kernel
 from hoof_env.simd.cache import COMPILED
-from hoof_env.simd.memory import intrinsic
+from hoof_env.simd.types import instruction
 from pathlib import Path
 
 HERE = Path(__file__).parent
 
-@intrinsic
-def same(context, x):
+@instruction(lambda x: x(x))
+def same(code, x):
     (HERE / "began").touch()
     limit = time.monotonic() + 100
     while not (HERE / "go").exists() and time.monotonic() < limit:
         time.sleep(0.05)
-    return x(x), lambda context, builder, signature, values: values[0]
+    return x
 
 @kernel
 def inner(x):
@@ -57,6 +60,7 @@ def start(tmp_path):
         settings = {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": f"{ROOT}{os.pathsep}{tmp_path}"}
         process = subprocess.Popen(
             [sys.executable, "-c", textwrap.dedent(code)],
+            cwd=tmp_path,
             env={**os.environ, "HOOF_ENV_QUIET": "0", **settings, **environment},
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -85,18 +89,18 @@ def until(condition, process):
         time.sleep(0.05)
 
 
-def holder_and_waiter(start, tmp_path):
+def holder_and_waiter(start, tmp_path, code=CALL):
     """A process that compiles and one that waits for it."""
     first = start()
     until((tmp_path / "began").exists, first)
-    second = start()
+    second = start(code)
     assert second.stderr.readline() == "hoof-env: waiting for another process, which compiles tiny ...\n"
-    (tmp_path / "go").touch()
     return first, second
 
 
 def test_one_process_compiles_while_another_waits_and_loads(start, tmp_path):
     first, second = holder_and_waiter(start, tmp_path)
+    (tmp_path / "go").touch()
     assert ended(first)[0] == "8.0 ['inner', 'tiny']"
     assert ended(second)[0] == "8.0 []"
     assert ended(start())[0] == "8.0 []"
@@ -111,10 +115,7 @@ def test_four_at_once_compile_each_kernel_once(start, tmp_path):
 
 @pytest.mark.skipif(os.name != "posix", reason="kills with SIGKILL")
 def test_a_process_that_is_killed_while_it_compiles_lets_go(start, tmp_path):
-    first = start()
-    until((tmp_path / "began").exists, first)
-    second = start()
-    assert "waiting for another process" in second.stderr.readline()
+    first, second = holder_and_waiter(start, tmp_path)
     first.send_signal(signal.SIGKILL)
     first.wait()
     (tmp_path / "go").touch()
@@ -157,11 +158,9 @@ def test_an_edit_beside_a_kernel_recompiles_it_and_another_does_not(start, tmp_p
 
 
 def test_who_waits_too_long_compiles_too(start, tmp_path):
-    first = start()
-    until((tmp_path / "began").exists, first)
-    second = start("from hoof_env.simd import cache; cache.LONGEST_WAIT = 0.2;" + CALL)
-    said = [second.stderr.readline() for _ in range(2)]
-    assert said[1] == "hoof-env: waited 0 s for tiny: compiling it here, too\n"
+    impatient = "from hoof_env.simd import cache; cache.LONGEST_WAIT = 0.2;" + CALL
+    first, second = holder_and_waiter(start, tmp_path, impatient)
+    assert second.stderr.readline() == "hoof-env: waited 0 s for tiny: compiling it here, too\n"
     (tmp_path / "go").touch()
     assert ended(first)[0] == "8.0 ['inner', 'tiny']"
     assert ended(second)[0].startswith("8.0")
@@ -198,32 +197,93 @@ def test_threads_and_forked_children_do_not_lock_each_other_out(start, tmp_path)
     assert ended(start(code))[0] == "['inner', 'inner', 'tiny', 'tiny']"
 
 
-READ_ONLY = """
-import tempfile
+CALL_OR_SAY = """
+from hoof_env.errors import OutputError
+import hoof_env.envs.manual  # no folder is needed before something is compiled
+import tempfile, tiny
 def refuse(*args, **kwargs):
     raise PermissionError("read-only")
-tempfile.TemporaryFile = refuse
-"""
-
-
-def test_kernels_are_loaded_from_a_folder_that_is_not_writable_and_nothing_else(start, tmp_path):
-    (tmp_path / "go").touch()
-    code = f"""
-from hoof_env.errors import OutputError
-import tiny
-{READ_ONLY}
+if {read_only}:
+    tempfile.TemporaryFile = refuse
 try:
     print(tiny.tiny(3.0), tiny.COMPILED)
 except OutputError as error:
     print(error)
 """
-    cache = tmp_path / "cache"
-    assert ended(start(code))[0] == (
-        f"cannot keep compiled kernels in {str(cache)!r} (read-only); expected a writable folder: "
-        "set the environment variable NUMBA_CACHE_DIR to one"
-    )
+
+
+@pytest.mark.parametrize(
+    "reason",
+    [
+        "a file is there", "read-only",
+        pytest.param("no permission", marks=pytest.mark.skipif(
+            os.name != "posix" or os.geteuid() == 0, reason="needs a folder that this user cannot write"
+        )),
+    ],
+)  # fmt: skip
+def test_a_folder_that_is_not_writable_is_named_with_the_remedy(start, tmp_path, reason):
+    (tmp_path / "go").touch()
+    folder = tmp_path / "parent" / "cache"
+    if reason == "a file is there":
+        folder.parent.write_text("")
+    else:
+        folder.parent.mkdir(0o500 if reason == "no permission" else 0o777)
+    code = CALL_OR_SAY.format(read_only=reason == "read-only")
+    out, _ = ended(start(code, NUMBA_CACHE_DIR=str(folder)))
+    assert out.startswith(f"cannot keep compiled kernels in {str(folder)!r} (")
+    assert out.endswith("expected a writable folder: set the environment variable NUMBA_CACHE_DIR to one")
+
+
+def test_kernels_are_loaded_from_a_folder_that_is_not_writable(start, tmp_path):
+    (tmp_path / "go").touch()
     ended(start())
-    assert ended(start(code))[0] == "8.0 []"
+    assert ended(start(CALL_OR_SAY.format(read_only=True)))[0] == "8.0 []"
+
+
+def test_without_compilation_the_reason_is_named(start):
+    _, said = start("import hoof_env.leg.kinematics", NUMBA_DISABLE_JIT="1").communicate()
+    assert "HoofEnvError: NUMBA_DISABLE_JIT is set" in said
+
+
+def test_an_edit_of_the_mechanics_makes_kernels_anew(start, tmp_path):
+    """`touch` calls `normal_force`, which lives in another file: numba alone would keep the old one."""
+    package, code = tmp_path / "hoof_env", """
+        import hoof_env
+        from hoof_env.ground.contact import Ground, new_contacts, touch
+        from hoof_env.simd.cache import COMPILED
+        force = touch(new_contacts()[0], -0.04j, 0j, Ground().to_record()).imag
+        print(hoof_env.__file__, force, "touch" in COMPILED)
+    """  # fmt: skip
+    shutil.copytree(ROOT / "hoof_env", package, ignore=shutil.ignore_patterns("__pycache__"))
+    law = (package / "ground" / "laws.py").read_text()
+    for factor, is_compiled in ((1.0, True), (1.0, False), (2.0, True)):
+        changed = (
+            law if factor == 1 else law.replace("return larger(spring *", "return larger(2.0 * spring *")
+        )
+        (package / "ground" / "laws.py").write_text(changed)
+        where, force, found = ended(start(code))[0].split()
+        assert where == str(package / "__init__.py")
+        assert float(force) == pytest.approx(factor * 2e4 * 0.04**1.5)
+        assert found == str(is_compiled)
+
+
+def test_compiling_is_said_once_and_only_when_it_happens(start, tmp_path):
+    code = """
+        import numba
+        numba.njit(lambda x: x + 1)(1)  # not ours
+        import sys
+        print("---", file=sys.stderr)
+        from hoof_env.ground.contact import Ground, new_contacts, touch
+        for _ in range(2):
+            touch(new_contacts()[0], -0.04j, 0j, Ground().to_record())
+    """
+    before, first, *rest = ended(start(code))[1].splitlines()
+    assert before == "---"
+    assert first == "hoof-env: compiling kernels for this machine, once (about half a minute) ..."
+    assert all(re.fullmatch(r"hoof-env: \w+ compiled in \d+\.\d s", line) for line in rest)
+    assert ended(start(code))[1] == "---\n"  # from the cache
+    new = {"NUMBA_CACHE_DIR": str(tmp_path / "new"), "HOOF_ENV_QUIET": "1"}
+    assert ended(start(code, **new))[1] == "---\n"
 
 
 def test_all_kernels_are_told_once_and_then_there_is_nothing_to_compile(start, tmp_path):

@@ -1,6 +1,7 @@
 """Fields by name: positions follow from the declaration, and what a kernel reads and writes is where NumPy
 finds it."""
 
+from itertools import pairwise
 from typing import Annotated
 
 import numpy as np
@@ -31,12 +32,8 @@ SIZE = Thing.size
 def test_positions_follow_from_the_declaration():
     assert (Thing.size, Point.size) == (10, 3)
     assert Thing.names[:5] == ("mass", "numbers_0", "numbers_1", "numbers_2", "toe_place_x")
-    assert [Thing.rows(name) for name in Thing.fields] == [
-        slice(0, 1),
-        slice(1, 4),
-        slice(4, 7),
-        slice(7, 10),
-    ]
+    starts = [0, 1, 4, 7, 10]
+    assert [Thing.rows(name) for name in Thing.fields] == [slice(*pair) for pair in pairwise(starts)]
     seen = views(Thing, np.arange(20.0).reshape(10, 2))
     assert (seen.mass == [0, 1]).all()
     assert (seen.heel == [[14, 15], [16, 17], [18, 19]]).all()
