@@ -42,8 +42,8 @@ def test_flight(scheme):
     parabola = first.momentum[0] / engine.total_mass * t - 0.5j * GRAVITY * t * (t + late)
     assert last.centre[0] - first.centre[0] == pytest.approx(parabola, rel=1e-11)
     assert np.ptp(np.diff(pitches)) > 0.01  # the legs turn the trunk
-    gap, work = energy(engine) - before - drives_less_losses(engine), np.abs(drives_less_losses(engine))
-    print("GAP", scheme, gap, work, before)
+    gap = energy(engine) - before - drives_less_losses(engine)  # of some 440 J
+    assert abs(gap) < (400, 0.6, 3e-3, 7e-4)[SCHEMES[scheme].order - 1]
 
 
 @pytest.mark.filterwarnings("ignore::hoof_env.dynamics.step_length.StepWarning")
