@@ -2,11 +2,13 @@
 
 import numpy as np
 
+from hoof_env.dynamics.constrained import SOLE
 from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.dynamics.parts import Limb, Motor, Trunk
+from hoof_env.dynamics.parts import GRAVITY, Limb, Motor, Trunk
 from hoof_env.gait.gait import load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
+from hoof_env.leg.linkage import CRANK, FRAME, JOINTS, LOCK
 
 LEG = load_geometry("first_fit")
 RUN, WALK = load_gait("run", "first_fit"), load_gait("walk", "first_fit")
@@ -40,3 +42,35 @@ def drives_less_losses(engine):
 def same(one, other, env=...):
     """Whether states or reports by name are alike, bit for bit."""
     return all(np.array_equal(one[name][..., env], other[name][..., env]) for name in one)
+
+
+def cross(arms, forces):
+    """Moments, shape (...), of forces at arms, shape (..., 2)."""
+    return arms[..., 0] * forces[..., 1] - arms[..., 1] * forces[..., 0]
+
+
+def loads(geometry, motion, joints, lock, driver, toe, heel):
+    """Forces, shape (15, 2), and moments about the centres, shape (15,), of joints and ground on each body of
+    a leg; the last is the leg's frame, about O."""
+    force, moment = np.zeros((15, 2)), np.zeros(15)
+    centres = np.vstack([motion.centres, motion.point("O")])
+
+    def push(body, point, pushed):
+        force[body] += pushed
+        moment[body] += cross(motion.point(point) - centres[body], pushed)
+
+    for joint, pushed in zip(JOINTS, joints, strict=True):
+        push(joint.i, joint.point, pushed)
+        push(joint.j, joint.point, -pushed)
+    push(SOLE, geometry.toe, toe)
+    push(SOLE, geometry.heel, heel)
+    moment[list(LOCK)] += lock, -lock
+    moment[CRANK] += driver
+    moment[FRAME] -= driver
+    return force, moment
+
+
+def inertia(geometry, motion):
+    """What moves the 14 links against their weight: forces, shape (14, 2), and moments, shape (14,)."""
+    force = geometry.body_masses[:, None] * np.add(motion.centre_accelerations, (0, GRAVITY))
+    return force, geometry.body_inertias * motion.angular_accelerations

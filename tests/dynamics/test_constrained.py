@@ -16,14 +16,15 @@ from hypothesis import strategies as st
 from hoof_env.dynamics.constrained import TRACE, ConstrainedLeg, new_trace
 from hoof_env.dynamics.constraints import closed_form
 from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.dynamics.parts import GRAVITY, Limb, Prescribed, Result, Trunk
+from hoof_env.dynamics.parts import Limb, Prescribed, Result, Trunk
 from hoof_env.dynamics.step_length import StepWarning
 from hoof_env.errors import ParameterError
 from hoof_env.gait.gait import LIMITS, GaitParameters, load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
-from hoof_env.leg.linkage import BODIES, CRANK, FRAME, JOINTS, LOCK
+from hoof_env.leg.linkage import FRAME, POINTS
+from tests.dynamics.scenes import inertia, loads
 
 GEOMETRY = load_geometry("first_fit")
 MIRRORED = {travel: GEOMETRY.replace(travel=travel) for travel in (1, -1)}
@@ -33,8 +34,6 @@ PAPER_BETA = math.sqrt(30)
 ORDERS = {"euler": 1, "semi_implicit_euler": 1, "midpoint": 2, "rk4": 4}
 AIR = 10.0
 """A height at which nothing touches [m]."""
-
-UP = np.array([0, GRAVITY])
 
 MOMENTA = ("momentum_x", "momentum_y", "spin")
 """Of the leg as a whole, which `ConstrainedLeg` does not report."""
@@ -204,10 +203,6 @@ def test_torques_converge_to_the_closed_form(scheme, order, height):
 # -- joint reactions ---------------------------------------------------------------------------
 
 
-def cross(a, b):
-    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
-
-
 @pytest.fixture(params=itertools.product((1, -1), (WALK, RUN), (0.3, 2.2)))
 def loaded(request):
     """A leg at one instant of its cycle, on the ground at the second angle, and its motion in the world."""
@@ -221,31 +216,14 @@ def loaded(request):
 
 
 def test_every_body_obeys_newton_and_euler(loaded):
-    leg, _, motion = loaded
-    geometry, reactions = leg.geometry, leg.reactions()
-    force = np.zeros((14, 2))
-    moment = np.zeros(14)
-
-    def push(body, point, pushed):
-        force[body] += pushed
-        moment[body] += cross(motion.point(point) - motion.centres[body], pushed)
-
-    for joint, reaction in zip(JOINTS, reactions.joints, strict=True):
-        push(joint.i, joint.point, reaction)
-        if joint.j != FRAME:
-            push(joint.j, joint.point, -reaction)
-    sole = next(i for i, body in enumerate(BODIES) if {body.tail, body.head} == {"I", "J"})
-    for point, contact in zip((geometry.toe, geometry.heel), leg.state.contacts, strict=True):
-        push(sole, point, np.array([contact["friction"], contact["normal"]]))
-    moment[list(LOCK)] += reactions.lock, -reactions.lock
-    moment[CRANK] += reactions.driver
-
-    masses = geometry.body_masses[:, None]
+    leg, row, motion = loaded
+    toe, heel = (np.array([row[f"{end}_friction"], row[f"{end}_normal"]]) for end in ("toe", "heel"))
+    reactions = leg.reactions()
+    force, moment = loads(leg.geometry, motion, *reactions, toe, heel)
+    need, turn = inertia(leg.geometry, motion)
     scale = np.abs(reactions.joints).max()
-    expected = masses * (motion.centre_accelerations + UP)
-    np.testing.assert_allclose(force, expected, atol=1e-11 * scale)
-    expected = geometry.body_inertias * motion.angular_accelerations
-    np.testing.assert_allclose(moment, expected, atol=1e-11 * scale)
+    np.testing.assert_allclose(force[:14], need, atol=1e-11 * scale)
+    np.testing.assert_allclose(moment[:14], turn, atol=1e-11 * scale)
 
 
 def test_the_frame_carries_the_leg(loaded):
@@ -253,28 +231,18 @@ def test_the_frame_carries_the_leg(loaded):
     about O is the hip torque; the drives' power is the rate of all energy less the power of the ground."""
     leg, row, motion = loaded
     geometry, reactions = leg.geometry, leg.reactions()
-    masses = geometry.body_masses[:, None]
-    load = masses * (motion.centre_accelerations + UP)
-    held = [(joint, force) for joint, force in zip(JOINTS, reactions.joints, strict=True) if joint.j == FRAME]
-    frame = sum(force for _, force in held)
+    toe, heel = (np.array([row[f"{end}_friction"], row[f"{end}_normal"]]) for end in ("toe", "heel"))
+    force, moment = loads(geometry, motion, *reactions, toe, heel)
+    need, turn = inertia(geometry, motion)
     scale = np.abs(reactions.joints).max()
-    np.testing.assert_allclose(
-        frame,
-        load.sum(axis=0) - (row["toe_friction"] + row["heel_friction"], normal(row)),
-        atol=1e-11 * scale,
-    )
-
-    about_o = sum(cross(motion.point(joint.point) - motion.point("O"), force) for joint, force in held)
+    np.testing.assert_allclose(-force[FRAME], need.sum(axis=0) - toe - heel, atol=1e-11 * scale)
     # the frame turns in its own sense, before the mirror; the crank turns clockwise in it
-    hip_torque = geometry.travel * (about_o + reactions.driver)
-    assert hip_torque == pytest.approx(row["hip_torque"], abs=1e-11 * scale)
+    assert -geometry.travel * moment[FRAME] == pytest.approx(row["hip_torque"], abs=1e-11 * scale)
     assert -geometry.travel * reactions.driver == pytest.approx(row["crank_torque"], abs=1e-11 * scale)
 
-    power = (load * motion.centre_velocities).sum()
-    power += (geometry.body_inertias * motion.angular_accelerations * motion.angular_velocities).sum()
-    names = list("OCPBDFEGAJI")
-    for point, end in ((geometry.toe, "toe"), (geometry.heel, "heel")):
-        power -= motion.point_velocities[names.index(point)] @ (row[f"{end}_friction"], row[f"{end}_normal"])
+    power = (need * motion.centre_velocities).sum() + turn @ motion.angular_velocities
+    for point, pushed in ((geometry.toe, toe), (geometry.heel, heel)):
+        power -= motion.point_velocities[POINTS.index(point)] @ pushed
     assert row["crank_power"] + row["hip_power"] == pytest.approx(power, abs=1e-10 * scale)
 
 
