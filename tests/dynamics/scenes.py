@@ -39,7 +39,7 @@ def drives_less_losses(engine):
     return gains - sum(total[name] for name in total if name.endswith("_loss"))
 
 
-def same(one, other, env=...):
+def same(one, other, env=slice(None)):
     """Whether states or reports by name are alike, bit for bit."""
     return all(np.array_equal(one[name][..., env], other[name][..., env]) for name in one)
 
