@@ -49,7 +49,7 @@ def cross(arms, forces):
     return arms[..., 0] * forces[..., 1] - arms[..., 1] * forces[..., 0]
 
 
-def loads(geometry, motion, joints, lock, driver, toe, heel):
+def loads(geometry, motion, joints, lock, driver, hip, toe, heel):
     """Forces, shape (15, 2), and moments about the centres, shape (15,), of joints and ground on each body of
     a leg; the last is the leg's frame, about O."""
     force, moment = np.zeros((15, 2)), np.zeros(15)
@@ -66,7 +66,7 @@ def loads(geometry, motion, joints, lock, driver, toe, heel):
     push(SOLE, geometry.heel, heel)
     moment[list(LOCK)] += lock, -lock
     moment[CRANK] += driver
-    moment[FRAME] -= driver
+    moment[FRAME] += hip - driver
     return force, moment
 
 
