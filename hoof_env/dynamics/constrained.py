@@ -72,22 +72,14 @@ def new_trace(rows: int) -> NDArray[np.void]:
 
 @dataclass
 class ConstrainedState:
-    """Everything that changes: copying its arrays copies the state.
+    """Everything that changes: copying its arrays copies the state."""
 
-    Attributes:
-        body: record of dtype `BODY`.
-        motion: record of dtype `MOTION`.
-        filters: shape (4,).
-        contacts: shape (2,), toe first.
-        q, qd: coordinates and their rates in the frame of the paper's drawing, shape (42,) each.
-    """
-
-    body: Any
-    motion: Any
-    filters: NDArray[np.void]
-    contacts: NDArray[np.void]
-    q: Vector
-    qd: Vector
+    body: Any  # record of dtype `BODY`
+    motion: Any  # record of dtype `MOTION`
+    filters: NDArray[np.void]  # (4,)
+    contacts: NDArray[np.void]  # (2,), toe first
+    q: Vector  # coordinates in the frame of the paper's drawing, (42,)
+    qd: Vector  # and their rates
 
     def copy(self) -> ConstrainedState:
         """An independent copy."""

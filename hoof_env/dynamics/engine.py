@@ -77,7 +77,8 @@ class TrunkEngine(Scene):
             forces at rest use `substeps` of sim_dt / step_limits["friction"], or more `friction_fast`.
 
     Raises:
-        ParameterError: a value is out of range or of the wrong type.
+        ParameterError: a value is out of range or of the wrong type; or, at the first reset, the contact law
+            cannot be compiled.
         GeometryError: a leg has no place for its links at any crank angle.
 
     Warns:

@@ -129,28 +129,17 @@ def count_stride(trunk, leg, h):  # type: ignore[no-untyped-def]
 
 @dataclass
 class StanceCounter:
-    """Stances of one leg so far.
+    """Stances of one leg so far."""
 
-    Attributes:
-        threshold: normal force that tells stance from swing [N].
-        is_open: whether the hoof is in stance.
-        began: crank angle where the last stance opened [rad].
-        peak: highest resultant force of the open stance [N], 0 between stances.
-        count: how many have opened.
-    """
-
-    threshold: float
-    is_open: bool = False
-    began: float = 0.0
-    peak: float = 0.0
-    count: int = 0
+    threshold: float  # normal force that tells stance from swing [N]
+    is_open: bool = False  # whether the hoof is in stance
+    began: float = 0.0  # crank angle where the last stance opened [rad]
+    peak: float = 0.0  # highest resultant force of the open stance [N], 0 between stances
+    count: int = 0  # how many have opened
 
     def add(self, theta: float, normal: float, force: float) -> float:
-        """Take the next substep: crank angle [rad], normal and resultant force on the hoof [N].
-
-        Returns:
-            By how much the running peak has grown [N]; over a stance these add up to its peak.
-        """
+        """Take the next substep: crank angle [rad], normal and resultant force on the hoof [N]. Returns how
+        much the running peak has grown [N]; over a stance that adds up to its peak."""
         loaded = normal > self.threshold
         goes_on = loaded and self.is_open and theta - self.began < REVOLUTION
         before = self.peak if goes_on else 0.0

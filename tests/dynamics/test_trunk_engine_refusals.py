@@ -105,6 +105,16 @@ def test_a_start_that_cannot_be(kind, changes, message):
     assert all((after[name] == before[name]).all() for name in ("trunk", "limbs", "command", "account"))
 
 
+def with_a_branch(penetration, rate, inverse_speed, ground):
+    return ground.stiffness * penetration if rate > 0.0 else 0.0
+
+
+def test_a_contact_law_that_lanes_cannot_run_is_refused_with_its_operation():
+    e = TrunkEngine(Limb(LEG), FREE, num_envs=9, contact_law=with_a_branch)
+    with pytest.raises(ParameterError, match=r"contact_law: cannot compile `if`, .* in with_a_branch \("):
+        e.reset(WALK)
+
+
 def test_no_start_where_the_links_have_no_place():
     rocker = LEG.replace(lengths={"CF": 0.8 * LEG.lengths["CF"]}, full_turn=False)
     e = TrunkEngine(Limb(rocker), Trunk("fixed"), num_envs=2)
