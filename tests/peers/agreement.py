@@ -41,28 +41,19 @@ EARLY = 0.1
 
 @dataclass(frozen=True)
 class Row:
-    """One quantity of one case in one engine against this project's at its fine step.
-
-    Attributes:
-        engine, quantity, unit: what is compared.
-        size: rms of the quantity; of coordinates, of what they moved by.
-        largest, relative: of the differences: the largest, and their rms as a share of `size`.
-        own: the largest difference between the engine's runs at its fine step and at twice that.
-        ours: the same of this project's engine.
-        closure: the widest gap of a loop in that engine [m].
-    """
+    """One quantity of one case in one engine against this project's at its fine step."""
 
     preset: str
     case: str
     engine: str
     quantity: str
     unit: str
-    size: float
-    largest: float
-    relative: float
-    own: float
-    ours: float
-    closure: float
+    size: float  # rms of the quantity; of coordinates, of what they moved by
+    largest: float  # of the differences
+    relative: float  # their rms as a share of `size`
+    own: float  # the largest difference between the engine's runs at its fine step and at twice that
+    ours: float  # the same of this project's engine
+    closure: float  # the widest gap of a loop in that engine [m]
 
     @property
     def share(self) -> float:

@@ -44,12 +44,8 @@ class TrunkLegs:
             GaitParameters(speed, swing - a * np.sin(theta) - b * np.cos(theta), a, b)
             for theta, speed, swing in zip(start.crank, start.crank_speed, start.swing, strict=True)
         ]
-        self.engine.reset(
-            gaits,
-            np.array(start.crank)[:, None],
-            x=start.position[0],
-            y=start.position[1],
-        )
+        x, y = start.position
+        self.engine.reset(gaits, np.array(start.crank)[:, None], x=x, y=y)
 
     def run(self, duration: float, samples: int) -> Record:
         """Advance by `duration` [s] and look `samples` times besides the beginning, evenly.
