@@ -6,14 +6,13 @@ import pytest
 from hoof_env.dynamics.engine import FEW, TrunkEngine
 from hoof_env.dynamics.parts import TRUNKS, Limb, Motor, Prescribed, Trunk
 from hoof_env.dynamics.stepping import SCHEMES
-from hoof_env.gait.gait import load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.laws import FRICTION_LAWS
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import load_geometry
+from tests.dynamics.scenes import LEG, RUN, WALK
 
-LEG, OTHER = load_geometry("first_fit"), load_geometry("identified")
-RUN, WALK = load_gait("run", "first_fit"), load_gait("walk", "first_fit")
+OTHER = load_geometry("identified")
 ALL, STEPS = 100, 200
 ROUGH = Terrain(
     (0.0, 0.03, -0.02, 0.01), (1.0, 0.4, 2.0, 1.0), (1.0, 0.1, 0.5, 2.0), start=-0.6, spacing=0.37
@@ -25,18 +24,13 @@ COMMAND = np.array(
 
 def engine(kind, n, legs=2, **changes):
     limbs = [Limb(LEG, (0.4, 0.0), Motor()), Limb(OTHER, (-0.4, 0.1), Prescribed())]
-    limbs = [*limbs, Limb(OTHER, (0.6, 0.0), Motor()), Limb(LEG, (-0.6, 0.0), Motor(rotor_inertia=0.0))][
-        :legs
-    ]
+    limbs += [Limb(OTHER, (0.6, 0.0), Motor()), Limb(LEG, (-0.6, 0.0), Motor(rotor_inertia=0.0))]
     k = TRUNKS.index(kind)  # another ground, law and scheme with each kind
     ground = Ground(exponent=(1.5, 1.125, 2.0, 1.75)[k], friction_law=FRICTION_LAWS[k % 3])
-    settings = {
-        "integrator": list(SCHEMES)[-k],
-        "terrain": ROUGH if k % 2 else None,
-        "substeps": (3, 1, 2, 2)[k],
-    }
+    settings = {"integrator": list(SCHEMES)[-k], "substeps": (3, 1, 2, 2)[k]}
+    settings |= {"terrain": ROUGH if k % 2 else None}
     trunk = Trunk(kind, mass=150.0, height=LEG.hip_height - 0.03, pitch_inertia=30.0)
-    return TrunkEngine(limbs, trunk, ground, num_envs=n, **(settings | changes))
+    return TrunkEngine(limbs[:legs], trunk, ground, num_envs=n, **(settings | changes))
 
 
 def start(engine, which):
@@ -117,7 +111,7 @@ def test_a_state_goes_on_as_if_it_had_never_been_away(kind, n):
 
 def test_tables_begin_with_a_line_of_the_cache():
     for legs in range(1, 6):  # NumPy's own arrays do by chance
-        limbs = [Limb(load_geometry("first_fit").replace(linear_density=1.0 + i)) for i in range(legs)]
+        limbs = [Limb(LEG.replace(linear_density=1.0 + i)) for i in range(legs)]
         assert TrunkEngine(limbs, Trunk("free"), Ground())._model[1].ctypes.data % 64 == 0
 
 

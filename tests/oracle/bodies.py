@@ -7,7 +7,6 @@ leg, and `Jet` carries their two derivatives by time along.
 import numpy as np
 
 from hoof_env.dynamics.parts import Motor
-from hoof_env.errors import ParameterError
 from hoof_env.gait.gait import COS, OFFSET, SIN
 from hoof_env.leg.linkage import BODIES, CONSTRUCTION, Dyad
 from tests.oracle.jet import Jet, concatenate, direction, inverse, root, stack, turn
@@ -17,8 +16,6 @@ class PlainBodies:
     """What moves: a trunk, N legs of 14 links and a rotor for each."""
 
     def __init__(self, trunk, limbs):
-        if not limbs:
-            raise ParameterError("limbs: expected at least one leg, got none")
         self.limbs, self.size = tuple(limbs), len(limbs)
         legs = [limb.geometry for limb in limbs]
         # columns: one row a leg, against the many motions that are computed at a time

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.errors import HoofEnvError, ParameterError
+from hoof_env.errors import HoofEnvError
 from hoof_env.gait.gait import SPEED, GaitParameters
 from tests.oracle.horse import WORKS
 
@@ -111,10 +111,6 @@ def simulate(horse, gaits, times, theta, theta_rate=None, trunk=None, trunk_rate
     """
     n = horse.size
     gaits = np.array([g.to_array() if isinstance(g, GaitParameters) else g for g in gaits], float)
-    if gaits.shape != (n, 4) or np.shape(theta) != (n,):
-        raise ParameterError(
-            f"gaits, theta: expected one for each of {n} legs, got {len(gaits)} and {theta!r}"
-        )
     wanted = gaits[:, SPEED]
     theta_rate = np.where(horse.motors, wanted if theta_rate is None else theta_rate, wanted)
     trunk = (0.0, horse.trunk.height, 0.0) if trunk is None else trunk
