@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
 
-from hoof_env.dynamics.constrained import TRACE, ConstrainedLeg, new_trace
+from hoof_env.dynamics.constrained import INTEGRATORS, TRACE, ConstrainedLeg, new_trace
 from hoof_env.dynamics.constraints import closed_form
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limb, Prescribed, Result, Trunk
@@ -35,8 +36,8 @@ LEGS = (
     OTHER.replace(masses=tuple(np.linspace(3, 0.2, 14)), inertia="paper"),
 )
 PAPER_BETA = math.sqrt(30)
-
 ORDERS = {"euler": 1, "semi_implicit_euler": 1, "midpoint": 2, "rk4": 4}
+
 AIR = 10.0
 """A height at which nothing touches [m]."""
 
@@ -315,3 +316,59 @@ def test_a_copy_goes_on_bit_for_bit(copied):
         runner.advance(RUN.to_array(), second)
         runs.append([rows.tobytes() for rows in (first, start, second, *vars(runner.state).values())])
     assert runs[0] == runs[1]
+
+
+# -- the schemes alone -------------------------------------------------------------------------
+
+
+def forced_oscillator(time, q, qd):
+    """q'' = -q - q'/5 + cos 3t, in two components."""
+    return -q - 0.2 * qd + np.array([np.cos(3 * time), np.sin(time)])
+
+
+def integrate(scheme, acceleration, q, qd, h, steps):
+    for k in range(steps):
+        start = k * h
+        q, qd = scheme(lambda elapsed, x, v, t0=start: acceleration(t0 + elapsed, x, v), q, qd, h)
+    return np.concatenate([q, qd])
+
+
+def test_every_scheme_has_its_known_order():
+    assert set(ORDERS) == set(INTEGRATORS)
+
+
+@pytest.mark.parametrize(("name", "order"), ORDERS.items())
+def test_order_of_convergence(name, order):
+    q, qd = np.array([1.0, -0.5]), np.array([0.3, 2.0])
+    exact = solve_ivp(
+        lambda t, u: np.concatenate([u[2:], forced_oscillator(t, u[:2], u[2:])]),
+        (0, 1), np.concatenate([q, qd]), method="DOP853", rtol=1e-13, atol=1e-13,
+    ).y[:, -1]  # fmt: skip
+    errors = [
+        np.abs(integrate(INTEGRATORS[name], forced_oscillator, q, qd, 1 / n, n) - exact).max()
+        for n in (25, 50, 100)
+    ]
+    slopes = np.diff(-np.log2(errors))
+    assert slopes == pytest.approx(order, abs=0.15)
+
+
+def test_rk4_integrates_a_quadratic_acceleration_exactly():
+    q, qd = INTEGRATORS["rk4"](lambda t, q, qd: np.array([t**2]), np.array([0.0]), np.array([0.0]), 0.7)
+    assert q == pytest.approx(0.7**4 / 12)
+    assert qd == pytest.approx(0.7**3 / 3)
+
+
+def test_only_semi_implicit_euler_keeps_an_oscillator_bounded():
+    def energy(name):
+        u = integrate(INTEGRATORS[name], lambda t, q, qd: -q, np.array([1.0]), np.array([0.0]), 0.05, 5000)
+        return (u**2).sum() / 2
+
+    assert energy("semi_implicit_euler") == pytest.approx(0.5, rel=0.06)
+    assert energy("euler") > 1e4
+
+
+@pytest.mark.parametrize("name", INTEGRATORS)
+def test_the_arguments_are_not_changed(name):
+    q, qd = np.array([1.0]), np.array([2.0])
+    INTEGRATORS[name](lambda t, q, qd: -q, q, qd, 0.1)
+    assert (q[0], qd[0]) == (1.0, 2.0)
