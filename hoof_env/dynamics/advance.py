@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,7 +23,7 @@ from hoof_env.dynamics.hoof import law_of, level_ground, remember_contacts
 from hoof_env.dynamics.layout import Account, LegMemory, LegRows, TrunkMemory, TrunkRows
 from hoof_env.dynamics.mechanics import evaluate, keep_still, settle
 from hoof_env.dynamics.observables import count_stride, keep_account, report_leg, report_trunk
-from hoof_env.dynamics.parts import FIXED
+from hoof_env.dynamics.parts import FIXED, Result
 from hoof_env.dynamics.reactions import LegConstants, Reactions, react
 from hoof_env.dynamics.stepping import begin_step, end_step, next_stage, weigh_stage
 from hoof_env.simd import anywhere, choose, columns, fill, lane_sum, level, nth, rows
@@ -33,8 +34,8 @@ from hoof_env.simd.user_functions import fingerprint
 LANES = 8
 """Environments side by side in a batch: one vector of 512 bits."""
 
-OK, NOT_FINITE, DEAD_POINT, FALLEN = 0, 1, 3, 4
-"""As in `parts.Result`."""
+OK, NOT_FINITE = float(Result.OK), float(Result.NOT_FINITE)
+DEAD_POINT, FALLEN = float(Result.DEAD_POINT), float(Result.FALLEN)
 
 STARTS = -1.0
 """Stands in the place of a result where an environment is to start."""
@@ -63,15 +64,7 @@ MODEL = np.dtype(
 
 
 class Model(NamedTuple):
-    """`MODEL` inside the kernels, small arrays on the stack, with the large ones.
-
-    Attributes:
-        together: the lanes are the legs of one trunk.
-        tables: pointer to the tables of all legs, one after the other.
-        settings, fractions, weights: pointers.
-        ground_cells: of the terrain's grid.
-        law: of contact, see `hoof.law_of`.
-    """
+    """`MODEL` inside the kernels, with the large arrays."""
 
     kind: int
     eighths: int
@@ -80,17 +73,17 @@ class Model(NamedTuple):
     is_terrain: bool
     new_rates: bool
     strides: bool
-    together: bool
+    together: bool  # the lanes are the legs of one trunk
     cells: int
-    tables: Any
-    settings: Any
+    tables: Any  # pointer to the tables of all legs, one after the other
+    settings: Any  # pointer to memory on the stack, as are fractions and weights
     stages: int
     fractions: Any
     weights: Any
-    ground_cells: Any
+    ground_cells: Any  # of the terrain's grid
     ground_origin: float
     ground_per_metre: float
-    law: Any
+    law: Any  # of contact, see `hoof.law_of`
 
 
 @inlined
@@ -144,8 +137,8 @@ def find_result(trunk, legs, leg_count, together):  # type: ignore[no-untyped-de
             total = total + leg.state[k]
     if together:
         total, stuck = lane_sum(level(trunk, 0.0), total), lane_sum(level(trunk, 0.0), stuck)
-    lost = choose(stuck > 0.0, float(DEAD_POINT), float(NOT_FINITE))
-    fell = choose(trunk.fallen > 0.0, float(FALLEN), float(OK))
+    lost = choose(stuck > 0.0, DEAD_POINT, NOT_FINITE)
+    fell = choose(trunk.fallen > 0.0, FALLEN, OK)
     return choose((total - total != 0.0) | (stuck > 0.0), lost, fell)
 
 
@@ -231,7 +224,7 @@ def run(  # type: ignore[no-untyped-def]
         )
         report_trunk(trunk, memory.report)
         result = find_result(trunk, legs, leg_count, together)
-        good = result == float(OK)
+        good = result == OK
         if steps < 0:  # the others are as they were; a start that cannot be is kept as it is
             result, good = choose(starts, result, before), starts
         memory.result = result
@@ -254,21 +247,17 @@ def run(  # type: ignore[no-untyped-def]
                     out[k] = kept[k]
 
 
-class AdvanceKernels(NamedTuple):
-    """Each environment by itself with one leg, or with four side by side; or `LANES` environments at a time
-    with any number of legs. Those that react compute joint reactions too."""
-
-    advance_leg: Any
-    advance_four: Any
-    advance_batch: Any
-    react_leg: Any
-    react_four: Any
-    react_batch: Any
+KERNELS = {"leg": (1, 1, False), "four": (1, 4, True), "batch": (0, LANES, False)}
+"""One leg alone, four legs of one trunk side by side, or `LANES` environments: how many legs, 0 for any
+number; lanes; whether these are the legs of one trunk."""
 
 
 @cache
-def advance_kernels(contact_law: Callable[..., Any] | None = None) -> AdvanceKernels:
-    """The kernels with a law of contact, see `hoof.law_of`; None is that of `ground.laws`."""
+def advance_kernels(contact_law: Callable[..., Any] | None = None) -> SimpleNamespace:
+    """`advance_leg`, `advance_four` and `advance_batch`; `react_leg` and so on compute joint reactions too.
+
+    The law of contact is as in `hoof.law_of`; None is that of `ground.laws`.
+    """
     law, identity = law_of(contact_law), fingerprint(contact_law)
 
     def made(name: str, legs: int, lanes: int, together: bool, reacts: bool) -> Any:
@@ -282,11 +271,7 @@ def advance_kernels(contact_law: Callable[..., Any] | None = None) -> AdvanceKer
         advance.__name__ = name
         return kernel(advance, f"{name} {identity}")
 
-    return AdvanceKernels(
-        made("advance_leg", 1, 1, False, False),
-        made("advance_four", 1, 4, True, False),
-        made("advance_batch", 0, LANES, False, False),
-        made("react_leg", 1, 1, False, True),
-        made("react_four", 1, 4, True, True),
-        made("react_batch", 0, LANES, False, True),
-    )
+    names = {f"{does}_{which}": which for does in ("advance", "react") for which in KERNELS}
+    return SimpleNamespace(**{
+        name: made(name, *KERNELS[which], name.startswith("react")) for name, which in names.items()
+    })  # fmt: skip

@@ -18,7 +18,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +34,7 @@ from hoof_env.dynamics.constraints import (
     closed_form,
 )
 from hoof_env.dynamics.layout import LEG_REPORT, LEG_STATE, TRUNK_REPORT, TRUNK_STATE
-from hoof_env.dynamics.parts import GRAVITY, Result, Trunk
+from hoof_env.dynamics.parts import GRAVITY, Reactions, Result, Trunk
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait.gait import (
     MOTION,
@@ -72,22 +72,14 @@ def new_trace(rows: int) -> NDArray[np.void]:
 
 @dataclass
 class ConstrainedState:
-    """Everything that changes: copying its arrays copies the state.
+    """Everything that changes: copying its arrays copies the state."""
 
-    Attributes:
-        body: record of dtype `BODY`.
-        motion: record of dtype `MOTION`.
-        filters: shape (4,).
-        contacts: shape (2,), toe first.
-        q, qd: coordinates and their rates in the frame of the paper's drawing, shape (42,) each.
-    """
-
-    body: Any
-    motion: Any
-    filters: NDArray[np.void]
-    contacts: NDArray[np.void]
-    q: Vector
-    qd: Vector
+    body: Any  # record of dtype `BODY`
+    motion: Any  # record of dtype `MOTION`
+    filters: NDArray[np.void]  # (4,)
+    contacts: NDArray[np.void]  # (2,), toe first
+    q: Vector  # coordinates in the frame of the paper's drawing, (42,)
+    qd: Vector  # and their rates
 
     def copy(self) -> ConstrainedState:
         """An independent copy."""
@@ -96,21 +88,6 @@ class ConstrainedState:
     def __setstate__(self, state: dict[str, Any]) -> None:
         # A record that was pickled has memory that writing by name misses; one taken from an array has not.
         vars(self).update({name: np.array(values)[()] for name, values in state.items()})
-
-
-class Reactions(NamedTuple):
-    """What the constraints do to the bodies, in the world (x forward, y up, counter-clockwise).
-
-    Attributes:
-        joints: shape (20, 2), force on body `i` of each `Joint(point, i, j)` [N], in the order of
-            `linkage.JOINTS`; body `j` (or the frame) feels the opposite.
-        lock: moment on body 10 by body 7 [N m].
-        driver: moment on the crank by the leg's frame [N m].
-    """
-
-    joints: NDArray[np.float64]
-    lock: float
-    driver: float
 
 
 class ConstrainedLeg:
@@ -236,9 +213,12 @@ class ConstrainedLeg:
 
     def reactions(self) -> Reactions:
         """Joint forces and moments at the present state, ground included."""
-        load = -self.solve()[1]  # the constraints load the bodies with -Phi_q^T lambda; Phi_q is +1 at body i
-        joints = load[:JOINT_ROWS].reshape(-1, 2) * (self._travel, 1.0)
-        return Reactions(joints, float(self._travel * load[LOCK_ROW]), float(self._travel * load[DRIVER_ROW]))
+        closure, travel = self.closure(), self._travel
+        _, multipliers = self._solve(closure, self._ground_load())
+        load = -multipliers  # the constraints load the bodies with -Phi_q^T lambda; Phi_q is +1 at body i
+        joints = load[:JOINT_ROWS].reshape(-1, 2) * (travel, 1.0)
+        hip = float(travel * (multipliers @ closure.by_phi))
+        return Reactions(joints, float(travel * load[LOCK_ROW]), float(travel * load[DRIVER_ROW]), hip)
 
     def _substep(self, command: NDArray[np.float64], t: float, row: np.void) -> bool:
         """One step of h to time t; fills `row` and returns whether all is finite."""

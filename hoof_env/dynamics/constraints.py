@@ -32,21 +32,13 @@ _X, _Y = np.arange(0, JOINT_ROWS, 2), np.arange(1, JOINT_ROWS, 2)
 
 
 class Closure(NamedTuple):
-    """The constraint equations at one instant, 42 rows (joint rows in m, lock and driver in rad).
+    """The constraint equations at one instant, 42 rows (joint rows in m, lock and driver in rad)."""
 
-    Attributes:
-        error: Phi(q, t).
-        error_rate: its rate Phi_q qd + Phi_t.
-        jacobian: Phi_q, shape (42, 42) (Eq. 3).
-        by_phi: d Phi / d phi, shape (42,). (d Phi / d theta is 1 in the driver's row and 0 elsewhere.)
-        gamma: what Phi_q qdd must be, -(Phi_q qd)_q qd - 2 Phi_qt qd - Phi_tt, shape (42,).
-    """
-
-    error: Vector
-    error_rate: Vector
-    jacobian: Vector
-    by_phi: Vector
-    gamma: Vector
+    error: Vector  # Phi(q, t)
+    error_rate: Vector  # Phi_q qd + Phi_t
+    jacobian: Vector  # Phi_q, shape (42, 42) (Eq. 3)
+    by_phi: Vector  # d Phi / d phi; d Phi / d theta is 1 in the driver's row and 0 elsewhere
+    gamma: Vector  # what Phi_q qdd must be, -(Phi_q qd)_q qd - 2 Phi_qt qd - Phi_tt
 
 
 def body_coordinate(geometry: Geometry, point: str, body: int) -> complex:

@@ -10,40 +10,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
+from numba.core.errors import NumbaError
 from numpy.typing import ArrayLike, NDArray
 
-from hoof_env.dynamics import reactions as r
-from hoof_env.dynamics.advance import (
-    LEG_ROWS,
-    STARTS,
-    TRUNK_ROWS,
-    advance_kernels,
-)
-from hoof_env.dynamics.engine_state import STATE, gaits_of, layout, read_state, start, which
-from hoof_env.dynamics.layout import (
-    ACCOUNT,
-    LEG_REPORT,
-    LEG_STATE,
-    STRIDE_SUMS,
-    STRIDES,
-    TRUNK_REPORT,
-    TRUNK_STATE,
-    LegMemory,
-)
-from hoof_env.dynamics.memory import (
-    check_shared,
-    columns_for,
-    memory_of,
-    named_rows,
-    new_memory,
-    new_model,
-    settings_of,
-)
-from hoof_env.dynamics.observables import Tally, tally
-from hoof_env.dynamics.parts import GRAVITY, Drive, Limb, Result, Trunk
+from hoof_env.dynamics import layout, memory
+from hoof_env.dynamics.advance import LEG_ROWS, STARTS, TRUNK_ROWS, advance_kernels
+from hoof_env.dynamics.parts import GRAVITY, Drive, Limb, Motor, Reactions, Result, Scene, Tally, Trunk
+from hoof_env.dynamics.reactions import Reactions as ReactionRows
 from hoof_env.dynamics.step_length import StepLength
 from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.errors import (
@@ -61,8 +37,8 @@ from hoof_env.errors import (
 from hoof_env.gait.gait import FilterSettings, GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
-from hoof_env.leg.profile import leg_profile
-from hoof_env.simd.user_functions import check_function
+from hoof_env.leg.profile import by_name, leg_profile
+from hoof_env.simd.user_functions import check_function, what_cannot_be_compiled
 
 FEW = 6
 """Up to so many environments of one leg or four are run one by one: eight lanes would be mostly empty."""
@@ -74,23 +50,7 @@ MOST_STEPS = 10**12
 """Substeps of a call, which are counted in 64 bits."""
 
 
-class Reactions(NamedTuple):
-    """What joints and drives do to the links, in the world; a motor's rotor is not among the links.
-
-    Attributes:
-        joints: force on body `i` of each joint of `linkage.JOINTS`, shape (legs, 20, 2, num_envs) [N].
-        lock: moment on body 10 by body 7, shape (legs, num_envs) [N m].
-        driver: moment on the crank by the leg's frame, shape (legs, num_envs) [N m].
-        hip: moment on the leg's frame by the trunk, about O, shape (legs, num_envs) [N m].
-    """
-
-    joints: Floats
-    lock: Floats
-    driver: Floats
-    hip: Floats
-
-
-class TrunkEngine:
+class TrunkEngine(Scene):
     """Legs on a trunk over the ground; see the module docstring.
 
     Args:
@@ -117,7 +77,8 @@ class TrunkEngine:
             forces at rest use `substeps` of sim_dt / step_limits["friction"], or more `friction_fast`.
 
     Raises:
-        ParameterError: a value is out of range or of the wrong type.
+        ParameterError: a value is out of range or of the wrong type; or, at the first reset, the contact law
+            cannot be compiled.
         GeometryError: a leg has no place for its links at any crank angle.
 
     Warns:
@@ -161,13 +122,14 @@ class TrunkEngine:
         self.reacts, self.counts_strides = flag("reactions", reactions), flag("strides", strides)
         self.is_few = len(self.limbs) in (1, 4) and self.num_envs <= FEW
         self._choose_kernel()
-        self._memory = new_memory(self, self.num_envs if self.is_few else columns_for(self.num_envs))
-        self._model = new_model(self)
+        columns = self.num_envs if self.is_few else memory.columns_for(self.num_envs)
+        self._memory = memory.new_memory(self, self.num_envs, columns, self.reacts)
+        self._model = memory.new_model(self, self.filters, self.counts_strides)
 
     def _choose_kernel(self) -> None:
-        kernels = advance_kernels(self.contact_law)
-        one, four, many = kernels[3:] if self.reacts else kernels[:3]
-        self._run = (one if len(self.limbs) == 1 else four) if self.is_few else many
+        which = ("leg" if len(self.limbs) == 1 else "four") if self.is_few else "batch"
+        does = "react" if self.reacts else "advance"
+        self._run = getattr(advance_kernels(self.contact_law), f"{does}_{which}")
 
     def __getstate__(self) -> dict[str, Any]:
         """A copy has memory of its own, also a shallow one."""
@@ -175,7 +137,7 @@ class TrunkEngine:
         return {**parts, "_memory": (m.data.copy(), self.num_envs, m.constants, m.reactions.copy())}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        vars(self).update(state, _memory=memory_of(*state["_memory"]))
+        vars(self).update(state, _memory=memory.memory_of(*state["_memory"]))
         self._choose_kernel()
 
     # What it is like
@@ -230,7 +192,8 @@ class TrunkEngine:
 
     def command_in(self, column: Floats) -> Floats:
         """The command in such a column, shape (legs, 4)."""
-        return column[TRUNK_ROWS:].reshape(len(self.limbs), LEG_ROWS)[:, LegMemory.rows("command")].copy()
+        legs = column[TRUNK_ROWS:].reshape(len(self.limbs), LEG_ROWS)
+        return legs[:, layout.LegMemory.rows("command")].copy()
 
     def alone(self) -> TrunkEngine:
         """An engine like this one, for one environment."""
@@ -272,14 +235,15 @@ class TrunkEngine:
             ParameterError: a value is not finite, of the wrong shape or forbidden by the trunk's kind, an
                 angle, place or rate is beyond `layout.FARTHEST`, or a leg's links have no place there.
         """
-        where, a = which(envs, self.num_envs), self._memory
-        values = gaits_of(gaits, len(self.limbs), where.size)
+        where, m = memory.which(envs, self.num_envs), self._memory
+        n = where.size
+        values = memory.gaits_of(gaits, len(self.limbs), n)
         height = self.trunk.height if y is None else y
-        at = {"x": x, "y": height, "pitch": pitch, "vx": vx, "vy": vy, "pitch_rate": pitch_rate}
-        a.trunk[:, where], a.limbs[:, :, where] = start(self, values, theta, theta_rate, at, where.size)
-        a.command[:, :, where] = values
-        a.account[:, where], a.strides[:, :, where] = 0.0, 0.0
-        a.result[where] = STARTS
+        trunk = {"x": x, "y": height, "pitch": pitch, "vx": vx, "vy": vy, "pitch_rate": pitch_rate}
+        m.trunk[:, where], m.limbs[:, :, where] = memory.start(self, values, theta, theta_rate, trunk, n)
+        m.command[:, :, where] = values
+        m.account[:, where], m.strides[:, :, where] = 0.0, 0.0
+        m.result[where] = STARTS
         self._go(-1)
 
     def vary(
@@ -300,13 +264,13 @@ class TrunkEngine:
         trunk = self.trunk if trunk is None else one_of("trunk", trunk, Trunk)
         ground = self.ground if ground is None else one_of("ground", ground, Ground)
         limbs = [limb if drive is None else replace(limb, drive=drive) for limb in self.limbs]
-        check_shared(self, trunk, ground, limbs)
+        memory.check_shared(self, trunk, ground, limbs)
         m = self._memory
-        m.trunk_settings[:, env], m.limb_settings[:, :, env] = settings_of(self, trunk, ground, limbs)
+        m.trunk_settings[:, env], m.limb_settings[:, :, env] = memory.settings_of(self, trunk, ground, limbs)
 
     def get_state(self) -> dict[str, Any]:
         """Everything that changes, as arrays of their own: continuing from it is bit-identical."""
-        return self._copy(STATE) | {"layout": layout(self)}
+        return self._copy(memory.STATE) | {"layout": self._layout}
 
     def set_state(self, state: Mapping[str, Any]) -> None:
         """Put back what `get_state` gave, and evaluate forces and accelerations there.
@@ -315,10 +279,16 @@ class TrunkEngine:
             ParameterError: the state belongs to an engine that would go on differently, lacks a part, or has
                 numbers that are not finite or beyond `FARTHEST`, in environments that were reset once.
         """
-        arrays, reset = read_state(self, self._memory, state)
+        arrays, reset = memory.read_state(self._layout, self._memory, state)
         self._put(arrays)
         self._memory.result[reset], self._memory.stride_sums[:] = 0.0, 0.0
         self._look()
+
+    @property
+    def _layout(self) -> dict[str, Any]:
+        return memory.identity_of(
+            self, self.filters, num_envs=self.num_envs, sim_dt=self.sim_dt, substeps=self.substeps
+        )
 
     # Motion
 
@@ -365,18 +335,18 @@ class TrunkEngine:
         """
         steps, every = count("steps", steps, low=0), count("every", every)
         self.advance(command, 0)
-        m, rows = self._memory, 1 + -(-steps // every)
-        whole = np.empty((*m.data.shape, rows))
+        m, times = self._memory, 1 + -(-steps // every)
+        whole = np.empty((*m.data.shape, times))
         whole[..., 0] = m.data
-        for row in range(1, rows):
-            self._go(min(every, steps - (row - 1) * every), True)
+        for k in range(1, times):
+            self._go(min(every, steps - (k - 1) * every), True)
             if m.result.any():
                 self._look()
-                rows = row
+                times = k
                 break
-            whole[..., row] = m.data
-        kept = memory_of(whole[..., :rows], self.num_envs, m.constants, m.reactions)
-        named = {name: np.moveaxis(values, -1, 0) for name, values in named_rows(kept).items()}
+            whole[..., k] = m.data
+        kept = memory.memory_of(whole[..., :times], self.num_envs, m.constants, m.reactions)
+        named = {name: np.moveaxis(values, -1, 0) for name, values in memory.named_rows(kept).items()}
         return named | {"result": self.results}
 
     def _command(self, command: ArrayLike) -> None:
@@ -391,12 +361,16 @@ class TrunkEngine:
         whole[:] = given
 
     def _go(self, steps: int, account: bool = False) -> None:
-        run: Any = self._run
-        run(*self.arrays, self.substep, steps * self.substeps, account)
+        try:
+            self._run(*self.arrays, self.substep, steps * self.substeps, account)
+        except NumbaError as error:
+            if self.contact_law is None:
+                raise
+            raise ParameterError(f"contact_law: {what_cannot_be_compiled(error)}") from error
 
     def _look(self) -> None:
         """Evaluate where the state is, and change nothing but the report."""
-        kept = self._copy((*STATE, "stride_sums", "result"))
+        kept = self._copy((*memory.STATE, "stride_sums", "result"))
         self._go(0)
         self._put(kept)
 
@@ -413,30 +387,33 @@ class TrunkEngine:
     def state(self) -> dict[str, Floats]:
         """The state by name: rows of `layout.TRUNK_STATE`, shape (num_envs,), and of `LEG_STATE`, shape
         (legs, num_envs)."""
-        named = named_rows(self._memory)
-        return {name: named[name].copy() for name in (*TRUNK_STATE, *LEG_STATE)}
+        return self._named(layout.TRUNK_STATE + layout.LEG_STATE)
 
     @property
     def report(self) -> dict[str, Floats]:
         """What acts at the present instant: `layout.TRUNK_REPORT` and `LEG_REPORT` by name."""
-        named = named_rows(self._memory)
-        return {name: named[name].copy() for name in (*TRUNK_REPORT, *LEG_REPORT)}
+        return self._named(layout.TRUNK_REPORT + layout.LEG_REPORT)
+
+    def _named(self, names: Sequence[str]) -> dict[str, Floats]:
+        named = memory.named_rows(self._memory)
+        return {name: named[name].copy() for name in names}
 
     @property
     def account(self) -> dict[str, Floats]:
         """Integrals since the reset by name, `layout.ACCOUNT`, shape (num_envs,)."""
-        return {name: self._memory.account[k].copy() for k, name in enumerate(ACCOUNT)}
+        return {name: self._memory.account[k].copy() for k, name in enumerate(layout.ACCOUNT)}
 
     @property
     def strides(self) -> dict[str, Floats]:
         """The open stance and the sums of the last call by name, `layout.STRIDES` and `STRIDE_SUMS`, shape
         (legs, num_envs); see `observables`. Zeros unless the engine was made with `strides=True`."""
-        names, m = (*STRIDES, *STRIDE_SUMS), self._memory
+        m = self._memory
         whole = np.concatenate([m.strides, m.stride_sums], axis=1)
-        return {name: whole[:, k] for k, name in enumerate(names)}
+        return {name: whole[:, k] for k, name in enumerate(layout.STRIDES + layout.STRIDE_SUMS)}
 
     def reactions(self) -> Reactions:
-        """Joint reactions at the present instant.
+        """Joint reactions at the present instant: of joints, shape (legs, 20, 2, num_envs), and the moments,
+        shape (legs, num_envs).
 
         Raises:
             ParameterError: the engine was not made with `reactions=True`.
@@ -445,15 +422,47 @@ class TrunkEngine:
             raise ParameterError("reactions: expected an engine made with reactions=True, got one without")
         found = self._memory.reactions[:, :, : self.num_envs]
         legs, _, n = found.shape
-        parts = {name: found[:, r.Reactions.rows(name)].copy() for name in r.Reactions.fields}
+        parts = {name: found[:, ReactionRows.rows(name)].copy() for name in ReactionRows.fields}
         joints = parts.pop("joints").reshape(legs, -1, 2, n)
         return Reactions(joints, **{name: part[:, 0] for name, part in parts.items()})
 
     def tally(self) -> Tally:
         """Momentum, spin and energy of all bodies at the present instant, added up anew from their motion."""
-        r, s = self.report, self.state
-        at = {"x": r["x"], "y": r["y"], "pitch": s["pitch"]} | {k: r[k] for k in ("vx", "vy", "pitch_rate")}
-        return tally(self, s["theta"], s["theta_rate"], r["phi"], r["phi_rate"], at)
+        r, s, own = self.report, self.state, self.trunk
+        place, velocity = r["x"] + 1j * r["y"], r["vx"] + 1j * r["vy"]
+        pitch_rate, turn = r["pitch_rate"], np.exp(1j * s["pitch"])
+        moment, momentum = own.mass * place, own.mass * velocity  # first moment about the origin
+        spin = own.pitch_inertia * pitch_rate + own.mass * _cross(place, velocity)  # about the origin
+        kinetic = 0.5 * own.mass * np.abs(velocity) ** 2 + 0.5 * own.pitch_inertia * pitch_rate**2
+        for i, limb in enumerate(self.limbs):
+            theta_rate = s["theta_rate"][i]
+            f = by_name(self.profiles[i](s["theta"][i])[0])
+            a, b, c = f["crank_inertia"], f["coupling"], f["frame_inertia"]
+            side = limb.geometry.travel
+            if isinstance(limb.drive, Motor):
+                rotor, gear = limb.drive.rotor_inertia, limb.drive.gear_ratio
+                a, b, c = a + gear**2 * rotor, b - side * gear * rotor, c + rotor
+            frame = turn * np.exp(1j * side * r["phi"][i])
+            frame_rate = pitch_rate + side * r["phi_rate"][i]
+            first_moment = frame * (f["first_moment_x"] + 1j * f["first_moment_y"])
+            slope = f["moment_slope_x"] + 1j * f["moment_slope_y"]
+            own_rate = frame * slope * theta_rate + 1j * first_moment * frame_rate
+            arm = turn * complex(*limb.hip)
+            hip, hip_rate, mass = place + arm, velocity + 1j * arm * pitch_rate, limb.geometry.mass
+            moment = moment + mass * hip + first_moment
+            momentum = momentum + mass * hip_rate + own_rate
+            spin = spin + _cross(hip, mass * hip_rate + own_rate) + _cross(first_moment, hip_rate)
+            spin = spin + b * theta_rate + c * frame_rate
+            kinetic = kinetic + 0.5 * mass * np.abs(hip_rate) ** 2 + (hip_rate.conj() * own_rate).real
+            rates = a * theta_rate**2 + 2 * b * theta_rate * frame_rate + c * frame_rate**2
+            kinetic = kinetic + 0.5 * rates
+        total = self.total_mass
+        centre = moment / total
+        potential = GRAVITY * moment.imag
+        if own.kind == "suspended":
+            potential = potential + 0.5 * own.stiffness * (r["y"] - own.height) ** 2
+            potential = potential - (1 - own.share) * total * GRAVITY * r["y"]
+        return Tally(centre, momentum, spin - _cross(centre, momentum), kinetic, potential)
 
     def messages(self) -> list[str]:
         """How each environment ended, for people."""
@@ -462,3 +471,8 @@ class TrunkEngine:
             "this environment was never reset" if new else Result(int(code)).message
             for code, new in zip(self._memory.result, np.atleast_1d(never), strict=True)
         ]
+
+
+def _cross(a: Any, b: Any) -> Floats:
+    found: Floats = (np.conj(a) * b).imag
+    return found

@@ -43,11 +43,7 @@ def meet_point(trunk, leg, point, memory, arm, arm_by_theta, hip, hip_velocity, 
     """Where a hoof point is, how deep in the ground, how fast it goes in and slides, and so the force of the
     ground on it and that force's part along theta and beta.
 
-    Args:
-        trunk, leg, model: as everywhere.
-        point, memory: the point's `Contact`, and what it remembers.
-        arm, arm_by_theta: the point from O in the leg's frame, and its derivative [m].
-        hip, hip_velocity: of O [m, m/s].
+    `memory` is what the point remembers; `arm` goes to it from O in the leg's frame; `hip` is O's place [m].
     """
     arm, by_theta = leg.turn * arm, leg.turn * arm_by_theta
     place = hip + arm
@@ -112,19 +108,12 @@ def push_back(ground, stiffness_scale, penetration, rate, inverse_speed, eighths
 
 
 class GroundHere(NamedTuple):
-    """The ground under a hoof point, for a law of contact.
+    """The ground under a hoof point, for a law of contact."""
 
-    Attributes:
-        stiffness: K of Eq. 14, with the terrain's factor there [N/m^n].
-        eighths: the exponent n in eighths, for `root_power`.
-        chi: damping factor, from restitution and `normal_law` [-].
-        dashpot: [N s/m].
-    """
-
-    stiffness: Any
-    eighths: Any
-    chi: Any
-    dashpot: Any
+    stiffness: Any  # K of Eq. 14, with the terrain's factor there [N/m^n]
+    eighths: Any  # the exponent n in eighths, for `root_power`
+    chi: Any  # damping factor, from restitution and `normal_law` [-]
+    dashpot: Any  # [N s/m]
 
 
 def law_of(contact_law: Callable[..., Any] | None) -> Any:

@@ -1,5 +1,5 @@
-"""What an engine is made of: a trunk, legs in their places on it, and what turns their cranks; and how a run
-of it ends.
+"""What an engine is made of: a trunk, legs in their places on it, and what turns their cranks; and what it
+says of a run.
 
 A prescribed drive is the paper's: the crank angle is a function of time and of the commands, whatever torque
 that takes. A motor is a speed servo with a torque limit, a rotor and a gear, so that a ground force slows the
@@ -7,11 +7,16 @@ crank. In both the swing is a function of the crank angle and of the gait parame
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import Any, NamedTuple
 
-from hoof_env.errors import ParameterError, check_choice, check_number
+from hoof_env.errors import Floats, ParameterError, check_choice, check_number
+from hoof_env.ground.contact import Ground
+from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
+from hoof_env.leg.profile import LegProfile
 
 GRAVITY = 9.81
 """[m/s^2], as in the paper's Table 1."""
@@ -143,10 +148,49 @@ class Limb:
             raise ParameterError(
                 f"limb.hip: expected two numbers (x, y) in metres, got {self.hip!r}"
             ) from None
-        hip = tuple(
-            check_number(f"limb.hip[{k}]", v, low=-FARTHEST, high=FARTHEST) for k, v in enumerate((x, y))
-        )
-        object.__setattr__(self, "hip", hip)
+        for k, value in enumerate((x, y)):
+            check_number(f"limb.hip[{k}]", value, low=-FARTHEST, high=FARTHEST)
+        object.__setattr__(self, "hip", (float(x), float(y)))
+
+
+@dataclass(eq=False, repr=False)
+class Scene:
+    """Legs on a trunk over the ground, and the scheme that moves them."""
+
+    limbs: Sequence[Limb]
+    profiles: Sequence[LegProfile]  # of each leg
+    trunk: Trunk
+    ground: Ground
+    terrain: Terrain
+    integrator: str
+
+
+class Reactions(NamedTuple):
+    """What joints and drives do to the links, in the world (x forward, y up, counter-clockwise); a motor's
+    rotor is not among the links. Shapes are of `ConstrainedLeg`; `TrunkEngine` gives (legs, ..., num_envs).
+
+    Attributes:
+        joints: force on body `i` of each `Joint(point, i, j)` of `linkage.JOINTS`, shape (20, 2) [N]; body
+            `j`, or the frame, feels the opposite.
+        lock: moment on body 10 by body 7 [N m].
+        driver: moment on the crank by the leg's frame [N m].
+        hip: moment on the leg's frame by the trunk, about O [N m].
+    """
+
+    joints: Floats
+    lock: Any
+    driver: Any
+    hip: Any
+
+
+class Tally(NamedTuple):
+    """What all bodies add up to, shape (num_envs,) each."""
+
+    centre: Any  # common centre of mass, complex [m]
+    momentum: Any  # complex [kg m/s]
+    spin: Floats  # angular momentum about the centre [kg m^2/s]
+    kinetic: Floats  # rotors included [J]
+    potential: Floats  # of weight and, on a suspended trunk, of spring and support [J]
 
 
 class Result(IntEnum):
@@ -164,13 +208,11 @@ class Result(IntEnum):
         return _MESSAGES[self]
 
 
+_PUT_BACK = "the state was put back to the last good one"
 _MESSAGES = {
     Result.OK: "ok",
     Result.NOT_FINITE: "the state stopped being finite; it was put back to the last good one",
-    Result.SINGULAR: "the equations of motion are singular; the state was put back to the last good one",
-    Result.DEAD_POINT: (
-        "a crank was driven to an angle at which its linkage does not close; "
-        "the state was put back to the last good one"
-    ),
-    Result.FALLEN: "the trunk fell through the ground; the state was put back to the last good one",
+    Result.SINGULAR: f"the equations of motion are singular; {_PUT_BACK}",
+    Result.DEAD_POINT: f"a crank was driven to an angle at which its linkage does not close; {_PUT_BACK}",
+    Result.FALLEN: f"the trunk fell through the ground; {_PUT_BACK}",
 }

@@ -95,11 +95,7 @@ def leg_constants(geometry: Geometry) -> NDArray[np.float64]:
     """The rows of `LegConstants` of a leg, shape (LegConstants.size,)."""
     lengths = geometry.lengths
     values = [lengths["OP"], geometry.travel * geometry.pivot[0], geometry.pivot[1], float(geometry.travel)]
-    values += [
-        1.0 if geometry.toe == "I" else 0.0,
-        lengths["FG"] / lengths["EF"],
-        lengths["CA"] / lengths["CF"],
-    ]
+    values += [float(geometry.toe == "I"), lengths["FG"] / lengths["EF"], lengths["CA"] / lengths["CF"]]
     spans = {"D": lengths["CB"], "I": lengths["GJ"]}
     for point in _HINGES + _TRIANGLES:
         step = _STEPS[point]
@@ -216,19 +212,10 @@ def hinge_force(hinge, by_one, by_two):  # type: ignore[no-untyped-def]
 def leg_reactions(  # type: ignore[no-untyped-def]
     g, crank_turn, theta_rate, theta_acc, frame_turn, beta_rate, beta_acc, lift, toe_force, heel_force
 ):
-    """Reactions of one leg.
+    """Reactions of one leg, as `parts.Reactions` has them.
 
-    Args:
-        g: `LegConstants`.
-        crank_turn, frame_turn: exp(i theta), exp(i beta).
-        theta_rate, theta_acc, beta_rate, beta_acc: [rad/s, rad/s^2].
-        lift: acceleration of O plus g upward [m/s^2].
-        toe_force, heel_force: of the ground on the leg [N].
-
-    Returns:
-        The forces on body `i` of each joint of `linkage.JOINTS` [N], and the moments on body 10 by body 7,
-        on the crank by the leg's frame and on the leg's frame by the trunk [N m]. Each joint's second body
-        feels the opposite.
+    `g` are its `LegConstants`, the turns exp(i theta) and exp(i beta), `lift` the acceleration of O plus g
+    upward [m/s^2], and the forces those of the ground on the leg [N].
     """
     # The crank turns clockwise before the mirror.
     travel = g.travel

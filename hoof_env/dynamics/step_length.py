@@ -15,17 +15,15 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from hoof_env.dynamics.parts import GRAVITY, Limb, Motor, Trunk
+from hoof_env.dynamics.parts import GRAVITY, Limb, Motor, Scene
+from hoof_env.errors import Floats
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.stiffness import LARGEST_ANGLE, SCHEMES, contact_rates
-from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.profile import LegProfile, by_name
 
 ANGLES = 48
@@ -34,7 +32,6 @@ ANGLES = 48
 FAST = 0.1
 """Speed of a fast touch-down [m/s], which goes deep."""
 
-Floats = NDArray[np.float64]
 Functions = dict[str, Floats]
 
 CAUSES = {
@@ -57,23 +54,15 @@ class StepWarning(UserWarning):
     """The time step is too long for the ground, the motors or what holds the trunk."""
 
 
-@dataclass(frozen=True)
-class StepLength:
-    """What decides on the step; arguments as of `TrunkEngine`, and a profile for each leg."""
-
-    limbs: Sequence[Limb]
-    profiles: Sequence[LegProfile]
-    trunk: Trunk
-    ground: Ground
-    terrain: Terrain
-    scheme: str
+class StepLength(Scene):
+    """What decides on the step."""
 
     @cached_property
     def limits(self) -> dict[str, float]:
         """Longest step [s] for each cause, infinite where there is none: "elastic", "damping" and "friction"
         of the ground (`ground.stiffness`), "servo" of the motors, "support" of what holds or drags the
         trunk."""
-        trunk, decay = self.trunk, SCHEMES[self.scheme].decay
+        trunk, decay = self.trunk, SCHEMES[self.integrator].decay
         mass, is_held = trunk.mass + sum(limb.geometry.mass for limb in self.limbs), trunk.kind == "suspended"
         damper, spring = (trunk.damping, trunk.stiffness) if is_held else (0.0, 0.0)
         drag = trunk.drag if trunk.kind != "fixed" else 0.0
@@ -122,7 +111,7 @@ class StepLength:
             for speed in {FAST, ground.approach_floor}:
                 mass, sliding_mass = min(sinks, whole), min(slides, whole)
                 rates = contact_rates(ground, mass, load, speed, sliding_mass, self.terrain)
-                for name, longest in rates.longest_steps(self.scheme).items():
+                for name, longest in rates.longest_steps(self.integrator).items():
                     if np.isfinite(slides if name == "friction" else sinks):
                         limits[name] = min(limits[name], longest)
         return limits

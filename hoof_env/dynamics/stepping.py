@@ -125,19 +125,12 @@ def end_step(trunk, legs, leg_count, model, h):  # type: ignore[no-untyped-def]
 
 @dataclass(frozen=True)
 class Scheme:
-    """One scheme.
+    """One scheme."""
 
-    Attributes:
-        order: of convergence [-].
-        fractions: a_j, one less than stages [-].
-        weights: w_j [-].
-        new_rates: coordinates move with the rates of the step's end.
-    """
-
-    order: int
-    fractions: tuple[float, ...]
-    weights: tuple[float, ...]
-    new_rates: bool = False
+    order: int  # of convergence
+    fractions: tuple[float, ...]  # a_j, one less than stages
+    weights: tuple[float, ...]  # w_j
+    new_rates: bool = False  # coordinates move with the rates of the step's end
 
 
 SCHEMES = MappingProxyType(

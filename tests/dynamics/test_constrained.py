@@ -12,29 +12,34 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
 
-from hoof_env.dynamics.constrained import TRACE, ConstrainedLeg, new_trace
+from hoof_env.dynamics.constrained import INTEGRATORS, TRACE, ConstrainedLeg, new_trace
 from hoof_env.dynamics.constraints import closed_form
 from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.dynamics.parts import GRAVITY, Limb, Prescribed, Result, Trunk
+from hoof_env.dynamics.parts import Limb, Prescribed, Result, Trunk
 from hoof_env.dynamics.step_length import StepWarning
 from hoof_env.errors import ParameterError
-from hoof_env.gait.gait import LIMITS, GaitParameters, load_gait
+from hoof_env.gait.gait import LIMITS, GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
-from hoof_env.leg.linkage import BODIES, CRANK, FRAME, JOINTS, LOCK
+from hoof_env.leg.linkage import FRAME, POINTS
+from tests.dynamics.scenes import LEG as GEOMETRY
+from tests.dynamics.scenes import RUN, WALK, inertia, loads
 
-GEOMETRY = load_geometry("first_fit")
-MIRRORED = {travel: GEOMETRY.replace(travel=travel) for travel in (1, -1)}
-WALK, RUN = load_gait("walk", "first_fit"), load_gait("run", "first_fit")
+OTHER = load_geometry("identified")
+LEGS = (
+    GEOMETRY,
+    GEOMETRY.replace(travel=-GEOMETRY.travel),
+    OTHER,
+    OTHER.replace(masses=tuple(np.linspace(3, 0.2, 14)), inertia="paper"),
+)
 PAPER_BETA = math.sqrt(30)
-
 ORDERS = {"euler": 1, "semi_implicit_euler": 1, "midpoint": 2, "rk4": 4}
+
 AIR = 10.0
 """A height at which nothing touches [m]."""
-
-UP = np.array([0, GRAVITY])
 
 MOMENTA = ("momentum_x", "momentum_y", "spin")
 """Of the leg as a whole, which `ConstrainedLeg` does not report."""
@@ -42,31 +47,16 @@ MOMENTA = ("momentum_x", "momentum_y", "spin")
 gaits = st.builds(GaitParameters, *(st.floats(low, high) for low, high in LIMITS.values()))
 
 
-class Exact:
-    """`TrunkEngine` on a fixed trunk, where it is the closed form, with the interface of `ConstrainedLeg`."""
-
-    def __init__(self, geometry, height, sim_dt=1e-3, ground=None):
-        limb, trunk = Limb(geometry, drive=Prescribed()), Trunk("fixed", height=height)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", StepWarning)  # nothing is integrated
-            self.engine = TrunkEngine(limb, trunk, ground or Ground(), sim_dt=sim_dt, substeps=1)
-        self.sim_dt = sim_dt
-
-    def reset(self, gait, theta=0.0, x=0.0):
-        self.engine.reset(gait, theta, x=x)
-        return self._rows(self.engine.state | self.engine.report, 1)
-
-    def advance(self, command, trace):
-        record = self.engine.run(command, len(trace))
-        trace[:] = self._rows(record, len(trace) + 1)[1:]
-        return Result(record["result"][0])
-
-    @staticmethod
-    def _rows(record, count):
-        rows = new_trace(count)
-        for name in TRACE.names:
-            rows[name] = record[name].reshape(count)
-        return rows
+def exact(geometry, height, gait, theta, command=None, steps=0, **settings):
+    """The last row of `TrunkEngine`, which on a fixed trunk is the closed form, and nothing is integrated."""
+    limb, trunk = Limb(geometry, drive=Prescribed()), Trunk("fixed", height=height)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", StepWarning)
+        engine = TrunkEngine(limb, trunk, **{"ground": Ground(), "substeps": 1} | settings)
+    engine.reset(gait, theta, x=0.7)
+    record = engine.run(command, steps)
+    assert not record.pop("result").any()
+    return {name: values[-1].item() for name, values in record.items()}
 
 
 def normal(rows):
@@ -164,48 +154,41 @@ def test_contact_changes_the_multipliers_and_never_the_motion():
 
 
 @settings(max_examples=60, deadline=None)
-@given(gaits, st.floats(-30, 30), st.floats(1.2, 2.5), st.sampled_from([1, -1]), st.sampled_from([0.0, 1.0]))
-def test_at_one_instant_everything_equals_the_closed_form(gait, theta, height, travel, restitution):
-    ground = Ground(restitution=restitution)
-    leg = ConstrainedLeg(MIRRORED[travel], ground, height=height)
-    expected = Exact(MIRRORED[travel], height, ground=ground).reset(gait, theta, x=0.7)[0]
+@given(gaits, st.floats(-30, 30), st.floats(-0.3, 1.0), st.sampled_from(LEGS), st.sampled_from([0.0, 1.0]))
+def test_at_one_instant_everything_equals_the_closed_form(gait, theta, above, geometry, restitution):
+    ground, height = Ground(restitution=restitution), geometry.hip_height + above
+    leg = ConstrainedLeg(geometry, ground, height=height)
+    expected = exact(geometry, height, gait, theta, ground=ground)
     assert_same_rows(leg.reset(gait, theta, x=0.7)[0], expected)
 
 
 @settings(max_examples=15, deadline=None)
-@given(gaits, gaits, st.floats(0, 6.3), st.sampled_from([1, -1]))
-def test_a_changing_gait_equals_the_closed_form(gait, command, theta, travel):
+@given(gaits, gaits, st.floats(0, 6.3), st.sampled_from(LEGS))
+def test_a_changing_gait_equals_the_closed_form(gait, command, theta, geometry):
     """The swing's accelerations and the filters' own: every derivative of the motion law is in Eq. 8."""
-    leg = ConstrainedLeg(MIRRORED[travel], Ground(), 2.5e-4, integrator="rk4")
-    engine = Exact(MIRRORED[travel], GEOMETRY.hip_height, 2.5e-4)
-    rows = []
-    for solver in (leg, engine):
-        solver.reset(gait, theta)
-        rows.append(new_trace(40))
-        assert solver.advance(command.to_array(), rows[-1]) is Result.OK
-    assert_same_rows(rows[0][-1], rows[1][-1], rtol=1e-6)
+    leg, trace = ConstrainedLeg(geometry, Ground(), 2.5e-4, integrator="rk4"), new_trace(40)
+    leg.reset(gait, theta, x=0.7)
+    assert leg.advance(command.to_array(), trace) is Result.OK
+    expected = exact(geometry, geometry.hip_height, gait, theta, command.to_array(), 40, sim_dt=2.5e-4)
+    assert_same_rows(trace[-1], expected, rtol=1e-6)
     assert np.abs(leg.closure().error).max() < 1e-8
 
 
 @pytest.mark.parametrize("height", [AIR, GEOMETRY.hip_height])
 @pytest.mark.parametrize(("scheme", "order"), ORDERS.items())
 def test_torques_converge_to_the_closed_form(scheme, order, height):
-    exact = travelled(Exact(GEOMETRY, height), RUN, 1.6, 0.15)
-    assert (normal(exact) > 1000) == (height < AIR)
+    true = exact(GEOMETRY, height, RUN, 1.6, steps=150)
+    assert (normal(true) > 1000) == (height < AIR)
     longest = {1: 2e-3, 2: 5e-3, 4: 1e-2}[order]  # where the scheme shows its order and round-off does not
     for name in ("crank_torque", "hip_torque"):
         errors = []
         for sim_dt in (longest, longest / 2, longest / 4):
             leg = ConstrainedLeg(GEOMETRY, Ground(), sim_dt, integrator=scheme, height=height)
-            errors.append(abs(travelled(leg, RUN, 1.6, 0.15)[name] - exact[name]))
+            errors.append(abs(travelled(leg, RUN, 1.6, 0.15)[name] - true[name]))
         assert np.diff(-np.log2(errors)) == pytest.approx(order, abs=0.3)
 
 
 # -- joint reactions ---------------------------------------------------------------------------
-
-
-def cross(a, b):
-    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
 @pytest.fixture(params=itertools.product((1, -1), (WALK, RUN), (0.3, 2.2)))
@@ -221,31 +204,14 @@ def loaded(request):
 
 
 def test_every_body_obeys_newton_and_euler(loaded):
-    leg, _, motion = loaded
-    geometry, reactions = leg.geometry, leg.reactions()
-    force = np.zeros((14, 2))
-    moment = np.zeros(14)
-
-    def push(body, point, pushed):
-        force[body] += pushed
-        moment[body] += cross(motion.point(point) - motion.centres[body], pushed)
-
-    for joint, reaction in zip(JOINTS, reactions.joints, strict=True):
-        push(joint.i, joint.point, reaction)
-        if joint.j != FRAME:
-            push(joint.j, joint.point, -reaction)
-    sole = next(i for i, body in enumerate(BODIES) if {body.tail, body.head} == {"I", "J"})
-    for point, contact in zip((geometry.toe, geometry.heel), leg.state.contacts, strict=True):
-        push(sole, point, np.array([contact["friction"], contact["normal"]]))
-    moment[list(LOCK)] += reactions.lock, -reactions.lock
-    moment[CRANK] += reactions.driver
-
-    masses = geometry.body_masses[:, None]
+    leg, row, motion = loaded
+    toe, heel = (np.array([row[f"{end}_friction"], row[f"{end}_normal"]]) for end in ("toe", "heel"))
+    reactions = leg.reactions()
+    force, moment = loads(leg.geometry, motion, *reactions, toe, heel)
+    need, turn = inertia(leg.geometry, motion)
     scale = np.abs(reactions.joints).max()
-    expected = masses * (motion.centre_accelerations + UP)
-    np.testing.assert_allclose(force, expected, atol=1e-11 * scale)
-    expected = geometry.body_inertias * motion.angular_accelerations
-    np.testing.assert_allclose(moment, expected, atol=1e-11 * scale)
+    np.testing.assert_allclose(force[:14], need, atol=1e-11 * scale)
+    np.testing.assert_allclose(moment[:14], turn, atol=1e-11 * scale)
 
 
 def test_the_frame_carries_the_leg(loaded):
@@ -253,28 +219,19 @@ def test_the_frame_carries_the_leg(loaded):
     about O is the hip torque; the drives' power is the rate of all energy less the power of the ground."""
     leg, row, motion = loaded
     geometry, reactions = leg.geometry, leg.reactions()
-    masses = geometry.body_masses[:, None]
-    load = masses * (motion.centre_accelerations + UP)
-    held = [(joint, force) for joint, force in zip(JOINTS, reactions.joints, strict=True) if joint.j == FRAME]
-    frame = sum(force for _, force in held)
+    toe, heel = (np.array([row[f"{end}_friction"], row[f"{end}_normal"]]) for end in ("toe", "heel"))
+    force, moment = loads(geometry, motion, *reactions, toe, heel)
+    need, turn = inertia(geometry, motion)
     scale = np.abs(reactions.joints).max()
-    np.testing.assert_allclose(
-        frame,
-        load.sum(axis=0) - (row["toe_friction"] + row["heel_friction"], normal(row)),
-        atol=1e-11 * scale,
-    )
-
-    about_o = sum(cross(motion.point(joint.point) - motion.point("O"), force) for joint, force in held)
+    np.testing.assert_allclose(-force[FRAME], need.sum(axis=0) - toe - heel, atol=1e-11 * scale)
     # the frame turns in its own sense, before the mirror; the crank turns clockwise in it
-    hip_torque = geometry.travel * (about_o + reactions.driver)
-    assert hip_torque == pytest.approx(row["hip_torque"], abs=1e-11 * scale)
+    assert moment[FRAME] == pytest.approx(0, abs=1e-11 * scale)
+    assert geometry.travel * reactions.hip == pytest.approx(row["hip_torque"], abs=1e-11 * scale)
     assert -geometry.travel * reactions.driver == pytest.approx(row["crank_torque"], abs=1e-11 * scale)
 
-    power = (load * motion.centre_velocities).sum()
-    power += (geometry.body_inertias * motion.angular_accelerations * motion.angular_velocities).sum()
-    names = list("OCPBDFEGAJI")
-    for point, end in ((geometry.toe, "toe"), (geometry.heel, "heel")):
-        power -= motion.point_velocities[names.index(point)] @ (row[f"{end}_friction"], row[f"{end}_normal"])
+    power = (need * motion.centre_velocities).sum() + turn @ motion.angular_velocities
+    for point, pushed in ((geometry.toe, toe), (geometry.heel, heel)):
+        power -= motion.point_velocities[POINTS.index(point)] @ pushed
     assert row["crank_power"] + row["hip_power"] == pytest.approx(power, abs=1e-10 * scale)
 
 
@@ -306,10 +263,7 @@ def test_a_reset_forgets_what_was_before():
 @pytest.mark.parametrize(
     ("spoil", "result"),
     [
-        (
-            lambda state: state.q.fill(0.0),
-            Result.SINGULAR,
-        ),  # all links along x: the loops close in one way only
+        (lambda state: state.q.fill(0.0), Result.SINGULAR),  # all links along x: the loops close in one way
         (lambda state: state.qd.fill(1e200), Result.NOT_FINITE),
     ],
 )
@@ -362,3 +316,59 @@ def test_a_copy_goes_on_bit_for_bit(copied):
         runner.advance(RUN.to_array(), second)
         runs.append([rows.tobytes() for rows in (first, start, second, *vars(runner.state).values())])
     assert runs[0] == runs[1]
+
+
+# -- the schemes alone -------------------------------------------------------------------------
+
+
+def forced_oscillator(time, q, qd):
+    """q'' = -q - q'/5 + cos 3t, in two components."""
+    return -q - 0.2 * qd + np.array([np.cos(3 * time), np.sin(time)])
+
+
+def integrate(scheme, acceleration, q, qd, h, steps):
+    for k in range(steps):
+        start = k * h
+        q, qd = scheme(lambda elapsed, x, v, t0=start: acceleration(t0 + elapsed, x, v), q, qd, h)
+    return np.concatenate([q, qd])
+
+
+def test_every_scheme_has_its_known_order():
+    assert set(ORDERS) == set(INTEGRATORS)
+
+
+@pytest.mark.parametrize(("name", "order"), ORDERS.items())
+def test_order_of_convergence(name, order):
+    q, qd = np.array([1.0, -0.5]), np.array([0.3, 2.0])
+    exact = solve_ivp(
+        lambda t, u: np.concatenate([u[2:], forced_oscillator(t, u[:2], u[2:])]),
+        (0, 1), np.concatenate([q, qd]), method="DOP853", rtol=1e-13, atol=1e-13,
+    ).y[:, -1]  # fmt: skip
+    errors = [
+        np.abs(integrate(INTEGRATORS[name], forced_oscillator, q, qd, 1 / n, n) - exact).max()
+        for n in (25, 50, 100)
+    ]
+    slopes = np.diff(-np.log2(errors))
+    assert slopes == pytest.approx(order, abs=0.15)
+
+
+def test_rk4_integrates_a_quadratic_acceleration_exactly():
+    q, qd = INTEGRATORS["rk4"](lambda t, q, qd: np.array([t**2]), np.array([0.0]), np.array([0.0]), 0.7)
+    assert q == pytest.approx(0.7**4 / 12)
+    assert qd == pytest.approx(0.7**3 / 3)
+
+
+def test_only_semi_implicit_euler_keeps_an_oscillator_bounded():
+    def energy(name):
+        u = integrate(INTEGRATORS[name], lambda t, q, qd: -q, np.array([1.0]), np.array([0.0]), 0.05, 5000)
+        return (u**2).sum() / 2
+
+    assert energy("semi_implicit_euler") == pytest.approx(0.5, rel=0.06)
+    assert energy("euler") > 1e4
+
+
+@pytest.mark.parametrize("name", INTEGRATORS)
+def test_the_arguments_are_not_changed(name):
+    q, qd = np.array([1.0]), np.array([2.0])
+    INTEGRATORS[name](lambda t, q, qd: -q, q, qd, 0.1)
+    assert (q[0], qd[0]) == (1.0, 2.0)

@@ -4,21 +4,17 @@ import numpy as np
 import pytest
 
 from hoof_env.dynamics.parts import GRAVITY, TRUNKS, Limb, Motor, Prescribed, Trunk
-from hoof_env.errors import ParameterError
-from hoof_env.gait.gait import load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
-from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
+from tests.dynamics.scenes import LEG, RUN, WALK
+from tests.dynamics.scenes import NATURAL as GROUND
 from tests.oracle.crank import PlainCrank
 from tests.oracle.ground import PlainGround
 from tests.oracle.horse import PlainHorse
 from tests.oracle.run import depths, follow, simulate
 
-LEG = load_geometry("first_fit")
 OTHER = LEG.replace(travel=-LEG.travel, linear_density=2.0, inertia="paper", lengths={"FG": 0.6})
-RUN, WALK = load_gait("run", "first_fit"), load_gait("walk", "first_fit")
-GROUND = Ground(restitution=0.5, approach_floor=0.1, friction_fast=0.05)
 LIMIT = 600.0
 LIMBS = (
     Limb(LEG, (0.6, -0.1), Motor(torque_limit=LIMIT)),
@@ -244,16 +240,3 @@ def test_the_reference_crank_has_converged(crank):
         ends = [crank.run(start, [0.0, 2.0], tolerance)[0][-1] for tolerance in (1e-12, 1e-13)]
         assert ends[0] == pytest.approx(ends[1], abs=1e-8)
         assert ends[0] - start < RUN.crank_speed * 2 - 0.1  # the ground has slowed it
-
-
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (lambda: PlainHorse(FREE, []), "limbs: expected at least one leg"),
-        (lambda: simulate(PlainHorse(FREE, LIMBS), [RUN], [0, 1], [0.0]), "one for each of 2 legs, got 1"),
-        (lambda: PlainCrank(Limb(LEG, drive=Prescribed()), RUN, GROUND, 1.7), "expected a Motor"),
-    ],
-)
-def test_bad_input_is_named(call, message):
-    with pytest.raises(ParameterError, match=message):
-        call()

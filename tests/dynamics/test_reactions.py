@@ -1,181 +1,127 @@
-"""Joint reactions by dyads against Eq. 8's multipliers and Newton and Euler's laws."""
+"""Joint reactions out of the engine: Newton and Euler's laws of every body, Eq. 8, the trunk's motion."""
 
 import numpy as np
 import pytest
-from numba import njit
 
 from hoof_env.dynamics.constrained import ConstrainedLeg
-from hoof_env.dynamics.constraints import closed_form
-from hoof_env.dynamics.parts import GRAVITY
-from hoof_env.dynamics.reactions import LegConstants, Reactions, leg_constants, leg_reactions
-from hoof_env.gait.gait import evaluate_motion, load_gait
-from hoof_env.ground.contact import Ground
+from hoof_env.dynamics.engine import TrunkEngine
+from hoof_env.dynamics.parts import GRAVITY, Limb, Motor, Prescribed, Trunk
+from hoof_env.errors import ParameterError
+from hoof_env.gait.gait import load_gait
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
-from hoof_env.leg.linkage import BODIES, CRANK, FRAME, JOINTS
-from hoof_env.leg.linkage import LOCK as LOCKED
-from hoof_env.simd import columns as columns_of
-from hoof_env.simd import fill, rows, store_vectors
-from hoof_env.simd.layout import Layout, Row, Vector, views
-from hoof_env.simd.memory import address, doubles
+from hoof_env.leg.linkage import FRAME, JOINTS
 from research.identify.ensemble import load_ensemble
+from tests.dynamics.scenes import LEG, NATURAL, RUN, WALK, horse, inertia, loads
 
-PRESETS = {name: load_geometry(name) for name in ("first_fit", "identified")}
+OTHER = load_geometry("identified")
 LEGS = {
-    **PRESETS,
-    "mirrored": PRESETS["first_fit"].replace(travel=-PRESETS["first_fit"].travel),
-    "other toe": PRESETS["identified"].replace(
-        toe=PRESETS["identified"].heel, heel=PRESETS["identified"].toe
-    ),
-    "own masses": PRESETS["identified"].replace(masses=tuple(np.linspace(3, 0.2, 14)), inertia="paper"),
-    **{
-        f"ensemble {k}": load_geometry(member)
-        for k, member in enumerate(load_ensemble("identified"))
-        if k % 5 == 0
-    },
+    "first_fit": LEG,
+    "identified": OTHER,
+    "mirrored": LEG.replace(travel=-LEG.travel),
+    "other toe": OTHER.replace(toe=OTHER.heel, heel=OTHER.toe),
+    "own masses": OTHER.replace(masses=tuple(np.linspace(3, 0.2, 14)), inertia="paper"),
+    **{f"ensemble {k}": load_geometry(m) for k, m in enumerate(load_ensemble("identified")) if k % 5 == 0},
 }
-RUN = load_gait("run", "first_fit")
-GROUND = ((-40.0, 900.0), (25.0, 1700.0))
-AIR = ((0.0, 0.0), (0.0, 0.0))
-
-
-def columns(count, seed=0):
-    """Random states of legs, rows as `solve` has columns, shape (14, count); their angles theta and beta."""
-    rng = np.random.default_rng(seed)
-    theta, beta = rng.uniform(0, 2 * np.pi, count), rng.uniform(-0.5, 0.5, count)
-    rates = rng.normal(0, 10, (4, count))
-    state = [np.cos(theta), np.sin(theta), rates[0], rates[1], np.cos(beta), np.sin(beta), rates[2], rates[3]]
-    return np.array([*state, *rng.normal(0, 5, (2, count)), *rng.normal(0, 500, (4, count))]), theta, beta
-
-
-def cross(arms, forces):
-    """Moments, shape (...), of forces at arms, shape (..., 2)."""
-    return arms[..., 0] * forces[..., 1] - arms[..., 1] * forces[..., 0]
-
-
-class State(Layout):
-    """What `columns` has."""
-
-    turn: Vector
-    rate: Row
-    acceleration: Row
-    frame_turn: Vector
-    frame_rate: Row
-    frame_acceleration: Row
-    lift: Vector
-    toe: Vector
-    heel: Vector
-
-
-CONSTANTS = LegConstants.size
-
-
-@njit(error_model="numpy")
-def solve(state, constants, out):
-    """A leg a column: turn, rate and acceleration of crank and of frame, lift, forces on toe and heel."""
-    count = state.shape[1]
-    g = rows(doubles(CONSTANTS), 1, LegConstants)
-    fill(g, columns_of(address(constants), 1, LegConstants, 0, 1, 1))
-    for k in range(count):
-        now = columns_of(address(state), 1, State, k, count, 1)
-        kept = columns_of(address(out), 1, Reactions, k, count, 1)
-        joints, lock, driver, hip = leg_reactions(
-            g, now.turn, now.rate, now.acceleration, now.frame_turn, now.frame_rate, now.frame_acceleration,
-            now.lift, now.toe, now.heel,
-        )  # fmt: skip
-        store_vectors(kept.joints, joints)
-        kept.lock, kept.driver, kept.hip = lock, driver, hip
-
-
-def solved(geometry, state):
-    """Reactions of legs alike by name, last axis the legs."""
-    out = np.full((Reactions.size, state.shape[1]), np.nan)
-    solve(np.ascontiguousarray(state), leg_constants(geometry), out)
-    return views(Reactions, out)
 
 
 def assert_close(value, expected, scale, rtol=1e-9):
     np.testing.assert_allclose(value, expected, rtol=0, atol=rtol * scale)
 
 
-@pytest.mark.parametrize("forces", [AIR, GROUND], ids=["air", "ground"])
+def leg_motion(engine, i):
+    """All links of a leg as the engine says it moves, and the ground's forces on toe and heel."""
+    r, s = ({name: row[..., 0] for name, row in rows.items()} for rows in (engine.report, engine.state))
+    limb, side = engine.limbs[i], engine.limbs[i].geometry.travel
+    arm = np.exp(1j * s["pitch"]) * complex(*limb.hip)
+    place = complex(r["x"], r["y"]) + arm
+    acc = complex(r["ax"], r["ay"]) + (1j * r["pitch_acc"] - r["pitch_rate"] ** 2) * arm
+    frame = FrameMotion(
+        r["phi"][i] + side * s["pitch"], r["phi_rate"][i] + side * r["pitch_rate"],
+        r["phi_acc"][i] + side * r["pitch_acc"],
+        position=(place.real, place.imag), acceleration=(acc.real, acc.imag),
+    )  # fmt: skip
+    motion = pose(limb.geometry, s["theta"][i], s["theta_rate"][i], r["theta_acc"][i], frame)
+    return motion, *(np.array([r[f"{p}_friction"][i], r[f"{p}_normal"][i]]) for p in ("toe", "heel"))
+
+
+@pytest.mark.parametrize("height", [-0.05, 10.0], ids=["ground", "air"])
 @pytest.mark.parametrize("geometry", LEGS.values(), ids=LEGS)
-def test_reactions_are_the_multipliers_of_eq_8(geometry, forces):
-    leg = ConstrainedLeg(geometry, Ground())
-    sigma, state = geometry.travel, leg.state
-    for theta in np.linspace(0.1, 6.2, 12):
-        leg.reset(RUN, theta)
-        state.filters["rate"], state.filters["acc"] = (3.0, 1.0, -0.7, 0.4), (0.0, 5.0, 8.0, -3.0)
-        evaluate_motion(state.motion, state.filters)
-        state.q, state.qd = closed_form(geometry, state.motion)
-        for contact, (friction, normal) in zip(state.contacts, forces, strict=True):
-            contact["friction"], contact["normal"] = friction, normal
-        turn, beta = np.exp(1j * theta), np.exp(1j * sigma * state.motion["phi"])
-        motion = state.motion
-        found = solved(geometry, np.array([[
-            turn.real, turn.imag, motion["theta_rate"], motion["theta_acc"],
-            beta.real, beta.imag, sigma * motion["phi_rate"], sigma * motion["phi_acc"],
-            0.0, GRAVITY, *forces[0], *forces[1],
-        ]]).T)  # fmt: skip
-        expected = leg.reactions()
-        scale = np.abs(expected.joints).max()
-        assert_close(found.joints[:, 0].reshape(-1, 2), expected.joints, scale)
-        assert_close(found.lock[0], expected.lock, scale * geometry.lengths["EF"])
-        assert_close(found.driver[0], expected.driver, scale * geometry.lengths["OP"])
-        hip = sigma * leg.solve()[1] @ leg.closure().by_phi
-        assert_close(found.hip[0], hip, scale * geometry.lengths["EF"])
+def test_every_body_obeys_newton_and_euler(geometry, height):
+    """Under a trunk that moves and pitches, with commands on the move, a motor and a prescribed crank."""
+    limbs = [Limb(geometry, (0.4, 0.1), Motor()), Limb(geometry, (-0.4, 0.0), Prescribed())]
+    trunk = Trunk("free", mass=150.0, height=geometry.hip_height + height, pitch_inertia=30.0)
+    engine = TrunkEngine(limbs, trunk, NATURAL, reactions=True)
+    engine.reset([RUN, WALK], [0.4, 2.0], vx=1.0, pitch_rate=0.3)
+    highest = 0.0
+    for k in range(8):
+        assert not engine.advance([9.0 - k, 0.3 + 0.1 * k, -0.4, 0.1 * k], 30).any()
+        found = engine.reactions()
+        for i in range(2):
+            motion, toe, heel = leg_motion(engine, i)
+            joints, *moments = (part[i, ..., 0] for part in found)
+            force, moment = loads(geometry, motion, joints, *moments, toe, heel)
+            need, turn = inertia(geometry, motion)
+            scale, highest = np.abs(joints).max(), max(highest, toe[1] + heel[1])
+            assert_close(force[:14], need, scale)
+            assert_close(moment[:14], turn, scale)
+            assert_close(moment[FRAME], 0, scale)
+    assert (highest > 100) == (height < 0)
 
 
-@pytest.mark.parametrize("name", ["first_fit", "identified", "mirrored", "other toe", "own masses"])
-def test_every_body_obeys_newton_and_euler(name):
-    """With a hip that accelerates, and a frame that turns: forces and moments from positions by `pose`."""
-    geometry = LEGS[name]
-    state, theta, beta = columns(20)
-    found = solved(geometry, state)
-    sigma = geometry.travel
-    for k in range(state.shape[1]):
-        column, pushes = state[:, k], found.joints[:, k].reshape(-1, 2)
-        lift = column[8:10]
-        frame = FrameMotion(
-            sigma * beta[k], sigma * column[6], sigma * column[7], acceleration=(lift[0], lift[1])
-        )
-        motion = pose(geometry, theta[k], column[2], column[3], frame)
-        need = geometry.body_masses[:, None] * motion.centre_accelerations
-        turn = geometry.body_inertias * motion.angular_accelerations
-        force, moment = np.zeros((15, 2)), np.zeros(15)  # the last is the leg's frame, about O
-        centres = np.vstack([motion.centres, [0, 0]])
-
-        def act(body, point, push, force=force, moment=moment, motion=motion, centres=centres):
-            force[body] += push
-            moment[body] += cross(motion.point(point) - centres[body], push)
-
-        for joint, push in zip(JOINTS, pushes, strict=True):
-            act(joint.i, joint.point, push)
-            act(joint.j, joint.point, -push)
-        moment[LOCKED[0]] += found.lock[k]
-        moment[LOCKED[1]] -= found.lock[k]
-        moment[CRANK] += found.driver[k]
-        moment[FRAME] += found.hip[k] - found.driver[k]
-        sole = next(i for i, body in enumerate(BODIES) if (body.tail, body.head) == ("I", "J"))
-        act(sole, geometry.toe, column[10:12])
-        act(sole, geometry.heel, column[12:14])
-        scale = np.abs(pushes).max()
-        assert_close(force[:14], need, scale)
-        assert_close(moment[:14], turn, scale)
-        assert_close(moment[FRAME], 0, scale)
-
-        # The whole leg: what the trunk gives at the hip and the ground at the hoof moves all its links.
-        ground = column[10:12] + column[12:14]
-        assert_close(-force[FRAME] + ground, need.sum(axis=0), scale)
-        about = cross(motion.centres, need).sum() + turn.sum()
-        about -= cross(motion.point(geometry.toe), column[10:12])
-        about -= cross(motion.point(geometry.heel), column[12:14])
-        assert_close(found.hip[k], about, scale)
+@pytest.mark.parametrize("preset", ["first_fit", "identified"])
+@pytest.mark.parametrize("theta", [0.3, 2.0, 4.4])
+def test_a_prescribed_crank_has_the_reactions_of_eq_8(preset, theta):
+    leg, gait = load_geometry(preset), load_gait("run", preset)
+    full = ConstrainedLeg(leg, NATURAL)
+    full.reset(gait, theta=theta)
+    expected = full.reactions()
+    trunk = Trunk("fixed", height=leg.hip_height)
+    engine = TrunkEngine(Limb(leg, drive=Prescribed()), trunk, NATURAL, reactions=True)
+    engine.reset(gait, theta)
+    found, scale = engine.reactions(), np.abs(expected.joints).max()
+    assert_close(found.joints[0, :, :, 0], expected.joints, scale)
+    for name in ("lock", "driver", "hip"):
+        assert_close(getattr(found, name)[0, 0], getattr(expected, name), scale)
 
 
-def test_a_massless_leg_in_the_air_carries_nothing():
-    geometry = PRESETS["identified"].replace(masses=(1e-12,) * 14)
-    state, _, _ = columns(50)
-    state[10:] = 0
-    found = solved(geometry, state)
-    assert max(np.abs(part).max() for part in vars(found).values()) < 1e-6
+def walker(n=1, **settings):
+    hips = [(x, 0.05) for x in (-0.75, -0.7, 0.7, 0.75)]
+    made = horse(NATURAL, None, hips, settings | {"num_envs": n}, height=LEG.hip_height - 0.05, drag=30.0)
+    made.reset(WALK, np.linspace(0, 6, n) + 1.5 * np.arange(4)[:, None], vx=1.0)
+    return made
+
+
+def test_forces_and_moments_at_the_hips_move_the_trunk():
+    engine = walker(reactions=True)
+    trunk = engine.trunk
+    at_frame = [k for k, joint in enumerate(JOINTS) if joint.j == FRAME]
+    for _ in range(20):
+        engine.advance(steps=10)
+        found, r = engine.reactions(), {name: row[..., 0] for name, row in engine.report.items()}
+        on_trunk = -found.joints[..., 0][:, at_frame].sum(1)  # (legs, 2): by each leg's frame
+        outer = np.add(on_trunk.sum(0), (-trunk.drag * r["vx"], -trunk.mass * GRAVITY))
+        scale = np.abs(on_trunk).sum()
+        assert_close(outer, trunk.mass * np.array([r["ax"], r["ay"]]), scale, 1e-8)
+        arms = np.exp(1j * engine.state["pitch"]) * [complex(*limb.hip) for limb in engine.limbs]
+        moment = (arms.conj() * (on_trunk @ [1, 1j])).imag.sum() - found.hip[:, 0].sum()
+        # A rotor is not among the links: it turns with the frame and, geared, with the crank.
+        motor, side = engine.limbs[0].drive, LEG.travel
+        turning = r["pitch_acc"] + side * r["phi_acc"] - side * motor.gear_ratio * r["theta_acc"]
+        moment -= motor.rotor_inertia * turning.sum()
+        assert_close(moment, trunk.pitch_inertia * r["pitch_acc"], scale, 1e-8)
+
+
+def test_reactions_change_no_bit_of_the_motion_and_are_the_same_in_a_batch():
+    alone, batch, silent = walker(reactions=True), walker(40, reactions=True), walker(40)
+    for engine in (alone, batch, silent):
+        assert not engine.advance(steps=50).any()
+    for name, row in batch.state.items():
+        np.testing.assert_array_equal(row, silent.state[name], name)
+    for one, many in zip(alone.reactions(), batch.reactions(), strict=True):
+        np.testing.assert_array_equal(one[..., 0], many[..., 0])
+
+
+def test_an_engine_without_them_says_so():
+    with pytest.raises(ParameterError, match="reactions=True"):
+        walker().reactions()

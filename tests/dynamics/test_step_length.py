@@ -2,6 +2,7 @@
 
 import re
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,15 +11,11 @@ from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import TRUNKS, Limb, Motor, Prescribed, Trunk
 from hoof_env.dynamics.step_length import MOST_SUBSTEPS, StepWarning
 from hoof_env.dynamics.stepping import SCHEMES
-from hoof_env.gait.gait import GaitParameters, load_gait
+from hoof_env.gait.gait import GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
-from hoof_env.leg.geometry import load_geometry
+from tests.dynamics.scenes import LEG, LOWEST, NATURAL, THETA, WALK, drives_less_losses, energy, horse
 
-LEG = load_geometry("first_fit")
-WALK = load_gait("walk", "first_fit")
-THETA, LOWEST = np.array([4.02, 4.18, 4.1, 4.14]), 1.389  # soles level, and how far they are below O [m]
-HIPS = (-0.75, -0.65, 0.65, 0.75)
 FAR = 60.0  # above the ground [m]
 
 
@@ -26,44 +23,35 @@ def damped(floor, restitution=0.5):
     return Ground(restitution=restitution, approach_floor=floor, friction_fast=0.05)
 
 
-def horse(ground, drive=None, substeps=None, num_envs=1, **trunk):
-    trunk = {"kind": "free", "mass": 320.0, "height": LOWEST, "pitch_inertia": 80.0, "drag": 0.0} | trunk
-    limbs = [Limb(LEG, (x, 0.0), drive or Motor()) for x in HIPS]
-    return TrunkEngine(limbs, Trunk(**trunk), ground, substeps=substeps, num_envs=num_envs)
-
-
-def quiet_horse(*args, **settings):
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", StepWarning)
-        return horse(*args, **settings)
+def many(floor, **settings):
+    """24 horses."""
+    return horse(damped(floor), settings={"num_envs": 24} | settings)
 
 
 def walk(engine):
     """How far the energy account is from closing after 0.5 s, over the work [-]; infinite for failures."""
     n = engine.num_envs
     engine.reset(WALK, np.linspace(0, 2 * np.pi, n, endpoint=False) + np.arange(4)[:, None] * 1.57)
-    first = engine.tally()
-    result = engine.advance(steps=500)
-    last, total = engine.tally(), engine.account
-    works = total["crank_work"] + total["swing_work"]
+    first = energy(engine)
+    result, total = engine.advance(steps=500), engine.account
+    gap = np.abs(energy(engine) - first - drives_less_losses(engine))
     losses = sum(total[name] for name in total if name.endswith("_loss"))
-    change = last.kinetic + last.potential - first.kinetic - first.potential
-    gap = np.abs(change - (works - total["ground_stored"] - losses))
     size = np.abs(total["crank_work"]) + np.abs(total["swing_work"]) + losses
     return np.where(result == 0, gap / size, np.inf)
 
 
+@pytest.mark.filterwarnings("ignore::hoof_env.dynamics.step_length.StepWarning")
 def test_slow_touch_downs_get_the_substeps_that_they_need():
-    chosen = horse(damped(1e-2), num_envs=24)
+    chosen = many(1e-2)
     assert 5 < chosen.substeps < MOST_SUBSTEPS
     assert chosen.step_limits["damping"] * chosen.substeps >= 1e-3
     assert walk(chosen).max() < 1e-4
-    assert walk(quiet_horse(damped(1e-2), substeps=1, num_envs=24)).max() > 0.1
+    assert walk(many(1e-2, substeps=1)).max() > 0.1
 
 
 def test_a_floor_too_low_for_any_substeps_is_named_with_one_that_would_do():
     with pytest.warns(StepWarning, match=r"damping of this ground") as caught:
-        engine = horse(damped(1e-4), num_envs=24)
+        engine = many(1e-4)
     assert engine.substeps == MOST_SUBSTEPS
     found = re.search(r"or an approach_floor of (\S+) m/s, not 0.0001$", str(caught[0].message))
     assert walk(engine).max() > 0.1  # the warning is true
@@ -136,12 +124,13 @@ def test_a_stiff_support_gets_the_substeps_that_it_needs(change):
         assert height(1)[1] > 0.02
 
 
+@pytest.mark.filterwarnings("ignore::hoof_env.dynamics.step_length.StepWarning")
 def test_standing_forces_are_clean_at_the_step_that_friction_asks_for():
     """The numbers in the docstring of `TrunkEngine`."""
     stand = GaitParameters(0.0, WALK.swing_offset, 0.0, 0.0)
 
     def forces(substeps):
-        engine = quiet_horse(damped(0.1), substeps=substeps)
+        engine = horse(NATURAL, settings={"substeps": substeps})
         engine.reset(stand, THETA)
         engine.advance(steps=500)
         record = engine.run(steps=300)
@@ -154,3 +143,37 @@ def test_standing_forces_are_clean_at_the_step_that_friction_asks_for():
     size = np.sqrt((finest**2).mean())
     assert np.sqrt(((fine - finest) ** 2).mean()) < 1e-3 * size
     assert np.sqrt(((coarse - finest) ** 2).mean()) > 0.5 * size
+
+
+def stiff(scheme, substeps=None):
+    """A horse of 500 kg comes down from 5 cm at a walk on 1 MN/m^1.5; height, pitch and cranks on the way."""
+    hips = [(x, 0.0) for x in (-1.5, -1.4, -0.1, 0.0)]
+    settings, mass = {"integrator": scheme, "substeps": substeps}, 500.0 - 4 * LEG.mass
+    ground = replace(NATURAL, stiffness=1e6)
+    e = horse(ground, None, hips, settings, mass=mass, height=LOWEST + 0.05, pitch_inertia=100.0)
+    e.reset(WALK, THETA)
+    way, most = [], 0.0
+    for _ in range(30):
+        assert not e.advance(steps=10).any()
+        way.append([e.report["y"][0], e.state["pitch"][0], *e.state["theta"][:, 0]])
+        most = max(most, e.report["toe_normal"].max())
+    assert most > e.weight / 4
+    return e, np.array(way)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_stiff_ground_gets_the_substeps_that_it_needs(scheme):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", StepWarning)
+        chosen, way = stiff(scheme)
+        _, fine = stiff(scheme, 8 * chosen.substeps)
+    needed = f"expected at most .* s, that is substeps={chosen.substeps} of sim_dt = 0.001 s"
+    with pytest.warns(StepWarning, match=f"steps of 0.001 s are too long .*: {needed}"):
+        _, coarse = stiff(scheme, 1)
+    error, too_long = np.abs(way - fine), np.abs(coarse - fine)
+    assert error.max() < 1e-3
+    assert too_long.max() > 4 * error.max()
+
+
+def test_soft_ground_needs_no_more_than_the_step():
+    assert TrunkEngine(Limb(LEG), Trunk("free", mass=100.0)).substeps == 1

@@ -7,20 +7,16 @@ from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import GRAVITY, Limb, Prescribed, Trunk
 from hoof_env.errors import ParameterError
 from hoof_env.gait.gait import GaitParameters
-from hoof_env.ground.contact import Ground
-from hoof_env.leg.geometry import load_geometry
+from tests.dynamics.scenes import LEG
 
-LEG = load_geometry("first_fit")
 STILL = GaitParameters(0.0, 0.4, 0.0, 0.0)
 NOTHING = {"share": 0.0, "stiffness": 0.0, "damping": 0.0, "drag": 0.0, "height": 30.0}
 
 
 def play(trunk, seconds, h=1e-4, **start):
-    engine = TrunkEngine(Limb(LEG, drive=Prescribed()), trunk, Ground(), sim_dt=h)
+    engine = TrunkEngine(Limb(LEG, drive=Prescribed()), trunk, sim_dt=h)
     engine.reset(STILL, **start)
-    trace = {
-        name: np.ravel(values) for name, values in engine.run(STILL.to_array(), round(seconds / h)).items()
-    }
+    trace = {name: np.ravel(values) for name, values in engine.run(steps=round(seconds / h)).items()}
     assert not trace["result"].any()
     assert not (trace["toe_normal"] + trace["heel_normal"]).any()
     return trace, trunk.mass + LEG.mass

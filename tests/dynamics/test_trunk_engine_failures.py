@@ -1,4 +1,4 @@
-"""Dead points, reports after a failure, records of a run."""
+"""How runs end that go wrong: what is no number, dead points, falls; and that neighbours do not notice."""
 
 import numpy as np
 import pytest
@@ -6,31 +6,58 @@ import pytest
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limb, Motor, Prescribed, Result, Trunk
 from hoof_env.errors import ParameterError
-from hoof_env.gait.gait import GaitParameters, load_gait
-from hoof_env.leg.geometry import load_geometry
+from hoof_env.gait.gait import GaitParameters
+from hoof_env.ground.contact import Ground
+from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.profile import functions
+from tests.dynamics.scenes import LEG, RUN, WALK, drives_less_losses, energy, same
 
-LEG = load_geometry("first_fit")
-WALK = load_gait("walk", "first_fit")
 ROCKER = LEG.replace(lengths={"CF": 0.8 * LEG.lengths["CF"]}, full_turn=False)
 END = np.radians(144.5)  # where the engine knows no more: the crank's dead point is some 1 deg on
-FAR = 60.0  # above the ground [m]
+HANGING = Trunk("suspended", height=LEG.hip_height)
+LIMBS = (Limb(LEG, (0.4, 0.0), Motor()), Limb(LEG, (-0.4, 0.0), Prescribed()))
+FREE = Trunk("free", mass=100.0, height=1.6)
 
 
-def engine(drive, n=1, kind="fixed", geometry=ROCKER, extra=()):
-    limbs = [Limb(geometry, (0.0, 0.0), drive), *extra]
-    return TrunkEngine(limbs, Trunk(kind, mass=80.0, height=FAR, drag=0.0), num_envs=n)
+def aloft(drive, n=1, kind="fixed", geometry=ROCKER, extra=()):
+    trunk = Trunk(kind, mass=80.0, height=60.0, drag=0.0)
+    return TrunkEngine([Limb(geometry, (0.0, 0.0), drive), *extra], trunk, num_envs=n)
 
 
-def same(one, other, env=...):
-    return all(np.array_equal(one[name][..., env], other[name][..., env]) for name in one)
+@pytest.mark.parametrize("n", [1, 3, 9])
+@pytest.mark.parametrize("row", ["theta_rate", "swing_sin_rate"])
+@pytest.mark.parametrize(
+    ("limbs", "trunk"), [((Limb(LEG),), HANGING), (LIMBS, FREE)], ids=["leg", "two legs"]
+)
+def test_what_is_no_number_any_more_is_a_result_of_one_alone(limbs, trunk, n, row):
+    well, ill = (TrunkEngine(limbs, trunk, num_envs=n, strides=True) for _ in range(2))
+    for engine in (well, ill):
+        engine.reset(WALK, np.linspace(0, 3, n)[None].repeat(len(limbs), 0))
+        engine.advance(WALK.to_array(), 300)
+        state = engine.get_state()
+        if engine is ill:
+            state["limbs"][0, list(engine.state)[7:].index(row), 0] = 1e300
+        engine.set_state(state)
+    report = well.report
+    well.advance(steps=100)
+    assert ill.advance(steps=100).tolist() == [Result.NOT_FINITE] + [Result.OK] * (n - 1)
+    assert "finite" in ill.messages()[0]
+    assert ill.messages()[1:] == ["ok"] * (n - 1)
+    now = ill.get_state()
+    assert all((now[name][..., 0] == state[name][..., 0]).all() for name in ("trunk", "limbs", "account"))
+    for name in ("x", "toe_y"):
+        assert (ill.report[name][..., 0] == report[name][..., 0]).all()  # of the state that is kept
+    for part in ("state", "report", "account", "strides"):
+        assert same(getattr(ill, part), getattr(well, part), slice(1, None))
+    ill.reset(WALK, envs=[0])
+    assert not ill.advance(steps=3).any()
 
 
 @pytest.mark.parametrize("kind", ["fixed", "free"])
 @pytest.mark.parametrize("drive", [Prescribed(), Motor()])
 @pytest.mark.parametrize("n", [2, 9])
 def test_a_crank_driven_past_its_end(kind, drive, n):
-    e = engine(drive, n, kind)
+    e = aloft(drive, n, kind)
     gait = GaitParameters(2.0, 0.3, 0.0, 0.0)
     e.reset(gait, np.r_[2.0, np.full(n - 1, -1.0)][None])
     results, before, report = [], None, None
@@ -48,58 +75,78 @@ def test_a_crank_driven_past_its_end(kind, drive, n):
     assert not e.advance(steps=10).any()
 
 
+@pytest.mark.parametrize("calls", [1, 60, 600])
+def test_no_crank_passes_a_dead_point_unnoticed(calls):
+    engine = aloft(Prescribed())
+    engine.reset(GaitParameters(8.0, 0.3, 0.0, 0.0), 2.0)
+    results = [int(engine.advance(steps=600 // calls)[0]) for _ in range(calls)]
+    assert Result.DEAD_POINT in results
+    assert np.isfinite(engine.account["crank_work"]).all()
+    assert engine.state["theta"][0, 0] < 6.0
+
+
 def test_a_crank_that_rocks_keeps_its_energy_account():
-    e = engine(Motor(), kind="free", extra=[Limb(LEG, (0.3, 0.0), Prescribed())])
+    e = aloft(Motor(), kind="free", extra=[Limb(LEG, (0.3, 0.0), Prescribed())])
     e.reset(GaitParameters(3.0, 0.3, 0.2, -0.1), [-1.5, 1.0])
-    first = e.tally()
+    before = energy(e)
     assert not e.advance(steps=1000).any()
-    last, total = e.tally(), e.account
-    work = total["crank_work"][0] + total["swing_work"][0]
-    change = last.kinetic[0] + last.potential[0] - first.kinetic[0] - first.potential[0]
-    assert change == pytest.approx(work, abs=1e-4 * abs(last.kinetic[0]))
-    theta, r = e.state["theta"][0], e.report
-    toe = functions(ROCKER, theta)[0][0, 0] + 1j * functions(ROCKER, theta)[0][0, 1]
-    turn = np.exp(1j * (e.state["pitch"][0] + ROCKER.travel * r["phi"][0, 0]))
-    assert r["toe_x"][0, 0] + 1j * r["toe_y"][0, 0] == pytest.approx(
-        r["x"][0] + 1j * r["y"][0] + turn * toe, abs=1e-10
+    assert energy(e) - before == pytest.approx(drives_less_losses(e), abs=1e-4 * e.tally().kinetic[0])
+    r, toe = (
+        {name: row[..., 0] for name, row in e.report.items()},
+        functions(ROCKER, e.state["theta"][0])[0][0],
     )
+    turn = np.exp(1j * (e.state["pitch"][0] + ROCKER.travel * r["phi"][0]))
+    expected = complex(r["x"], r["y"]) + turn * complex(toe[0], toe[1])
+    assert complex(r["toe_x"][0], r["toe_y"][0]) == pytest.approx(expected, abs=1e-10)
 
 
-def test_no_start_where_the_links_have_no_place():
-    e = engine(Motor(), 2)
-    with pytest.raises(ParameterError, match="theta: the links of leg 0 have no place at some of"):
-        e.reset(WALK, np.array([[0.0, np.pi]]))
+@pytest.mark.parametrize("level", [0.0, -0.4])
+def test_a_trunk_that_falls_through_soft_ground(level):
+    e = TrunkEngine(LIMBS, FREE, Ground(stiffness=10.0), Terrain((level,)), num_envs=2)
+    e.reset([RUN, WALK], y=[1.0, 40.0])
+    kept, results = None, []
+    for _ in range(100):
+        kept = e.get_state()
+        results.append(e.advance(steps=10)[0])
+        if results[-1]:
+            break
+    assert results[-1] == Result.FALLEN
+    assert set(results[:-1]) == {Result.OK}
+    assert "fell through the ground" in e.messages()[0]
+    now = e.get_state()
+    assert (now["trunk"][:, 0] == kept["trunk"][:, 0]).all()
+    assert (now["limbs"][..., 0] == kept["limbs"][..., 0]).all()
+    assert now["trunk"][0, 1] > kept["trunk"][0, 1]  # the other one goes on
+    assert level < e.report["y"][0] + 0.2
+    assert now["trunk"][2, 0] > level - 0.5
 
 
-@pytest.mark.parametrize("value", [{"theta": 1e10}, {"x": -1e10}, {"y": 1e300}, {"pitch": 1e300}])
-def test_what_is_too_far_to_be_told_is_refused(value):
-    e = engine(Motor(), kind="free", geometry=LEG)
-    with pytest.raises(ParameterError, match=rf"{next(iter(value))}: expected numbers within \+-1e\+09"):
-        e.reset(WALK, **value)
+@pytest.mark.parametrize("n", [1, 8])
+def test_a_start_that_fails_is_whole(n):
+    """It fails again at once, from the momentum that its speed means."""
+    engine = TrunkEngine(Limb(LEG), HANGING, num_envs=n)
+    engine.reset(WALK, 0.0, y=-0.01, vx=1.0)
+    assert set(engine.results) == {Result.FALLEN}
+    assert engine.state["momentum_x"] == pytest.approx(engine.tally().momentum.real)
+    np.testing.assert_array_equal(engine.report["vx"], np.ones(n))
+    assert set(engine.advance(steps=1)) == {Result.FALLEN}
 
 
-@pytest.mark.parametrize("n", [3, 9])
-def test_a_report_is_of_the_state_that_is_kept(n):
-    e = engine(Motor(), n, "free", LEG)
-    e.reset(WALK, np.linspace(0, 1, n)[None])
-    e.advance(steps=20)
-    state, before = e.get_state(), e.report
-    state["limbs"][0, 1, 1] = 1e200  # the crank's rate, whose square is no number
-    e.set_state(state)
-    assert e.advance(steps=5).tolist() == [0, Result.NOT_FINITE] + [0] * (n - 2)
-    assert same({"x": e.report["x"], "toe_y": e.report["toe_y"]}, before, 1)
-    assert e.messages()[0] == "ok"
-    alone = engine(Motor(), n, "free", LEG)
-    alone.reset(WALK, np.linspace(0, 1, n)[None])
-    alone.advance(steps=20)
-    alone.advance(steps=5)
-    assert same(e.report, alone.report, 0)
-    assert same(e.state, alone.state, 0)
-    assert same(e.account, alone.account, 0)
+@pytest.mark.parametrize("n", [3, 8, 9])
+def test_a_reset_leaves_results_and_sums_of_the_others(n):
+    engine = TrunkEngine(Limb(LEG), HANGING, num_envs=n, strides=True)
+    y, vy = np.full(n, 1.7), np.zeros(n)
+    y[1], vy[1] = 0.05, -100.0
+    engine.reset(WALK, 0.0, y=y, vy=vy)
+    assert list(engine.advance(steps=2)[:3]) == [Result.OK, Result.FALLEN, Result.OK]
+    before = engine.strides
+    engine.reset(WALK, 0.0, envs=[0])
+    assert list(engine.results[:3]) == [Result.OK, Result.FALLEN, Result.OK]
+    assert same(engine.strides, before, slice(1, None))
 
 
 def test_a_state_that_is_put_back_is_reported_and_kept_to_the_bit():
-    one, other = engine(Motor(), 2, "free", LEG), engine(Motor(), 2, "free", LEG)
+    one, other = (TrunkEngine(Limb(LEG), FREE, num_envs=2) for _ in range(2))
     one.reset(WALK, 0.5, envs=[1])  # the other one is nowhere
     one.advance(steps=30)
     state = one.get_state()
@@ -112,7 +159,7 @@ def test_a_state_that_is_put_back_is_reported_and_kept_to_the_bit():
 
 
 def test_the_record_of_a_run():
-    one, other = (engine(Motor(), 2, "free", LEG) for _ in range(2))
+    one, other = (TrunkEngine(Limb(LEG), FREE, num_envs=2) for _ in range(2))
     for e in (one, other):
         e.reset(WALK, np.array([[0.0, 1.0]]))
     command = [5.0, 0.3, 0.1, 0.0]
@@ -128,7 +175,7 @@ def test_the_record_of_a_run():
 
 
 def test_a_run_that_fails_ends_its_record():
-    e = engine(Prescribed(), 2)
+    e = aloft(Prescribed(), 2)
     e.reset(GaitParameters(2.0, 0.3, 0.0, 0.0), np.array([[2.0, -1.0]]))
     record = e.run(steps=1000, every=20)
     assert record["result"].tolist() == [Result.DEAD_POINT, Result.OK]
@@ -136,3 +183,21 @@ def test_a_run_that_fails_ends_its_record():
     assert np.isfinite(record["theta"]).all()
     with pytest.raises(ParameterError, match="every: expected a whole number, 1 or more, got 0"):
         e.run(steps=10, every=0)
+
+
+def test_a_state_cannot_point_outside_the_tables():
+    engine = TrunkEngine(Limb(LEG), HANGING)
+    engine.reset(WALK, 0.3)
+    state = engine.get_state()
+    state["limb_settings"][:, 4] = 1e12
+    engine.set_state(state)
+    assert engine.advance(steps=10)[0] == Result.OK
+
+
+def test_one_gait_and_one_command_are_for_all_legs():
+    one, each = (TrunkEngine(LIMBS, FREE, num_envs=3) for _ in range(2))
+    one.reset(RUN, 0.5)
+    each.reset([RUN, RUN], [[0.5] * 3] * 2, theta_rate=RUN.crank_speed, envs=[True] * 3)
+    one.advance(WALK.to_array(), 30)
+    each.advance(np.tile(WALK.to_array()[:, None], (2, 1, 3)), 30)
+    assert same(one.state, each.state)

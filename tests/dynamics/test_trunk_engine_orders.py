@@ -8,17 +8,14 @@ import pytest
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limb, Motor, Prescribed, Trunk
 from hoof_env.dynamics.stepping import SCHEMES
-from hoof_env.gait.gait import GaitParameters, load_gait
-from hoof_env.ground.contact import Ground
-from hoof_env.leg.geometry import load_geometry
+from hoof_env.gait.gait import GaitParameters
+from tests.dynamics.scenes import FAR, LEG, RUN, WALK
 from tests.oracle.horse import PlainHorse
 from tests.oracle.run import simulate
 
-LEG = load_geometry("first_fit")
 OTHER = LEG.replace(travel=-LEG.travel, lengths={"FG": 0.6})
-GAITS = (load_gait("run", "first_fit"), load_gait("walk", "first_fit"))
+GAITS = (RUN, WALK)
 MOTOR = Motor(speed_gain=60.0, torque_limit=1e4, rotor_inertia=4e-4)
-FAR = Ground(stiffness=100.0)  # out of reach, and soft enough for any step
 THETA, RATE, SECONDS = (1.0, 4.0), (6.0, 9.0), 0.05
 MOVES = {
     "fixed": ((0.0, 3.0, 0.0), (0.0, 0.0, 0.0)),

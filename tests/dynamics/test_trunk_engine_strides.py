@@ -1,95 +1,122 @@
-"""Stances, peaks and work of a run are what its record says, counted by the environments' earlier account."""
+"""The rule of a stance, beside one that splits the load anew; stances, peaks and work of a run are what its
+record says."""
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import settings as draws
+from hypothesis import strategies as st
 
 from hoof_env.dynamics.engine import TrunkEngine
+from hoof_env.dynamics.observables import StanceCounter
 from hoof_env.dynamics.parts import Limb, Prescribed, Trunk
 from hoof_env.errors import ParameterError
-from hoof_env.gait.gait import load_gait
-from hoof_env.ground.contact import Ground
-from hoof_env.leg.geometry import load_geometry
+from tests.dynamics.scenes import LEG, RUN
 
-LEG, RUN = load_geometry("first_fit"), load_gait("run", "first_fit")
-LIMB = Limb(LEG, drive=Prescribed())
 TRUNKS = {
     "suspended": Trunk(height=LEG.hip_height),
     "fixed": Trunk(kind="fixed", height=LEG.hip_height - 0.05),
 }
 
 
-def stances(load, force, theta, threshold):
+def engine(kind="suspended", legs=1, strides=True):
+    made = TrunkEngine([Limb(LEG, drive=Prescribed())] * legs, TRUNKS[kind], strides=strides)
+    made.reset(RUN, 0.3 + np.arange(legs))
+    return made
+
+
+def peaks_of(loads, angles, forces, threshold):
     """Peaks of all stances: split where the load ends or after a revolution."""
     peaks, opened = [], None
-    for n, f, angle in zip(load, force, theta, strict=True):
-        if n <= threshold:
+    for normal, theta, grf in zip(loads, angles, forces, strict=True):
+        if normal <= threshold:
             opened = None
-        elif opened is None or angle - opened >= 2 * np.pi:
-            opened = angle
-            peaks.append(f)
+        elif opened is None or theta - opened >= 2 * np.pi:
+            opened = theta
+            peaks.append(grf)
         else:
-            peaks[-1] = max(peaks[-1], f)
+            peaks[-1] = max(peaks[-1], grf)
     return peaks
+
+
+def play(loads, angles, forces, threshold):
+    """The stance after all, and what its running peaks have grown by."""
+    stance = StanceCounter(threshold)
+    return stance, sum(stance.add(*now) for now in zip(angles, loads, forces, strict=True))
+
+
+@given(st.lists(st.floats(0, 1e4), min_size=1, max_size=60), st.floats(0.01, 1.5),
+       st.sampled_from([0.0, 40.0, 2000.0]))  # fmt: skip
+@draws(max_examples=100, deadline=None)
+def test_over_any_load_the_increases_add_up_to_the_peaks(loads, turn, threshold):
+    angles, forces = turn * np.arange(len(loads)), 1.1 * np.array(loads)
+    stance, grown = play(loads, angles, forces, threshold)
+    peaks = peaks_of(loads, angles, forces, threshold)
+    assert stance.count == len(peaks)
+    assert np.isclose(grown, sum(peaks), rtol=1e-9, atol=1e-9)
+    assert stance.is_open == (loads[-1] > threshold)
+    assert stance.peak == (peaks[-1] if stance.is_open else 0.0)
+
+
+def test_a_hoof_that_never_lifts_pays_every_revolution():
+    stance, grown = play([690.0] * 1000, np.linspace(0.0, 6 * np.pi - 1e-6, 1000), [700.0] * 1000, 40.0)
+    assert (stance.count, grown) == (3, 3 * 700.0)
+
+
+def test_grazing_the_ground_between_two_pushes_ends_a_stance():
+    """Or a policy could hold one peak for ever and push under it."""
+    loads = [900.0, 30.0, 900.0, 900.0]
+    stance, grown = play(loads, [0.0] * 4, loads, 40.0)
+    assert (stance.count, grown) == (2, 1800.0)
 
 
 @pytest.mark.parametrize("kind", TRUNKS)
 @pytest.mark.parametrize("legs", [1, 2])
 def test_strides_are_those_of_the_record(kind, legs):
-    engine = TrunkEngine([LIMB] * legs, TRUNKS[kind], Ground(), strides=True)
-    engine.reset(RUN, 0.3 + np.arange(legs))
-    sums, rows = [], []
+    made = engine(kind, legs)
+    record = {name: rows[1:, ..., 0] for name, rows in made.run(steps=2400).items() if rows.ndim > 1}
+    made, sums = engine(kind, legs), []
     for _ in range(120):
-        for _ in range(20):
-            engine.advance(steps=1)
-            rows.append(engine.report | engine.state)
-    engine.reset(RUN, 0.3 + np.arange(legs))
-    for _ in range(120):
-        engine.advance(steps=20)
-        sums.append(engine.strides)
-    record = {name: np.array([row[name] for row in rows]) for name in rows[0]}
-    total = {name: np.sum([s[name] for s in sums], axis=0) for name in sums[0]}
+        made.advance(steps=20)
+        sums.append(made.strides)
+    total = {name: np.sum([s[name][:, 0] for s in sums], axis=0) for name in sums[0]}
+    toe, heel = record["toe_normal"], record["heel_normal"]
+    load, down = toe + heel, toe + heel > 0
+    force = np.hypot(load, record["toe_friction"] + record["heel_friction"])
+    assert np.max([s["highest"][:, 0] for s in sums], axis=0) == pytest.approx(force.max(0), rel=1e-12)
+    power = np.maximum(record["crank_power"], 0) + np.maximum(record["hip_power"], 0)
+    assert total["positive_work"] == pytest.approx(1e-3 * power.sum(0), rel=1e-12)
+    assert total["load_impulse"] == pytest.approx(1e-3 * load.sum(0), rel=1e-12)
+    assert total["loaded_time"] == pytest.approx(1e-3 * down.sum(0))
+    slid = (toe * record["toe_slide"] + heel * record["heel_slide"]) / np.where(down, load, np.inf)
+    assert total["travel"] == pytest.approx(-1e-3 * slid.sum(0), rel=1e-10)
     for leg in range(legs):
-        toe, heel = record["toe_normal"][:, leg, 0], record["heel_normal"][:, leg, 0]
-        rub = record["toe_friction"][:, leg, 0] + record["heel_friction"][:, leg, 0]
-        load, force = toe + heel, np.hypot(toe + heel, rub)
-        peaks = stances(load, force, record["theta"][:, leg, 0], 0.05 * engine.weight / legs)
-        assert len(peaks) > 2
-        assert total["stances"][leg, 0] == len(peaks)
-        assert total["peak_increase"][leg, 0] == pytest.approx(sum(peaks), rel=1e-12)
-        assert max(s["highest"][leg, 0] for s in sums) == pytest.approx(force.max(), rel=1e-12)
-        power = np.maximum(record["crank_power"][:, leg, 0], 0) + np.maximum(
-            record["hip_power"][:, leg, 0], 0
-        )
-        assert total["positive_work"][leg, 0] == pytest.approx(1e-3 * power.sum(), rel=1e-12)
-        assert total["load_impulse"][leg, 0] == pytest.approx(1e-3 * load.sum(), rel=1e-12)
-        assert total["loaded_time"][leg, 0] == pytest.approx(1e-3 * (load > 0).sum())
-        slid = toe * record["toe_slide"][:, leg, 0] + heel * record["heel_slide"][:, leg, 0]
-        travel = -1e-3 * (slid[load > 0] / load[load > 0]).sum()
-        assert total["travel"][leg, 0] == pytest.approx(travel, rel=1e-10)
+        history = load[:, leg], record["theta"][:, leg], force[:, leg]
+        peaks = peaks_of(*history, 0.05 * made.weight / legs)
+        assert total["stances"][leg] == len(peaks) > 2
+        assert total["peak_increase"][leg] == pytest.approx(sum(peaks), rel=1e-12)
 
 
 def test_a_stance_goes_on_from_a_state_that_was_put_back():
-    engine = TrunkEngine(LIMB, TRUNKS["suspended"], Ground(), strides=True)
-    engine.reset(RUN, 0.3)
-    while not engine.strides["stance_open"][0, 0]:
-        engine.advance(steps=5)
-    engine.advance(steps=20)
-    state, before = engine.get_state(), engine.strides["stance_peak"]
-    engine.advance(steps=20)
-    after = engine.strides
-    engine.reset(RUN, 2.0)
-    engine.set_state(state)
-    assert engine.strides["stance_peak"] == before > 0
-    engine.advance(steps=20)
-    for name, value in engine.strides.items():
+    made = engine()
+    while not made.strides["stance_open"][0, 0]:
+        made.advance(steps=5)
+    made.advance(steps=20)
+    state, before = made.get_state(), made.strides["stance_peak"]
+    made.advance(steps=20)
+    after = made.strides
+    made.reset(RUN, 2.0)
+    made.set_state(state)
+    assert made.strides["stance_peak"] == before > 0
+    made.advance(steps=20)
+    for name, value in made.strides.items():
         np.testing.assert_array_equal(value, after[name], err_msg=name)
 
 
 def test_strides_change_nothing_else():
-    engines = [TrunkEngine(LIMB, TRUNKS["suspended"], Ground(), strides=on) for on in (False, True)]
-    for engine in engines:
-        engine.reset(RUN, 0.3)
-        engine.advance(steps=400)
+    engines = [engine(strides=on) for on in (False, True)]
+    for made in engines:
+        made.advance(steps=400)
     for name, value in engines[0].state.items():
         np.testing.assert_array_equal(value, engines[1].state[name], err_msg=name)
 
@@ -97,4 +124,4 @@ def test_strides_change_nothing_else():
 @pytest.mark.parametrize("name", ["strides", "reactions"])
 def test_a_flag_is_a_truth(name):
     with pytest.raises(ParameterError, match=f"{name}: expected True or False, got 'no'"):
-        TrunkEngine(LIMB, TRUNKS["suspended"], Ground(), **{name: "no"})
+        TrunkEngine(Limb(LEG), TRUNKS["suspended"], **{name: "no"})

@@ -4,38 +4,19 @@ Nothing here is a formula for a speed: places of points and turns of links come 
 leg, and `Jet` carries their two derivatives by time along.
 """
 
-from __future__ import annotations
-
-from collections.abc import Sequence
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
-from hoof_env.dynamics.parts import Limb, Motor, Trunk
-from hoof_env.errors import ParameterError
+from hoof_env.dynamics.parts import Motor
 from hoof_env.gait.gait import COS, OFFSET, SIN
 from hoof_env.leg.linkage import BODIES, CONSTRUCTION, Dyad
 from tests.oracle.jet import Jet, concatenate, direction, inverse, root, stack, turn
 
-Array = NDArray[Any]
-
 
 class PlainBodies:
-    """What moves: a trunk, N legs of 14 links and a rotor for each.
+    """What moves: a trunk, N legs of 14 links and a rotor for each."""
 
-    Args:
-        trunk: what the legs hang from.
-        limbs: the legs, where they hang and what turns them.
-
-    Raises:
-        ParameterError: no leg.
-    """
-
-    def __init__(self, trunk: Trunk, limbs: Sequence[Limb]) -> None:
-        if not limbs:
-            raise ParameterError("limbs: expected at least one leg, got none")
-        self.limbs = tuple(limbs)
+    def __init__(self, trunk, limbs):
+        self.limbs, self.size = tuple(limbs), len(limbs)
         legs = [limb.geometry for limb in limbs]
         # columns: one row a leg, against the many motions that are computed at a time
         self._lengths = {name: _column(leg.lengths[name] for leg in legs) for name in legs[0].lengths}
@@ -52,12 +33,7 @@ class PlainBodies:
         links = np.transpose([leg.body_inertias for leg in legs]).ravel()
         self.inertias = np.concatenate([[trunk.pitch_inertia], links, [r.rotor_inertia for r in rotors]])
 
-    @property
-    def size(self) -> int:
-        """Number of legs."""
-        return len(self.limbs)
-
-    def motion(self, u: Array, ud: Array, udd: Array) -> tuple[Jet, Jet, Jet]:
+    def motion(self, u, ud, udd):
         """Every body's centre (complex) and turn, and every hoof point, for B accelerations at a time.
 
         Args:
@@ -72,7 +48,7 @@ class PlainBodies:
         trunk = Jet(complex(u[0], u[1]), complex(ud[0], ud[1]), a[0] + 1j * a[1])
         pitch = Jet(u[2], ud[2], a[2])
         theta, phi = (Jet(u[k : k + n, None], ud[k : k + n, None], a[k : k + n]) for k in (3, 3 + n))
-        z: dict[str, Jet] = {"O": Jet(np.zeros_like(self._pivot)), "C": Jet(self._pivot)}
+        z = {"O": Jet(np.zeros_like(self._pivot)), "C": Jet(self._pivot)}
         z["P"] = self._lengths["OP"] * turn(theta * -1.0)
         for step in CONSTRUCTION:
             start, span = z[step.first], z[step.second] - z[step.first]
@@ -86,7 +62,7 @@ class PlainBodies:
                 part = self._lengths[step.distance] / self._lengths[step.span]
                 z[step.point] = z[step.origin] + span * part
 
-        def mirrored(w: Any) -> Any:
+        def mirrored(w):
             return self._travel * np.real(w) + 1j * np.imag(w)
 
         swing, tilt = turn(phi), turn(pitch)
@@ -96,7 +72,7 @@ class PlainBodies:
         rotors = stack([pitch + self._travel * (phi - self._ratio * theta)], (n, count))
         hooves = stack([at["I"], at["J"]], (n, count))
 
-        def all_bodies(*jets: Jet) -> Jet:
+        def all_bodies(*jets):
             return concatenate([jet.part(lambda x: x.reshape(-1, count)) for jet in jets])
 
         return (
@@ -105,15 +81,13 @@ class PlainBodies:
             hooves.part(lambda x: np.where(self._toe_is_i, x, x[::-1]).swapaxes(0, 1)),
         )
 
-    def swing(self, theta: Jet, filters: Array) -> Jet:
+    def swing(self, theta, filters):
         """phi = offset + A sin theta + B cos theta, `filters` of shape (N, 4, 3)."""
         offset, a, b = (Jet(*filters[:, k].T) for k in (OFFSET, SIN, COS))
         e = turn(theta)
         return offset + a * e.part(np.imag) + b * e.part(np.real)
 
-    def hooves(
-        self, trunk: Any, trunk_rate: Any, theta: Any, theta_rate: Any, gaits: Any
-    ) -> tuple[Array, Array]:
+    def hooves(self, trunk, trunk_rate, theta, theta_rate, gaits):
         """Place and velocity [m, m/s] of hoof points under steady gaits (N, 4); complex, shapes (N, 2)."""
         phi = self.swing(Jet(np.asarray(theta), theta_rate), gaits[:, :, None] * [1.0, 0.0, 0.0])
         u, ud = np.concatenate([trunk, theta, phi.value]), np.concatenate([trunk_rate, theta_rate, phi.rate])
@@ -121,5 +95,5 @@ class PlainBodies:
         return at.value[..., 0], at.rate[..., 0]
 
 
-def _column(values: Any) -> Array:
+def _column(values):
     return np.array(list(values))[:, None]

@@ -3,22 +3,12 @@
 A reference for the crank angle under load: what the accuracy of a fixed-step scheme is measured against.
 """
 
-from __future__ import annotations
-
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
-from hoof_env.dynamics.parts import Limb, Motor, Trunk
-from hoof_env.errors import ParameterError
-from hoof_env.gait.gait import GaitParameters
-from hoof_env.ground.contact import Ground
+from hoof_env.dynamics.parts import Trunk
 from tests.oracle.ground import PlainGround
 from tests.oracle.horse import PlainHorse, servo
-from tests.oracle.run import Touch, follow
-
-Array = NDArray[Any]
+from tests.oracle.run import follow
 
 
 class PlainCrank:
@@ -27,28 +17,10 @@ class PlainCrank:
     All that moves is theta: I thetadd + I'/2 thetad^2 + V' = servo + ground. Inertia I, I'/2, V' and the hoof
     points are the plain horse's, at the nodes of Chebyshev polynomials on equal pieces of a revolution.
 
-    Args:
-        limb: its drive a `Motor`.
-        gait: steady; its swing is in the tables.
-        ground: what it stands on.
-        height: of the crank centre above it [m].
-        pieces, order: of the tables.
-
-    Raises:
-        ParameterError: the drive is not a motor.
+    `height` is that of the crank centre above the ground [m], `pieces` and `order` are of the tables.
     """
 
-    def __init__(
-        self,
-        limb: Limb,
-        gait: GaitParameters,
-        ground: Ground,
-        height: float,
-        pieces: int = 64,
-        order: int = 16,
-    ) -> None:
-        if not isinstance(limb.drive, Motor):
-            raise ParameterError(f"limb.drive: expected a Motor, got {limb.drive!r}")
+    def __init__(self, limb, gait, ground, height, pieces=64, order=16):
         self.drive, self.speed, self.ground = limb.drive, gait.crank_speed, PlainGround(ground)
         self._pieces, self._orders = pieces, np.arange(order)
         horse, base = PlainHorse(Trunk("fixed", height=height), [limb]), gait.to_array()
@@ -57,7 +29,7 @@ class PlainCrank:
         weights = np.cos(np.outer(self._orders, np.arccos(nodes))) * 2 / order
         weights[0] /= 2
 
-        def row(theta: float) -> list[float]:
+        def row(theta):
             still, moving = (
                 horse.at(*place, [theta], [w], [[w, *base[1:]]])
                 for w in (0.0, 1.0)  # no servo torque
@@ -71,15 +43,14 @@ class PlainCrank:
             (weights @ [row(middle + np.pi / pieces * x) for x in nodes]).T.copy() for middle in middles
         ]
 
-    def at(self, theta: float) -> Array:
+    def at(self, theta):
         """I, I'/2, V', then x of toe and heel, their derivatives by theta, y and its derivatives likewise."""
         turns = theta / (2 * np.pi)
         piece, x = divmod((turns - np.floor(turns)) * self._pieces, 1.0)
         basis = np.cos(self._orders * np.arccos(min(max(2 * x - 1, -1.0), 1.0)))
-        found: Array = self._tables[int(piece) % self._pieces] @ basis
-        return found
+        return self._tables[int(piece) % self._pieces] @ basis
 
-    def rate(self, y: Array, approach: Array) -> Array:
+    def rate(self, y, approach):
         """Of (theta, thetad)."""
         theta, w = y.tolist()
         row = self.at(theta).tolist()
@@ -91,19 +62,13 @@ class PlainCrank:
                 force += f.real * dx + f.imag * dy
         return np.array([w, force / row[0]])
 
-    def depth(self, y: Array) -> tuple[Array, Array]:
+    def depth(self, y):
         """Of toe and heel, and its rate."""
         row = self.at(float(y[0]))
         return -row[7:9], -row[9:11] * y[1]
 
-    def run(self, theta: float, times: Any, tolerance: float = 1e-12) -> tuple[Array, Array, list[Touch]]:
+    def run(self, theta, times, tolerance=1e-12):
         """Crank angle and speed at `times` from `theta` at the gait's speed, shapes (K,), and the touches."""
-        y, _, touches = follow(
-            self.rate,
-            self.depth,
-            np.array([theta, self.speed]),
-            times,
-            self.ground.ground.approach_floor,
-            tolerance,
-        )
+        start, floor = np.array([theta, self.speed]), self.ground.ground.approach_floor
+        y, _, touches = follow(self.rate, self.depth, start, times, floor, tolerance)
         return y[:, 0], y[:, 1], touches

@@ -1,28 +1,15 @@
 """The ground under the plain horse: one point at a time, on any terrain."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from hoof_env.ground.contact import Ground
 from hoof_env.ground.laws import FRICTION_LAWS, damping
 from tests.oracle.laws import friction_force, normal_force
 
-if TYPE_CHECKING:
-    from hoof_env.ground.terrain import Terrain
-
 
 class PlainGround:
-    """The laws of a `Ground` (Eqs. 10-15) on a terrain, or on the level y = 0.
+    """The laws of a `Ground` (Eqs. 10-15) on a terrain, or on the level y = 0."""
 
-    Args:
-        ground: laws and their constants.
-        terrain: heights and factors along x.
-    """
-
-    def __init__(self, ground: Ground, terrain: Terrain | None = None) -> None:
+    def __init__(self, ground, terrain=None):
         self.ground = ground
         self.chi, self.dashpot = damping(
             ground.normal_law, ground.restitution, ground.stiffness, ground.reference_mass
@@ -31,7 +18,7 @@ class PlainGround:
         self.terrain = terrain if terrain is not None and len(terrain.height) > 1 else None
         self.level = terrain.height[0] if terrain is not None else 0.0
 
-    def surface(self, x: float) -> tuple[float, complex]:
+    def surface(self, x):
         """Height [m] of the ground at `x` [m] and its unit normal."""
         if self.terrain is None:
             return self.level, 1j
@@ -42,12 +29,12 @@ class PlainGround:
             slope = (height[cell] - height[cell - 1]) / (knots[cell] - knots[cell - 1])
         return float(np.interp(x, knots, height)), complex(-slope, 1.0) / abs(complex(-slope, 1.0))
 
-    def depth(self, position: complex, velocity: complex) -> tuple[float, float]:
+    def depth(self, position, velocity):
         """Penetration of a point along the normal [m] and its rate [m/s]."""
         height, normal = self.surface(position.real)
         return (height - position.imag) * normal.imag, -(velocity * normal.conjugate()).real
 
-    def forces(self, position: complex, velocity: complex, approach: float) -> tuple[complex, complex]:
+    def forces(self, position, velocity, approach):
         """Normal force and friction [N] on a point that touched down at `approach` [m/s]."""
         ground, (_, normal) = self.ground, self.surface(position.real)
         harder, rougher = 1.0, 1.0

@@ -12,24 +12,18 @@ and each leg's crank angle theta and swing phi; the motion law binds phi to thet
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.parts import GRAVITY, TRUNKS, Drive, Limb, Motor, Trunk
+from hoof_env.dynamics.parts import GRAVITY, TRUNKS, Motor
 from hoof_env.gait.gait import SPEED
-from hoof_env.ground.contact import Ground
 from tests.oracle.bodies import PlainBodies
 from tests.oracle.ground import PlainGround
 from tests.oracle.jet import Jet
 
-if TYPE_CHECKING:
-    from hoof_env.ground.terrain import Terrain
-
-Array = NDArray[Any]
+Array = NDArray[np.generic]
 
 WORKS = ("crank", "hip", "normal", "friction", "drag", "damping")
 """Who gives power to the horse: the drives, the ground's two forces (its damping included), the drag and the
@@ -38,78 +32,39 @@ support's damper. Weight and the support's spring are in the potential energy.""
 
 @dataclass(frozen=True)
 class Moment:
-    """The horse at one instant; planar vectors are complex, x + i y. N legs, toe first, then heel.
+    """The horse at one instant; planar vectors are complex, x + i y. N legs, toe first, then heel."""
 
-    Attributes:
-        trunk_acc: of x, y and pitch, shape (3,) [m/s^2, rad/s^2].
-        theta_acc, phi, phi_rate, phi_acc: of each crank and swing, shape (N,) [rad, s].
-        mass_matrix, load: M and f of M qdd = f for what is free, trunk first, then the motors' cranks.
-        centre, momentum: of the whole [m, kg m/s], complex.
-        angular_momentum: about `centre` [kg m^2/s].
-        kinetic, potential: energies [J]; the potential is of weight, support's spring and weight share.
-        crank_torque, hip_torque: along theta and phi, shape (N,) [N m]. A motor's crank torque is the
-            servo's; its hip torque is what the gearing between crank and swing carries.
-        hold: force and torque that keep the trunk where it is not free, shape (3,) [N, N m].
-        hoof, hoof_velocity, hoof_force: of the hoof points in the world, shape (N, 2), complex [m, m/s, N].
-        power: [W] of each of `WORKS`; a motor's hip gives what the gearing does not take from the crank.
-    """
-
-    trunk_acc: Array
-    theta_acc: Array
-    phi: Array
+    trunk_acc: Array  # of x, y and pitch, (3,) [m/s^2, rad/s^2]
+    theta_acc: Array  # of each crank, (N,) [rad/s^2]
+    phi: Array  # each swing and its derivatives by time, (N,) [rad, s]
     phi_rate: Array
     phi_acc: Array
-    mass_matrix: Array
+    mass_matrix: Array  # M and f of M qdd = f for what is free, trunk first, then the motors' cranks
     load: Array
-    centre: complex
-    momentum: complex
-    angular_momentum: float
-    kinetic: float
-    potential: float
-    crank_torque: Array
-    hip_torque: Array
-    hold: Array
-    hoof: Array
+    centre: complex  # of the whole [m]
+    momentum: complex  # [kg m/s]
+    angular_momentum: float  # about `centre` [kg m^2/s]
+    kinetic: float  # [J]
+    potential: float  # of weight, support's spring and weight share [J]
+    crank_torque: Array  # along theta, (N,) [N m]; a motor's is the servo's
+    hip_torque: Array  # along phi; a motor's is what the gearing between crank and swing carries
+    hoof: Array  # of the hoof points in the world, (N, 2), complex [m, m/s, N]
     hoof_velocity: Array
     hoof_force: Array
-    power: dict[str, float]
+    power: dict[str, float]  # [W] of each of `WORKS`; a motor's hip gives what the gearing does not take
 
 
 class PlainHorse(PlainBodies):
-    """N legs on one trunk over the ground.
+    """N legs on one trunk over the ground, on y = 0 or on `terrain`; where None, nothing."""
 
-    Args:
-        trunk: what the legs hang from.
-        limbs: the legs, where they hang and what turns them.
-        ground: what they stand on, on y = 0 or on `terrain`; where None, nothing.
-
-    Raises:
-        ParameterError: no leg.
-    """
-
-    def __init__(
-        self,
-        trunk: Trunk,
-        limbs: Sequence[Limb],
-        ground: Ground | None = None,
-        terrain: Terrain | None = None,
-    ) -> None:
+    def __init__(self, trunk, limbs, ground=None, terrain=None):
         super().__init__(trunk, limbs)
         self.trunk = trunk
         self.ground = None if ground is None else PlainGround(ground, terrain)
         self.motors = np.array([isinstance(limb.drive, Motor) for limb in limbs])
         self.trunk_freedom = ((), (0,), (0, 1), (0, 1, 2))[TRUNKS.index(trunk.kind)]
 
-    def at(
-        self,
-        trunk: Any,
-        trunk_rate: Any,
-        theta: Any,
-        theta_rate: Any,
-        filters: Any,
-        approach: Any = None,
-        gravity: float = GRAVITY,
-    ) -> Moment:
+    def at(self, trunk, trunk_rate, theta, theta_rate, filters, approach=None):
         """Everything about one instant.
 
         Args:
@@ -140,13 +95,13 @@ class PlainHorse(PlainBodies):
         step = np.moveaxis(hooves.acc[..., 1:] - hooves.acc[..., :1], -1, 0)
         m, inertia = self.masses, self.inertias
         mass = (move.conj() * m @ move.T).real + spin * inertia @ spin.T
-        bias = (move.conj() @ (m * (centres.acc[:, 0] + 1j * gravity))).real
+        bias = (move.conj() @ (m * (centres.acc[:, 0] + 1j * GRAVITY))).real
         bias += spin @ (inertia * turns.acc[:, 0])
 
         hoof, hoof_velocity = hooves.value[..., 0], hooves.rate[..., 0]
         normal, friction = self.ground_forces(hoof, hoof_velocity, approach)
         force = normal + friction
-        support, springs = self.support(u[1], gravity)
+        support, springs = self.support(u[1])
         damper = -self.trunk.damping * ud[1] if self.trunk.kind == "suspended" else 0.0
         drag = -self.trunk.drag * ud[0] if self.trunk.kind != "fixed" else 0.0
         outer = np.einsum("dnp,np->d", step.conj(), force).real
@@ -165,7 +120,7 @@ class PlainHorse(PlainBodies):
         drives = np.concatenate([np.zeros(3), torque, np.zeros(n)])
         dense, load = free.T @ mass @ free, free.T @ (outer + drives - bias - mass @ known)
         udd = known + free @ np.linalg.solve(dense, load)
-        needed = mass @ udd + bias - outer  # by the drives, and by what holds the trunk
+        needed = mass @ udd + bias - outer  # by the drives
 
         crank, hip = np.where(self.motors, torque, needed[3 : 3 + n]), needed[3 + n :]
         by_time = np.where(self.motors, phi.rate - slope * rate, phi.rate)
@@ -178,9 +133,8 @@ class PlainHorse(PlainBodies):
             mass_matrix=dense, load=load, centre=centre, momentum=momentum,
             angular_momentum=float(m @ (arm.conj() * relative).imag + inertia @ w),
             kinetic=float(m @ np.abs(v) ** 2 + inertia @ w**2) / 2,
-            potential=float(gravity * m @ centres.value[:, 0].imag) + springs,
+            potential=float(GRAVITY * m @ centres.value[:, 0].imag) + springs,
             crank_torque=crank, hip_torque=hip,
-            hold=np.where(np.isin(range(3), self.trunk_freedom), 0.0, needed[:3]),
             hoof=hoof, hoof_velocity=hoof_velocity, hoof_force=force,
             power=dict(zip(WORKS, map(float, (
                 crank @ rate, hip @ by_time, np.sum(normal.conj() * hoof_velocity).real,
@@ -188,16 +142,16 @@ class PlainHorse(PlainBodies):
             )), strict=True)),
         )  # fmt: skip
 
-    def support(self, y: float, gravity: float) -> tuple[float, float]:
+    def support(self, y):
         """The rest of the animal under a suspended trunk at height `y`, but for its damper: force [N] and
         potential [J]."""
         trunk = self.trunk
         if trunk.kind != "suspended":
             return 0.0, 0.0
-        weight, stretch = (1 - trunk.share) * self.masses.sum() * gravity, y - trunk.height
+        weight, stretch = (1 - trunk.share) * self.masses.sum() * GRAVITY, y - trunk.height
         return weight - trunk.stiffness * stretch, trunk.stiffness * stretch**2 / 2 - weight * y
 
-    def ground_forces(self, hoof: Array, velocity: Array, approach: Array) -> tuple[Array, Array]:
+    def ground_forces(self, hoof, velocity, approach):
         """Normal force and friction on each hoof point that is in the ground, complex [N]."""
         forces = np.zeros((2, *hoof.shape), complex)
         if self.ground is not None:
@@ -207,7 +161,7 @@ class PlainHorse(PlainBodies):
         return forces[0], forces[1]
 
 
-def servo(drive: Drive, lag: float) -> float:
+def servo(drive, lag):
     """Torque of a drive [N m] on a crank that is `lag` [rad/s] too slow; 0 if it is prescribed."""
     if not isinstance(drive, Motor):
         return 0.0

@@ -6,19 +6,16 @@ pull, where the step shrinks by itself. A hoof point's approach speed is its spe
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.errors import HoofEnvError, ParameterError
+from hoof_env.errors import HoofEnvError
 from hoof_env.gait.gait import SPEED, GaitParameters
-from tests.oracle.ground import PlainGround
-from tests.oracle.horse import WORKS, PlainHorse
+from tests.oracle.horse import WORKS
 
-Array = NDArray[Any]
+Array = NDArray[np.generic]
 
 
 @dataclass(frozen=True)
@@ -33,36 +30,19 @@ class Touch:
 
 @dataclass(frozen=True)
 class Run:
-    """A horse at K times.
+    """A horse at K times."""
 
-    Attributes:
-        t: shape (K,) [s].
-        trunk, trunk_rate: x, y, pitch, shape (K, 3) [m, rad, s].
-        theta, theta_rate: of each crank, shape (K, N) [rad, s].
-        work: since the start, of each of `WORKS`, shape (K,) each [J].
-        approach: v0 of each hoof point in the ground at each time, else NaN, shape (K, N, 2) [m/s].
-        touches: in order; point 2 i is the toe of leg i, 2 i + 1 its heel.
-    """
-
-    t: Array
-    trunk: Array
+    t: Array  # (K,) [s]
+    trunk: Array  # x, y, pitch, (K, 3) [m, rad]
     trunk_rate: Array
-    theta: Array
+    theta: Array  # of each crank, (K, N) [rad]
     theta_rate: Array
-    work: dict[str, Array]
-    approach: Array
-    touches: list[Touch]
+    work: dict[str, Array]  # since the start, of each of `WORKS`, (K,) each [J]
+    approach: Array  # v0 of each hoof point in the ground at each time, else NaN, (K, N, 2) [m/s]
+    touches: list[Touch]  # in order; point 2 i is the toe of leg i, 2 i + 1 its heel
 
 
-def follow(
-    rate: Callable[[Array, Array], Array],
-    depth: Callable[[Array], tuple[Array, Array]],
-    state: Array,
-    times: Array,
-    floor: float,
-    tolerance: float = 1e-12,
-    longest: float = 5e-3,
-) -> tuple[Array, Array, list[Touch]]:
+def follow(rate, depth, state, times, floor, tolerance=1e-12, longest=5e-3):
     """Integrate from `times[0]`, stopping where any of P points crosses the ground.
 
     Args:
@@ -76,17 +56,14 @@ def follow(
 
     Returns:
         States, shape (K, ...), approach speeds, shape (K, P), and the touches.
-
-    Raises:
-        HoofEnvError: the scheme gave up.
     """
     from scipy.integrate import solve_ivp
 
-    def crossing(point: int, inside: bool) -> Callable[[float, Array], float]:
-        def event(_: float, y: Array) -> float:
+    def crossing(point, inside):
+        def event(_, y):
             return float(depth(y)[0][point])
 
-        event.terminal, event.direction = True, -1.0 if inside else 1.0  # type: ignore[attr-defined]
+        event.terminal, event.direction = True, -1.0 if inside else 1.0
         return event
 
     times = np.asarray(times, float)
@@ -118,7 +95,7 @@ def follow(
     return states, speeds, touches
 
 
-def depths(ground: PlainGround | None, at: Array, velocity: Array) -> tuple[Array, Array]:
+def depths(ground, at, velocity):
     """Penetration [m] and its rate [m/s] of points, shape (P,); far from ground where there is none."""
     if ground is None:
         return np.full(at.shape, -1.0), np.zeros(at.shape)
@@ -126,57 +103,34 @@ def depths(ground: PlainGround | None, at: Array, velocity: Array) -> tuple[Arra
     return found[:, 0], found[:, 1]
 
 
-def simulate(
-    horse: PlainHorse,
-    gaits: Any,
-    times: Any,
-    theta: Any,
-    theta_rate: Any = None,
-    trunk: Any = None,
-    trunk_rate: Any = (0.0, 0.0, 0.0),
-    tolerance: float = 1e-12,
-) -> Run:
-    """A horse under steady gaits.
+def simulate(horse, gaits, times, theta, theta_rate=None, trunk=None, trunk_rate=(0.0, 0.0, 0.0)):
+    """A horse under steady gaits, one for each leg, at times of which the first is the start.
 
-    Args:
-        horse: trunk, legs and ground.
-        gaits: of each leg, `GaitParameters` or rows of four.
-        times: increasing, the first is the start, shape (K,) [s].
-        theta, theta_rate: of the cranks at the start, shape (N,) [rad, rad/s]; a rate of None is the gait's,
-            as is that of a prescribed crank in any case.
-        trunk, trunk_rate: x, y, pitch at the start and their rates [m, rad, s]; None is (0, trunk height, 0).
-        tolerance: of the integration, relative and absolute.
-
-    Raises:
-        ParameterError: the number of gaits, or of crank angles, is not that of the legs.
-        HoofEnvError: the scheme gave up.
+    A `theta_rate` of None is the gait's, as is that of a prescribed crank in any case; `trunk` is x, y and
+    pitch at the start, None (0, trunk height, 0).
     """
     n = horse.size
     gaits = np.array([g.to_array() if isinstance(g, GaitParameters) else g for g in gaits], float)
-    if gaits.shape != (n, 4) or np.shape(theta) != (n,):
-        raise ParameterError(
-            f"gaits, theta: expected one for each of {n} legs, got {len(gaits)} and {theta!r}"
-        )
     wanted = gaits[:, SPEED]
     theta_rate = np.where(horse.motors, wanted if theta_rate is None else theta_rate, wanted)
     trunk = (0.0, horse.trunk.height, 0.0) if trunk is None else trunk
 
-    def split(y: Array) -> tuple[Array, ...]:
+    def split(y):
         return y[:3], y[3:6], y[6 : 6 + n], y[6 + n : 6 + 2 * n]
 
-    def rate(y: Array, approach: Array) -> Array:
+    def rate(y, approach):
         x, v, angle, w = split(y)
         now = horse.at(x, v, angle, w, gaits, approach.reshape(n, 2))
         return np.concatenate([v, now.trunk_acc, w, now.theta_acc, [now.power[name] for name in WORKS]])
 
-    def depth(y: Array) -> tuple[Array, Array]:
+    def depth(y):
         x, v, angle, w = split(y)
         at, velocity = horse.hooves(x, v, angle, w, gaits)
         return depths(horse.ground, at.ravel(), velocity.ravel())
 
     start = np.concatenate([trunk, trunk_rate, theta, theta_rate, np.zeros(len(WORKS))])
     floor = horse.ground.ground.approach_floor if horse.ground else np.inf
-    y, approach, touches = follow(rate, depth, start, times, floor, tolerance)
+    y, approach, touches = follow(rate, depth, start, times, floor)
     parts = split(y.T)
     work = dict(zip(WORKS, y.T[6 + 2 * n :], strict=True))
     return Run(np.asarray(times, float), parts[0].T, parts[1].T, parts[2].T, parts[3].T, work,

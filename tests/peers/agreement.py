@@ -6,18 +6,14 @@ has no swing that moves: those cases are Exudyn's alone. All quantities of all c
 docs/evidence/agreement.md.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from benchmarks.common import ALL, Assembly, Record
+from benchmarks.common import ALL
 from benchmarks.exudyn_legs import ExudynLegs
 from benchmarks.mujoco_legs import MujocoLegs
 from hoof_env.dynamics.parts import TRUNKS, Motor
-from tests.peers.cases import Case
 
 PEERS = {"MuJoCo": MujocoLegs, "Exudyn": ExudynLegs}
 
@@ -41,36 +37,27 @@ EARLY = 0.1
 
 @dataclass(frozen=True)
 class Row:
-    """One quantity of one case in one engine against this project's at its fine step.
-
-    Attributes:
-        engine, quantity, unit: what is compared.
-        size: rms of the quantity; of coordinates, of what they moved by.
-        largest, relative: of the differences: the largest, and their rms as a share of `size`.
-        own: the largest difference between the engine's runs at its fine step and at twice that.
-        ours: the same of this project's engine.
-        closure: the widest gap of a loop in that engine [m].
-    """
+    """One quantity of one case in one engine against this project's at its fine step."""
 
     preset: str
     case: str
     engine: str
     quantity: str
     unit: str
-    size: float
-    largest: float
-    relative: float
-    own: float
-    ours: float
-    closure: float
+    size: float  # rms of the quantity; of coordinates, of what they moved by
+    largest: float  # of the differences
+    relative: float  # their rms as a share of `size`
+    own: float  # the largest difference between the engine's runs at its fine step and at twice that
+    ours: float  # the same of this project's engine
+    closure: float  # the widest gap of a loop in that engine [m]
 
     @property
-    def share(self) -> float:
+    def share(self):
         """The largest difference as a share of what both engines differ from themselves by."""
         return self.largest / (self.own + self.ours) if self.largest else 0.0
 
 
-def quantities(case: Case, record: Record, has: Assembly, wanted: Assembly) -> dict[str, NDArray[np.float64]]:
+def quantities(case, record, has, wanted):
     """What of a record is compared, by name; `has` is its assembly, `wanted` the other's."""
     late = slice(round(EARLY * case.samples), None)
     pins = record.pins if has is wanted else wanted.pin_forces(record.pins)
@@ -85,12 +72,12 @@ def quantities(case: Case, record: Record, has: Assembly, wanted: Assembly) -> d
     }
 
 
-def compare(preset: str, case: Case, steps: dict[str, float] | None = None) -> list[Row]:
+def compare(preset, case, steps=None):
     """All rows of a case; `steps` are fine steps [s] other than `AIR` or `GROUND`."""
     horse, steps = case.horse(preset), steps or (GROUND if case.ground else AIR)
     fine, coarse = (horse.ours(k * steps["ours"]) for k in (1, 2))
     users = horse.ours(USERS[1], USERS[0])
-    runs: dict[str, tuple[Record, Record, Assembly]] = {f"ours, {USERS[0]} 1 ms": (users, users, ALL)}
+    runs = {f"ours, {USERS[0]} 1 ms": (users, users, ALL)}
     for name, engine in PEERS.items():
         if name == "MuJoCo" and case.swung:
             continue
@@ -120,11 +107,11 @@ def compare(preset: str, case: Case, steps: dict[str, float] | None = None) -> l
     return rows
 
 
-def rms(x: NDArray[np.float64]) -> float:
+def rms(x):
     """Root of the mean square."""
     return float(np.sqrt(np.mean(np.square(x))))
 
 
-def largest(x: NDArray[np.float64]) -> float:
+def largest(x):
     """Largest magnitude."""
     return float(np.abs(x).max())

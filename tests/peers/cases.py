@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
-from benchmarks.common import Assembly, GroundForces, Record, Start, corners
+from benchmarks.common import GroundForces, Start, corners
 from hoof_env.dynamics.parts import Drive, Limb, Motor, Prescribed, Trunk
 from hoof_env.gait.gait import load_gait
 from hoof_env.ground.contact import Ground, load_ground
@@ -28,33 +26,26 @@ PHASES = (0.0, np.pi, np.pi / 2, -np.pi / 2)
 
 @dataclass(frozen=True)
 class Case:
-    """A horse of a preset, how it starts and for how long it is followed.
+    """A horse of a preset, how it starts and for how long it is followed."""
 
-    Attributes:
-        kind, legs, drive: of the trunk, how many, of the cranks.
-        swung: whether phi follows the crank, as in the preset's run; else it is held as amid its walk.
-        ground: whether there is any in reach.
-        duration: [s].
-        samples: instants at which the engines are compared, besides the beginning.
-    """
-
-    kind: str
+    kind: str  # of trunk
     legs: int = 1
     drive: Drive = Prescribed()  # noqa: RUF009 (frozen)
-    swung: bool = False
-    ground: bool = False
-    duration: float = 1.0
-    samples: int = 50
+    swung: bool = (
+        False  # whether phi follows the crank, as in the preset's run; else it is held as amid its walk
+    )
+    ground: bool = False  # whether there is any in reach
+    duration: float = 1.0  # [s]
+    samples: int = 50  # instants at which the engines are compared, besides the beginning
 
     @property
-    def name(self) -> str:
-        """In words."""
+    def name(self):
         legs = "one leg" if self.legs == 1 else f"{self.legs} legs"
         drive = "motor" if isinstance(self.drive, Motor) else "prescribed crank"
         swing = "swing geared to the crank" if self.swung else "swing held"
         return f"{legs}, {self.kind} trunk, {drive}, {swing}, {'ground' if self.ground else 'air'}"
 
-    def horse(self, preset: str) -> Horse:
+    def horse(self, preset):
         """With the leg, ground and run of a preset."""
         geometry, n = load_geometry(preset), self.legs
         gait = load_gait("run" if self.swung else "walk", preset)
@@ -62,12 +53,12 @@ class Case:
         limbs = tuple(Limb(geometry, hip=hip, drive=self.drive) for hip in hips)
         a, b = (gait.swing_sin, gait.swing_cos) if self.swung else (0.0, 0.0)
 
-        def start(thetas: Any, height: float) -> Start:
+        def start(thetas, height):
             swing = gait.swing_offset + a * np.sin(thetas) + b * np.cos(thetas)
             k = len(thetas)
             return Start(tuple(thetas), (gait.crank_speed,) * k, tuple(swing), a, b, (0.0, height))
 
-        def sole(thetas: Any, limbs: Sequence[Limb]) -> list[float]:
+        def sole(thetas, limbs):
             """Height of the lower of toe and heel above the trunk's centre [m]."""
             poses = start(thetas, 0.0).poses(limbs)
             return [
@@ -95,21 +86,16 @@ class Horse:
     ground: Ground
     case: Case
 
-    def ours(self, dt: float, integrator: str = "rk4") -> Record:
+    def ours(self, dt, integrator="rk4"):
         """This project's engine."""
         legs = TrunkLegs(self.limbs, self.trunk, self.start, dt, self.ground, integrator)
         return legs.run(self.case.duration, self.case.samples)
 
-    def peer(self, engine: Any, dt: float, **settings: Any) -> tuple[Record, Assembly]:
+    def peer(self, engine, dt, **settings):
         """A peer's record, and the assembly that its pins are those of; `settings` are the peer's own."""
         outside = GroundForces(self.ground, len(self.limbs)) if self.case.ground else None
         legs = engine(self.limbs, self.trunk, self.start, dt=dt, outside=outside, **settings)
         return legs.run(self.case.duration, self.case.samples), legs.assembly
-
-
-def both(case: Case) -> tuple[Case, Case]:
-    """A case in the air and on the ground."""
-    return case, replace(case, ground=True)
 
 
 CASES = tuple(
@@ -125,5 +111,5 @@ CASES = tuple(
         Case("free", legs=4, drive=Motor(), duration=0.4, samples=40),
         Case("free", legs=4, drive=Motor(), swung=True, duration=0.4, samples=40),
     )
-    for one in both(case)
+    for one in (case, replace(case, ground=True))
 )

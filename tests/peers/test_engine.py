@@ -1,4 +1,4 @@
-"""The engine against the peers without ground: as near as each is to itself at twice its step."""
+"""The engine against the peers: as near as each is to itself at twice its step."""
 
 from dataclasses import replace
 
@@ -11,7 +11,9 @@ from benchmarks.common import ALL
 from hoof_env.dynamics.parts import Motor
 from tests.peers.agreement import PEERS, compare, quantities
 from tests.peers.cases import CASES, Case
+from tests.peers.trunk_legs import TrunkLegs
 
+GROUND = [case for case in CASES if case.ground]
 COARSE = {"ours": 5e-4, "MuJoCo": 1e-3, "Exudyn": 1e-3}
 
 
@@ -49,6 +51,30 @@ def test_the_comparison_sees_a_rotor_that_is_a_hundredth_heavier():
 @pytest.mark.peers
 @pytest.mark.parametrize("case", [case for case in CASES if not case.ground], ids=lambda case: case.name)
 @pytest.mark.parametrize("preset", ["first_fit", "identified"])
-def test_engine_agrees_with_the_peers(preset, case):
+def test_engine_agrees_with_the_peers_in_the_air(preset, case):
     steps = {"ours": 1e-4, "MuJoCo": 2e-4, "Exudyn": 2e-4}
     assert_agreement(compare(preset, case, steps), forces=2e-4, motion=1e-6)
+
+
+@pytest.mark.peers
+@pytest.mark.parametrize("case", GROUND, ids=lambda case: case.name)
+def test_engine_agrees_with_the_peers_on_the_ground(case):
+    """On one leg, for time; docs/evidence/agreement.md has both."""
+    for row in compare("identified", case):
+        label = f"{row.engine}, {row.quantity}: {row}"
+        if row.engine in PEERS:
+            assert row.share < 1.5, label
+            assert row.relative < (1e-5 if row.unit in ("m", "rad") else 1e-4), label
+            assert row.closure < 1e-8, label
+        else:
+            assert row.closure < 1e-12, label
+
+
+@pytest.mark.peers
+@pytest.mark.parametrize("case", GROUND, ids=lambda case: case.name)
+@pytest.mark.parametrize("preset", ["first_fit", "identified"])
+def test_every_case_feels_the_ground(preset, case):
+    horse = case.horse(preset)
+    legs = TrunkLegs(horse.limbs, horse.trunk, horse.start, 1e-3, horse.ground, "midpoint")
+    legs.run(case.duration, case.samples)
+    assert legs.engine.account["impulse_y"][0] > 1

@@ -1,31 +1,22 @@
-"""The engine of several legs refuses what it cannot mean, and says how a run ended that went wrong."""
+"""The engine of several legs refuses what it cannot mean."""
 
-import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limb, Motor, Prescribed, Result, Trunk
-from hoof_env.dynamics.step_length import StepWarning
-from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.errors import NotStartedError, ParameterError
-from hoof_env.gait.gait import GaitParameters, load_gait
-from hoof_env.ground.contact import Ground
-from hoof_env.ground.terrain import Terrain
-from hoof_env.leg.geometry import load_geometry
+from tests.dynamics.scenes import LEG, RUN, WALK
 
-LEG = load_geometry("first_fit")
-RUN, WALK = load_gait("run", "first_fit"), load_gait("walk", "first_fit")
-STILL = GaitParameters(0.0, 0.0, 0.0, 0.0)
 LIMBS = (Limb(LEG, (0.4, 0.0), Motor()), Limb(LEG, (-0.4, 0.0), Prescribed()))
 FREE = Trunk("free", mass=100.0, height=1.6)
-THETA, LOWEST = np.array([4.02, 4.18, 4.1, 4.14]), 1.389  # soles level, and how far they are below O [m]
 
 
-def engine(trunk=FREE, n=3, ground=None):
-    e = TrunkEngine(LIMBS, trunk, ground, num_envs=n)
-    e.reset([RUN, WALK])
+def engine(trunk=FREE, n=3, limbs=LIMBS):
+    e = TrunkEngine(limbs, trunk, num_envs=n)
+    e.reset(WALK)
     return e
 
 
@@ -93,6 +84,10 @@ def test_an_engine_that_cannot_be(changes, message):
         ("fixed", {"y": 1.7}, "y: a fixed trunk is at 1.6 m, got"),
         ("free", {"vx": 1e200}, r"vx: expected numbers within \+-1e\+09, got 1e\+200"),
         ("free", {"theta_rate": [1e200, 1.0]}, r"theta_rate: expected numbers within \+-1e\+09"),
+        ("free", {"theta": 1e10}, r"theta: expected numbers within \+-1e\+09"),
+        ("free", {"x": -1e10}, r"x: expected numbers within \+-1e\+09"),
+        ("free", {"y": 1e300}, r"y: expected numbers within \+-1e\+09"),
+        ("free", {"pitch": 1e300}, r"pitch: expected numbers within \+-1e\+09"),
         ("free", {"envs": 1}, r"envs: expected indices below 3 or a mask of shape \(3,\), got 1"),
         ("free", {"envs": [0, 3]}, r"envs: expected indices below 3 or a mask of shape \(3,\), got \[0, 3\]"),
         ("free", {"envs": [-1]}, r"envs: expected indices below 3 or a mask of shape \(3,\), got \[-1\]"),
@@ -108,6 +103,23 @@ def test_a_start_that_cannot_be(kind, changes, message):
         e.reset(**({"gaits": [RUN, WALK]} | changes))
     after = e.get_state()
     assert all((after[name] == before[name]).all() for name in ("trunk", "limbs", "command", "account"))
+
+
+def with_a_branch(penetration, rate, inverse_speed, ground):
+    return ground.stiffness * penetration if rate > 0.0 else 0.0
+
+
+def test_a_contact_law_that_lanes_cannot_run_is_refused_with_its_operation():
+    e = TrunkEngine(Limb(LEG), FREE, num_envs=9, contact_law=with_a_branch)
+    with pytest.raises(ParameterError, match=r"contact_law: cannot compile `if`, .* in with_a_branch \("):
+        e.reset(WALK)
+
+
+def test_no_start_where_the_links_have_no_place():
+    rocker = LEG.replace(lengths={"CF": 0.8 * LEG.lengths["CF"]}, full_turn=False)
+    e = TrunkEngine(Limb(rocker), Trunk("fixed"), num_envs=2)
+    with pytest.raises(ParameterError, match="theta: the links of leg 0 have no place at some of"):
+        e.reset(WALK, np.array([[0.0, np.pi]]))
 
 
 @pytest.mark.parametrize(
@@ -144,84 +156,67 @@ def test_before_a_reset_it_is_nowhere():
     assert e.messages()[1] == "ok"
 
 
-def test_one_gait_and_one_command_are_for_all_legs():
-    one, each = engine(), engine()
-    one.reset(RUN, 0.5)
-    each.reset([RUN, RUN], [[0.5] * 3] * 2, theta_rate=RUN.crank_speed, envs=[True] * 3)
-    one.advance(WALK.to_array(), 30)
-    each.advance(np.tile(WALK.to_array()[:, None], (2, 1, 3)), 30)
-    assert (one.get_state()["limbs"] == each.get_state()["limbs"]).all()
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"trunk": "x"}, "trunk: expected Trunk"),
+        ({"ground": 3}, "ground: expected Ground"),
+        ({"trunk": replace(FREE, kind="rail")}, "trunk.kind: expected 'free'"),
+        ({"trunk": replace(FREE, height=3.0)}, "trunk.height: expected"),
+        ({"drive": Motor()}, "drive: expected a Prescribed"),
+    ],
+)
+def test_what_environments_share_cannot_be_varied(change, message):
+    with pytest.raises(ParameterError, match=message):
+        engine().vary(0, **change)
 
 
-@pytest.mark.parametrize("n", [1, 9])
-@pytest.mark.parametrize("row", ["theta_rate", "swing_sin_rate"])
-def test_what_is_no_number_any_more_is_a_result(n, row):
-    e = engine(n=n)
-    state = e.get_state()
-    state["limbs"][0, list(e.state)[7:].index(row), 0] = 1e300
-    e.set_state(state)
-    assert e.advance(steps=3).tolist() == [Result.NOT_FINITE] + [Result.OK] * (n - 1)
-    assert "finite" in e.messages()[0]
-    for name in ("trunk", "limbs", "account"):
-        assert (e.get_state()[name][..., 0] == state[name][..., 0]).all()
-    e.reset([RUN, WALK], envs=[0])
-    assert not e.advance(steps=3).any()
+@pytest.mark.parametrize("env", [-1, 3, 1.5])
+def test_an_environment_that_is_not_there(env):
+    for call in (engine().vary, engine().column):
+        with pytest.raises(ParameterError, match="env: expected"):
+            call(env)
 
 
-@pytest.mark.parametrize("level", [0.0, -0.4])
-def test_a_trunk_that_falls_through_soft_ground(level):
-    ground, terrain = Ground(stiffness=10.0), Terrain((level,))
-    e = TrunkEngine(LIMBS, FREE, ground, terrain, num_envs=2)
-    e.reset([RUN, WALK], y=[1.0, 40.0])
-    kept, results = None, []
-    for _ in range(100):
-        kept = e.get_state()
-        results.append(e.advance(steps=10)[0])
-        if results[-1]:
-            break
-    assert results[-1] == Result.FALLEN
-    assert set(results[:-1]) == {Result.OK}
-    assert "fell through the ground" in e.messages()[0]
-    now = e.get_state()
-    assert (now["trunk"][:, 0] == kept["trunk"][:, 0]).all()
-    assert (now["limbs"][..., 0] == kept["limbs"][..., 0]).all()
-    assert now["trunk"][0, 1] > kept["trunk"][0, 1]  # the other one goes on
-    assert level < e.report["y"][0] + 0.2
-    assert now["trunk"][2, 0] > level - 0.5
+def test_a_column_of_another_engine():
+    with pytest.raises(ParameterError, match="column: expected shape"):
+        engine().set_column(0, np.zeros(3))
 
 
-# -- stiff ground ----------------------------------------------------------------------------------------
-
-
-def stiff(scheme, substeps=None):
-    """A horse of 500 kg comes down from 5 cm at a walk on 1 MN/m^1.5; height, pitch and cranks on the way."""
-    ground = Ground(stiffness=1e6, restitution=0.5, approach_floor=0.1, friction_fast=0.05)
-    trunk = Trunk("free", mass=500.0 - 4 * LEG.mass, height=LOWEST + 0.05, drag=0.0, pitch_inertia=100.0)
-    limbs = [Limb(LEG, (x, 0.0), Motor()) for x in (-1.5, -1.4, -0.1, 0.0)]
-    e = TrunkEngine(limbs, trunk, ground, integrator=scheme, substeps=substeps)
-    e.reset(WALK, THETA)
-    way, most = [], 0.0
-    for _ in range(30):
-        assert not e.advance(steps=10).any()
-        way.append([e.report["y"][0], e.state["pitch"][0], *e.state["theta"][:, 0]])
-        most = max(most, e.report["toe_normal"].max())
-    assert most > e.weight / 4
-    return e, np.array(way)
-
-
-@pytest.mark.parametrize("scheme", SCHEMES)
-def test_stiff_ground_gets_the_substeps_that_it_needs(scheme):
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", StepWarning)
-        chosen, way = stiff(scheme)
-        _, fine = stiff(scheme, 8 * chosen.substeps)
-    needed = f"expected at most .* s, that is substeps={chosen.substeps} of sim_dt = 0.001 s"
-    with pytest.warns(StepWarning, match=f"steps of 0.001 s are too long .*: {needed}"):
-        _, coarse = stiff(scheme, 1)
-    error, too_long = np.abs(way - fine), np.abs(coarse - fine)
-    assert error.max() < 1e-3
-    assert too_long.max() > 4 * error.max()
-
-
-def test_soft_ground_needs_no_more_than_the_step():
-    assert engine().substeps == 1
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda s: s.pop("limbs"), "state: .* limbs is missing"),
+        (lambda s: s.update(limbs=s["limbs"][:, :-1]), r"state\['limbs'\]: expected shape \(2, 16, 3\)"),
+        (lambda s: s.update(trunk=None), r"state\['trunk'\]: expected shape .*, got \(\)"),
+        (lambda s: s["limbs"].__setitem__((1, 0, 2), np.nan), r"state\['limbs'\]: expected finite"),
+        (lambda s: s["trunk"].__setitem__((1, 0), np.inf), r"state\['trunk'\]: expected finite"),
+        (
+            lambda s: s.update(layout=engine(Trunk("rail")).get_state()["layout"]),
+            "trunk.kind: expected 'free', got 'rail'",
+        ),
+        (lambda s: s.update(layout=engine(n=4).get_state()["layout"]), "num_envs: expected 3, got 4"),
+        (
+            lambda s: s.update(layout=engine(limbs=LIMBS[:1]).get_state()["layout"]),
+            "state: of another engine; .*",
+        ),
+        (lambda s: s["layout"].update(substeps=4), "another engine; substeps: expected 1, got 4$"),
+        (lambda s: s["layout"].pop("ground.friction"), "ground.friction: expected 0.4, got None"),
+        (lambda s: s["layout"].update(more=1), "more: expected None, got 1"),
+        (lambda s: s.update(layout=7), "state: expected .* a layout by name is missing"),
+        (
+            lambda s: s["limbs"].__setitem__((1, 0, 2), 1e10),
+            r"crank angles: expected numbers within \+-1e\+09",
+        ),
+        (lambda s: s["trunk"].__setitem__((1, 0), 1e300), "places and pitch: expected numbers within"),
+        (lambda s: s["trunk"].__setitem__((5, 0), -1e10), "places and pitch: expected numbers within"),
+    ],
+)
+def test_a_state_of_another_engine_is_refused(change, message):
+    e = engine()
+    before, state = e.get_state(), e.get_state()
+    change(state)
+    with pytest.raises(ParameterError, match=message):
+        e.set_state(state)
+    e.advance(steps=0)
+    np.testing.assert_equal(e.get_state(), before)

@@ -1,0 +1,76 @@
+"""What several tests of the engines stand on."""
+
+import numpy as np
+
+from hoof_env.dynamics.constrained import SOLE
+from hoof_env.dynamics.engine import TrunkEngine
+from hoof_env.dynamics.parts import GRAVITY, Limb, Motor, Trunk
+from hoof_env.gait.gait import load_gait
+from hoof_env.ground.contact import Ground
+from hoof_env.leg.geometry import load_geometry
+from hoof_env.leg.linkage import CRANK, FRAME, JOINTS, LOCK
+
+LEG = load_geometry("first_fit")
+RUN, WALK = load_gait("run", "first_fit"), load_gait("walk", "first_fit")
+NATURAL = Ground(restitution=0.5, approach_floor=0.1, friction_fast=0.05)  # that of `HorseLeg-v0`
+FAR = Ground(stiffness=100.0)  # out of reach, and soft enough for any step
+THETA, LOWEST = np.array([4.02, 4.18, 4.1, 4.14]), 1.389  # soles level, and how far they are below O [m]
+HIPS = ((-0.75, 0.0), (-0.65, 0.0), (0.65, 0.0), (0.75, 0.0))
+
+
+def horse(ground=FAR, drive=None, hips=HIPS, settings=(), **trunk):
+    """Four legs on one trunk, free unless told otherwise."""
+    trunk = {"kind": "free", "mass": 320.0, "height": LOWEST, "drag": 0.0, "pitch_inertia": 80.0} | trunk
+    return TrunkEngine(
+        [Limb(LEG, hip, drive or Motor()) for hip in hips], Trunk(**trunk), ground, **dict(settings)
+    )
+
+
+def energy(engine):
+    """Kinetic and potential [J], shape (num_envs,)."""
+    tally = engine.tally()
+    return tally.kinetic + tally.potential
+
+
+def drives_less_losses(engine):
+    """What the account says of the change of `energy` [J]."""
+    total = engine.account
+    gains = total["crank_work"] + total["swing_work"] - total["ground_stored"]
+    return gains - sum(total[name] for name in total if name.endswith("_loss"))
+
+
+def same(one, other, env=slice(None)):
+    """Whether states or reports by name are alike, bit for bit."""
+    return all(np.array_equal(one[name][..., env], other[name][..., env]) for name in one)
+
+
+def cross(arms, forces):
+    """Moments, shape (...), of forces at arms, shape (..., 2)."""
+    return arms[..., 0] * forces[..., 1] - arms[..., 1] * forces[..., 0]
+
+
+def loads(geometry, motion, joints, lock, driver, hip, toe, heel):
+    """Forces, shape (15, 2), and moments about the centres, shape (15,), of joints and ground on each body of
+    a leg; the last is the leg's frame, about O."""
+    force, moment = np.zeros((15, 2)), np.zeros(15)
+    centres = np.vstack([motion.centres, motion.point("O")])
+
+    def push(body, point, pushed):
+        force[body] += pushed
+        moment[body] += cross(motion.point(point) - centres[body], pushed)
+
+    for joint, pushed in zip(JOINTS, joints, strict=True):
+        push(joint.i, joint.point, pushed)
+        push(joint.j, joint.point, -pushed)
+    push(SOLE, geometry.toe, toe)
+    push(SOLE, geometry.heel, heel)
+    moment[list(LOCK)] += lock, -lock
+    moment[CRANK] += driver
+    moment[FRAME] += hip - driver
+    return force, moment
+
+
+def inertia(geometry, motion):
+    """What moves the 14 links against their weight: forces, shape (14, 2), and moments, shape (14,)."""
+    force = geometry.body_masses[:, None] * np.add(motion.centre_accelerations, (0, GRAVITY))
+    return force, geometry.body_inertias * motion.angular_accelerations
