@@ -1,16 +1,12 @@
-"""Trainings on a Ray cluster: many of Stable-Baselines3, or one of RLlib on several workers.
+"""Trainings of `agents.train` on a Ray cluster: seeds, sweeps and searches.
 
     python -m agents.distribute trials --seeds 5                                      five seeds
     python -m agents.distribute trials --seeds 3 --space 'learning_rate=[1e-3,5e-4]'  a sweep
     python -m agents.distribute trials --samples 20 --asha --space 'learning_rate=loguniform(1e-4,1e-2)'
-    python -m agents.distribute rllib --workers 2                                     RLlib's PPO
 
 Without --address a cluster of this machine's cores is made and ended with the command. A worker that dies is
 replaced and its trial goes on from its last checkpoint. Ctrl-C keeps what is there; the same command, given
 again, runs what is missing. docs/distribute.md says how to use a real cluster and where results land.
-
-RLlib's settings are those of agents/hyperparams/ppo.yml as far as RLlib has them: it neither scales rewards
-nor lets the first spread of actions be chosen.
 """
 
 from __future__ import annotations
@@ -26,11 +22,13 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any, Literal
+
+from tyro.conf import Positional
 
 from agents import runs
 from agents.command import parse_pairs, run
-from agents.settings import ENV, FOLDER, TrainingArgs, algorithm_class, load_settings
+from agents.settings import ENV, TrainingArgs, algorithm_class
 from agents.train import Args as TrainArgs
 from agents.train import checked
 from hoof_env.errors import HoofEnvError, OutputError, ParameterError, check_number
@@ -55,6 +53,8 @@ LISTED = "grid_search"
 
 @dataclass(frozen=True)
 class Cluster:
+    what: Positional[Literal["trials"]] = "trials"
+    """trainings, each a trial of Ray Tune"""
     address: str | None = None
     """a running Ray cluster: auto (this machine is part of it), host:port or ray://host:10001"""
     cpus: int | None = None
@@ -70,8 +70,6 @@ class Cluster:
 
 @dataclass(frozen=True)
 class Trials(Cluster, TrainingArgs):
-    """Trainings of agents.train, each a trial of Ray Tune: seeds, sweeps, searches."""
-
     seeds: int = 1
     """trainings of each setting, from seed 0 on"""
     space: tuple[str, ...] = ()
@@ -85,27 +83,6 @@ class Trials(Cluster, TrainingArgs):
     """steps between two scores, which are checkpoints as well"""
     cpus_per_trial: int = 1
     """cores that a trial asks of the cluster, and threads of torch"""
-
-
-@dataclass(frozen=True)
-class Rllib(Cluster):
-    """One training by RLlib's PPO, its environments on several workers."""
-
-    env_id: str = "hoof_env/HorseLeg-v0"
-    """registered environment with a native vector environment"""
-    workers: int = 2
-    """processes with environments; one more learns"""
-    n_envs: int = 64
-    """environments of each worker"""
-    steps: int = 1_000_000
-    """environment steps in all"""
-    seed: int = 0
-    """of environments and network"""
-    env_kwargs: tuple[str, ...] = ()
-    """arguments of the environment: key=value ..., or one JSON object"""
-    params: tuple[str, ...] = ()
-    """hyperparameters of ppo.yml to change: key=value ..., or one JSON object; n_steps times n_envs there is
-    the batch, whatever the workers' n_envs"""
 
 
 @dataclass(frozen=True)
@@ -225,14 +202,18 @@ def prepare(args: Trials) -> dict[str, Any]:
 
 
 def run_trials(args: Trials) -> int:
-    """Run the trials of `args` that have not ended yet and write their table; see `fit` for the rest."""
+    """Run the trials of `args` that have not ended yet and write their table.
+
+    Returns:
+        The exit code: 0, 1 where a trial failed for good, 130 after Ctrl-C.
+    """
     plan = prepare(args)
     start(args)
     from ray import tune
     from ray.tune.schedulers import ASHAScheduler
     from ray.tune.search.basic_variant import BasicVariantGenerator
 
-    from agents.distribute_trial import FIXED, train_trial
+    from agents.distribute_trial import FIXED, Progress, train_trial, write_table
 
     axes = [key for key in plan if key not in FIXED]
     space = plan | {key: plan[key].build() for key in axes} | {"seed": tune.grid_search(plan["seed"])}
@@ -247,9 +228,33 @@ def run_trials(args: Trials) -> int:
         trial_dirname_creator=lambda trial: _folder_name(trial, varied),
     )  # fmt: skip
     trainable = tune.with_resources(train_trial, {"cpu": args.cpus_per_trial})
-    tuner = {"trainable": trainable, "param_space": space, "tune_config": config}
-    name = f"{args.algo}-{args.env_id.rpartition('/')[2]}"
-    return fit(args, name, tuner, varied, checkpoint_config=tune.CheckpointConfig(num_to_keep=1))
+    name, storage = experiment_name(args), args.out
+    storage = storage if "://" in storage else str(Path(storage).absolute())
+    folder = f"{storage}/{name}"
+    running = tune.RunConfig(
+        name=name, storage_path=storage, verbose=0, callbacks=[Progress()],
+        failure_config=tune.FailureConfig(max_failures=args.retries),
+        checkpoint_config=tune.CheckpointConfig(num_to_keep=1),
+    )  # fmt: skip
+    try:
+        if tune.Tuner.can_restore(folder):
+            print(f"going on with {folder}", flush=True)
+            experiment = tune.Tuner.restore(folder, trainable, resume_errored=True)
+        else:
+            experiment = tune.Tuner(trainable, param_space=space, tune_config=config, run_config=running)
+        results = experiment.fit()
+    except OSError as error:
+        raise OutputError(f"cannot write to {args.out!r}: {error}") from None
+    except tune.TuneError as error:
+        raise HoofEnvError(f"Ray Tune: {str(error).strip().splitlines()[-1]}") from None
+    return write_table(results, folder, varied)
+
+
+def experiment_name(args: Trials) -> str:
+    """What the folder is called: a digest tells apart what was asked for, wherever it runs."""
+    asked = {key: value for key, value in asdict(args).items() if key not in Cluster.__dataclass_fields__}
+    digest = hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()[:8]
+    return f"{args.algo}-{args.env_id.rpartition('/')[2]}-{digest}"
 
 
 def _folder_name(trial: Any, varied: list[str]) -> str:
@@ -258,78 +263,17 @@ def _folder_name(trial: Any, varied: list[str]) -> str:
     return f"{number}-" + "".join(c if c.isalnum() or c in "=,.-_" else "_" for c in text)[:100]
 
 
-def make_config(args: Rllib) -> Any:
-    """RLlib's `PPOConfig` for `args`.
-
-    Raises:
-        ParameterError, DataFileError: the arguments, the environment or the hyperparameter file do not fit.
-    """
-    from ray.rllib.algorithms.ppo import PPOConfig
-
-    env_kwargs = parse_pairs("--env-kwargs", args.env_kwargs)
-    settings = load_settings(FOLDER / "ppo.yml", args.env_id) | parse_pairs("--params", args.params)
-    rate = settings["learning_rate"]
-    if isinstance(rate, str):  # lin_<x>
-        rate = [[0, float(rate.removeprefix("lin_"))], [args.steps, 0.0]]
-    return (
-        PPOConfig()
-        .environment(f"hoof_env:{args.env_id}", env_config=env_kwargs)
-        .env_runners(
-            num_env_runners=args.workers,
-            num_envs_per_env_runner=args.n_envs,
-            gym_env_vectorize_mode="vector_entry_point",
-        )
-        .training(
-            lr=rate,
-            gamma=settings["gamma"],
-            lambda_=settings["gae_lambda"],
-            clip_param=settings["clip_range"],
-            entropy_coeff=settings["ent_coef"],
-            vf_loss_coeff=settings["vf_coef"],
-            grad_clip=settings["max_grad_norm"],
-            num_epochs=settings["n_epochs"],
-            minibatch_size=settings["batch_size"],
-            train_batch_size_per_learner=settings["n_steps"] * settings["n_envs"],
-        )
-        .rl_module(model_config={"fcnet_hiddens": settings["policy_kwargs"]["net_arch"]})
-        .learners(num_learners=0)  # in the trial's own process
-        .fault_tolerance(restart_failed_env_runners=True)
-        .debugging(seed=args.seed)
-    )
-
-
-def run_rllib(args: Rllib) -> int:
-    """Train as `args` say, or go on; see `fit` for the rest."""
-    for name in ("workers", "n_envs", "steps"):
-        check_number(name, getattr(args, name), low=1)
-    check_number("seed", args.seed, low=0)
-    kwargs = parse_pairs("--env-kwargs", args.env_kwargs)
-    with runs.make_env(args.env_id, **kwargs) as env:
-        if env.spec is None or env.spec.vector_entry_point is None or hasattr(env.unwrapped, "reward_space"):
-            raise ParameterError(f"env_id: expected one with a native vector environment, got {args.env_id}")
-        runs.warm_up(env)
-    start(args)
-    from ray import tune
-
-    # No metric: Tune would refuse iterations in which no episode ended
-    config = tune.TuneConfig(trial_dirname_creator=lambda trial: f"seed={args.seed}")
-    tuner = {"trainable": "PPO", "param_space": make_config(args), "tune_config": config}
-    return fit(
-        args, f"rllib-{args.env_id.rpartition('/')[2]}", tuner, ["seed"],
-        stop={"num_env_steps_sampled_lifetime": args.steps},
-        checkpoint_config=tune.CheckpointConfig(
-            num_to_keep=1, checkpoint_frequency=10, checkpoint_at_end=True
-        ),
-    )  # fmt: skip
-
-
 def start(args: Cluster) -> None:
     """Join the cluster at `args.address`, or make one of this machine's cores.
 
     Raises:
         ParameterError: Ray is not installed, or no cluster at that address lets us in.
     """
-    check_installed(args)
+    if missing := [name for name in ("ray", "pandas") if not importlib.util.find_spec(name)]:
+        raise ParameterError(
+            f"expected ray[tune] to be installed, found no {', '.join(missing)}: "
+            "pip install 'hoof-env[distribute]'"
+        )
     check_number("retries", args.retries, low=0)
     if args.cpus is not None:
         check_number("cpus", args.cpus, low=1)
@@ -353,66 +297,10 @@ def start(args: Cluster) -> None:
         raise ParameterError(f"address: expected {where}, cannot reach it: {lines[0]}") from None
 
 
-def check_installed(args: Cluster) -> None:
-    """`ParameterError` that names the extra unless all that the command needs is there."""
-    kind, extra, more = (
-        ("rllib", "ray", ("torch", "tree")) if isinstance(args, Rllib) else ("tune", "distribute", ())
-    )
-    missing = [name for name in ("ray", "pandas", *more) if not importlib.util.find_spec(name)]
-    if missing:
-        raise ParameterError(
-            f"expected ray[{kind}] to be installed, found no {', '.join(missing)}: "
-            f"pip install 'hoof-env[{extra}]'"
-        )
-
-
-def fit(args: Cluster, name: str, tuner: dict[str, Any], varied: list[str], **running: Any) -> int:
-    """Run or go on with the experiment whose name the arguments give, and write its table.
-
-    Args:
-        args: the command's.
-        name: start of the experiment's folder in `args.out`; a digest of what is asked for follows.
-        tuner: arguments of `ray.tune.Tuner`.
-        varied: keys of the parameter space for the table.
-        running: more arguments of `ray.tune.RunConfig`.
-
-    Returns:
-        The exit code: 0, 1 where a trial failed for good, 130 after Ctrl-C.
-    """
-    from ray import tune
-
-    from agents.distribute_trial import Progress, write_table
-
-    options = {key: value for key, value in asdict(args).items() if key not in Cluster.__dataclass_fields__}
-    digest = hashlib.sha256(json.dumps(options, sort_keys=True).encode()).hexdigest()[:8]
-    storage = args.out if "://" in args.out else str(Path(args.out).absolute())
-    folder = f"{storage}/{name}-{digest}"
-    config = tune.RunConfig(
-        name=f"{name}-{digest}", storage_path=storage, verbose=0, callbacks=[Progress()],
-        failure_config=tune.FailureConfig(max_failures=args.retries), **running,
-    )  # fmt: skip
-    try:
-        if tune.Tuner.can_restore(folder):
-            print(f"going on with {folder}", flush=True)
-            experiment = tune.Tuner.restore(folder, tuner["trainable"], resume_errored=True)
-        else:
-            experiment = tune.Tuner(**tuner, run_config=config)
-        results = experiment.fit()
-    except OSError as error:
-        raise OutputError(f"cannot write to {args.out!r}: {error}") from None
-    except tune.TuneError as error:
-        raise HoofEnvError(f"Ray Tune: {str(error).strip().splitlines()[-1]}") from None
-    return write_table(results, folder, varied)
-
-
 def main(argv: list[str] | None = None) -> int:
     import tyro
 
-    choice = (
-        Annotated[Trials, tyro.conf.subcommand("trials")] | Annotated[Rllib, tyro.conf.subcommand("rllib")]
-    )
-    args: Any = tyro.cli(choice, args=argv, prog="python -m agents.distribute", description=__doc__)
-    return run_rllib(args) if isinstance(args, Rllib) else run_trials(args)
+    return run_trials(tyro.cli(Trials, args=argv, prog="python -m agents.distribute", description=__doc__))
 
 
 if __name__ == "__main__":

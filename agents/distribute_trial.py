@@ -96,15 +96,8 @@ class Reporter(Scorer):
         tune.report(self.last, checkpoint=checkpoint)
 
 
-def figures(report: dict[str, Any] | None) -> dict[str, Any]:
-    """Of a report of a `Reporter` or of RLlib: return, steps and seconds of training."""
-    report = report or {}
-    runner = report.get("env_runners", {})
-    return {
-        "return": report.get("return", runner.get("episode_return_mean")),
-        "steps": report.get("steps", report.get("num_env_steps_sampled_lifetime")),
-        "train_s": report.get("train_s", report.get("time_total_s")),
-    }
+FIGURES = ("return", "steps", "train_s")
+"""Of a report."""
 
 
 class Progress(tune.Callback):
@@ -122,21 +115,18 @@ class Progress(tune.Callback):
     def on_trial_result(
         self, iteration: int, trials: list[Any], trial: Any, result: dict[str, Any], **info: Any
     ) -> None:
-        score = figures(result)
-        if score["return"] is not None:  # it is none where no episode of RLlib's ended
-            write_line(trial, f"{score['steps']:,.0f} steps, return {score['return']:.2f}")
+        write_line(trial, f"{result.get('steps', 0):,.0f} steps, return {result['return']:.2f}")
 
     def on_trial_recover(self, iteration: int, trials: list[Any], trial: Any, **info: Any) -> None:
         kept = trial.latest_checkpoint_result
-        steps = figures(kept.metrics)["steps"] if kept else 0
+        steps = kept.metrics["steps"] if kept else 0
         write_line(trial, f"{last_failure(trial)} Retry {trial.num_failures}, from step {steps:,.0f}")
 
     def on_trial_error(self, iteration: int, trials: list[Any], trial: Any, **info: Any) -> None:
         write_line(trial, f"{last_failure(trial)} No retry is left")
 
     def on_trial_complete(self, iteration: int, trials: list[Any], trial: Any, **info: Any) -> None:
-        score = figures(trial.last_result)["return"]
-        write_line(trial, "done" if score is None else f"done, return {score:.2f}")
+        write_line(trial, f"done, return {trial.last_result['return']:.2f}")
 
 
 def write_line(trial: Any, what: str) -> None:
@@ -174,7 +164,7 @@ def write_table(results: Any, folder: str, varied: list[str]) -> int:
         is_done = trial.status == "TERMINATED" and trial.trial_id not in Progress.going
         state = "failed" if why else "done" if is_done else "unfinished"
         reasons += [f"  {kept or 'a trial'}: {why}"] if why else []
-        row = {key: config.get(key) for key in varied} | figures(report)
+        row = {key: config.get(key) for key in varied} | {key: report.get(key) for key in FIGURES}
         rows.append(row | {"state": state, "run": str(kept).removeprefix(f"{folder}/")})
     if "://" not in folder and rows:
         text = io.StringIO()
