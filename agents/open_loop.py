@@ -2,7 +2,6 @@
 
     python -m agents.open_loop                                             mean return on hoof_env/HorseLeg-v0
     python -m agents.open_loop --env-id hoof_env/HorseLegRail-v0 --family clocked
-    python -m agents.open_loop --objective peak --speed 3                  least force at 3 m/s or more
     python -m agents.evaluate --policy run runs/open_loop/HorseLeg-v0-constant.json
 
 Families: "constant", the paper's gaits, four numbers that are held; "clocked", each of the four actions with
@@ -67,16 +66,6 @@ OPTIONS = {
 }  # fmt: skip
 """Of CMA-ES: it ends when the steps are small."""
 
-SHORTFALL = 10.0
-"""What 1 m/s or a whole weight too little costs, and failing always: more than it can save."""
-
-
-AVERAGED = (
-    "return", "speed_m_s", "stance_peak_n", "drive_work_j", "distance_m", "weight_share", "failed",
-)  # fmt: skip
-"""Figures of an episode that a cost is made of."""
-
-
 EPISODES = {"constant": 10_240, "clocked": 30_720}
 """Of a search, by family."""
 
@@ -95,12 +84,6 @@ class Args:
     """its arguments: key=value ..., or one JSON object; with reward_weights returns weigh otherwise"""
     family: Literal["constant", "clocked"] = "constant"
     """of gaits"""
-    objective: Literal["return", "peak", "transport"] = "return"
-    """highest mean return; or, at --speed or more, least mean peak force of a stance or cost of transport"""
-    speed: float | None = None
-    """mean speed that "peak" and "transport" ask for [m/s]"""
-    weight_share: float | None = None
-    """mean part of the weight that they ask the leg to bear"""
     restarts: int = 5
     """searches, of seeds 0, 1, ..."""
     episodes: int | None = None
@@ -110,7 +93,7 @@ class Args:
     start: Path | None = None
     """file of a gait whose constants every second search begins with"""
     out: Path | None = None
-    """file; otherwise runs/open_loop/ENV-FAMILY[-OBJECTIVE-SPEED[-share-SHARE]].json"""
+    """file; otherwise runs/open_loop/ENV-FAMILY.json"""
 
 
 def decode(family: str, x: Floats) -> dict[str, Floats]:
@@ -121,34 +104,12 @@ def decode(family: str, x: Floats) -> dict[str, Floats]:
     return {"constant": x[..., :4], "sin": x[..., 4:8], "cos": x[..., 8:12], "frequency_hz": frequency}
 
 
-def cost(episodes: Episodes, objective: str, weight: float, speed: float = 0.0, share: float = 0.0) -> float:
-    """What a search makes small.
-
-    Args:
-        episodes: of one candidate.
-        objective: "return"; or, under conditions, "peak" or "transport": mean peak force of a stance
-            [weights], and work per weight and distance of all episodes together.
-        weight: of trunk and leg [N].
-        speed, share: conditions: mean speed [m/s] and part of the weight that the leg bears, or more.
-    """
-    mean = {key: float(np.mean([one[key] for one in episodes])) for key in AVERAGED}
-    if objective == "return":
-        return -mean["return"]
-    missing = max(0.0, speed - mean["speed_m_s"]) + max(0.0, share - mean["weight_share"])
-    penalty = SHORTFALL * (missing + mean["failed"])
-    if objective == "peak":
-        return mean["stance_peak_n"] / weight + penalty
-    transport = mean["drive_work_j"] / (weight * max(mean["distance_m"], 0.1))  # who stands is only too slow
-    return min(transport, SHORTFALL) + penalty
-
-
 class Objective:
     """Scores candidates by episodes in the rows of one vector environment.
 
     Args:
         env_id, env_kwargs: the environment.
         family: of the candidates.
-        objective, speed, share: as of `cost`.
 
     Attributes:
         leg: a single environment like the rows.
@@ -158,29 +119,19 @@ class Objective:
         ParameterError: no such environment, or one without many at once.
     """
 
-    def __init__(
-        self,
-        env_id: str,
-        env_kwargs: dict[str, Any],
-        family: str,
-        objective: str = "return",
-        speed: float | None = None,
-        share: float | None = None,
-    ) -> None:
-        leg: Any = runs.make_env(env_id, **env_kwargs).unwrapped
+    def __init__(self, env_id: str, env_kwargs: dict[str, Any], family: str) -> None:
+        self.leg: Any = runs.make_env(env_id, **env_kwargs).unwrapped
         envs = make_rows(env_id, ROWS, **env_kwargs)
         if envs is None:
             raise ParameterError(f"env_id: expected an id of this package with many at once, got {env_id!r}")
-        self.leg, self.envs, self.spent = leg, envs, 0
-        self.family = family
-        conditions = {"speed": speed or 0.0, "share": share or 0.0}
-        self._cost: dict[str, Any] = {"objective": objective, "weight": leg.weight, **conditions}
+        self.envs, self.spent, self.family = envs, 0, family
 
     def costs(self, x: Floats, seeds: Sequence[int]) -> list[float]:
-        """`cost` of candidates, shape (n, size), that meet the same starts; n * len(seeds) is `ROWS`."""
+        """Minus the mean returns of candidates, shape (n, size), that meet the same starts; n * len(seeds) is
+        `ROWS`."""
         episodes = self._play(decode(self.family, np.repeat(x, len(seeds), axis=0)), [*seeds] * len(x))
-        each = [episodes[k : k + len(seeds)] for k in range(0, len(episodes), len(seeds))]
-        return [cost(some, **self._cost) for some in each]
+        returns = np.reshape([one["return"] for one in episodes], (len(x), len(seeds)))
+        return [-float(np.mean(some)) for some in returns]
 
     def test(self, parameters: dict[str, Any], count: int) -> Episodes:
         """Episodes of the final score of one candidate."""
@@ -268,26 +219,23 @@ def optimise(args: Args) -> dict[str, Any]:
     """Search, and write the file after every search; returns what it holds.
 
     Raises:
-        HoofEnvError: no CMA-ES is installed. ParameterError: an argument does not fit. DataFileError,
-            OutputError: the file is of something else, or cannot be written. KeyboardInterrupt: Ctrl-C; what
-            was found is in the file.
+        HoofEnvError: no CMA-ES is installed. ParameterError: an argument does not fit.
+        DataFileError, OutputError: the file is of something else, or cannot be written.
+        KeyboardInterrupt: Ctrl-C; what was found is in the file.
     """
     episodes = check(args)
     from tqdm import tqdm
 
-    path = args.out or Path("runs/open_loop", file_name(args))
+    path = place(args)
     about: dict[str, Any] = {
         "env_id": args.env_id, "env_kwargs": parse_pairs("--env-kwargs", args.env_kwargs),
-        "family": args.family, "objective": args.objective,
-        "speed": args.speed, "weight_share": args.weight_share,
+        "family": args.family, "objective": "return",
         "episodes_of_a_search": episodes, "test_episodes": args.test_episodes,
         "start": stored(args.start)["parameters"]["constant"] if args.start else None,
     }  # fmt: skip
     restarts = earlier(path, about)
     check_folder(path.parent)
-    objective = Objective(
-        args.env_id, about["env_kwargs"], args.family, args.objective, args.speed, args.weight_share
-    )
+    objective = Objective(args.env_id, about["env_kwargs"], args.family)
     left = [seed for seed in range(args.restarts) if seed not in [one["seed"] for one in restarts]]
     content: dict[str, Any] = {}
     with tqdm(total=episodes * len(left), unit=" episodes", leave=False, disable=None) as bar:
@@ -314,13 +262,6 @@ def check(args: Args) -> int:
     check_number("test_episodes", args.test_episodes, low=2, high=1e6)
     episodes = args.episodes or EPISODES[args.family]
     check_number("episodes", episodes, low=3 * ROWS, high=1e7)
-    if (args.objective == "return") != (args.speed is None):
-        raise ParameterError(f"speed: expected one for 'peak' and 'transport' alone, got {args.speed!r}")
-    if args.objective == "return" and args.weight_share is not None:
-        raise ParameterError("weight_share: expected none for 'return', which has no conditions")
-    for name, high in (("speed", 20), ("weight_share", 1)):
-        if getattr(args, name) is not None:
-            check_number(name, getattr(args, name), low=0, high=high)
     return episodes
 
 
@@ -408,11 +349,10 @@ def earlier(path: Path, about: dict[str, Any]) -> list[dict[str, Any]]:
     raise DataFileError(f"{path}: expected searches with {about} to go on with; name another --out")
 
 
-def file_name(args: Args) -> str:
-    """What the file of a search is called."""
-    goal = "" if args.objective == "return" else f"-{args.objective}-{args.speed:g}"
-    goal += "" if args.weight_share is None else f"-share-{args.weight_share:g}"
-    return f"{args.env_id.rpartition('/')[2]}-{args.family}{goal}.json"
+def place(args: Args) -> Path:
+    """Where the file is."""
+    name = f"{args.env_id.rpartition('/')[2]}-{args.family}.json"
+    return args.out or Path("runs/open_loop", name)
 
 
 def main(argv: list[str] | None = None) -> None:
@@ -427,7 +367,7 @@ def main(argv: list[str] | None = None) -> None:
     for key, mean in content["score"]["mean"].items():
         bounds = content["score"]["interval95"][key]
         print(f"{key:18} " + (f"{mean:.3f} [{bounds[0]:.3f}, {bounds[1]:.3f}]" if bounds else "infinite"))
-    print(f"written: {args.out or Path('runs/open_loop', file_name(args))}")
+    print(f"written: {place(args)}")
 
 
 if __name__ == "__main__":
