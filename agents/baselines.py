@@ -44,12 +44,8 @@ class Args:
 
 
 def train_all(args: Args) -> list[Run]:
-    """Train what is not done yet; returns the trainings that failed.
-
-    Raises:
-        ParameterError: no training of that name. OutputError: the folder cannot be written.
-        KeyboardInterrupt: Ctrl-C; everything can go on.
-    """
+    """Train what is not done yet; returns the trainings that failed. `ParameterError`: no training of that
+    name. `OutputError`: the folder cannot be written. `KeyboardInterrupt`: Ctrl-C; everything can go on."""
     check_number("workers", args.workers, low=1)
     folder = args.out or FOLDERS[args.subset]
     names = args.only or ("",)
@@ -89,7 +85,6 @@ def work_off(chosen: Sequence[Run], folder: Path, workers: int) -> list[Run]:
 
 
 def is_done(one: Run, folder: Path) -> bool:
-    """Whether a training is through and scored."""
     return (folder / one.name / FINAL).is_file()
 
 
@@ -114,7 +109,6 @@ def stop(running: dict[Run, subprocess.Popen[bytes]]) -> None:
 
 
 def last_line(folder: Path) -> str:
-    """The last line of a log that is not empty."""
     lines = (folder / "log.txt").read_text(encoding="utf-8", errors="replace").split("\n")
     return next((line for line in reversed(lines) if line.strip()), "its log is empty")
 

@@ -26,7 +26,7 @@ from agents.baselines_results import Row, Scored, over_seeds, reference
 from agents.baselines_run import LEG
 from agents.score import CURVE_SEEDS, FINAL_SEEDS, mean_figures, score_vector
 from hoof_env._output import markdown_table
-from hoof_env.envs.policies import GAITS
+from hoof_env.envs.policies import GAITS, open_loop
 from hoof_env.gait.gait import LIMITS, GaitParameters
 
 SPEED = "hoof_env/HorseLegSpeed-v0"
@@ -53,7 +53,6 @@ SLOWER = 0.05
 
 
 def cells(one: Scored) -> list[str]:
-    """Of a table with `COLUMNS`; empty for a figure that the id does not have."""
     known = one.intervals
     return [known[key].text(digits, by) if key in known else "" for key, (_, digits, by) in COLUMNS.items()]
 
@@ -88,14 +87,18 @@ def scaled_runs() -> tuple[list[tuple[float, float]], np.ndarray]:
     return factors, actions
 
 
+def held(actions: np.ndarray) -> Any:
+    """The policy that holds actions, shape (4,), or (n, 4) for n environments."""
+    return open_loop({"constant": actions}, dt=1.0)  # of a clock that is not there
+
+
 def sped_up(speed: float) -> list[Scored]:
     """The scaled runs that go at `speed` [m/s], or by `SLOWER` less at most, with the lowest stance peak and
     with the lowest cost of transport, chosen on the episodes of the learning curves; where none goes so
     fast, the fastest."""
     factors, actions = scaled_runs()
-    few = CURVE_SEEDS[:5]
-    episodes = score_vector(np.repeat(actions, len(few), axis=0), LEG, list(few) * len(actions))
-    means = [mean_figures(episodes[k : k + len(few)]) for k in range(0, len(episodes), len(few))]
+    episodes = [score_vector(held(actions), LEG, [seed] * len(actions)) for seed in CURVE_SEEDS[:5]]
+    means = [mean_figures(each) for each in zip(*episodes, strict=True)]
     near = [k for k, one in enumerate(means) if (1 - SLOWER) * speed <= one["speed_m_s"] <= speed]
     words: dict[int, list[str]] = {}
     if near:
@@ -106,7 +109,7 @@ def sped_up(speed: float) -> list[Scored]:
     return [
         reference(
             f"run, crank × {factors[k][0]:.2f}, swing × {factors[k][1]:.2f} ({' and '.join(chosen)})",
-            actions[k],
+            held(actions[k]),
             LEG,
         )
         for k, chosen in words.items()
@@ -120,12 +123,10 @@ def dominates(agent: Scored, other: Scored) -> bool:
 
 
 def bears_less(agent: Scored, other: Scored) -> bool:
-    """Whether the agent bears less of the weight, intervals apart."""
     return other.intervals["weight_share"].above(agent.intervals["weight_share"])
 
 
 def verdict(agent: Scored, other: Scored) -> str:
-    """Whether the agent dominates, and whether it bears less of the weight then, in words."""
     if not dominates(agent, other):
         return "no"
     return "yes, bearing less of the weight" if bears_less(agent, other) else "yes"
@@ -142,13 +143,8 @@ def seeds_that_dominate(agent: Scored, other: Scored) -> str:
 
 
 def compare(rows: Sequence[Row], best: Row | None, run: Scored) -> str:
-    """The comparison as a table: each version of the run, and below it what is held against it.
-
-    Args:
-        rows: of the plan, those that are done.
-        best: the best agents of HorseLeg-v0.
-        run: the paper's, on HorseLeg-v0.
-    """
+    """The comparison as a table: each version of the paper's `run`, and below it what is held against it: the
+    plan's rows that are done, and the best agents of HorseLeg-v0."""
     agents = []
     for row in rows:
         if row.entry.env_id == LEG and row.entry.label:

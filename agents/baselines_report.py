@@ -74,7 +74,6 @@ def best_of(rows: Sequence[Row]) -> Row | None:
 
 
 def results_table(rows: Sequence[Row], gaits: References) -> str:
-    """Returns of agents and of policies without learning, id by id."""
     titles = (
         "id", "policy", "seeds", "steps", "wall s", "processor s", "return: IQM [95 %]", "mean",
         "worst to best seed", "seeds above run", "above open-loop",
@@ -91,7 +90,6 @@ def results_table(rows: Sequence[Row], gaits: References) -> str:
 
 
 def row_cells(row: Row, known: Mapping[str, Scored]) -> list[str]:
-    """The cells of an entry from its seeds on."""
     count, returns = len(row.results), np.array([one.figures["return"] for one in row.results])
     steps, wall, cpu = (
         np.median([one.final[key] for one in row.results]) for key in ("steps", "wall_s", "cpu_s")
@@ -118,7 +116,6 @@ def times_to_beat(row: Row, known: Mapping[str, Scored]) -> list[float]:
 
 
 def figures_table(rows: Sequence[Row], gaits: References) -> str:
-    """What the gaits are like, id by id."""
     lines = [
         [f"`{env_id}`", one.name, *cells(one)]
         for env_id, known in gaits.items()
@@ -128,7 +125,6 @@ def figures_table(rows: Sequence[Row], gaits: References) -> str:
 
 
 def made_text(rows: Sequence[Row]) -> str:
-    """The command of each entry's first seed, and the versions of all."""
     commands = "\n".join(f"    {row.command}" for row in rows)
     versions = ", ".join(f"{name} {value}" for name, value in versions_of(rows).items())
     return f"The first seed of each:\n\n{commands}\n\nVersions: {versions}.\n"
@@ -196,14 +192,7 @@ def draw_curves(rows: Sequence[Row], known: Mapping[str, Scored], path: Path) ->
 
 def draw_learning_curve(folder: Path, scores: Sequence[Score], path: Path, **options: Any) -> None:
     """Draw the training episodes of a run folder, the scores on the way where it has a curve.csv, the trained
-    policy, which is the first of `scores`, and the means of the others.
-
-    Args:
-        folder: of the run.
-        scores: of the trained policy, and of others to compare it with.
-        path: of the picture.
-        options: of `Figure.savefig`.
-    """
+    policy, which is the first of `scores`, and the means of the others; `options` are of `Figure.savefig`."""
     episodes = runs.read_episodes(folder)
     bins = [part for part in np.array_split(episodes, BINS) if len(part)]
     with matplotlib.rc_context({**STYLE, "font.size": 10}):
@@ -244,11 +233,8 @@ def training_length(folder: Path) -> tuple[int, float]:
 
 
 def report(args: Args) -> Path:
-    """Write page, pictures and CSV; returns the page.
-
-    Raises:
-        DataFileError: nothing is done, or a result cannot be read.
-    """
+    """Write page, pictures and CSV; returns the page. `DataFileError`: nothing is done, or a result cannot be
+    read."""
     folder = args.runs or FOLDERS[args.subset]
     rows = read_results(load_plan(args.subset), folder)
     page = args.page or folder / "report.md"

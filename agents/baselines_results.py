@@ -38,14 +38,9 @@ REPS = 5000
 
 @dataclass(frozen=True)
 class Scored:
-    """A policy without learning, or the seeds of an entry, on the episodes of the final score.
-
-    Attributes:
-        name: for tables.
-        intervals: figures over episodes or, of an entry, over seeds.
-        seeds: figures of each seed; none without learning.
-        curve_return: without learning, the mean return over the episodes of the learning curves.
-    """
+    """A policy without learning, or the seeds of an entry, on the episodes of the final score: figures over
+    episodes or over seeds, those of each seed, and, without learning, the mean return over the episodes of
+    the learning curves."""
 
     name: str
     intervals: Mapping[str, Interval]
@@ -55,8 +50,6 @@ class Scored:
 
 @dataclass(frozen=True)
 class Result:
-    """One training that is done."""
-
     folder: Path
     final: dict[str, Any]
 
@@ -67,7 +60,6 @@ class Result:
 
     @cached_property
     def curve(self) -> list[dict[str, float]]:
-        """Rows of its curve.csv."""
         return read_curve(self.folder / CURVE)
 
 
@@ -80,7 +72,6 @@ class Row:
 
     @property
     def title(self) -> str:
-        """Algorithm, and what sets the entry apart."""
         return " ".join(filter(None, (self.entry.algo.upper(), self.entry.label)))
 
     @cached_property
@@ -96,7 +87,6 @@ class Row:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The hyperparameters of the trainings."""
         return load_settings(self.results[0].folder / CONFIG, self.entry.env_id)
 
     @property
@@ -106,11 +96,8 @@ class Row:
 
 
 def read_results(plan: Sequence[Entry], folder: Path) -> list[Row]:
-    """What is done of a plan; entries without a training that is done are left out.
-
-    Raises:
-        DataFileError: nothing is done, or a result cannot be read or is not what the plan asks for.
-    """
+    """What is done of a plan; entries without a training that is done are left out. `DataFileError`: nothing
+    is done, or a result cannot be read or is not what the plan asks for."""
     rows = []
     for entry in plan:
         folders = [folder / Run(entry, seed).name for seed in range(entry.seeds)]
@@ -143,7 +130,6 @@ def read_result(entry: Entry, folder: Path) -> Result:
 
 
 def expected_settings(entry: Entry) -> dict[str, Any]:
-    """The hyperparameters that an entry is trained with now."""
     settings = load_settings(FOLDER / f"{entry.algo}.yml", entry.env_id)
     return settings if entry.steps is None else settings | {"n_timesteps": entry.steps}
 
@@ -202,15 +188,9 @@ def over_episodes(episodes: Sequence[Mapping[str, float]]) -> dict[str, Interval
 
 
 def iqm(scores: ArrayLike) -> Floats:
-    """Interquartile mean over seeds and the percentile bootstrap's interval of it, which draws whole seeds.
-
-    Args:
-        scores: of each seed, shape (seeds,), or several numbers of each, shape (seeds, n).
-
-    Returns:
-        Mean, low and high, shape (3,) or (3, n); low and high are NaN for one seed. The bootstrap draws the
-        same seeds each time.
-    """
+    """Interquartile mean over seeds and the percentile bootstrap's interval of it, which draws whole seeds:
+    mean, low and high, shape (3,) or (3, n), of scores of shape (seeds,) or (seeds, n). Low and high are NaN
+    for one seed. The bootstrap draws the same seeds each time."""
     from scipy.stats import bootstrap, trim_mean
 
     def middle(some: Floats, axis: int) -> Floats:

@@ -64,20 +64,16 @@ class Entry:
 
     @property
     def name(self) -> str:
-        """For folders and tables."""
         return "-".join(filter(None, (self.algo, self.env_id.rpartition("/")[2], self.label)))
 
 
 @dataclass(frozen=True)
 class Run:
-    """One training of an entry."""
-
     entry: Entry
     seed: int
 
     @property
     def name(self) -> str:
-        """Of its folder."""
         return f"{self.entry.name}-s{self.seed}"
 
     def command(self, folder: Path | None = None) -> list[str]:
@@ -92,11 +88,7 @@ class Run:
 
 
 def load_plan(name: str) -> tuple[Entry, ...]:
-    """The entries of a plan.
-
-    Raises:
-        DataFileError: there is no such file, or an entry is none.
-    """
+    """The entries of a plan; `DataFileError` if there is no such file, or an entry is none."""
     path = PLANS / f"{name}.yml"
     try:
         return tuple(Entry(**entry) for entry in yaml.safe_load(path.read_text(encoding="utf-8")))
@@ -121,11 +113,7 @@ class Args(TrainingArgs):
 
 
 def train_one(args: Args) -> bool:
-    """Train, or go on training, and score; whether it is done, and not interrupted.
-
-    Raises:
-        ParameterError, DataFileError, OutputError: as `agents.train.train`.
-    """
+    """Train, or go on training, and score; whether it is done, not interrupted; raises as `train` does."""
     check_number("points", args.points, low=1)
     check_number("seed", args.seed, low=0, high=CURVE_SEEDS[0] // 2)
     name = args.env_id.rpartition("/")[2]
@@ -183,7 +171,6 @@ class CurveScorer(Scorer):
         return True
 
     def keep(self, episodes: list[dict[str, float]]) -> None:
-        """Add a row and write them all."""
         clock = {"steps": float(self.num_timesteps), "wall_s": self.wall_s, "cpu_s": self.cpu_s}
         self.rows.append(clock | mean_figures(episodes))
         write_csv(self.path, COLUMNS, self.rows, "{:.10g}")

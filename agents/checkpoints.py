@@ -43,11 +43,8 @@ UNFINISHED = ".unfinished-"
 
 @contextmanager
 def whole(folder: Path) -> Iterator[Path]:
-    """A folder that is there with all its files, on the disk, once the block has succeeded, else not at all.
-
-    Raises:
-        OutputError: it cannot be written.
-    """
+    """A folder that is there with all its files, on the disk, once the block has succeeded, else not at all;
+    `OutputError` if it cannot be written."""
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         stage = Path(tempfile.mkdtemp(prefix=UNFINISHED, dir=folder.parent))
@@ -123,13 +120,7 @@ def write_episodes(envs: Any, path: Path, go_on: bool = False) -> None:
 
 
 class Resumed:
-    """A model that goes on from a checkpoint, its environments too.
-
-    Args:
-        checkpoint: folder.
-        algorithm: class of the model.
-        many: `VecEnv` without wrappers, as the run had it.
-        device: of torch.
+    """A model that goes on from a checkpoint of its class, with `many`, its `VecEnv` without wrappers.
 
     Attributes:
         model: of Stable-Baselines3; call `model.learn(rest, reset_num_timesteps=False)`.
@@ -205,12 +196,10 @@ class Resumed:
 
 
 def _explorer(model: Any) -> Any:
-    """The distribution that holds gSDE's noise."""
     return getattr(model, "actor", model.policy).action_dist
 
 
 def _layer(envs: Any, kind: type) -> Any:
-    """The wrapper of that class."""
     while not isinstance(envs, kind):
         envs = envs.venv
     return envs

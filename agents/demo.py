@@ -71,11 +71,8 @@ class Args:
 
 
 def demo(args: Args) -> Path:
-    """Do all four steps and return the path of the report.
-
-    Raises:
-        OutputError: the folder cannot be written. KeyboardInterrupt: Ctrl-C; nothing was replaced.
-    """
+    """Do all four steps and return the path of the report. `OutputError`: the folder cannot be written.
+    `KeyboardInterrupt`: Ctrl-C; nothing was replaced."""
     check_number("seed", args.seed, low=0, high=FIRST_SEED - 1)
     check_folder(args.out)
     budget = QUICK if args.quick else FULL
@@ -107,13 +104,11 @@ def demo(args: Args) -> Path:
 
 
 def say(line: str) -> None:
-    """A line of progress, under the title of its step."""
     print(f"      {line}", flush=True)
 
 
 @contextmanager
 def announced(number: int, title: str) -> Iterator[None]:
-    """A numbered step: its title before, its time after."""
     print(f"[{number}/4] {title}", flush=True)
     started = time.monotonic()
     yield
@@ -174,12 +169,10 @@ def film_all(scores: Sequence[evaluate.Score], budget: Budget, stage: Path) -> l
 
 
 def clip(title: str, caption: str, path: Path) -> dict[str, str]:
-    """A film for the page."""
     return {"title": title, "caption": caption, "film": data_uri(path)}
 
 
 def print_counts(reproduction: Reproduction) -> None:
-    """How many rows are within their bars and how many claims hold, by solver."""
     for solver in SOLVERS:
         say(f"{solver} solver: {counted(reproduction.rows, reproduction.shapes, solver)}")
 
@@ -192,16 +185,8 @@ def render(
     clips: Sequence[dict[str, str]],
     folder: Path,
 ) -> str:
-    """The report: one HTML page that holds its pictures and films and needs no network.
-
-    Args:
-        args: the command's.
-        reproduction: of the paper. Its figures lie in `folder` as SVG.
-        scores: of the policies, the trained one last; all played the same episodes.
-        trained: the training, whose run folder is `folder`.
-        clips: films to show.
-        folder: see there.
-    """
+    """The report: one HTML page that holds its pictures and films and needs no network. The trained policy is
+    the last of `scores`; its run folder is `folder`, where the figures lie as SVG."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     *others, agent = scores

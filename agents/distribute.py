@@ -99,11 +99,7 @@ class Axis:
         return list(self.arguments[0] if self.draw in (LISTED, "choice") else self.arguments[:2])
 
     def build(self) -> Any:
-        """The same for Tune.
-
-        Raises:
-            ParameterError: Tune refuses the arguments.
-        """
+        """The same for Tune; `ParameterError` if it refuses the arguments."""
         from ray import tune
 
         try:
@@ -117,14 +113,12 @@ class Axis:
 
 
 def parse_space(items: Sequence[str]) -> list[Axis]:
-    """Read `key=[...]` and `key=distribution(...)`.
+    """Read `key=[...]` and `key=distribution(...)`; `ParameterError` if an item is neither or a key comes
+    twice.
 
     >>> parse_space(["n_steps=[16, 32]", "learning_rate=loguniform(1e-4, 1e-2)"])
     [Axis(key='n_steps', draw='grid_search', arguments=([16, 32],)), \
-Axis(key='learning_rate', draw='loguniform', arguments=(0.0001, 0.01))]
-
-    Raises:
-        ParameterError: an item is neither, or a key comes twice.
+    Axis(key='learning_rate', draw='loguniform', arguments=(0.0001, 0.01))]
     """
     axes: dict[str, Axis] = {}
     for item in items:
@@ -154,11 +148,7 @@ def _read(text: str) -> tuple[str, tuple[Any, ...]]:
 
 
 def check_keys(axes: Iterable[Axis], algo: str, settings: Iterable[str]) -> None:
-    """Refuse keys that are neither hyperparameters of `algo`, nor in its `settings`, nor an environment's.
-
-    Raises:
-        ParameterError: an unknown key.
-    """
+    """Refuse keys that are neither hyperparameters of `algo`, nor in its `settings`, nor an environment's."""
     known = {*inspect.signature(algorithm_class(algo)).parameters, *settings, "normalize", "n_envs"}
     known -= {"env", "seed", "device", "_init_setup_model", "verbose", "tensorboard_log", "n_timesteps"}
     for axis in axes:
@@ -170,11 +160,7 @@ def check_keys(axes: Iterable[Axis], algo: str, settings: Iterable[str]) -> None
 
 
 def prepare(args: Trials) -> dict[str, Any]:
-    """The parameter space of `args`: constants, an `Axis` for what varies, a list of seeds; all checked.
-
-    Raises:
-        ParameterError, DataFileError: the arguments, the environment, the space or the file do not fit.
-    """
+    """The parameter space of `args`: constants, an `Axis` for what varies, a list of seeds; all checked."""
     for name in ("seeds", "samples", "report_every", "cpus_per_trial"):
         check_number(name, getattr(args, name), low=1)
     algorithm_class(args.algo)
@@ -202,11 +188,7 @@ def prepare(args: Trials) -> dict[str, Any]:
 
 
 def run_trials(args: Trials) -> int:
-    """Run the trials of `args` that have not ended yet and write their table.
-
-    Returns:
-        The exit code: 0, 1 where a trial failed for good, 130 after Ctrl-C.
-    """
+    """Run the trials of `args` that have not ended yet and write their table; returns its exit code."""
     plan = prepare(args)
     start(args)
     from ray import tune
@@ -264,11 +246,8 @@ def _folder_name(trial: Any, varied: list[str]) -> str:
 
 
 def start(args: Cluster) -> None:
-    """Join the cluster at `args.address`, or make one of this machine's cores.
-
-    Raises:
-        ParameterError: Ray is not installed, or no cluster at that address lets us in.
-    """
+    """Join the cluster at `args.address`, or make one of this machine's cores; `ParameterError` if Ray is not
+    installed, or no cluster at that address lets us in."""
     if missing := [name for name in ("ray", "pandas") if not importlib.util.find_spec(name)]:
         raise ParameterError(
             f"expected ray[tune] to be installed, found no {', '.join(missing)}: "

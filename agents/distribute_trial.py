@@ -26,15 +26,10 @@ FIXED = ("train", "env_kwargs", "params", "report_every", "seed", "command")
 
 
 def train_trial(config: dict[str, Any]) -> None:
-    """Train as `config` says; every `report_every` steps and at the end report to Tune the score and, as a
-    checkpoint, the run folder. A trial that is retried goes on from its last one. One that diverges or whose
-    settings do not fit would do so again: it ends with the reason as its figure "failed".
-
-    Args:
-        config: "train", fields of `agents.train.Args`; "env_kwargs" and "params", mappings; "report_every",
-            steps; "seed"; "command", for run.json; and what the search chose: hyperparameters, and arguments
-            of the environment behind "env.".
-    """
+    """Train as `config` says (`agents.distribute.prepare`); every `report_every` steps and at the end report
+    to Tune the score and, as a checkpoint, the run folder. A trial that is retried goes on from its last one.
+    One that diverges or whose settings do not fit would do so again: it ends with the reason as its figure
+    "failed"."""
     chosen = {key: value for key, value in config.items() if key not in FIXED}
     env_kwargs = config["env_kwargs"] | {
         k.removeprefix(ENV): v for k, v in chosen.items() if k.startswith(ENV)
@@ -61,12 +56,9 @@ def train_trial(config: dict[str, Any]) -> None:
 
 
 class Reporter(Scorer):
-    """Scores the policy, keeps a checkpoint and reports both to Tune.
-
-    Attributes:
-        last: the last score: "return", mean over the episodes of `CURVE_SEEDS`; "steps"; "train_s", seconds
-            of training, scores and retried parts aside.
-    """
+    """Scores the policy, keeps a checkpoint and reports both to Tune. `last` is the last score: "return",
+    mean over the episodes of `CURVE_SEEDS`, "steps", and "train_s", seconds of training alone, also of
+    retried ones."""
 
     def __init__(
         self, folder: Path, config: dict[str, Any], env_kwargs: dict[str, Any], last: dict[str, float]
@@ -76,7 +68,6 @@ class Reporter(Scorer):
         self.wall_s = self.last.get("train_s", 0.0)
 
     def keep(self, episodes: list[dict[str, float]]) -> None:
-        """Remember the score."""
         mean = sum(one["return"] for one in episodes) / len(episodes)
         self.last = {"return": mean, "steps": self.num_timesteps, "train_s": self.wall_s}
 
@@ -90,7 +81,6 @@ class Reporter(Scorer):
             self._start_clock()
 
     def report(self) -> None:
-        """Hand the last score and the run folder to Tune."""
         checkpoint = tune.Checkpoint.from_directory(str(self.folder))
         checkpoint.set_metadata(self.last)
         tune.report(self.last, checkpoint=checkpoint)
@@ -101,11 +91,8 @@ FIGURES = ("return", "steps", "train_s")
 
 
 class Progress(tune.Callback):
-    """A line for each score, and when a trial ends, when its worker died and when it goes on.
-
-    Attributes:
-        going: ids of trials that had not ended at the last step; of the class, for Tune works with a copy.
-    """
+    """A line for each score, and when a trial ends, when its worker died and when it goes on. `going` are the
+    ids of trials that had not ended at the last step; of the class, for Tune works with a copy."""
 
     going: ClassVar[set[str]] = set()
 
@@ -130,7 +117,6 @@ class Progress(tune.Callback):
 
 
 def write_line(trial: Any, what: str) -> None:
-    """A line about a trial, at once."""
     print(f"trial {trial.trial_id.rpartition('_')[2]}: {what}", flush=True)
 
 
@@ -149,11 +135,8 @@ def reason(error: str) -> str:
 
 
 def write_table(results: Any, folder: str, varied: list[str]) -> int:
-    """Write `folder`/trials.csv where that is a path, print what came of the trials.
-
-    Returns:
-        The exit code: 0, 1 where a trial failed for good, 130 where one has not ended.
-    """
+    """Write `folder`/trials.csv where that is a path, print what came of the trials; returns the exit code:
+    0, 1 where a trial failed for good, 130 where one has not ended."""
     rows, reasons = [], []
     # Whether a trial is done stands in its status alone; but after Ctrl-C all look as if they were
     pairs = zip(results, results._experiment_analysis.trials, strict=True)

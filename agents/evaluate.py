@@ -36,7 +36,7 @@ DEFAULT_ENV = "hoof_env/HorseLeg-v0"
 
 @dataclass(frozen=True)
 class Metric:
-    """One column of the table: `title`, factor and digits of what a person reads."""
+    """A column of the table: title, factor and digits of what a person reads."""
 
     title: str
     factor: float = 1.0
@@ -77,7 +77,6 @@ class Interval:
         return mean, "" if self.low == self.high or math.isnan(self.low) else f"[{low}, {high}]"
 
     def text(self, digits: int = 1, factor: float = 1.0) -> str:
-        """The same in one."""
         return " ".join(filter(None, self.parts(digits, factor)))
 
     def above(self, other: Interval) -> bool:
@@ -115,11 +114,8 @@ def estimate(values: Sequence[float]) -> Interval:
 
 
 def film_paths(video: Path, names: Sequence[str]) -> dict[str, Path]:
-    """Where the film of each policy goes: `video`, with the policy's name added if there are several.
-
-    Raises:
-        ParameterError: two films would have one name, or it is not that of an MP4.
-    """
+    """Where the film of each policy goes: `video`, with the policy's name added if there are several;
+    `ParameterError` if two films would have one name, or it is not that of an MP4."""
     if video.suffix.lower() not in ("", ".mp4"):
         raise ParameterError(f"--video: expected a file that ends in .mp4, got {str(video)!r}")
     paths: dict[str, Path] = {}
@@ -208,17 +204,8 @@ def _environment(args: Args) -> tuple[str, dict[str, Any]]:
 
 
 def film(env: gym.Env[Any, Any], policy: Any, path: Path, seed: int) -> None:
-    """Write one episode to `path`, an MP4; an older file is replaced at the end.
-
-    Args:
-        env: made with render_mode="rgb_array".
-        policy: anything with Stable-Baselines3's `predict`.
-        path: of the film.
-        seed: of the episode.
-
-    Raises:
-        OutputError: the folder cannot be written, or the disk is full.
-    """
+    """Write one episode, of an `env` made with render_mode="rgb_array", to an MP4; an older file is replaced
+    at the end. `OutputError`: the folder cannot be written, or the disk is full."""
     from hoof_env.film import write_film
 
     write_film(pictures(env, policy, seed), path, env.metadata["render_fps"])
@@ -237,12 +224,10 @@ def pictures(env: gym.Env[Any, Any], policy: Any, seed: int) -> Iterator[NDArray
 
 
 def cell(key: str, value: Interval) -> tuple[str, str]:
-    """Mean and interval of a figure of `METRICS` as a person reads them."""
     return value.parts(METRICS[key].digits, METRICS[key].factor)
 
 
 def table(scores: Sequence[Score]) -> Any:
-    """The scores as a `rich` table."""
     from rich import box
     from rich.table import Table
 

@@ -30,9 +30,10 @@ from tyro.conf import Positional
 import hoof_env
 from agents import runs
 from agents.command import run
-from hoof_env._output import check_folder, staged
-from hoof_env.errors import DataFileError, HoofEnvError, OutputError, ParameterError
+from hoof_env._output import staged
+from hoof_env.errors import DataFileError, HoofEnvError, ParameterError
 from hoof_env.onnx_policy import INPUT, LISTS, OUTPUT, OnnxPolicy, describe, settings_of
+from hoof_env.records import check_place
 
 OPSET = 18
 """Of the file; onnxruntime reads it from 1.14 on."""
@@ -55,18 +56,14 @@ class Args:
 
 
 def export(model: Path, out: Path, env_id: str | None = None) -> float:
-    """Write the policy of a model and return the largest difference of an action, as in `TOLERANCE`.
-
-    Args:
-        model: run folder or .zip.
-        out: ends in .onnx.
-        env_id: what it is for; otherwise what run.json says.
+    """Write the policy of a run folder or .zip to an .onnx and return the largest difference of an action, as
+    in `TOLERANCE`. It is for `env_id`, or what run.json says.
 
     Raises:
         ParameterError: another suffix, or no environment known. DataFileError: no such model.
         Others as `write_policy`.
     """
-    check_place(out)
+    check_place(out, [".onnx"])
     saved = runs.SavedModel.find(model)
     env_id = env_id or saved.record.get("env_id")
     if env_id is None:
@@ -76,15 +73,6 @@ def export(model: Path, out: Path, env_id: str | None = None) -> float:
         trained = saved.load(env, env_id)
         metadata = about(env, env_id, kwargs, saved.record)
     return write_policy(trained, out, metadata)
-
-
-def check_place(out: Path) -> None:
-    """Raise unless a policy can be written there: `ParameterError` for its suffix, else `OutputError`."""
-    if out.suffix != ".onnx":
-        raise ParameterError(f"out: expected a file that ends in .onnx, got {str(out)!r}")
-    if out.is_dir():
-        raise OutputError(f"cannot write to {str(out)!r}: expected a file, got a folder")
-    check_folder(out.parent)
 
 
 def about(env: Any, env_id: str, env_kwargs: dict[str, Any], record: dict[str, Any]) -> dict[str, Any]:
@@ -153,7 +141,6 @@ class Deterministic(torch.nn.Module):
             self.register_buffer("scale", torch.as_tensor(scale))
 
     def forward(self, observation: Any) -> Any:
-        """Actions, shape (batch, n), for observations, shape (batch, k)."""
         if self.clip is not None:
             scaled = (observation.double() - self.mean) / self.scale
             observation = scaled.clamp(-self.clip, self.clip).float()
@@ -164,11 +151,8 @@ class Deterministic(torch.nn.Module):
 
 
 def module_of(trained: runs.TrainedPolicy) -> Any:
-    """The policy as a torch module that is ready to be traced.
-
-    Raises:
-        ParameterError: a recurrent policy, or actions that are not vectors.
-    """
+    """The policy as a torch module that is ready to be traced; `ParameterError` for a recurrent one, or
+    actions that are not vectors."""
     policy, space = trained.model.policy, trained.model.action_space
     if not isinstance(space, gym.spaces.Box) or len(space.shape) != 1 or hasattr(policy, "lstm_actor"):
         raise ParameterError(f"model: expected a memoryless policy with vectors for actions, got {space}")
@@ -177,11 +161,8 @@ def module_of(trained: runs.TrainedPolicy) -> Any:
 
 
 def some_observations(space: gym.Space[Any]) -> Any:
-    """`TRIED` random observations, a few of them far outside of what is usual, shape (TRIED, k), float32.
-
-    Raises:
-        ParameterError: not a space of vectors.
-    """
+    """`TRIED` random observations, a few of them far outside of what is usual, shape (TRIED, k), float32;
+    `ParameterError` for a space that is not of vectors."""
     if not isinstance(space, gym.spaces.Box) or len(space.shape) != 1:
         raise ParameterError(f"model: expected one that observes vectors, got {space}")
     space.seed(0)
@@ -209,11 +190,7 @@ def _quietly() -> Iterator[None]:
 
 
 def write_onnx(module: Any, example: Any, path: Path, metadata: dict[str, Any]) -> None:
-    """Write a module as ONNX with any number of rows.
-
-    Raises:
-        HoofEnvError: a package is missing.
-    """
+    """Write a module as ONNX with any number of rows; `HoofEnvError` if a package is missing."""
     try:
         import onnx  # noqa: F401
         import onnxscript  # noqa: F401

@@ -105,19 +105,8 @@ def decode(family: str, x: Floats) -> dict[str, Floats]:
 
 
 class Objective:
-    """Scores candidates by episodes in the rows of one vector environment.
-
-    Args:
-        env_id, env_kwargs: the environment.
-        family: of the candidates.
-
-    Attributes:
-        leg: a single environment like the rows.
-        spent: episodes so far.
-
-    Raises:
-        ParameterError: no such environment, or one without many at once.
-    """
+    """Scores candidates of a family by episodes in the rows of one vector environment; `leg` is a single one
+    like them, `spent` counts episodes. `ParameterError`: no such environment, or one without many at once."""
 
     def __init__(self, env_id: str, env_kwargs: dict[str, Any], family: str) -> None:
         self.leg: Any = runs.make_env(env_id, **env_kwargs).unwrapped
@@ -134,7 +123,6 @@ class Objective:
         return [-float(np.mean(some)) for some in returns]
 
     def test(self, parameters: dict[str, Any], count: int) -> Episodes:
-        """Episodes of the final score of one candidate."""
         episodes: Episodes = []
         while len(episodes) < count:
             first = TEST_SEED + len(episodes)
@@ -153,23 +141,13 @@ def search(
     tick: Callable[[int, float], Any],
     start: Sequence[float] | None = None,
 ) -> tuple[Floats, float, bool]:
-    """One CMA-ES from the best point of a random screening, or from a constant action.
+    """One CMA-ES from the best point of a random screening, or from the constant action `start`, shape (4,).
 
-    All candidates of a generation meet the same starts, those of the next meet others. At the end the mean
-    of the distribution, the luckiest candidate and the best of the last generation meet more.
-
-    Args:
-        objective: what scores candidates.
-        seed: of the search; searches of different seeds share no start.
-        episodes: to spend, about.
-        tick: called with the number of episodes that were added and the lowest cost in them.
-        start: the constant action to begin with, shape (4,); harmonics are none there.
-
-    Returns:
-        The best point, its cost over starts that the search had not met, and whether Ctrl-C ended it.
-
-    Raises:
-        KeyboardInterrupt: Ctrl-C before anything was found.
+    All candidates of a generation meet the same starts, those of the next meet others; searches of different
+    seeds share none. At the end the mean of the distribution, the luckiest candidate and the best of the last
+    generation meet more. About `episodes` are spent; `tick` is called with the number of those that were
+    added and the lowest cost in them. Returns the best point, its cost over starts that the search had not
+    met, and whether Ctrl-C ended it; `KeyboardInterrupt`: it did before anything was found.
     """
     import cma
 
@@ -266,7 +244,6 @@ def check(args: Args) -> int:
 
 
 def search_once(objective: Objective, seed: int, about: dict[str, Any], bar: Any) -> dict[str, Any]:
-    """One search, as the file keeps it."""
     began, used, objective.spent = time.monotonic(), time.process_time(), 0
 
     def tick(count: int, lowest: float) -> None:
@@ -289,7 +266,6 @@ def search_once(objective: Objective, seed: int, about: dict[str, Any], bar: Any
 
 
 def means(episodes: Episodes) -> dict[str, float | None]:
-    """Of the figures that are kept; None for an infinite one."""
     figures = {key: float(np.mean([one[key] for one in episodes])) for key in KEPT}
     return {key: value if math.isfinite(value) else None for key, value in figures.items()}
 
@@ -301,14 +277,8 @@ def write(
     restarts: list[dict[str, Any]],
     before: dict[str, Any],
 ) -> dict[str, Any]:
-    """Write the best of the searches, scored, and all of them; returns what the file holds.
-
-    Args:
-        path, about: the file, and what was asked for.
-        objective: what scores a gait.
-        restarts: the searches.
-        before: what the file held, or nothing.
-    """
+    """Write the best of the searches, scored, and all of them; returns what the file holds. `before` is what
+    it held, or nothing."""
     best = min(restarts, key=lambda one: one["cost"])
     score = before.get("score")
     if before.get("parameters") != best["parameters"]:
@@ -335,11 +305,8 @@ def write(
 
 
 def earlier(path: Path, about: dict[str, Any]) -> list[dict[str, Any]]:
-    """The searches of a file that were not interrupted; none if there is no file.
-
-    Raises:
-        DataFileError: the file is of something else.
-    """
+    """The searches of a file that were not interrupted; none if there is no file. `DataFileError`: the file
+    is of something else."""
     if not path.is_file():
         return []
     with suppress(OSError, ValueError, KeyError, TypeError, AttributeError):
@@ -350,7 +317,6 @@ def earlier(path: Path, about: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def place(args: Args) -> Path:
-    """Where the file is."""
     name = f"{args.env_id.rpartition('/')[2]}-{args.family}.json"
     return args.out or Path("runs/open_loop", name)
 

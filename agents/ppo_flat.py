@@ -93,8 +93,6 @@ DIVERGED = "the training diverged: policy or gradient is not finite any more; tr
 
 @dataclass
 class Learned:
-    """What a training leaves: the agent, and a row per rollout as in progress.csv."""
-
     agent: Agent
     progress: list[dict[str, float]] = field(default_factory=list)
 
@@ -153,12 +151,8 @@ def estimate_advantages(
 
 
 def make_envs(args: Args) -> gym.wrappers.vector.RecordEpisodeStatistics:
-    """The vector environment, with episode returns.
-
-    Raises:
-        ParameterError: unknown id or argument, spaces that are not boxes of one dimension, or an environment
-            that restarts in another way than on the next step.
-    """
+    """The vector environment, with episode returns. `ParameterError`: unknown id or argument, spaces that are
+    not boxes of one dimension, or an environment that restarts in another way than on the next step."""
     kwargs: dict[str, Any] = parse_pairs("--env-kwargs", args.env_kwargs)
     try:
         envs = gym.make_vec(args.env_id, args.n_envs, args.vectorization, **kwargs)
@@ -328,7 +322,6 @@ def report(steps: int, seconds: float, envs: gym.wrappers.vector.RecordEpisodeSt
 
 
 def write(learned: Learned, folder: Path) -> None:
-    """Write model.pt and progress.csv, whole or not at all."""
     weights = io.BytesIO()
     torch.save(learned.agent.state_dict(), weights)
     with staged(folder) as stage:

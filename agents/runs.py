@@ -52,12 +52,8 @@ PACKAGES = ("hoof-env", "numpy", "gymnasium", "numba", "stable-baselines3", "sb3
 
 @contextmanager
 def alone(folder: Path) -> Iterator[None]:
-    """The folder is there and nobody else works in it meanwhile; a process that is killed leaves it free.
-    A block that fails before it has written anything leaves nothing behind.
-
-    Raises:
-        OutputError: another process is at work there, or it cannot be written.
-    """
+    """The folder is there and nobody else works in it meanwhile, else `OutputError`; a process that is killed
+    leaves it free. A block that fails before it has written anything leaves nothing behind."""
     from filelock import FileLock, Timeout
 
     made = [path for path in (folder / ".lock", folder, *folder.parents) if not path.exists()]
@@ -79,11 +75,8 @@ def alone(folder: Path) -> Iterator[None]:
 
 
 def make_env(env_id: str, **kwargs: Any) -> gym.Env[Any, Any]:
-    """`gymnasium.make`, refusals in our words.
-
-    Raises:
-        ParameterError: unknown id, or an argument that the environment does not take.
-    """
+    """`gymnasium.make`; `ParameterError` for an unknown id, or an argument that the environment does not
+    take."""
     try:
         return gym.make(env_id, **kwargs)
     except (gym.error.Error, ModuleNotFoundError, TypeError) as error:
@@ -92,11 +85,7 @@ def make_env(env_id: str, **kwargs: Any) -> gym.Env[Any, Any]:
 
 def make_vec_env(env_id: str, n_envs: int, **kwargs: Any) -> Any:
     """Environments side by side as Stable-Baselines3's `VecEnv`: in one call where the id has a vector
-    environment of this package, else one after the other. A pipe to another process would cost more.
-
-    Raises:
-        ParameterError: as `make_env`.
-    """
+    environment of this package, else one after the other. A pipe to another process would cost more."""
     with make_env(env_id, **kwargs) as env:
         spec = env.spec
     if spec is not None and str(spec.vector_entry_point).startswith("hoof_env."):
@@ -112,13 +101,11 @@ def make_vec_env(env_id: str, n_envs: int, **kwargs: Any) -> Any:
 
 
 def warm_up(env: gym.Env[Any, Any]) -> None:
-    """Reset and step once, so that kernels are compiled before anything is timed."""
     env.reset(seed=0)
     env.step(env.action_space.sample())
 
 
 def command() -> str:
-    """The command that started this process."""
     return shlex.join(["python", *sys.orig_argv[1:]])
 
 
@@ -143,7 +130,6 @@ def write_text(path: Path, text: str) -> None:
 
 
 def write_record(folder: Path, record: dict[str, Any]) -> None:
-    """Write run.json."""
     write_text(folder / RECORD, json.dumps(record, indent=2) + "\n")
 
 

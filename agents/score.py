@@ -8,7 +8,7 @@ first seconds, in which a gait settles, are left out.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -86,19 +86,15 @@ def score_vector(
     policy: Any,
     env_id: str,
     seeds: Sequence[int],
-    tick: Callable[[int], Any] = lambda count: None,
     **env_kwargs: Any,
 ) -> list[dict[str, float]]:
     """One episode per seed; its return and the figures of its summary, as `play` gives them.
 
     Args:
         policy: anything with Stable-Baselines3's `predict` that takes many observations, shape (n, k), and
-            `episode_start`, shape (n,); the name or path of one, as `find_policy` takes them; or actions
-            that are held, shape (4,) for all or (len(seeds), 4).
-        env_id: registered environment. One without a native vector environment is played one by one.
+            `episode_start`, shape (n,); or the name or path of one, as `find_policy` takes them.
+        env_id, env_kwargs: the environment. One without a native vector environment is played one by one.
         seeds: of the episodes.
-        tick: called with the number of episodes that were added.
-        env_kwargs: arguments of the environment.
 
     Raises:
         ParameterError, DataFileError: unknown environment or policy, or one that does not fit.
@@ -106,47 +102,16 @@ def score_vector(
     with runs.make_env(env_id, **env_kwargs) as env:
         if isinstance(policy, str):
             policy = find_policy(policy, env, env_id)
-        held = None if hasattr(policy, "predict") else _held(policy, len(seeds))
+        if not hasattr(policy, "predict"):
+            raise ParameterError(f"policy: expected one with predict, or its name, got {policy!r}")
         episodes: list[dict[str, float]] = []
         envs = None
         for first in range(0, len(seeds), ROWS):
-            part = slice(first, first + ROWS)
-            batch, acting = list(seeds[part]), policy if held is None else Held(held[part])
+            batch = list(seeds[first : first + ROWS])
             if envs is None or envs.num_envs != len(batch):
                 envs = make_rows(env_id, len(batch), **env_kwargs)
-            if envs is None:
-                for k, seed in enumerate(batch):
-                    episodes += play(env, policy if held is None else Held(held[first + k]), [seed])
-                    tick(1)
-            else:
-                episodes += play_rows(envs, acting, batch)
-                tick(len(batch))
+            episodes += play(env, policy, batch) if envs is None else play_rows(envs, policy, batch)
     return episodes
-
-
-class Held:
-    """A policy that holds its actions, shape (4,), or (n, 4) for n environments."""
-
-    def __init__(self, actions: NDArray[np.float32]) -> None:
-        self._actions = np.asarray(actions, np.float32)
-
-    def predict(
-        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
-    ) -> tuple[NDArray[np.float32], None]:
-        """The actions."""
-        return np.broadcast_to(self._actions, (*np.shape(observation)[:-1], self._actions.shape[-1])), None
-
-
-def _held(actions: Any, count: int) -> NDArray[np.float32]:
-    """Actions for `count` episodes, shape (count, 4)."""
-    with suppress(ValueError, TypeError):
-        given = np.asarray(actions, np.float32)
-        if given.shape in ((4,), (count, 4)) and np.isfinite(given).all():
-            return np.broadcast_to(given, (count, 4))
-    raise ParameterError(
-        f"policy: expected one with predict, its name, or finite actions of shape (4,) or ({count}, 4), "
-        f"got {actions!r}"
-    )
 
 
 def make_rows(env_id: str, num_envs: int, **env_kwargs: Any) -> HorseLegVectorEnv | None:
@@ -205,20 +170,14 @@ def is_model(name: str) -> bool:
 
 
 def saved_model(path: Path) -> OnnxPolicy | runs.SavedModel:
-    """A policy in a file or a folder: an exported one, or a model of agents.train.
-
-    Raises:
-        DataFileError: there is none.
-    """
+    """A policy in a file or a folder: an exported one, or a model of agents.train; `DataFileError` if there
+    is none."""
     return OnnxPolicy(path) if OnnxPolicy.stands_at(path) else runs.SavedModel.find(path)
 
 
 def read_policy_record(name: str) -> dict[str, Any]:
     """What a policy's file says of itself, env_id and env_kwargs among it; empty for a scripted policy.
-
-    Raises:
-        DataFileError: no such model or gait.
-    """
+    `DataFileError`: no such model or gait."""
     if name.endswith(".json"):
         return open_loop_record(Path(name))
     return saved_model(Path(name)).record if is_model(name) else {}
@@ -240,11 +199,8 @@ def find_policy(name: str, env: gym.Env[Any, Any], env_id: str) -> Any:
 
 
 class LoadingRate:
-    """The mean loading rate of an episode, from the substeps that the environment records.
-
-    Args:
-        env: an environment of this package that was just reset. Call `add` after each step.
-    """
+    """The mean loading rate of an episode, from the substeps that an environment of this package, just reset,
+    records. Call `add` after each step."""
 
     def __init__(self, env: Any) -> None:
         self._leg, self._setting = env.unwrapped, records.setting(env)
@@ -252,7 +208,6 @@ class LoadingRate:
         self._leg.record()  # substeps are kept from here on
 
     def add(self) -> None:
-        """Keep the substeps of the last step."""
         record = self._leg.record()
         self._parts.append({name: record[name].ravel() for name in ("time", *FORCES)})
 
@@ -292,11 +247,6 @@ def stances(normal: Floats, lift_off: float) -> NDArray[np.int64]:
 
 
 def steepest(force: Floats, dt: float) -> float:
-    """Steepest rise over `WINDOW` [N/s], or over all of the force where that is shorter.
-
-    Args:
-        force: shape (n,), `dt` [s] apart [N].
-        dt: see there.
-    """
+    """Steepest rise [N/s] of a force, shape (n,) [N], over `WINDOW`, or all of it where that is shorter."""
     width = min(max(1, round(WINDOW / dt)), len(force) - 1)
     return float((force[width:] - force[:-width]).max() / (width * dt)) if width > 0 else 0.0

@@ -51,11 +51,8 @@ SCHEDULED = ("learning_rate", "clip_range", "clip_range_vf")
 
 
 def load_settings(path: Path, env_id: str) -> dict[str, Any]:
-    """The entry of `env_id` in the YAML file at `path`, else its `default`, as plain data.
-
-    Raises:
-        DataFileError: no such file, not YAML, or neither entry is a mapping with n_envs and n_timesteps.
-    """
+    """The entry of `env_id` in the YAML file at `path`, else its `default`, as plain data. `DataFileError`:
+    no such file, not YAML, or neither entry is a mapping with n_envs, n_timesteps and policy."""
     try:
         entries = yaml.safe_load(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
@@ -75,11 +72,7 @@ def load_settings(path: Path, env_id: str) -> dict[str, Any]:
 
 def model_arguments(settings: Mapping[str, Any], actions: int = 1) -> dict[str, Any]:
     """The part of `settings` that the algorithm's constructor takes; schedules, noise on `actions` numbers
-    and network arguments are built.
-
-    Raises:
-        DataFileError: a count, a schedule, the noise or `policy_kwargs` is not in the zoo's form.
-    """
+    and network arguments are built. `DataFileError`: one of them, or a count, is not in the zoo's form."""
     from stable_baselines3.common.utils import LinearSchedule
 
     arguments = {
@@ -113,10 +106,7 @@ def model_arguments(settings: Mapping[str, Any], actions: int = 1) -> dict[str, 
 
 def normalize_arguments(settings: Mapping[str, Any]) -> dict[str, Any] | None:
     """Arguments of `VecNormalize` as the key `normalize` of `settings` has them; None where it is false.
-
-    Raises:
-        DataFileError: it is neither true or false nor a mapping of such arguments.
-    """
+    `DataFileError`: it is neither true or false nor a mapping of such arguments."""
     given = settings.get("normalize") or False
     arguments = {} if isinstance(given, bool) else given
     if not isinstance(arguments, Mapping) or not all(

@@ -90,10 +90,7 @@ class Choice:
 
 def find_runs(folder: Path) -> dict[str, list[runs.SavedModel]]:
     """The trained models in or beneath a folder by environment, those with arguments of it left out.
-
-    Raises:
-        DataFileError: there is none, or one lacks a file.
-    """
+    `DataFileError`: there is none, or one lacks a file."""
     models: dict[str, list[runs.SavedModel]] = {}
     is_run = (folder / runs.RECORD).is_file()
     for path in [folder] if is_run else sorted(record.parent for record in folder.rglob(runs.RECORD)):
@@ -138,13 +135,8 @@ def whole(folder: Path) -> Iterator[Path]:
 
 
 def ship(choice: Choice, env_id: str, out: Path, seconds: float = 4.0) -> dict[str, Any]:
-    """Write the folder of one policy; returns what its score.json holds.
-
-    Args:
-        choice: the run.
-        env_id: for which it is shipped: its own or one that `STANDS_FOR` it.
-        out: the folder for all policies.
-        seconds: of the film.
+    """Write the folder of one policy beneath `out`, for its own id or one that `STANDS_FOR` it; returns what
+    its score.json holds.
 
     Raises:
         DataFileError: the model does not fit. OutputError: the folder cannot be written or gets too large.
@@ -226,7 +218,6 @@ class Trembling:
         self._policy, self._generator = policy, np.random.default_rng(0)
 
     def predict(self, observation: Any, *args: Any, **kwargs: Any) -> tuple[Any, Any]:
-        """As the policy's."""
         actions, state = self._policy.predict(observation, *args, **kwargs)
         return actions + self._generator.uniform(-1e-6, 1e-6, actions.shape).astype(np.float32), state
 
@@ -260,7 +251,6 @@ def write_card(
     scores: Sequence[Score],
     choice: Choice,
 ) -> None:
-    """Write card.md into `folder`, from run.json, config.yml and score.json."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     keys = [key for key in SHOWN if key in scores[0].estimates]

@@ -69,7 +69,6 @@ class Trained:
 
     @property
     def rate(self) -> float:
-        """Steps per second."""
         return self.steps / max(self.seconds, 1e-9)
 
     def __str__(self) -> str:
@@ -145,8 +144,6 @@ def _train(
 
 
 def set_up_torch(args: Args) -> None:
-    """Threads and device of torch, whose import takes seconds; `ParameterError` for a GPU that is not there,
-    where the library would take the CPU."""
     import torch
 
     if args.device.startswith("cuda") and not torch.cuda.is_available():
@@ -243,11 +240,8 @@ def make_record(args: Args, env_kwargs: dict[str, Any]) -> dict[str, Any]:
 def find_earlier(
     args: Args, folder: Path, record: dict[str, Any], settings: dict[str, Any]
 ) -> dict[str, Any]:
-    """The record of the run in `folder` to go on with, empty if there is none.
-
-    Raises:
-        OutputError: there is a run, but none to go on with. ParameterError: it was begun otherwise.
-    """
+    """The record of the run in `folder` to go on with, empty if there is none. `OutputError`: there is a run,
+    but none to go on with. `ParameterError`: it was begun otherwise."""
     earlier = runs.read_record(folder)
     there = [name for name in (*runs.FILES, runs.STATISTICS, runs.CHECKPOINTS) if (folder / name).exists()]
     if there and not earlier:

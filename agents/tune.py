@@ -54,11 +54,8 @@ class Args(TrainingArgs):
 
 def load_space(path: Path, algo: str) -> dict[str, Any]:
     """The ranges of `algo` in a file like agents/studies/spaces.yml: key to a list, or to a mapping with
-    "uniform" or "log" [low, high] and perhaps "lin".
-
-    Raises:
-        DataFileError: not such a file, or a range that is none.
-    """
+    "uniform" or "log" [low, high] and perhaps "lin". `DataFileError`: not such a file, or a range that is
+    none."""
     try:
         space = yaml.safe_load(path.read_text(encoding="utf-8"))[algo]
         for key, how in space.items():
@@ -93,13 +90,8 @@ def draw(trial: Any, space: Mapping[str, Any], base: Mapping[str, Any]) -> dict[
 
 
 class TrialScorer(Scorer):
-    """Keeps the mean returns; `report(steps, score)` may say after each but the last that the training is to
-    end.
-
-    Attributes:
-        curve: rows of (steps, mean return).
-        is_pruned: whether the training was ended.
-    """
+    """Keeps the mean returns in `curve`, rows of (steps, mean return); `report(steps, score)` may say after
+    each but the last that the training is to end, which is then pruned."""
 
     def __init__(
         self,
@@ -206,12 +198,8 @@ def finished(study: Any) -> list[Any]:
 
 def open_study(args: Args, folder: Path, about: dict[str, Any]) -> Any:
     """The study in `folder`, made if need be; a trial that was killed is queued to be run again.
-
-    Raises:
-        ParameterError: Optuna is missing, the settings do not fit the algorithm, or the study was begun with
-            others.
-        DataFileError: study.db is not a study.
-    """
+    `ParameterError`: Optuna is missing, the settings do not fit the algorithm, or the study was begun with
+    others. `DataFileError`: study.db is not a study."""
     try:
         import optuna
     except ModuleNotFoundError:

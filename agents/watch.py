@@ -47,7 +47,6 @@ def divergence(model: Any) -> str:
 
 
 def check_divergence(model: Any, folder: Path) -> None:
-    """Raise `DivergedError`, which says where and names what is left, if losses or policy diverged."""
     if reason := divergence(model):
         raise diverged(model, folder, reason)
 
@@ -63,16 +62,9 @@ def diverged(model: Any, folder: Path, reason: str) -> DivergedError:
 
 
 class Watch(BaseCallback):
-    """Between two rollouts it checks the model, keeps a checkpoint when one is due, and ends the training by
-    `EndedError`; it shows progress and logs gait figures.
-
-    Args:
-        folder: of the run.
-        steps: of the whole training.
-        checkpoint_every: seconds between two checkpoints; 0: none.
-        max_minutes: when to end, or None.
-        resumed: what the training goes on from, or None.
-    """
+    """Between two rollouts it checks the model, keeps a checkpoint when one is due, `checkpoint_every`
+    seconds after the last (0: none), and ends the training by `EndedError`; it shows progress and logs gait
+    figures."""
 
     def __init__(
         self,
@@ -91,7 +83,6 @@ class Watch(BaseCallback):
 
     @property
     def seconds(self) -> float:
-        """Of training, before a resume too."""
         return (self.resumed.seconds if self.resumed else 0.0) + time.monotonic() - self.started
 
     def _on_training_start(self) -> None:
@@ -135,7 +126,6 @@ class Watch(BaseCallback):
         self.summaries.clear()
 
     def close(self) -> None:
-        """End the bar."""
         if self.bar is not None:
             self.bar.close()
 
@@ -165,17 +155,8 @@ def stop_on_signals(watch: Watch) -> Iterator[None]:
 
 class Scorer(BaseCallback):
     """Scores the policy in training on the same episodes each time: between two rollouts whenever `every`
-    more steps are done, and at the end. A subclass does something with them in `keep`.
-
-    Args:
-        env_id, env_kwargs: what the episodes are played in.
-        seeds: of the episodes.
-        every: steps between two scores.
-
-    Attributes:
-        wall_s, cpu_s: of training alone, scores left out; a subclass that resumes sets them.
-        scored_at: steps at the last score.
-    """
+    more steps are done, and at the end. A subclass does something with them in `keep`. `wall_s` and `cpu_s`
+    are of training alone, scores left out; a subclass that resumes sets them."""
 
     def __init__(self, env_id: str, env_kwargs: Mapping[str, Any], seeds: Sequence[int], every: int) -> None:
         super().__init__()
@@ -187,7 +168,6 @@ class Scorer(BaseCallback):
         raise NotImplementedError
 
     def score(self) -> None:
-        """Play the episodes and keep them."""
         self.wall_s += time.monotonic() - self._since[0]
         self.cpu_s += time.process_time() - self._since[1]
         self.scored_at = self.num_timesteps

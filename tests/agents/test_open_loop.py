@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from agents import open_loop
+from agents.baselines_matched import held
 from agents.open_loop import SIZES, Args, decode, main, optimise, search
 from agents.runs import make_env
 from agents.score import find_policy, play, score_vector
@@ -92,7 +93,7 @@ def test_a_cost_is_minus_the_mean_return():
     actions, seeds = np.random.default_rng(0).uniform(-1, 1, (16, 4)), range(7, 11)
     costs = open_loop.Objective(ENV_ID, {"episode_seconds": 0.4}, "constant").costs(actions, seeds)
     for action, cost in zip(actions[:3], costs, strict=False):
-        episodes = score_vector(action, ENV_ID, seeds, episode_seconds=0.4)
+        episodes = score_vector(held(action), ENV_ID, seeds, episode_seconds=0.4)
         assert cost == pytest.approx(-np.mean([one["return"] for one in episodes]), abs=1e-6)
 
 
