@@ -20,14 +20,14 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter, NullFormatter
 
 from agents import runs
-from agents.baselines_matched import COLUMNS as GAIT_COLUMNS
-from agents.baselines_matched import cells, compare
 from agents.baselines_results import (
-    GAITS,
+    GAIT_COLUMNS,
     OPEN_LOOP,
     Floats,
     Row,
     Scored,
+    cells,
+    compare,
     iqm,
     read_results,
     references,
@@ -38,6 +38,8 @@ from agents.command import run
 from agents.evaluate import Score
 from hoof_env._output import markdown_table
 from hoof_env.paper.figure_style import BLUE, GREEN, GREY, ORANGE, PURPLE, STYLE
+
+TEMPLATES = Path(__file__).with_name("templates")
 
 POINTS = 40
 """Of a curve."""
@@ -77,7 +79,6 @@ def results_table(rows: Sequence[Row], gaits: References) -> str:
     titles = (
         "id", "policy", "seeds", "steps", "wall s", "processor s", "return: IQM [95 %]", "mean",
         "worst to best seed", "seeds above run", "above open-loop",
-        "seeds that beat both gaits: after s, median (slowest)",
     )  # fmt: skip
     lines = []
     for env_id, known in gaits.items():
@@ -100,19 +101,12 @@ def row_cells(row: Row, known: Mapping[str, Scored]) -> list[str]:
             return ""
         return f"{np.sum(returns > known[name].intervals['return'].mean)}/{count}"
 
-    seconds = times_to_beat(row, known)
     return [
         str(count) if count == row.entry.seeds else f"{count} of {row.entry.seeds}",
         f"{steps:,.0f}", f"{wall:,.0f}", f"{cpu:,.0f}",
         row.scored.intervals["return"].text(), f"{returns.mean():.1f}",
         f"{returns.min():.1f} to {returns.max():.1f}", above("run"), above(OPEN_LOOP),
-        f"{len(seconds)}/{count}" + (f": {np.median(seconds):.0f} ({max(seconds):.0f})" if seconds else ""),
     ]  # fmt: skip
-
-
-def times_to_beat(row: Row, known: Mapping[str, Scored]) -> list[float]:
-    """Wall seconds of training until the curve is above both gaits, of the seeds that get there."""
-    return row.times_above(max(known[name].curve_return for name in GAITS))
 
 
 def figures_table(rows: Sequence[Row], gaits: References) -> str:
@@ -222,6 +216,17 @@ def draw_learning_curve(folder: Path, scores: Sequence[Score], path: Path, **opt
         axes.grid(axis="y", color=GREY, alpha=0.15)
         figure.legend(loc="outside upper left", ncols=2)
         figure.savefig(path, **options)
+
+
+def render_template(file: str, /, **values: Any) -> str:
+    """Fill a file of agents/templates; values are escaped in a page of HTML."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    templates = Environment(
+        loader=FileSystemLoader(TEMPLATES), autoescape=".html" in file, undefined=StrictUndefined,
+        trim_blocks=True, lstrip_blocks=True,
+    )  # fmt: skip
+    return templates.get_template(file).render(values)
 
 
 def training_length(folder: Path) -> tuple[int, float]:

@@ -25,9 +25,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from agents import evaluate, runs, train
-from agents.baselines_report import draw_learning_curve
+from agents.baselines_report import draw_learning_curve, render_template
 from agents.command import run
-from agents.ship import TEMPLATES
 from hoof_env._output import check_folder, staged
 from hoof_env.errors import check_number
 from hoof_env.film import render_episode
@@ -187,17 +186,12 @@ def render(
 ) -> str:
     """The report: one HTML page that holds its pictures and films and needs no network. The trained policy is
     the last of `scores`; its run folder is `folder`, where the figures lie as SVG."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
     *others, agent = scores
-    keys, episodes = list(agent.estimates), len(agent.episodes)
+    episodes = len(agent.episodes)
     gaits = [score for score in others if score.policy in GAITS]
     draw_learning_curve(folder, [agent, *gaits], folder / "curve.svg", metadata={"Date": None})
-    template = Environment(
-        loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined,
-        trim_blocks=True, lstrip_blocks=True,
-    ).get_template("report.html.j2")  # fmt: skip
-    return template.render(
+    return render_template(
+        "report.html.j2",
         quick=args.quick,
         reproduction=reproduction,
         simulated={(row["id"], row["solver"]): row for row in reproduction.rows},
@@ -206,9 +200,9 @@ def render(
         error=format_error,
         solvers=SOLVERS,
         figures={path.stem: data_uri(path) for path in folder.glob("figure*.svg")},
-        metrics=[evaluate.METRICS[key] for key in keys],
+        metrics=[evaluate.METRICS[key] for key in agent.estimates],
         scores=[
-            (score.policy, [evaluate.cell(key, score.estimates[key]) for key in keys]) for score in scores
+            (score.policy, [evaluate.cell(*pair) for pair in score.estimates.items()]) for score in scores
         ],
         episodes=episodes,
         seeds=(FIRST_SEED, FIRST_SEED + episodes - 1),

@@ -1,8 +1,7 @@
-"""Trainings of `agents.train` on a Ray cluster: seeds, sweeps and searches.
+"""Trainings of `agents.train` on a Ray cluster: seeds and sweeps.
 
     python -m agents.distribute trials --seeds 5                                      five seeds
     python -m agents.distribute trials --seeds 3 --space 'learning_rate=[1e-3,5e-4]'  a sweep
-    python -m agents.distribute trials --samples 20 --asha --space 'learning_rate=loguniform(1e-4,1e-2)'
 
 Without --address a cluster of this machine's cores is made and ended with the command. A worker that dies is
 replaced and its trial goes on from its last checkpoint. Ctrl-C keeps what is there; the same command, given
@@ -11,7 +10,6 @@ again, runs what is missing. docs/distribute.md says how to use a real cluster a
 
 from __future__ import annotations
 
-import ast
 import hashlib
 import importlib.util
 import inspect
@@ -19,7 +17,6 @@ import json
 import logging
 import os
 from collections.abc import Iterable, Sequence
-from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -40,15 +37,6 @@ SHIPPED = {
     "excludes": ["/.?*", "/runs", "/docs", "/dist", "/build", "__pycache__", "*.pyc"],
 }
 """Runtime environment of trials on a cluster: the checkout, without what no training needs."""
-
-
-DRAWS = {
-    "choice": 1, "uniform": 2, "loguniform": 2, "randint": 2, "lograndint": 2,
-    "quniform": 3, "qloguniform": 3, "qrandint": 3, "qlograndint": 3,
-}  # fmt: skip
-"""Distributions of ray.tune, with the number of their arguments."""
-
-LISTED = "grid_search"
 
 
 @dataclass(frozen=True)
@@ -73,116 +61,66 @@ class Trials(Cluster, TrainingArgs):
     seeds: int = 1
     """trainings of each setting, from seed 0 on"""
     space: tuple[str, ...] = ()
-    """what is varied: key=[JSON, ...] runs all, key=loguniform(a,b) and the like of ray.tune draw; a key is a
-    hyperparameter, or env.ARGUMENT of the environment"""
-    samples: int = 1
-    """draws of the distributions in --space; the same for each seed"""
-    asha: bool = False
-    """give up the worse trials early (asynchronous successive halving)"""
+    """what is varied: key=[JSON, ...] runs all; a key is a hyperparameter, or env.ARGUMENT of the
+    environment"""
     report_every: int = 100_000
     """steps between two scores, which are checkpoints as well"""
     cpus_per_trial: int = 1
     """cores that a trial asks of the cluster, and threads of torch"""
 
 
-@dataclass(frozen=True)
-class Axis:
-    """One thing that is varied: `values` to run all of, or a distribution of `DRAWS` with its arguments."""
+def parse_space(items: Sequence[str]) -> dict[str, list[Any]]:
+    """Read `key=[...]`; `ParameterError` if an item is something else or a key comes twice.
 
-    key: str
-    draw: str
-    arguments: tuple[Any, ...]
-
-    @property
-    def values(self) -> list[Any]:
-        """Those that are listed, or the arguments of the distribution: something of the right kind to try."""
-        return list(self.arguments[0] if self.draw in (LISTED, "choice") else self.arguments[:2])
-
-    def build(self) -> Any:
-        """The same for Tune; `ParameterError` if it refuses the arguments."""
-        from ray import tune
-
-        try:
-            built = getattr(tune, self.draw)(*self.arguments)
-            if self.draw != LISTED:
-                built.sample()
-        except (TypeError, ValueError, ArithmeticError, AssertionError) as error:
-            reason = f"--space {self.key}: {self.draw}{self.arguments} cannot be drawn from: {error}"
-            raise ParameterError(reason) from None
-        return built
-
-
-def parse_space(items: Sequence[str]) -> list[Axis]:
-    """Read `key=[...]` and `key=distribution(...)`; `ParameterError` if an item is neither or a key comes
-    twice.
-
-    >>> parse_space(["n_steps=[16, 32]", "learning_rate=loguniform(1e-4, 1e-2)"])
-    [Axis(key='n_steps', draw='grid_search', arguments=([16, 32],)), \
-    Axis(key='learning_rate', draw='loguniform', arguments=(0.0001, 0.01))]
+    >>> parse_space(["n_steps=[16, 32]", 'env.trunk=["rail"]'])
+    {'n_steps': [16, 32], 'env.trunk': ['rail']}
     """
-    axes: dict[str, Axis] = {}
+    space: dict[str, list[Any]] = {}
     for item in items:
         key, _, text = item.partition("=")
-        draw, arguments = _read(text)
-        if not key or not draw:
-            known = ", ".join(f"{name}({', '.join('abq'[:count])})" for name, count in DRAWS.items())
-            raise ParameterError(f"--space: expected key=[JSON, ...] or key=draw of {known}; got {item!r}")
-        if key in axes:
+        values = parse_pairs("--space", [f"values={text}"])["values"]
+        if not (key and values and isinstance(values, list)):
+            raise ParameterError(f"--space: expected key=[JSON, ...], got {item!r}; agents.tune searches")
+        if key in space:
             raise ParameterError(f"--space: {key} is given twice")
-        axes[key] = Axis(key, draw, arguments)
-    return list(axes.values())
+        space[key] = values
+    return space
 
 
-def _read(text: str) -> tuple[str, tuple[Any, ...]]:
-    """Name and arguments of what stands behind the equals sign; no name where it cannot be read."""
-    values = parse_pairs("--space", [f"values={text}"])["values"]
-    if isinstance(values, list):
-        return (LISTED, (values,)) if values else ("", ())
-    with suppress(SyntaxError, ValueError):
-        match ast.parse(text.strip(), mode="eval").body:
-            case ast.Call(func=ast.Name(id=name), args=nodes, keywords=[]) if len(nodes) == DRAWS.get(name):
-                arguments = tuple(ast.literal_eval(node) for node in nodes)
-                if name != "choice" or (isinstance(arguments[0], list) and arguments[0]):
-                    return name, arguments
-    return "", ()
-
-
-def check_keys(axes: Iterable[Axis], algo: str, settings: Iterable[str]) -> None:
+def check_keys(keys: Iterable[str], algo: str, settings: Iterable[str]) -> None:
     """Refuse keys that are neither hyperparameters of `algo`, nor in its `settings`, nor an environment's."""
     known = {*inspect.signature(algorithm_class(algo)).parameters, *settings, "normalize", "n_envs"}
     known -= {"env", "seed", "device", "_init_setup_model", "verbose", "tensorboard_log", "n_timesteps"}
-    for axis in axes:
-        if axis.key not in known and not axis.key.startswith(ENV):
+    for key in keys:
+        if key not in known and not key.startswith(ENV):
             raise ParameterError(
                 f"--space: expected a hyperparameter of {algo} ({', '.join(sorted(known))}) or {ENV}ARGUMENT "
-                f"of the environment, got {axis.key!r}"
+                f"of the environment, got {key!r}"
             )
 
 
 def prepare(args: Trials) -> dict[str, Any]:
-    """The parameter space of `args`: constants, an `Axis` for what varies, a list of seeds; all checked."""
-    for name in ("seeds", "samples", "report_every", "cpus_per_trial"):
+    """The parameter space of `args`: constants, lists of what varies and of seeds; all checked."""
+    for name in ("seeds", "report_every", "cpus_per_trial"):
         check_number(name, getattr(args, name), low=1)
     algorithm_class(args.algo)
     fixed: dict[str, Any] = {"env_id": args.env_id, "algo": args.algo, "torch_threads": args.cpus_per_trial}
     one = TrainArgs(**fixed, steps=args.steps, env_kwargs=args.env_kwargs, params=args.params)
     env_kwargs, settings = checked(one)
-    axes = parse_space(args.space)
-    check_keys(axes, args.algo, settings)
-    if args.samples > 1 and all(axis.draw == "grid_search" for axis in axes):
-        raise ParameterError(f"samples: expected 1 where --space draws nothing, got {args.samples}")
+    space = parse_space(args.space)
+    check_keys(space, args.algo, settings)
     with runs.make_env(args.env_id, **env_kwargs) as env:
         runs.warm_up(env)  # kernels are compiled before workers want them
-    for axis in axes:
-        for value in axis.values if axis.key.startswith(ENV) else ():
-            runs.make_env(args.env_id, **env_kwargs | {axis.key.removeprefix(ENV): value}).close()
+    for key, values in space.items():
+        for value in values if key.startswith(ENV) else ():
+            runs.make_env(args.env_id, **env_kwargs | {key.removeprefix(ENV): value}).close()
     return {
         "train": fixed | {"steps": settings["n_timesteps"]},
         "env_kwargs": env_kwargs,
         "params": parse_pairs("--params", args.params),
         "report_every": args.report_every,
         "command": runs.command(),
-        **{axis.key: axis for axis in axes},
+        **space,
         "seed": list(range(args.seeds)),
     }
 
@@ -192,20 +130,13 @@ def run_trials(args: Trials) -> int:
     plan = prepare(args)
     start(args)
     from ray import tune
-    from ray.tune.schedulers import ASHAScheduler
-    from ray.tune.search.basic_variant import BasicVariantGenerator
 
     from agents.distribute_trial import FIXED, Progress, train_trial, write_table
 
-    axes = [key for key in plan if key not in FIXED]
-    space = plan | {key: plan[key].build() for key in axes} | {"seed": tune.grid_search(plan["seed"])}
-    steps = plan["train"]["steps"]
-    asha = ASHAScheduler("steps", max_t=steps, grace_period=min(args.report_every, steps))
-    varied = [*axes, "seed"]
+    varied = [*(key for key in plan if key not in FIXED), "seed"]
+    space = plan | {key: tune.grid_search(plan[key]) for key in varied}
     config = tune.TuneConfig(
-        metric="return", mode="max", num_samples=args.samples,
-        search_alg=BasicVariantGenerator(constant_grid_search=True, random_state=0),
-        scheduler=asha if args.asha else None,
+        metric="return", mode="max",
         reuse_actors=True,  # libraries are imported and kernels read once for each worker
         trial_dirname_creator=lambda trial: _folder_name(trial, varied),
     )  # fmt: skip

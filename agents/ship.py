@@ -31,7 +31,7 @@ import numpy as np
 from tyro.conf import Positional
 
 from agents import runs
-from agents.baselines_report import draw_learning_curve, training_length
+from agents.baselines_report import draw_learning_curve, render_template, training_length
 from agents.command import run
 from agents.evaluate import METRICS, Interval, Score, cell, to_json
 from agents.export import about, write_policy
@@ -40,14 +40,13 @@ from agents.score import score_vector
 from hoof_env._output import check_folder, markdown_table, staged
 from hoof_env.envs.policies import STANDS_FOR
 from hoof_env.envs.tasks import TASKS
-from hoof_env.errors import DataFileError, OutputError, ParameterError, check_choice, check_number
+from hoof_env.errors import DataFileError, OutputError, ParameterError
 from hoof_env.film import render_episode
 from hoof_env.onnx_policy import FILE, OnnxPolicy
 from hoof_env.plain_policy import ABOUT, WEIGHTS
 from hoof_env.records import setting
 
 POLICIES = Path(__file__).with_name("policies")
-TEMPLATES = Path(__file__).with_name("templates")
 SHOWN = ("return", "distance_m", "stance_peak_n", "weight_share", "cost_of_transport", "failed")
 """Columns of the card's table, keys of `METRICS`."""
 
@@ -63,6 +62,8 @@ GAITS = ("run", "walk", "carrying_walk", "open-loop")
 LIMIT, FILM_LIMIT = 1_000_000, 750_000
 """Bytes of a folder and of the film in it, which is made shorter where it is larger."""
 
+FILM_SECONDS = 4.0
+
 COPIED = (WEIGHTS, ABOUT, runs.CONFIG)
 NOT_COPIED = ("args",)
 """Of run.json: paths of the machine that trained; the command says the rest."""
@@ -74,10 +75,6 @@ class Args:
     """a run folder of agents.train, or a folder with several beneath it"""
     out: Path = POLICIES
     """folder for the policies' folders"""
-    ids: tuple[str, ...] = ()
-    """only these environments"""
-    seconds: float = 4.0
-    """of the film"""
 
 
 @dataclass(frozen=True)
@@ -134,7 +131,7 @@ def whole(folder: Path) -> Iterator[Path]:
             folder.parent.rmdir()
 
 
-def ship(choice: Choice, env_id: str, out: Path, seconds: float = 4.0) -> dict[str, Any]:
+def ship(choice: Choice, env_id: str, out: Path) -> dict[str, Any]:
     """Write the folder of one policy beneath `out`, for its own id or one that `STANDS_FOR` it; returns what
     its score.json holds.
 
@@ -167,7 +164,7 @@ def ship(choice: Choice, env_id: str, out: Path, seconds: float = 4.0) -> dict[s
         (stage / "score.json").write_text(text + "\n", encoding="utf-8")
         no_name = {"Software": None}  # of the program that drew it
         draw_learning_curve(saved.path.parent, scores, stage / "curve.png", dpi=90, metadata=no_name)
-        film(stage, env_id, seconds)
+        film(stage, env_id)
         write_card(stage, env_id, record, score, scores, choice)
         size = sum(file.stat().st_size for file in stage.iterdir())
         if size > LIMIT:
@@ -175,9 +172,9 @@ def ship(choice: Choice, env_id: str, out: Path, seconds: float = 4.0) -> dict[s
     return score
 
 
-def film(folder: Path, env_id: str, seconds: float) -> None:
+def film(folder: Path, env_id: str) -> None:
     """Write film.gif of the policy in `folder`, shorter where it would be larger than `FILM_LIMIT`."""
-    path, policy = folder / "film.gif", str(folder / FILE)
+    path, policy, seconds = folder / "film.gif", str(folder / FILE), FILM_SECONDS
     while not path.is_file() or path.stat().st_size > FILM_LIMIT:
         render_episode(path, policy, env_id, seed=SCORE_SEEDS[0], seconds=seconds, fps=20, size=(480, 270))
         seconds *= 0.75
@@ -251,18 +248,14 @@ def write_card(
     scores: Sequence[Score],
     choice: Choice,
 ) -> None:
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
     keys = [key for key in SHOWN if key in scores[0].estimates]
-    template = Environment(
-        loader=FileSystemLoader(TEMPLATES), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    ).get_template("model_card.md.j2")
     with runs.make_env(env_id) as env:
         is_suspended = setting(env).trunk == "suspended"
         summaries = {task.id: task.summary for task in TASKS.values()}
         summary = summaries.get(env_id) or (type(env.unwrapped).__doc__ or "").partition("\n")[0]
     steps, seconds = training_length(choice.saved.path.parent)
-    text = template.render(
+    text = render_template(
+        "model_card.md.j2",
         env_id=env_id,
         name=env_id.rpartition("/")[2],
         summary=summary,
@@ -307,17 +300,13 @@ def main(argv: list[str] | None = None) -> None:
     import tyro
 
     args = tyro.cli(Args, args=argv, prog="python -m agents.ship", description=__doc__)
-    check_number("seconds", args.seconds, low=0, exclusive_low=True)
     models = find_runs(args.runs)
     sources = {env_id: env_id for env_id in models}
     sources |= {one: other for one, other in STANDS_FOR.items() if one not in models and other in models}
-    ids = [check_choice("ids", env_id, sources) for env_id in args.ids] or list(sources)
     check_folder(args.out)
-    choices = {
-        source: choose(models[source], source) for source in dict.fromkeys(sources[one] for one in ids)
-    }
-    for env_id in ids:
-        score = ship(choices[sources[env_id]], env_id, args.out, args.seconds)
+    choices = {source: choose(models[source], source) for source in models}
+    for env_id, source in sources.items():
+        score = ship(choices[source], env_id, args.out)
         means = {name: one["mean"]["return"] for name, one in score["policies"].items()}
         write_index(args.out)
         print(f"{env_id}: " + ", ".join(f"{name} {value:.2f}" for name, value in means.items()), flush=True)

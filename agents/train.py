@@ -79,11 +79,8 @@ class Trained:
 
 
 def train(args: Args, *also: Any) -> Trained:
-    """Train as `args` say and fill the run folder. SIGINT, SIGTERM and the time limit end it early.
-
-    Args:
-        args: see there.
-        also: more callbacks of Stable-Baselines3; on a resume they begin anew.
+    """Train as `args` say and fill the run folder; SIGINT, SIGTERM and the time limit end it early. `also`
+    are more callbacks of Stable-Baselines3; on a resume they begin anew.
 
     Raises:
         ParameterError, DataFileError: the arguments, the environment or the hyperparameters do not fit, or
@@ -123,7 +120,11 @@ def _train(
     if start:
         warn_of_bits(folder, earlier, record)
         record = {**earlier, "resumed": [*earlier.get("resumed", []), int(start.name)]}
-    set_up_torch(args)
+    import torch  # which takes seconds
+
+    if args.device.startswith("cuda") and not torch.cuda.is_available():  # the library would take the CPU
+        raise ParameterError(f"device: expected one that torch finds here, got {args.device!r}")
+    torch.set_num_threads(args.torch_threads)
     config = yaml.safe_dump({args.env_id: settings}, sort_keys=False)  # the library adds to policy_kwargs
     envs = many = runs.make_vec_env(args.env_id, settings["n_envs"], **env_kwargs)
     try:
@@ -141,14 +142,6 @@ def _train(
         return learn(args, folder, record, settings["n_timesteps"], model, resumed, also)
     finally:
         envs.close()
-
-
-def set_up_torch(args: Args) -> None:
-    import torch
-
-    if args.device.startswith("cuda") and not torch.cuda.is_available():
-        raise ParameterError(f"device: expected one that torch finds here, got {args.device!r}")
-    torch.set_num_threads(args.torch_threads)
 
 
 def learn(
@@ -195,12 +188,11 @@ def checked(args: Args) -> tuple[dict[str, Any], dict[str, Any]]:
     env_kwargs = parse_pairs("--env-kwargs", args.env_kwargs)
     settings = load_settings(args.hyperparams or FOLDER / f"{args.algo}.yml", args.env_id)
     settings |= parse_pairs("--params", args.params)
-    settings |= {"n_timesteps": args.steps} if args.steps is not None else {}
-    settings |= {"n_envs": args.n_envs} if args.n_envs is not None else {}
+    given = {"n_timesteps": args.steps, "n_envs": args.n_envs}
+    settings |= {key: value for key, value in given.items() if value is not None}
     settings["n_envs"] = int(check_number("n_envs", settings["n_envs"], low=1, high=4096))
     settings["n_timesteps"] = int(check_number("steps", settings["n_timesteps"], low=1))
-    if args.seed < 0:
-        raise ParameterError(f"seed: expected 0 or more, got {args.seed}")
+    check_number("seed", args.seed, low=0)
     check_number("checkpoint_every", args.checkpoint_every, low=0)
     check_number("torch_threads", args.torch_threads, low=1)
     normalize_arguments(settings)

@@ -118,13 +118,9 @@ class TrialScorer(Scorer):
 
 
 def tune(args: Args) -> Any:
-    """Run the study of `args` until it has all trials; returns the Optuna study.
-
-    Raises:
-        ParameterError, DataFileError: the arguments, the environment, the space or the settings do not fit,
-            or the study in the folder was begun with others.
-        OutputError: the folder cannot be written. KeyboardInterrupt: Ctrl-C; finished trials stay.
-    """
+    """Run the study of `args` until it has all trials; returns the Optuna study. `ParameterError`,
+    `DataFileError`: what was given does not fit, or the study in the folder was begun with others.
+    `KeyboardInterrupt`: Ctrl-C; finished trials stay."""
     check_number("trials", args.trials, low=1)
     check_number("scores", args.scores, low=1)
     kwargs, held = parse_pairs("--env-kwargs", args.env_kwargs), parse_pairs("--params", args.params)
@@ -135,28 +131,21 @@ def tune(args: Args) -> Any:
     }
     make_record(TrainArgs(env_id=args.env_id), kwargs)  # refuses what cannot be trained on
     folder = args.out or Path("runs/tune", f"{args.algo}-{args.env_id.rpartition('/')[2]}")
-    with runs.alone(folder):
-        return _tune(args, folder, kwargs, base, space)
-
-
-def _tune(
-    args: Args, folder: Path, env_kwargs: dict[str, Any], base: dict[str, Any], space: dict[str, Any]
-) -> Any:
-    """`tune` in a folder that nobody else works in."""
-    study = open_study(args, folder, {"env_kwargs": env_kwargs, "base": base, "space": space})
 
     def keep(study: Any, trial: Any) -> None:
         curve = trial.user_attrs.get("curve") or [(0, float("nan"))]
         print(f"trial {trial.number}: {trial.state.name.lower()}, {curve[-1][1]:.1f}", flush=True)
         write_best(study, folder, args.env_id)
 
-    while (left := args.trials - len(finished(study))) > 0:
-        study.optimize(
-            lambda trial: run_trial(trial, args, folder, env_kwargs, base | draw(trial, space, base)),
-            n_trials=left,
-            callbacks=[keep],
-        )
-    write_best(study, folder, args.env_id)
+    with runs.alone(folder):
+        study = open_study(args, folder, {"env_kwargs": kwargs, "base": base, "space": space})
+        while (left := args.trials - len(finished(study))) > 0:
+            study.optimize(
+                lambda trial: run_trial(trial, args, folder, kwargs, base | draw(trial, space, base)),
+                n_trials=left,
+                callbacks=[keep],
+            )
+        write_best(study, folder, args.env_id)
     return study
 
 

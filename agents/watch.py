@@ -35,20 +35,15 @@ LARGEST = 1e10
 """No parameter of a policy that learns comes near it."""
 
 
-def divergence(model: Any) -> str:
-    """Which loss or parameter of a model is out of all bounds; empty if none is."""
+def check_divergence(model: Any, folder: Path) -> None:
+    """Raise `DivergedError` if a loss or a parameter is out of all bounds."""
     for name, value in model.logger.name_to_value.items():
         if "loss" in name and not math.isfinite(value):
-            return f"{name} is {value}"
+            raise diverged(model, folder, f"{name} is {value}")
     for name, parameter in model.policy.named_parameters():
-        if not float(parameter.detach().abs().max()) < LARGEST:  # nor NaN
-            return f"the policy's {name} holds {float(parameter.detach().abs().max()):g}"
-    return ""
-
-
-def check_divergence(model: Any, folder: Path) -> None:
-    if reason := divergence(model):
-        raise diverged(model, folder, reason)
+        highest = float(parameter.detach().abs().max())
+        if not highest < LARGEST:  # nor NaN
+            raise diverged(model, folder, f"the policy's {name} holds {highest:g}")
 
 
 def diverged(model: Any, folder: Path, reason: str) -> DivergedError:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from agents import open_loop
-from agents.baselines_matched import held
+from agents.baselines_results import held
 from agents.open_loop import SIZES, Args, decode, main, optimise, search
 from agents.runs import make_env
 from agents.score import find_policy, play, score_vector

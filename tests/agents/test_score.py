@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from agents import score
-from agents.baselines_matched import held
+from agents.baselines_results import held
 from agents.evaluate import Args, evaluate
 from agents.runs import make_env
 from agents.score import find_policy, loading_rates, play, score_vector, stances, steepest
