@@ -163,7 +163,8 @@ class Resumed:
             many.seed((model.seed or 0) + model.num_timesteps)
             return
         many.reset()
-        _set_environment_states(many, states)
+        for env, state in zip(_stateful(many), states, strict=True):
+            env.set_state(state)
         for name, value in self._state["monitor"].items():
             setattr(monitor, name, value)
         if self._state["returns"] is not None:
@@ -205,24 +206,19 @@ def _layer(envs: Any, kind: type) -> Any:
     return envs
 
 
+def _stateful(many: Any) -> list[Any]:
+    """What has the states of a `VecEnv` without wrappers: one environment for all, or each."""
+    from hoof_env.envs.sb3 import Sb3VecEnv
+
+    return [many.envs] if isinstance(many, Sb3VecEnv) else [env.unwrapped for env in many.envs]
+
+
 def _environment_states(envs: Any) -> list[Any] | None:
     """States of the environments, None if one has none."""
-    from hoof_env.envs.sb3 import Sb3VecEnv
-
-    if isinstance(envs.unwrapped, Sb3VecEnv):
-        return [envs.unwrapped.envs.get_state()]
     try:
-        return [env.get_wrapper_attr("get_state")() for env in envs.unwrapped.envs]
+        return [env.get_state() for env in _stateful(envs.unwrapped)]
     except AttributeError:
         return None
-
-
-def _set_environment_states(many: Any, states: list[Any]) -> None:
-    from hoof_env.envs.sb3 import Sb3VecEnv
-
-    single = [many.envs] if isinstance(many, Sb3VecEnv) else [env.unwrapped for env in many.envs]
-    for env, state in zip(single, states, strict=True):
-        env.set_state(state)
 
 
 def _flush(path: Path) -> None:

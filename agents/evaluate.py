@@ -15,23 +15,24 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
-from numpy.typing import NDArray
 
 from agents import runs
 from agents.command import parse_pairs, run
 from agents.score import find_policy, play, read_policy_record
+from hoof_env import records
 from hoof_env._output import check_folder
 from hoof_env.errors import OutputError, ParameterError, check_number
 
 DEFAULT_ENV = "hoof_env/HorseLeg-v0"
+FPS = 50.0
+"""Of films."""
 
 
 @dataclass(frozen=True)
@@ -163,8 +164,9 @@ def evaluate(args: Args) -> tuple[list[Score], dict[str, Any]]:
     env_id, env_kwargs = _environment(args)
     scores = []
     with runs.make_env(env_id, **env_kwargs) as env:
-        if args.loading_rate and not hasattr(env.unwrapped, "record"):
-            raise ParameterError(f"--loading-rate: expected an environment of hoof_env, got {env_id}")
+        if (args.loading_rate or args.video) and not hasattr(env.unwrapped, "record"):
+            option = "--loading-rate" if args.loading_rate else "--video"
+            raise ParameterError(f"{option}: expected an environment of hoof_env, got {env_id}")
         runs.warm_up(env)
         # All are found before the first is played
         policies = {name: find_policy(name, env, env_id) for name in args.policy}
@@ -175,11 +177,9 @@ def evaluate(args: Args) -> tuple[list[Score], dict[str, Any]]:
                 scores.append(
                     Score(name, play(env, policy, seeds, bar.update, loading_rate=args.loading_rate))
                 )
-    if args.video:
-        with runs.make_env(env_id, **{**env_kwargs, "render_mode": "rgb_array"}) as env:
-            for name, path in films.items():
-                film(env, find_policy(name, env, env_id), path, args.seed)
-                print(f"filmed {name}: {path}")
+        for name, path in films.items():
+            film(env, find_policy(name, env, env_id), path, args.seed)
+            print(f"filmed {name}: {path}")
     return scores, {"env_id": env_id, "env_kwargs": env_kwargs}
 
 
@@ -203,24 +203,13 @@ def _environment(args: Args) -> tuple[str, dict[str, Any]]:
     return env_id, parse_pairs("--env-kwargs", args.env_kwargs) or own
 
 
-def film(env: gym.Env[Any, Any], policy: Any, path: Path, seed: int) -> None:
-    """Write one episode, of an `env` made with render_mode="rgb_array", to an MP4; an older file is replaced
-    at the end. `OutputError`: the folder cannot be written, or the disk is full."""
-    from hoof_env.film import write_film
+def film(env: Any, policy: Any, path: Path, seed: int) -> None:
+    """Write one episode to an MP4; an older file is replaced at the end, `OutputError` if it cannot be."""
+    from hoof_env.film import frames, write_film
+    from hoof_env.render.renderer import new_renderer
 
-    write_film(pictures(env, policy, seed), path, env.metadata["render_fps"])
-
-
-def pictures(env: gym.Env[Any, Any], policy: Any, seed: int) -> Iterator[NDArray[np.uint8]]:
-    """What `env` renders before each step of one episode, shape (height, width, 3)."""
-    observation, _ = env.reset(seed=seed)
-    start, done = np.ones(1, bool), False
-    while not done:
-        picture: Any = env.render()
-        yield picture
-        action, _ = policy.predict(observation, episode_start=start, deterministic=True)
-        observation, _, terminated, truncated, _ = env.step(action)
-        start, done = np.zeros(1, bool), terminated or truncated
+    renderer = new_renderer(records.setting(env), FPS, (960, 540))
+    write_film(frames(renderer, records.episode(env, policy, seed), FPS), path, FPS)
 
 
 def cell(key: str, value: Interval) -> tuple[str, str]:

@@ -65,7 +65,6 @@ OPTIONS = {
     "verbose": -9, "verb_log": 0,
 }  # fmt: skip
 """Of CMA-ES: it ends when the steps are small."""
-
 EPISODES = {"constant": 10_240, "clocked": 30_720}
 """Of a search, by family."""
 
@@ -215,16 +214,15 @@ def optimise(args: Args) -> dict[str, Any]:
     check_folder(path.parent)
     objective = Objective(args.env_id, about["env_kwargs"], args.family)
     left = [seed for seed in range(args.restarts) if seed not in [one["seed"] for one in restarts]]
-    content: dict[str, Any] = {}
     with tqdm(total=episodes * len(left), unit=" episodes", leave=False, disable=None) as bar:
         for k, seed in enumerate(left):
             bar.set_description(f"{path.stem}, search {seed}")
             restarts.append(search_once(objective, seed, about, bar))
-            content = write(path, about, objective, restarts, content)
+            write(path, about, objective, restarts)
             if restarts[-1].get("interrupted"):
                 raise KeyboardInterrupt
             bar.n = (k + 1) * episodes  # a search may have converged before
-    return content or write(path, about, objective, restarts, {})
+    return write(path, about, objective, restarts)
 
 
 def check(args: Args) -> int:
@@ -271,22 +269,15 @@ def means(episodes: Episodes) -> dict[str, float | None]:
 
 
 def write(
-    path: Path,
-    about: dict[str, Any],
-    objective: Objective,
-    restarts: list[dict[str, Any]],
-    before: dict[str, Any],
+    path: Path, about: dict[str, Any], objective: Objective, restarts: list[dict[str, Any]]
 ) -> dict[str, Any]:
-    """Write the best of the searches, scored, and all of them; returns what the file holds. `before` is what
-    it held, or nothing."""
+    """Write the best of the searches, scored, and all of them; returns what the file holds."""
     best = min(restarts, key=lambda one: one["cost"])
-    score = before.get("score")
-    if before.get("parameters") != best["parameters"]:
-        episodes = objective.test(best["parameters"], about["test_episodes"])
-        score = {"first_seed": TEST_SEED, "mean": means(episodes), "interval95": {}}
-        for key, mean in score["mean"].items():
-            interval = estimate([one[key] for one in episodes]) if mean is not None else None
-            score["interval95"][key] = [interval.low, interval.high] if interval else None
+    episodes = objective.test(best["parameters"], about["test_episodes"])
+    score: dict[str, Any] = {"first_seed": TEST_SEED, "mean": means(episodes), "interval95": {}}
+    for key, mean in score["mean"].items():
+        interval = estimate([one[key] for one in episodes]) if mean is not None else None
+        score["interval95"][key] = [interval.low, interval.high] if interval else None
     gait = objective.leg.command_of(np.array(best["parameters"]["constant"])).tolist()
     content = {
         **about,

@@ -221,7 +221,7 @@ def test_a_film_that_cannot_be_written_is_refused_in_one_line(tmp_path, capfd):
     """ffmpeg alone meets the limit of a file's size: it leaves half a file, as on a full disk."""
     resource = pytest.importorskip("resource")
 
-    with make_env(ENV_ID, episode_seconds=0.4, render_mode="rgb_array") as env:
+    with make_env(ENV_ID, episode_seconds=0.4) as env:
         policy = find_policy("run", env, ENV_ID)
         old = resource.getrlimit(resource.RLIMIT_FSIZE)
         resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, old[1]))

@@ -1,6 +1,8 @@
 """Episodes as rows are the episodes one by one: returns and summaries, whatever the policy. The loading rate:
 on made forces, and as a figure of agents.evaluate."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -113,11 +115,15 @@ def test_one_cycle_of_the_paper_is_not_left_out():
     assert score.estimates[KEY].mean > 0
 
 
-def test_an_environment_without_records_is_refused():
+@pytest.mark.parametrize(
+    ("option", "given"),
+    [("--loading-rate", {"loading_rate": True}), ("--video", {"video": Path("film.mp4")})],
+)
+def test_an_environment_without_records_is_refused(option, given):
     with pytest.raises(
-        ParameterError, match="--loading-rate: expected an environment of hoof_env, got Pendulum-v1"
+        ParameterError, match=f"{option}: expected an environment of hoof_env, got Pendulum-v1"
     ):
-        evaluate(Args(policy=("random",), env_id="Pendulum-v1", loading_rate=True))
+        evaluate(Args(policy=("random",), env_id="Pendulum-v1", **given))
 
 
 def test_to_measure_it_changes_nothing_else():
