@@ -1,17 +1,11 @@
-"""What the trainings of a plan left, entry by entry, what policies without learning get in the same episodes,
-and agents beside the paper's run at matched speed: forces and costs of gaits of other speeds say little.
+"""What the trainings of a plan left, what policies without learning get in the same episodes, and agents
+beside the paper's run at matched speed: forces and costs of gaits of other speeds say little.
 
-Two ways to match:
-
- - Agents are slowed down to the run. Those with a label in agents/plans are trained for that: the default
-   reward, but progress beyond a speed is taken back, so that they look for the softest and cheapest gait of
-   that speed; some are paid for bearing weight, too, for else they lean on the suspension. Those of
-   HorseLegSpeed-v0 are commanded to keep the speed.
- - The run is sped up to the agents of the default reward: its crank speed and the amplitude of its swing are
-   scaled by constants, over all that the actions allow.
-
-An agent dominates where it is at least as fast, and its peak forces and cost of transport are lower, all
-intervals apart. The weight that the leg bears stands beside them, for bearing less is a way to be soft.
+Agents are slowed down to the run: those with a label in agents/plans are paid for progress up to a speed,
+some for bearing weight, too, for else they lean on the suspension; those of HorseLegSpeed-v0 are commanded
+it. And the run is sped up to the agents of the default reward: constants scale its crank speed and the
+amplitude of its swing, over all that the actions allow. An agent dominates where it is at least as fast, and
+its peak forces and cost of transport are lower, all intervals apart; bearing less weight is a way to be soft.
 
 Statistics over seeds: interquartile means with bootstrap 95 % intervals (Agarwal et al. 2021, Deep
 reinforcement learning at the edge of the statistical precipice).
@@ -46,11 +40,8 @@ from hoof_env.gait.gait import LIMITS, GaitParameters
 Floats = NDArray[np.float64]
 
 GAITS = ("run", "walk")
-OPEN_LOOP = "open-loop"
-"""Name of the gait that CMA-ES found for an id, without learning."""
-
-REPS = 5000
-"""Of a bootstrap over seeds."""
+OPEN_LOOP = "open-loop"  # name of the gait that CMA-ES found for an id, without learning
+REPS = 5000  # of a bootstrap over seeds
 
 SPEED = "hoof_env/HorseLegSpeed-v0"
 MATCHED_SPEED = 2.1
@@ -68,11 +59,8 @@ GAIT_COLUMNS: Mapping[str, tuple[str, int, float]] = {
 }
 """Title, digits and factor of what the tables show."""
 
-SCALES = 25
-"""Of the crank speed and of the amplitude that are tried, each."""
-
-SLOWER = 0.05
-"""By so much of its speed a scaled run may be slower than the agents it stands beside."""
+SCALES = 25  # of the crank speed and of the amplitude that are tried, each
+SLOWER = 0.05  # by so much of its speed a scaled run may be slower than the agents it stands beside
 
 
 @dataclass(frozen=True)
@@ -92,7 +80,6 @@ class Result:
 
     @cached_property
     def figures(self) -> dict[str, float]:
-        """Of the last policy on fresh episodes."""
         return mean_figures(self.final["episodes"])
 
     @cached_property
@@ -102,8 +89,6 @@ class Result:
 
 @dataclass(frozen=True)
 class Row:
-    """An entry with the trainings of it that are done."""
-
     entry: Entry
     results: tuple[Result, ...]
 
@@ -113,13 +98,8 @@ class Row:
 
     @cached_property
     def scored(self) -> Scored:
-        """Figures over seeds, those that the id has."""
         seeds = [one.figures for one in self.results]
         return Scored(self.title, over_seeds(seeds), seeds)
-
-    @property
-    def settings(self) -> dict[str, Any]:
-        return load_settings(self.results[0].folder / runs.CONFIG, self.entry.env_id)
 
     @property
     def command(self) -> str:
@@ -248,7 +228,6 @@ def cells(one: Scored) -> list[str]:
 
 
 def commanded_speed(row: Row, speed: float) -> Scored:
-    """Agents of HorseLegSpeed-v0 that are commanded one speed and no other."""
     kwargs: dict[str, Any] = {"target_speed": [speed, speed]}
     with warnings.catch_warnings():
         # That they were trained with other speeds, which is meant
@@ -312,14 +291,11 @@ def dominates(agent: Scored, other: Scored) -> bool:
     return is_fast and all(other.intervals[key].above(agent.intervals[key]) for key in LOWER)
 
 
-def bears_less(agent: Scored, other: Scored) -> bool:
-    return other.intervals["weight_share"].above(agent.intervals["weight_share"])
-
-
 def verdict(agent: Scored, other: Scored) -> str:
     if not dominates(agent, other):
         return "no"
-    return "yes, bearing less of the weight" if bears_less(agent, other) else "yes"
+    bears_less = other.intervals["weight_share"].above(agent.intervals["weight_share"])
+    return "yes, bearing less of the weight" if bears_less else "yes"
 
 
 def seeds_that_dominate(agent: Scored, other: Scored) -> str:

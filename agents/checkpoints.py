@@ -1,12 +1,8 @@
 """Checkpoints: all that a training goes on from, in a folder that is whole or is not there.
 
-A checkpoint stands between two rollouts. `checkpoints/N/`, after N steps, holds
-
-    model.zip         weights, optimisers, counters, schedules, action noise (Stable-Baselines3)
-    vecnormalize.pkl  statistics, where there is normalisation
-    replay.pkl        replay buffer, where there is one
-    state.pkl         environments, generators, where monitor.csv stood
-    policy.*          the policy as hoof_env/plain_policy.py writes it
+`checkpoints/N/`, after N steps and between two rollouts, holds model.zip (weights, optimisers, counters,
+schedules, action noise), policy.*, where they exist vecnormalize.pkl and replay.pkl, and state.pkl:
+environments, generators, where monitor.csv stood.
 
 What goes on from there has the bits of a run that was never stopped: on the same machine, on the CPU, with
 the same number of threads, with environments that have `get_state` and `set_state`, and without
@@ -36,6 +32,7 @@ from hoof_env.errors import DataFileError, OutputError
 
 KEPT = 2
 REPLAY, STATE = "replay.pkl", "state.pkl"
+COUNTED = ("episode_returns", "episode_lengths", "episode_count")  # by a `VecMonitor`
 EXPLORATION = ("exploration_mat", "exploration_matrices")
 """What gSDE drew for a rollout, before its first callback."""
 UNFINISHED = ".unfinished-"
@@ -87,9 +84,7 @@ def save(model: Any, run: Path, seconds: float) -> None:
     normalize = model.get_vec_normalize_env()
     state = {
         "seconds": seconds,
-        "monitor": {
-            name: getattr(monitor, name) for name in ("episode_returns", "episode_lengths", "episode_count")
-        },
+        "monitor": {name: getattr(monitor, name) for name in COUNTED},
         "monitor_bytes": (run / runs.MONITOR).stat().st_size,
         "returns": None if normalize is None else normalize.returns,
         "environments": _environment_states(model.env),
@@ -120,14 +115,9 @@ def write_episodes(envs: Any, path: Path, go_on: bool = False) -> None:
 
 
 class Resumed:
-    """A model that goes on from a checkpoint of its class, with `many`, its `VecEnv` without wrappers.
-
-    Attributes:
-        model: of Stable-Baselines3; call `model.learn(rest, reset_num_timesteps=False)`.
-        seconds: of training up to here.
-
-    Raises:
-        DataFileError: the checkpoint cannot be read or is of other environments.
+    """A model that goes on from a checkpoint of its class, with `many`, its `VecEnv` without wrappers:
+    `model.learn(rest, reset_num_timesteps=False)`; `seconds` are of training up to here. `DataFileError`: the
+    checkpoint cannot be read or is of other environments.
     """
 
     def __init__(self, checkpoint: Path, algorithm: Any, many: Any, device: str) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import re
 import shlex
@@ -86,8 +84,7 @@ class Reporter(Scorer):
         tune.report(self.last, checkpoint=checkpoint)
 
 
-FIGURES = ("return", "steps", "train_s")
-"""Of a report."""
+FIGURES = ("return", "steps", "train_s")  # of a report
 
 
 class Progress(tune.Callback):
@@ -121,7 +118,6 @@ def write_line(trial: Any, what: str) -> None:
 
 
 def last_failure(trial: Any) -> str:
-    """Why a trial failed the last time, from the file that Tune writes."""
     path = Path(trial.error_file or "")
     return reason(path.read_text() if path.is_file() else "")
 
@@ -150,11 +146,7 @@ def write_table(results: Any, folder: str, varied: list[str]) -> int:
         row = {key: config.get(key) for key in varied} | {key: report.get(key) for key in FIGURES}
         rows.append(row | {"state": state, "run": str(kept).removeprefix(f"{folder}/")})
     if "://" not in folder and rows:
-        text = io.StringIO()
-        writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
-        runs.write_text(Path(folder, "trials.csv"), text.getvalue())
+        runs.write_csv(Path(folder, "trials.csv"), list(rows[0]), rows)
     counts = {state: sum(row["state"] == state for row in rows) for state in ("done", "failed", "unfinished")}
     print(", ".join(f"{count} {state}" for state, count in counts.items() if count) + f": {folder}")
     print("\n".join(reasons), end="\n" if reasons else "")

@@ -5,9 +5,8 @@
 
 A policy is a name (a gait of the preset, idle, random, bang-bang, drag, airborne; open-loop, the best stored
 gait of the id), the .json of a gait, or a trained model: its .zip, .onnx or run folder. Brackets hold the
-bootstrap's 95 % interval of the mean over episodes.
-
-A model file is a pickle and can run any code when it is loaded: give only files that you trust.
+bootstrap's 95 % interval of the mean over episodes. A model file is a pickle and can run any code when it is
+loaded: give only files that you trust.
 """
 
 from __future__ import annotations
@@ -31,8 +30,7 @@ from hoof_env._output import check_folder
 from hoof_env.errors import OutputError, ParameterError, check_number
 
 DEFAULT_ENV = "hoof_env/HorseLeg-v0"
-FPS = 50.0
-"""Of films."""
+FPS = 50.0  # of films
 
 
 @dataclass(frozen=True)
@@ -152,11 +150,8 @@ class Args:
 
 def evaluate(args: Args) -> tuple[list[Score], dict[str, Any]]:
     """Score the policies of `args`; returns the scores and what they were measured in (env_id, env_kwargs).
-
-    Raises:
-        ParameterError, DataFileError: the arguments, a policy or a model do not fit.
-        OutputError: the JSON or the video cannot be written.
-    """
+    `ParameterError`, `DataFileError`: the arguments, a policy or a model do not fit. `OutputError`: the JSON
+    or the video cannot be written."""
     from tqdm import tqdm
 
     _check(args)

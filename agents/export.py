@@ -1,13 +1,10 @@
 """Write a trained policy as one file that needs no Stable-Baselines3: ONNX, which onnxruntime reads.
 
     python -m agents.export runs/ppo-HorseLeg-v0-s0 --out policy.onnx
-    python -m agents.export runs/ppo-HorseLeg-v0-s0/model.zip --out policy.onnx
 
 The file maps observations of the environment, shape (batch, k), to deterministic actions, (batch, n), float32
 both: the normalisation of observations and the limits of actions are inside. It is kept only if it gives the
-actions of the model it was made from. What it is for stands in its metadata (`hoof_env/onnx_policy.py`);
-examples/run_policy.py plays an ONNX file in twenty lines.
-
+actions of the model it was made from. What it is for stands in its metadata (`hoof_env/onnx_policy.py`).
 A .zip is a pickle and can run any code when it is loaded: give only files that you trust. ONNX is data.
 """
 
@@ -35,14 +32,9 @@ from hoof_env.errors import DataFileError, HoofEnvError, ParameterError
 from hoof_env.onnx_policy import INPUT, LISTS, OUTPUT, OnnxPolicy, describe, settings_of
 from hoof_env.records import check_place
 
-OPSET = 18
-"""Of the file; onnxruntime reads it from 1.14 on."""
-
-TRIED = 1000
-"""Random observations on which file and model must agree."""
-
-TOLERANCE = 1e-5
-"""By how much an action may differ, as a part of the half range of the action space."""
+OPSET = 18  # of the file; onnxruntime reads it from 1.14 on
+TRIED = 1000  # random observations on which file and model must agree
+TOLERANCE = 1e-5  # by how much an action may differ, as a part of the half range of the action space
 
 
 @dataclass(frozen=True)
@@ -56,13 +48,9 @@ class Args:
 
 
 def export(model: Path, out: Path, env_id: str | None = None) -> float:
-    """Write the policy of a run folder or .zip to an .onnx and return the largest difference of an action, as
-    in `TOLERANCE`. It is for `env_id`, or what run.json says.
-
-    Raises:
-        ParameterError: another suffix, or no environment known. DataFileError: no such model.
-        Others as `write_policy`.
-    """
+    """Write the policy of a run folder or .zip to an .onnx, for `env_id` or what run.json says, and return
+    the largest difference of an action, as in `TOLERANCE`. `ParameterError`: another suffix, or no
+    environment known. `DataFileError`: no such model. Others as `write_policy`."""
     check_place(out, [".onnx"])
     saved = runs.SavedModel.find(model)
     env_id = env_id or saved.record.get("env_id")
@@ -86,12 +74,8 @@ def about(env: Any, env_id: str, env_kwargs: dict[str, Any], record: dict[str, A
 
 def write_policy(trained: runs.TrainedPolicy, out: Path, metadata: dict[str, Any]) -> float:
     """Write a policy to `out`, an older file is replaced, and return the largest difference of an action.
-
-    Raises:
-        ParameterError: a policy that observes or does something else than vectors, or remembers.
-        DataFileError: the file does not act as the policy does; it is not kept.
-        OutputError: it cannot be written. HoofEnvError: a package is missing.
-    """
+    `ParameterError`: it observes or does something else than vectors, or remembers. `DataFileError`: the file
+    does not act as the policy does; it is not kept. `HoofEnvError`: a package is missing."""
     observations = some_observations(trained.model.observation_space)
     module = module_of(trained)
     with staged(out.parent) as stage:

@@ -5,12 +5,9 @@
     python -m agents.evaluate --policy run runs/open_loop/HorseLeg-v0-constant.json
 
 Families: "constant", the paper's gaits, four numbers that are held; "clocked", each of the four actions with
-a first harmonic of one clock beside it, thirteen numbers. The clock starts with the episode, wherever the
-crank is.
-
-The best of several searches is chosen by starts that none has met and scored with yet others, the episodes
-of agents.evaluate. The file is written after every search; searches that are in it are not made again, and
-Ctrl-C keeps the best so far.
+a first harmonic of one clock beside it, which starts with the episode, thirteen numbers. The best of several
+searches is chosen by starts that none has met and scored with yet others, the episodes of agents.evaluate.
+The file is written after every search; searches that are in it are not made again.
 """
 
 from __future__ import annotations
@@ -40,19 +37,11 @@ from hoof_env.gait.gait import PARAMETERS
 Floats = NDArray[np.float64]
 Episodes = list[dict[str, float]]
 
-SIZES = {"constant": 4, "clocked": 13}
-"""Numbers of a gait, by family."""
-
-SLOWEST, FASTEST = 0.2, 4.0
-"""Of the clock [Hz]; the crank turns at 2 Hz at most."""
-
-POPULATION, STARTS = 16, 16
-"""Candidates of a generation and random starts that each meets."""
-
+SIZES = {"constant": 4, "clocked": 13}  # numbers of a gait, by family
+SLOWEST, FASTEST = 0.2, 4.0  # of the clock [Hz]; the crank turns at 2 Hz at most
+POPULATION, STARTS = 16, 16  # candidates of a generation and random starts that each meets
 ROWS = POPULATION * STARTS
-
-FINALISTS = 4
-"""Candidates of a search that meet more starts at its end."""
+FINALISTS = 4  # candidates of a search that meet more starts at its end
 
 STEP, HARMONIC = 0.3, 0.3
 """First standard deviation and largest first harmonic; the box of every number is 2 wide."""
@@ -65,8 +54,8 @@ OPTIONS = {
     "verbose": -9, "verb_log": 0,
 }  # fmt: skip
 """Of CMA-ES: it ends when the steps are small."""
-EPISODES = {"constant": 10_240, "clocked": 30_720}
-"""Of a search, by family."""
+
+EPISODES = {"constant": 10_240, "clocked": 30_720}  # of a search, by family
 
 KEPT = (
     "return", "speed_m_s", "stance_peak_n", "cost_of_transport", "peak_grf_n", "weight_share", "stances",
@@ -142,11 +131,11 @@ def search(
 ) -> tuple[Floats, float, bool]:
     """One CMA-ES from the best point of a random screening, or from the constant action `start`, shape (4,).
 
-    All candidates of a generation meet the same starts, those of the next meet others; searches of different
-    seeds share none. At the end the mean of the distribution, the luckiest candidate and the best of the last
-    generation meet more. About `episodes` are spent; `tick` is called with the number of those that were
-    added and the lowest cost in them. Returns the best point, its cost over starts that the search had not
-    met, and whether Ctrl-C ended it; `KeyboardInterrupt`: it did before anything was found.
+    Candidates of a generation meet the same starts, those of the next and other searches others. At the end
+    the mean of the distribution, the luckiest candidate and the best of the last generation meet more. About
+    `episodes` are spent; `tick` is called with their number and the lowest cost in them. Returns the best
+    point, its cost over starts that the search had not met, and whether Ctrl-C ended it; `KeyboardInterrupt`:
+    it did before anything was found.
     """
     import cma
 
@@ -159,7 +148,13 @@ def search(
         tick(ROWS, min(values))
         return values
 
-    first, step = first_point(SIZES[objective.family], costs, generator, start)
+    size, step = SIZES[objective.family], STEP
+    if start is not None:
+        first, step = np.array([*start, *[0.0] * (size - len(start))]), STEP / 3
+    else:
+        screened = generator.uniform(-1, 1, (ROWS // 4, size))
+        screened[:, 4:12] *= HARMONIC
+        first = screened[np.argmin(costs(screened, 4))]
     options = OPTIONS | {"popsize": POPULATION, "seed": int(generator.integers(1, 2**31))}
     strategy, best, interrupted = cma.CMAEvolutionStrategy(first, step, options), [first], False
     try:
@@ -178,28 +173,10 @@ def search(
     return finalists[np.argmin(final)], min(final), interrupted
 
 
-def first_point(
-    size: int,
-    costs: Callable[[Any, int], list[float]],
-    generator: np.random.Generator,
-    start: Sequence[float] | None,
-) -> tuple[Floats, float]:
-    """Where a search begins, and its first standard deviation."""
-    if start is not None:
-        return np.array([*start, *[0.0] * (size - len(start))]), STEP / 3
-    screened = generator.uniform(-1, 1, (ROWS // 4, size))
-    screened[:, 4:12] *= HARMONIC
-    return screened[np.argmin(costs(screened, 4))], STEP
-
-
 def optimise(args: Args) -> dict[str, Any]:
-    """Search, and write the file after every search; returns what it holds.
-
-    Raises:
-        HoofEnvError: no CMA-ES is installed. ParameterError: an argument does not fit.
-        DataFileError, OutputError: the file is of something else, or cannot be written.
-        KeyboardInterrupt: Ctrl-C; what was found is in the file.
-    """
+    """Search, and write the file after every search; returns what it holds. `HoofEnvError`: no CMA-ES is
+    installed. `DataFileError`: the file is of something else. `KeyboardInterrupt`: what was found is in the
+    file."""
     episodes = check(args)
     from tqdm import tqdm
 

@@ -1,15 +1,11 @@
 """The folder of one training run: what stands in it, how it is written and how a model is read back.
 
     policy.*          the trained policy as plain data (hoof_env/plain_policy.py): this is what is loaded
-    model.zip         the trained model (Stable-Baselines3)
-    vecnormalize.pkl  statistics, only where the hyperparameters ask for normalisation
+    model.zip         the trained model (Stable-Baselines3); vecnormalize.pkl: statistics, if normalised
     config.yml        the hyperparameters that were used, in rl-baselines3-zoo's form
-    run.json          environment, its settings and spaces, command, arguments, versions; when it is through,
-                      steps and seconds under "finished"
-    monitor.csv       return, length and time of every training episode
+    run.json          environment, settings, spaces, command, arguments, versions; "finished" when through
+    monitor.csv       return, length and time of every training episode; tensorboard/ has curves
     checkpoints/N/    what `--resume` goes on from (agents/checkpoints.py), until the training is through
-    tensorboard/      curves
-    .lock             held while a process works here
 
 A .zip or .pkl is a pickle and can run any code when it is loaded: load only files that you trust.
 """
@@ -17,12 +13,13 @@ A .zip or .pkl is a pickle and can run any code when it is loaded: load only fil
 from __future__ import annotations
 
 import csv
+import io
 import json
 import platform
 import shlex
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -127,6 +124,18 @@ def write_text(path: Path, text: str) -> None:
     """Write a text file that replaces an older one only when it is complete; `OutputError` if it cannot."""
     with staged(path.parent) as stage:
         (stage / path.name).write_text(text, encoding="utf-8")
+
+
+def write_csv(
+    path: Path, columns: Sequence[str], rows: Sequence[Mapping[str, Any]], number: str = "{}"
+) -> None:
+    """Write a CSV file, whole or not at all; `number` formats its cells."""
+    text = io.StringIO()
+    writer = csv.DictWriter(text, columns, lineterminator="\n")
+    writer.writeheader()
+    for row in rows:
+        writer.writerow({key: number.format(x) for key, x in row.items() if x is not None})
+    write_text(path, text.getvalue())
 
 
 def write_record(folder: Path, record: dict[str, Any]) -> None:

@@ -2,8 +2,7 @@
 
 A row is the episode that `play` gives with the same seed, to the bit where the policy acts in a batch as
 alone: scripted policies do, but for "random", which draws for all rows at once; a network does to its last
-bits. The loading rate of an episode is how steeply the force on the hoof rises when it meets the ground; the
-first seconds, in which a gait settles, are left out.
+bits. The loading rate of an episode, after its first seconds, is the steepest rise of the force at impact.
 """
 
 from __future__ import annotations
@@ -26,8 +25,7 @@ from hoof_env.onnx_policy import OnnxPolicy
 
 Floats = NDArray[np.float64]
 
-ROWS = 1024
-"""Episodes side by side at most; more are played one batch after the other."""
+ROWS = 1024  # episodes side by side at most; more are played one batch after the other
 
 CURVE_SEEDS = range(1000, 1020)
 """Episodes of the learning curves; training starts its own from other seeds."""
@@ -44,11 +42,8 @@ TRANSPORT = ("distance_m", "drive_work_j", "mean_grf_n", "weight_share")
 """What a cost of transport over several episodes is made of; the force by the share is the weight."""
 
 
-SETTLED = 3.0
-"""Seconds of an episode that are left out, where it is at least twice as long."""
-
-WINDOW = 0.005
-"""The loading rate is the steepest rise of the force over so many seconds."""
+SETTLED = 3.0  # seconds of an episode that are left out, where it is at least twice as long
+WINDOW = 0.005  # the loading rate is the steepest rise of the force over so many seconds
 
 FORCES = ("toe_normal", "heel_normal", "toe_friction", "heel_friction")
 
@@ -82,23 +77,11 @@ def play(
     return episodes
 
 
-def score_vector(
-    policy: Any,
-    env_id: str,
-    seeds: Sequence[int],
-    **env_kwargs: Any,
-) -> list[dict[str, float]]:
-    """One episode per seed; its return and the figures of its summary, as `play` gives them.
-
-    Args:
-        policy: anything with Stable-Baselines3's `predict` that takes many observations, shape (n, k), and
-            `episode_start`, shape (n,); or the name or path of one, as `find_policy` takes them.
-        env_id, env_kwargs: the environment. One without a native vector environment is played one by one.
-        seeds: of the episodes.
-
-    Raises:
-        ParameterError, DataFileError: unknown environment or policy, or one that does not fit.
-    """
+def score_vector(policy: Any, env_id: str, seeds: Sequence[int], **env_kwargs: Any) -> list[dict[str, float]]:
+    """One episode per seed, as `play` gives it, in batches of the native vector environment where the id has
+    one. The policy, or the name or path of one as `find_policy` takes them, has Stable-Baselines3's `predict`
+    for many observations, shape (n, k), and `episode_start`, shape (n,). `ParameterError`, `DataFileError`:
+    unknown environment or policy, or one that does not fit."""
     with runs.make_env(env_id, **env_kwargs) as env:
         if isinstance(policy, str):
             policy = find_policy(policy, env, env_id)
@@ -145,7 +128,6 @@ def play_rows(envs: HorseLegVectorEnv, policy: Any, seeds: Sequence[int]) -> lis
 
 
 def _with_stance_peak(summary: Mapping[str, float]) -> dict[str, float]:
-    """An episode summary with the mean of the stances' highest forces, where it counts stances."""
     if "stances" not in summary:
         return dict(summary)
     return {**summary, "stance_peak_n": summary["stance_peak_sum_n"] / max(summary["stances"], 1.0)}
@@ -164,9 +146,8 @@ def mean_figures(episodes: Sequence[Mapping[str, float]]) -> dict[str, float]:
 
 def is_model(name: str) -> bool:
     """Whether a policy's name is the path of a model rather than that of a scripted policy or of a gait."""
-    if name.endswith(".json"):
-        return False
-    return name.endswith((".zip", ".onnx")) or Path(name).name != name or Path(name, runs.MODEL).is_file()
+    is_path = name.endswith((".zip", ".onnx")) or Path(name).name != name or Path(name, runs.MODEL).is_file()
+    return is_path and not name.endswith(".json")
 
 
 def saved_model(path: Path) -> OnnxPolicy | runs.SavedModel:
@@ -185,10 +166,7 @@ def read_policy_record(name: str) -> dict[str, Any]:
 
 def find_policy(name: str, env: gym.Env[Any, Any], env_id: str) -> Any:
     """A policy as `hoof_env.records.find_policy` takes it, or a model of any environment by its path.
-
-    Raises:
-        ParameterError: unknown name. DataFileError: no such model or gait, or one that does not fit.
-    """
+    `ParameterError`: unknown name. `DataFileError`: no such model or gait, or one that does not fit."""
     if is_model(name):
         return saved_model(Path(name)).load(env, env_id)
     if not hasattr(env.unwrapped, "gaits"):
@@ -224,13 +202,8 @@ class LoadingRate:
 
 def loading_rates(normal: Floats, friction: Floats, lift_off: float, dt: float) -> Floats:
     """Loading rate of each whole stance [N/s], shape (stances,): the steepest rise of the normal force from
-    touch-down to the highest ground reaction force.
-
-    Args:
-        normal, friction: forces on the hoof, `dt` apart, shape (substeps,) [N].
-        lift_off: normal force that separates stance from swing [N].
-        dt: substep [s].
-    """
+    touch-down to the highest ground reaction force. Forces on the hoof, shape (substeps,) [N], are `dt` [s]
+    apart; a normal force above `lift_off` [N] is stance."""
     grf = np.hypot(normal, friction)
     rates = []
     for first, end in stances(normal, lift_off):

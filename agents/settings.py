@@ -15,8 +15,7 @@ from hoof_env.errors import DataFileError
 from hoof_env.plain_policy import ALGORITHMS as ALGORITHMS
 from hoof_env.plain_policy import algorithm_class as algorithm_class
 
-Algorithm = Literal["ppo", "sac", "td3", "tqc"]
-"""Names of `ALGORITHMS`, for the commands."""
+Algorithm = Literal["ppo", "sac", "td3", "tqc"]  # names of `ALGORITHMS`, for the commands
 
 
 @dataclass(frozen=True)
@@ -37,8 +36,7 @@ class TrainingArgs:
 
 
 FOLDER = Path(__file__).parent / "hyperparams"
-ENV = "env."
-"""Before the name of an argument of the environment where hyperparameters may stand, too."""
+ENV = "env."  # before the name of an argument of the environment where hyperparameters may stand, too
 
 COUNTED = ("n_epochs", "n_steps", "batch_size", "buffer_size", "policy_delay")
 """Keys that hold whole numbers of 1 or more; not all are looked at before they are used."""
@@ -120,7 +118,6 @@ def normalize_arguments(settings: Mapping[str, Any]) -> dict[str, Any] | None:
 
 
 def _action_noise(kind: Any, spread: Any, actions: int) -> Any:
-    """What is added to the actions while learning; both kinds in units of the action."""
     from stable_baselines3.common.noise import NormalActionNoise, OrnsteinUhlenbeckActionNoise
 
     known = {"normal": NormalActionNoise, "ornstein-uhlenbeck": OrnsteinUhlenbeckActionNoise}

@@ -4,15 +4,9 @@
     python -m agents.ship runs/ppo-HorseLeg-v0-s0       this run
 
 The best of an id is that with the highest mean return in episodes on which nothing is reported. Its folder
-agents/policies/NAME is written whole or not at all:
-
-    policy.onnx         the policy, as agents.export writes it; agents.evaluate and hoof-env render play it
-    policy.safetensors  the weights, with policy.json, for Stable-Baselines3 (hoof_env/plain_policy.py)
-    run.json, config.yml   how it was trained
-    score.json          returns in fixed episodes beside those of gaits, and how far other machines may be off
-    card.md, curve.png, film.gif   the model card and its pictures
-
-agents/policies/README.md lists all that are there.
+agents/policies/NAME, written whole or not at all, holds the exported policy and its weights as plain data,
+how it was trained, its returns beside those of gaits and how far other machines may be off, a model card, a
+curve and a film. agents/policies/README.md lists all that are there.
 """
 
 from __future__ import annotations
@@ -56,8 +50,7 @@ CHOOSING_SEEDS = range(500_000, 500_100)
 CHECKED = 20
 """Episodes, from the first of the score on, that are played again to check a shipped policy."""
 
-GAITS = ("run", "walk", "carrying_walk", "open-loop")
-"""Scored beside the policy, where an id has them."""
+GAITS = ("run", "walk", "carrying_walk", "open-loop")  # scored beside the policy, where an id has them
 
 LIMIT, FILM_LIMIT = 1_000_000, 750_000
 """Bytes of a folder and of the film in it, which is made shorter where it is larger."""
@@ -65,8 +58,6 @@ LIMIT, FILM_LIMIT = 1_000_000, 750_000
 FILM_SECONDS = 4.0
 
 COPIED = (WEIGHTS, ABOUT, runs.CONFIG)
-NOT_COPIED = ("args",)
-"""Of run.json: paths of the machine that trained; the command says the rest."""
 
 
 @dataclass(frozen=True)
@@ -132,18 +123,13 @@ def whole(folder: Path) -> Iterator[Path]:
 
 
 def ship(choice: Choice, env_id: str, out: Path) -> dict[str, Any]:
-    """Write the folder of one policy beneath `out`, for its own id or one that `STANDS_FOR` it; returns what
-    its score.json holds.
-
-    Raises:
-        DataFileError: the model does not fit. OutputError: the folder cannot be written or gets too large.
-        HoofEnvError: a package is missing.
-    """
+    """Write the folder of one policy beneath `out`, for its own id or one that `STANDS_FOR` it; returns its
+    score.json. `DataFileError`: the model does not fit. `OutputError`: the folder gets too large."""
     saved, trained_on = choice.saved, choice.saved.record["env_id"]
     if not len(runs.read_episodes(saved.path.parent)):
         raise DataFileError(f"run {saved.path.parent}: expected a training in which episodes end, got none")
-    record = {key: value for key, value in saved.record.items() if key not in NOT_COPIED}
-    record |= {"command": shown_command(record.get("command", "")), "env_id": env_id}
+    record = saved.record | {"command": shown_command(saved.record.get("command", "")), "env_id": env_id}
+    record.pop("args", None)  # paths of the machine that trained; the command says the rest
     with runs.make_env(trained_on) as env:
         trained = saved.load(env, trained_on)
     with runs.make_env(env_id) as env:
@@ -182,7 +168,6 @@ def film(folder: Path, env_id: str) -> None:
 
 @cache
 def gaits(env_id: str) -> list[Score]:
-    """The scores of those of `GAITS` that an id has."""
     scores = []
     for name in GAITS:
         with suppress(ParameterError, DataFileError):  # it has no such gait
@@ -220,11 +205,8 @@ class Trembling:
 
 
 def tolerance(policy: Any, env_id: str, returns: Sequence[float]) -> float:
-    """By how much the mean return of the first `CHECKED` episodes may differ on another machine.
-
-    The last bits of an action can change an episode. Measured by playing them once more with a
-    `Trembling` policy: four standard errors of the mean difference, and 1 % of the mean.
-    """
+    """By how much the mean return of the first `CHECKED` episodes may differ on another machine: four
+    standard errors of what a `Trembling` policy changes, and 1 % of the mean."""
     again = score_vector(Trembling(policy), env_id, SCORE_SEEDS[:CHECKED])
     off = np.array([episode["return"] for episode in again]) - returns[: len(again)]
     return float(4 * np.sqrt(np.mean(off**2) / len(off)) + 0.01 * abs(np.mean(returns)))
@@ -235,8 +217,7 @@ def shown_command(command: str) -> str:
     words = shlex.split(command)
     while "--out" in words:
         del words[words.index("--out") : words.index("--out") + 2]
-    here = f"{Path.cwd()}/"
-    shown = [word.removeprefix(here) for word in words]
+    shown = [word.removeprefix(f"{Path.cwd()}/") for word in words]
     return shlex.join([Path(word).name if Path(word).is_absolute() else word for word in shown])
 
 

@@ -5,9 +5,9 @@
     python -m agents.train --out runs/mine --resume         go on where it was stopped or killed, else start
     tensorboard --logdir runs                               watch it
 
-Ctrl-C stops after the current rollout and keeps the model and a checkpoint; pressed twice it stops at once
-and keeps only checkpoints. What a run folder holds is written in agents/runs.py. The same seed, arguments,
-machine and versions give the same run, resumed or not (agents/checkpoints.py says where that ends).
+Ctrl-C stops after the current rollout and keeps the model and a checkpoint; pressed twice it keeps only
+checkpoints. agents/runs.py says what a run folder holds. The same seed, arguments, machine and versions give
+the same run, resumed or not (agents/checkpoints.py says where that ends).
 """
 
 from __future__ import annotations
@@ -60,8 +60,6 @@ class Args(TrainingArgs):
 
 @dataclass(frozen=True)
 class Trained:
-    """Where a training ended."""
-
     folder: Path
     steps: int
     seconds: float
@@ -72,22 +70,16 @@ class Trained:
         return self.steps / max(self.seconds, 1e-9)
 
     def __str__(self) -> str:
-        return (
-            f"{self.steps:,} steps in {self.seconds:.0f} s ({self.rate:,.0f} steps/s); "
-            f"model kept in {self.folder}"
-        )
+        pace = f"{self.steps:,} steps in {self.seconds:.0f} s ({self.rate:,.0f} steps/s)"
+        return f"{pace}; model kept in {self.folder}"
 
 
 def train(args: Args, *also: Any) -> Trained:
     """Train as `args` say and fill the run folder; SIGINT, SIGTERM and the time limit end it early. `also`
-    are more callbacks of Stable-Baselines3; on a resume they begin anew.
-
-    Raises:
-        ParameterError, DataFileError: the arguments, the environment or the hyperparameters do not fit, or
-            are not those of the run to go on with.
-        OutputError: the run folder cannot be written, already holds a run, or another process trains there.
-        DivergedError: a loss or the policy is not finite any more; the checkpoints before that stay.
-    """
+    are more callbacks of Stable-Baselines3; on a resume they begin anew. `ParameterError`, `DataFileError`:
+    something does not fit, or not the run to go on with. `OutputError`: the folder cannot be written, holds a
+    run already, or another process trains there. `DivergedError`: a loss or the policy is not finite any
+    more."""
     env_kwargs, settings = checked(args)
     check_threads(args.torch_threads)
     name = args.env_id.rpartition("/")[2]
@@ -153,7 +145,6 @@ def learn(
     resumed: checkpoints.Resumed | None,
     also: tuple[Any, ...],
 ) -> Trained:
-    """Let the model learn until it has `steps`, and write it."""
     from stable_baselines3.common.callbacks import CallbackList
 
     from agents.watch import EndedError, Watch, check_divergence, diverged, stop_on_signals
@@ -194,7 +185,6 @@ def checked(args: Args) -> tuple[dict[str, Any], dict[str, Any]]:
     settings["n_timesteps"] = int(check_number("steps", settings["n_timesteps"], low=1))
     check_number("seed", args.seed, low=0)
     check_number("checkpoint_every", args.checkpoint_every, low=0)
-    check_number("torch_threads", args.torch_threads, low=1)
     normalize_arguments(settings)
     if args.max_minutes is not None:
         check_number("max_minutes", args.max_minutes, low=0.0, exclusive_low=True)
@@ -204,7 +194,6 @@ def checked(args: Args) -> tuple[dict[str, Any], dict[str, Any]]:
 
 
 def make_record(args: Args, env_kwargs: dict[str, Any]) -> dict[str, Any]:
-    """What run.json says of a run that starts."""
     with runs.make_env(args.env_id, **env_kwargs) as env:
         if hasattr(env.unwrapped, "reward_space"):
             raise ParameterError(

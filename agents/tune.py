@@ -2,15 +2,13 @@
 
     python -m agents.tune --algo ppo --env-id hoof_env/HorseLeg-v0 --trials 30 --steps 1500000
     python -m agents.tune --trials 60 --steps 1500000          the same study goes on until it has 60
-
-A trial draws settings from agents/studies/spaces.yml, trains by agents.train, and is scored as it goes on
-64 episodes with which no training starts; a bad one is pruned. Its training has a seed of its own, so that
-no setting wins by a lucky one. Ctrl-C ends the trial in hand; the same command goes on with the study, even
-after kill -9, when the trial that was killed is run again. One process works on a study. Into the folder go
-study.db (Optuna's), best.yml (in rl-baselines3-zoo's format, for --hyperparams of agents.train) and trials/N,
-the run folders. Optuna shows a study:
-
     optuna trials --storage sqlite:///runs/tune/ppo-HorseLeg-v0/study.db --study-name study
+
+A trial draws settings from agents/studies/spaces.yml, trains by agents.train with a seed of its own, and is
+scored as it goes on 64 episodes with which no training starts; a bad one is pruned. Ctrl-C ends the trial in
+hand; the same command goes on, even after kill -9, when the trial that was killed is run again. One process
+works on a study. Its folder holds study.db (Optuna's), best.yml (for --hyperparams of agents.train) and
+trials/N, the run folders.
 """
 
 from __future__ import annotations
@@ -34,8 +32,7 @@ from agents.watch import DivergedError, EndedError, Scorer
 from hoof_env.errors import DataFileError, ParameterError, check_number
 
 SPACES = Path(__file__).parent / "studies" / "spaces.yml"
-SEEDS = range(1000, 1064)
-"""Scored episodes; trainings start theirs from other seeds."""
+SEEDS = range(1000, 1064)  # scored episodes; trainings start theirs from other seeds
 
 
 @dataclass(frozen=True)
@@ -105,7 +102,6 @@ class TrialScorer(Scorer):
         self.curve: list[tuple[int, float]] = []
 
     def keep(self, episodes: list[dict[str, float]]) -> None:
-        """Add a row."""
         mean = sum(one["return"] for one in episodes) / len(episodes)
         self.curve.append((self.num_timesteps, mean))
 
@@ -181,7 +177,6 @@ def run_trial(
 
 
 def finished(study: Any) -> list[Any]:
-    """Trials that ended by themselves; interrupted and killed ones have failed."""
     return [trial for trial in study.trials if trial.state.name in ("COMPLETE", "PRUNED")]
 
 
@@ -191,11 +186,25 @@ def open_study(args: Args, folder: Path, about: dict[str, Any]) -> Any:
     others. `DataFileError`: study.db is not a study."""
     try:
         import optuna
+        from sqlalchemy.exc import SQLAlchemyError
     except ModuleNotFoundError:
         raise ParameterError("agents.tune needs Optuna: pip install 'hoof-env[tune]'") from None
     optuna.logging.set_verbosity(optuna.logging.ERROR)  # what ends a trial is raised, too
     check_space(args, about)
-    study = load_study(folder / "study.db", about["base"]["n_timesteps"])
+    path = folder / "study.db"
+    try:
+        study = optuna.create_study(
+            storage=f"sqlite:///{path}",
+            study_name="study",
+            # By the median of five whole trials at the least, and not before a third of a training
+            pruner=optuna.pruners.MedianPruner(5, n_warmup_steps=about["base"]["n_timesteps"] // 3),
+            direction="maximize",
+            load_if_exists=True,
+        )
+        len(study.trials)  # reads all of it
+    except (SQLAlchemyError, optuna.exceptions.OptunaError, RuntimeError) as error:
+        reason = str(error).partition("\n")[0]
+        raise DataFileError(f"{path}: expected the database of a study, cannot read it: {reason}") from None
     # Of the same seed a study that goes on would draw again what it has drawn
     seed = args.seed + len(study.trials)
     study.sampler = optuna.samplers.TPESampler(seed=seed, multivariate=True, n_startup_trials=8)
@@ -224,29 +233,7 @@ def check_space(args: Args, about: dict[str, Any]) -> None:
         make_model(training, settings, many)
 
 
-def load_study(path: Path, steps: int) -> Any:
-    """Optuna's study in the database at `path`, made if need be, of trainings of so many steps."""
-    import optuna
-    from sqlalchemy.exc import SQLAlchemyError
-
-    try:
-        study = optuna.create_study(
-            storage=f"sqlite:///{path}",
-            study_name="study",
-            # By the median of five whole trials at the least, and not before a third of a training
-            pruner=optuna.pruners.MedianPruner(5, n_warmup_steps=steps // 3),
-            direction="maximize",
-            load_if_exists=True,
-        )
-        len(study.trials)  # reads all of it
-    except (SQLAlchemyError, optuna.exceptions.OptunaError, RuntimeError) as error:
-        reason = str(error).partition("\n")[0]
-        raise DataFileError(f"{path}: expected the database of a study, cannot read it: {reason}") from None
-    return study
-
-
 def write_best(study: Any, folder: Path, env_id: str) -> None:
-    """Write best.yml, once there is a trial that was not pruned."""
     complete = [trial for trial in study.trials if trial.state.name == "COMPLETE"]
     if complete:
         best = max(complete, key=lambda trial: trial.value)

@@ -31,8 +31,7 @@ class EndedError(Exception):
     """The training was asked to end; it stands between two rollouts."""
 
 
-LARGEST = 1e10
-"""No parameter of a policy that learns comes near it."""
+LARGEST = 1e10  # no parameter of a policy that learns comes near it
 
 
 def check_divergence(model: Any, folder: Path) -> None:

@@ -350,7 +350,7 @@ def page(done, tmp_path, monkeypatch):
     monkeypatch.setattr(baselines_results, "sped_up", lambda speed: [])
     monkeypatch.setattr(baselines_results, "REPS", 100)
     monkeypatch.setattr(baselines_report, "load_plan", lambda name: SMALL)
-    args = baselines_report.Args("nightly", tmp_path / "runs", tmp_path / "page.md")
+    args = baselines_report.Args("nightly", tmp_path / "runs")
     return baselines_report.report(args)
 
 

@@ -21,8 +21,7 @@ def test_space():
 
 
 @pytest.mark.parametrize(
-    "item",
-    ["gamma", "gamma=", "gamma=0.9", "gamma=[]", "=[1]", "gamma=uniform(0,1)", "gamma=[1", "gamma={}"],
+    "item", ["gamma", "gamma=", "gamma=0.9", "gamma=[]", "=[1]", "gamma=uniform(0,1)", "gamma=[1", "gamma={}"]
 )
 def test_bad_space(item):
     with pytest.raises(ParameterError, match="--space: expected key="):

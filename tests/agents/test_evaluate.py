@@ -8,18 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from agents.evaluate import (
-    METRICS,
-    Args,
-    Score,
-    estimate,
-    evaluate,
-    film,
-    film_paths,
-    main,
-    table,
-    to_json,
-)
+from agents.evaluate import METRICS, Args, Score, estimate, evaluate, film, film_paths, main, table, to_json
 from agents.runs import SavedModel, make_env
 from agents.score import find_policy, play
 from hoof_env.envs.policies import GAITS
