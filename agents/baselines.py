@@ -39,17 +39,11 @@ class Args:
     """trainings at a time, one thread each"""
     out: Path | None = None
     """folder of trainings and page; otherwise runs/baselines-nightly, or runs/baselines and docs/"""
-    report: bool = True
-    """write the page when nothing is left"""
 
 
 def train_all(args: Args) -> list[Run]:
-    """Train what is not done yet; returns the trainings that failed.
-
-    Raises:
-        ParameterError: no training of that name. OutputError: the folder cannot be written.
-        KeyboardInterrupt: Ctrl-C; everything can go on.
-    """
+    """Train what is not done yet; returns the trainings that failed. `ParameterError`: no training of that
+    name. `OutputError`: the folder cannot be written. `KeyboardInterrupt`: Ctrl-C; everything can go on."""
     check_number("workers", args.workers, low=1)
     folder = args.out or FOLDERS[args.subset]
     names = args.only or ("",)
@@ -84,12 +78,14 @@ def work_off(chosen: Sequence[Run], folder: Path, workers: int) -> list[Run]:
                 bar.set_postfix_str(", ".join(one.name for one in running), refresh=False)
                 bar.update(0)
         finally:
-            stop(running)
+            for process in running.values():  # each ends in good order, with a checkpoint
+                process.terminate()
+            for process in running.values():
+                process.wait()
     return failed
 
 
 def is_done(one: Run, folder: Path) -> bool:
-    """Whether a training is through and scored."""
     return (folder / one.name / FINAL).is_file()
 
 
@@ -105,16 +101,7 @@ def start(one: Run, folder: Path) -> subprocess.Popen[bytes]:
         )  # fmt: skip
 
 
-def stop(running: dict[Run, subprocess.Popen[bytes]]) -> None:
-    """Let trainings end in good order, each with a checkpoint."""
-    for process in running.values():
-        process.terminate()
-    for process in running.values():
-        process.wait()
-
-
 def last_line(folder: Path) -> str:
-    """The last line of a log that is not empty."""
     lines = (folder / "log.txt").read_text(encoding="utf-8", errors="replace").split("\n")
     return next((line for line in reversed(lines) if line.strip()), "its log is empty")
 
@@ -128,8 +115,7 @@ def main(argv: list[str] | None = None) -> int:
     signal.signal(signal.SIGTERM, interrupt)
     args = tyro.cli(Args, args=argv, prog="python -m agents.baselines", description=__doc__)
     failed = train_all(args)
-    if args.report:
-        print(f"written: {baselines_report.report(baselines_report.Args(args.subset, args.out))}")
+    print(f"written: {baselines_report.report(baselines_report.Args(args.subset, args.out))}")
     for one in failed:
         print(f"failed: {one.name}", file=sys.stderr)
     return 1 if failed else 0

@@ -1,9 +1,7 @@
-"""The page of the baselines from what `agents.baselines` left: tables, curves as CSV and as pictures.
+"""The page of the baselines, report.md, from what `agents.baselines` left: tables, curves as CSV and
+pictures.
 
-    python -m agents.baselines                  trains, then writes runs/baselines/report.md
     python -m agents.baselines_report           writes it again, from whatever is done
-
-docs/baselines.md says what the tables mean and what came of the full plan.
 """
 
 from __future__ import annotations
@@ -20,36 +18,31 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter, NullFormatter
 
 from agents import runs
-from agents.baselines_matched import COLUMNS as GAIT_COLUMNS
-from agents.baselines_matched import cells, compare
 from agents.baselines_results import (
-    GAITS,
+    GAIT_COLUMNS,
     OPEN_LOOP,
     Floats,
     Row,
     Scored,
+    cells,
+    compare,
     iqm,
     read_results,
     references,
     versions_of,
 )
-from agents.baselines_run import COLUMNS, CURVE, FOLDERS, LEG, Plan, load_plan, read_curve, write_csv
+from agents.baselines_run import COLUMNS, CURVE, FOLDERS, LEG, Plan, load_plan, read_curve
 from agents.command import run
 from agents.evaluate import Score
+from agents.settings import load_settings
 from hoof_env._output import markdown_table
 from hoof_env.paper.figure_style import BLUE, GREEN, GREY, ORANGE, PURPLE, STYLE
 
-POINTS = 40
-"""Of a curve."""
+TEMPLATES = Path(__file__).with_name("templates")
 
-BINS = 60
-"""Of training episodes in the picture of one training."""
-
-WIDE = 5.0
-"""An axis is logarithmic where the longest training is so many times the shortest."""
-
-References = Mapping[str, Mapping[str, Scored]]
-"""Policies without learning, by id and name."""
+POINTS = 40  # of a curve
+BINS = 60  # of training episodes in the picture of one training
+References = Mapping[str, Mapping[str, Scored]]  # policies without learning, by id and name
 
 
 @dataclass(frozen=True)
@@ -57,10 +50,7 @@ class Args:
     subset: Plan = "full"
     """which plan"""
     runs: Path | None = None
-    """folder of the trainings; otherwise runs/baselines or runs/baselines-nightly"""
-    page: Path | None = None
-    """the page; pictures and CSV go into the folder beside it of the same name; otherwise report.md in the
-    folder of the trainings"""
+    """folder of the trainings, and of report.md; otherwise runs/baselines or runs/baselines-nightly"""
 
 
 def unlabelled(rows: Sequence[Row], env_id: str) -> list[Row]:
@@ -68,17 +58,10 @@ def unlabelled(rows: Sequence[Row], env_id: str) -> list[Row]:
     return [row for row in rows if row.entry.env_id == env_id and not row.entry.label]
 
 
-def best_of(rows: Sequence[Row]) -> Row | None:
-    """The entry of HorseLeg-v0 with the highest return."""
-    return max(unlabelled(rows, LEG), key=lambda row: row.scored.intervals["return"].mean, default=None)
-
-
 def results_table(rows: Sequence[Row], gaits: References) -> str:
-    """Returns of agents and of policies without learning, id by id."""
     titles = (
         "id", "policy", "seeds", "steps", "wall s", "processor s", "return: IQM [95 %]", "mean",
         "worst to best seed", "seeds above run", "above open-loop",
-        "seeds that beat both gaits: after s, median (slowest)",
     )  # fmt: skip
     lines = []
     for env_id, known in gaits.items():
@@ -91,7 +74,6 @@ def results_table(rows: Sequence[Row], gaits: References) -> str:
 
 
 def row_cells(row: Row, known: Mapping[str, Scored]) -> list[str]:
-    """The cells of an entry from its seeds on."""
     count, returns = len(row.results), np.array([one.figures["return"] for one in row.results])
     steps, wall, cpu = (
         np.median([one.final[key] for one in row.results]) for key in ("steps", "wall_s", "cpu_s")
@@ -102,23 +84,15 @@ def row_cells(row: Row, known: Mapping[str, Scored]) -> list[str]:
             return ""
         return f"{np.sum(returns > known[name].intervals['return'].mean)}/{count}"
 
-    seconds = times_to_beat(row, known)
     return [
         str(count) if count == row.entry.seeds else f"{count} of {row.entry.seeds}",
         f"{steps:,.0f}", f"{wall:,.0f}", f"{cpu:,.0f}",
         row.scored.intervals["return"].text(), f"{returns.mean():.1f}",
         f"{returns.min():.1f} to {returns.max():.1f}", above("run"), above(OPEN_LOOP),
-        f"{len(seconds)}/{count}" + (f": {np.median(seconds):.0f} ({max(seconds):.0f})" if seconds else ""),
     ]  # fmt: skip
 
 
-def times_to_beat(row: Row, known: Mapping[str, Scored]) -> list[float]:
-    """Wall seconds of training until the curve is above both gaits, of the seeds that get there."""
-    return row.times_above(max(known[name].curve_return for name in GAITS))
-
-
 def figures_table(rows: Sequence[Row], gaits: References) -> str:
-    """What the gaits are like, id by id."""
     lines = [
         [f"`{env_id}`", one.name, *cells(one)]
         for env_id, known in gaits.items()
@@ -128,7 +102,6 @@ def figures_table(rows: Sequence[Row], gaits: References) -> str:
 
 
 def made_text(rows: Sequence[Row]) -> str:
-    """The command of each entry's first seed, and the versions of all."""
     commands = "\n".join(f"    {row.command}" for row in rows)
     versions = ", ".join(f"{name} {value}" for name, value in versions_of(rows).items())
     return f"The first seed of each:\n\n{commands}\n\nVersions: {versions}.\n"
@@ -143,25 +116,25 @@ def write_data(rows: Sequence[Row], folder: Path) -> None:
             curves += [about | line for line in one.curve]
             clock = {key: one.final[key] for key in ("steps", "wall_s", "cpu_s")}
             numbers = {key: round(value, 4) for key, value in (clock | one.figures).items()}
-            ends.append(about | numbers | {"config": json.dumps(row.settings)})
+            settings = load_settings(one.folder / runs.CONFIG, row.entry.env_id)
+            ends.append(about | numbers | {"config": json.dumps(settings)})
     columns = ("policy", "env_id", "seed", *COLUMNS)
-    write_csv(folder / "curves.csv", columns, curves)
-    write_csv(folder / "runs.csv", (*columns, "config"), ends)
+    runs.write_csv(folder / "curves.csv", columns, curves)
+    runs.write_csv(folder / "runs.csv", (*columns, "config"), ends)
 
 
-def over_time(row: Row, key: str, is_log: bool) -> tuple[Floats, Floats]:
-    """IQM and interval of the return, shape (3, `POINTS`), over "steps" or "wall_s", shape (`POINTS`,), up to
-    the last score that all seeds have; on a logarithmic axis from the first score of a trained policy."""
+def over_time(row: Row, key: str) -> tuple[Floats, Floats]:
+    """IQM and interval of the return, shape (3, `POINTS`), over "steps" or "wall_s", shape (`POINTS`,), from
+    the first score of a trained policy to the last that all seeds have."""
     curves = [one.curve for one in row.results]
     last = min(curve[-1][key] for curve in curves)
     first = min(max(curve[1][key] for curve in curves), last)
-    x = np.geomspace(first, last, POINTS) if is_log else np.linspace(0, last, POINTS)
+    x = np.geomspace(first, last, POINTS)
     each = [np.interp(x, [p[key] for p in curve], [p["return"] for p in curve]) for curve in curves]
     return x, iqm(each)
 
 
 def draw_curves(rows: Sequence[Row], known: Mapping[str, Scored], path: Path) -> None:
-    """One picture: the return against steps and against wall time, a line and a band for each entry."""
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(9, 3.6), layout="constrained")
         panels = figure.subplots(1, 2, sharey=True)
@@ -169,10 +142,8 @@ def draw_curves(rows: Sequence[Row], known: Mapping[str, Scored], path: Path) ->
         for axes, key, label in zip(
             panels, ("steps", "wall_s"), ("environment steps", "wall time of training [s]"), strict=True
         ):
-            ends = [one.curve[-1][key] for row in rows for one in row.results]
-            is_log = max(ends) > WIDE * min(ends)
             for row, colour in zip(rows, (BLUE, ORANGE, GREEN, PURPLE), strict=False):
-                x, (mean, low, high) = over_time(row, key, is_log)
+                x, (mean, low, high) = over_time(row, key)
                 lowest = min(lowest, float(mean.min()))
                 axes.fill_between(x, low, high, color=colour, alpha=0.2, lw=0)
                 axes.plot(x, mean, color=colour, lw=1.5, label=f"{row.title}, {len(row.results)} seeds")
@@ -180,9 +151,8 @@ def draw_curves(rows: Sequence[Row], known: Mapping[str, Scored], path: Path) ->
                 if name in known:
                     level = known[name].intervals["return"].mean
                     axes.axhline(level, color=GREY, lw=1.2, ls=style, label=name)
-            if is_log:
-                axes.set_xscale("log")
-                axes.xaxis.set_minor_formatter(NullFormatter())
+            axes.set_xscale("log")
+            axes.xaxis.set_minor_formatter(NullFormatter())
             axes.xaxis.set_major_formatter(EngFormatter(sep=" " if key == "steps" else ""))
             axes.set_xlabel(label)
             axes.grid(axis="y", color=GREY, alpha=0.15)
@@ -196,14 +166,7 @@ def draw_curves(rows: Sequence[Row], known: Mapping[str, Scored], path: Path) ->
 
 def draw_learning_curve(folder: Path, scores: Sequence[Score], path: Path, **options: Any) -> None:
     """Draw the training episodes of a run folder, the scores on the way where it has a curve.csv, the trained
-    policy, which is the first of `scores`, and the means of the others.
-
-    Args:
-        folder: of the run.
-        scores: of the trained policy, and of others to compare it with.
-        path: of the picture.
-        options: of `Figure.savefig`.
-    """
+    policy, which is the first of `scores`, and the means of the others; `options` are of `Figure.savefig`."""
     episodes = runs.read_episodes(folder)
     bins = [part for part in np.array_split(episodes, BINS) if len(part)]
     with matplotlib.rc_context({**STYLE, "font.size": 10}):
@@ -235,8 +198,18 @@ def draw_learning_curve(folder: Path, scores: Sequence[Score], path: Path, **opt
         figure.savefig(path, **options)
 
 
+def render_template(file: str, /, **values: Any) -> str:
+    """Fill a file of agents/templates; values are escaped in a page of HTML."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    templates = Environment(
+        loader=FileSystemLoader(TEMPLATES), autoescape=".html" in file, undefined=StrictUndefined,
+        trim_blocks=True, lstrip_blocks=True,
+    )  # fmt: skip
+    return templates.get_template(file).render(values)
+
+
 def training_length(folder: Path) -> tuple[int, float]:
-    """Environment steps and seconds of wall time of a training."""
     if finished := runs.read_record(folder).get("finished"):
         return int(finished["steps"]), float(finished["seconds"])
     episodes = runs.read_episodes(folder)
@@ -244,15 +217,11 @@ def training_length(folder: Path) -> tuple[int, float]:
 
 
 def report(args: Args) -> Path:
-    """Write page, pictures and CSV; returns the page.
-
-    Raises:
-        DataFileError: nothing is done, or a result cannot be read.
-    """
+    """Write page, pictures and CSV; returns the page. `DataFileError`: nothing is done, or a result cannot be
+    read."""
     folder = args.runs or FOLDERS[args.subset]
     rows = read_results(load_plan(args.subset), folder)
-    page = args.page or folder / "report.md"
-    beside = page.with_suffix("")
+    page, beside = folder / "report.md", folder / "report"
     beside.mkdir(parents=True, exist_ok=True)
     gaits = {row.entry.env_id: references(row.entry.env_id) for row in rows}
     pictures = []
@@ -263,6 +232,7 @@ def report(args: Args) -> Path:
             pictures.append(f"![{name}]({beside.name}/{name}.png)")
     write_data(rows, beside)
     known = gaits.get(LEG) or references(LEG)
+    best = max(unlabelled(rows, LEG), key=lambda row: row.scored.intervals["return"].mean, default=None)
     parts = [
         f"# Baselines: the {args.subset} plan",
         "## Returns",
@@ -271,7 +241,7 @@ def report(args: Args) -> Path:
         "## What the gaits are like",
         figures_table(rows, gaits),
         "## At matched speed",
-        compare(rows, best_of(rows), known["run"]),
+        compare(rows, best, known["run"]),
         "## How it was made",
         made_text(rows),
     ]

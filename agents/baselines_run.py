@@ -3,17 +3,13 @@
     python -m agents.baselines_run --algo ppo --env-id hoof_env/HorseLeg-v0 --seed 0
 
 The folder is that of `agents.train` with curve.csv, a row per score on the episodes of the learning curves,
-and final.json, the last policy's score on fresh episodes. The same command goes on with a training that was
-interrupted, and does nothing where it is done.
-
-Seconds are of training alone: without scores, imports and the compilation of kernels. Wall time tells of the
-machine's other work, too; the processor's time of this process does not.
+and final.json, the last policy's score on fresh episodes. The same command goes on where it was interrupted.
+Seconds are of training alone; wall time tells of the machine's other work, too.
 """
 
 from __future__ import annotations
 
 import csv
-import io
 import json
 import os
 import signal
@@ -64,20 +60,16 @@ class Entry:
 
     @property
     def name(self) -> str:
-        """For folders and tables."""
         return "-".join(filter(None, (self.algo, self.env_id.rpartition("/")[2], self.label)))
 
 
 @dataclass(frozen=True)
 class Run:
-    """One training of an entry."""
-
     entry: Entry
     seed: int
 
     @property
     def name(self) -> str:
-        """Of its folder."""
         return f"{self.entry.name}-s{self.seed}"
 
     def command(self, folder: Path | None = None) -> list[str]:
@@ -92,11 +84,7 @@ class Run:
 
 
 def load_plan(name: str) -> tuple[Entry, ...]:
-    """The entries of a plan.
-
-    Raises:
-        DataFileError: there is no such file, or an entry is none.
-    """
+    """The entries of a plan; `DataFileError` if there is no such file, or an entry is none."""
     path = PLANS / f"{name}.yml"
     try:
         return tuple(Entry(**entry) for entry in yaml.safe_load(path.read_text(encoding="utf-8")))
@@ -121,11 +109,7 @@ class Args(TrainingArgs):
 
 
 def train_one(args: Args) -> bool:
-    """Train, or go on training, and score; whether it is done, and not interrupted.
-
-    Raises:
-        ParameterError, DataFileError, OutputError: as `agents.train.train`.
-    """
+    """Train, or go on training, and score; whether it is done, not interrupted; raises as `train` does."""
     check_number("points", args.points, low=1)
     check_number("seed", args.seed, low=0, high=CURVE_SEEDS[0] // 2)
     name = args.env_id.rpartition("/")[2]
@@ -183,10 +167,9 @@ class CurveScorer(Scorer):
         return True
 
     def keep(self, episodes: list[dict[str, float]]) -> None:
-        """Add a row and write them all."""
         clock = {"steps": float(self.num_timesteps), "wall_s": self.wall_s, "cpu_s": self.cpu_s}
         self.rows.append(clock | mean_figures(episodes))
-        write_csv(self.path, COLUMNS, self.rows, "{:.10g}")
+        runs.write_csv(self.path, COLUMNS, self.rows, "{:.10g}")
 
 
 def read_curve(path: Path) -> list[dict[str, float]]:
@@ -195,17 +178,6 @@ def read_curve(path: Path) -> list[dict[str, float]]:
         return []
     with path.open(encoding="utf-8", newline="") as file:
         return [{key: float(x) for key, x in row.items() if x} for row in csv.DictReader(file)]
-
-
-def write_csv(
-    path: Path, columns: Sequence[str], rows: Sequence[Mapping[str, Any]], number: str = "{}"
-) -> None:
-    """Write a CSV file, whole or not at all; `number` formats its cells."""
-    text = io.StringIO()
-    writer = csv.DictWriter(text, columns, lineterminator="\n")
-    writer.writeheader()
-    writer.writerows({key: number.format(value) for key, value in row.items()} for row in rows)
-    runs.write_text(path, text.getvalue())
 
 
 def main(argv: list[str] | None = None) -> int:

@@ -1,12 +1,8 @@
 """Checkpoints: all that a training goes on from, in a folder that is whole or is not there.
 
-A checkpoint stands between two rollouts. `checkpoints/N/`, after N steps, holds
-
-    model.zip         weights, optimisers, counters, schedules, action noise (Stable-Baselines3)
-    vecnormalize.pkl  statistics, where there is normalisation
-    replay.pkl        replay buffer, where there is one
-    state.pkl         environments, generators, where monitor.csv stood
-    policy.*          the policy as hoof_env/saved_policy.py writes it
+`checkpoints/N/`, after N steps and between two rollouts, holds model.zip (weights, optimisers, counters,
+schedules, action noise), policy.*, where they exist vecnormalize.pkl and replay.pkl, and state.pkl:
+environments, generators, where monitor.csv stood.
 
 What goes on from there has the bits of a run that was never stopped: on the same machine, on the CPU, with
 the same number of threads, with environments that have `get_state` and `set_state`, and without
@@ -36,6 +32,7 @@ from hoof_env.errors import DataFileError, OutputError
 
 KEPT = 2
 REPLAY, STATE = "replay.pkl", "state.pkl"
+COUNTED = ("episode_returns", "episode_lengths", "episode_count")  # by a `VecMonitor`
 EXPLORATION = ("exploration_mat", "exploration_matrices")
 """What gSDE drew for a rollout, before its first callback."""
 UNFINISHED = ".unfinished-"
@@ -43,11 +40,8 @@ UNFINISHED = ".unfinished-"
 
 @contextmanager
 def whole(folder: Path) -> Iterator[Path]:
-    """A folder that is there with all its files, on the disk, once the block has succeeded, else not at all.
-
-    Raises:
-        OutputError: it cannot be written.
-    """
+    """A folder that is there with all its files, on the disk, once the block has succeeded, else not at all;
+    `OutputError` if it cannot be written."""
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         stage = Path(tempfile.mkdtemp(prefix=UNFINISHED, dir=folder.parent))
@@ -90,9 +84,7 @@ def save(model: Any, run: Path, seconds: float) -> None:
     normalize = model.get_vec_normalize_env()
     state = {
         "seconds": seconds,
-        "monitor": {
-            name: getattr(monitor, name) for name in ("episode_returns", "episode_lengths", "episode_count")
-        },
+        "monitor": {name: getattr(monitor, name) for name in COUNTED},
         "monitor_bytes": (run / runs.MONITOR).stat().st_size,
         "returns": None if normalize is None else normalize.returns,
         "environments": _environment_states(model.env),
@@ -123,20 +115,9 @@ def write_episodes(envs: Any, path: Path, go_on: bool = False) -> None:
 
 
 class Resumed:
-    """A model that goes on from a checkpoint, its environments too.
-
-    Args:
-        checkpoint: folder.
-        algorithm: class of the model.
-        many: `VecEnv` without wrappers, as the run had it.
-        device: of torch.
-
-    Attributes:
-        model: of Stable-Baselines3; call `model.learn(rest, reset_num_timesteps=False)`.
-        seconds: of training up to here.
-
-    Raises:
-        DataFileError: the checkpoint cannot be read or is of other environments.
+    """A model that goes on from a checkpoint of its class, with `many`, its `VecEnv` without wrappers:
+    `model.learn(rest, reset_num_timesteps=False)`; `seconds` are of training up to here. `DataFileError`: the
+    checkpoint cannot be read or is of other environments.
     """
 
     def __init__(self, checkpoint: Path, algorithm: Any, many: Any, device: str) -> None:
@@ -172,7 +153,8 @@ class Resumed:
             many.seed((model.seed or 0) + model.num_timesteps)
             return
         many.reset()
-        _set_environment_states(many, states)
+        for env, state in zip(_stateful(many), states, strict=True):
+            env.set_state(state)
         for name, value in self._state["monitor"].items():
             setattr(monitor, name, value)
         if self._state["returns"] is not None:
@@ -205,35 +187,28 @@ class Resumed:
 
 
 def _explorer(model: Any) -> Any:
-    """The distribution that holds gSDE's noise."""
     return getattr(model, "actor", model.policy).action_dist
 
 
 def _layer(envs: Any, kind: type) -> Any:
-    """The wrapper of that class."""
     while not isinstance(envs, kind):
         envs = envs.venv
     return envs
 
 
+def _stateful(many: Any) -> list[Any]:
+    """What has the states of a `VecEnv` without wrappers: one environment for all, or each."""
+    from hoof_env.envs.sb3 import Sb3VecEnv
+
+    return [many.envs] if isinstance(many, Sb3VecEnv) else [env.unwrapped for env in many.envs]
+
+
 def _environment_states(envs: Any) -> list[Any] | None:
     """States of the environments, None if one has none."""
-    from hoof_env.envs.sb3 import Sb3VecEnv
-
-    if isinstance(envs.unwrapped, Sb3VecEnv):
-        return [envs.unwrapped.envs.get_state()]
     try:
-        return [env.get_wrapper_attr("get_state")() for env in envs.unwrapped.envs]
+        return [env.get_state() for env in _stateful(envs.unwrapped)]
     except AttributeError:
         return None
-
-
-def _set_environment_states(many: Any, states: list[Any]) -> None:
-    from hoof_env.envs.sb3 import Sb3VecEnv
-
-    single = [many.envs] if isinstance(many, Sb3VecEnv) else [env.unwrapped for env in many.envs]
-    for env, state in zip(single, states, strict=True):
-        env.set_state(state)
 
 
 def _flush(path: Path) -> None:

@@ -1,5 +1,4 @@
-"""What the commands of this folder share: key=value arguments, threads, one line for an error, 130 for
-Ctrl-C, and tables in Markdown."""
+"""What the commands share: key=value arguments, threads, one line for an error, 130 for Ctrl-C."""
 
 from __future__ import annotations
 
@@ -10,9 +9,8 @@ import warnings
 from collections.abc import Callable
 from typing import NoReturn
 
-from hoof_env.errors import HoofEnvError, check_number, parse_pairs
-
-__all__ = ["check_threads", "parse_pairs", "run"]
+from hoof_env.errors import HoofEnvError, check_number
+from hoof_env.errors import parse_pairs as parse_pairs
 
 
 def check_threads(threads: int) -> None:

@@ -3,13 +3,10 @@
     python -m agents.demo              into runs/demo, a few minutes
     python -m agents.demo --quick      tiny numbers, only to see that everything works
 
-1. The paper's four conditions with every solver, published beside simulated.
-2. The scripted gaits and the simplest policies in hoof_env/HorseLeg-v0.
-3. A small PPO agent, trained and scored on the same episodes.
-4. report.html: one file with tables, figures and films, to be opened or sent as it is.
-
-The folder also holds the reproduction, the figures, the films, the scores and the model, so that
-`python -m agents.evaluate --policy runs/demo` plays it. Ctrl-C leaves an older report as it was.
+The paper's four conditions with every solver, published beside simulated; scripted gaits and the simplest
+policies in hoof_env/HorseLeg-v0; a small PPO agent, trained and scored on the same episodes; and report.html,
+one file with tables, figures and films. The folder is a run folder, too, which agents.evaluate plays. Ctrl-C
+leaves an older report as it was.
 """
 
 from __future__ import annotations
@@ -25,9 +22,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from agents import evaluate, runs, train
-from agents.baselines_report import draw_learning_curve
+from agents.baselines_report import draw_learning_curve, render_template
 from agents.command import run
-from agents.ship import TEMPLATES
 from hoof_env._output import check_folder, staged
 from hoof_env.errors import check_number
 from hoof_env.film import render_episode
@@ -38,17 +34,12 @@ from hoof_env.paper.rows import Reproduction, counted
 ENV_ID, FIXED_ID = "hoof_env/HorseLeg-v0", "hoof_env/HorseLegFixed-v0"
 SCRIPTED = ("walk", "run", "idle", "random", "bang-bang")
 TRAINED = "trained agent"
-FIRST_SEED = 1000
-"""Of the scored episodes; training starts its own from another seed."""
-
-SLOW = 4
-"""How many times slower than life the films of the fixed trunk play."""
+FIRST_SEED = 1000  # of the scored episodes; training starts its own from another seed
+SLOW = 4  # how many times slower than life the films of the fixed trunk play
 
 
 @dataclass(frozen=True)
 class Budget:
-    """How much is done: training steps and their time limit, episodes a policy, length of the films."""
-
     steps: int
     max_minutes: float
     episodes: int
@@ -71,11 +62,8 @@ class Args:
 
 
 def demo(args: Args) -> Path:
-    """Do all four steps and return the path of the report.
-
-    Raises:
-        OutputError: the folder cannot be written. KeyboardInterrupt: Ctrl-C; nothing was replaced.
-    """
+    """Do all four steps and return the path of the report. `OutputError`: the folder cannot be written.
+    `KeyboardInterrupt`: Ctrl-C; nothing was replaced."""
     check_number("seed", args.seed, low=0, high=FIRST_SEED - 1)
     check_folder(args.out)
     budget = QUICK if args.quick else FULL
@@ -86,13 +74,14 @@ def demo(args: Args) -> Path:
             print_counts(reproduction)
 
         with announced(2, f"scripted policies in {ENV_ID}, {budget.episodes} episodes each"):
-            scores, _ = evaluate.evaluate(evaluate_args(budget, SCRIPTED))
+            playing = evaluate.Args(policy=SCRIPTED, episodes=budget.episodes, seed=FIRST_SEED, env_id=ENV_ID)
+            scores, _ = evaluate.evaluate(playing)
             evaluate.print_table(scores)
 
         with announced(3, f"PPO learns for {budget.steps:,} steps, {budget.max_minutes:g} minutes at most"):
             trained = train_agent(args, budget, stage)
             say(f"{trained.steps:,} steps at {trained.rate:,.0f} steps/s")
-            (score,), setting = evaluate.evaluate(evaluate_args(budget, (str(stage / runs.MODEL),)))
+            (score,), setting = evaluate.evaluate(replace(playing, policy=(str(stage / runs.MODEL),)))
             scores.append(replace(score, policy=TRAINED))
             evaluate.print_table(scores)
 
@@ -107,21 +96,15 @@ def demo(args: Args) -> Path:
 
 
 def say(line: str) -> None:
-    """A line of progress, under the title of its step."""
     print(f"      {line}", flush=True)
 
 
 @contextmanager
 def announced(number: int, title: str) -> Iterator[None]:
-    """A numbered step: its title before, its time after."""
     print(f"[{number}/4] {title}", flush=True)
     started = time.monotonic()
     yield
     say(f"done in {time.monotonic() - started:.0f} s")
-
-
-def evaluate_args(budget: Budget, policies: tuple[str, ...]) -> evaluate.Args:
-    return evaluate.Args(policy=policies, episodes=budget.episodes, seed=FIRST_SEED, env_id=ENV_ID)
 
 
 def train_agent(args: Args, budget: Budget, stage: Path) -> train.Trained:
@@ -129,15 +112,10 @@ def train_agent(args: Args, budget: Budget, stage: Path) -> train.Trained:
     folder = stage / "training"
     trained = train.train(
         train.Args(
-            env_id=ENV_ID,
-            seed=args.seed,
-            steps=budget.steps,
-            max_minutes=budget.max_minutes,
-            params=budget.params,
-            out=folder,
-            checkpoint_every=0,
+            env_id=ENV_ID, seed=args.seed, steps=budget.steps, max_minutes=budget.max_minutes,
+            params=budget.params, out=folder, checkpoint_every=0,
         )
-    )
+    )  # fmt: skip
     if trained.stopped_by:
         raise KeyboardInterrupt
     for name in filter(lambda name: (folder / name).is_file(), (*runs.FILES, runs.STATISTICS)):
@@ -161,25 +139,21 @@ def film_all(scores: Sequence[evaluate.Score], budget: Budget, stage: Path) -> l
             f"{abs(first['distance_m']):.1f} m {way} in an episode of {first['seconds']:.0f} s, "
             f"return {first['return']:.1f}"
         )
-        clips.append(clip(f"{name.capitalize()}, moving trunk", caption, path))
+        title = f"{name.capitalize()}, moving trunk"
+        clips.append({"title": title, "caption": caption, "film": data_uri(path)})
         say(f"filmed {name}")
     for gait in GAITS:
         path = stage / f"{gait}-fixed.mp4"
         seconds = min(1.0, budget.film_seconds)
         render_episode(path, gait, FIXED_ID, (f"gait={gait}",), seconds=seconds, slow=SLOW, size=size)
         caption = f"one cycle of 1 s as in the paper, {SLOW} times slower than life"
-        clips.append(clip(f"{gait.capitalize()}, fixed trunk", caption, path))
+        title = f"{gait.capitalize()}, fixed trunk"
+        clips.append({"title": title, "caption": caption, "film": data_uri(path)})
         say(f"filmed {gait} on a fixed trunk")
     return clips
 
 
-def clip(title: str, caption: str, path: Path) -> dict[str, str]:
-    """A film for the page."""
-    return {"title": title, "caption": caption, "film": data_uri(path)}
-
-
 def print_counts(reproduction: Reproduction) -> None:
-    """How many rows are within their bars and how many claims hold, by solver."""
     for solver in SOLVERS:
         say(f"{solver} solver: {counted(reproduction.rows, reproduction.shapes, solver)}")
 
@@ -192,27 +166,14 @@ def render(
     clips: Sequence[dict[str, str]],
     folder: Path,
 ) -> str:
-    """The report: one HTML page that holds its pictures and films and needs no network.
-
-    Args:
-        args: the command's.
-        reproduction: of the paper. Its figures lie in `folder` as SVG.
-        scores: of the policies, the trained one last; all played the same episodes.
-        trained: the training, whose run folder is `folder`.
-        clips: films to show.
-        folder: see there.
-    """
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
+    """The report: one HTML page that holds its pictures and films and needs no network. The trained policy is
+    the last of `scores`; its run folder is `folder`, where the figures lie as SVG."""
     *others, agent = scores
-    keys, episodes = list(agent.estimates), len(agent.episodes)
+    episodes = len(agent.episodes)
     gaits = [score for score in others if score.policy in GAITS]
     draw_learning_curve(folder, [agent, *gaits], folder / "curve.svg", metadata={"Date": None})
-    template = Environment(
-        loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined,
-        trim_blocks=True, lstrip_blocks=True,
-    ).get_template("report.html.j2")  # fmt: skip
-    return template.render(
+    return render_template(
+        "report.html.j2",
         quick=args.quick,
         reproduction=reproduction,
         simulated={(row["id"], row["solver"]): row for row in reproduction.rows},
@@ -221,9 +182,9 @@ def render(
         error=format_error,
         solvers=SOLVERS,
         figures={path.stem: data_uri(path) for path in folder.glob("figure*.svg")},
-        metrics=[evaluate.METRICS[key] for key in keys],
+        metrics=[evaluate.METRICS[key] for key in agent.estimates],
         scores=[
-            (score.policy, [evaluate.cell(key, score.estimates[key]) for key in keys]) for score in scores
+            (score.policy, [evaluate.cell(*pair) for pair in score.estimates.items()]) for score in scores
         ],
         episodes=episodes,
         seeds=(FIRST_SEED, FIRST_SEED + episodes - 1),
@@ -240,7 +201,6 @@ def render(
 
 
 def data_uri(path: Path) -> str:
-    """A picture or film as a link that holds it."""
     kind = {".svg": "image/svg+xml", ".mp4": "video/mp4"}[path.suffix]
     return f"data:{kind};base64,{base64.b64encode(path.read_bytes()).decode('ascii')}"
 

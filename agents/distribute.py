@@ -1,21 +1,15 @@
-"""Trainings on a Ray cluster: many of Stable-Baselines3, or one of RLlib on several workers.
+"""Trainings of `agents.train` on a Ray cluster: seeds and sweeps.
 
     python -m agents.distribute trials --seeds 5                                      five seeds
     python -m agents.distribute trials --seeds 3 --space 'learning_rate=[1e-3,5e-4]'  a sweep
-    python -m agents.distribute trials --samples 20 --asha --space 'learning_rate=loguniform(1e-4,1e-2)'
-    python -m agents.distribute rllib --workers 2                                     RLlib's PPO
 
 Without --address a cluster of this machine's cores is made and ended with the command. A worker that dies is
 replaced and its trial goes on from its last checkpoint. Ctrl-C keeps what is there; the same command, given
 again, runs what is missing. docs/distribute.md says how to use a real cluster and where results land.
-
-RLlib's settings are those of agents/hyperparams/ppo.yml as far as RLlib has them: it neither scales rewards
-nor lets the first spread of actions be chosen.
 """
 
 from __future__ import annotations
 
-import ast
 import hashlib
 import importlib.util
 import inspect
@@ -23,14 +17,15 @@ import json
 import logging
 import os
 from collections.abc import Iterable, Sequence
-from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any, Literal
+
+from tyro.conf import Positional
 
 from agents import runs
 from agents.command import parse_pairs, run
-from agents.settings import ENV, FOLDER, TrainingArgs, algorithm_class, load_settings
+from agents.settings import ENV, TrainingArgs, algorithm_class
 from agents.train import Args as TrainArgs
 from agents.train import checked
 from hoof_env.errors import HoofEnvError, OutputError, ParameterError, check_number
@@ -44,17 +39,10 @@ SHIPPED = {
 """Runtime environment of trials on a cluster: the checkout, without what no training needs."""
 
 
-DRAWS = {
-    "choice": 1, "uniform": 2, "loguniform": 2, "randint": 2, "lograndint": 2,
-    "quniform": 3, "qloguniform": 3, "qrandint": 3, "qlograndint": 3,
-}  # fmt: skip
-"""Distributions of ray.tune, with the number of their arguments."""
-
-LISTED = "grid_search"
-
-
 @dataclass(frozen=True)
 class Cluster:
+    what: Positional[Literal["trials"]] = "trials"
+    """trainings, each a trial of Ray Tune"""
     address: str | None = None
     """a running Ray cluster: auto (this machine is part of it), host:port or ray://host:10001"""
     cpus: int | None = None
@@ -70,186 +58,116 @@ class Cluster:
 
 @dataclass(frozen=True)
 class Trials(Cluster, TrainingArgs):
-    """Trainings of agents.train, each a trial of Ray Tune: seeds, sweeps, searches."""
-
     seeds: int = 1
     """trainings of each setting, from seed 0 on"""
     space: tuple[str, ...] = ()
-    """what is varied: key=[JSON, ...] runs all, key=loguniform(a,b) and the like of ray.tune draw; a key is a
-    hyperparameter, or env.ARGUMENT of the environment"""
-    samples: int = 1
-    """draws of the distributions in --space; the same for each seed"""
-    asha: bool = False
-    """give up the worse trials early (asynchronous successive halving)"""
+    """what is varied: key=[JSON, ...] runs all; a key is a hyperparameter, or env.ARGUMENT of the
+    environment"""
     report_every: int = 100_000
     """steps between two scores, which are checkpoints as well"""
     cpus_per_trial: int = 1
     """cores that a trial asks of the cluster, and threads of torch"""
 
 
-@dataclass(frozen=True)
-class Rllib(Cluster):
-    """One training by RLlib's PPO, its environments on several workers."""
+def parse_space(items: Sequence[str]) -> dict[str, list[Any]]:
+    """Read `key=[...]`; `ParameterError` if an item is something else or a key comes twice.
 
-    env_id: str = "hoof_env/HorseLeg-v0"
-    """registered environment with a native vector environment"""
-    workers: int = 2
-    """processes with environments; one more learns"""
-    n_envs: int = 64
-    """environments of each worker"""
-    steps: int = 1_000_000
-    """environment steps in all"""
-    seed: int = 0
-    """of environments and network"""
-    env_kwargs: tuple[str, ...] = ()
-    """arguments of the environment: key=value ..., or one JSON object"""
-    params: tuple[str, ...] = ()
-    """hyperparameters of ppo.yml to change: key=value ..., or one JSON object; n_steps times n_envs there is
-    the batch, whatever the workers' n_envs"""
-
-
-@dataclass(frozen=True)
-class Axis:
-    """One thing that is varied: `values` to run all of, or a distribution of `DRAWS` with its arguments."""
-
-    key: str
-    draw: str
-    arguments: tuple[Any, ...]
-
-    @property
-    def values(self) -> list[Any]:
-        """Those that are listed, or the arguments of the distribution: something of the right kind to try."""
-        return list(self.arguments[0] if self.draw in (LISTED, "choice") else self.arguments[:2])
-
-    def build(self) -> Any:
-        """The same for Tune.
-
-        Raises:
-            ParameterError: Tune refuses the arguments.
-        """
-        from ray import tune
-
-        try:
-            built = getattr(tune, self.draw)(*self.arguments)
-            if self.draw != LISTED:
-                built.sample()
-        except (TypeError, ValueError, ArithmeticError, AssertionError) as error:
-            reason = f"--space {self.key}: {self.draw}{self.arguments} cannot be drawn from: {error}"
-            raise ParameterError(reason) from None
-        return built
-
-
-def parse_space(items: Sequence[str]) -> list[Axis]:
-    """Read `key=[...]` and `key=distribution(...)`.
-
-    >>> parse_space(["n_steps=[16, 32]", "learning_rate=loguniform(1e-4, 1e-2)"])
-    [Axis(key='n_steps', draw='grid_search', arguments=([16, 32],)), \
-Axis(key='learning_rate', draw='loguniform', arguments=(0.0001, 0.01))]
-
-    Raises:
-        ParameterError: an item is neither, or a key comes twice.
+    >>> parse_space(["n_steps=[16, 32]", 'env.trunk=["rail"]'])
+    {'n_steps': [16, 32], 'env.trunk': ['rail']}
     """
-    axes: dict[str, Axis] = {}
+    space: dict[str, list[Any]] = {}
     for item in items:
         key, _, text = item.partition("=")
-        draw, arguments = _read(text)
-        if not key or not draw:
-            known = ", ".join(f"{name}({', '.join('abq'[:count])})" for name, count in DRAWS.items())
-            raise ParameterError(f"--space: expected key=[JSON, ...] or key=draw of {known}; got {item!r}")
-        if key in axes:
+        values = parse_pairs("--space", [f"values={text}"])["values"]
+        if not (key and values and isinstance(values, list)):
+            raise ParameterError(f"--space: expected key=[JSON, ...], got {item!r}; agents.tune searches")
+        if key in space:
             raise ParameterError(f"--space: {key} is given twice")
-        axes[key] = Axis(key, draw, arguments)
-    return list(axes.values())
+        space[key] = values
+    return space
 
 
-def _read(text: str) -> tuple[str, tuple[Any, ...]]:
-    """Name and arguments of what stands behind the equals sign; no name where it cannot be read."""
-    values = parse_pairs("--space", [f"values={text}"])["values"]
-    if isinstance(values, list):
-        return (LISTED, (values,)) if values else ("", ())
-    with suppress(SyntaxError, ValueError):
-        match ast.parse(text.strip(), mode="eval").body:
-            case ast.Call(func=ast.Name(id=name), args=nodes, keywords=[]) if len(nodes) == DRAWS.get(name):
-                arguments = tuple(ast.literal_eval(node) for node in nodes)
-                if name != "choice" or (isinstance(arguments[0], list) and arguments[0]):
-                    return name, arguments
-    return "", ()
-
-
-def check_keys(axes: Iterable[Axis], algo: str, settings: Iterable[str]) -> None:
-    """Refuse keys that are neither hyperparameters of `algo`, nor in its `settings`, nor an environment's.
-
-    Raises:
-        ParameterError: an unknown key.
-    """
+def check_keys(keys: Iterable[str], algo: str, settings: Iterable[str]) -> None:
+    """Refuse keys that are neither hyperparameters of `algo`, nor in its `settings`, nor an environment's."""
     known = {*inspect.signature(algorithm_class(algo)).parameters, *settings, "normalize", "n_envs"}
     known -= {"env", "seed", "device", "_init_setup_model", "verbose", "tensorboard_log", "n_timesteps"}
-    for axis in axes:
-        if axis.key not in known and not axis.key.startswith(ENV):
+    for key in keys:
+        if key not in known and not key.startswith(ENV):
             raise ParameterError(
                 f"--space: expected a hyperparameter of {algo} ({', '.join(sorted(known))}) or {ENV}ARGUMENT "
-                f"of the environment, got {axis.key!r}"
+                f"of the environment, got {key!r}"
             )
 
 
 def prepare(args: Trials) -> dict[str, Any]:
-    """The parameter space of `args`: constants, an `Axis` for what varies, a list of seeds; all checked.
-
-    Raises:
-        ParameterError, DataFileError: the arguments, the environment, the space or the file do not fit.
-    """
-    for name in ("seeds", "samples", "report_every", "cpus_per_trial"):
+    """The parameter space of `args`: constants, lists of what varies and of seeds; all checked."""
+    for name in ("seeds", "report_every", "cpus_per_trial"):
         check_number(name, getattr(args, name), low=1)
     algorithm_class(args.algo)
     fixed: dict[str, Any] = {"env_id": args.env_id, "algo": args.algo, "torch_threads": args.cpus_per_trial}
     one = TrainArgs(**fixed, steps=args.steps, env_kwargs=args.env_kwargs, params=args.params)
     env_kwargs, settings = checked(one)
-    axes = parse_space(args.space)
-    check_keys(axes, args.algo, settings)
-    if args.samples > 1 and all(axis.draw == "grid_search" for axis in axes):
-        raise ParameterError(f"samples: expected 1 where --space draws nothing, got {args.samples}")
+    space = parse_space(args.space)
+    check_keys(space, args.algo, settings)
     with runs.make_env(args.env_id, **env_kwargs) as env:
         runs.warm_up(env)  # kernels are compiled before workers want them
-    for axis in axes:
-        for value in axis.values if axis.key.startswith(ENV) else ():
-            runs.make_env(args.env_id, **env_kwargs | {axis.key.removeprefix(ENV): value}).close()
+    for key, values in space.items():
+        for value in values if key.startswith(ENV) else ():
+            runs.make_env(args.env_id, **env_kwargs | {key.removeprefix(ENV): value}).close()
     return {
         "train": fixed | {"steps": settings["n_timesteps"]},
         "env_kwargs": env_kwargs,
         "params": parse_pairs("--params", args.params),
         "report_every": args.report_every,
         "command": runs.command(),
-        **{axis.key: axis for axis in axes},
+        **space,
         "seed": list(range(args.seeds)),
     }
 
 
 def run_trials(args: Trials) -> int:
-    """Run the trials of `args` that have not ended yet and write their table; see `fit` for the rest."""
+    """Run the trials of `args` that have not ended yet and write their table; returns its exit code."""
     plan = prepare(args)
     start(args)
     from ray import tune
-    from ray.tune.schedulers import ASHAScheduler
-    from ray.tune.search.basic_variant import BasicVariantGenerator
 
-    from agents.distribute_trial import FIXED, train_trial
+    from agents.distribute_trial import FIXED, Progress, train_trial, write_table
 
-    axes = [key for key in plan if key not in FIXED]
-    space = plan | {key: plan[key].build() for key in axes} | {"seed": tune.grid_search(plan["seed"])}
-    steps = plan["train"]["steps"]
-    asha = ASHAScheduler("steps", max_t=steps, grace_period=min(args.report_every, steps))
-    varied = [*axes, "seed"]
+    varied = [*(key for key in plan if key not in FIXED), "seed"]
+    space = plan | {key: tune.grid_search(plan[key]) for key in varied}
     config = tune.TuneConfig(
-        metric="return", mode="max", num_samples=args.samples,
-        search_alg=BasicVariantGenerator(constant_grid_search=True, random_state=0),
-        scheduler=asha if args.asha else None,
+        metric="return", mode="max",
         reuse_actors=True,  # libraries are imported and kernels read once for each worker
         trial_dirname_creator=lambda trial: _folder_name(trial, varied),
     )  # fmt: skip
     trainable = tune.with_resources(train_trial, {"cpu": args.cpus_per_trial})
-    tuner = {"trainable": trainable, "param_space": space, "tune_config": config}
-    name = f"{args.algo}-{args.env_id.rpartition('/')[2]}"
-    return fit(args, name, tuner, varied, checkpoint_config=tune.CheckpointConfig(num_to_keep=1))
+    name, storage = experiment_name(args), args.out
+    storage = storage if "://" in storage else str(Path(storage).absolute())
+    folder = f"{storage}/{name}"
+    running = tune.RunConfig(
+        name=name, storage_path=storage, verbose=0, callbacks=[Progress()],
+        failure_config=tune.FailureConfig(max_failures=args.retries),
+        checkpoint_config=tune.CheckpointConfig(num_to_keep=1),
+    )  # fmt: skip
+    try:
+        if tune.Tuner.can_restore(folder):
+            print(f"going on with {folder}", flush=True)
+            experiment = tune.Tuner.restore(folder, trainable, resume_errored=True)
+        else:
+            experiment = tune.Tuner(trainable, param_space=space, tune_config=config, run_config=running)
+        results = experiment.fit()
+    except OSError as error:
+        raise OutputError(f"cannot write to {args.out!r}: {error}") from None
+    except tune.TuneError as error:
+        raise HoofEnvError(f"Ray Tune: {str(error).strip().splitlines()[-1]}") from None
+    return write_table(results, folder, varied)
+
+
+def experiment_name(args: Trials) -> str:
+    """What the folder is called: a digest tells apart what was asked for, wherever it runs."""
+    asked = {key: value for key, value in asdict(args).items() if key not in Cluster.__dataclass_fields__}
+    digest = hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()[:8]
+    return f"{args.algo}-{args.env_id.rpartition('/')[2]}-{digest}"
 
 
 def _folder_name(trial: Any, varied: list[str]) -> str:
@@ -258,78 +176,14 @@ def _folder_name(trial: Any, varied: list[str]) -> str:
     return f"{number}-" + "".join(c if c.isalnum() or c in "=,.-_" else "_" for c in text)[:100]
 
 
-def make_config(args: Rllib) -> Any:
-    """RLlib's `PPOConfig` for `args`.
-
-    Raises:
-        ParameterError, DataFileError: the arguments, the environment or the hyperparameter file do not fit.
-    """
-    from ray.rllib.algorithms.ppo import PPOConfig
-
-    env_kwargs = parse_pairs("--env-kwargs", args.env_kwargs)
-    settings = load_settings(FOLDER / "ppo.yml", args.env_id) | parse_pairs("--params", args.params)
-    rate = settings["learning_rate"]
-    if isinstance(rate, str):  # lin_<x>
-        rate = [[0, float(rate.removeprefix("lin_"))], [args.steps, 0.0]]
-    return (
-        PPOConfig()
-        .environment(f"hoof_env:{args.env_id}", env_config=env_kwargs)
-        .env_runners(
-            num_env_runners=args.workers,
-            num_envs_per_env_runner=args.n_envs,
-            gym_env_vectorize_mode="vector_entry_point",
-        )
-        .training(
-            lr=rate,
-            gamma=settings["gamma"],
-            lambda_=settings["gae_lambda"],
-            clip_param=settings["clip_range"],
-            entropy_coeff=settings["ent_coef"],
-            vf_loss_coeff=settings["vf_coef"],
-            grad_clip=settings["max_grad_norm"],
-            num_epochs=settings["n_epochs"],
-            minibatch_size=settings["batch_size"],
-            train_batch_size_per_learner=settings["n_steps"] * settings["n_envs"],
-        )
-        .rl_module(model_config={"fcnet_hiddens": settings["policy_kwargs"]["net_arch"]})
-        .learners(num_learners=0)  # in the trial's own process
-        .fault_tolerance(restart_failed_env_runners=True)
-        .debugging(seed=args.seed)
-    )
-
-
-def run_rllib(args: Rllib) -> int:
-    """Train as `args` say, or go on; see `fit` for the rest."""
-    for name in ("workers", "n_envs", "steps"):
-        check_number(name, getattr(args, name), low=1)
-    check_number("seed", args.seed, low=0)
-    kwargs = parse_pairs("--env-kwargs", args.env_kwargs)
-    with runs.make_env(args.env_id, **kwargs) as env:
-        if env.spec is None or env.spec.vector_entry_point is None or hasattr(env.unwrapped, "reward_space"):
-            raise ParameterError(f"env_id: expected one with a native vector environment, got {args.env_id}")
-        runs.warm_up(env)
-    start(args)
-    from ray import tune
-
-    # No metric: Tune would refuse iterations in which no episode ended
-    config = tune.TuneConfig(trial_dirname_creator=lambda trial: f"seed={args.seed}")
-    tuner = {"trainable": "PPO", "param_space": make_config(args), "tune_config": config}
-    return fit(
-        args, f"rllib-{args.env_id.rpartition('/')[2]}", tuner, ["seed"],
-        stop={"num_env_steps_sampled_lifetime": args.steps},
-        checkpoint_config=tune.CheckpointConfig(
-            num_to_keep=1, checkpoint_frequency=10, checkpoint_at_end=True
-        ),
-    )  # fmt: skip
-
-
 def start(args: Cluster) -> None:
-    """Join the cluster at `args.address`, or make one of this machine's cores.
-
-    Raises:
-        ParameterError: Ray is not installed, or no cluster at that address lets us in.
-    """
-    check_installed(args)
+    """Join the cluster at `args.address`, or make one of this machine's cores; `ParameterError` if Ray is not
+    installed, or no cluster at that address lets us in."""
+    if missing := [name for name in ("ray", "pandas") if not importlib.util.find_spec(name)]:
+        raise ParameterError(
+            f"expected ray[tune] to be installed, found no {', '.join(missing)}: "
+            "pip install 'hoof-env[distribute]'"
+        )
     check_number("retries", args.retries, low=0)
     if args.cpus is not None:
         check_number("cpus", args.cpus, low=1)
@@ -353,66 +207,10 @@ def start(args: Cluster) -> None:
         raise ParameterError(f"address: expected {where}, cannot reach it: {lines[0]}") from None
 
 
-def check_installed(args: Cluster) -> None:
-    """`ParameterError` that names the extra unless all that the command needs is there."""
-    kind, extra, more = (
-        ("rllib", "ray", ("torch", "tree")) if isinstance(args, Rllib) else ("tune", "distribute", ())
-    )
-    missing = [name for name in ("ray", "pandas", *more) if not importlib.util.find_spec(name)]
-    if missing:
-        raise ParameterError(
-            f"expected ray[{kind}] to be installed, found no {', '.join(missing)}: "
-            f"pip install 'hoof-env[{extra}]'"
-        )
-
-
-def fit(args: Cluster, name: str, tuner: dict[str, Any], varied: list[str], **running: Any) -> int:
-    """Run or go on with the experiment whose name the arguments give, and write its table.
-
-    Args:
-        args: the command's.
-        name: start of the experiment's folder in `args.out`; a digest of what is asked for follows.
-        tuner: arguments of `ray.tune.Tuner`.
-        varied: keys of the parameter space for the table.
-        running: more arguments of `ray.tune.RunConfig`.
-
-    Returns:
-        The exit code: 0, 1 where a trial failed for good, 130 after Ctrl-C.
-    """
-    from ray import tune
-
-    from agents.distribute_trial import Progress, write_table
-
-    options = {key: value for key, value in asdict(args).items() if key not in Cluster.__dataclass_fields__}
-    digest = hashlib.sha256(json.dumps(options, sort_keys=True).encode()).hexdigest()[:8]
-    storage = args.out if "://" in args.out else str(Path(args.out).absolute())
-    folder = f"{storage}/{name}-{digest}"
-    config = tune.RunConfig(
-        name=f"{name}-{digest}", storage_path=storage, verbose=0, callbacks=[Progress()],
-        failure_config=tune.FailureConfig(max_failures=args.retries), **running,
-    )  # fmt: skip
-    try:
-        if tune.Tuner.can_restore(folder):
-            print(f"going on with {folder}", flush=True)
-            experiment = tune.Tuner.restore(folder, tuner["trainable"], resume_errored=True)
-        else:
-            experiment = tune.Tuner(**tuner, run_config=config)
-        results = experiment.fit()
-    except OSError as error:
-        raise OutputError(f"cannot write to {args.out!r}: {error}") from None
-    except tune.TuneError as error:
-        raise HoofEnvError(f"Ray Tune: {str(error).strip().splitlines()[-1]}") from None
-    return write_table(results, folder, varied)
-
-
 def main(argv: list[str] | None = None) -> int:
     import tyro
 
-    choice = (
-        Annotated[Trials, tyro.conf.subcommand("trials")] | Annotated[Rllib, tyro.conf.subcommand("rllib")]
-    )
-    args: Any = tyro.cli(choice, args=argv, prog="python -m agents.distribute", description=__doc__)
-    return run_rllib(args) if isinstance(args, Rllib) else run_trials(args)
+    return run_trials(tyro.cli(Trials, args=argv, prog="python -m agents.distribute", description=__doc__))
 
 
 if __name__ == "__main__":

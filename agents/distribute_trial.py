@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import re
 import shlex
@@ -26,15 +24,10 @@ FIXED = ("train", "env_kwargs", "params", "report_every", "seed", "command")
 
 
 def train_trial(config: dict[str, Any]) -> None:
-    """Train as `config` says; every `report_every` steps and at the end report to Tune the score and, as a
-    checkpoint, the run folder. A trial that is retried goes on from its last one. One that diverges or whose
-    settings do not fit would do so again: it ends with the reason as its figure "failed".
-
-    Args:
-        config: "train", fields of `agents.train.Args`; "env_kwargs" and "params", mappings; "report_every",
-            steps; "seed"; "command", for run.json; and what the search chose: hyperparameters, and arguments
-            of the environment behind "env.".
-    """
+    """Train as `config` says (`agents.distribute.prepare`); every `report_every` steps and at the end report
+    to Tune the score and, as a checkpoint, the run folder. A trial that is retried goes on from its last one.
+    One that diverges or whose settings do not fit would do so again: it ends with the reason as its figure
+    "failed"."""
     chosen = {key: value for key, value in config.items() if key not in FIXED}
     env_kwargs = config["env_kwargs"] | {
         k.removeprefix(ENV): v for k, v in chosen.items() if k.startswith(ENV)
@@ -61,12 +54,9 @@ def train_trial(config: dict[str, Any]) -> None:
 
 
 class Reporter(Scorer):
-    """Scores the policy, keeps a checkpoint and reports both to Tune.
-
-    Attributes:
-        last: the last score: "return", mean over the episodes of `CURVE_SEEDS`; "steps"; "train_s", seconds
-            of training, scores and retried parts aside.
-    """
+    """Scores the policy, keeps a checkpoint and reports both to Tune. `last` is the last score: "return",
+    mean over the episodes of `CURVE_SEEDS`, "steps", and "train_s", seconds of training alone, also of
+    retried ones."""
 
     def __init__(
         self, folder: Path, config: dict[str, Any], env_kwargs: dict[str, Any], last: dict[str, float]
@@ -76,7 +66,6 @@ class Reporter(Scorer):
         self.wall_s = self.last.get("train_s", 0.0)
 
     def keep(self, episodes: list[dict[str, float]]) -> None:
-        """Remember the score."""
         mean = sum(one["return"] for one in episodes) / len(episodes)
         self.last = {"return": mean, "steps": self.num_timesteps, "train_s": self.wall_s}
 
@@ -90,29 +79,17 @@ class Reporter(Scorer):
             self._start_clock()
 
     def report(self) -> None:
-        """Hand the last score and the run folder to Tune."""
         checkpoint = tune.Checkpoint.from_directory(str(self.folder))
         checkpoint.set_metadata(self.last)
         tune.report(self.last, checkpoint=checkpoint)
 
 
-def figures(report: dict[str, Any] | None) -> dict[str, Any]:
-    """Of a report of a `Reporter` or of RLlib: return, steps and seconds of training."""
-    report = report or {}
-    runner = report.get("env_runners", {})
-    return {
-        "return": report.get("return", runner.get("episode_return_mean")),
-        "steps": report.get("steps", report.get("num_env_steps_sampled_lifetime")),
-        "train_s": report.get("train_s", report.get("time_total_s")),
-    }
+FIGURES = ("return", "steps", "train_s")  # of a report
 
 
 class Progress(tune.Callback):
-    """A line for each score, and when a trial ends, when its worker died and when it goes on.
-
-    Attributes:
-        going: ids of trials that had not ended at the last step; of the class, for Tune works with a copy.
-    """
+    """A line for each score, and when a trial ends, when its worker died and when it goes on. `going` are the
+    ids of trials that had not ended at the last step; of the class, for Tune works with a copy."""
 
     going: ClassVar[set[str]] = set()
 
@@ -122,30 +99,25 @@ class Progress(tune.Callback):
     def on_trial_result(
         self, iteration: int, trials: list[Any], trial: Any, result: dict[str, Any], **info: Any
     ) -> None:
-        score = figures(result)
-        if score["return"] is not None:  # it is none where no episode of RLlib's ended
-            write_line(trial, f"{score['steps']:,.0f} steps, return {score['return']:.2f}")
+        write_line(trial, f"{result.get('steps', 0):,.0f} steps, return {result['return']:.2f}")
 
     def on_trial_recover(self, iteration: int, trials: list[Any], trial: Any, **info: Any) -> None:
         kept = trial.latest_checkpoint_result
-        steps = figures(kept.metrics)["steps"] if kept else 0
+        steps = kept.metrics["steps"] if kept else 0
         write_line(trial, f"{last_failure(trial)} Retry {trial.num_failures}, from step {steps:,.0f}")
 
     def on_trial_error(self, iteration: int, trials: list[Any], trial: Any, **info: Any) -> None:
         write_line(trial, f"{last_failure(trial)} No retry is left")
 
     def on_trial_complete(self, iteration: int, trials: list[Any], trial: Any, **info: Any) -> None:
-        score = figures(trial.last_result)["return"]
-        write_line(trial, "done" if score is None else f"done, return {score:.2f}")
+        write_line(trial, f"done, return {trial.last_result['return']:.2f}")
 
 
 def write_line(trial: Any, what: str) -> None:
-    """A line about a trial, at once."""
     print(f"trial {trial.trial_id.rpartition('_')[2]}: {what}", flush=True)
 
 
 def last_failure(trial: Any) -> str:
-    """Why a trial failed the last time, from the file that Tune writes."""
     path = Path(trial.error_file or "")
     return reason(path.read_text() if path.is_file() else "")
 
@@ -159,11 +131,8 @@ def reason(error: str) -> str:
 
 
 def write_table(results: Any, folder: str, varied: list[str]) -> int:
-    """Write `folder`/trials.csv where that is a path, print what came of the trials.
-
-    Returns:
-        The exit code: 0, 1 where a trial failed for good, 130 where one has not ended.
-    """
+    """Write `folder`/trials.csv where that is a path, print what came of the trials; returns the exit code:
+    0, 1 where a trial failed for good, 130 where one has not ended."""
     rows, reasons = [], []
     # Whether a trial is done stands in its status alone; but after Ctrl-C all look as if they were
     pairs = zip(results, results._experiment_analysis.trials, strict=True)
@@ -174,14 +143,10 @@ def write_table(results: Any, folder: str, varied: list[str]) -> int:
         is_done = trial.status == "TERMINATED" and trial.trial_id not in Progress.going
         state = "failed" if why else "done" if is_done else "unfinished"
         reasons += [f"  {kept or 'a trial'}: {why}"] if why else []
-        row = {key: config.get(key) for key in varied} | figures(report)
+        row = {key: config.get(key) for key in varied} | {key: report.get(key) for key in FIGURES}
         rows.append(row | {"state": state, "run": str(kept).removeprefix(f"{folder}/")})
     if "://" not in folder and rows:
-        text = io.StringIO()
-        writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
-        runs.write_text(Path(folder, "trials.csv"), text.getvalue())
+        runs.write_csv(Path(folder, "trials.csv"), list(rows[0]), rows)
     counts = {state: sum(row["state"] == state for row in rows) for state in ("done", "failed", "unfinished")}
     print(", ".join(f"{count} {state}" for state, count in counts.items() if count) + f": {folder}")
     print("\n".join(reasons), end="\n" if reasons else "")

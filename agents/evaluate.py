@@ -5,9 +5,8 @@
 
 A policy is a name (a gait of the preset, idle, random, bang-bang, drag, airborne; open-loop, the best stored
 gait of the id), the .json of a gait, or a trained model: its .zip, .onnx or run folder. Brackets hold the
-bootstrap's 95 % interval of the mean over episodes.
-
-A model file is a pickle and can run any code when it is loaded: give only files that you trust.
+bootstrap's 95 % interval of the mean over episodes. A model file is a pickle and can run any code when it is
+loaded: give only files that you trust.
 """
 
 from __future__ import annotations
@@ -15,28 +14,28 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
-from numpy.typing import NDArray
 
 from agents import runs
 from agents.command import parse_pairs, run
 from agents.score import find_policy, play, read_policy_record
+from hoof_env import records
 from hoof_env._output import check_folder
 from hoof_env.errors import OutputError, ParameterError, check_number
 
 DEFAULT_ENV = "hoof_env/HorseLeg-v0"
+FPS = 50.0  # of films
 
 
 @dataclass(frozen=True)
 class Metric:
-    """One column of the table: `title`, factor and digits of what a person reads."""
+    """A column of the table: title, factor and digits of what a person reads."""
 
     title: str
     factor: float = 1.0
@@ -77,7 +76,6 @@ class Interval:
         return mean, "" if self.low == self.high or math.isnan(self.low) else f"[{low}, {high}]"
 
     def text(self, digits: int = 1, factor: float = 1.0) -> str:
-        """The same in one."""
         return " ".join(filter(None, self.parts(digits, factor)))
 
     def above(self, other: Interval) -> bool:
@@ -115,11 +113,8 @@ def estimate(values: Sequence[float]) -> Interval:
 
 
 def film_paths(video: Path, names: Sequence[str]) -> dict[str, Path]:
-    """Where the film of each policy goes: `video`, with the policy's name added if there are several.
-
-    Raises:
-        ParameterError: two films would have one name, or it is not that of an MP4.
-    """
+    """Where the film of each policy goes: `video`, with the policy's name added if there are several;
+    `ParameterError` if two films would have one name, or it is not that of an MP4."""
     if video.suffix.lower() not in ("", ".mp4"):
         raise ParameterError(f"--video: expected a file that ends in .mp4, got {str(video)!r}")
     paths: dict[str, Path] = {}
@@ -155,11 +150,8 @@ class Args:
 
 def evaluate(args: Args) -> tuple[list[Score], dict[str, Any]]:
     """Score the policies of `args`; returns the scores and what they were measured in (env_id, env_kwargs).
-
-    Raises:
-        ParameterError, DataFileError: the arguments, a policy or a model do not fit.
-        OutputError: the JSON or the video cannot be written.
-    """
+    `ParameterError`, `DataFileError`: the arguments, a policy or a model do not fit. `OutputError`: the JSON
+    or the video cannot be written."""
     from tqdm import tqdm
 
     _check(args)
@@ -167,8 +159,9 @@ def evaluate(args: Args) -> tuple[list[Score], dict[str, Any]]:
     env_id, env_kwargs = _environment(args)
     scores = []
     with runs.make_env(env_id, **env_kwargs) as env:
-        if args.loading_rate and not hasattr(env.unwrapped, "record"):
-            raise ParameterError(f"--loading-rate: expected an environment of hoof_env, got {env_id}")
+        if (args.loading_rate or args.video) and not hasattr(env.unwrapped, "record"):
+            option = "--loading-rate" if args.loading_rate else "--video"
+            raise ParameterError(f"{option}: expected an environment of hoof_env, got {env_id}")
         runs.warm_up(env)
         # All are found before the first is played
         policies = {name: find_policy(name, env, env_id) for name in args.policy}
@@ -179,11 +172,9 @@ def evaluate(args: Args) -> tuple[list[Score], dict[str, Any]]:
                 scores.append(
                     Score(name, play(env, policy, seeds, bar.update, loading_rate=args.loading_rate))
                 )
-    if args.video:
-        with runs.make_env(env_id, **{**env_kwargs, "render_mode": "rgb_array"}) as env:
-            for name, path in films.items():
-                film(env, find_policy(name, env, env_id), path, args.seed)
-                print(f"filmed {name}: {path}")
+        for name, path in films.items():
+            film(env, find_policy(name, env, env_id), path, args.seed)
+            print(f"filmed {name}: {path}")
     return scores, {"env_id": env_id, "env_kwargs": env_kwargs}
 
 
@@ -207,42 +198,20 @@ def _environment(args: Args) -> tuple[str, dict[str, Any]]:
     return env_id, parse_pairs("--env-kwargs", args.env_kwargs) or own
 
 
-def film(env: gym.Env[Any, Any], policy: Any, path: Path, seed: int) -> None:
-    """Write one episode to `path`, an MP4; an older file is replaced at the end.
+def film(env: Any, policy: Any, path: Path, seed: int) -> None:
+    """Write one episode to an MP4; an older file is replaced at the end, `OutputError` if it cannot be."""
+    from hoof_env.film import frames, write_film
+    from hoof_env.render.renderer import new_renderer
 
-    Args:
-        env: made with render_mode="rgb_array".
-        policy: anything with Stable-Baselines3's `predict`.
-        path: of the film.
-        seed: of the episode.
-
-    Raises:
-        OutputError: the folder cannot be written, or the disk is full.
-    """
-    from hoof_env.film import write_film
-
-    write_film(pictures(env, policy, seed), path, env.metadata["render_fps"])
-
-
-def pictures(env: gym.Env[Any, Any], policy: Any, seed: int) -> Iterator[NDArray[np.uint8]]:
-    """What `env` renders before each step of one episode, shape (height, width, 3)."""
-    observation, _ = env.reset(seed=seed)
-    start, done = np.ones(1, bool), False
-    while not done:
-        picture: Any = env.render()
-        yield picture
-        action, _ = policy.predict(observation, episode_start=start, deterministic=True)
-        observation, _, terminated, truncated, _ = env.step(action)
-        start, done = np.zeros(1, bool), terminated or truncated
+    renderer = new_renderer(records.setting(env), FPS, (960, 540))
+    write_film(frames(renderer, records.episode(env, policy, seed), FPS), path, FPS)
 
 
 def cell(key: str, value: Interval) -> tuple[str, str]:
-    """Mean and interval of a figure of `METRICS` as a person reads them."""
     return value.parts(METRICS[key].digits, METRICS[key].factor)
 
 
 def table(scores: Sequence[Score]) -> Any:
-    """The scores as a `rich` table."""
     from rich import box
     from rich.table import Table
 

@@ -1,13 +1,10 @@
-"""Write a trained policy as one file that needs no Stable-Baselines3: ONNX, or TorchScript.
+"""Write a trained policy as one file that needs no Stable-Baselines3: ONNX, which onnxruntime reads.
 
-    python -m agents.export runs/ppo-HorseLeg-v0-s0 --out policy.onnx      onnxruntime reads it
-    python -m agents.export runs/ppo-HorseLeg-v0-s0/model.zip --out policy.pt     torch.jit.load reads it
+    python -m agents.export runs/ppo-HorseLeg-v0-s0 --out policy.onnx
 
 The file maps observations of the environment, shape (batch, k), to deterministic actions, (batch, n), float32
 both: the normalisation of observations and the limits of actions are inside. It is kept only if it gives the
-actions of the model it was made from. What it is for stands in its metadata (`hoof_env/onnx_policy.py`);
-examples/run_policy.py plays an ONNX file in twenty lines.
-
+actions of the model it was made from. What it is for stands in its metadata (`hoof_env/onnx_policy.py`).
 A .zip is a pickle and can run any code when it is loaded: give only files that you trust. ONNX is data.
 """
 
@@ -20,7 +17,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -30,19 +27,14 @@ from tyro.conf import Positional
 import hoof_env
 from agents import runs
 from agents.command import run
-from hoof_env._output import check_folder, staged
-from hoof_env.errors import DataFileError, HoofEnvError, OutputError, ParameterError
+from hoof_env._output import staged
+from hoof_env.errors import DataFileError, HoofEnvError, ParameterError
 from hoof_env.onnx_policy import INPUT, LISTS, OUTPUT, OnnxPolicy, describe, settings_of
+from hoof_env.records import check_place
 
-SUFFIXES = (".onnx", ".pt")
-OPSET = 18
-"""Of the ONNX file; onnxruntime reads it from 1.14 on."""
-
-TRIED = 1000
-"""Random observations on which file and model must agree."""
-
-TOLERANCE = 1e-5
-"""By how much an action may differ, as a part of the half range of the action space."""
+OPSET = 18  # of the file; onnxruntime reads it from 1.14 on
+TRIED = 1000  # random observations on which file and model must agree
+TOLERANCE = 1e-5  # by how much an action may differ, as a part of the half range of the action space
 
 
 @dataclass(frozen=True)
@@ -50,24 +42,16 @@ class Args:
     model: Positional[Path]
     """run folder of agents.train, or a .zip of Stable-Baselines3"""
     out: Path
-    """file to write: .onnx or .pt (TorchScript)"""
+    """file to write: .onnx"""
     env_id: str | None = None
     """environment of a model without run.json"""
 
 
 def export(model: Path, out: Path, env_id: str | None = None) -> float:
-    """Write the policy of a model and return the largest difference of an action, as in `TOLERANCE`.
-
-    Args:
-        model: run folder or .zip.
-        out: ends in one of `SUFFIXES`.
-        env_id: what it is for; otherwise what run.json says.
-
-    Raises:
-        ParameterError: another suffix, or no environment known. DataFileError: no such model.
-        Others as `write_policy`.
-    """
-    check_place(out)
+    """Write the policy of a run folder or .zip to an .onnx, for `env_id` or what run.json says, and return
+    the largest difference of an action, as in `TOLERANCE`. `ParameterError`: another suffix, or no
+    environment known. `DataFileError`: no such model. Others as `write_policy`."""
+    check_place(out, [".onnx"])
     saved = runs.SavedModel.find(model)
     env_id = env_id or saved.record.get("env_id")
     if env_id is None:
@@ -77,15 +61,6 @@ def export(model: Path, out: Path, env_id: str | None = None) -> float:
         trained = saved.load(env, env_id)
         metadata = about(env, env_id, kwargs, saved.record)
     return write_policy(trained, out, metadata)
-
-
-def check_place(out: Path) -> None:
-    """Raise unless a policy can be written there: `ParameterError` for its suffix, else `OutputError`."""
-    if out.suffix not in SUFFIXES:
-        raise ParameterError(f"out: expected a file that ends in {' or '.join(SUFFIXES)}, got {str(out)!r}")
-    if out.is_dir():
-        raise OutputError(f"cannot write to {str(out)!r}: expected a file, got a folder")
-    check_folder(out.parent)
 
 
 def about(env: Any, env_id: str, env_kwargs: dict[str, Any], record: dict[str, Any]) -> dict[str, Any]:
@@ -99,19 +74,13 @@ def about(env: Any, env_id: str, env_kwargs: dict[str, Any], record: dict[str, A
 
 def write_policy(trained: runs.TrainedPolicy, out: Path, metadata: dict[str, Any]) -> float:
     """Write a policy to `out`, an older file is replaced, and return the largest difference of an action.
-
-    Raises:
-        ParameterError: a policy that observes or does something else than vectors, or remembers.
-        DataFileError: the file does not act as the policy does; it is not kept.
-        OutputError: it cannot be written. HoofEnvError: a package is missing.
-    """
+    `ParameterError`: it observes or does something else than vectors, or remembers. `DataFileError`: the file
+    does not act as the policy does; it is not kept. `HoofEnvError`: a package is missing."""
     observations = some_observations(trained.model.observation_space)
-    module, onnx = module_of(trained), out.suffix == ".onnx"
+    module = module_of(trained)
     with staged(out.parent) as stage:
-        file = stage / out.name
-        (write_onnx if onnx else write_torchscript)(module, observations[:2], file, metadata)
-        predict = OnnxPolicy(file).predict if onnx else read_torchscript(file)
-        off = difference(trained, predict, observations)
+        write_onnx(module, observations[:2], stage / out.name, metadata)
+        off = difference(trained, OnnxPolicy(stage / out.name).predict, observations)
         if not off <= TOLERANCE:
             raise DataFileError(
                 f"{out}: expected actions within {TOLERANCE:g} of the model's, got {off:.2g}; not kept"
@@ -119,16 +88,9 @@ def write_policy(trained: runs.TrainedPolicy, out: Path, metadata: dict[str, Any
     return off
 
 
-class Statistics(NamedTuple):
-    """Observations minus `mean` by `scale`, shape (k,), float64, then within `clip` of 0."""
-
-    mean: Any
-    scale: Any
-    clip: float
-
-
-def statistics_of(normalize: Any) -> Statistics | None:
-    """What the `normalize` of a `TrainedPolicy` does; None for nothing."""
+def statistics_of(normalize: Any) -> tuple[Any, Any, float] | None:
+    """What the `normalize` of a `TrainedPolicy` does, None for nothing: observations minus a mean by a scale,
+    shape (k,), float64, then within a limit of 0."""
     from stable_baselines3.common.vec_env import VecNormalize
 
     source = getattr(normalize, "__self__", normalize)  # it may be a method of `VecNormalize`
@@ -138,7 +100,7 @@ def statistics_of(normalize: Any) -> Statistics | None:
     moments: Any = source.obs_rms if isinstance(source, VecNormalize) else source
     clip = source.clip_obs if isinstance(source, VecNormalize) else source.clip
     scale = np.sqrt(np.asarray(moments.var) + source.epsilon)
-    return Statistics(np.asarray(moments.mean), scale, float(clip))
+    return np.asarray(moments.mean), scale, float(clip)
 
 
 class Deterministic(torch.nn.Module):
@@ -155,16 +117,17 @@ class Deterministic(torch.nn.Module):
         space = trained.model.action_space
         self.register_buffer("low", torch.as_tensor(space.low))
         self.register_buffer("high", torch.as_tensor(space.high))
-        self.statistics = statistics_of(trained.normalize)
-        if self.statistics is not None:  # in float64, as VecNormalize computes
-            self.register_buffer("mean", torch.as_tensor(self.statistics.mean))
-            self.register_buffer("scale", torch.as_tensor(self.statistics.scale))
+        statistics = statistics_of(trained.normalize)
+        self.clip: float | None = None
+        if statistics is not None:  # in float64, as VecNormalize computes
+            mean, scale, self.clip = statistics
+            self.register_buffer("mean", torch.as_tensor(mean))
+            self.register_buffer("scale", torch.as_tensor(scale))
 
     def forward(self, observation: Any) -> Any:
-        """Actions, shape (batch, n), for observations, shape (batch, k)."""
-        if self.statistics is not None:
+        if self.clip is not None:
             scaled = (observation.double() - self.mean) / self.scale
-            observation = scaled.clamp(-self.statistics.clip, self.statistics.clip).float()
+            observation = scaled.clamp(-self.clip, self.clip).float()
         action = self.policy._predict(observation, deterministic=True)
         if self.policy.squash_output:  # in [-1, 1]: to the limits of the space
             return self.low + 0.5 * (action + 1.0) * (self.high - self.low)
@@ -172,11 +135,8 @@ class Deterministic(torch.nn.Module):
 
 
 def module_of(trained: runs.TrainedPolicy) -> Any:
-    """The policy as a torch module that is ready to be traced.
-
-    Raises:
-        ParameterError: a recurrent policy, or actions that are not vectors.
-    """
+    """The policy as a torch module that is ready to be traced; `ParameterError` for a recurrent one, or
+    actions that are not vectors."""
     policy, space = trained.model.policy, trained.model.action_space
     if not isinstance(space, gym.spaces.Box) or len(space.shape) != 1 or hasattr(policy, "lstm_actor"):
         raise ParameterError(f"model: expected a memoryless policy with vectors for actions, got {space}")
@@ -185,11 +145,8 @@ def module_of(trained: runs.TrainedPolicy) -> Any:
 
 
 def some_observations(space: gym.Space[Any]) -> Any:
-    """`TRIED` random observations, a few of them far outside of what is usual, shape (TRIED, k), float32.
-
-    Raises:
-        ParameterError: not a space of vectors.
-    """
+    """`TRIED` random observations, a few of them far outside of what is usual, shape (TRIED, k), float32;
+    `ParameterError` for a space that is not of vectors."""
     if not isinstance(space, gym.spaces.Box) or len(space.shape) != 1:
         raise ParameterError(f"model: expected one that observes vectors, got {space}")
     space.seed(0)
@@ -200,7 +157,7 @@ def some_observations(space: gym.Space[Any]) -> Any:
 
 @contextmanager
 def _quietly() -> Iterator[None]:
-    """Without the exporters' notes and without the checks of distributions, which cannot be traced."""
+    """Without the exporter's notes and without the checks of distributions, which cannot be traced."""
     from torch.distributions import Distribution
 
     logger = logging.getLogger("torch.onnx")
@@ -217,11 +174,7 @@ def _quietly() -> Iterator[None]:
 
 
 def write_onnx(module: Any, example: Any, path: Path, metadata: dict[str, Any]) -> None:
-    """Write a module as ONNX with any number of rows.
-
-    Raises:
-        HoofEnvError: a package is missing.
-    """
+    """Write a module as ONNX with any number of rows; `HoofEnvError` if a package is missing."""
     try:
         import onnx  # noqa: F401
         import onnxscript  # noqa: F401
@@ -240,25 +193,6 @@ def write_onnx(module: Any, example: Any, path: Path, metadata: dict[str, Any]) 
     for key, value in metadata.items():
         program.model.metadata_props[key] = json.dumps(value) if key in LISTS else str(value)
     program.save(path, external_data=False)
-
-
-def write_torchscript(module: Any, example: Any, path: Path, metadata: dict[str, Any]) -> None:
-    """Write a module as TorchScript; the metadata are its extra file metadata.json."""
-    with _quietly(), torch.no_grad():
-        script = torch.jit.trace(module, torch.as_tensor(example))
-        torch.jit.save(script, str(path), _extra_files={"metadata.json": json.dumps(metadata).encode()})
-
-
-def read_torchscript(path: Path) -> Any:
-    """The file as a function of observations, as `predict`."""
-    with _quietly():
-        script = torch.jit.load(str(path))
-
-    def predict(observation: Any) -> tuple[Any, None]:
-        with torch.no_grad():
-            return script(torch.as_tensor(np.atleast_2d(observation))).numpy(), None
-
-    return predict
 
 
 def difference(trained: Any, predict: Any, observations: Any) -> float:

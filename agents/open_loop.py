@@ -2,16 +2,12 @@
 
     python -m agents.open_loop                                             mean return on hoof_env/HorseLeg-v0
     python -m agents.open_loop --env-id hoof_env/HorseLegRail-v0 --family clocked
-    python -m agents.open_loop --objective peak --speed 3                  least force at 3 m/s or more
     python -m agents.evaluate --policy run runs/open_loop/HorseLeg-v0-constant.json
 
 Families: "constant", the paper's gaits, four numbers that are held; "clocked", each of the four actions with
-a first harmonic of one clock beside it, thirteen numbers. The clock starts with the episode, wherever the
-crank is.
-
-The best of several searches is chosen by starts that none has met and scored with yet others, the episodes
-of agents.evaluate. The file is written after every search; searches that are in it are not made again, and
-Ctrl-C keeps the best so far.
+a first harmonic of one clock beside it, which starts with the episode, thirteen numbers. The best of several
+searches is chosen by starts that none has met and scored with yet others, the episodes of agents.evaluate.
+The file is written after every search; searches that are in it are not made again.
 """
 
 from __future__ import annotations
@@ -41,19 +37,11 @@ from hoof_env.gait.gait import PARAMETERS
 Floats = NDArray[np.float64]
 Episodes = list[dict[str, float]]
 
-SIZES = {"constant": 4, "clocked": 13}
-"""Numbers of a gait, by family."""
-
-SLOWEST, FASTEST = 0.2, 4.0
-"""Of the clock [Hz]; the crank turns at 2 Hz at most."""
-
-POPULATION, STARTS = 16, 16
-"""Candidates of a generation and random starts that each meets."""
-
+SIZES = {"constant": 4, "clocked": 13}  # numbers of a gait, by family
+SLOWEST, FASTEST = 0.2, 4.0  # of the clock [Hz]; the crank turns at 2 Hz at most
+POPULATION, STARTS = 16, 16  # candidates of a generation and random starts that each meets
 ROWS = POPULATION * STARTS
-
-FINALISTS = 4
-"""Candidates of a search that meet more starts at its end."""
+FINALISTS = 4  # candidates of a search that meet more starts at its end
 
 STEP, HARMONIC = 0.3, 0.3
 """First standard deviation and largest first harmonic; the box of every number is 2 wide."""
@@ -67,18 +55,7 @@ OPTIONS = {
 }  # fmt: skip
 """Of CMA-ES: it ends when the steps are small."""
 
-SHORTFALL = 10.0
-"""What 1 m/s or a whole weight too little costs, and failing always: more than it can save."""
-
-
-AVERAGED = (
-    "return", "speed_m_s", "stance_peak_n", "drive_work_j", "distance_m", "weight_share", "failed",
-)  # fmt: skip
-"""Figures of an episode that a cost is made of."""
-
-
-EPISODES = {"constant": 10_240, "clocked": 30_720}
-"""Of a search, by family."""
+EPISODES = {"constant": 10_240, "clocked": 30_720}  # of a search, by family
 
 KEPT = (
     "return", "speed_m_s", "stance_peak_n", "cost_of_transport", "peak_grf_n", "weight_share", "stances",
@@ -95,12 +72,6 @@ class Args:
     """its arguments: key=value ..., or one JSON object; with reward_weights returns weigh otherwise"""
     family: Literal["constant", "clocked"] = "constant"
     """of gaits"""
-    objective: Literal["return", "peak", "transport"] = "return"
-    """highest mean return; or, at --speed or more, least mean peak force of a stance or cost of transport"""
-    speed: float | None = None
-    """mean speed that "peak" and "transport" ask for [m/s]"""
-    weight_share: float | None = None
-    """mean part of the weight that they ask the leg to bear"""
     restarts: int = 5
     """searches, of seeds 0, 1, ..."""
     episodes: int | None = None
@@ -110,7 +81,7 @@ class Args:
     start: Path | None = None
     """file of a gait whose constants every second search begins with"""
     out: Path | None = None
-    """file; otherwise runs/open_loop/ENV-FAMILY[-OBJECTIVE-SPEED[-share-SHARE]].json"""
+    """file; otherwise runs/open_loop/ENV-FAMILY.json"""
 
 
 def decode(family: str, x: Floats) -> dict[str, Floats]:
@@ -121,69 +92,25 @@ def decode(family: str, x: Floats) -> dict[str, Floats]:
     return {"constant": x[..., :4], "sin": x[..., 4:8], "cos": x[..., 8:12], "frequency_hz": frequency}
 
 
-def cost(episodes: Episodes, objective: str, weight: float, speed: float = 0.0, share: float = 0.0) -> float:
-    """What a search makes small.
-
-    Args:
-        episodes: of one candidate.
-        objective: "return"; or, under conditions, "peak" or "transport": mean peak force of a stance
-            [weights], and work per weight and distance of all episodes together.
-        weight: of trunk and leg [N].
-        speed, share: conditions: mean speed [m/s] and part of the weight that the leg bears, or more.
-    """
-    mean = {key: float(np.mean([one[key] for one in episodes])) for key in AVERAGED}
-    if objective == "return":
-        return -mean["return"]
-    missing = max(0.0, speed - mean["speed_m_s"]) + max(0.0, share - mean["weight_share"])
-    penalty = SHORTFALL * (missing + mean["failed"])
-    if objective == "peak":
-        return mean["stance_peak_n"] / weight + penalty
-    transport = mean["drive_work_j"] / (weight * max(mean["distance_m"], 0.1))  # who stands is only too slow
-    return min(transport, SHORTFALL) + penalty
-
-
 class Objective:
-    """Scores candidates by episodes in the rows of one vector environment.
+    """Scores candidates of a family by episodes in the rows of one vector environment; `leg` is a single one
+    like them, `spent` counts episodes. `ParameterError`: no such environment, or one without many at once."""
 
-    Args:
-        env_id, env_kwargs: the environment.
-        family: of the candidates.
-        objective, speed, share: as of `cost`.
-
-    Attributes:
-        leg: a single environment like the rows.
-        spent: episodes so far.
-
-    Raises:
-        ParameterError: no such environment, or one without many at once.
-    """
-
-    def __init__(
-        self,
-        env_id: str,
-        env_kwargs: dict[str, Any],
-        family: str,
-        objective: str = "return",
-        speed: float | None = None,
-        share: float | None = None,
-    ) -> None:
-        leg: Any = runs.make_env(env_id, **env_kwargs).unwrapped
+    def __init__(self, env_id: str, env_kwargs: dict[str, Any], family: str) -> None:
+        self.leg: Any = runs.make_env(env_id, **env_kwargs).unwrapped
         envs = make_rows(env_id, ROWS, **env_kwargs)
         if envs is None:
             raise ParameterError(f"env_id: expected an id of this package with many at once, got {env_id!r}")
-        self.leg, self.envs, self.spent = leg, envs, 0
-        self.family = family
-        conditions = {"speed": speed or 0.0, "share": share or 0.0}
-        self._cost: dict[str, Any] = {"objective": objective, "weight": leg.weight, **conditions}
+        self.envs, self.spent, self.family = envs, 0, family
 
     def costs(self, x: Floats, seeds: Sequence[int]) -> list[float]:
-        """`cost` of candidates, shape (n, size), that meet the same starts; n * len(seeds) is `ROWS`."""
+        """Minus the mean returns of candidates, shape (n, size), that meet the same starts; n * len(seeds) is
+        `ROWS`."""
         episodes = self._play(decode(self.family, np.repeat(x, len(seeds), axis=0)), [*seeds] * len(x))
-        each = [episodes[k : k + len(seeds)] for k in range(0, len(episodes), len(seeds))]
-        return [cost(some, **self._cost) for some in each]
+        returns = np.reshape([one["return"] for one in episodes], (len(x), len(seeds)))
+        return [-float(np.mean(some)) for some in returns]
 
     def test(self, parameters: dict[str, Any], count: int) -> Episodes:
-        """Episodes of the final score of one candidate."""
         episodes: Episodes = []
         while len(episodes) < count:
             first = TEST_SEED + len(episodes)
@@ -202,23 +129,13 @@ def search(
     tick: Callable[[int, float], Any],
     start: Sequence[float] | None = None,
 ) -> tuple[Floats, float, bool]:
-    """One CMA-ES from the best point of a random screening, or from a constant action.
+    """One CMA-ES from the best point of a random screening, or from the constant action `start`, shape (4,).
 
-    All candidates of a generation meet the same starts, those of the next meet others. At the end the mean
-    of the distribution, the luckiest candidate and the best of the last generation meet more.
-
-    Args:
-        objective: what scores candidates.
-        seed: of the search; searches of different seeds share no start.
-        episodes: to spend, about.
-        tick: called with the number of episodes that were added and the lowest cost in them.
-        start: the constant action to begin with, shape (4,); harmonics are none there.
-
-    Returns:
-        The best point, its cost over starts that the search had not met, and whether Ctrl-C ended it.
-
-    Raises:
-        KeyboardInterrupt: Ctrl-C before anything was found.
+    Candidates of a generation meet the same starts, those of the next and other searches others. At the end
+    the mean of the distribution, the luckiest candidate and the best of the last generation meet more. About
+    `episodes` are spent; `tick` is called with their number and the lowest cost in them. Returns the best
+    point, its cost over starts that the search had not met, and whether Ctrl-C ended it; `KeyboardInterrupt`:
+    it did before anything was found.
     """
     import cma
 
@@ -231,7 +148,13 @@ def search(
         tick(ROWS, min(values))
         return values
 
-    first, step = first_point(SIZES[objective.family], costs, generator, start)
+    size, step = SIZES[objective.family], STEP
+    if start is not None:
+        first, step = np.array([*start, *[0.0] * (size - len(start))]), STEP / 3
+    else:
+        screened = generator.uniform(-1, 1, (ROWS // 4, size))
+        screened[:, 4:12] *= HARMONIC
+        first = screened[np.argmin(costs(screened, 4))]
     options = OPTIONS | {"popsize": POPULATION, "seed": int(generator.integers(1, 2**31))}
     strategy, best, interrupted = cma.CMAEvolutionStrategy(first, step, options), [first], False
     try:
@@ -250,55 +173,33 @@ def search(
     return finalists[np.argmin(final)], min(final), interrupted
 
 
-def first_point(
-    size: int,
-    costs: Callable[[Any, int], list[float]],
-    generator: np.random.Generator,
-    start: Sequence[float] | None,
-) -> tuple[Floats, float]:
-    """Where a search begins, and its first standard deviation."""
-    if start is not None:
-        return np.array([*start, *[0.0] * (size - len(start))]), STEP / 3
-    screened = generator.uniform(-1, 1, (ROWS // 4, size))
-    screened[:, 4:12] *= HARMONIC
-    return screened[np.argmin(costs(screened, 4))], STEP
-
-
 def optimise(args: Args) -> dict[str, Any]:
-    """Search, and write the file after every search; returns what it holds.
-
-    Raises:
-        HoofEnvError: no CMA-ES is installed. ParameterError: an argument does not fit. DataFileError,
-            OutputError: the file is of something else, or cannot be written. KeyboardInterrupt: Ctrl-C; what
-            was found is in the file.
-    """
+    """Search, and write the file after every search; returns what it holds. `HoofEnvError`: no CMA-ES is
+    installed. `DataFileError`: the file is of something else. `KeyboardInterrupt`: what was found is in the
+    file."""
     episodes = check(args)
     from tqdm import tqdm
 
-    path = args.out or Path("runs/open_loop", file_name(args))
+    path = place(args)
     about: dict[str, Any] = {
         "env_id": args.env_id, "env_kwargs": parse_pairs("--env-kwargs", args.env_kwargs),
-        "family": args.family, "objective": args.objective,
-        "speed": args.speed, "weight_share": args.weight_share,
+        "family": args.family, "objective": "return",
         "episodes_of_a_search": episodes, "test_episodes": args.test_episodes,
         "start": stored(args.start)["parameters"]["constant"] if args.start else None,
     }  # fmt: skip
     restarts = earlier(path, about)
     check_folder(path.parent)
-    objective = Objective(
-        args.env_id, about["env_kwargs"], args.family, args.objective, args.speed, args.weight_share
-    )
+    objective = Objective(args.env_id, about["env_kwargs"], args.family)
     left = [seed for seed in range(args.restarts) if seed not in [one["seed"] for one in restarts]]
-    content: dict[str, Any] = {}
     with tqdm(total=episodes * len(left), unit=" episodes", leave=False, disable=None) as bar:
         for k, seed in enumerate(left):
             bar.set_description(f"{path.stem}, search {seed}")
             restarts.append(search_once(objective, seed, about, bar))
-            content = write(path, about, objective, restarts, content)
+            write(path, about, objective, restarts)
             if restarts[-1].get("interrupted"):
                 raise KeyboardInterrupt
             bar.n = (k + 1) * episodes  # a search may have converged before
-    return content or write(path, about, objective, restarts, {})
+    return write(path, about, objective, restarts)
 
 
 def check(args: Args) -> int:
@@ -314,18 +215,10 @@ def check(args: Args) -> int:
     check_number("test_episodes", args.test_episodes, low=2, high=1e6)
     episodes = args.episodes or EPISODES[args.family]
     check_number("episodes", episodes, low=3 * ROWS, high=1e7)
-    if (args.objective == "return") != (args.speed is None):
-        raise ParameterError(f"speed: expected one for 'peak' and 'transport' alone, got {args.speed!r}")
-    if args.objective == "return" and args.weight_share is not None:
-        raise ParameterError("weight_share: expected none for 'return', which has no conditions")
-    for name, high in (("speed", 20), ("weight_share", 1)):
-        if getattr(args, name) is not None:
-            check_number(name, getattr(args, name), low=0, high=high)
     return episodes
 
 
 def search_once(objective: Objective, seed: int, about: dict[str, Any], bar: Any) -> dict[str, Any]:
-    """One search, as the file keeps it."""
     began, used, objective.spent = time.monotonic(), time.process_time(), 0
 
     def tick(count: int, lowest: float) -> None:
@@ -348,34 +241,20 @@ def search_once(objective: Objective, seed: int, about: dict[str, Any], bar: Any
 
 
 def means(episodes: Episodes) -> dict[str, float | None]:
-    """Of the figures that are kept; None for an infinite one."""
     figures = {key: float(np.mean([one[key] for one in episodes])) for key in KEPT}
     return {key: value if math.isfinite(value) else None for key, value in figures.items()}
 
 
 def write(
-    path: Path,
-    about: dict[str, Any],
-    objective: Objective,
-    restarts: list[dict[str, Any]],
-    before: dict[str, Any],
+    path: Path, about: dict[str, Any], objective: Objective, restarts: list[dict[str, Any]]
 ) -> dict[str, Any]:
-    """Write the best of the searches, scored, and all of them; returns what the file holds.
-
-    Args:
-        path, about: the file, and what was asked for.
-        objective: what scores a gait.
-        restarts: the searches.
-        before: what the file held, or nothing.
-    """
+    """Write the best of the searches, scored, and all of them; returns what the file holds."""
     best = min(restarts, key=lambda one: one["cost"])
-    score = before.get("score")
-    if before.get("parameters") != best["parameters"]:
-        episodes = objective.test(best["parameters"], about["test_episodes"])
-        score = {"first_seed": TEST_SEED, "mean": means(episodes), "interval95": {}}
-        for key, mean in score["mean"].items():
-            interval = estimate([one[key] for one in episodes]) if mean is not None else None
-            score["interval95"][key] = [interval.low, interval.high] if interval else None
+    episodes = objective.test(best["parameters"], about["test_episodes"])
+    score: dict[str, Any] = {"first_seed": TEST_SEED, "mean": means(episodes), "interval95": {}}
+    for key, mean in score["mean"].items():
+        interval = estimate([one[key] for one in episodes]) if mean is not None else None
+        score["interval95"][key] = [interval.low, interval.high] if interval else None
     gait = objective.leg.command_of(np.array(best["parameters"]["constant"])).tolist()
     content = {
         **about,
@@ -394,11 +273,8 @@ def write(
 
 
 def earlier(path: Path, about: dict[str, Any]) -> list[dict[str, Any]]:
-    """The searches of a file that were not interrupted; none if there is no file.
-
-    Raises:
-        DataFileError: the file is of something else.
-    """
+    """The searches of a file that were not interrupted; none if there is no file. `DataFileError`: the file
+    is of something else."""
     if not path.is_file():
         return []
     with suppress(OSError, ValueError, KeyError, TypeError, AttributeError):
@@ -408,11 +284,9 @@ def earlier(path: Path, about: dict[str, Any]) -> list[dict[str, Any]]:
     raise DataFileError(f"{path}: expected searches with {about} to go on with; name another --out")
 
 
-def file_name(args: Args) -> str:
-    """What the file of a search is called."""
-    goal = "" if args.objective == "return" else f"-{args.objective}-{args.speed:g}"
-    goal += "" if args.weight_share is None else f"-share-{args.weight_share:g}"
-    return f"{args.env_id.rpartition('/')[2]}-{args.family}{goal}.json"
+def place(args: Args) -> Path:
+    name = f"{args.env_id.rpartition('/')[2]}-{args.family}.json"
+    return args.out or Path("runs/open_loop", name)
 
 
 def main(argv: list[str] | None = None) -> None:
@@ -427,7 +301,7 @@ def main(argv: list[str] | None = None) -> None:
     for key, mean in content["score"]["mean"].items():
         bounds = content["score"]["interval95"][key]
         print(f"{key:18} " + (f"{mean:.3f} [{bounds[0]:.3f}, {bounds[1]:.3f}]" if bounds else "infinite"))
-    print(f"written: {args.out or Path('runs/open_loop', file_name(args))}")
+    print(f"written: {place(args)}")
 
 
 if __name__ == "__main__":

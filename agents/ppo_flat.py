@@ -5,10 +5,9 @@
 
 Read `learn` first: it plays a rollout, estimates what its actions were worth, improves the agent, reports.
 
-Vector environments restart in Gymnasium's default way, on the next step: the step that ends an episode
-returns its last observation, and the step after it ignores its action and returns the next one's first. So
-the value of a last observation is at hand where a time limit truncates an episode, which is not the end of
-the task; only a termination has no future. The steps that restart are no experience and are left out.
+Vector environments restart in Gymnasium's default way: the step after one that ends an episode ignores its
+action and returns the next first observation. So the value of a last observation is at hand where a time
+limit truncates an episode, and only a termination has no future. Steps that restart are left out.
 """
 
 from __future__ import annotations
@@ -93,8 +92,6 @@ DIVERGED = "the training diverged: policy or gradient is not finite any more; tr
 
 @dataclass
 class Learned:
-    """What a training leaves: the agent, and a row per rollout as in progress.csv."""
-
     agent: Agent
     progress: list[dict[str, float]] = field(default_factory=list)
 
@@ -135,14 +132,9 @@ def _network(sizes: list[int], last_gain: float) -> nn.Sequential:
 def estimate_advantages(
     rewards: Tensor, values: Tensor, terminated: Tensor, truncated: Tensor, gamma: float, gae_lambda: float
 ) -> Tensor:
-    """Generalised advantage estimation (Schulman et al. 2016) over time limits, shape (T, n).
-
-    Args:
-        rewards, terminated, truncated: of T steps of n environments, shape (T, n).
-        values: of the observations before each step and after the last, shape (T + 1, n). The
-            observation after a step that ends an episode is that episode's last one.
-        gamma, gae_lambda: discount, and weight of longer estimates.
-    """
+    """Generalised advantage estimation (Schulman et al. 2016) over time limits, shape (T, n), of T steps of n
+    environments; `values`, shape (T + 1, n), are of the observations before each step and after the last. The
+    observation after a step that ends an episode is that episode's last one."""
     surprise = rewards + gamma * values[1:] * ~terminated - values[:-1]
     goes_on = ~(terminated | truncated)
     advantages = torch.zeros_like(rewards)
@@ -153,12 +145,8 @@ def estimate_advantages(
 
 
 def make_envs(args: Args) -> gym.wrappers.vector.RecordEpisodeStatistics:
-    """The vector environment, with episode returns.
-
-    Raises:
-        ParameterError: unknown id or argument, spaces that are not boxes of one dimension, or an environment
-            that restarts in another way than on the next step.
-    """
+    """The vector environment, with episode returns. `ParameterError`: unknown id or argument, spaces that are
+    not boxes of one dimension, or an environment that restarts in another way than on the next step."""
     kwargs: dict[str, Any] = parse_pairs("--env-kwargs", args.env_kwargs)
     try:
         envs = gym.make_vec(args.env_id, args.n_envs, args.vectorization, **kwargs)
@@ -177,12 +165,8 @@ def make_envs(args: Args) -> gym.wrappers.vector.RecordEpisodeStatistics:
 
 class Rollout:
     """Steps of all environments, shape (n_steps, n_envs, ...); observations have one row more, for the value
-    after the last step.
-
-    Attributes:
-        restarts: steps that only restart an episode.
-        ended: whether the last step of each environment ended an episode.
-    """
+    after the last step. `restarts` are steps that only restart an episode; `ended`, whether the last step of
+    each environment ended one."""
 
     def __init__(self, args: Args, n_obs: int, n_actions: int, device: torch.device) -> None:
         shape = (args.n_steps, args.n_envs)
@@ -258,11 +242,7 @@ def improve(
 
 def learn(args: Args) -> Learned:
     """Train as `args` say, with a printed line per rollout. The same arguments give the same agent.
-
-    Raises:
-        ParameterError: the arguments or the environment do not fit.
-        OutputError: the folder cannot be written. HoofEnvError: the training diverged.
-    """
+    `ParameterError`: the arguments or the environment do not fit. `HoofEnvError`: the training diverged."""
     device = check(args)
     torch.set_num_threads(args.torch_threads)
     torch.manual_seed(args.seed)
@@ -293,7 +273,6 @@ def learn(args: Args) -> Learned:
 
 
 def check(args: Args) -> torch.device:
-    """Refuse what does not fit; returns the device."""
     for name, (low, high) in LIMITS.items():
         check_number(name, getattr(args, name), low=low, high=high)
     check_threads(args.torch_threads)
@@ -328,7 +307,6 @@ def report(steps: int, seconds: float, envs: gym.wrappers.vector.RecordEpisodeSt
 
 
 def write(learned: Learned, folder: Path) -> None:
-    """Write model.pt and progress.csv, whole or not at all."""
     weights = io.BytesIO()
     torch.save(learned.agent.state_dict(), weights)
     with staged(folder) as stage:

@@ -1,15 +1,11 @@
 """The folder of one training run: what stands in it, how it is written and how a model is read back.
 
     policy.*          the trained policy as plain data (hoof_env/saved_policy.py): this is what is loaded
-    model.zip         the trained model (Stable-Baselines3)
-    vecnormalize.pkl  statistics, only where the hyperparameters ask for normalisation
+    model.zip         the trained model (Stable-Baselines3); vecnormalize.pkl: statistics, if normalised
     config.yml        the hyperparameters that were used, in rl-baselines3-zoo's form
-    run.json          environment, its settings and spaces, command, arguments, versions; when it is through,
-                      steps and seconds under "finished"
-    monitor.csv       return, length and time of every training episode
+    run.json          environment, settings, spaces, command, arguments, versions; "finished" when through
+    monitor.csv       return, length and time of every training episode; tensorboard/ has curves
     checkpoints/N/    what `--resume` goes on from (agents/checkpoints.py), until the training is through
-    tensorboard/      curves
-    .lock             held while a process works here
 
 A .zip or .pkl is a pickle and can run any code when it is loaded: load only files that you trust.
 """
@@ -17,12 +13,13 @@ A .zip or .pkl is a pickle and can run any code when it is loaded: load only fil
 from __future__ import annotations
 
 import csv
+import io
 import json
 import platform
 import shlex
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -51,12 +48,8 @@ PACKAGES = ("hoof-env", "numpy", "gymnasium", "numba", "stable-baselines3", "sb3
 
 @contextmanager
 def alone(folder: Path) -> Iterator[None]:
-    """The folder is there and nobody else works in it meanwhile; a process that is killed leaves it free.
-    A block that fails before it has written anything leaves nothing behind.
-
-    Raises:
-        OutputError: another process is at work there, or it cannot be written.
-    """
+    """The folder is there and nobody else works in it meanwhile, else `OutputError`; a process that is killed
+    leaves it free. A block that fails before it has written anything leaves nothing behind."""
     from filelock import FileLock, Timeout
 
     made = [path for path in (folder / ".lock", folder, *folder.parents) if not path.exists()]
@@ -78,11 +71,8 @@ def alone(folder: Path) -> Iterator[None]:
 
 
 def make_env(env_id: str, **kwargs: Any) -> gym.Env[Any, Any]:
-    """`gymnasium.make`, refusals in our words.
-
-    Raises:
-        ParameterError: unknown id, or an argument that the environment does not take.
-    """
+    """`gymnasium.make`; `ParameterError` for an unknown id, or an argument that the environment does not
+    take."""
     try:
         return gym.make(env_id, **kwargs)
     except (gym.error.Error, ModuleNotFoundError, TypeError) as error:
@@ -91,11 +81,7 @@ def make_env(env_id: str, **kwargs: Any) -> gym.Env[Any, Any]:
 
 def make_vec_env(env_id: str, n_envs: int, **kwargs: Any) -> Any:
     """Environments side by side as Stable-Baselines3's `VecEnv`: in one call where the id has a vector
-    environment of this package, else one after the other. A pipe to another process would cost more.
-
-    Raises:
-        ParameterError: as `make_env`.
-    """
+    environment of this package, else one after the other. A pipe to another process would cost more."""
     with make_env(env_id, **kwargs) as env:
         spec = env.spec
     if spec is not None and str(spec.vector_entry_point).startswith("hoof_env."):
@@ -111,13 +97,11 @@ def make_vec_env(env_id: str, n_envs: int, **kwargs: Any) -> Any:
 
 
 def warm_up(env: gym.Env[Any, Any]) -> None:
-    """Reset and step once, so that kernels are compiled before anything is timed."""
     env.reset(seed=0)
     env.step(env.action_space.sample())
 
 
 def command() -> str:
-    """The command that started this process."""
     return shlex.join(["python", *sys.orig_argv[1:]])
 
 
@@ -141,8 +125,19 @@ def write_text(path: Path, text: str) -> None:
         (stage / path.name).write_text(text, encoding="utf-8")
 
 
+def write_csv(
+    path: Path, columns: Sequence[str], rows: Sequence[Mapping[str, Any]], number: str = "{}"
+) -> None:
+    """Write a CSV file, whole or not at all; `number` formats its cells."""
+    text = io.StringIO()
+    writer = csv.DictWriter(text, columns, lineterminator="\n")
+    writer.writeheader()
+    for row in rows:
+        writer.writerow({key: number.format(x) for key, x in row.items() if x is not None})
+    write_text(path, text.getvalue())
+
+
 def write_record(folder: Path, record: dict[str, Any]) -> None:
-    """Write run.json."""
     write_text(folder / RECORD, json.dumps(record, indent=2) + "\n")
 
 

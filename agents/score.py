@@ -2,13 +2,12 @@
 
 A row is the episode that `play` gives with the same seed, to the bit where the policy acts in a batch as
 alone: scripted policies do, but for "random", which draws for all rows at once; a network does to its last
-bits. The loading rate of an episode is how steeply the force on the hoof rises when it meets the ground; the
-first seconds, in which a gait settles, are left out.
+bits. The loading rate of an episode, after its first seconds, is the steepest rise of the force at impact.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -26,8 +25,7 @@ from hoof_env.onnx_policy import OnnxPolicy
 
 Floats = NDArray[np.float64]
 
-ROWS = 1024
-"""Episodes side by side at most; more are played one batch after the other."""
+ROWS = 1024  # episodes side by side at most; more are played one batch after the other
 
 CURVE_SEEDS = range(1000, 1020)
 """Episodes of the learning curves; training starts its own from other seeds."""
@@ -44,11 +42,8 @@ TRANSPORT = ("distance_m", "drive_work_j", "mean_grf_n", "weight_share")
 """What a cost of transport over several episodes is made of; the force by the share is the weight."""
 
 
-SETTLED = 3.0
-"""Seconds of an episode that are left out, where it is at least twice as long."""
-
-WINDOW = 0.005
-"""The loading rate is the steepest rise of the force over so many seconds."""
+SETTLED = 3.0  # seconds of an episode that are left out, where it is at least twice as long
+WINDOW = 0.005  # the loading rate is the steepest rise of the force over so many seconds
 
 FORCES = ("toe_normal", "heel_normal", "toe_friction", "heel_friction")
 
@@ -82,71 +77,24 @@ def play(
     return episodes
 
 
-def score_vector(
-    policy: Any,
-    env_id: str,
-    seeds: Sequence[int],
-    tick: Callable[[int], Any] = lambda count: None,
-    **env_kwargs: Any,
-) -> list[dict[str, float]]:
-    """One episode per seed; its return and the figures of its summary, as `play` gives them.
-
-    Args:
-        policy: anything with Stable-Baselines3's `predict` that takes many observations, shape (n, k), and
-            `episode_start`, shape (n,); the name or path of one, as `find_policy` takes them; or actions
-            that are held, shape (4,) for all or (len(seeds), 4).
-        env_id: registered environment. One without a native vector environment is played one by one.
-        seeds: of the episodes.
-        tick: called with the number of episodes that were added.
-        env_kwargs: arguments of the environment.
-
-    Raises:
-        ParameterError, DataFileError: unknown environment or policy, or one that does not fit.
-    """
+def score_vector(policy: Any, env_id: str, seeds: Sequence[int], **env_kwargs: Any) -> list[dict[str, float]]:
+    """One episode per seed, as `play` gives it, in batches of the native vector environment where the id has
+    one. The policy, or the name or path of one as `find_policy` takes them, has Stable-Baselines3's `predict`
+    for many observations, shape (n, k), and `episode_start`, shape (n,). `ParameterError`, `DataFileError`:
+    unknown environment or policy, or one that does not fit."""
     with runs.make_env(env_id, **env_kwargs) as env:
         if isinstance(policy, str):
             policy = find_policy(policy, env, env_id)
-        held = None if hasattr(policy, "predict") else _held(policy, len(seeds))
+        if not hasattr(policy, "predict"):
+            raise ParameterError(f"policy: expected one with predict, or its name, got {policy!r}")
         episodes: list[dict[str, float]] = []
         envs = None
         for first in range(0, len(seeds), ROWS):
-            part = slice(first, first + ROWS)
-            batch, acting = list(seeds[part]), policy if held is None else Held(held[part])
+            batch = list(seeds[first : first + ROWS])
             if envs is None or envs.num_envs != len(batch):
                 envs = make_rows(env_id, len(batch), **env_kwargs)
-            if envs is None:
-                for k, seed in enumerate(batch):
-                    episodes += play(env, policy if held is None else Held(held[first + k]), [seed])
-                    tick(1)
-            else:
-                episodes += play_rows(envs, acting, batch)
-                tick(len(batch))
+            episodes += play(env, policy, batch) if envs is None else play_rows(envs, policy, batch)
     return episodes
-
-
-class Held:
-    """A policy that holds its actions, shape (4,), or (n, 4) for n environments."""
-
-    def __init__(self, actions: NDArray[np.float32]) -> None:
-        self._actions = np.asarray(actions, np.float32)
-
-    def predict(
-        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
-    ) -> tuple[NDArray[np.float32], None]:
-        """The actions."""
-        return np.broadcast_to(self._actions, (*np.shape(observation)[:-1], self._actions.shape[-1])), None
-
-
-def _held(actions: Any, count: int) -> NDArray[np.float32]:
-    """Actions for `count` episodes, shape (count, 4)."""
-    with suppress(ValueError, TypeError):
-        given = np.asarray(actions, np.float32)
-        if given.shape in ((4,), (count, 4)) and np.isfinite(given).all():
-            return np.broadcast_to(given, (count, 4))
-    raise ParameterError(
-        f"policy: expected one with predict, its name, or finite actions of shape (4,) or ({count}, 4), "
-        f"got {actions!r}"
-    )
 
 
 def make_rows(env_id: str, num_envs: int, **env_kwargs: Any) -> HorseLegVectorEnv | None:
@@ -180,7 +128,6 @@ def play_rows(envs: HorseLegVectorEnv, policy: Any, seeds: Sequence[int]) -> lis
 
 
 def _with_stance_peak(summary: Mapping[str, float]) -> dict[str, float]:
-    """An episode summary with the mean of the stances' highest forces, where it counts stances."""
     if "stances" not in summary:
         return dict(summary)
     return {**summary, "stance_peak_n": summary["stance_peak_sum_n"] / max(summary["stances"], 1.0)}
@@ -199,26 +146,19 @@ def mean_figures(episodes: Sequence[Mapping[str, float]]) -> dict[str, float]:
 
 def is_model(name: str) -> bool:
     """Whether a policy's name is the path of a model rather than that of a scripted policy or of a gait."""
-    if name.endswith(".json"):
-        return False
-    return name.endswith((".zip", ".onnx")) or Path(name).name != name or Path(name, runs.MODEL).is_file()
+    is_path = name.endswith((".zip", ".onnx")) or Path(name).name != name or Path(name, runs.MODEL).is_file()
+    return is_path and not name.endswith(".json")
 
 
 def saved_model(path: Path) -> OnnxPolicy | runs.SavedModel:
-    """A policy in a file or a folder: an exported one, or a model of agents.train.
-
-    Raises:
-        DataFileError: there is none.
-    """
+    """A policy in a file or a folder: an exported one, or a model of agents.train; `DataFileError` if there
+    is none."""
     return OnnxPolicy(path) if OnnxPolicy.stands_at(path) else runs.SavedModel.find(path)
 
 
 def read_policy_record(name: str) -> dict[str, Any]:
     """What a policy's file says of itself, env_id and env_kwargs among it; empty for a scripted policy.
-
-    Raises:
-        DataFileError: no such model or gait.
-    """
+    `DataFileError`: no such model or gait."""
     if name.endswith(".json"):
         return open_loop_record(Path(name))
     return saved_model(Path(name)).record if is_model(name) else {}
@@ -226,10 +166,7 @@ def read_policy_record(name: str) -> dict[str, Any]:
 
 def find_policy(name: str, env: gym.Env[Any, Any], env_id: str) -> Any:
     """A policy as `hoof_env.records.find_policy` takes it, or a model of any environment by its path.
-
-    Raises:
-        ParameterError: unknown name. DataFileError: no such model or gait, or one that does not fit.
-    """
+    `ParameterError`: unknown name. `DataFileError`: no such model or gait, or one that does not fit."""
     if is_model(name):
         return saved_model(Path(name)).load(env, env_id)
     if not hasattr(env.unwrapped, "gaits"):
@@ -240,11 +177,8 @@ def find_policy(name: str, env: gym.Env[Any, Any], env_id: str) -> Any:
 
 
 class LoadingRate:
-    """The mean loading rate of an episode, from the substeps that the environment records.
-
-    Args:
-        env: an environment of this package that was just reset. Call `add` after each step.
-    """
+    """The mean loading rate of an episode, from the substeps that an environment of this package, just reset,
+    records. Call `add` after each step."""
 
     def __init__(self, env: Any) -> None:
         self._leg, self._setting = env.unwrapped, records.setting(env)
@@ -252,7 +186,6 @@ class LoadingRate:
         self._leg.record()  # substeps are kept from here on
 
     def add(self) -> None:
-        """Keep the substeps of the last step."""
         record = self._leg.record()
         self._parts.append({name: record[name].ravel() for name in ("time", *FORCES)})
 
@@ -269,13 +202,8 @@ class LoadingRate:
 
 def loading_rates(normal: Floats, friction: Floats, lift_off: float, dt: float) -> Floats:
     """Loading rate of each whole stance [N/s], shape (stances,): the steepest rise of the normal force from
-    touch-down to the highest ground reaction force.
-
-    Args:
-        normal, friction: forces on the hoof, `dt` apart, shape (substeps,) [N].
-        lift_off: normal force that separates stance from swing [N].
-        dt: substep [s].
-    """
+    touch-down to the highest ground reaction force. Forces on the hoof, shape (substeps,) [N], are `dt` [s]
+    apart; a normal force above `lift_off` [N] is stance."""
     grf = np.hypot(normal, friction)
     rates = []
     for first, end in stances(normal, lift_off):
@@ -292,11 +220,6 @@ def stances(normal: Floats, lift_off: float) -> NDArray[np.int64]:
 
 
 def steepest(force: Floats, dt: float) -> float:
-    """Steepest rise over `WINDOW` [N/s], or over all of the force where that is shorter.
-
-    Args:
-        force: shape (n,), `dt` [s] apart [N].
-        dt: see there.
-    """
+    """Steepest rise [N/s] of a force, shape (n,) [N], over `WINDOW`, or all of it where that is shorter."""
     width = min(max(1, round(WINDOW / dt)), len(force) - 1)
     return float((force[width:] - force[:-width]).max() / (width * dt)) if width > 0 else 0.0

@@ -15,8 +15,7 @@ from hoof_env.errors import DataFileError
 from hoof_env.saved_policy import ALGORITHMS as ALGORITHMS
 from hoof_env.saved_policy import algorithm_class as algorithm_class
 
-Algorithm = Literal["ppo", "sac", "td3", "tqc"]
-"""Names of `ALGORITHMS`, for the commands."""
+Algorithm = Literal["ppo", "sac", "td3", "tqc"]  # names of `ALGORITHMS`, for the commands
 
 
 @dataclass(frozen=True)
@@ -37,8 +36,7 @@ class TrainingArgs:
 
 
 FOLDER = Path(__file__).parent / "hyperparams"
-ENV = "env."
-"""Before the name of an argument of the environment where hyperparameters may stand, too."""
+ENV = "env."  # before the name of an argument of the environment where hyperparameters may stand, too
 
 COUNTED = ("n_epochs", "n_steps", "batch_size", "buffer_size", "policy_delay")
 """Keys that hold whole numbers of 1 or more; not all are looked at before they are used."""
@@ -51,11 +49,8 @@ SCHEDULED = ("learning_rate", "clip_range", "clip_range_vf")
 
 
 def load_settings(path: Path, env_id: str) -> dict[str, Any]:
-    """The entry of `env_id` in the YAML file at `path`, else its `default`, as plain data.
-
-    Raises:
-        DataFileError: no such file, not YAML, or neither entry is a mapping with n_envs and n_timesteps.
-    """
+    """The entry of `env_id` in the YAML file at `path`, else its `default`, as plain data. `DataFileError`:
+    no such file, not YAML, or neither entry is a mapping with n_envs, n_timesteps and policy."""
     try:
         entries = yaml.safe_load(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
@@ -75,11 +70,7 @@ def load_settings(path: Path, env_id: str) -> dict[str, Any]:
 
 def model_arguments(settings: Mapping[str, Any], actions: int = 1) -> dict[str, Any]:
     """The part of `settings` that the algorithm's constructor takes; schedules, noise on `actions` numbers
-    and network arguments are built.
-
-    Raises:
-        DataFileError: a count, a schedule, the noise or `policy_kwargs` is not in the zoo's form.
-    """
+    and network arguments are built. `DataFileError`: one of them, or a count, is not in the zoo's form."""
     from stable_baselines3.common.utils import LinearSchedule
 
     arguments = {
@@ -113,10 +104,7 @@ def model_arguments(settings: Mapping[str, Any], actions: int = 1) -> dict[str, 
 
 def normalize_arguments(settings: Mapping[str, Any]) -> dict[str, Any] | None:
     """Arguments of `VecNormalize` as the key `normalize` of `settings` has them; None where it is false.
-
-    Raises:
-        DataFileError: it is neither true or false nor a mapping of such arguments.
-    """
+    `DataFileError`: it is neither true or false nor a mapping of such arguments."""
     given = settings.get("normalize") or False
     arguments = {} if isinstance(given, bool) else given
     if not isinstance(arguments, Mapping) or not all(
@@ -130,7 +118,6 @@ def normalize_arguments(settings: Mapping[str, Any]) -> dict[str, Any] | None:
 
 
 def _action_noise(kind: Any, spread: Any, actions: int) -> Any:
-    """What is added to the actions while learning; both kinds in units of the action."""
     from stable_baselines3.common.noise import NormalActionNoise, OrnsteinUhlenbeckActionNoise
 
     known = {"normal": NormalActionNoise, "ornstein-uhlenbeck": OrnsteinUhlenbeckActionNoise}

@@ -4,15 +4,9 @@
     python -m agents.ship runs/ppo-HorseLeg-v0-s0       this run
 
 The best of an id is that with the highest mean return in episodes on which nothing is reported. Its folder
-agents/policies/NAME is written whole or not at all:
-
-    policy.onnx         the policy, as agents.export writes it; agents.evaluate and hoof-env render play it
-    policy.safetensors  the weights, with policy.json, for Stable-Baselines3 (hoof_env/saved_policy.py)
-    run.json, config.yml   how it was trained
-    score.json          returns in fixed episodes beside those of gaits, and how far other machines may be off
-    card.md, curve.png, film.gif   the model card and its pictures
-
-agents/policies/README.md lists all that are there.
+agents/policies/NAME, written whole or not at all, holds the exported policy and its weights as plain data,
+how it was trained, its returns beside those of gaits and how far other machines may be off, a model card, a
+curve and a film. agents/policies/README.md lists all that are there.
 """
 
 from __future__ import annotations
@@ -31,7 +25,7 @@ import numpy as np
 from tyro.conf import Positional
 
 from agents import runs
-from agents.baselines_report import draw_learning_curve, training_length
+from agents.baselines_report import draw_learning_curve, render_template, training_length
 from agents.command import run
 from agents.evaluate import METRICS, Interval, Score, cell, to_json
 from agents.export import about, write_policy
@@ -40,14 +34,13 @@ from agents.score import score_vector
 from hoof_env._output import check_folder, markdown_table, staged
 from hoof_env.envs.policies import STANDS_FOR
 from hoof_env.envs.tasks import TASKS
-from hoof_env.errors import DataFileError, OutputError, ParameterError, check_choice, check_number
+from hoof_env.errors import DataFileError, OutputError, ParameterError
 from hoof_env.film import render_episode
 from hoof_env.onnx_policy import FILE, OnnxPolicy
 from hoof_env.records import setting
 from hoof_env.saved_policy import ABOUT, WEIGHTS
 
 POLICIES = Path(__file__).with_name("policies")
-TEMPLATES = Path(__file__).with_name("templates")
 SHOWN = ("return", "distance_m", "stance_peak_n", "weight_share", "cost_of_transport", "failed")
 """Columns of the card's table, keys of `METRICS`."""
 
@@ -57,15 +50,14 @@ CHOOSING_SEEDS = range(500_000, 500_100)
 CHECKED = 20
 """Episodes, from the first of the score on, that are played again to check a shipped policy."""
 
-GAITS = ("run", "walk", "carrying_walk", "open-loop")
-"""Scored beside the policy, where an id has them."""
+GAITS = ("run", "walk", "carrying_walk", "open-loop")  # scored beside the policy, where an id has them
 
 LIMIT, FILM_LIMIT = 1_000_000, 750_000
 """Bytes of a folder and of the film in it, which is made shorter where it is larger."""
 
+FILM_SECONDS = 4.0
+
 COPIED = (WEIGHTS, ABOUT, runs.CONFIG)
-NOT_COPIED = ("args",)
-"""Of run.json: paths of the machine that trained; the command says the rest."""
 
 
 @dataclass(frozen=True)
@@ -74,10 +66,6 @@ class Args:
     """a run folder of agents.train, or a folder with several beneath it"""
     out: Path = POLICIES
     """folder for the policies' folders"""
-    ids: tuple[str, ...] = ()
-    """only these environments"""
-    seconds: float = 4.0
-    """of the film"""
 
 
 @dataclass(frozen=True)
@@ -90,10 +78,7 @@ class Choice:
 
 def find_runs(folder: Path) -> dict[str, list[runs.SavedModel]]:
     """The trained models in or beneath a folder by environment, those with arguments of it left out.
-
-    Raises:
-        DataFileError: there is none, or one lacks a file.
-    """
+    `DataFileError`: there is none, or one lacks a file."""
     models: dict[str, list[runs.SavedModel]] = {}
     is_run = (folder / runs.RECORD).is_file()
     for path in [folder] if is_run else sorted(record.parent for record in folder.rglob(runs.RECORD)):
@@ -137,24 +122,14 @@ def whole(folder: Path) -> Iterator[Path]:
             folder.parent.rmdir()
 
 
-def ship(choice: Choice, env_id: str, out: Path, seconds: float = 4.0) -> dict[str, Any]:
-    """Write the folder of one policy; returns what its score.json holds.
-
-    Args:
-        choice: the run.
-        env_id: for which it is shipped: its own or one that `STANDS_FOR` it.
-        out: the folder for all policies.
-        seconds: of the film.
-
-    Raises:
-        DataFileError: the model does not fit. OutputError: the folder cannot be written or gets too large.
-        HoofEnvError: a package is missing.
-    """
+def ship(choice: Choice, env_id: str, out: Path) -> dict[str, Any]:
+    """Write the folder of one policy beneath `out`, for its own id or one that `STANDS_FOR` it; returns its
+    score.json. `DataFileError`: the model does not fit. `OutputError`: the folder gets too large."""
     saved, trained_on = choice.saved, choice.saved.record["env_id"]
     if not len(runs.read_episodes(saved.path.parent)):
         raise DataFileError(f"run {saved.path.parent}: expected a training in which episodes end, got none")
-    record = {key: value for key, value in saved.record.items() if key not in NOT_COPIED}
-    record |= {"command": shown_command(record.get("command", "")), "env_id": env_id}
+    record = saved.record | {"command": shown_command(saved.record.get("command", "")), "env_id": env_id}
+    record.pop("args", None)  # paths of the machine that trained; the command says the rest
     with runs.make_env(trained_on) as env:
         trained = saved.load(env, trained_on)
     with runs.make_env(env_id) as env:
@@ -175,7 +150,7 @@ def ship(choice: Choice, env_id: str, out: Path, seconds: float = 4.0) -> dict[s
         (stage / "score.json").write_text(text + "\n", encoding="utf-8")
         no_name = {"Software": None}  # of the program that drew it
         draw_learning_curve(saved.path.parent, scores, stage / "curve.png", dpi=90, metadata=no_name)
-        film(stage, env_id, seconds)
+        film(stage, env_id)
         write_card(stage, env_id, record, score, scores, choice)
         size = sum(file.stat().st_size for file in stage.iterdir())
         if size > LIMIT:
@@ -183,9 +158,9 @@ def ship(choice: Choice, env_id: str, out: Path, seconds: float = 4.0) -> dict[s
     return score
 
 
-def film(folder: Path, env_id: str, seconds: float) -> None:
+def film(folder: Path, env_id: str) -> None:
     """Write film.gif of the policy in `folder`, shorter where it would be larger than `FILM_LIMIT`."""
-    path, policy = folder / "film.gif", str(folder / FILE)
+    path, policy, seconds = folder / "film.gif", str(folder / FILE), FILM_SECONDS
     while not path.is_file() or path.stat().st_size > FILM_LIMIT:
         render_episode(path, policy, env_id, seed=SCORE_SEEDS[0], seconds=seconds, fps=20, size=(480, 270))
         seconds *= 0.75
@@ -193,7 +168,6 @@ def film(folder: Path, env_id: str, seconds: float) -> None:
 
 @cache
 def gaits(env_id: str) -> list[Score]:
-    """The scores of those of `GAITS` that an id has."""
     scores = []
     for name in GAITS:
         with suppress(ParameterError, DataFileError):  # it has no such gait
@@ -226,17 +200,13 @@ class Trembling:
         self._policy, self._generator = policy, np.random.default_rng(0)
 
     def predict(self, observation: Any, *args: Any, **kwargs: Any) -> tuple[Any, Any]:
-        """As the policy's."""
         actions, state = self._policy.predict(observation, *args, **kwargs)
         return actions + self._generator.uniform(-1e-6, 1e-6, actions.shape).astype(np.float32), state
 
 
 def tolerance(policy: Any, env_id: str, returns: Sequence[float]) -> float:
-    """By how much the mean return of the first `CHECKED` episodes may differ on another machine.
-
-    The last bits of an action can change an episode. Measured by playing them once more with a
-    `Trembling` policy: four standard errors of the mean difference, and 1 % of the mean.
-    """
+    """By how much the mean return of the first `CHECKED` episodes may differ on another machine: four
+    standard errors of what a `Trembling` policy changes, and 1 % of the mean."""
     again = score_vector(Trembling(policy), env_id, SCORE_SEEDS[:CHECKED])
     off = np.array([episode["return"] for episode in again]) - returns[: len(again)]
     return float(4 * np.sqrt(np.mean(off**2) / len(off)) + 0.01 * abs(np.mean(returns)))
@@ -247,8 +217,7 @@ def shown_command(command: str) -> str:
     words = shlex.split(command)
     while "--out" in words:
         del words[words.index("--out") : words.index("--out") + 2]
-    here = f"{Path.cwd()}/"
-    shown = [word.removeprefix(here) for word in words]
+    shown = [word.removeprefix(f"{Path.cwd()}/") for word in words]
     return shlex.join([Path(word).name if Path(word).is_absolute() else word for word in shown])
 
 
@@ -260,19 +229,14 @@ def write_card(
     scores: Sequence[Score],
     choice: Choice,
 ) -> None:
-    """Write card.md into `folder`, from run.json, config.yml and score.json."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
     keys = [key for key in SHOWN if key in scores[0].estimates]
-    template = Environment(
-        loader=FileSystemLoader(TEMPLATES), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    ).get_template("model_card.md.j2")
     with runs.make_env(env_id) as env:
         is_suspended = setting(env).trunk == "suspended"
         summaries = {task.id: task.summary for task in TASKS.values()}
         summary = summaries.get(env_id) or (type(env.unwrapped).__doc__ or "").partition("\n")[0]
     steps, seconds = training_length(choice.saved.path.parent)
-    text = template.render(
+    text = render_template(
+        "model_card.md.j2",
         env_id=env_id,
         name=env_id.rpartition("/")[2],
         summary=summary,
@@ -317,17 +281,13 @@ def main(argv: list[str] | None = None) -> None:
     import tyro
 
     args = tyro.cli(Args, args=argv, prog="python -m agents.ship", description=__doc__)
-    check_number("seconds", args.seconds, low=0, exclusive_low=True)
     models = find_runs(args.runs)
     sources = {env_id: env_id for env_id in models}
     sources |= {one: other for one, other in STANDS_FOR.items() if one not in models and other in models}
-    ids = [check_choice("ids", env_id, sources) for env_id in args.ids] or list(sources)
     check_folder(args.out)
-    choices = {
-        source: choose(models[source], source) for source in dict.fromkeys(sources[one] for one in ids)
-    }
-    for env_id in ids:
-        score = ship(choices[sources[env_id]], env_id, args.out, args.seconds)
+    choices = {source: choose(models[source], source) for source in models}
+    for env_id, source in sources.items():
+        score = ship(choices[source], env_id, args.out)
         means = {name: one["mean"]["return"] for name, one in score["policies"].items()}
         write_index(args.out)
         print(f"{env_id}: " + ", ".join(f"{name} {value:.2f}" for name, value in means.items()), flush=True)

@@ -5,9 +5,9 @@
     python -m agents.train --out runs/mine --resume         go on where it was stopped or killed, else start
     tensorboard --logdir runs                               watch it
 
-Ctrl-C stops after the current rollout and keeps the model and a checkpoint; pressed twice it stops at once
-and keeps only checkpoints. What a run folder holds is written in agents/runs.py. The same seed, arguments,
-machine and versions give the same run, resumed or not (agents/checkpoints.py says where that ends).
+Ctrl-C stops after the current rollout and keeps the model and a checkpoint; pressed twice it keeps only
+checkpoints. agents/runs.py says what a run folder holds. The same seed, arguments, machine and versions give
+the same run, resumed or not (agents/checkpoints.py says where that ends).
 """
 
 from __future__ import annotations
@@ -60,8 +60,6 @@ class Args(TrainingArgs):
 
 @dataclass(frozen=True)
 class Trained:
-    """Where a training ended."""
-
     folder: Path
     steps: int
     seconds: float
@@ -69,29 +67,19 @@ class Trained:
 
     @property
     def rate(self) -> float:
-        """Steps per second."""
         return self.steps / max(self.seconds, 1e-9)
 
     def __str__(self) -> str:
-        return (
-            f"{self.steps:,} steps in {self.seconds:.0f} s ({self.rate:,.0f} steps/s); "
-            f"model kept in {self.folder}"
-        )
+        pace = f"{self.steps:,} steps in {self.seconds:.0f} s ({self.rate:,.0f} steps/s)"
+        return f"{pace}; model kept in {self.folder}"
 
 
 def train(args: Args, *also: Any) -> Trained:
-    """Train as `args` say and fill the run folder. SIGINT, SIGTERM and the time limit end it early.
-
-    Args:
-        args: see there.
-        also: more callbacks of Stable-Baselines3; on a resume they begin anew.
-
-    Raises:
-        ParameterError, DataFileError: the arguments, the environment or the hyperparameters do not fit, or
-            are not those of the run to go on with.
-        OutputError: the run folder cannot be written, already holds a run, or another process trains there.
-        DivergedError: a loss or the policy is not finite any more; the checkpoints before that stay.
-    """
+    """Train as `args` say and fill the run folder; SIGINT, SIGTERM and the time limit end it early. `also`
+    are more callbacks of Stable-Baselines3; on a resume they begin anew. `ParameterError`, `DataFileError`:
+    something does not fit, or not the run to go on with. `OutputError`: the folder cannot be written, holds a
+    run already, or another process trains there. `DivergedError`: a loss or the policy is not finite any
+    more."""
     env_kwargs, settings = checked(args)
     check_threads(args.torch_threads)
     name = args.env_id.rpartition("/")[2]
@@ -124,7 +112,11 @@ def _train(
     if start:
         warn_of_bits(folder, earlier, record)
         record = {**earlier, "resumed": [*earlier.get("resumed", []), int(start.name)]}
-    set_up_torch(args)
+    import torch  # which takes seconds
+
+    if args.device.startswith("cuda") and not torch.cuda.is_available():  # the library would take the CPU
+        raise ParameterError(f"device: expected one that torch finds here, got {args.device!r}")
+    torch.set_num_threads(args.torch_threads)
     config = yaml.safe_dump({args.env_id: settings}, sort_keys=False)  # the library adds to policy_kwargs
     envs = many = runs.make_vec_env(args.env_id, settings["n_envs"], **env_kwargs)
     try:
@@ -144,16 +136,6 @@ def _train(
         envs.close()
 
 
-def set_up_torch(args: Args) -> None:
-    """Threads and device of torch, whose import takes seconds; `ParameterError` for a GPU that is not there,
-    where the library would take the CPU."""
-    import torch
-
-    if args.device.startswith("cuda") and not torch.cuda.is_available():
-        raise ParameterError(f"device: expected one that torch finds here, got {args.device!r}")
-    torch.set_num_threads(args.torch_threads)
-
-
 def learn(
     args: Args,
     folder: Path,
@@ -163,7 +145,6 @@ def learn(
     resumed: checkpoints.Resumed | None,
     also: tuple[Any, ...],
 ) -> Trained:
-    """Let the model learn until it has `steps`, and write it."""
     from stable_baselines3.common.callbacks import CallbackList
 
     from agents.watch import EndedError, Watch, check_divergence, diverged, stop_on_signals
@@ -198,14 +179,12 @@ def checked(args: Args) -> tuple[dict[str, Any], dict[str, Any]]:
     env_kwargs = parse_pairs("--env-kwargs", args.env_kwargs)
     settings = load_settings(args.hyperparams or FOLDER / f"{args.algo}.yml", args.env_id)
     settings |= parse_pairs("--params", args.params)
-    settings |= {"n_timesteps": args.steps} if args.steps is not None else {}
-    settings |= {"n_envs": args.n_envs} if args.n_envs is not None else {}
+    given = {"n_timesteps": args.steps, "n_envs": args.n_envs}
+    settings |= {key: value for key, value in given.items() if value is not None}
     settings["n_envs"] = int(check_number("n_envs", settings["n_envs"], low=1, high=4096))
     settings["n_timesteps"] = int(check_number("steps", settings["n_timesteps"], low=1))
-    if args.seed < 0:
-        raise ParameterError(f"seed: expected 0 or more, got {args.seed}")
+    check_number("seed", args.seed, low=0)
     check_number("checkpoint_every", args.checkpoint_every, low=0)
-    check_number("torch_threads", args.torch_threads, low=1)
     normalize_arguments(settings)
     if args.max_minutes is not None:
         check_number("max_minutes", args.max_minutes, low=0.0, exclusive_low=True)
@@ -215,7 +194,6 @@ def checked(args: Args) -> tuple[dict[str, Any], dict[str, Any]]:
 
 
 def make_record(args: Args, env_kwargs: dict[str, Any]) -> dict[str, Any]:
-    """What run.json says of a run that starts."""
     with runs.make_env(args.env_id, **env_kwargs) as env:
         if hasattr(env.unwrapped, "reward_space"):
             raise ParameterError(
@@ -243,11 +221,8 @@ def make_record(args: Args, env_kwargs: dict[str, Any]) -> dict[str, Any]:
 def find_earlier(
     args: Args, folder: Path, record: dict[str, Any], settings: dict[str, Any]
 ) -> dict[str, Any]:
-    """The record of the run in `folder` to go on with, empty if there is none.
-
-    Raises:
-        OutputError: there is a run, but none to go on with. ParameterError: it was begun otherwise.
-    """
+    """The record of the run in `folder` to go on with, empty if there is none. `OutputError`: there is a run,
+    but none to go on with. `ParameterError`: it was begun otherwise."""
     earlier = runs.read_record(folder)
     there = [name for name in (*runs.FILES, runs.STATISTICS, runs.CHECKPOINTS) if (folder / name).exists()]
     if there and not earlier:

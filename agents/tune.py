@@ -2,15 +2,13 @@
 
     python -m agents.tune --algo ppo --env-id hoof_env/HorseLeg-v0 --trials 30 --steps 1500000
     python -m agents.tune --trials 60 --steps 1500000          the same study goes on until it has 60
-
-A trial draws settings from agents/studies/spaces.yml, trains by agents.train, and is scored as it goes on
-64 episodes with which no training starts; a bad one is pruned. Its training has a seed of its own, so that
-no setting wins by a lucky one. Ctrl-C ends the trial in hand; the same command goes on with the study, even
-after kill -9, when the trial that was killed is run again. One process works on a study. Into the folder go
-study.db (Optuna's), best.yml (in rl-baselines3-zoo's format, for --hyperparams of agents.train) and trials/N,
-the run folders. Optuna shows a study:
-
     optuna trials --storage sqlite:///runs/tune/ppo-HorseLeg-v0/study.db --study-name study
+
+A trial draws settings from agents/studies/spaces.yml, trains by agents.train with a seed of its own, and is
+scored as it goes on 64 episodes with which no training starts; a bad one is pruned. Ctrl-C ends the trial in
+hand; the same command goes on, even after kill -9, when the trial that was killed is run again. One process
+works on a study. Its folder holds study.db (Optuna's), best.yml (for --hyperparams of agents.train) and
+trials/N, the run folders.
 """
 
 from __future__ import annotations
@@ -34,8 +32,7 @@ from agents.watch import DivergedError, EndedError, Scorer
 from hoof_env.errors import DataFileError, ParameterError, check_number
 
 SPACES = Path(__file__).parent / "studies" / "spaces.yml"
-SEEDS = range(1000, 1064)
-"""Scored episodes; trainings start theirs from other seeds."""
+SEEDS = range(1000, 1064)  # scored episodes; trainings start theirs from other seeds
 
 
 @dataclass(frozen=True)
@@ -54,11 +51,8 @@ class Args(TrainingArgs):
 
 def load_space(path: Path, algo: str) -> dict[str, Any]:
     """The ranges of `algo` in a file like agents/studies/spaces.yml: key to a list, or to a mapping with
-    "uniform" or "log" [low, high] and perhaps "lin".
-
-    Raises:
-        DataFileError: not such a file, or a range that is none.
-    """
+    "uniform" or "log" [low, high] and perhaps "lin". `DataFileError`: not such a file, or a range that is
+    none."""
     try:
         space = yaml.safe_load(path.read_text(encoding="utf-8"))[algo]
         for key, how in space.items():
@@ -93,13 +87,8 @@ def draw(trial: Any, space: Mapping[str, Any], base: Mapping[str, Any]) -> dict[
 
 
 class TrialScorer(Scorer):
-    """Keeps the mean returns; `report(steps, score)` may say after each but the last that the training is to
-    end.
-
-    Attributes:
-        curve: rows of (steps, mean return).
-        is_pruned: whether the training was ended.
-    """
+    """Keeps the mean returns in `curve`, rows of (steps, mean return); `report(steps, score)` may say after
+    each but the last that the training is to end, which is then pruned."""
 
     def __init__(
         self,
@@ -113,7 +102,6 @@ class TrialScorer(Scorer):
         self.curve: list[tuple[int, float]] = []
 
     def keep(self, episodes: list[dict[str, float]]) -> None:
-        """Add a row."""
         mean = sum(one["return"] for one in episodes) / len(episodes)
         self.curve.append((self.num_timesteps, mean))
 
@@ -126,13 +114,9 @@ class TrialScorer(Scorer):
 
 
 def tune(args: Args) -> Any:
-    """Run the study of `args` until it has all trials; returns the Optuna study.
-
-    Raises:
-        ParameterError, DataFileError: the arguments, the environment, the space or the settings do not fit,
-            or the study in the folder was begun with others.
-        OutputError: the folder cannot be written. KeyboardInterrupt: Ctrl-C; finished trials stay.
-    """
+    """Run the study of `args` until it has all trials; returns the Optuna study. `ParameterError`,
+    `DataFileError`: what was given does not fit, or the study in the folder was begun with others.
+    `KeyboardInterrupt`: Ctrl-C; finished trials stay."""
     check_number("trials", args.trials, low=1)
     check_number("scores", args.scores, low=1)
     kwargs, held = parse_pairs("--env-kwargs", args.env_kwargs), parse_pairs("--params", args.params)
@@ -143,28 +127,21 @@ def tune(args: Args) -> Any:
     }
     make_record(TrainArgs(env_id=args.env_id), kwargs)  # refuses what cannot be trained on
     folder = args.out or Path("runs/tune", f"{args.algo}-{args.env_id.rpartition('/')[2]}")
-    with runs.alone(folder):
-        return _tune(args, folder, kwargs, base, space)
-
-
-def _tune(
-    args: Args, folder: Path, env_kwargs: dict[str, Any], base: dict[str, Any], space: dict[str, Any]
-) -> Any:
-    """`tune` in a folder that nobody else works in."""
-    study = open_study(args, folder, {"env_kwargs": env_kwargs, "base": base, "space": space})
 
     def keep(study: Any, trial: Any) -> None:
         curve = trial.user_attrs.get("curve") or [(0, float("nan"))]
         print(f"trial {trial.number}: {trial.state.name.lower()}, {curve[-1][1]:.1f}", flush=True)
         write_best(study, folder, args.env_id)
 
-    while (left := args.trials - len(finished(study))) > 0:
-        study.optimize(
-            lambda trial: run_trial(trial, args, folder, env_kwargs, base | draw(trial, space, base)),
-            n_trials=left,
-            callbacks=[keep],
-        )
-    write_best(study, folder, args.env_id)
+    with runs.alone(folder):
+        study = open_study(args, folder, {"env_kwargs": kwargs, "base": base, "space": space})
+        while (left := args.trials - len(finished(study))) > 0:
+            study.optimize(
+                lambda trial: run_trial(trial, args, folder, kwargs, base | draw(trial, space, base)),
+                n_trials=left,
+                callbacks=[keep],
+            )
+        write_best(study, folder, args.env_id)
     return study
 
 
@@ -200,25 +177,34 @@ def run_trial(
 
 
 def finished(study: Any) -> list[Any]:
-    """Trials that ended by themselves; interrupted and killed ones have failed."""
     return [trial for trial in study.trials if trial.state.name in ("COMPLETE", "PRUNED")]
 
 
 def open_study(args: Args, folder: Path, about: dict[str, Any]) -> Any:
     """The study in `folder`, made if need be; a trial that was killed is queued to be run again.
-
-    Raises:
-        ParameterError: Optuna is missing, the settings do not fit the algorithm, or the study was begun with
-            others.
-        DataFileError: study.db is not a study.
-    """
+    `ParameterError`: Optuna is missing, the settings do not fit the algorithm, or the study was begun with
+    others. `DataFileError`: study.db is not a study."""
     try:
         import optuna
+        from sqlalchemy.exc import SQLAlchemyError
     except ModuleNotFoundError:
         raise ParameterError("agents.tune needs Optuna: pip install 'hoof-env[tune]'") from None
     optuna.logging.set_verbosity(optuna.logging.ERROR)  # what ends a trial is raised, too
     check_space(args, about)
-    study = load_study(folder / "study.db", about["base"]["n_timesteps"])
+    path = folder / "study.db"
+    try:
+        study = optuna.create_study(
+            storage=f"sqlite:///{path}",
+            study_name="study",
+            # By the median of five whole trials at the least, and not before a third of a training
+            pruner=optuna.pruners.MedianPruner(5, n_warmup_steps=about["base"]["n_timesteps"] // 3),
+            direction="maximize",
+            load_if_exists=True,
+        )
+        len(study.trials)  # reads all of it
+    except (SQLAlchemyError, optuna.exceptions.OptunaError, RuntimeError) as error:
+        reason = str(error).partition("\n")[0]
+        raise DataFileError(f"{path}: expected the database of a study, cannot read it: {reason}") from None
     # Of the same seed a study that goes on would draw again what it has drawn
     seed = args.seed + len(study.trials)
     study.sampler = optuna.samplers.TPESampler(seed=seed, multivariate=True, n_startup_trials=8)
@@ -247,29 +233,7 @@ def check_space(args: Args, about: dict[str, Any]) -> None:
         make_model(training, settings, many)
 
 
-def load_study(path: Path, steps: int) -> Any:
-    """Optuna's study in the database at `path`, made if need be, of trainings of so many steps."""
-    import optuna
-    from sqlalchemy.exc import SQLAlchemyError
-
-    try:
-        study = optuna.create_study(
-            storage=f"sqlite:///{path}",
-            study_name="study",
-            # By the median of five whole trials at the least, and not before a third of a training
-            pruner=optuna.pruners.MedianPruner(5, n_warmup_steps=steps // 3),
-            direction="maximize",
-            load_if_exists=True,
-        )
-        len(study.trials)  # reads all of it
-    except (SQLAlchemyError, optuna.exceptions.OptunaError, RuntimeError) as error:
-        reason = str(error).partition("\n")[0]
-        raise DataFileError(f"{path}: expected the database of a study, cannot read it: {reason}") from None
-    return study
-
-
 def write_best(study: Any, folder: Path, env_id: str) -> None:
-    """Write best.yml, once there is a trial that was not pruned."""
     complete = [trial for trial in study.trials if trial.state.name == "COMPLETE"]
     if complete:
         best = max(complete, key=lambda trial: trial.value)

@@ -31,25 +31,18 @@ class EndedError(Exception):
     """The training was asked to end; it stands between two rollouts."""
 
 
-LARGEST = 1e10
-"""No parameter of a policy that learns comes near it."""
-
-
-def divergence(model: Any) -> str:
-    """Which loss or parameter of a model is out of all bounds; empty if none is."""
-    for name, value in model.logger.name_to_value.items():
-        if "loss" in name and not math.isfinite(value):
-            return f"{name} is {value}"
-    for name, parameter in model.policy.named_parameters():
-        if not float(parameter.detach().abs().max()) < LARGEST:  # nor NaN
-            return f"the policy's {name} holds {float(parameter.detach().abs().max()):g}"
-    return ""
+LARGEST = 1e10  # no parameter of a policy that learns comes near it
 
 
 def check_divergence(model: Any, folder: Path) -> None:
-    """Raise `DivergedError`, which says where and names what is left, if losses or policy diverged."""
-    if reason := divergence(model):
-        raise diverged(model, folder, reason)
+    """Raise `DivergedError` if a loss or a parameter is out of all bounds."""
+    for name, value in model.logger.name_to_value.items():
+        if "loss" in name and not math.isfinite(value):
+            raise diverged(model, folder, f"{name} is {value}")
+    for name, parameter in model.policy.named_parameters():
+        highest = float(parameter.detach().abs().max())
+        if not highest < LARGEST:  # nor NaN
+            raise diverged(model, folder, f"the policy's {name} holds {highest:g}")
 
 
 def diverged(model: Any, folder: Path, reason: str) -> DivergedError:
@@ -63,16 +56,9 @@ def diverged(model: Any, folder: Path, reason: str) -> DivergedError:
 
 
 class Watch(BaseCallback):
-    """Between two rollouts it checks the model, keeps a checkpoint when one is due, and ends the training by
-    `EndedError`; it shows progress and logs gait figures.
-
-    Args:
-        folder: of the run.
-        steps: of the whole training.
-        checkpoint_every: seconds between two checkpoints; 0: none.
-        max_minutes: when to end, or None.
-        resumed: what the training goes on from, or None.
-    """
+    """Between two rollouts it checks the model, keeps a checkpoint when one is due, `checkpoint_every`
+    seconds after the last (0: none), and ends the training by `EndedError`; it shows progress and logs gait
+    figures."""
 
     def __init__(
         self,
@@ -91,7 +77,6 @@ class Watch(BaseCallback):
 
     @property
     def seconds(self) -> float:
-        """Of training, before a resume too."""
         return (self.resumed.seconds if self.resumed else 0.0) + time.monotonic() - self.started
 
     def _on_training_start(self) -> None:
@@ -135,7 +120,6 @@ class Watch(BaseCallback):
         self.summaries.clear()
 
     def close(self) -> None:
-        """End the bar."""
         if self.bar is not None:
             self.bar.close()
 
@@ -165,17 +149,8 @@ def stop_on_signals(watch: Watch) -> Iterator[None]:
 
 class Scorer(BaseCallback):
     """Scores the policy in training on the same episodes each time: between two rollouts whenever `every`
-    more steps are done, and at the end. A subclass does something with them in `keep`.
-
-    Args:
-        env_id, env_kwargs: what the episodes are played in.
-        seeds: of the episodes.
-        every: steps between two scores.
-
-    Attributes:
-        wall_s, cpu_s: of training alone, scores left out; a subclass that resumes sets them.
-        scored_at: steps at the last score.
-    """
+    more steps are done, and at the end. A subclass does something with them in `keep`. `wall_s` and `cpu_s`
+    are of training alone, scores left out; a subclass that resumes sets them."""
 
     def __init__(self, env_id: str, env_kwargs: Mapping[str, Any], seeds: Sequence[int], every: int) -> None:
         super().__init__()
@@ -187,7 +162,6 @@ class Scorer(BaseCallback):
         raise NotImplementedError
 
     def score(self) -> None:
-        """Play the episodes and keep them."""
         self.wall_s += time.monotonic() - self._since[0]
         self.cpu_s += time.process_time() - self._since[1]
         self.scored_at = self.num_timesteps

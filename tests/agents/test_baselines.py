@@ -16,15 +16,19 @@ import pytest
 import yaml
 
 import hoof_env  # noqa: F401  registers the ids
-from agents import baselines, baselines_matched, baselines_report, baselines_results, baselines_run
-from agents.baselines_matched import MATCHED_SPEED, dominates, scaled_runs, seeds_that_dominate, verdict
+from agents import baselines, baselines_report, baselines_results, baselines_run
 from agents.baselines_results import (
+    MATCHED_SPEED,
     Scored,
+    dominates,
     expected_settings,
     iqm,
     over_episodes,
     read_results,
     references,
+    scaled_runs,
+    seeds_that_dominate,
+    verdict,
 )
 from agents.baselines_run import (
     CURVE,
@@ -341,12 +345,12 @@ def page(done, tmp_path, monkeypatch):
     point = {key: Interval(x, x, x) for key, x in (
         ("return", 6.0), ("speed_m_s", 2.0), ("peak_grf_n", 4e3), ("stance_peak_n", 3500.0),
         ("cost_of_transport", 1.3), ("weight_share", 0.7))}  # fmt: skip
-    known = {name: Scored(name, point, curve_return=6.0) for name in ("run", "walk", "open-loop")}
+    known = {name: Scored(name, point) for name in ("run", "walk", "open-loop")}
     monkeypatch.setattr(baselines_report, "references", lambda env_id: known)
-    monkeypatch.setattr(baselines_matched, "sped_up", lambda speed: [])
+    monkeypatch.setattr(baselines_results, "sped_up", lambda speed: [])
     monkeypatch.setattr(baselines_results, "REPS", 100)
     monkeypatch.setattr(baselines_report, "load_plan", lambda name: SMALL)
-    args = baselines_report.Args("nightly", tmp_path / "runs", tmp_path / "page.md")
+    args = baselines_report.Args("nightly", tmp_path / "runs")
     return baselines_report.report(args)
 
 

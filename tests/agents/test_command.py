@@ -13,10 +13,7 @@ from hoof_env.errors import ParameterError
 
 @pytest.mark.parametrize(
     ("given", "expected"),
-    [
-        ({}, "1 1 PASSIVE"),
-        ({"OMP_NUM_THREADS": "2", "OMP_WAIT_POLICY": "ACTIVE"}, "2 2 ACTIVE"),
-    ],
+    [({}, "1 1 PASSIVE"), ({"OMP_NUM_THREADS": "2", "OMP_WAIT_POLICY": "ACTIVE"}, "2 2 ACTIVE")],
 )
 def test_commands_take_one_thread_and_let_others_work_unless_the_user_says_so(given, expected):
     code = (

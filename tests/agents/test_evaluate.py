@@ -8,19 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from agents.evaluate import (
-    METRICS,
-    Args,
-    Score,
-    estimate,
-    evaluate,
-    film,
-    film_paths,
-    main,
-    table,
-    to_json,
-)
-from agents.runs import SavedModel, make_env
+from agents.evaluate import METRICS, Args, Score, estimate, evaluate, film_paths, main, table, to_json
+from agents.runs import make_env
 from agents.score import find_policy, play
 from hoof_env.envs.policies import GAITS
 from hoof_env.errors import DataFileError, OutputError, ParameterError
@@ -79,12 +68,6 @@ def test_policies_meet_the_same_episodes_whatever_stands_beside_them(env):
     alone, _ = evaluate(Args(policy=("run",), episodes=2, env_kwargs=SHORT))
     beside, _ = evaluate(Args(policy=("walk", "run"), episodes=2, env_kwargs=SHORT))
     assert alone[0] == beside[1]
-
-
-def test_seeds_follow_each_other(env):
-    both = play(env, find_policy("run", env, ENV_ID), [5, 6])
-    assert both == [play(env, find_policy("run", env, ENV_ID), [seed])[0] for seed in (5, 6)]
-    assert both[0] != both[1]
 
 
 def test_table_json_and_video(trained, tmp_path, capsys):
@@ -171,13 +154,6 @@ def test_model_of_another_environment_is_refused_unopened(trained, monkeypatch):
         find_policy(str(trained.folder), rail, ENV_ID)
 
 
-def test_spaces_are_compared_even_without_a_record(trained, tmp_path):
-    bare = shutil.copy(trained.folder / "model.zip", tmp_path / "bare.zip")
-    assert SavedModel.find(tmp_path / "bare.zip").record == {}
-    with make_env(ENV_ID, trunk="rail") as rail, pytest.raises(DataFileError, match="observation_space"):
-        find_policy(str(bare), rail, ENV_ID)
-
-
 @pytest.mark.parametrize("content", ["", "[1]", "{}", '{"env_id": "x"}'])
 def test_unusable_record(trained, tmp_path, env, content):
     shutil.copy(trained.folder / "model.zip", tmp_path)
@@ -215,23 +191,6 @@ def test_a_film_that_is_no_mp4_is_refused_before_the_first_episode(tmp_path, mon
     monkeypatch.setattr("agents.evaluate.play", lambda *_: pytest.fail("was played"))
     with pytest.raises(ParameterError, match=r"ends in \.mp4, got .*film\.xyz"):
         evaluate(Args(policy=("run",), video=tmp_path / "film.xyz"))
-
-
-def test_a_film_that_cannot_be_written_is_refused_in_one_line(tmp_path, capfd):
-    """ffmpeg alone meets the limit of a file's size: it leaves half a file, as on a full disk."""
-    resource = pytest.importorskip("resource")
-
-    with make_env(ENV_ID, episode_seconds=0.4, render_mode="rgb_array") as env:
-        policy = find_policy("run", env, ENV_ID)
-        old = resource.getrlimit(resource.RLIMIT_FSIZE)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, old[1]))
-        try:
-            with pytest.raises(OutputError, match=r"^cannot write to .*: ffmpeg could not [^\n]*$"):
-                film(env, policy, tmp_path / "film.mp4", seed=0)
-        finally:
-            resource.setrlimit(resource.RLIMIT_FSIZE, old)
-    assert not list(tmp_path.iterdir())
-    assert not capfd.readouterr().err
 
 
 def test_films_of_two_policies_never_share_a_file():

@@ -11,6 +11,7 @@ from pathlib import Path
 import gymnasium as gym
 import numpy as np
 import pytest
+import torch
 from sb3_contrib import TQC
 from stable_baselines3 import PPO, SAC, TD3
 from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
@@ -53,11 +54,11 @@ def untrained(algorithm, normalized: bool) -> TrainedPolicy:
 
 @pytest.mark.parametrize("normalized", [True, False])
 @pytest.mark.parametrize("algorithm", [PPO, SAC, TD3, TQC])
-def test_torchscript_acts_as_the_model(tmp_path, algorithm, normalized):
+def test_what_is_exported_acts_as_the_model(algorithm, normalized):
     policy = untrained(algorithm, normalized)
-    assert write_policy(policy, tmp_path / "policy.pt", {"env_id": "Pendulum-v1"}) < 1e-5
     rows = np.random.default_rng(1).normal(0, 3, (50, 3)).astype(np.float32)
-    actions, _ = export.read_torchscript(tmp_path / "policy.pt")(rows)
+    with torch.no_grad():
+        actions = export.module_of(policy)(torch.as_tensor(rows)).numpy()
     wanted, _ = policy.predict(rows)
     np.testing.assert_allclose(actions, wanted, atol=2e-5)
     assert np.ptp(wanted) > 0.1
@@ -141,28 +142,14 @@ def test_a_file_names_the_version_that_trained(trained):
 
 
 def test_a_file_that_acts_otherwise_is_not_kept(tmp_path, monkeypatch):
-    right = export.module_of
-    monkeypatch.setattr(export, "module_of", lambda trained: _Shifted(right(trained)))
-    path = tmp_path / "policy.pt"
+    right = export.Deterministic.forward
+    monkeypatch.setattr(export.Deterministic, "forward", lambda self, rows: right(self, rows) + 1e-4)
+    path = tmp_path / "policy.onnx"
     path.write_text("older")
     with pytest.raises(DataFileError, match="within 1e-05 of the model's, got 5e-05"):
-        write_policy(untrained(TD3, normalized=False), path, {})
-    assert [one.name for one in tmp_path.iterdir()] == ["policy.pt"]
+        write_policy(untrained(TD3, normalized=False), path, {"env_id": "Pendulum-v1"})
+    assert [one.name for one in tmp_path.iterdir()] == ["policy.onnx"]
     assert path.read_text() == "older"
-
-
-def _Shifted(module):
-    import torch
-
-    class Shifted(torch.nn.Module):
-        def __init__(self):
-            super().__init__()
-            self.inner = module
-
-        def forward(self, observation):
-            return self.inner(observation) + 1e-4
-
-    return Shifted()
 
 
 def test_a_policy_that_does_not_fit_is_refused(exported):
@@ -176,33 +163,29 @@ def test_a_policy_that_does_not_fit_is_refused(exported):
 
 
 def test_unreadable_files(exported, tmp_path):
+    import onnx
+
     content = exported.read_bytes()
+    graph = onnx.load(exported)
+    del graph.metadata_props[:]
+    onnx.save(graph, tmp_path / "bare.onnx")
     (tmp_path / "half.onnx").write_bytes(content[: len(content) // 2])
     (tmp_path / "text.onnx").write_text("no graph")
     (tmp_path / "empty.onnx").touch()
-    for name in ("half", "text", "empty", "none"):
+    for name in ("half", "text", "empty", "none", "bare"):
         with pytest.raises(DataFileError, match=rf"{name}\.onnx: expected an ONNX file of agents\.export"):
             OnnxPolicy(tmp_path / f"{name}.onnx")
 
 
-def test_a_graph_of_somebody_else_is_refused(tmp_path, exported):
-    import onnx
-
-    graph = onnx.load(exported)
-    del graph.metadata_props[:]
-    onnx.save(graph, tmp_path / "bare.onnx")
-    with pytest.raises(DataFileError, match=r"bare\.onnx: expected an ONNX file of agents\.export"):
-        OnnxPolicy(tmp_path / "bare.onnx")
-
-
 def test_bad_arguments(trained, tmp_path):
-    with pytest.raises(ParameterError, match=r"\.onnx or \.pt, got 'policy\.h5'"):
-        export.export(trained.folder, Path("policy.h5"))
-    (tmp_path / "is.pt").mkdir()
+    for name in ("policy.h5", "policy.pt"):
+        with pytest.raises(ParameterError, match=rf"ends in \.onnx, got '{name}'"):
+            export.export(trained.folder, Path(name))
+    (tmp_path / "is.onnx").mkdir()
     with pytest.raises(OutputError, match="got a folder"):
-        export.export(trained.folder, tmp_path / "is.pt")
+        export.export(trained.folder, tmp_path / "is.onnx")
     with pytest.raises(DataFileError, match="nowhere"):
-        export.export(Path("nowhere"), tmp_path / "policy.pt")
+        export.export(Path("nowhere"), tmp_path / "policy.onnx")
 
 
 def test_missing_packages_are_named(tmp_path, exported, monkeypatch):

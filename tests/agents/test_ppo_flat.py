@@ -164,9 +164,7 @@ def test_refuses_environments_that_restart_at_once(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "changes",
-    [{"steps": 1_000}, {"steps": 1, "n_steps": 1, "n_epochs": 1}],
-    ids=["at once", "at the last"],
+    "changes", [{"steps": 1_000}, {"steps": 1, "n_steps": 1, "n_epochs": 1}], ids=["at once", "at the last"]
 )
 def test_a_training_that_diverges_leaves_nothing(tmp_path, changes):
     with pytest.raises(HoofEnvError, match="diverged"):

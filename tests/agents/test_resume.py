@@ -217,12 +217,7 @@ def test_a_damaged_checkpoint_is_named_and_an_earlier_one_serves(stopped, tmp_pa
 
 
 def test_environments_without_a_state_start_new_episodes(tmp_path):
-    pendulum = {
-        "env_id": "Pendulum-v1",
-        "n_envs": 2,
-        "steps": 1024,
-        "params": TINY,
-    }
+    pendulum = {"env_id": "Pendulum-v1", "n_envs": 2, "steps": 1024, "params": TINY}
     stopped = train(Args(out=tmp_path / "run", **pendulum), At(700, interrupt))
     assert stopped.steps == 704
     assert train(Args(out=tmp_path / "run", resume=True, **pendulum)).steps == 1024

@@ -92,16 +92,13 @@ def test_an_algorithm_that_is_not_there(monkeypatch):
 
 def test_the_algorithm_takes_the_entry():
     settings = load_settings(FOLDER / "ppo.yml", "hoof_env/HorseLeg-v0")
+    assert load_settings(FOLDER / "ppo.yml", "Pendulum-v1") == ENTRIES["default"]
     model = PPO(
         env="Pendulum-v1", device="cpu", **model_arguments(settings | {"n_steps": 8, "batch_size": 8})
     )
     start = float(settings["learning_rate"].removeprefix("lin_"))
     assert model.lr_schedule(1.0) == pytest.approx(start)
     assert model.lr_schedule(0.25) == pytest.approx(start / 4)
-
-
-def test_unknown_id_takes_the_default():
-    assert load_settings(FOLDER / "ppo.yml", "Pendulum-v1") == ENTRIES["default"]
 
 
 def test_network_arguments_in_the_zoo_s_text_form():
@@ -130,11 +127,8 @@ def test_unknown_schedule(value):
 @pytest.mark.parametrize("content", ["a: [", "[1, 2]", "Pendulum-v1: {n_envs: 1}", "other: {}", b"\xff\xfe"])
 def test_unusable_file(tmp_path, content):
     path = tmp_path / "ppo.yml"
+    with pytest.raises(DataFileError, match=r"ppo\.yml"):
+        load_settings(path, "Pendulum-v1")  # it is not there
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
     with pytest.raises(DataFileError, match=r"ppo\.yml"):
         load_settings(path, "Pendulum-v1")
-
-
-def test_missing_file(tmp_path):
-    with pytest.raises(DataFileError, match=r"none\.yml"):
-        load_settings(tmp_path / "none.yml", "Pendulum-v1")

@@ -102,22 +102,13 @@ def test_the_multi_objective_policy_returns_the_same_in_sum():
 def test_a_run_is_shipped_by_one_command(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(ship, "SCORE_SEEDS", range(1_000_000, 1_000_003))
     monkeypatch.setattr(ship, "CHOOSING_SEEDS", range(500_000, 500_002))
+    monkeypatch.setattr(ship, "FILM_SECONDS", 0.1)
     ship.gaits.cache_clear()
     for seed in (0, 1):
         train_tiny(tmp_path / "runs" / f"s{seed}", env_kwargs=(), steps=2048, seed=seed)
     (tmp_path / "runs" / "unfinished").mkdir()
     (tmp_path / "runs" / "unfinished" / "run.json").write_text("{}")
-    ship.main(
-        [
-            str(tmp_path / "runs"),
-            "--out",
-            str(tmp_path / "out"),
-            "--seconds",
-            "0.1",
-            "--ids",
-            "hoof_env/HorseLeg-v0",
-        ]
-    )
+    ship.main([str(tmp_path / "runs"), "--out", str(tmp_path / "out")])
     folder = tmp_path / "out" / "HorseLeg-v0"
     test_folder(folder)
     score = read(folder / "score.json")

@@ -19,8 +19,7 @@ import yaml
 from stable_baselines3 import PPO
 
 from agents.command import parse_pairs, run
-from agents.runs import FILES, STATISTICS, SavedModel, make_env, read_episodes
-from agents.train import Args, train
+from agents.runs import FILES, STATISTICS, read_episodes
 from hoof_env.errors import DataFileError, OutputError, ParameterError
 from tests.agents.conftest import SHORT, TINY, train_tiny
 
@@ -37,12 +36,7 @@ def curve(folder: Path) -> list[tuple[str, str]]:
 
 def test_run_folder(trained):
     names = {path.name for path in trained.folder.iterdir()}
-    assert names == {
-        *FILES,
-        STATISTICS,
-        "tensorboard",
-        ".lock",
-    }  # checkpoints are gone when a training is through
+    assert names == {*FILES, STATISTICS, "tensorboard", ".lock"}  # no checkpoints when it is through
     assert trained.steps == 256
     assert trained.stopped_by is None
     record = json.loads((trained.folder / "run.json").read_text())
@@ -68,15 +62,6 @@ def test_every_training_step_is_in_the_curve(trained):
 def test_episodes_count_steps(tmp_path):
     (tmp_path / "monitor.csv").write_text('#{"t_start": 0}\nr,l,t\n-1.5,20,0.1\n2.0,30,0.2\n')
     np.testing.assert_array_equal(read_episodes(tmp_path), [[20, -1.5, 0.1], [50, 2.0, 0.2]])
-
-
-def test_model_reloads(trained):
-    with make_env("hoof_env/HorseLeg-v0", **parse_pairs("", SHORT)) as env:
-        observation, _ = env.reset(seed=3)
-        policy = SavedModel.find(trained.folder).load(env, "hoof_env/HorseLeg-v0")
-        action, _ = policy.predict(observation)
-        expected, _ = PPO.load(trained.folder / "model.zip").predict(observation, deterministic=True)
-    np.testing.assert_array_equal(action, expected)
 
 
 def test_same_seed_same_run(trained, tmp_path):
@@ -212,8 +197,3 @@ def test_pairs():
         "x": None,
         "empty": "",
     }
-
-
-def test_another_environment_trains_too(tmp_path):
-    folder = train(Args(env_id="Pendulum-v1", steps=64, n_envs=2, params=TINY, out=tmp_path / "run")).folder
-    assert SavedModel.find(folder).record["env_id"] == "Pendulum-v1"

@@ -133,22 +133,6 @@ def test_interrupted(tmp_path):
     assert code == 0
 
 
-def test_rllib_worker_killed(tmp_path):
-    """RLlib's PPO: SIGKILL for one of two workers with environments; it is replaced and training goes on"""
-    small = ("rllib", "--cpus", "3", "--workers", "2", "--n-envs", "8")
-    process = start(tmp_path, *small, "--steps", "40000", "--params", "n_envs=128", "n_steps=32")
-    wait_for(process, tmp_path, 2)
-    (victim, *others) = env_runners(int(reports(tmp_path)[-1]["pid"]))
-    assert len(others) == 1
-    os.kill(victim, signal.SIGKILL)
-    code, said = finish(process, tmp_path)
-    assert code == 0, said
-    (row,) = table(tmp_path)
-    assert row["state"] == "done"
-    assert float(row["steps"]) >= 40_000
-    assert reports(tmp_path)[-1]["env_runners"]["num_env_steps_sampled"] >= 4096
-
-
 def test_node_killed(tmp_path):
     """A cluster of two nodes, both at work: SIGKILL for all of one; its trial goes on on the other"""
     with nodes(2) as (address, environment, (_, lost)):
@@ -230,13 +214,6 @@ def descendants(pid: int) -> set[int]:
         layer = {child for child, parent in parents.items() if parent and int(parent) in layer}
         found |= layer
     return found
-
-
-def env_runners(learner: int) -> list[int]:
-    """Process ids of Ray's workers with environments beside the process `learner`, of the same raylet."""
-    parent = stat(learner)[1]
-    found = [int(path.name) for path in Path("/proc").iterdir() if path.name.isdigit()]
-    return [pid for pid in found if stat(pid)[1] == parent and "SingleAgentEnvRunner" in stat(pid)[0]]
 
 
 def stat(pid: int) -> tuple[str, str]:
