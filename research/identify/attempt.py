@@ -108,11 +108,6 @@ class Attempt:
     y: tuple[float, ...]
     merit: float
 
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Attempt:
-        """Inverse of `dataclasses.asdict`; KeyError or TypeError for anything else."""
-        return cls(**{**data, "y": tuple(data["y"])})
-
 
 @dataclass(frozen=True)
 class Verdict:
@@ -181,7 +176,7 @@ def judge(made: Attempt, aim: Aim) -> tuple[str, Verdict]:
     short = problem.objective(FINE, aim.both).plausibility(x)
     try:
         preset = to_preset(x, problem.choice, "a candidate of an ensemble")
-        run = confirm(preset, problem.targets)
+        run = confirm(preset)
     except HoofEnvError as error:  # a dead point between two samples, a gait beyond its limits
         return made.id, Verdict({}, {}, short, (f"cannot be simulated: {error}",))
     counted = [name for name in COUNTED if aim.both or name == "exact"]

@@ -7,7 +7,7 @@ resumption change nothing in what is found.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -118,9 +118,9 @@ def _push_from(inside: Sequence[Attempt], number: int, index: int, seed: int) ->
 
 def _round(tasks: Sequence[Task], aim: Aim, state: State, run: Run) -> list[Attempt]:
     """Make the attempts that are not yet in the folder; all of them in their order."""
-    done = {t.id: kept for t in tasks if (kept := state.load(f"attempt-{t.id}", Attempt.from_dict))}
+    done = {t.id: kept for t in tasks if (kept := state.load(f"attempt-{t.id}", Attempt))}
     for made in run(partial(attempt, aim=aim), [task for task in tasks if task.id not in done]):
-        state.save(f"attempt-{made.id}", asdict(made))
+        state.save(f"attempt-{made.id}", made)
         done[made.id] = made
     return [done[task.id] for task in tasks]
 

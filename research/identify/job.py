@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -87,11 +86,6 @@ class Result:
     both: float
     standing: str
     confirmed: bool
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Result:
-        """Inverse of `dataclasses.asdict`; KeyError or TypeError for anything else."""
-        return cls(**{**data, "x": tuple(data["x"])})
 
 
 @dataclass(frozen=True)

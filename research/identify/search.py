@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from functools import partial
 
 from research.identify.job import Job, Phase, Result, run_job
@@ -74,12 +74,12 @@ def search(
             if spent >= budget:
                 break
             jobs = plan(number, phase, start, results, seed, budget - spent)
-            done = {job.id: kept for job in jobs if (kept := state.load(f"job-{job.id}", Result.from_dict))}
+            done = {job.id: kept for job in jobs if (kept := state.load(f"job-{job.id}", Result))}
             for result in done.values():
                 report(result, phase.weight * result.evaluations)
             missing = [job for job in _needed(jobs, done) if job.id not in done]
             for result in run(partial(run_job, problem), missing):
-                state.save(f"job-{result.id}", asdict(result))
+                state.save(f"job-{result.id}", result)
                 done[result.id] = result
                 report(result, phase.weight * result.evaluations)
                 if all(job.id in done for job in _needed(jobs, done)):

@@ -8,6 +8,7 @@ from functools import partial
 import gymnasium as gym
 import numpy as np
 import pytest
+from alone import skip_unless_native
 from gymnasium.utils.env_checker import check_env
 from gymnasium.wrappers import NormalizeObservation, RecordEpisodeStatistics, RecordVideo
 from gymnasium.wrappers import vector as vector_wrappers
@@ -20,8 +21,8 @@ SHORT = 0.2
 def envs(request, env_id):
     """Two environments side by side, ten steps an episode, warnings as errors."""
     mode = "vector_entry_point" if request.param == "native" else request.param
-    if request.param == "native" and gym.spec(env_id).vector_entry_point is None:
-        pytest.skip("no native vector environment")
+    if request.param == "native":
+        skip_unless_native(env_id)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)  # torch's

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import gymnasium as gym
 import numpy as np
 import pytest
+from alone import skip_unless_native
 from gymnasium import wrappers
 from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers import vector
@@ -201,8 +202,7 @@ def wrap(env, wrapper, arguments):
 
 def native(env_id, **settings):
     """The native vector environment of two rows, or the test is skipped."""
-    if gym.spec(env_id).vector_entry_point is None:
-        pytest.skip("no native vector environment")
+    skip_unless_native(env_id)
     return gym.make_vec(env_id, num_envs=ROWS, vectorization_mode="vector_entry_point", **settings)
 
 

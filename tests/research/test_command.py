@@ -54,8 +54,6 @@ def test_a_search_writes_a_preset_and_how_good_it_is(searched):
 def test_a_finished_search_is_neither_begun_anew_nor_mixed_with_another(searched, capsys, tmp_path):
     out, _ = searched
     before = contents(out)
-    targets = tmp_path / "targets.json"
-    targets.write_text(json.dumps({"rows": [_row("walk.contact_start")]}))
     preset = tmp_path / "other.json"
     preset.write_text(json.dumps(_moved_preset()))
     for arguments, message in [
@@ -64,7 +62,6 @@ def test_a_finished_search_is_neither_begun_anew_nor_mixed_with_another(searched
         (["--resume", "--budget", "300"], "budget is 200 there and 300 here"),
         (["--resume", "--exponent", "1.5"], "exponent is 1.375 there and 1.5 here"),
         (["--resume", "--start", str(preset)], "start is 'first_fit ("),
-        (["--resume", "--targets", str(targets)], "targets is "),
     ]:
         options = arguments if "--budget" in arguments else [*arguments, "--budget", "200"]
         assert main(["--out", str(out), *options]) == 2
@@ -94,9 +91,6 @@ def test_a_leg_found_alone_is_not_written_over(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--targets", "EMPTY"], "list 'rows' of at least one row"),
-        (["--targets", "CONTRADICTION"], "row walk.contact_end: expected later than walk.contact_start"),
-        (["--targets", "nowhere.json"], "cannot read nowhere.json"),
         (["--start", "STUCK"], "stuck.json: dyad 1 (C-B-P"),
         (["--start", "nobody"], "start nobody: preset: expected one of first_fit"),
         (["--start", "GROUND"], "ground.json: preset"),
@@ -120,8 +114,6 @@ def test_bad_input_is_one_line_before_anything_is_written(tmp_path, capsys, argu
     ground = {**read_preset("first_fit"), "ground": {"exponent": -1}}
     files = {
         "GROUND": ground,
-        "EMPTY": {"rows": []},
-        "CONTRADICTION": {"rows": [_row("walk.contact_start", published=0.6), _row("walk.contact_end")]},
         "STUCK": stuck,
         "GAITLESS": gaitless,
         "SLOW": slow,
@@ -194,17 +186,6 @@ def _alive(group):
     except ProcessLookupError:
         return False
     return True
-
-
-def _row(row_id, **changes):
-    rows = json.loads((_published()).read_text(encoding="utf-8"))["rows"]
-    return {**next(row for row in rows if row["id"] == row_id), **changes}
-
-
-def _published():
-    from importlib import resources
-
-    return resources.files("hoof_env.paper").joinpath("published.json")
 
 
 def _moved_preset():

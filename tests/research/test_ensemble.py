@@ -26,11 +26,10 @@ from research.identify.leg import encode, to_preset
 from research.identify.objective import Objective
 from research.identify.problem import LegProblem
 from research.identify.state import open_state
-from research.identify.targets import load_targets
 
 PRESET = "first_fit"
 CHOICE, X = load_start(PRESET, 1.5)
-AIM = Aim(LegProblem(load_targets(), CHOICE), 20.0, False, steps=1)
+AIM = Aim(LegProblem(CHOICE), 20.0, False, steps=1)
 
 
 @pytest.fixture(scope="module")
@@ -89,7 +88,7 @@ def test_a_start_comes_within_the_bar_and_a_push_stays_there_and_goes_its_way(en
 def test_the_verdict_is_that_of_the_full_system():
     y = AIM.problem.inward(np.array(X), 801)
     _, judged = judge(Attempt("0", PRESET, tuple(y.tolist()), 0.0), AIM)
-    verdict = confirm(read_preset(PRESET), AIM.problem.targets)
+    verdict = confirm(read_preset(PRESET))
     assert judged.errors == pytest.approx(verdict.errors, rel=1e-4)
     assert set(judged.reasons) >= {f"{n} ({s})" for n, s in verdict.untrue if s == "exact"}
     short = Objective(CHOICE, samples=2001).plausibility(np.array(X))
@@ -237,7 +236,7 @@ def test_the_command_writes_an_ensemble_says_how_it_was_found_and_overwrites_not
 ):
     monkeypatch.setattr(command, "Aim", partial(Aim, steps=1))
     out, preset = tmp_path / "out", tmp_path / "leg.json"
-    preset.write_text(json.dumps(to_preset(start, CHOICE, "a test")))
+    preset.write_text(json.dumps(to_preset(np.array(start), CHOICE, "a test")))
     given = ["--out", str(out), "--preset", str(preset), "--size", "2", "--bar", "20", "--attempts", "1"]
     given += ["--workers", "1"]
     assert command.main(given) == 0

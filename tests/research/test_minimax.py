@@ -97,7 +97,7 @@ def test_the_published_seed_gets_better_at_once():
     """One descent from first_fit takes a third off its merit; CMA-ES needs some ten thousand evaluations."""
     choice, x = encode("first_fit")
     objective = Objective(choice, by_toe=True)
-    y = objective.to_touch_down(x)
+    y = Objective(choice).to_touch_down(x)
     found = descend(objective.rate, y, TOE_SCALES)
     assert found.rating.merit(2.0) < 0.67 * objective.rate(y).merit(2.0)
     assert found.evaluations < 1000

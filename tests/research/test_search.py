@@ -20,7 +20,6 @@ from research.identify.problem import SAMPLES, TOE_SCALES, LegProblem
 from research.identify.processes import processes
 from research.identify.search import SCHEDULE, elite, plan, rounds, search
 from research.identify.state import open_state
-from research.identify.targets import load_targets
 
 PHASE = Phase("around", jobs=3, evaluations=400, sigmas=(0.02, 0.05))
 MINIMAX = replace(PHASE, name="descend", method="minimax", elite=6, jobs=2, sigmas=(0.002, 0.01))
@@ -66,7 +65,7 @@ class Valley:
 @pytest.fixture(scope="module")
 def leg():
     choice, x = load_start("first_fit", 1.375)
-    return LegProblem(load_targets(), choice), x
+    return LegProblem(choice), x
 
 
 def plain(result):
@@ -205,7 +204,7 @@ from pathlib import Path
 from test_search import *
 if __name__ == "__main__":
     choice, x = load_start("first_fit", 1.375)
-    run((LegProblem(load_targets(), choice), x), Path(sys.argv[1]), workers=2)
+    run((LegProblem(choice), x), Path(sys.argv[1]), workers=2)
 """
 
 
@@ -259,9 +258,9 @@ def test_a_process_that_dies_is_one_error_that_names_the_way_on():
 
 
 def test_an_error_in_a_job_comes_out_of_it(leg):
-    problem = replace(leg[0], targets=())
-    with processes(2) as run, pytest.raises(HoofEnvError, match="at least one row with a bar"):
-        list(run(partial(run_job, problem), [Job(0, 0, PHASE, 0, 100, leg[1])]))
+    wrong = Job(0, 0, replace(PHASE, samples=3), 0, 100, leg[1])
+    with processes(2) as run, pytest.raises(HoofEnvError, match="samples: expected"):
+        list(run(partial(run_job, leg[0]), [wrong]))
 
 
 def test_a_search_is_not_begun_over_another_nor_resumed_from_nothing(tmp_path):

@@ -12,13 +12,12 @@ from research.identify import ensemble
 from research.identify.confirm import confirm
 from research.identify.leg import encode
 from research.identify.objective import Objective
-from research.identify.targets import load_targets
 
 MEMBERS = ensemble.load_ensemble("identified")
 
 
 def test_the_identified_leg_meets_every_row_and_claim_with_the_exact_and_the_papers_solver():
-    verdict = confirm(read_preset("identified"), load_targets())
+    verdict = confirm(read_preset("identified"))
     assert verdict.holds
     assert verdict.within(EXACT) == (22, 22)
     assert verdict.within(PROBABLE) == (19, 19)
