@@ -1,7 +1,6 @@
 """Set-up: what it says when something is missing, where packages come from, that it does nothing twice."""
 
-from __future__ import annotations
-
+import functools
 import importlib.util
 import os
 import shutil
@@ -10,7 +9,6 @@ import subprocess
 import sys
 from collections import namedtuple
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 
@@ -18,7 +16,7 @@ ROOT = Path(__file__).resolve().parent.parent
 
 
 @pytest.fixture
-def checkout(tmp_path: Path) -> Path:
+def checkout(tmp_path):
     """As much of a fresh clone as set-up looks at."""
     for name in "Makefile", "pyproject.toml", "constraints.txt", "scripts/setup_venv.py", "scripts/lock.py":
         (tmp_path / name).parent.mkdir(exist_ok=True)
@@ -27,21 +25,19 @@ def checkout(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def setup(checkout: Path) -> ModuleType:
+def setup(checkout):
     spec = importlib.util.spec_from_file_location("setup_venv", checkout / "scripts" / "setup_venv.py")
-    assert spec is not None
-    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
 
 
 @pytest.fixture
-def installs(setup: ModuleType, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+def installs(setup, monkeypatch):
     """Set-up with the installing itself replaced by a note of what was asked for."""
-    done: list[str] = []
+    done = []
 
-    def install(purpose: str, anew: bool) -> None:
+    def install(purpose, anew):
         done.append(f"{purpose} anew" if anew else f"{purpose} more")
         setup.venv("bin").mkdir(parents=True, exist_ok=True)
         setup.venv("bin/python").touch()
@@ -50,7 +46,7 @@ def installs(setup: ModuleType, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return done
 
 
-def the_one_line(capsys: pytest.CaptureFixture[str]) -> str:
+def the_one_line(capsys):
     said = capsys.readouterr().err.splitlines()
     assert len(said) == 1
     return said[0]
@@ -59,69 +55,30 @@ def the_one_line(capsys: pytest.CaptureFixture[str]) -> str:
 # What is missing
 
 
-def test_wrong_python(
-    setup: ModuleType,
-    installs: list[str],
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    monkeypatch.setattr(setup, "OLDEST", (3, 98))
-    monkeypatch.setattr(setup, "NEWEST", (3, 99))
+Usage = namedtuple("Usage", "free")
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("OLDEST", (3, 98), "Python 3.98 to 3.13 is needed"),
+        ("shutil.disk_usage", lambda _: Usage(0.5e9), "0.5 GB are free"),
+        ("importlib.util.find_spec", lambda name: None if name == "ensurepip" else name, "ensurepip"),
+        ("ROOT", ROOT / "Makefile" / "below-a-file", "below-a-file: Not a directory"),
+        ("os.access", lambda path, mode: False, "cannot be written to"),
+    ],
+)
+def test_what_is_missing_is_told_and_nothing_installed(
+    setup, installs, monkeypatch, capsys, name, value, message
+):
+    *holders, last = name.split(".")
+    monkeypatch.setattr(functools.reduce(getattr, holders, setup), last, value)
     assert setup.main() == 1
-    assert "Python 3.98 to 3.99 is needed" in the_one_line(capsys)
+    assert message in the_one_line(capsys)
     assert not installs
 
 
-def test_full_disk(
-    setup: ModuleType,
-    installs: list[str],
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    usage = namedtuple("usage", "free")
-    monkeypatch.setattr(setup.shutil, "disk_usage", lambda _: usage(0.5e9))
-    assert setup.main() == 1
-    assert "0.5 GB are free" in the_one_line(capsys)
-    assert not installs
-
-
-def test_python_without_ensurepip(
-    setup: ModuleType,
-    installs: list[str],
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    monkeypatch.setattr(setup.importlib.util, "find_spec", lambda name: None if name == "ensurepip" else name)
-    assert setup.main() == 1
-    assert "ensurepip" in the_one_line(capsys)
-    assert not installs
-
-
-def test_folder_that_cannot_be_used(
-    setup: ModuleType,
-    installs: list[str],
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    monkeypatch.setattr(setup, "ROOT", setup.ROOT / "Makefile" / "below-a-file")
-    assert setup.main() == 1
-    assert "below-a-file: Not a directory" in the_one_line(capsys)
-    assert not installs
-
-
-def test_folder_that_cannot_be_written_to(
-    setup: ModuleType,
-    installs: list[str],
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    monkeypatch.setattr(setup.os, "access", lambda path, mode: False)
-    assert setup.main() == 1
-    assert "cannot be written to" in the_one_line(capsys)
-    assert not installs
-
-
-def test_unreachable_package_index(checkout: Path) -> None:
+def test_unreachable_package_index(checkout):
     with socket.socket() as unused:
         unused.bind(("127.0.0.1", 0))
         nowhere = f"http://127.0.0.1:{unused.getsockname()[1]}/simple"
@@ -142,7 +99,7 @@ def test_unreachable_package_index(checkout: Path) -> None:
 
 
 @pytest.mark.skipif(shutil.which("make") is None, reason="no make here")
-def test_make_without_a_suitable_python(checkout: Path) -> None:
+def test_make_without_a_suitable_python(checkout):
     ended = subprocess.run(
         ["make", "setup", "PYTHON=no-such-python"], cwd=checkout, capture_output=True, text=True, check=False
     )
@@ -152,7 +109,7 @@ def test_make_without_a_suitable_python(checkout: Path) -> None:
     assert "no Python 3.11 to 3.13" in ours[0]
 
 
-def test_makefile_and_script_agree_on_the_pythons(setup: ModuleType) -> None:
+def test_makefile_and_script_agree_on_the_pythons(setup):
     assert f"{setup.OLDEST} <= sys.version_info[:2] <= {setup.NEWEST}" in (ROOT / "Makefile").read_text()
 
 
@@ -160,11 +117,11 @@ def test_makefile_and_script_agree_on_the_pythons(setup: ModuleType) -> None:
 
 
 @pytest.fixture
-def asked(setup: ModuleType, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+def asked(setup, monkeypatch):
     """What is asked of pip and uv, which have nothing."""
-    words: list[str] = []
+    words = []
 
-    def packages(tool: str, title: str, *arguments: str, **environment: str) -> None:
+    def packages(tool, title, *arguments, **environment):
         words.append(" ".join((tool, *(word for word in arguments if word not in setup.ONLY_WHEELS))))
         raise setup.Missing("nothing here")
 
@@ -172,28 +129,19 @@ def asked(setup: ModuleType, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return words
 
 
-def test_pip_installs_where_uv_cannot_be_had(
-    setup: ModuleType, asked: list[str], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_pip_installs_where_uv_cannot_be_had(setup, asked, capsys):
     assert setup.installer() == "pip"
     assert asked == ["pip uv"]
     assert "no uv here: nothing here; pip installs the same" in capsys.readouterr().out
 
 
-def test_pip_installs_where_it_is_asked_for(
-    setup: ModuleType, asked: list[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_pip_installs_where_it_is_asked_for(setup, asked, monkeypatch):
     monkeypatch.setenv("INSTALLER", "pip")
     assert setup.installer() == "pip"
     assert not asked
 
 
-def test_places_of_pytorch_in_their_order(
-    setup: ModuleType,
-    asked: list[str],
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_places_of_pytorch_in_their_order(setup, asked, monkeypatch, capsys):
     monkeypatch.setattr(setup.sys, "platform", "linux")
     monkeypatch.setattr(setup, "TORCH_INDEX", "https://nowhere.example/cpu")
     monkeypatch.setattr(setup, "pip_settings", lambda: {"find-links": "wheels"})
@@ -206,9 +154,7 @@ def test_places_of_pytorch_in_their_order(
     assert "PyTorch with CUDA, some gigabytes" in capsys.readouterr().out
 
 
-def test_uv_is_told_what_pip_is_told(
-    setup: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_uv_is_told_what_pip_is_told(setup, tmp_path, monkeypatch):
     for name in [name for name in os.environ if name.startswith(("PIP_", "UV_"))]:
         monkeypatch.delenv(name)
     monkeypatch.delenv("SSL_CERT_FILE", raising=False)
@@ -229,7 +175,7 @@ def test_uv_is_told_what_pip_is_told(
     assert "UV_DEFAULT_INDEX" not in told
 
 
-def uv_pip_compile(setup: ModuleType, *options: str, stdin: str) -> None:
+def uv_pip_compile(setup, *options, stdin):
     """Fail where what is asked for cannot be had as wheels; skip where no index can be reached."""
     command = [sys.executable, "-m", "uv", "pip", "compile", "--only-binary", ":all:", *options, "-"]
     command += ["--python", sys.executable]  # no other Python is looked for, nor downloaded
@@ -246,7 +192,7 @@ def uv_pip_compile(setup: ModuleType, *options: str, stdin: str) -> None:
 
 
 @pytest.fixture
-def ours(setup: ModuleType, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+def ours(setup, monkeypatch):
     """Set-up that asks the pip of the tests' own environment for its settings."""
     monkeypatch.setattr(
         setup, "venv", lambda path: Path(sys.executable) if path == "bin/python" else setup.ROOT / path
@@ -258,19 +204,19 @@ def ours(setup: ModuleType, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     "platform", ["x86_64-manylinux_2_28", "aarch64-manylinux_2_28", "aarch64-apple-darwin"]
 )
 @pytest.mark.parametrize("minor", [11, 12, 13])
-def test_everything_that_is_locked_has_a_wheel(ours: ModuleType, minor: int, platform: str) -> None:
+def test_everything_that_is_locked_has_a_wheel(ours, minor, platform):
     assert ours.OLDEST <= (3, minor) <= ours.NEWEST
     place = ("--python-version", f"3.{minor}", "--python-platform", platform)
     asked = "\n".join(["hatchling", *ours.requirements("all")])
     uv_pip_compile(ours, *place, "--constraints", "constraints.txt", stdin=asked)
 
 
-def test_what_has_no_wheel_is_refused(ours: ModuleType) -> None:
+def test_what_has_no_wheel_is_refused(ours):
     with pytest.raises(pytest.fail.Exception, match="rliable"):
         uv_pip_compile(ours, "--python-version", "3.12", stdin="rliable==1.2.0\n")
 
 
-def test_the_lock_is_what_its_command_writes(ours: ModuleType) -> None:
+def test_the_lock_is_what_its_command_writes(ours):
     uv_pip_compile(ours, stdin="hatchling\n")  # whether there is an index
     command = [sys.executable, "scripts/lock.py"]
     subprocess.run(command, cwd=ours.ROOT, check=True, env={**os.environ, **ours.uv_settings()})
@@ -280,30 +226,25 @@ def test_the_lock_is_what_its_command_writes(ours: ModuleType) -> None:
 # Nothing twice
 
 
-def test_second_run_does_nothing(setup: ModuleType, installs: list[str]) -> None:
+def test_second_run_does_nothing(setup, installs):
     assert [setup.main(), setup.main()] == [0, 0]
     assert installs == ["all anew"]
 
 
-def test_what_the_tests_need_is_added_to_the_demos(setup: ModuleType, installs: list[str]) -> None:
+def test_what_the_tests_need_is_added_to_the_demos(setup, installs):
     assert [setup.main(purpose) for purpose in ("demo", "demo", "all", "demo", "all")] == [0] * 5
     assert installs == ["demo anew", "all more"]
     assert set(setup.requirements("demo")) < set(setup.requirements("all"))
 
 
-def test_a_venv_whose_python_has_gone_is_made_anew(setup: ModuleType, installs: list[str]) -> None:
+def test_a_venv_whose_python_has_gone_is_made_anew(setup, installs):
     setup.main()
     setup.venv("bin/python").unlink()
     setup.main()
     assert installs == ["all anew"] * 2
 
 
-def test_wrong_words_are_refused_before_anything_is_touched(
-    setup: ModuleType,
-    installs: list[str],
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_wrong_words_are_refused_before_anything_is_touched(setup, installs, monkeypatch, capsys):
     assert setup.main("--help") == 1
     assert "expected demo or all, got '--help'" in the_one_line(capsys)
     monkeypatch.setenv("INSTALLER", "Pip")
@@ -312,7 +253,7 @@ def test_wrong_words_are_refused_before_anything_is_touched(
     assert not installs
 
 
-def test_changed_pins_update_what_is_there(setup: ModuleType, installs: list[str]) -> None:
+def test_changed_pins_update_what_is_there(setup, installs):
     setup.main()
     with (setup.ROOT / "constraints.txt").open("a") as pins:
         pins.write("another==1.0\n")
@@ -320,20 +261,15 @@ def test_changed_pins_update_what_is_there(setup: ModuleType, installs: list[str
     assert installs == ["all anew", "all more"]
 
 
-def test_moved_checkout_is_set_up_anew(setup: ModuleType, installs: list[str]) -> None:
+def test_moved_checkout_is_set_up_anew(setup, installs):
     setup.main()
     setup.ROOT = setup.ROOT.rename(setup.ROOT.with_name("moved"))
     assert setup.main() == 0
     assert installs == ["all anew", "all anew"]
 
 
-def test_interrupted_setup_is_made_anew(
-    setup: ModuleType,
-    installs: list[str],
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    def interrupted(purpose: str, anew: bool) -> None:
+def test_interrupted_setup_is_made_anew(setup, installs, monkeypatch, capsys):
+    def interrupted(purpose, anew):
         setup.venv("").mkdir()
         raise KeyboardInterrupt
 

@@ -17,10 +17,9 @@ from hoof_env.errors import HoofEnvError, ParameterError, check_number
 from hoof_env.simd.math import EXPONENT_UNIT
 from research.identify.command import check_counts, check_extras, load_start, provenance, run
 from research.identify.confirm import Confirmation, confirm
-from research.identify.job import Result
 from research.identify.leg import to_preset
 from research.identify.problem import LegProblem
-from research.identify.search import BUDGET, SCHEDULE, search
+from research.identify.search import BUDGET, SCHEDULE, Result, search
 from research.identify.state import digest_of, open_state, versions, write_json
 
 EXPONENT = 1.375

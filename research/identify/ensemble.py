@@ -26,8 +26,7 @@ from typing import Any
 
 from hoof_env.errors import HoofEnvError, ParameterError, check_number
 from hoof_env.ground.contact import Ground, load_ground, write_ground
-from research.identify.attempt import Aim
-from research.identify.collect import collect
+from research.identify.collect import Aim, collect
 from research.identify.command import check_counts, check_extras, load_start, provenance, run
 from research.identify.confirm import COUNTED
 from research.identify.problem import LegProblem

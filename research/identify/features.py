@@ -228,7 +228,7 @@ def prominences(force):  # type: ignore[no-untyped-def]
 
 @kernel
 def place(cycle, t):  # type: ignore[no-untyped-def]
-    """Toe and heel at the time t [s], complex [m], by the cubic."""
+    """Toe and heel at the time t [s], complex [m]."""
     at, velocity, h = cycle.at, cycle.velocity, cycle.h
     k = min(max(int(t / h), 0), at.shape[1] - 2)
     toe, _ = cubic(at[0, k], at[0, k + 1], velocity[0, k], velocity[0, k + 1], h, t / h - k)

@@ -16,15 +16,7 @@ from hoof_env.errors import HoofEnvError, check_number
 from hoof_env.ground.contact import Ground
 from hoof_env.paper.published import load_published
 from hoof_env.paper.rows import ILL_CONDITIONED
-from research.identify.demands import (
-    BOTH,
-    DEMANDS,
-    GAIT_DEMANDS,
-    LEG,
-    LEG_DEMANDS,
-    MEASURED,
-    Demand,
-)
+from research.identify.demands import BOTH, DEMANDS, GAIT_DEMANDS, LEG, LEG_DEMANDS, MEASURED, Demand
 from research.identify.features import FEATURES, TOPS
 from research.identify.leg import LEVEL, OFFSET, Choice
 from research.identify.measure import (
@@ -68,8 +60,8 @@ _TRANSMISSION = _NAMES.index("transmission")
 
 
 class Standing(NamedTuple):
-    """Where a candidate stands: whether every row is within its bar and nothing falls short, the error that
-    is furthest out [bars], and the same in words."""
+    """Whether every row is within its bar and nothing falls short, the error that is furthest out [bars], and
+    the same in words."""
 
     met: bool
     error: float
@@ -92,8 +84,7 @@ class Objective:
     Args:
         choice: assembly and law of the legs.
         samples: instants a revolution of the exact solver.
-        paper_solver: the cost counts the paper's solver too, all rows but `ILL_CONDITIONED` and all demands
-            on its gaits.
+        paper_solver: the paper's solver counts too, all rows but `ILL_CONDITIONED` and all demands on gaits.
         by_toe: x holds instead of the hip's height the time [s] at which the toe touches down in walking, and
             instead of the walk's offset the logarithm of the toe's approach speed there [log m/s]; level and
             offset follow: for searches. That contact grazes: a tenth of a millimetre of height, or a
@@ -186,18 +177,16 @@ class Objective:
         sine = np.abs((one.conj() * two).imag) / (np.abs(one) * np.abs(two) + 1e-12)
         return _finite(sense * (bound - sine.min(axis=1)) * scale, MISSED)
 
-    def rows(self, x: Array) -> Array:
-        """Signed errors in bars, shape (rows,), with the exact solver; `MISSED_ROW` if there is no value."""
-        self._measure(x)
-        return self._errors(self._exact.flat)
+    def rows(self, x: Array, *, paper_solver: bool = False) -> Array:
+        """Signed errors in bars, shape (rows,), with one solver; `MISSED_ROW` if there is no value."""
+        return self._errors(self._numbers(x, paper_solver))
 
-    def paper_rows(self, x: Array) -> Array:
-        """The same with the paper's solver."""
-        self._measure(x, True)
-        return self._errors(self._paper.flat)
+    def _numbers(self, x: Array, paper_solver: bool) -> Array:
+        self._measure(x, paper_solver)
+        return (self._paper if paper_solver else self._exact).flat
 
     def plausibility(self, x: Array) -> dict[str, float]:
-        """Shortages above 0 by name of the demand; with "paper." before one of the paper's solver."""
+        """Shortages above 0 by name of the demand, those of the paper's solver after "paper."."""
         self._measure(x, self.paper_solver)
         short = dict(zip(_NAMES, _shortages(self._exact.flat, _DEMANDS).tolist(), strict=True))
         if self.paper_solver:
@@ -209,7 +198,7 @@ class Objective:
         """Where a candidate stands, with the solvers that the cost counts."""
         errors = dict(zip(self.row_ids, self.rows(x).tolist(), strict=True))
         if self.paper_solver:
-            paper = zip(self.row_ids, self.paper_rows(x).tolist(), self._counts, strict=True)
+            paper = zip(self.row_ids, self.rows(x, paper_solver=True).tolist(), self._counts, strict=True)
             errors |= {f"paper.{name}": error for name, error, counts in paper if counts}
         worst = max(errors, key=lambda name: abs(errors[name]))
         within, short = sum(abs(error) <= 1 for error in errors.values()), sum(self.plausibility(x).values())
@@ -219,9 +208,7 @@ class Objective:
 
     def measured(self, x: Array, *, paper_solver: bool = False) -> dict[str, float]:
         """Every number of `demands.MEASURED` by name, NaN where there is none."""
-        self._measure(x, paper_solver)
-        flat = (self._paper if paper_solver else self._exact).flat
-        return dict(zip(MEASURED, flat.tolist(), strict=True))
+        return dict(zip(MEASURED, self._numbers(x, paper_solver).tolist(), strict=True))
 
     def to_touch_down(self, x: Array) -> Array:
         """x as an objective `by_toe` has it, by one that is not.

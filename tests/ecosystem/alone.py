@@ -1,4 +1,4 @@
-"""What the checks share: an environment's own data, to hold against a library's, and a run of a learner."""
+"""What the checks share: what an environment does alone, a film of it, and the run of a learner."""
 
 from __future__ import annotations
 
@@ -20,6 +20,16 @@ def alone(env, actions, seed):
         following, *others, _ = env.step(action)
         yield observation, following, *others
         observation = env.reset()[0] if others[1] or others[2] else following
+
+
+def assert_filmed(folder):
+    """The one film in a folder shows an episode of ten steps, not all of it alike; returns its frames."""
+    imageio = pytest.importorskip("imageio.v3")
+    (file,) = folder.glob("*.mp4")
+    frames = imageio.imread(file)
+    assert len(frames) in (10, 11)  # ten steps and the start; moviepy may round one away
+    assert np.ptp(frames[..., 0].astype(float), axis=0).max() > 50
+    return frames
 
 
 def learns(model, envs, folder, parameters):

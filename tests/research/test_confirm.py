@@ -12,8 +12,8 @@ from hoof_env.paper.rows import EXACT, PROBABLE
 from research.identify.__main__ import best_leg
 from research.identify.command import load_start
 from research.identify.confirm import COUNTED, confirm
-from research.identify.job import Result
 from research.identify.problem import LegProblem
+from research.identify.search import Result
 
 ABOUT = {"start": "first_fit (0)", "seed": 0, "versions": {"cma": "4"}}
 

@@ -59,10 +59,3 @@ def test_a_leg_that_cannot_turn_or_a_gait_beyond_its_limits_is_no_preset():
         to_preset(stuck, CHOICE, "")
     with pytest.raises(ParameterError, match="swing_offset"):
         to_preset(beyond, CHOICE, "")
-
-
-def test_another_crank_speed_is_refused():
-    preset = read_preset("first_fit")
-    preset["gaits"]["walk"]["crank_speed"] = 5.0
-    with pytest.raises(ParameterError, match=r"walk\.crank_speed"):
-        encode(preset)
