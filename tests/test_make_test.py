@@ -1,7 +1,5 @@
 """`make test` ends whatever a test does: one that kills its process or never ends is named, the run fails."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys
@@ -19,14 +17,14 @@ TESTS = {
 }
 
 
-def options() -> list[str]:
+def options():
     """Those of pytest in `make test`, with two processes."""
     (line,) = re.findall(r"-m pytest (-q -n auto .*)", (ROOT / "Makefile").read_text())
     return str(line).replace("-n auto", "-n 2").split()
 
 
 @pytest.mark.parametrize("what", TESTS)
-def test_a_lost_worker_ends_the_run(what: str, tmp_path: Path) -> None:
+def test_a_lost_worker_ends_the_run(what, tmp_path):
     (tmp_path / "pyproject.toml").write_text((ROOT / "pyproject.toml").read_text())
     (tmp_path / "tests").mkdir()
     (tmp_path / "tests" / "test_bad.py").write_text(TESTS[what] + "\n")
@@ -41,6 +39,6 @@ def test_a_lost_worker_ends_the_run(what: str, tmp_path: Path) -> None:
     assert time.monotonic() - started < 100
 
 
-def test_a_test_has_a_limit_of_time(pytestconfig: pytest.Config) -> None:
+def test_a_test_has_a_limit_of_time(pytestconfig):
     assert float(pytestconfig.getini("faulthandler_timeout")) > 0
     assert pytestconfig.getini("faulthandler_exit_on_timeout")

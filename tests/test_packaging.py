@@ -1,7 +1,5 @@
 """What is shipped: the wheel, the version, and an import that costs next to nothing."""
 
-from __future__ import annotations
-
 import json
 import os
 import re
@@ -23,14 +21,14 @@ SHIPPED = {".py", ".json", ".typed", ".toml", ".in", ".md"}
 
 
 @pytest.fixture(scope="module")
-def wheel(tmp_path_factory: pytest.TempPathFactory) -> zipfile.ZipFile:
+def wheel(tmp_path_factory):
     folder = tmp_path_factory.mktemp("dist")
     build = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)]
     subprocess.run(build, cwd=ROOT, check=True, capture_output=True)
     return zipfile.ZipFile(next(folder.glob("*.whl")))
 
 
-def test_wheel_holds_the_package_and_nothing_else(wheel: zipfile.ZipFile) -> None:
+def test_wheel_holds_the_package_and_nothing_else(wheel):
     shipped = {name for name in wheel.namelist() if ".dist-info/" not in name}
     sources = {path for path in (ROOT / "hoof_env").rglob("*") if path.suffix in SHIPPED}
     sources.add(ROOT / "hoof_env" / "py.typed")
@@ -38,7 +36,7 @@ def test_wheel_holds_the_package_and_nothing_else(wheel: zipfile.ZipFile) -> Non
     assert any(name.endswith(".json") for name in shipped)
 
 
-def test_wheel_carries_licence_version_and_command(wheel: zipfile.ZipFile) -> None:
+def test_wheel_carries_licence_version_and_command(wheel):
     info = f"hoof_env-{hoof_env.__version__}.dist-info"
     metadata = wheel.read(f"{info}/METADATA").decode()
     assert f"\nVersion: {hoof_env.__version__}\n" in metadata
@@ -46,7 +44,7 @@ def test_wheel_carries_licence_version_and_command(wheel: zipfile.ZipFile) -> No
     assert "hoof-env = hoof_env.cli:main" in wheel.read(f"{info}/entry_points.txt").decode()
 
 
-def test_import_is_quick_and_loads_nothing_heavy() -> None:
+def test_import_is_quick_and_loads_nothing_heavy():
     """Processor time, which a busy machine hardly changes; the first run of five may still compile bytes."""
     program = (
         "import sys, time; start = time.process_time(); import hoof_env; took = time.process_time() - start;"
@@ -60,7 +58,7 @@ def test_import_is_quick_and_loads_nothing_heavy() -> None:
     assert min(seconds) < 0.5
 
 
-def test_every_dependency_has_a_tested_version() -> None:
+def test_every_dependency_has_a_tested_version():
     """And the tested version lies within the bounds that pyproject.toml gives."""
     from packaging.requirements import Requirement
     from packaging.utils import canonicalize_name

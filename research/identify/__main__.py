@@ -17,12 +17,10 @@ from hoof_env.errors import HoofEnvError, ParameterError, check_number
 from hoof_env.simd.math import EXPONENT_UNIT
 from research.identify.command import check_counts, check_extras, load_start, provenance, run
 from research.identify.confirm import Confirmation, confirm
-from research.identify.job import Result
 from research.identify.leg import to_preset
 from research.identify.problem import LegProblem
-from research.identify.search import BUDGET, SCHEDULE, search
+from research.identify.search import BUDGET, SCHEDULE, Result, search
 from research.identify.state import digest_of, open_state, versions, write_json
-from research.identify.targets import load_targets
 
 EXPONENT = 1.375
 """n of Eq. 14 unless told otherwise: with it a leg meets every published number, see docs/decisions.md."""
@@ -32,7 +30,6 @@ def identify(
     out: Path,
     start: str = "first_fit",
     seed: int = 0,
-    targets: Path | None = None,
     exponent: float = EXPONENT,
     workers: int = 2,
     budget: int = BUDGET,
@@ -47,7 +44,6 @@ def identify(
             folder state holds what a killed search is resumed from.
         start: a preset to search around, a name or a JSON file.
         seed: the same seed and options find the same leg, with any number of workers.
-        targets: JSON file of the rows to meet, as published.json.
         exponent: of the contact law (Eq. 14), which the paper does not print.
         workers: processes.
         budget: evaluations at most; one with the paper's solver counts for several.
@@ -64,10 +60,9 @@ def identify(
             f"got {exponent!r}"
         )
     choice, x = load_start(start, exponent)
-    problem = LegProblem(load_targets(targets), choice)
+    problem = LegProblem(choice)
     about = {
         "start": f"{Path(start).stem} ({digest_of([asdict(choice), x])})",
-        "targets": digest_of([asdict(row) for row in problem.targets]),
         "exponent": exponent,
         "seed": seed,
         "budget": budget,
@@ -110,7 +105,7 @@ def best_leg(
         origin = provenance(f"research.identify, job {result.id}", about)
         try:
             preset = to_preset(np.array(result.x), problem.choice, origin)
-            return result, preset, confirm(preset, problem.targets)
+            return result, preset, confirm(preset)
         except HoofEnvError:  # it does not turn, or a gait is beyond its limits
             continue
     return None

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
-from hoof_env.paper.measure import measure_stance
-from hoof_env.paper.reproduce import SOLVERS, reproduce
-from hoof_env.paper.rows import EXACT, PROBABLE, compare, severity
+from hoof_env.paper.reproduce import reproduce
+from hoof_env.paper.rows import EXACT, PROBABLE, severity
 from hoof_env.paper.shapes import HOOF_ON_GROUND
 from research.identify.objective import MISSED_ROW
-from research.identify.targets import Rows
 
 COUNTED = {"exact": EXACT, "paper": PROBABLE}
 """Solvers that count, by short names: the paper's with Baumgarte's beta as it is probably meant."""
@@ -22,7 +20,7 @@ class Confirmation:
     """What the full system says of a preset.
 
     Attributes:
-        rows, claims: as `hoof_env.paper.reproduce.Reproduction` has them, the rows compared with the targets.
+        rows, claims: as `hoof_env.paper.reproduce.Reproduction` has them.
         errors: by `COUNTED`, the largest error of a row, without the ill-conditioned rows [bars].
         outside: (id, solver) of the rows outside their bars, of the solvers that count.
         untrue: likewise of the claims that do not hold.
@@ -50,28 +48,24 @@ class Confirmation:
         return f"the bar {verdict}; rows within their bars: {', '.join(counts)}"
 
 
-def confirm(preset: Mapping[str, Any], targets: Rows) -> Confirmation:
-    """Run the content of a preset file through the full system and compare it with the targets.
+def confirm(preset: Mapping[str, Any]) -> Confirmation:
+    """Run the content of a preset file through the full system and compare it with the paper.
 
     Raises:
         HoofEnvError: the leg does not turn, or its simulation stops.
     """
     content: Any = dict(preset)
     run = reproduce(preset=content)
-    published = replace(run.published, rows=targets)
-    rows: list[dict[str, Any]] = []
-    for solver in SOLVERS:
-        stances = {key[:2]: measure_stance(trace) for key, trace in run.traces.items() if key[2] == solver}
-        rows += compare(published, stances, solver)
-    counted = set(COUNTED.values())
-    outside = [(r["id"], r["solver"]) for r in rows if r["within_bar"] is False and r["solver"] in counted]
+    counted = COUNTED.values()
+    rows = [row for row in run.rows if row["solver"] in counted]
+    outside = [(row["id"], row["solver"]) for row in rows if row["within_bar"] is False]
     untrue = [
         (claim["id"], claim["solver"])
         for claim in run.shapes
         if claim["solver"] in counted and not claim["readings"].get(HOOF_ON_GROUND, claim["holds"])
     ]
-    errors = dict.fromkeys(COUNTED, MISSED_ROW)
+    errors = {}
     for name, solver in COUNTED.items():
-        off = [severity(row, published) for row in rows if row["solver"] == solver and not row["spared"]]
-        errors[name] = min(max(off, default=MISSED_ROW), MISSED_ROW)
-    return Confirmation(rows, run.shapes, errors, outside, untrue)
+        judged = [row for row in rows if row["solver"] == solver and not row["spared"]]
+        errors[name] = min(max(severity(row, run.published) for row in judged), MISSED_ROW)
+    return Confirmation(run.rows, run.shapes, errors, outside, untrue)

@@ -26,13 +26,11 @@ from typing import Any
 
 from hoof_env.errors import HoofEnvError, ParameterError, check_number
 from hoof_env.ground.contact import Ground, load_ground, write_ground
-from research.identify.attempt import Aim
-from research.identify.collect import collect
+from research.identify.collect import Aim, collect
 from research.identify.command import check_counts, check_extras, load_start, provenance, run
 from research.identify.confirm import COUNTED
 from research.identify.problem import LegProblem
 from research.identify.state import digest_of, open_state, read_json, versions, write_json
-from research.identify.targets import load_targets
 
 
 def load_ensemble(preset: str) -> list[dict[str, Any]]:
@@ -55,7 +53,6 @@ def ensemble(
     size: int = 24,
     bar: float = 1.0,
     both: bool = False,
-    targets: Path | None = None,
     seed: int = 0,
     attempts: int = 240,
     workers: int = 2,
@@ -71,7 +68,6 @@ def ensemble(
         size: members wanted.
         bar: largest error of a row, in units of its own bar.
         both: rows count with the paper's solver too, all but the ill-conditioned.
-        targets: JSON file of the rows to meet, as published.json.
         seed: the same seed and options find the same legs, with any number of workers.
         attempts: to find a further leg; the members are chosen among all that were found.
         workers: processes.
@@ -97,10 +93,9 @@ def ensemble(
         if x in legs.values():
             raise ParameterError(f"starts: expected different legs, got one twice: {source}")
         legs[f"{Path(source).stem} ({digest_of([asdict(choice), x])})"] = x
-    aim = Aim(LegProblem(load_targets(targets), choice), bar, both)
+    aim = Aim(LegProblem(choice), bar, both)
     about = {
         "starts": [*legs],
-        "targets": digest_of([asdict(row) for row in aim.problem.targets]),
         "bar": bar,
         "both": both,
         "seed": seed,

@@ -82,7 +82,7 @@ def half_link(bodies, i, sense):  # type: ignore[no-untyped-def]
 
 @kernel
 def place_arm(bodies, i, arm):  # type: ignore[no-untyped-def]
-    """Position and velocity of the point at `arm` from the centre of body i, complex [m, m/s]."""
+    """Position and velocity of the point at `arm` from the centre of body i [m, m/s]."""
     q, qd = bodies.q, bodies.qd
     return complex(q[i, 0], q[i, 1]) + arm, complex(qd[i, 0], qd[i, 1]) + 1j * qd[i, 2] * arm
 
@@ -110,8 +110,7 @@ def accelerate(pivot, values, motion, damping, spring, bodies, points):  # type:
     """Fill `bodies.qdd` by the second row of Eq. 8, and `points`; returns False where it is singular.
 
     Args:
-        pivot: C relative to O, complex [m].
-        values: as from `geometry.tables`.
+        pivot, values: as in `motion.leg_paths`.
         motion: (theta, its rate, phi, its rate, its acceleration); the crank's acceleration is 0.
         damping, spring: 2 alpha [1/s] and beta^2 [1/s^2].
     """
@@ -192,17 +191,12 @@ def euler_cycle(crank, pivot, values, setup, gait, theta, h, bodies, at, velocit
     """Integrate one steady gait by explicit Euler from closed loops; returns whether all stayed finite.
 
     Args:
-        crank: OP [m].
-        pivot: C relative to O, complex [m].
-        values: as from `geometry.tables`.
+        crank, pivot, values: as in `motion.leg_paths`.
         setup: the leg and its solver, see `measure.Setup`.
-        gait: (crank speed [rad/s], offset, sine and cosine coefficient of the swing [rad]).
+        gait, at, velocity, ankle: as in `motion.swing_hoof`, at n instants from the start.
         theta: crank angle at the start [rad].
         h: time step [s].
         bodies: output, the state at the end.
-        at, velocity: outputs, complex, shape (2, n): toe and heel relative to O at n instants, the first at
-            the start, in world axes [m, m/s].
-        ankle: output, shape (n,): height of G relative to O [m].
 
     If a dyad does not close at the start or is singular, or anything stops being finite, all outputs are NaN.
     """
@@ -211,7 +205,7 @@ def euler_cycle(crank, pivot, values, setup, gait, theta, h, bodies, at, velocit
     points = Points(empty[0], empty[1], empty[2])
     bodies.length[DRIVER] = crank
     close_loops(theta, crank, pivot, values, gait, bodies, points)
-    damping, spring, is_regular = 2.0 * setup.alpha, setup.beta * setup.beta, True
+    damping, spring = 2.0 * setup.alpha, setup.beta * setup.beta
     for k in range(at.shape[1]):
         if k > 0:
             for i in range(q.shape[0]):
@@ -219,17 +213,14 @@ def euler_cycle(crank, pivot, values, setup, gait, theta, h, bodies, at, velocit
                     q[i, c] += h * qd[i, c]
                     qd[i, c] += h * bodies.qdd[i, c]
         motion = swing_motion(theta + k * h * gait[0], gait)
-        is_regular = accelerate(pivot, values, motion, damping, spring, bodies, points)
-        if not is_regular:
-            break
+        if not accelerate(pivot, values, motion, damping, spring, bodies, points):
+            q[:], qd[:], ankle[:] = np.nan, np.nan, np.nan
+            at[:], velocity[:] = complex(np.nan, np.nan), complex(np.nan, np.nan)
+            return False
         for c in range(2):
             corner = setup.toe if c == 0 else setup.heel
-            place, rate = place_arm(
-                bodies, _SOLE, half_link(bodies, _SOLE, 1 if _HEAD[_SOLE] == corner else -1)
-            )
+            arm = half_link(bodies, _SOLE, 1 if _HEAD[_SOLE] == corner else -1)
+            place, rate = place_arm(bodies, _SOLE, arm)
             at[c, k], velocity[c, k] = mirror(place, setup.travel), mirror(rate, setup.travel)
         ankle[k] = points.z[_G].imag
-    if not is_regular:
-        q[:], qd[:], ankle[:] = np.nan, np.nan, np.nan
-        at[:], velocity[:] = complex(np.nan, np.nan), complex(np.nan, np.nan)
-    return is_regular
+    return True

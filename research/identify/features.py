@@ -7,12 +7,14 @@ thousand for. `hoof_env.paper` stays the judge: tests compare.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.ground.contact import Ground
+from hoof_env.ground.laws import AMBROSIO, friction_part, normal_force
 from hoof_env.simd.compile import kernel
 
 FEATURES = np.dtype(
@@ -49,12 +51,11 @@ FEATURES = np.dtype(
 BACKWARD = 0.3
 """How fast the sole must move back under half of the load [m/s]."""
 
-CHI, FLOOR, MU, SLOW, FAST = (
-    float(Ground(restitution=0.0).to_record()[name])
-    for name in ("chi", "approach_floor", "friction", "friction_slow", "friction_fast")
-)
-"""The paper's ground at cr = 0: factor of the damping, smallest approach speed [m/s], friction and its two
-speeds [m/s]."""
+GROUND = Ground(restitution=0.0)
+"""The paper's at cr = 0; stiffness and exponent are the leg's."""
+
+CHI = float(GROUND.to_record()["chi"])
+FLOOR, MU, SLOW, FAST = GROUND.approach_floor, GROUND.friction, GROUND.friction_slow, GROUND.friction_fast
 
 NEAR_TOP = 0.9
 """A maximum of the samples from this part of the highest may be the highest between samples [-]."""
@@ -118,13 +119,6 @@ def crossing(d0, d1, v0, v1, h):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def friction_part(v):  # type: ignore[no-untyped-def]
-    """Friction over mu N against a sliding velocity v [m/s], with Ambrosio's correction."""
-    size = min(max((abs(v) - SLOW) / (FAST - SLOW), 0.0), 1.0)
-    return -size if v > 0 else size
-
-
-@kernel
 def force_within(cycle, approach, chi, k, s):  # type: ignore[no-untyped-def]
     """Normal force [N] at part s of the sample that begins at k, by Eq. 14 with the factor `chi`.
 
@@ -137,7 +131,7 @@ def force_within(cycle, approach, chi, k, s):  # type: ignore[no-untyped-def]
             d0, d1 = -height - at[i, k].imag, -height - at[i, k + 1].imag
             d, v = cubic(d0, d1, -velocity[i, k].imag, -velocity[i, k + 1].imag, cycle.h, s)
             if d > 0.0:
-                total += cycle.stiffness * d**cycle.exponent * max(1.0 + chi * v / speed, 0.0)
+                total += normal_force(cycle.stiffness * d**cycle.exponent, chi * v / speed, 0.0)
     return total
 
 
@@ -234,7 +228,7 @@ def prominences(force):  # type: ignore[no-untyped-def]
 
 @kernel
 def place(cycle, t):  # type: ignore[no-untyped-def]
-    """Toe and heel at the time t [s], complex [m], by the cubic."""
+    """Toe and heel at the time t [s], complex [m]."""
     at, velocity, h = cycle.at, cycle.velocity, cycle.h
     k = min(max(int(t / h), 0), at.shape[1] - 2)
     toe, _ = cubic(at[0, k], at[0, k + 1], velocity[0, k], velocity[0, k + 1], h, t / h - k)
@@ -270,8 +264,10 @@ def press(cycle, work, out):  # type: ignore[no-untyped-def]
                     enter[i] = min(enter[i], (k - 1 + s) * h)
                 elastic = cycle.stiffness * d**cycle.exponent
                 work[EL, k] += elastic
-                work[INEL, k] += elastic * max(1.0 + CHI * rate / approach, 0.0)
-                work[PUSH, k] += elastic * (MU * friction_part(velocity[i, k].real))
+                work[INEL, k] += normal_force(elastic, CHI * rate / approach, 0.0)
+                slide = velocity[i, k].real
+                part = friction_part(abs(slide), AMBROSIO, SLOW, FAST)
+                work[PUSH, k] -= math.copysign(elastic * (MU * part), slide)
                 work[TOE_IN + i, k] = approach
             elif k > 0 and before > 0.0:
                 s, v = crossing(before, d, rate_before, rate, h)

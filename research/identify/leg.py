@@ -79,22 +79,7 @@ def encode(preset: Preset, exponent: float | None = None) -> tuple[Choice, Vecto
     return choice, np.array([*logs, *geometry.pivot, geometry.hip_height, *swings])
 
 
-def check_vector(x: Any) -> Vector:
-    """x as floats.
-
-    Raises:
-        ParameterError: another length than `NAMES`, or a number that is not finite.
-    """
-    try:
-        array = np.asarray(x, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ParameterError(f"x: expected {len(NAMES)} numbers, got {x!r}") from None
-    if array.shape != (len(NAMES),) or not np.isfinite(array).all():
-        raise ParameterError(f"x: expected {len(NAMES)} finite numbers, got {x!r}")
-    return array
-
-
-def to_preset(x: Any, choice: Choice, provenance: str) -> dict[str, Any]:
+def to_preset(x: Vector, choice: Choice, provenance: str) -> dict[str, Any]:
     """The content of a preset file, as those in `hoof_env/data`.
 
     Args:
@@ -102,10 +87,12 @@ def to_preset(x: Any, choice: Choice, provenance: str) -> dict[str, Any]:
         provenance: where its numbers come from.
 
     Raises:
-        ParameterError: x has another length, or a gait is outside its limits. GeometryError: the leg cannot
-            turn.
+        ParameterError: x has another length or a number that is not finite, or a gait is outside its limits.
+        GeometryError: the leg cannot turn.
     """
-    values = dict(zip(NAMES, check_vector(x).tolist(), strict=True))
+    if x.shape != (len(NAMES),) or not np.isfinite(x).all():
+        raise ParameterError(f"x: expected {len(NAMES)} finite numbers, got {x!r}")
+    values = dict(zip(NAMES, x.tolist(), strict=True))
     geometry = Geometry(
         lengths={name: float(np.exp(values[f"log {name}"])) for name in LENGTHS},
         pivot=(values["pivot_x"], values["pivot_y"]),

@@ -86,9 +86,9 @@ def new_bodies() -> Bodies:
 
 
 @kernel
-def offset_excess(offset):  # type: ignore[no-untyped-def]
-    """How far a swing offset lies beyond its limits [rad]."""
-    return max(offset - _HIGH[0], _LOW[0] - offset, 0.0)
+def excess(value, low, high):  # type: ignore[no-untyped-def]
+    """How far a value lies beyond its limits."""
+    return max(value - high, low - value, 0.0)
 
 
 @kernel
@@ -97,7 +97,7 @@ def unpack(x, setup, arrays, leg):  # type: ignore[no-untyped-def]
     lengths, values, gaits = np.exp(x[:_COUNT]), arrays.values, arrays.gaits
     leg.length_excess = 0.0
     for i in range(_COUNT):
-        leg.length_excess += max(x[i] - _LOG_RANGE[1], _LOG_RANGE[0] - x[i], 0.0) if i != _SOLE else 0.0
+        leg.length_excess += excess(x[i], _LOG_RANGE[0], _LOG_RANGE[1]) if i != _SOLE else 0.0
     for j in range(STEPS.shape[0]):
         one, two = lengths[_SOURCES[j, 0]], lengths[_SOURCES[j, 1]]
         if STEPS[j, 0] == 1:
@@ -105,16 +105,16 @@ def unpack(x, setup, arrays, leg):  # type: ignore[no-untyped-def]
         else:
             values[j, 0] = one / two
     for g in range(2):
-        excess = 0.0
+        beyond = 0.0
         for i in range(3):
             value = x[_REST + 3 * g + i]
             gaits[g, i + 1] = value
             if i > 0 or g > 0 or not setup.by_toe:  # else the walk's offset is not yet known
-                excess += max(value - _HIGH[i], _LOW[i] - value, 0.0)
+                beyond += excess(value, _LOW[i], _HIGH[i])
         if g == 0:
-            leg.walk_excess = excess
+            leg.walk_excess = beyond
         else:
-            leg.run_excess = excess
+            leg.run_excess = beyond
     leg.sole = lengths[_SOLE]
     leg.pivot_excess = max(abs(complex(x[_PIVOT_X], x[_PIVOT_Y])) - LENGTH_RANGE[1], 0.0)
     return lengths[0]
@@ -126,11 +126,7 @@ def offset_at(z, dz, gait, toe, t, speed):  # type: ignore[no-untyped-def]
 
     Turning the frame turns the toe's velocity: the offset follows in closed form. Of the two that there are,
     about half a turn apart, it is the one nearer to the middle of the limits. A toe that is too slow gets the
-    nearest it can.
-
-    Args:
-        z, dz: from `leg_paths`.
-        gait: as in `swing_hoof`, its offset ignored.
+    nearest it can. The offset in `gait` is ignored.
     """
     h = 2.0 * np.pi / (z.shape[1] - 1)
     theta = min(max(gait[0] * t, 0.0), 6.28)
@@ -148,12 +144,7 @@ def offset_at(z, dz, gait, toe, t, speed):  # type: ignore[no-untyped-def]
 
 @kernel
 def height_at(at, velocity, h, t):  # type: ignore[no-untyped-def]
-    """Height [m] of the swing's centre above a ground that the toe crosses at time t [s].
-
-    Args:
-        at, velocity: from `swing_hoof`.
-        h: time between two samples [s].
-    """
+    """Height [m] of the swing's centre above a ground that the toe crosses at time t [s]; h: of a sample."""
     part = min(max(t / h, 0.0), at.shape[1] - 1.001)
     k = int(part)
     y, _ = cubic(at[0, k].imag, at[0, k + 1].imag, velocity[0, k].imag, velocity[0, k + 1].imag, h, part - k)
@@ -184,7 +175,7 @@ def measure_exact(x, setup, arrays, leg, features, both):  # type: ignore[no-unt
     if setup.by_toe:
         speed = np.exp(min(x[_REST], 5.0))
         gaits[0, 1] = offset_at(z, dz, gaits[0], setup.toe, x[LEVEL], speed)
-        leg.walk_excess += offset_excess(gaits[0, 1])
+        leg.walk_excess += excess(gaits[0, 1], _LOW[0], _HIGH[0])
     for g in range(2):
         h = 2.0 * np.pi / gaits[g, 0] / (at.shape[1] - 1)
         lowest = swing_hoof(z, dz, gaits[g], setup, at, velocity, ankle)

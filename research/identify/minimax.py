@@ -37,14 +37,9 @@ SMALLEST = 1e-5
 
 @dataclass(frozen=True)
 class Rating:
-    """How far a candidate is from its goal.
-
-    Attributes:
-        rows: signed errors [bars], shape (m,).
-        demands: shortages, shape (k,), at most 0 where satisfied.
-        peaks: by index of a row that is the largest of many values, these as errors [bars], shape (n,): the
-            row has a crease where two of them are equal.
-    """
+    """How far a candidate is from its goal: signed errors of the rows [bars]; shortages, at most 0 where a
+    demand is satisfied; and by index of a row that is the largest of many values, which makes creases, these
+    values as errors [bars]."""
 
     rows: Array
     demands: Array
@@ -103,7 +98,6 @@ def descend(
                 radius *= 0.3
                 continue
             if predicted < 1e-5:
-                radius = 0.0
                 break
             best, move_merit, there = y, np.inf, here
             for correction in range(1 + CORRECTIONS):
@@ -141,8 +135,8 @@ class _Model:
         self.highest = {row: int(np.argmax(values)) for row, values in here.peaks.items()}
         self.near = here.demands > -NEAR
         self.plain = np.array([row not in here.peaks for row in range(here.rows.size)])
-        upper, lower, demands = (np.empty((n, v.size)) for v in self._parts(here))
         base = self._parts(here)
+        upper, lower, demands = (np.empty((n, v.size)) for v in base)
         for i in range(n):
             h = step * scales[i]
             moved = y.copy()

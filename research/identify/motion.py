@@ -42,18 +42,14 @@ def close_dyad(p, a, b, r1, r2, side, k, z, dz):  # type: ignore[no-untyped-def]
 
 @kernel
 def leg_paths(crank, pivot, values, z, dz):  # type: ignore[no-untyped-def]
-    """Fill `z`, `dz` (complex, shape (11, n)) over one revolution; returns (miss, transmission).
-
-    Column k stands at theta = 2 pi k / (n - 1); lengths in m, derivatives by theta.
+    """Fill `z`, `dz` (complex, shape (11, n)) over one revolution, column k at theta = 2 pi k / (n - 1), with
+    derivatives by theta. Returns the largest gap of a dyad over its reach [-], at most 0 where all close,
+    and the smallest |sine| of the angle between the links of a dyad [-].
 
     Args:
         crank: OP [m].
         pivot: C relative to O, complex [m].
         values: as from `geometry.tables`.
-
-    Returns:
-        miss: largest gap over the revolution of a dyad that does not close, over the dyad's reach [-].
-        transmission: smallest |sine| of the angle between the links of a dyad [-].
     """
     n = z.shape[1]
     miss, transmission = 0.0, 1.0

@@ -12,20 +12,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.errors import HoofEnvError, ParameterError, check_number
+from hoof_env.errors import HoofEnvError, check_number
 from hoof_env.ground.contact import Ground
-from hoof_env.paper.rows import ILL_CONDITIONED
-from research.identify.demands import (
-    BOTH,
-    DEMANDS,
-    GAIT_DEMANDS,
-    LEG,
-    LEG_DEMANDS,
-    MEASURED,
-    Demand,
-)
+from hoof_env.paper.rows import ILL_CONDITIONED, load_published
+from research.identify.demands import BOTH, DEMANDS, GAIT_DEMANDS, LEG, LEG_DEMANDS, MEASURED, Demand
 from research.identify.features import FEATURES, TOPS
-from research.identify.leg import LEVEL, OFFSET, Choice, check_vector
+from research.identify.leg import LEVEL, OFFSET, Choice
 from research.identify.measure import (
     PAPER_SAMPLES,
     Setup,
@@ -36,7 +28,6 @@ from research.identify.measure import (
 )
 from research.identify.minimax import Rating
 from research.identify.motion import NUMBER, STEPS
-from research.identify.targets import Rows, load_targets
 
 Array = NDArray[np.float64]
 Columns = tuple[NDArray[np.int64], Array, Array, Array]
@@ -68,8 +59,8 @@ _TRANSMISSION = _NAMES.index("transmission")
 
 
 class Standing(NamedTuple):
-    """Where a candidate stands: whether every row is within its bar and nothing falls short, the error that
-    is furthest out [bars], and the same in words."""
+    """Whether every row is within its bar and nothing falls short, the error that is furthest out [bars], and
+    the same in words."""
 
     met: bool
     error: float
@@ -91,37 +82,26 @@ class Objective:
 
     Args:
         choice: assembly and law of the legs.
-        targets: rows with their bars; the paper's own if None. A row without a bar does not count.
         samples: instants a revolution of the exact solver.
-        paper_solver: the cost counts the paper's solver too, all rows but `ILL_CONDITIONED` and all demands
-            on its gaits.
+        paper_solver: the paper's solver counts too, all rows but `ILL_CONDITIONED` and all demands on gaits.
         by_toe: x holds instead of the hip's height the time [s] at which the toe touches down in walking, and
             instead of the walk's offset the logarithm of the toe's approach speed there [log m/s]; level and
             offset follow: for searches. That contact grazes: a tenth of a millimetre of height, or a
             milliradian, is a large step of the inelastic force. See `to_touch_down`, `from_touch_down`.
 
     Attributes:
-        row_ids: the rows that `rows` gives, in order.
+        row_ids: the paper's rows that have a bar, in the order of `rows`.
 
     Raises:
-        ParameterError: samples out of range, or no row with a bar.
+        ParameterError: samples out of range.
     """
 
     def __init__(
-        self,
-        choice: Choice,
-        targets: Rows | None = None,
-        *,
-        samples: int = 201,
-        paper_solver: bool = False,
-        by_toe: bool = False,
+        self, choice: Choice, *, samples: int = 201, paper_solver: bool = False, by_toe: bool = False
     ) -> None:
         samples = int(check_number("samples", samples, low=21, high=100_001))
-        self.choice, self.targets, self.samples = choice, targets, samples
         self.paper_solver = paper_solver
-        rows = [row for row in (load_targets() if targets is None else targets) if row.bar.limit is not None]
-        if not rows:
-            raise ParameterError("targets: expected at least one row with a bar")
+        rows = [row for row in load_published().rows if row.bar.limit is not None]
         self.row_ids = tuple(row.id for row in rows)
         self._row = (
             np.array([MEASURED.index(row.id.replace("ratio.", "both.")) for row in rows]),
@@ -179,10 +159,9 @@ class Objective:
             ("walk.peak_inelastic", force),
             ("walk.reduction", 100 * (1 - self._exact.records[1][0]["peak_elastic"] / force)),
         ):
-            if name in self.row_ids:
-                row, (_, target, per_unit) = self.row_ids.index(name), self._row
-                peaks[row] = _finite((values - target[row]) * per_unit[row], MISSED_ROW)
-                rows[row] = peaks[row].max()
+            row, (_, target, per_unit) = self.row_ids.index(name), self._row
+            peaks[row] = _finite((values - target[row]) * per_unit[row], MISSED_ROW)
+            rows[row] = peaks[row].max()
         if self.paper_solver:
             rows = np.append(rows, self._errors(self._paper.flat)[self._counts])
             shortages.append(_shortages(self._paper.flat, _OF_GAITS))
@@ -197,19 +176,17 @@ class Objective:
         sine = np.abs((one.conj() * two).imag) / (np.abs(one) * np.abs(two) + 1e-12)
         return _finite(sense * (bound - sine.min(axis=1)) * scale, MISSED)
 
-    def rows(self, x: Array) -> Array:
-        """Signed errors in bars, shape (rows,), with the exact solver; `MISSED_ROW` if there is no value."""
-        self._measure(check_vector(x))
-        return self._errors(self._exact.flat)
+    def rows(self, x: Array, *, paper_solver: bool = False) -> Array:
+        """Signed errors in bars, shape (rows,), with one solver; `MISSED_ROW` if there is no value."""
+        return self._errors(self._numbers(x, paper_solver))
 
-    def paper_rows(self, x: Array) -> Array:
-        """The same with the paper's solver."""
-        self._measure(check_vector(x), True)
-        return self._errors(self._paper.flat)
+    def _numbers(self, x: Array, paper_solver: bool) -> Array:
+        self._measure(x, paper_solver)
+        return (self._paper if paper_solver else self._exact).flat
 
     def plausibility(self, x: Array) -> dict[str, float]:
-        """Shortages above 0 by name of the demand; with "paper." before one of the paper's solver."""
-        self._measure(check_vector(x), self.paper_solver)
+        """Shortages above 0 by name of the demand, those of the paper's solver after "paper."."""
+        self._measure(x, self.paper_solver)
         short = dict(zip(_NAMES, _shortages(self._exact.flat, _DEMANDS).tolist(), strict=True))
         if self.paper_solver:
             names = (f"paper.{name}" for name in _NAMES[len(LEG_DEMANDS) :])
@@ -220,7 +197,7 @@ class Objective:
         """Where a candidate stands, with the solvers that the cost counts."""
         errors = dict(zip(self.row_ids, self.rows(x).tolist(), strict=True))
         if self.paper_solver:
-            paper = zip(self.row_ids, self.paper_rows(x).tolist(), self._counts, strict=True)
+            paper = zip(self.row_ids, self.rows(x, paper_solver=True).tolist(), self._counts, strict=True)
             errors |= {f"paper.{name}": error for name, error, counts in paper if counts}
         worst = max(errors, key=lambda name: abs(errors[name]))
         within, short = sum(abs(error) <= 1 for error in errors.values()), sum(self.plausibility(x).values())
@@ -230,27 +207,24 @@ class Objective:
 
     def measured(self, x: Array, *, paper_solver: bool = False) -> dict[str, float]:
         """Every number of `demands.MEASURED` by name, NaN where there is none."""
-        self._measure(check_vector(x), paper_solver)
-        flat = (self._paper if paper_solver else self._exact).flat
-        return dict(zip(MEASURED, flat.tolist(), strict=True))
+        return dict(zip(MEASURED, self._numbers(x, paper_solver).tolist(), strict=True))
 
     def to_touch_down(self, x: Array) -> Array:
-        """x as a search with `by_toe` has it.
+        """x as an objective `by_toe` has it, by one that is not.
 
         Raises:
             HoofEnvError: the toe does not touch down in walking.
         """
-        measured = Objective(self.choice, self.targets, samples=self.samples).measured(x)
+        measured = self.measured(x)
         time = measured["walk.contact_start"] + max(measured["walk.toe_after_heel_in"], 0.0)
         if not (0 <= time <= 1 and measured["walk.toe_speed"] > 0):
             raise HoofEnvError("expected a walk whose toe touches down, got one whose toe stays in the air")
         return with_toe(x, time, math.log(measured["walk.toe_speed"]))
 
     def from_touch_down(self, y: Array) -> Array:
-        """Inverse of `to_touch_down`, of a walk whose toe comes in once."""
-        by_toe = Objective(self.choice, self.targets, samples=self.samples, by_toe=True)
-        height = by_toe.measured(y)["leg.hip_height"]
-        return with_toe(y, height, float(by_toe._arrays.gaits[0, 1]))
+        """Inverse of `to_touch_down`, by an objective `by_toe`, of a walk whose toe comes in once."""
+        height = self.measured(y)["leg.hip_height"]
+        return with_toe(y, height, float(self._arrays.gaits[0, 1]))
 
 
 def with_toe(x: Array, level: float, offset: float) -> Array:

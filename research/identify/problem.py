@@ -11,7 +11,6 @@ from hoof_env.errors import HoofEnvError
 from research.identify.confirm import confirm
 from research.identify.leg import SCALES, Choice, Vector, to_preset
 from research.identify.objective import Objective, with_toe
-from research.identify.targets import Rows
 
 TOE_DOWN, TOE_SPEED = 0.35, -3.0
 """When [s] and how fast [log m/s] the search puts down a walking toe that stays in the air."""
@@ -31,10 +30,9 @@ PENALTY = 2.0
 
 @dataclass(frozen=True)
 class LegProblem:
-    """What is searched: legs of one choice that meet the targets. A search goes by touch-down, in coordinates
-    y; see `Objective`."""
+    """What is searched: legs of one choice that meet the paper's rows. A search goes by touch-down, in
+    coordinates y; see `Objective`."""
 
-    targets: Rows
     choice: Choice
 
     def objective(self, samples: int, both: bool, by_toe: bool = False) -> Objective:
@@ -58,7 +56,7 @@ class LegProblem:
 
     def outward(self, y: Vector, samples: int) -> Vector:
         """Inverse of `inward`."""
-        x = self.objective(samples, False).from_touch_down(y)
+        x = self.objective(samples, False, True).from_touch_down(y)
         return np.where(np.isfinite(x), x, 0.0)
 
     def merit(self, x: Vector, both: bool) -> float:
@@ -68,11 +66,11 @@ class LegProblem:
     def confirm(self, x: Vector) -> bool:
         """Whether the full system finds every bar met and every claim true."""
         try:
-            return confirm(to_preset(x, self.choice, "a candidate of a search"), self.targets).holds
+            return confirm(to_preset(x, self.choice, "a candidate of a search")).holds
         except HoofEnvError:  # a dead point between two samples, a gait beyond its limits
             return False
 
 
 @lru_cache(maxsize=16)
 def _objective(problem: LegProblem, samples: int, both: bool, by_toe: bool) -> Objective:
-    return Objective(problem.choice, problem.targets, samples=samples, paper_solver=both, by_toe=by_toe)
+    return Objective(problem.choice, samples=samples, paper_solver=both, by_toe=by_toe)

@@ -35,12 +35,14 @@ def processes(count: int) -> Iterator[Run]:
         return
     for variable in _ONE_THREAD:
         os.environ.setdefault(variable, "1")  # as the processes inherit it
-    context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(count, context, initializer=_end_with_parent)
+    pool = ProcessPoolExecutor(count, multiprocessing.get_context("spawn"), initializer=_end_with_parent)
 
     def run(function: Callable[[Any], Any], tasks: Sequence[Any]) -> Iterator[Any]:
-        with _quiet_start():
+        handler = signal.signal(signal.SIGINT, signal.SIG_IGN)  # as the processes inherit it
+        try:
             futures = [pool.submit(function, task) for task in tasks]
+        finally:
+            signal.signal(signal.SIGINT, handler)
         try:
             for future in as_completed(futures):
                 yield future.result()
@@ -57,25 +59,11 @@ def processes(count: int) -> Iterator[Run]:
         pool.shutdown(cancel_futures=True)
 
 
-@contextmanager
-def _quiet_start() -> Iterator[None]:
-    """Processes that are started meanwhile leave an interrupt to their parent."""
-    main = threading.current_thread() is threading.main_thread()
-    handler = signal.signal(signal.SIGINT, signal.SIG_IGN) if main else None
-    try:
-        yield
-    finally:
-        if main:
-            signal.signal(signal.SIGINT, handler)
-
-
 def _end_with_parent() -> None:
-    """Make this process end when its parent does, however that ends."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        threading.Thread(target=_exit_after, args=(parent,), daemon=True).start()
+    parent: Any = multiprocessing.parent_process()
 
+    def wait() -> None:
+        parent.join()
+        os._exit(1)
 
-def _exit_after(parent: Any) -> None:
-    parent.join()
-    os._exit(1)
+    threading.Thread(target=wait, daemon=True).start()

@@ -1,28 +1,198 @@
-"""Rounds of jobs. What a job starts from depends on earlier rounds alone, so that the number of processes,
-a kill and a resumption change nothing in what is found."""
+"""A search: rounds of jobs, each of which goes down from a start of its own.
+
+What a job starts from depends on earlier rounds alone, so that the number of processes, a kill and a
+resumption change nothing in what is found.
+"""
 
 from __future__ import annotations
 
 import itertools
+import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, replace
+from dataclasses import dataclass, replace
 from functools import partial
 
-from research.identify.job import Job, Phase, Result, run_job
-from research.identify.problem import LegProblem
+import numpy as np
+
+from research.identify.leg import Vector
+from research.identify.minimax import Rating, descend
+from research.identify.problem import PENALTY, SAMPLES, TOE_SCALES, LegProblem
 from research.identify.processes import processes
 from research.identify.state import State
+
+CLEAR = 0.995
+"""Largest error with which a job ends at the bar [bars], so that the judge, who samples finer, agrees."""
+
+POPULATION = 20
+"""Of CMA-ES."""
+
+PAPER_WEIGHT = 12
+"""How many evaluations one with the paper's solver counts for: it takes that much longer."""
+
+
+@dataclass(frozen=True)
+class Phase:
+    """One or more rounds of equal jobs, each from a start of its own.
+
+    Attributes:
+        name: in reports.
+        jobs, rounds: jobs a round, and rounds.
+        evaluations: at most, a job; a descent that has begun is finished.
+        sigmas: one is drawn for a job of CMA-ES, or for each hop between descents; in scales.
+        method: "cma" (CMA-ES on the cost of all errors) or "minimax" (descents of the largest error, each
+            from beside the best so far, see `minimax`).
+        elite: how many independent starts are refined, job i from the best result of the i-th best of them;
+            0: a job is an independent start, from a leg around the preset.
+        below: results of other phases that are further out with the exact solver [bars] are not refined.
+        samples: instants a revolution.
+        paper_solver: the objective contains the paper's solver too.
+        ends_at_bar: a job ends as soon as all rows are clear within their bars and nothing falls short.
+    """
+
+    name: str
+    jobs: int
+    evaluations: int
+    sigmas: tuple[float, ...]
+    method: str = "cma"
+    rounds: int = 1
+    elite: int = 0
+    below: float = float("inf")
+    samples: int = 101
+    paper_solver: bool = False
+    ends_at_bar: bool = False
+
+    @property
+    def weight(self) -> int:
+        """What an evaluation counts for."""
+        return PAPER_WEIGHT if self.paper_solver else 1
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a job found.
+
+    Attributes:
+        id: round and index.
+        phase: its name.
+        root: id of the independent start that it goes back to.
+        x: the best leg, see `leg`.
+        evaluations, seconds: spent.
+        exact, both: merit [bars] with the exact solver alone and with both.
+        standing: in words, with both solvers once the leg meets every bar with the exact one.
+        confirmed: the full system finds every bar met and every claim true.
+    """
+
+    id: str
+    phase: str
+    root: str
+    x: tuple[float, ...]
+    evaluations: int
+    seconds: float
+    exact: float
+    both: float
+    standing: str
+    confirmed: bool
+
+
+@dataclass(frozen=True)
+class Job:
+    """A job: its place in the search, the search's seed, what it may spend and where it starts: around x, or
+    from what the job `root` came to."""
+
+    round: int
+    index: int
+    phase: Phase
+    seed: int
+    evaluations: int
+    x: tuple[float, ...]
+    root: str = ""
+
+    @property
+    def id(self) -> str:
+        return f"{self.round:03d}-{self.index:02d}"
+
+
+Progress = Iterator[tuple[Vector, float, int]]
+"""The best y so far, its value and the evaluations spent, again and again."""
+
+
+def evolve(cost: Callable[[Vector], float], y: Vector, sigma: float, rng: np.random.Generator) -> Progress:
+    """CMA-ES on `Objective.cost`, a generation at a time, until it has converged."""
+    import cma
+
+    options = {
+        "verbose": -9,
+        "seed": np.nan,  # draws come from `randn` alone
+        "randn": lambda *shape: rng.standard_normal(shape),
+        "popsize": POPULATION,
+        "tolfun": 1e-5,
+        "CMA_stds": TOE_SCALES,
+        "signals_filename": "",
+    }
+    strategy = cma.CMAEvolutionStrategy(y, sigma, options)
+    while not strategy.stop():
+        points = [np.ascontiguousarray(point) for point in strategy.ask()]  # kernels know one type
+        strategy.tell(points, [cost(point) for point in points])
+        yield np.array(strategy.best.x), float(strategy.best.f), int(strategy.countevals)
+
+
+def hop(
+    rate: Callable[[Vector], Rating], y: Vector, sigmas: tuple[float, ...], rng: np.random.Generator
+) -> Progress:
+    """Descents of `Objective.rate`, one at a time: from y, then from beside the best so far."""
+    value, spent = np.inf, 0
+    while True:
+        size = float(rng.choice(sigmas)) if spent else 0.0
+        start = y + size * TOE_SCALES * rng.standard_normal(y.size)
+        end = descend(rate, start, TOE_SCALES, penalty=PENALTY, central=bool(rng.integers(2)))
+        spent += end.evaluations
+        if end.rating.merit(PENALTY) < value:
+            y, value = end.y, end.rating.merit(PENALTY)
+        yield y, value, spent
+
+
+def run_job(problem: LegProblem, job: Job) -> Result:
+    """Run a job; the same job gives the same result, bit for bit."""
+    began, phase, rng = time.monotonic(), job.phase, np.random.default_rng([job.seed, job.round, job.index])
+    sigma, x = float(rng.choice(phase.sigmas)), np.array(job.x)
+    y = problem.inward(x, phase.samples) if job.root else problem.around(x, phase.samples, rng)
+    objective = problem.objective(phase.samples, phase.paper_solver, True)
+    if phase.method == "cma":
+        progress = evolve(objective.cost, y, sigma, rng)
+    else:
+        progress = hop(objective.rate, y, phase.sigmas, rng)
+    judged, spent = np.inf, 0
+    for y, value, spent in progress:
+        if phase.ends_at_bar and value < judged:
+            judged, x = value, problem.outward(y, phase.samples)
+            standing = problem.objective(SAMPLES, phase.paper_solver).standing(x)
+            if standing.met and abs(standing.error) <= CLEAR:
+                break
+        if spent >= job.evaluations:
+            break
+    x = problem.outward(y, phase.samples)
+    exact, both = (problem.objective(SAMPLES, both).standing(x) for both in (False, True))
+    return Result(
+        id=job.id,
+        phase=phase.name,
+        root=job.root or job.id,
+        x=tuple(x.tolist()),
+        evaluations=spent,
+        seconds=time.monotonic() - began,
+        exact=problem.merit(x, False),
+        both=problem.merit(x, True),
+        standing=both.words if exact.met else exact.words,
+        confirmed=both.met and problem.confirm(x),
+    )
+
 
 BUDGET = 10_000_000
 """Evaluations of a search unless told otherwise; one takes some 0.1 ms."""
 
 Schedule = tuple[Phase, ...]
-"""Phases, run again and again until the bar is reached or the budget spent."""
 
 _DESCEND = Phase("descend", 8, 4_000, (0.003, 0.01, 0.03, 0.1), method="minimax", elite=8, samples=401)
-_POLISH = replace(
-    _DESCEND, name="polish", jobs=4, elite=2, rounds=3, evaluations=16_000, ends_at_bar=True
-)  # fmt: skip
+_POLISH = replace(_DESCEND, name="polish", jobs=4, elite=2, rounds=3, evaluations=16_000, ends_at_bar=True)
 _BOTH = replace(
     _POLISH, name="both solvers", rounds=2, evaluations=8_000, sigmas=(0.002, 0.005, 0.01, 0.02, 0.04),
     below=1.5, paper_solver=True,
@@ -54,15 +224,12 @@ def search(
     budget: int,
     workers: int = 2,
 ) -> list[Result]:
-    """Run or resume a search until a candidate is confirmed or the budget is spent.
-
-    The results are in the order of the jobs; if the full system confirmed a candidate, it is the last.
+    """Run or resume a search from `start`, x of the preset, until a candidate is confirmed or the budget is
+    spent. The results are in the order of the jobs; if the full system confirmed a candidate, it is the last.
 
     Args:
-        start: x of the preset.
         report: called with each result and what it spent, by its weight.
         budget: evaluations, one with the paper's solver by its weight; the last round may exceed it a little.
-        workers: processes.
 
     Raises:
         HoofEnvError: a damaged file, a folder that cannot be written, a job that failed.
@@ -74,12 +241,12 @@ def search(
             if spent >= budget:
                 break
             jobs = plan(number, phase, start, results, seed, budget - spent)
-            done = {job.id: kept for job in jobs if (kept := state.load(f"job-{job.id}", Result.from_dict))}
+            done = {job.id: kept for job in jobs if (kept := state.load(f"job-{job.id}", Result))}
             for result in done.values():
                 report(result, phase.weight * result.evaluations)
             missing = [job for job in _needed(jobs, done) if job.id not in done]
             for result in run(partial(run_job, problem), missing):
-                state.save(f"job-{result.id}", asdict(result))
+                state.save(f"job-{result.id}", result)
                 done[result.id] = result
                 report(result, phase.weight * result.evaluations)
                 if all(job.id in done for job in _needed(jobs, done)):
@@ -101,13 +268,7 @@ def _needed(jobs: list[Job], done: dict[str, Result]) -> list[Job]:
 def plan(
     number: int, phase: Phase, start: tuple[float, ...], results: Sequence[Result], seed: int, left: int
 ) -> list[Job]:
-    """The jobs of a round: none if it refines and there is nothing to refine.
-
-    Args:
-        number: of the round.
-        results: of all earlier rounds.
-        left: of the budget.
-    """
+    """The jobs of a round after these results, `left` of the budget: none where nothing is left to refine."""
     origins = [(result.x, result.root) for result in elite(phase, results)] if phase.elite else [(start, "")]
     evaluations = max(1, min(phase.evaluations, left // (phase.weight * phase.jobs)))
     return [

@@ -8,8 +8,8 @@ from __future__ import annotations
 import hashlib
 import json
 import platform
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TypeVar
@@ -30,8 +30,8 @@ class State:
     folder: Path
     digest: str
 
-    def load(self, name: str, read: Callable[[Any], T]) -> T | None:
-        """What `save` wrote under a name, through `read`; None if there is nothing.
+    def load(self, name: str, kind: type[T]) -> T | None:
+        """The dataclass that `save` wrote under a name; None if there is nothing.
 
         Raises:
             DataFileError: the file is damaged or of another search.
@@ -41,8 +41,9 @@ class State:
             return None
         data = read_json(path, f"delete it to repeat {name}")
         try:
-            digest, content = data["problem"], read(data["content"])
-        except (KeyError, TypeError):
+            digest, fields = data["problem"], data["content"].items()
+            content = kind(**{key: tuple(v) if isinstance(v, list) else v for key, v in fields})
+        except (AttributeError, KeyError, TypeError):
             raise DataFileError(f"{path} is damaged; delete it to repeat {name}") from None
         if digest != self.digest:
             raise DataFileError(
@@ -51,21 +52,15 @@ class State:
         return content
 
     def save(self, name: str, content: Any) -> None:
-        """Write a JSON value under a name; a kill never leaves half of it.
-
-        Raises:
-            OutputError: it cannot be written.
-        """
-        write_json(self.folder, name, {"problem": self.digest, "content": content})
+        """Write a dataclass under a name; a kill never leaves half of it."""
+        write_json(self.folder, name, {"problem": self.digest, "content": asdict(content)})
 
 
 def open_state(out: Path, problem: Mapping[str, Any], *, resume: bool, product: str) -> State:
     """Begin a search in `out`, or go on with the one that is there.
 
     Args:
-        out: the search's output folder, made if need be.
         problem: JSON object, what tells this search from another.
-        resume: go on with a search rather than begin one.
         product: the file that it ends with.
 
     Raises:
@@ -90,9 +85,9 @@ def open_state(out: Path, problem: Mapping[str, Any], *, resume: bool, product: 
         raise DataFileError(f"{str(out)!r} holds no search to resume; leave out --resume to begin one")
     there, here = read_json(file, f"nothing can be resumed: {_HINT}"), json.loads(json.dumps(problem))
     if there != here:
-        keys = [key for key in here if not isinstance(there, dict) or there.get(key) != here[key]]
-        other = there if isinstance(there, dict) else {}
-        differing = (f"{key} is {other.get(key)!r} there and {here[key]!r} here" for key in keys)
+        was = there if isinstance(there, dict) else {}
+        keys = (key for key in here if was.get(key) != here[key])
+        differing = (f"{key} is {was.get(key)!r} there and {here[key]!r} here" for key in keys)
         raise DataFileError(f"{str(out)!r} holds another search: {'; '.join(differing)}; {_HINT}")
     return state
 

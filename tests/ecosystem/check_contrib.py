@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 import torch
+from alone import learns, torch_parameters
 from sb3_contrib import TQC, RecurrentPPO
 from stable_baselines3 import PPO
 from stable_baselines3.common.env_util import make_vec_env
-from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.vec_env import SubprocVecEnv, VecNormalize
 
 torch.set_num_threads(1)
@@ -24,27 +23,19 @@ def test_learn(env_id, algorithm, tmp_path):
     """TQC and RecurrentPPO: `learn` (256 steps), `save`, `load`, `evaluate_policy`."""
     policy, settings = CASES[algorithm]
     envs = make_vec_env(env_id, n_envs=2, seed=0, env_kwargs={"episode_seconds": 0.4})
-    model = algorithm(policy, envs, seed=0, device="cpu", **settings).learn(256)
-    model.save(tmp_path / "model")
-    mean, _ = evaluate_policy(algorithm.load(tmp_path / "model", device="cpu"), envs, n_eval_episodes=2)
-    assert np.isfinite(mean)
+    learns(algorithm(policy, envs, seed=0, device="cpu", **settings), envs, tmp_path, torch_parameters)
 
 
 @pytest.mark.parametrize("method", ["spawn", "forkserver"])
 def test_worker_processes(env_id, method):
     """`SubprocVecEnv`, spawned and from a fork server, `hoof_env:` before the id; PPO on it."""
+    processes = {"vec_env_cls": SubprocVecEnv, "vec_env_kwargs": {"start_method": method}}
     envs = make_vec_env(
-        f"hoof_env:{env_id}",
-        n_envs=2,
-        seed=0,
-        vec_env_cls=SubprocVecEnv,
-        vec_env_kwargs={"start_method": method},
-        env_kwargs={"episode_seconds": 0.4},
+        f"hoof_env:{env_id}", n_envs=2, seed=0, env_kwargs={"episode_seconds": 0.4}, **processes
     )
     try:
-        model = PPO(
-            "MlpPolicy", VecNormalize(envs), n_steps=32, batch_size=32, n_epochs=1, device="cpu"
-        ).learn(64)
+        short = {"n_steps": 32, "batch_size": 32, "n_epochs": 1}
+        model = PPO("MlpPolicy", VecNormalize(envs), device="cpu", **short).learn(64)
         assert all(torch.isfinite(parameter).all() for parameter in model.policy.parameters())
     finally:
         envs.close()

@@ -64,17 +64,6 @@ def table(out: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-def tell(said: str, told: list[dict[str, float]], dead: set[int]) -> None:
-    """What `pytest -s` shows, and docs/distribute.md: the command's lines, and each report of a trial."""
-    lines = [line.strip() for line in said.replace("\r", "\n").splitlines()]
-    print("", *(line for line in lines if line.startswith("trial ") or " done: " in line), sep="\n")
-    print("\ntrial   process   steps    return")
-    for one in told:
-        end = "     killed" if one["pid"] in dead else ""
-        number = str(one["trial_id"]).rpartition("_")[2]
-        print(f"{number}   {one['pid']:<9} {one['steps']:<8} {one['return']:.4f}{end}")
-
-
 def test_worker_killed(tmp_path):
     """Seeds: SIGKILL for a worker in the middle; its trial goes on from its checkpoint, none is lost"""
     process = start(tmp_path, *TRIALS, *SLOW)
@@ -87,7 +76,6 @@ def test_worker_killed(tmp_path):
     assert [(row["seed"], row["state"]) for row in table(tmp_path)] == [(s, "done") for s in "012"]
     seed = str(victim["config"]["seed"])
     told = reports(tmp_path, f"*seed={seed}")
-    tell(said, told, {victim["pid"]})
     pids = [report["pid"] for report in told]
     assert len(set(pids)) > 1
     steps = [report["steps"] for report in told]
@@ -154,7 +142,6 @@ def test_node_killed(tmp_path):
     assert said.count("Retry 1") == 1
     assert [(row["state"], row["steps"]) for row in table(tmp_path)] == [("done", "40448")] * 2
     told = reports(tmp_path, f"*seed={seed}")
-    tell(said, told, dead)
     assert told[-1]["pid"] not in dead
     assert_undisturbed(tmp_path, seed, 40_000)
 

@@ -6,9 +6,9 @@ import gymnasium as gym
 import jax
 import numpy as np
 import pytest
+from alone import alone, learns, skip_unless_native
 from sbx import PPO, SAC
 from stable_baselines3.common.env_util import make_vec_env
-from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.vec_env import VecMonitor
 
 from hoof_env import Sb3VecEnv
@@ -27,8 +27,7 @@ def envs(request, env_id):
     """Two environments as Stable-Baselines3's `make_vec_env` makes them, or `Sb3VecEnv`."""
     if request.param == "dummy":
         return make_vec_env(env_id, n_envs=2, env_kwargs={"episode_seconds": SECONDS})
-    if gym.spec(env_id).vector_entry_point is None:
-        pytest.skip("no native vector environment")
+    skip_unless_native(env_id)
     return VecMonitor(Sb3VecEnv(env_id, num_envs=2, episode_seconds=SECONDS))
 
 
@@ -36,37 +35,20 @@ def envs(request, env_id):
 def test_learn(env_id, envs, algorithm, tmp_path):
     """PPO and SAC: `learn` (256 steps), `save`, `load`, `evaluate_policy`; also on `Sb3VecEnv`."""
     model = algorithm("MlpPolicy", envs, seed=5, policy_kwargs={"net_arch": [16]}, **CASES[algorithm])
-    before = jax.tree.leaves(model.policy.actor_state.params)
-    model.learn(256)
-    after = jax.tree.leaves(model.policy.actor_state.params)
-    assert any((old != new).any() for old, new in zip(before, after, strict=True))
-    assert all(np.isfinite(leaf).all() for leaf in after)
-    assert len(model.ep_info_buffer) >= 10
+    learns(model, envs, tmp_path, lambda model: jax.tree.leaves(model.policy.actor_state.params))
     if algorithm is SAC:
         assert_plays_again(env_id, model)
-    model.save(tmp_path / "model")
-    again = algorithm.load(tmp_path / "model")
-    observation = envs.reset()
-    np.testing.assert_array_equal(
-        *(one.predict(observation, deterministic=True)[0] for one in (model, again))
-    )
-    mean, _ = evaluate_policy(again, envs, n_eval_episodes=2)
-    assert np.isfinite(mean)
 
 
 def assert_plays_again(env_id, model):
     """What the replay buffer holds is what the environment does, the last observations of episodes too."""
     buffer = model.replay_buffer
     for row in range(2):
-        env = gym.make(env_id, episode_seconds=SECONDS)
-        observation, _ = env.reset(seed=5 + row)
-        for step in range(buffer.pos):
+        actions = model.policy.unscale_action(buffer.actions[: buffer.pos, row])
+        played = alone(gym.make(env_id, episode_seconds=SECONDS), actions, seed=5 + row)
+        for step, (observation, following, reward, terminated, truncated) in enumerate(played):
             np.testing.assert_array_equal(buffer.observations[step, row], observation)
-            action = model.policy.unscale_action(buffer.actions[step, row])
-            observation, reward, terminated, truncated, _ = env.step(action)
-            np.testing.assert_array_equal(buffer.next_observations[step, row], observation)
+            np.testing.assert_array_equal(buffer.next_observations[step, row], following)
             assert buffer.rewards[step, row] == np.float32(reward)
             assert buffer.dones[step, row] == (terminated or truncated)
             assert buffer.timeouts[step, row] == (truncated and not terminated)
-            if terminated or truncated:
-                observation, _ = env.reset()

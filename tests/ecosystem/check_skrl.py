@@ -6,6 +6,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 import torch
+from alone import skip_unless_native
 from skrl.agents.torch.ppo import PPO
 from skrl.envs.wrappers.torch import wrap_env
 from skrl.memories.torch import RandomMemory
@@ -27,8 +28,8 @@ def env(request, env_id):
     set_seed(SEED)
     if request.param == "single":
         return wrap_env(gym.make(env_id, episode_seconds=SECONDS), verbose=False)
-    if request.param == "native" and gym.spec(env_id).vector_entry_point is None:
-        pytest.skip("no native vector environment")
+    if request.param == "native":
+        skip_unless_native(env_id)
     settings = {"vectorization_mode": MODES[request.param], "episode_seconds": SECONDS}
     return wrap_env(gym.make_vec(env_id, num_envs=2, **settings), verbose=False)
 
@@ -46,21 +47,14 @@ def test_wrap_env(env_id, env):
         actions = 2 * torch.rand(env.num_envs, *env.action_space.shape) - 1
         observations, rewards, terminated, truncated, _ = env.step(actions)
         for row, (one, action) in enumerate(zip(alone, actions.numpy(), strict=True)):
-            told = (
-                observations[row].numpy(),
-                rewards[row].item(),
-                terminated[row].item(),
-                truncated[row].item(),
-            )
             if ended[row]:  # this step restarts
-                assert told[1:] == (0.0, False, False)
-                np.testing.assert_array_equal(told[0], one.reset()[0])
-                ended[row] = False
-                continue
-            observation, *others, _ = one.step(action)
-            np.testing.assert_array_equal(told[0], observation)
-            assert told[1:] == (np.float32(others[0]), *others[1:])
-            ended[row] = told[2] or told[3]
+                observation, wanted = one.reset()[0], [0.0, False, False]
+            else:
+                observation, reward, *flags, _ = one.step(action)
+                wanted = [np.float32(reward), *flags]
+            np.testing.assert_array_equal(observations[row].numpy(), observation)
+            assert [told[row].item() for told in (rewards, terminated, truncated)] == wanted
+            ended[row] = wanted[1] or wanted[2]
             ends += ended[row]
         if env.num_envs == 1 and ended[0]:  # as skrl's trainers do
             np.testing.assert_array_equal(env.reset()[0][0], alone[0].reset()[0])
@@ -96,8 +90,7 @@ def test_ppo(env, tmp_path):
 
 def test_render(env_id):
     """`SequentialTrainer`'s `env.render()` of a native vector environment: a frame of each."""
-    if gym.spec(env_id).vector_entry_point is None:
-        pytest.skip("no native vector environment")
+    skip_unless_native(env_id)
     envs = gym.make_vec(
         env_id, num_envs=2, vectorization_mode="vector_entry_point", render_mode="rgb_array", rendered=2
     )

@@ -8,6 +8,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 import torch
+from alone import alone
 from tianshou.algorithm import PPO, SAC
 from tianshou.algorithm.algorithm_base import RandomActionPolicy
 from tianshou.algorithm.modelfree.reinforce import ProbabilisticActorPolicy
@@ -55,15 +56,11 @@ def assert_collects(vectorize, env_id):
 
 def assert_plays_again(env, batch):
     """What a buffer holds is what the environment does with its actions."""
-    observation, _ = env.reset(seed=3)
-    for step in range(len(batch)):
+    for step, (observation, following, reward, *ended) in enumerate(alone(env, batch.act, seed=3)):
         np.testing.assert_array_equal(batch.obs[step], observation)
-        observation, reward, terminated, truncated, _ = env.step(batch.act[step])
-        np.testing.assert_array_equal(batch.obs_next[step], observation)
+        np.testing.assert_array_equal(batch.obs_next[step], following)
         assert batch.rew[step] == reward
-        assert (batch.terminated[step], batch.truncated[step]) == (terminated, truncated)
-        if terminated or truncated:
-            observation, _ = env.reset()
+        assert [batch.terminated[step], batch.truncated[step]] == ended
 
 
 def actor(env):

@@ -22,39 +22,11 @@ def zoo(command, *arguments):
 
 
 def train_and_enjoy(algorithm, env_id, folder):
-    common = (
-        "--algo",
-        algorithm,
-        "--env",
-        env_id,
-        "-f",
-        folder,
-        "--seed",
-        "0",
-        "--device",
-        "cpu",
-        "--num-threads",
-        "1",
-    )
-    settings = (
-        "--conf-file",
-        SETTINGS / f"{algorithm}.yml",
-        "--hyperparams",
-        *FEW.get(algorithm, OFF_POLICY),
-    )
-    zoo(
-        "train",
-        *common,
-        *settings,
-        "-n",
-        "300",
-        "--eval-freq",
-        "200",
-        "--eval-episodes",
-        "1",
-        "--env-kwargs",
-        "episode_seconds:0.4",
-    )
+    common = f"--algo {algorithm} --env {env_id} --seed 0 --device cpu --num-threads 1".split()
+    common += ["-f", folder]
+    settings = ["--conf-file", SETTINGS / f"{algorithm}.yml", "--env-kwargs", "episode_seconds:0.4"]
+    settings += ["--hyperparams", *FEW.get(algorithm, OFF_POLICY)]
+    zoo("train", *common, *settings, *["-n", "300", "--eval-freq", "200", "--eval-episodes", "1"])
     run = folder / algorithm / f"{env_id.replace('/', '-')}_1"
     assert (run / f"{env_id.replace('/', '-')}.zip").exists()
     assert (run / "best_model.zip").exists()

@@ -3,12 +3,17 @@ vector reward, which libraries for one objective cannot take; one with `mo_id` r
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+
 import gymnasium as gym
 import pytest
 
 import hoof_env  # noqa: F401  (registers the environments)
 
 collect_ignore = ["third_party"]  # somebody else's project
+
+sys.path.insert(0, str(Path(__file__).parent))  # for `alone`
 
 MULTI_OBJECTIVE = "hoof_env.envs.multi_objective:"
 

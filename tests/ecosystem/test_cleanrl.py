@@ -7,6 +7,7 @@ from functools import partial
 import gymnasium as gym
 import numpy as np
 import pytest
+from alone import alone, skip_unless_native
 
 SECONDS = 0.2
 """Of an episode: ten steps."""
@@ -28,18 +29,15 @@ def make_env(env_id):
     return gym.wrappers.TransformReward(env, lambda reward: np.clip(reward, -10, 10))
 
 
-def alone(env_id, row, actions):
+def ends(env_id, row, actions):
     """Last observations and returns of an environment's episodes under clipped actions (steps, 4)."""
     env = gym.make(env_id, episode_seconds=SECONDS)
-    env.reset(seed=1 + row)
     last, returns, total = [], [], 0.0
-    for action in actions.clip(-1, 1):
-        observation, reward, terminated, truncated, _ = env.step(action)
+    for _, observation, reward, terminated, truncated in alone(env, actions.clip(-1, 1), seed=1 + row):
         total += reward
         if terminated or truncated:
             last.append(observation)
             returns.append(total)
-            env.reset()
             total = 0.0
     return last, returns
 
@@ -92,7 +90,7 @@ def test_ppo(env_id):
     assert all(torch.isfinite(parameter).all() for parameter in parameters)
     assert all(not torch.equal(*pair) for pair in zip(before, parameters, strict=True))
     for row in range(ROWS):
-        assert returns[row] == pytest.approx(alone(env_id, row, np.array(taken)[:, row])[1])
+        assert returns[row] == pytest.approx(ends(env_id, row, np.array(taken)[:, row])[1])
         assert len(returns[row]) >= 6
 
 
@@ -102,9 +100,8 @@ def test_final_obs(env_id, kind):
     if kind == "sync":
         make = partial(gym.make, env_id, episode_seconds=SECONDS)
         envs = gym.vector.SyncVectorEnv([make] * ROWS, autoreset_mode=MODE)
-    elif gym.spec(env_id).vector_entry_point is None:
-        pytest.skip("no native vector environment")
     else:
+        skip_unless_native(env_id)
         settings = {"vectorization_mode": "vector_entry_point", "episode_seconds": SECONDS}
         envs = gym.make_vec(env_id, num_envs=ROWS, autoreset_mode=MODE, **settings)
     envs = gym.wrappers.vector.RecordEpisodeStatistics(envs)
@@ -122,7 +119,7 @@ def test_final_obs(env_id, kind):
             assert not np.array_equal(real_next_obs[row], next_obs[row])
     envs.close()
     for row in range(ROWS):
-        observations, sums = alone(env_id, row, np.array(taken)[:, row])
+        observations, sums = ends(env_id, row, np.array(taken)[:, row])
         np.testing.assert_array_equal(last[row], observations)
         assert returns[row] == pytest.approx(sums)
         assert len(sums) >= 4

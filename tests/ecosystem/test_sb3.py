@@ -5,13 +5,12 @@ from __future__ import annotations
 import warnings
 
 import gymnasium as gym
-import numpy as np
 import pytest
 import torch
+from alone import learns, torch_parameters
 from stable_baselines3 import PPO, SAC, TD3
 from stable_baselines3.common.env_checker import check_env
 from stable_baselines3.common.env_util import make_vec_env
-from stable_baselines3.common.evaluation import evaluate_policy
 
 SMALL = {
     PPO: {"n_steps": 64, "batch_size": 64, "n_epochs": 2},
@@ -42,17 +41,4 @@ def test_learn(env_id, algorithm, tmp_path):
     model = algorithm(
         "MlpPolicy", envs, seed=0, policy_kwargs={"net_arch": [16]}, device="cpu", **SMALL[algorithm]
     )
-    before = [parameter.clone() for parameter in model.policy.parameters()]
-    model.learn(256)
-    after = list(model.policy.parameters())
-    assert any(not torch.equal(*pair) for pair in zip(before, after, strict=True))
-    assert all(torch.isfinite(parameter).all() for parameter in after)
-    assert len(model.ep_info_buffer) > 0
-    model.save(tmp_path / "model")
-    again = algorithm.load(tmp_path / "model", device="cpu")
-    observation = envs.reset()
-    np.testing.assert_array_equal(
-        *(one.predict(observation, deterministic=True)[0] for one in (model, again))
-    )
-    mean, _ = evaluate_policy(again, envs, n_eval_episodes=2)
-    assert np.isfinite(mean)
+    learns(model, envs, tmp_path, torch_parameters)

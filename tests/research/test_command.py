@@ -11,6 +11,7 @@ import pytest
 
 from hoof_env.leg.geometry import load_geometry, read_preset
 from research.identify.__main__ import main
+from tests.research.commands import refusal, wait_for_end, wait_until
 
 COMMAND = [sys.executable, "-m", "research.identify"]
 
@@ -32,11 +33,7 @@ def contents(folder):
 
 def test_a_search_writes_a_preset_and_how_good_it_is(searched):
     out, done = searched
-    assert {path.name for path in out.iterdir()} == {
-        "identified.json",
-        "identify.json",
-        "state",
-    }
+    assert {path.name for path in out.iterdir()} == {"identified.json", "identify.json", "state"}
     assert done.stderr == ""
     *jobs, verdict, preset, report = done.stdout.splitlines()
     assert all(line.startswith("job 0") for line in jobs)
@@ -54,24 +51,19 @@ def test_a_search_writes_a_preset_and_how_good_it_is(searched):
 def test_a_finished_search_is_neither_begun_anew_nor_mixed_with_another(searched, capsys, tmp_path):
     out, _ = searched
     before = contents(out)
-    targets = tmp_path / "targets.json"
-    targets.write_text(json.dumps({"rows": [_row("walk.contact_start")]}))
     preset = tmp_path / "other.json"
-    preset.write_text(json.dumps(_moved_preset()))
+    moved = read_preset("first_fit")
+    moved["geometry"]["hip_height"] += 0.001
+    preset.write_text(json.dumps(moved))
     for arguments, message in [
         ([], "already holds a search"),
         (["--resume", "--seed", "1"], "seed is 0 there and 1 here"),
         (["--resume", "--budget", "300"], "budget is 200 there and 300 here"),
         (["--resume", "--exponent", "1.5"], "exponent is 1.375 there and 1.5 here"),
         (["--resume", "--start", str(preset)], "start is 'first_fit ("),
-        (["--resume", "--targets", str(targets)], "targets is "),
     ]:
         options = arguments if "--budget" in arguments else [*arguments, "--budget", "200"]
-        assert main(["--out", str(out), *options]) == 2
-        error = capsys.readouterr().err
-        assert error.startswith("error: ")
-        assert error.count("\n") == 1
-        assert message in error
+        assert message in refusal(main, ["--out", out, *options], capsys)
     assert contents(out) == before
 
 
@@ -79,24 +71,18 @@ def test_a_finished_search_resumes_to_the_same_files(searched, capsys):
     out, _ = searched
     before = contents(out)
     assert main(["--out", str(out), "--budget", "200", "--resume"]) == 0
-    after = contents(out)
-    same = [path for path in before if before[path] == after[path]]
-    assert same == [*before]
+    assert contents(out) == before
 
 
 def test_a_leg_found_alone_is_not_written_over(tmp_path, capsys):
     (tmp_path / "identified.json").write_text("mine")
-    assert main(["--out", str(tmp_path), "--budget", "200"]) == 2
-    assert "already holds a search" in capsys.readouterr().err
+    assert "already holds a search" in refusal(main, ["--out", tmp_path, "--budget", "200"], capsys)
     assert [path.name for path in tmp_path.iterdir()] == ["identified.json"]
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--targets", "EMPTY"], "list 'rows' of at least one row"),
-        (["--targets", "CONTRADICTION"], "row walk.contact_end: expected later than walk.contact_start"),
-        (["--targets", "nowhere.json"], "cannot read nowhere.json"),
         (["--start", "STUCK"], "stuck.json: dyad 1 (C-B-P"),
         (["--start", "nobody"], "start nobody: preset: expected one of first_fit"),
         (["--start", "GROUND"], "ground.json: preset"),
@@ -104,10 +90,7 @@ def test_a_leg_found_alone_is_not_written_over(tmp_path, capsys):
         (["--start", "SLOW"], "run.crank_speed: expected the paper's 6.283185 rad/s, got 3.0"),
         (["--workers", "0"], "workers: expected a finite number in [1, 1024], got 0"),
         (["--budget", "0"], "budget: expected"),
-        (
-            ["--exponent", "1.4142"],
-            "exponent: expected a multiple of 1/8, for no environment takes another, got",
-        ),
+        (["--exponent", "1.4142"], "exponent: expected a multiple of 1/8, for no environment takes another"),
         (["--seed", "-1"], "seed: expected"),
         (["--resume"], "holds no search to resume"),
     ],
@@ -118,96 +101,39 @@ def test_bad_input_is_one_line_before_anything_is_written(tmp_path, capsys, argu
     del gaitless["gaits"]["run"]
     slow["gaits"]["run"]["crank_speed"] = 3.0
     ground = {**read_preset("first_fit"), "ground": {"exponent": -1}}
-    files = {
-        "GROUND": ground,
-        "EMPTY": {"rows": []},
-        "CONTRADICTION": {"rows": [_row("walk.contact_start", published=0.6), _row("walk.contact_end")]},
-        "STUCK": stuck,
-        "GAITLESS": gaitless,
-        "SLOW": slow,
-    }
+    files = {"GROUND": ground, "STUCK": stuck, "GAITLESS": gaitless, "SLOW": slow}
     for name, content in files.items():
         (tmp_path / f"{name.lower()}.json").write_text(json.dumps(content))
     given = [str(tmp_path / f"{a.lower()}.json") if a in files else a for a in arguments]
     out = tmp_path / "out"
-    assert main(["--out", str(out), *given]) == 2
-    error = capsys.readouterr().err
-    assert error.startswith("error: ")
-    assert error.count("\n") == 1
-    assert message in error
+    assert message in refusal(main, ["--out", out, *given], capsys)
     assert not out.exists()
 
 
 def test_a_folder_that_cannot_be_written_is_one_line(tmp_path, capsys):
     (tmp_path / "file").write_text("mine")
-    assert main(["--out", str(tmp_path / "file")]) == 2
-    assert "cannot write to" in capsys.readouterr().err
+    assert "cannot write to" in refusal(main, ["--out", tmp_path / "file"], capsys)
     assert (tmp_path / "file").read_text() == "mine"
 
 
 @pytest.mark.parametrize("name", ["cma", "scipy", "tqdm"])
 def test_a_missing_extra_is_named_with_the_way_out(tmp_path, capsys, monkeypatch, name):
     monkeypatch.setitem(sys.modules, name, None)
-    assert main(["--out", str(tmp_path / "out")]) == 2
-    assert f'identify needs {name}: pip install "hoof-env[identify]"' in capsys.readouterr().err
+    error = refusal(main, ["--out", tmp_path / "out"], capsys)
+    assert f'identify needs {name}: pip install "hoof-env[identify]"' in error
     assert not (tmp_path / "out").exists()
-
-
-def test_importing_the_command_line_needs_none_of_them(tmp_path):
-    code = "import sys, hoof_env.cli; print(*[m for m in ('cma', 'tqdm', 'scipy') if m in sys.modules])"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == ""
 
 
 @pytest.mark.skipif(not hasattr(os, "killpg"), reason="no process groups")
 def test_an_interrupt_keeps_the_search_and_says_how_to_go_on(tmp_path):
     out = tmp_path / "out"
     process = subprocess.Popen(
-        [
-            *COMMAND,
-            "--out",
-            str(out),
-        ],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
+        [*COMMAND, "--out", str(out)], stderr=subprocess.PIPE, text=True, start_new_session=True
     )
-    deadline = time.monotonic() + 300
-    while not (out / "state" / "problem.json").exists():
-        assert process.poll() is None, process.communicate()[1]
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
+    wait_until((out / "state" / "problem.json").exists, process)
     time.sleep(2.0)  # its workers start
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does, to all of them
     _, errors = process.communicate(timeout=300)
     assert process.returncode == 130, errors
     assert errors == "interrupted; the same command goes on with --resume\n"
-    while _alive(process.pid):
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
-
-
-def _alive(group):
-    try:
-        os.killpg(group, 0)
-    except ProcessLookupError:
-        return False
-    return True
-
-
-def _row(row_id, **changes):
-    rows = json.loads((_published()).read_text(encoding="utf-8"))["rows"]
-    return {**next(row for row in rows if row["id"] == row_id), **changes}
-
-
-def _published():
-    from importlib import resources
-
-    return resources.files("hoof_env.paper").joinpath("published.json")
-
-
-def _moved_preset():
-    preset = read_preset("first_fit")
-    preset["geometry"]["hip_height"] += 0.001
-    return preset
+    wait_for_end(process)

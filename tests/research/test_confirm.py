@@ -1,28 +1,25 @@
 """The judge: the full system, and the best leg of a search under it."""
 
-import json
 from dataclasses import replace
-from importlib import resources
 
 import numpy as np
 import pytest
 
 from hoof_env.leg.geometry import load_geometry, read_preset
 from hoof_env.paper.reproduce import reproduce
-from hoof_env.paper.rows import EXACT, PROBABLE
+from hoof_env.paper.rows import EXACT, PROBABLE, load_published
 from research.identify.__main__ import best_leg
 from research.identify.command import load_start
 from research.identify.confirm import COUNTED, confirm
-from research.identify.job import Result
 from research.identify.problem import LegProblem
-from research.identify.targets import load_targets
+from research.identify.search import Result
 
 ABOUT = {"start": "first_fit (0)", "seed": 0, "versions": {"cma": "4"}}
 
 
 @pytest.fixture(scope="module")
 def verdict():
-    return confirm(read_preset("first_fit"), load_targets())
+    return confirm(read_preset("first_fit"))
 
 
 def test_the_full_system_is_the_judge(verdict):
@@ -32,7 +29,7 @@ def test_the_full_system_is_the_judge(verdict):
     assert set(verdict.outside) == {(row, solver) for row, solver in out if solver in COUNTED.values()}
     assert ("walk.direction", EXACT) in verdict.untrue
     assert not verdict.holds
-    bars = {row.id: row.bar.limit for row in load_targets()}
+    bars = {row.id: row.bar.limit for row in load_published().rows}
     off = [
         abs(row["error"]) / bars[row["id"]]
         for row in again.rows
@@ -41,26 +38,9 @@ def test_the_full_system_is_the_judge(verdict):
     assert verdict.errors["paper"] == pytest.approx(max(off))
 
 
-def test_a_leg_that_is_its_own_target_meets_every_row(verdict, tmp_path):
-    text = resources.files("hoof_env.paper").joinpath("published.json").read_text(encoding="utf-8")
-    simulated = {row["id"]: row["simulated"] for row in verdict.rows if row["solver"] == EXACT}
-    rows = json.loads(text)["rows"]
-    wider = {"2 %": "20 %", "0.005 s": "0.02 s", "1 deg": "9 deg", "3 deg": "9 deg", "1 point": "20 point"}
-    for row in rows:  # the paper's solver is elsewhere than the exact one
-        row["published"] = row["read_as"] = simulated[row["id"]]
-        row["bar"] = {**wider, "0.01": "0.1"}.get(row["bar"], row["bar"])
-    path = tmp_path / "own.json"
-    path.write_text(json.dumps({"rows": rows}))
-    own = confirm(read_preset("first_fit"), load_targets(path))
-    assert own.outside == []
-    assert {name for name, _ in own.untrue} == {"walk.walks", "walk.direction"}  # too slow, brakes first
-    assert own.within(EXACT) == (22, 22)
-    assert own.errors["exact"] < 1e-6
-
-
 def test_the_best_leg_that_turns_becomes_a_preset():
     choice, x = load_start("first_fit", 1.375)
-    problem = LegProblem(load_targets(), choice)
+    problem = LegProblem(choice)
     first = Result("000-00", "around", "000-00", x, 500, 2.0, 8.0, 9.0, "words", False)
     stuck = replace(first, id="000-01", x=(1.0, *x[1:]), both=6.5)
     result, preset, _ = best_leg(problem, [first, stuck], ABOUT)

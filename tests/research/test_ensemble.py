@@ -3,9 +3,6 @@
 import json
 import os
 import shutil
-import subprocess
-import sys
-import time
 from dataclasses import replace
 from functools import partial
 from unittest.mock import patch
@@ -15,22 +12,20 @@ import pytest
 
 from hoof_env.errors import DataFileError, HoofEnvError
 from hoof_env.leg.geometry import read_preset
-from research.identify import attempt as attempting
 from research.identify import collect as collecting
 from research.identify import ensemble as command
-from research.identify.attempt import Aim, Attempt, Task, attempt, judge
-from research.identify.collect import collect, distance
+from research.identify.collect import Aim, Attempt, Task, attempt, collect, distance, judge
 from research.identify.command import load_start
 from research.identify.confirm import confirm
 from research.identify.leg import encode, to_preset
 from research.identify.objective import Objective
 from research.identify.problem import LegProblem
 from research.identify.state import open_state
-from research.identify.targets import load_targets
+from tests.research.commands import kill_when, refusal
 
 PRESET = "first_fit"
 CHOICE, X = load_start(PRESET, 1.5)
-AIM = Aim(LegProblem(load_targets(), CHOICE), 20.0, False, steps=1)
+AIM = Aim(LegProblem(CHOICE), 20.0, False, steps=1)
 
 
 @pytest.fixture(scope="module")
@@ -89,7 +84,7 @@ def test_a_start_comes_within_the_bar_and_a_push_stays_there_and_goes_its_way(en
 def test_the_verdict_is_that_of_the_full_system():
     y = AIM.problem.inward(np.array(X), 801)
     _, judged = judge(Attempt("0", PRESET, tuple(y.tolist()), 0.0), AIM)
-    verdict = confirm(read_preset(PRESET), AIM.problem.targets)
+    verdict = confirm(read_preset(PRESET))
     assert judged.errors == pytest.approx(verdict.errors, rel=1e-4)
     assert set(judged.reasons) >= {f"{n} ({s})" for n, s in verdict.untrue if s == "exact"}
     short = Objective(CHOICE, samples=2001).plausibility(np.array(X))
@@ -109,9 +104,8 @@ def test_members_meet_the_bar_are_different_and_begin_with_the_start(whole):
     gaps = [distance(a, b) for i, a in enumerate(whole.members) for b in whole.members[:i]]
     assert min(gaps) > 1e-4
     assert len(whole.attempts) == 5  # a round is made whole
-    fit = [
-        one for one in whole.attempts if one.id not in whole.verdicts or not whole.verdicts[one.id].reasons
-    ]
+    refused = [name for name, verdict in whole.verdicts.items() if verdict.reasons]
+    fit = [one for one in whole.attempts if one.id not in refused]
     assert distance(*whole.members[:2]) == max(distance(whole.members[0], one) for one in fit)
 
 
@@ -121,33 +115,12 @@ def test_the_number_of_processes_changes_nothing(start, whole, tmp_path):
     assert other.attempts == whole.attempts
 
 
-SCRIPT = """
-import sys
-from pathlib import Path
-from test_ensemble import *
-if __name__ == "__main__":
-    gather(Path(sys.argv[1]), tuple(json.loads(Path(sys.argv[2]).read_text())))
-"""
-
-
+@pytest.mark.skipif(not hasattr(os, "killpg"), reason="no process groups")
 def test_a_collection_that_was_killed_goes_on_to_the_same_members(start, whole, tmp_path):
-    script, leg = tmp_path / "script.py", tmp_path / "leg.json"
-    script.write_text(SCRIPT)
-    leg.write_text(json.dumps(start))
-    path = os.pathsep.join([os.path.dirname(__file__), *sys.path])
-    process = subprocess.Popen(
-        [sys.executable, str(script), str(tmp_path / "out"), str(leg)], env={**os.environ, "PYTHONPATH": path}
-    )
-    state, deadline = tmp_path / "out" / "state", time.monotonic() + 300
-    while len(list(state.glob("attempt-0001-*.json"))) < 2:
-        assert process.poll() is None, "ended before it was killed"
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
-    process.kill()
-    process.wait()
-    kept = {file: file.read_bytes() for file in state.glob("attempt-*.json")}
-    assert len(kept) < len(whole.attempts)
-    assert gather(tmp_path / "out", start, resume=True) == whole
+    code = ("from pathlib import Path", f"gather(Path({str(tmp_path)!r}), {start!r})")
+    kept = kill_when(code, "test_ensemble", tmp_path, "state/attempt-0001-*.json", 2)
+    assert len(kept) < len(whole.attempts) - 1
+    assert gather(tmp_path, start, resume=True) == whole
     assert all(file.read_bytes() == content for file, content in kept.items())
 
 
@@ -170,10 +143,8 @@ def test_a_leg_that_the_full_system_refuses_is_replaced(start, whole, folder, tm
 
 
 def test_no_leg_within_the_bar_says_how_far_the_nearest_is(start, tmp_path, monkeypatch):
-    monkeypatch.setattr(attempting, "TRIES", 1)
-    with pytest.raises(
-        HoofEnvError, match=r"no start comes within 0\.01 bars without a shortage, the nearest has \d+\.\d+"
-    ):
+    monkeypatch.setattr(collecting, "TRIES", 1)
+    with pytest.raises(HoofEnvError, match=r"no start comes within 0\.01 bars .* the nearest has \d+\.\d+"):
         gather(tmp_path, start, replace(AIM, bar=0.01))
 
 
@@ -182,10 +153,7 @@ def test_no_leg_within_the_bar_says_how_far_the_nearest_is(start, tmp_path, monk
     [
         ("{", "damaged; delete it to repeat attempt-0000-00"),
         ('{"problem": "digest"}', "damaged; delete it to repeat attempt-0000-00"),
-        (
-            '{"problem": "other", "content": {"id": "", "start": "", "y": [], "merit": 0}}',
-            "belongs to another search",
-        ),
+        ('{"problem": "other", "content": {"id": "", "start": "", "y": [], "merit": 0}}', "another search"),
     ],
 )
 def test_a_damaged_attempt_or_one_of_another_collection_is_named(start, tmp_path, content, message):
@@ -221,11 +189,7 @@ def test_bad_input_is_one_line_before_anything_is_written(tmp_path, capsys, argu
     given = [str(tmp_path / f"{a}.json") if a in files else a for a in arguments]
     if "--preset" not in given:
         given += ["--preset", PRESET]
-    assert command.main(["--out", str(tmp_path / "out"), *given]) == 2
-    error = capsys.readouterr().err
-    assert error.startswith("error: ")
-    assert error.count("\n") == 1
-    assert message in error
+    assert message in refusal(command.main, ["--out", tmp_path / "out", *given], capsys)
     assert not (tmp_path / "out").exists()
 
 
@@ -254,7 +218,6 @@ def test_the_command_writes_an_ensemble_says_how_it_was_found_and_overwrites_not
         ([], "already holds a search or what one found"),
         (["--seed", "1", "--resume"], "another search: seed is 0 there and 1 here"),
     ):
-        assert command.main([*given, *more]) == 2
-        assert message in capsys.readouterr().err
+        assert message in refusal(command.main, [*given, *more], capsys)
     assert command.main([*given, "--resume"]) == 0
     assert path.read_bytes() == before

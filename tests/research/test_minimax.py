@@ -9,7 +9,6 @@ from scipy.optimize import brentq
 from research.identify.leg import encode
 from research.identify.minimax import Rating, descend
 from research.identify.objective import Objective
-from research.identify.problem import TOE_SCALES
 
 MET = np.array([-1.0])
 
@@ -91,16 +90,6 @@ def test_a_goal_ends_it_early_and_a_rating_without_numbers_is_survived():
 
     found = descend(broken, np.zeros(2), np.ones(2))
     assert found.rating.merit(1.0) == pytest.approx(2.5, abs=1e-3)
-
-
-def test_the_published_seed_gets_better_at_once():
-    """One descent from first_fit takes a third off its merit; CMA-ES needs some ten thousand evaluations."""
-    choice, x = encode("first_fit")
-    objective = Objective(choice, by_toe=True)
-    y = objective.to_touch_down(x)
-    found = descend(objective.rate, y, TOE_SCALES)
-    assert found.rating.merit(2.0) < 0.67 * objective.rate(y).merit(2.0)
-    assert found.evaluations < 1000
 
 
 def test_a_rating_is_the_objectives_rows_and_shortages():

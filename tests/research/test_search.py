@@ -1,10 +1,7 @@
 """The search on problems whose answer is known, and on tiny budgets of the real one."""
 
 import os
-import subprocess
-import sys
-import time
-from dataclasses import asdict, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -12,15 +9,25 @@ import pytest
 
 from hoof_env.errors import DataFileError, HoofEnvError, OutputError
 from research.identify.command import load_start
-from research.identify.job import CLEAR, Job, Phase, Result, run_job
 from research.identify.leg import LEVEL, NAMES
 from research.identify.minimax import Rating
 from research.identify.objective import Standing
 from research.identify.problem import SAMPLES, TOE_SCALES, LegProblem
 from research.identify.processes import processes
-from research.identify.search import SCHEDULE, elite, plan, rounds, search
+from research.identify.search import (
+    CLEAR,
+    SCHEDULE,
+    Job,
+    Phase,
+    Result,
+    elite,
+    plan,
+    rounds,
+    run_job,
+    search,
+)  # fmt: skip
 from research.identify.state import open_state
-from research.identify.targets import load_targets
+from tests.research.commands import kill_when
 
 PHASE = Phase("around", jobs=3, evaluations=400, sigmas=(0.02, 0.05))
 MINIMAX = replace(PHASE, name="descend", method="minimax", elite=6, jobs=2, sigmas=(0.002, 0.01))
@@ -66,7 +73,7 @@ class Valley:
 @pytest.fixture(scope="module")
 def leg():
     choice, x = load_start("first_fit", 1.375)
-    return LegProblem(load_targets(), choice), x
+    return LegProblem(choice), x
 
 
 def plain(result):
@@ -124,11 +131,6 @@ def test_a_leg_keeps_its_ground_level_through_a_search_by_touch_down(leg):
     high[LEVEL] += 1.0  # a toe in the air is put down
     lower = problem.outward(problem.inward(high, SAMPLES), SAMPLES)
     assert lower[LEVEL] < high[LEVEL] - 0.5
-
-
-def test_a_result_survives_json():
-    done = run_job(Valley(), Job(0, 0, PHASE, 0, 100, (0.0,) * 24))
-    assert Result.from_dict(asdict(done)) == done
 
 
 # --- rounds ----------------------------------------------------------------------------------------------
@@ -199,44 +201,16 @@ def test_the_number_of_processes_changes_nothing(leg, whole, tmp_path):
     assert run(leg, tmp_path, workers=2) == whole
 
 
-SCRIPT = """
-import sys
-from pathlib import Path
-from test_search import *
-if __name__ == "__main__":
-    choice, x = load_start("first_fit", 1.375)
-    run((LegProblem(load_targets(), choice), x), Path(sys.argv[1]), workers=2)
-"""
-
-
 @pytest.mark.skipif(not hasattr(os, "killpg"), reason="no process groups")
 def test_a_search_that_was_killed_goes_on_to_the_same_result(leg, whole, tmp_path):
-    script = tmp_path / "script.py"
-    script.write_text(SCRIPT)
-    path = os.pathsep.join([os.path.dirname(__file__), *sys.path])
-    process = subprocess.Popen(
-        [sys.executable, str(script), str(tmp_path / "out")],
-        env={**os.environ, "PYTHONPATH": path},
-        start_new_session=True,
+    code = (
+        "from pathlib import Path",
+        "choice, x = load_start('first_fit', 1.375)",
+        f"run((LegProblem(choice), x), Path({str(tmp_path)!r}), workers=2)",
     )
-    state = tmp_path / "out" / "state"
-    deadline = time.monotonic() + 300
-    while len(list(state.glob("job-*.json"))) < 2:
-        assert process.poll() is None, "ended before its second job"
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
-    process.kill()
-    process.wait()
-    while True:  # its workers end by themselves
-        try:
-            os.killpg(process.pid, 0)
-        except ProcessLookupError:
-            break
-        assert time.monotonic() < deadline, "a worker outlived its parent"
-        time.sleep(0.05)
-    kept = {file: file.read_bytes() for file in state.glob("job-*.json")}
+    kept = kill_when(code, "test_search", tmp_path, "state/job-*.json", 2)
     assert len(kept) < len(whole)
-    assert run(leg, tmp_path / "out", resume=True) == whole
+    assert run(leg, tmp_path, resume=True) == whole
     assert all(file.read_bytes() == content for file, content in kept.items())
 
 
@@ -244,8 +218,8 @@ def test_a_search_that_was_killed_goes_on_to_the_same_result(leg, whole, tmp_pat
 def test_a_confirmed_candidate_ends_the_search_whichever_jobs_were_faster(tmp_path, later):
     state = begin(tmp_path)
     for index in later:
-        state.save(f"job-000-0{index}", asdict(result(f"000-0{index}", "000-01", 1.0, 1.0, confirmed=True)))
-    state.save("job-000-00", asdict(result("000-00", "000-00", 2.0)))
+        state.save(f"job-000-0{index}", result(f"000-0{index}", "000-01", 1.0, 1.0, confirmed=True))
+    state.save("job-000-00", result("000-00", "000-00", 2.0))
     results = search(Valley(), (), (PHASE,), state, lambda *_: None, seed=0, budget=10_000)
     assert [one.id for one in results] == ["000-00", "000-01"]
 
@@ -259,9 +233,9 @@ def test_a_process_that_dies_is_one_error_that_names_the_way_on():
 
 
 def test_an_error_in_a_job_comes_out_of_it(leg):
-    problem = replace(leg[0], targets=())
-    with processes(2) as run, pytest.raises(HoofEnvError, match="at least one row with a bar"):
-        list(run(partial(run_job, problem), [Job(0, 0, PHASE, 0, 100, leg[1])]))
+    wrong = Job(0, 0, replace(PHASE, samples=3), 0, 100, leg[1])
+    with processes(2) as run, pytest.raises(HoofEnvError, match="samples: expected"):
+        list(run(partial(run_job, leg[0]), [wrong]))
 
 
 def test_a_search_is_not_begun_over_another_nor_resumed_from_nothing(tmp_path):
@@ -285,15 +259,17 @@ def test_a_damaged_job_is_named(tmp_path, content):
     path = tmp_path / "state" / "job-000-01.json"
     path.write_text(content)
     with pytest.raises(DataFileError, match=r"job-000-01\.json is damaged; delete it to repeat job-000-01"):
-        state.load("job-000-01", Result.from_dict)
+        state.load("job-000-01", Result)
     assert path.read_text() == content
 
 
 def test_files_of_another_search_and_a_damaged_problem_are_named(tmp_path):
     state = begin(tmp_path)
-    state.save("job-000-00", asdict(result("000-00", "000-00", 1.0)))
+    one = result("000-00", "000-00", 1.0)
+    state.save("job-000-00", one)
+    assert state.load("job-000-00", Result) == one
     with pytest.raises(DataFileError, match=r"belongs to another search \(expected other, got '"):
-        replace(state, digest="other").load("job-000-00", Result.from_dict)
+        replace(state, digest="other").load("job-000-00", Result)
     with pytest.raises(DataFileError, match=r"another search: a is 1 there and 2 here; name another"):
         open_state(tmp_path, {"a": 2}, resume=True, product="identified.json")
     for content, message in (("{", "damaged; nothing can be resumed"), ("[]", "another search: a is None")):
