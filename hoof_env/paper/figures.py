@@ -52,11 +52,8 @@ PRINT: dict[Any, Any] = {
     "axes.titlesize": 8,
     "axes.titlelocation": "left",
     "axes.labelsize": 8,
-    "axes.linewidth": 0.6,
     "xtick.labelsize": SMALL,
     "ytick.labelsize": SMALL,
-    "xtick.major.width": 0.6,
-    "ytick.major.width": 0.6,
     "legend.fontsize": SMALL,
     "svg.fonttype": "none",
     "savefig.dpi": 300,
@@ -81,15 +78,11 @@ HEIGHT = "height above the ground [m]"
 Point = NDArray[np.float64]
 
 
-def points_at(geometry: Geometry, row: np.void) -> dict[str, Point]:
-    """World position (x, y) [m] of every named point at one row of a trace."""
+def leg_at(geometry: Geometry, trace: Trace, t: float) -> dict[str, Point]:
+    """World position (x, y) [m] of every named point at the row of a trace nearest to an instant [s]."""
+    row = trace[int(np.argmin(np.abs(trace["time"] - t)))]
     frame = FrameMotion(phi=float(row["phi"]), position=(float(row["x"]), float(row["y"])))
     return dict(zip(JOINTS, pose(geometry, float(row["theta"]), frame=frame).points, strict=True))
-
-
-def leg_at(reproduction: Reproduction, trace: Trace, t: float) -> dict[str, Point]:
-    """`points_at` the row of a trace nearest to an instant [s]."""
-    return points_at(reproduction.geometry, trace[int(np.argmin(np.abs(trace["time"] - t)))])
 
 
 def elastic_cycles(reproduction: Reproduction) -> dict[str, tuple[Trace, Stance]]:
@@ -200,7 +193,7 @@ def draw_mechanism(figure: Any, reproduction: Reproduction) -> None:
     geometry, (trace, _) = reproduction.geometry, elastic_cycles(reproduction)["walk"]
     tip = max(POINTS, key=lambda point: trace[f"{point}_normal"].max())
     row = trace[int(np.argmax(trace[f"{tip}_normal"] * (0.01 + np.abs(trace["hoof_angle"]))))]
-    at = points_at(geometry, row)
+    at = leg_at(geometry, trace, float(row["time"]))
     points = np.array(list(at.values()))
     hoof = np.array([at["G"], at[geometry.toe], at[geometry.heel]])
     side = float(np.ptp(hoof, axis=0).max())
@@ -329,8 +322,8 @@ def draw_paths(figure: Any, reproduction: Reproduction) -> None:
 
 def _extent(reproduction: Reproduction, trace: Trace, stance: Stance) -> Point:
     """Lower left and upper right corner [m] of what is drawn of a gait, with a margin."""
-    leg = leg_at(reproduction, trace, stance.middle).values()
-    hooves = [leg_at(reproduction, trace, t)["G"] for t in _instants(stance)]
+    leg = leg_at(reproduction.geometry, trace, stance.middle).values()
+    hooves = [leg_at(reproduction.geometry, trace, t)["G"] for t in _instants(stance)]
     paths = [np.stack([trace[f"{name}_x"], -trace[f"{name}_penetration"]], 1) for name in POINTS]
     shown = np.concatenate([*paths, np.array([*leg, *hooves])])
     return np.array([shown.min(axis=0) - 0.1, shown.max(axis=0) + 0.1])
@@ -341,7 +334,7 @@ def _instants(stance: Stance) -> Point:
 
 
 def _draw_leg(ax: Any, reproduction: Reproduction, trace: Trace, stance: Stance) -> None:
-    at = leg_at(reproduction, trace, stance.middle)
+    at = leg_at(reproduction.geometry, trace, stance.middle)
     for body in BODIES:
         line = np.array([at[body.tail], at[body.head]])
         ax.plot(*line.T, color=GREY, lw=0.9, label="leg at mid-stance", zorder=6, solid_capstyle="round")
@@ -349,7 +342,7 @@ def _draw_leg(ax: Any, reproduction: Reproduction, trace: Trace, stance: Stance)
         ax.plot(*at[name], "^", ms=4.5, mfc="black", mec="black", zorder=7)
         ax.annotate(name, at[name], (-7, 0), textcoords="offset points", ha="center", va="center")
     for t in _instants(stance):
-        at = leg_at(reproduction, trace, t)
+        at = leg_at(reproduction.geometry, trace, t)
         bears = stance.start <= t <= stance.end
         colour, label = (SKY, "hoof in stance") if bears else ("#CCCCCC", "hoof in swing")
         corners = np.array([at[corner] for corner in "GJI"])
@@ -428,7 +421,7 @@ def _hooves(reproduction: Reproduction, trace: Trace, stance: Stance) -> Point:
     """Corners G, toe, heel at the instants of the sketches, x from the middle of each hoof,
     shape (SKETCHES, 3, 2) [m]."""
     names = "G", reproduction.geometry.toe, reproduction.geometry.heel
-    legs = [leg_at(reproduction, trace, t) for t in np.linspace(stance.start, stance.end, SKETCHES)]
+    legs = [leg_at(reproduction.geometry, trace, t) for t in np.linspace(stance.start, stance.end, SKETCHES)]
     hooves = np.array([[at[name] for name in names] for at in legs])
     x = hooves[..., 0]
     x -= (x.min(axis=1, keepdims=True) + x.max(axis=1, keepdims=True)) / 2

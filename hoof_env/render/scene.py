@@ -80,8 +80,7 @@ class Scene:
         self._scale = min(size[1] / (soil + sky), self._centre / (out + MARGIN_M))
         self._level = size[1] - soil * self._scale  # of the ground [pixels] while the camera keeps its height
         self._camera = 0j
-        self._heel: deque[tuple[float, complex]] = deque()  # its path
-        self._toe: deque[tuple[float, complex]] = deque()
+        self._paths: deque[tuple[float, complex, complex]] = deque()  # time [s], heel, toe [m]
         self._ground = GroundPainter(brush, terrain, size, self._scale, 2 * self._centre)
         self._leg = tables(geometry)
         self._kind = trunk
@@ -91,19 +90,16 @@ class Scene:
 
     def reset(self) -> None:
         """Forget the paths."""
-        for path in (self._heel, self._toe):
-            path.clear()
+        self._paths.clear()
 
     def add(self, instants: Sequence[Instant]) -> None:
         """Lengthen the paths of toe and heel by instants in the order of time."""
-        now = instants[-1].time
-        toe, heel = self._toe, self._heel
-        for instant in instants:
-            if not toe or instant.time >= toe[-1][0] + PATH_STEP * (1 - 1e-6):
-                toe.append((instant.time, complex(instant.toe_x, instant.toe_y)))
-                heel.append((instant.time, complex(instant.heel_x, instant.heel_y)))
-        while toe[0][0] < now - PATH_SECONDS:
-            toe.popleft(), heel.popleft()
+        paths = self._paths
+        for now in instants:
+            if not paths or now.time >= paths[-1][0] + PATH_STEP * (1 - 1e-6):
+                paths.append((now.time, complex(now.heel_x, now.heel_y), complex(now.toe_x, now.toe_y)))
+        while paths[0][0] < instants[-1].time - PATH_SECONDS:
+            paths.popleft()
 
     def draw(self, canvas: Any, now: Instant, full_scale: float) -> None:
         """Draw an instant; the arrow of a force `full_scale` [N] is `ARROW_M` long."""
@@ -233,14 +229,12 @@ class Scene:
             self._brush.write(canvas, pivot, (letter.real, letter.imag), 18, INK, side)
 
     def _draw_paths(self, canvas: Any, pixels: dict[str, complex]) -> None:
-        for colour, path, point in (
-            (HEEL, self._heel, self._geometry.heel),
-            (TOE, self._toe, self._geometry.toe),
-        ):
-            if len(path) < 2:
-                continue
-            times, places = zip(*path, strict=True)
-            line = np.append(self._pixels(np.array(places)), pixels[point])
+        if len(self._paths) < 2:
+            return
+        times, *paths = zip(*self._paths, strict=True)
+        points_now = pixels[self._geometry.heel], pixels[self._geometry.toe]
+        for colour, places, end in zip((HEEL, TOE), paths, points_now, strict=True):
+            line = np.append(self._pixels(np.array(places)), end)
             points = list(zip(line.real.tolist(), line.imag.tolist(), strict=True))
             for first in range(0, len(points) - 1, 10):  # older parts fade into the sky
                 part = points[first : first + 11]
