@@ -36,7 +36,7 @@ from agents.command import run
 from agents.evaluate import Score
 from agents.settings import load_settings
 from hoof_env._output import markdown_table
-from hoof_env.paper.figure_style import BLUE, GREEN, GREY, ORANGE, PURPLE, STYLE
+from hoof_env.paper.figures import BLUE, GREEN, GREY, ORANGE, PURPLE, STYLE
 
 TEMPLATES = Path(__file__).with_name("templates")
 

@@ -173,7 +173,7 @@ def _strip(size: tuple[int, int]) -> int:
 
 def _draw_strip(window: Any, renderer: Any, game: Game, size: tuple[int, int]) -> None:
     """Score, state and keys, below the picture."""
-    from hoof_env.render.body import CRANK, FORCE, GREY, INK, PAPER
+    from hoof_env.render.brush import CRANK, FORCE, GREY, INK, PAPER
 
     brush = renderer.brush
     unit, top = brush.unit, size[1]

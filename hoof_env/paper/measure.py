@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.constrained import TRACE
 from hoof_env.errors import ParameterError
-from hoof_env.ground.contact import HEEL, TOE, Ground, new_contacts, touch
-from hoof_env.simd.compile import kernel
 
 Interval = tuple[float, float]
 
@@ -34,56 +32,18 @@ Trace = NDArray[np.void]  # one cycle of dtype `CYCLE`
 
 
 def cycle_of(record: Mapping[str, Any]) -> Trace:
-    """Rows of dtype `CYCLE`, shape (n,), from what an environment's `record` gives."""
+    """Rows of dtype `CYCLE`, shape (n,), from the `record` of an environment with a fixed, level leg."""
     cycle = np.zeros(len(record["time"]), CYCLE)
     for name in TRACE.names or ():
         cycle[name] = np.asarray(record[name]).reshape(len(cycle))
-    return add_sums(cycle)
-
-
-def add_sums(cycle: Trace) -> Trace:
-    """Fill `SUMS` of a cycle on a fixed trunk over level ground; returns it."""
-    c = cycle
     for name in ("normal", "friction"):
-        c[name] = c[f"toe_{name}"] + c[f"heel_{name}"]
-    c["grf"] = np.hypot(c["normal"], c["friction"])
-    loaded = c["normal"] > 0
-    moment = c["toe_normal"] * c["toe_x"] + c["heel_normal"] * c["heel_x"]
-    c["cop_x"] = np.where(loaded, moment / np.where(loaded, c["normal"], 1.0), np.nan)
-    c["hoof_angle"] = np.arctan2(c["heel_y"] - c["toe_y"], c["toe_x"] - c["heel_x"])
+        cycle[name] = cycle[f"toe_{name}"] + cycle[f"heel_{name}"]
+    cycle["grf"] = np.hypot(cycle["normal"], cycle["friction"])
+    loaded = cycle["normal"] > 0
+    moment = cycle["toe_normal"] * cycle["toe_x"] + cycle["heel_normal"] * cycle["heel_x"]
+    cycle["cop_x"] = np.where(loaded, moment / np.where(loaded, cycle["normal"], 1.0), np.nan)
+    cycle["hoof_angle"] = np.arctan2(cycle["heel_y"] - cycle["toe_y"], cycle["toe_x"] - cycle["heel_x"])
     return cycle
-
-
-def replay(cycle: Trace, ground: Ground, rise: float = 0.0) -> Trace:
-    """A cycle of dtype `CYCLE` on another ground, which lies higher by `rise` [m]: the trunk stands lower by
-    as much.
-
-    On a fixed trunk the ground changes forces only, so the leg need not move again: contact and forces are
-    computed anew, and torques and powers of the drives become NaN.
-    """
-    result = cycle.copy()
-    for drive in ("crank", "hip"):
-        result[f"{drive}_torque"] = result[f"{drive}_power"] = np.nan
-    for name in ("y", "centre_y"):
-        result[name] -= rise
-    for point in POINTS:
-        result[f"{point}_penetration"] += rise
-        result[f"{point}_y"] = -result[f"{point}_penetration"]
-    _touch_again(result, new_contacts(), ground.to_record())
-    return add_sums(result)
-
-
-@kernel
-def _touch_again(cycle, contacts, ground):  # type: ignore[no-untyped-def]
-    toe, heel = contacts[TOE], contacts[HEEL]
-    for k in range(cycle.shape[0]):
-        row = cycle[k]
-        touch(toe, complex(row.toe_x, row.toe_y), complex(row.toe_slide, -row.toe_rate), ground)
-        touch(heel, complex(row.heel_x, row.heel_y), complex(row.heel_slide, -row.heel_rate), ground)
-        row.toe_normal, row.toe_friction = toe.normal, toe.friction
-        row.heel_normal, row.heel_friction = heel.normal, heel.friction
-        row.toe_slowness = 1.0 / toe.approach if toe.inside else 0.0
-        row.heel_slowness = 1.0 / heel.approach if heel.inside else 0.0
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from typing import Any
 from hoof_env import __version__
 from hoof_env._output import markdown_table
 from hoof_env.ground.contact import HERTZ
+from hoof_env.paper.figures import DRAWINGS
 from hoof_env.paper.measure import hoof_error, measure_stance
 from hoof_env.paper.rows import (
     EULER,
@@ -28,7 +29,6 @@ from hoof_env.paper.rows import (
 )
 
 WORST = 3  # how many rows of each solver are named as its worst
-FIGURES = ("figure1", "figure3", "figure4", "figure5", "figure6")
 PAGE = Path(__file__).with_name("report.md.in")  # its numbers and tables begin with $
 _DIGITS = {"s": 4, "deg": 2, "N": 1, "%": 2, "-": 3, "point": 2, "": 3}
 _PACKAGES = ("gymnasium", "numpy", "numba")
@@ -65,7 +65,7 @@ def markdown(reproduction: Reproduction, *, command: str, figures: bool) -> str:
         **which_beta(reproduction),
     )
     if figures:
-        shown = [f"![{name}]({name}.png)\n[{name}.svg]({name}.svg)" for name in FIGURES]
+        shown = [f"![{name}]({name}.png)\n[{name}.svg]({name}.svg)" for name in DRAWINGS]
         page += "\n" + "\n\n".join(["## Figures", *shown]) + "\n"
     return page
 

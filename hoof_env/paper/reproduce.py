@@ -18,7 +18,7 @@ import hoof_env  # noqa: F401  (registers the environments)
 from hoof_env._output import staged
 from hoof_env.errors import HoofEnvError
 from hoof_env.paper import report
-from hoof_env.paper.measure import Trace, cycle_of, measure_stance, replay
+from hoof_env.paper.measure import Trace, cycle_of, measure_stance
 from hoof_env.paper.rows import (
     CONDITIONS,
     EXACT,
@@ -99,10 +99,11 @@ def reproduce(progress: Callable[[str], None] | None = None, *, preset: str | No
                 traces[gait, condition, solver] = trace
                 stance = stances[gait, condition] = measure_stance(trace)
                 tell(f"{solver}, {gait}, {condition}: peak {stance.peak:.1f} N, mean {stance.mean:.1f} N")
-            walked = traces[
-                gait, "elastic", solver
-            ]  # whose motion, on a fixed trunk, any ground leaves alone
-            by_depth = {depth: sole_velocity(replay(walked, ground, depth)) for depth in DEPTHS}
+            cycles = {0.0: traces[gait, "elastic", solver]}
+            for depth in DEPTHS[1:]:
+                lower = {"restitution": CONDITIONS["elastic"], "hip_height": geometry.hip_height - depth}
+                cycles[depth] = run_cycle(gait, solver, **lower, **settings)
+            by_depth = {depth: sole_velocity(cycle) for depth, cycle in cycles.items()}
             medians[solver][gait] = by_depth
             values = ", ".join(f"{value:+.2f}" for value in by_depth.values())
             tell(f"{solver}, {gait}, 0, 5, 10 cm deep: sole moves at {values} m/s")

@@ -11,7 +11,7 @@ import pygame
 from numpy.typing import NDArray
 
 from hoof_env.ground.terrain import Terrain
-from hoof_env.render.body import PAPER, Brush, Colour, mix
+from hoof_env.render.brush import PAPER, Brush, Colour, mix
 from hoof_env.render.instant import Instant
 
 SOIL, SOIL_LINE = (214, 200, 174), (112, 95, 66)
@@ -22,11 +22,7 @@ SLIPPERY, ROUGHER = (86, 180, 233), (90, 50, 20)
 STRONG = 4.0  # a factor of stiffness or friction of this, or its inverse, has the full colour [-]
 ALIKE = 0.02  # relative difference of a factor from 1 below which the ground counts as usual [-]
 FLANK_M = 0.09  # how far from the hoof the footprint draws the ground down; the model has no width [m]
-PRESSED = ((0.5, 0.12), (0.33, 0.24), (0.17, 0.36))
-"""How far below the footprint the soil is darker, in parts of its depth, and how much."""
-
 COLUMN = 6  # distance of the places where the surface is drawn [pixels of the usual picture]
-MOST_EDGES = 60  # so many changes of kind are drawn where they are; of more, each at the next place
 LABEL = 90  # least width of a patch that is labelled [pixels of the usual picture]
 
 Point = tuple[float, float]
@@ -52,7 +48,6 @@ class GroundPainter:
         self._stiffness, self._friction = np.array(terrain.stiffness), np.array(terrain.friction)
         self._level = bool(np.ptp(self._heights) == 0)
         self._labelled = [p for p in find_patches(terrain) if p.end - p.start > LABEL * brush.unit / scale]
-        self._edges = edges(terrain)
         self._grid = COLUMN * brush.unit / scale
 
     def height(self, x: Any) -> Any:
@@ -73,20 +68,16 @@ class GroundPainter:
     def draw(self, canvas: Any, now: Instant, corner: complex) -> None:
         """Draw the ground; `corner` is the place in the world of the picture's upper left corner [m]."""
         x = self._places(now, corner.real)
-        free = (corner.imag - self.height(x)) * self._scale
+        surface = (corner.imag - self.height(x)) * self._scale
         if self._level:
-            free = np.round(free)  # a sharp line
-        surface = free
+            surface = np.round(surface)  # a sharp line
         if max(now.toe_depth, now.heel_depth) > 0:
-            surface = free + footprint(now, x) * self._scale
-        columns = (x - corner.real) * self._scale
-        line = list(zip(columns.tolist(), surface.tolist(), strict=True))
+            surface += footprint(now, x) * self._scale
+        line = list(zip(((x - corner.real) * self._scale).tolist(), surface.tolist(), strict=True))
         middle = (x[1:] + x[:-1]) / 2
         for part, colour in self._runs(line, middle, self._stiffness, BODY):
             bottom = self._size[1] + 1
             pygame.draw.polygon(canvas, colour, [(part[0][0], bottom), *part, (part[-1][0], bottom)])
-        if surface is not free and now.normal > 0:
-            self._press(canvas, columns, free, surface)
         deep = 8 * self._brush.unit
         for part, colour in self._runs(line, middle, self._friction, SKIN):
             pygame.draw.polygon(canvas, colour, [*part, *((a, b + deep) for a, b in reversed(part))])
@@ -100,9 +91,6 @@ class GroundPainter:
         right = left + self._size[0] / self._scale
         grid = self._grid
         x = [np.arange(np.floor(left / grid), np.ceil(right / grid) + 1) * grid]
-        first, last = np.searchsorted(self._edges, (left, right))
-        if last - first <= MOST_EDGES:
-            x.append(self._edges[first:last])
         if max(now.toe_depth, now.heel_depth) > 0:
             near, far = sorted((now.toe_x, now.heel_x))
             x.append(np.arange(near - 3 * FLANK_M, min(far, near + 1) + 3 * FLANK_M, 2 / self._scale))
@@ -112,27 +100,12 @@ class GroundPainter:
         self, line: list[Point], middle: Any, factors: Any, colours: tuple[Colour | None, ...]
     ) -> Iterator[tuple[list[Point], Colour]]:
         """Stretches of the surface line of one colour, by the factor in the middle of each piece of it."""
-        if len(factors) == 1:
-            shades = np.full(len(middle), shade(factors[0]))
-        else:
-            shades = shade(np.interp(middle, self._knots, factors))
+        shades = shade(np.interp(middle, self._knots, factors))
         changes = [0, *(np.flatnonzero(np.diff(shades)) + 1).tolist(), len(shades)]
         for start, end in pairwise(changes):
             colour = colours[int(shades[start])]
             if colour is not None:
                 yield line[start : end + 1], colour
-
-    def _press(self, canvas: Any, columns: Any, free: Any, surface: Any) -> None:
-        """Darken the soil under the footprint, in bands that fade with depth."""
-        dent = surface - free
-        pressed = np.flatnonzero(dent > 0.5)
-        if len(pressed):
-            part = slice(max(pressed[0] - 1, 0), pressed[-1] + 2)
-            x, top, deep = columns[part].tolist(), surface[part], dent[part]
-            above = list(zip(x, top.tolist(), strict=True))
-            for reach, shade in PRESSED:
-                below = list(zip(x, (top + reach * deep).tolist(), strict=True))
-                pygame.draw.polygon(canvas, mix(SOIL, SOIL_LINE, shade), [*above, *below[::-1]])
 
     def _draw_ticks(self, canvas: Any, corner: complex) -> None:
         unit, scale = self._brush.unit, self._scale
@@ -180,7 +153,8 @@ def footprint(now: Instant, x: NDArray[np.float64]) -> NDArray[np.float64]:
 def find_patches(terrain: Terrain) -> list[Patch]:
     """Stretches of one kind, all but the usual; a change over one spacing counts half to either side."""
     factors = np.array([terrain.stiffness, terrain.friction])
-    changes = [0, *_changes(terrain).tolist(), factors.shape[1]]
+    differs = (np.diff(np.round(factors / ALIKE), axis=1) != 0).any(axis=0)
+    changes = [0, *(np.flatnonzero(differs) + 1).tolist(), factors.shape[1]]
     patches = []
     for first, end in pairwise(changes):
         stiffness, friction = factors[:, (first + end) // 2].tolist()
@@ -189,17 +163,6 @@ def find_patches(terrain: Terrain) -> list[Patch]:
             right = np.inf if end == factors.shape[1] else terrain.start + (end - 0.5) * terrain.spacing
             patches.append(Patch(left, right, stiffness, friction))
     return patches
-
-
-def edges(terrain: Terrain) -> NDArray[np.float64]:
-    """Where the kind of ground changes [m], in order."""
-    return (terrain.start + (_changes(terrain) - 0.5) * terrain.spacing).astype(np.float64)
-
-
-def _changes(terrain: Terrain) -> NDArray[np.int64]:
-    """Knots that differ in kind from the one before."""
-    kinds = np.round(np.array([terrain.stiffness, terrain.friction]) / ALIKE)
-    return np.flatnonzero((np.diff(kinds, axis=1) != 0).any(axis=0)) + 1
 
 
 def shade(factor: Any) -> Any:

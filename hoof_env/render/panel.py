@@ -13,7 +13,7 @@ import pygame
 
 from hoof_env.dynamics.observables import StanceCounter
 from hoof_env.gait.gait import LIMITS
-from hoof_env.render.body import CRANK, FAINT, FINE, FORCE, GREY, INK, PAPER, Brush
+from hoof_env.render.brush import CRANK, FAINT, FINE, FORCE, GREY, INK, PAPER, Brush
 from hoof_env.render.instant import Instant
 
 SECONDS = 3  # time shown [s]

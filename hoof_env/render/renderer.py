@@ -70,7 +70,7 @@ class Renderer:
         except ImportError:
             hint = 'pygame is not installed, run `pip install "hoof-env[render]"`'
             raise DependencyNotInstalled(hint) from None
-        from hoof_env.render.body import Brush
+        from hoof_env.render.brush import Brush
         from hoof_env.render.panel import Panel
         from hoof_env.render.scene import Scene
 

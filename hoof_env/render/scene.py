@@ -20,16 +20,17 @@ from hoof_env.gait.gait import LIMITS
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry, tables
 from hoof_env.leg.kinematics import pose, solve_points
-from hoof_env.leg.linkage import POINTS
-from hoof_env.render.body import (
+from hoof_env.leg.linkage import BODIES, POINTS
+from hoof_env.leg.linkage import CRANK as CRANK_BODY
+from hoof_env.render.brush import (
     CRANK,
     FINE,
     FORCE,
     GREY,
     HEEL,
+    INK,
     PAPER,
     TOE,
-    Body,
     Brush,
     arrow,
     bar,
@@ -39,6 +40,14 @@ from hoof_env.render.ground import SOIL_LINE, GroundPainter
 from hoof_env.render.instant import Instant
 
 SKY_TOP, SKY_BOTTOM = (219, 231, 242), (249, 250, 252)
+COAT, COAT_EDGE, PASTERN, HOOF = (226, 210, 194), (186, 163, 141), (196, 170, 146), (104, 74, 54)
+LINK, PLATE = (64, 78, 92), (186, 195, 205)
+
+TRUNK_M = (1.05, 0.42, 0.16)  # the trunk about O: half its length, its height above and below [m]
+HOLD_M = 0.1  # height above the trunk of the rail or plate that holds it [m]
+FLESH_M = (("O", "C", 0.13, 0.15), ("C", "F", 0.15, 0.095), ("F", "G", 0.085, 0.055))
+"""Flesh around the rigid links where a horse's leg has its bones: from, to, radius at both ends [m]."""
+HORN_SHARE = 0.45  # part of the hoof triangle, from the sole up, that is horn; above it is the pastern [-]
 
 HEIGHT_SLACK_M = 0.2  # how far O may rise or sink from the paper's hip height before the camera follows [m]
 SOIL_M = 0.4  # least depth of soil in the picture [m]
@@ -71,39 +80,36 @@ class Scene:
         self._scale = min(size[1] / (soil + sky), self._centre / (out + MARGIN_M))
         self._level = size[1] - soil * self._scale  # of the ground [pixels] while the camera keeps its height
         self._camera = 0j
-        self._heel: deque[tuple[float, complex]] = deque()  # its path
-        self._toe: deque[tuple[float, complex]] = deque()
-        self._leg = tables(geometry)
+        self._paths: deque[tuple[float, complex, complex]] = deque()  # time [s], heel, toe [m]
         self._ground = GroundPainter(brush, terrain, size, self._scale, 2 * self._centre)
-        self._body = Body(brush, geometry, self._scale, trunk)
+        self._leg = tables(geometry)
+        self._kind = trunk
+        self._trunk = self._paint_trunk()
         self._sky = self._paint_sky()
         self._key = lru_cache(maxsize=8)(self._paint_key)
 
     def reset(self) -> None:
         """Forget the paths."""
-        for path in (self._heel, self._toe):
-            path.clear()
+        self._paths.clear()
 
     def add(self, instants: Sequence[Instant]) -> None:
         """Lengthen the paths of toe and heel by instants in the order of time."""
-        now = instants[-1].time
-        toe, heel = self._toe, self._heel
-        for instant in instants:
-            if not toe or instant.time >= toe[-1][0] + PATH_STEP * (1 - 1e-6):
-                toe.append((instant.time, complex(instant.toe_x, instant.toe_y)))
-                heel.append((instant.time, complex(instant.heel_x, instant.heel_y)))
-        while toe[0][0] < now - PATH_SECONDS:
-            toe.popleft(), heel.popleft()
+        paths = self._paths
+        for now in instants:
+            if not paths or now.time >= paths[-1][0] + PATH_STEP * (1 - 1e-6):
+                paths.append((now.time, complex(now.heel_x, now.heel_y), complex(now.toe_x, now.toe_y)))
+        while paths[0][0] < instants[-1].time - PATH_SECONDS:
+            paths.popleft()
 
     def draw(self, canvas: Any, now: Instant, full_scale: float) -> None:
         """Draw an instant; the arrow of a force `full_scale` [N] is `ARROW_M` long."""
         pixels = self.look_at(now)
         canvas.blit(self._sky, (0, 0))
-        self._body.draw_support(canvas, pixels["O"])
+        self._draw_support(canvas, pixels["O"])
         self._ground.draw(canvas, now, self.corner)
-        self._body.draw_trunk(canvas, pixels["O"], now.pitch)
+        self._draw_trunk(canvas, pixels["O"], now.pitch)
         self._draw_paths(canvas, pixels)
-        self._body.draw_leg(canvas, pixels)
+        self._draw_leg(canvas, pixels)
         self._draw_forces(canvas, now, full_scale)
         canvas.blit(self._key(full_scale), (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
 
@@ -138,15 +144,97 @@ class Scene:
         ramp.set_at((0, 1), SKY_BOTTOM)
         return pygame.transform.smoothscale(ramp, self._size)
 
+    def _paint_trunk(self) -> Any:
+        half, above, below = (self._scale * length for length in TRUNK_M)
+        image = pygame.Surface((round(2 * half), round(above + below)), pygame.SRCALPHA, 32)
+
+        def paint(fine: Any, place: Any) -> None:
+            for colour, inset in ((COAT_EDGE, 0), (COAT, round(1.5 * FINE))):
+                radius = round(0.25 * self._scale * FINE) - inset
+                barrel = fine.get_rect().inflate(-2 * inset, -2 * inset)
+                pygame.draw.rect(fine, colour, barrel, border_radius=radius)
+
+        self._brush.smooth(image, [0j, complex(*image.get_size())], 0, paint)
+        return image
+
+    def _draw_support(self, canvas: Any, hip: complex) -> None:
+        """The spring, the rail with wheels or the plate that holds the trunk around O at pixel `hip`."""
+        half, top, hold = TRUNK_M[0] * self._scale, hip - 1j * TRUNK_M[1] * self._scale, HOLD_M * self._scale
+        if self._kind == "suspended":
+            coil = np.linspace(complex(hip.real, 0), top, 17)
+            coil[2:-2] += 0.06 * self._scale * np.resize([1, -1], 13)
+
+            def paint(fine: Any, place: Any) -> None:
+                width = round(2 * self._brush.unit * FINE)
+                pygame.draw.lines(fine, GREY, False, [place(z) for z in coil.tolist()], width)
+
+            self._brush.smooth(canvas, coil, 3, paint)
+            return
+        thick = max(2, round(4 * self._brush.unit))
+        rail, plate = round(top.imag - hold), canvas.get_rect()
+        ends = [top - half / 2, top + half / 2]
+        if self._kind == "rail":
+            for end in ends:
+                self._brush.disc(canvas, GREY, (end.real, end.imag - hold / 2), hold / 2)
+        else:
+            plate = pygame.Rect(round(hip.real - half), 0, round(2 * half), 0)
+            for x in np.arange(plate.left, plate.right, hold).tolist():  # hatched as drawings have it
+                pygame.draw.aaline(canvas, GREY, (x, rail - thick), (x + hold, rail - thick - hold))
+            for end in ends:
+                canvas.fill(GREY, (round(end.real - hold), rail, round(2 * hold), round(hold) + 1))
+        canvas.fill(GREY, (plate.left, rail - thick, plate.width, thick))
+
+    def _draw_trunk(self, canvas: Any, hip: complex, pitch: float) -> None:
+        """The trunk around O at pixel `hip`, turned by `pitch` [rad]."""
+        half, above, below = (self._scale * length for length in TRUNK_M)
+        image, corner = self._trunk, hip - complex(half, above)
+        if pitch:
+            image = pygame.transform.rotozoom(image, float(np.degrees(pitch)), 1.0)
+            middle = hip + 0.5j * (below - above) * np.exp(-1j * pitch)
+            corner = middle - complex(*image.get_size()) / 2
+        at = round(corner.real), round(corner.imag)
+        canvas.blit(image, at, special_flags=pygame.BLEND_PREMULTIPLIED)
+
+    def _draw_leg(self, canvas: Any, pixels: dict[str, complex]) -> None:
+        """Draw the leg; `pixels` holds every named point."""
+        metre, crank = self._scale * FINE, self._geometry.lengths["OP"]  # metre: on the fine surface
+        edge = 1.5 * FINE
+
+        def paint(fine: Any, place: Any) -> None:
+            at = {name: place(z) for name, z in pixels.items()}
+            horn = [place(pixels[n] + HORN_SHARE * (pixels["G"] - pixels[n])) for n in "JI"]
+            for colour, grow in ((COAT_EDGE, edge), (COAT, 0.0)):
+                for a, b, radius_a, radius_b in FLESH_M:
+                    bar(fine, colour, at[a], at[b], radius_a * metre + grow, radius_b * metre + grow)
+            pygame.draw.polygon(fine, PASTERN, [at["G"], at["I"], at["J"]])
+            pygame.draw.polygon(fine, HOOF, [at["I"], at["J"], *horn])
+            pygame.draw.circle(fine, CRANK, at["O"], crank * metre, round(1.3 * FINE))
+            bar(fine, PLATE, at["O"], at["C"], 0.02 * metre, 0.02 * metre)
+            pygame.draw.polygon(fine, PLATE, [at["C"], at["B"], at["D"]])
+            for i, link in enumerate(BODIES):
+                colour, radius = (CRANK, 0.024 * metre) if i == CRANK_BODY else (LINK, 0.015 * metre)
+                bar(fine, colour, at[link.tail], at[link.head], radius, radius)
+            for name, where in at.items():
+                radius = (0.038 if name in "OC" else 0.025) * metre
+                pygame.draw.circle(fine, INK, where, radius)
+                pygame.draw.circle(fine, PAPER, where, radius - edge)
+            for pivot in "OC":
+                pygame.draw.circle(fine, INK, at[pivot], 0.013 * metre)
+
+        turn = crank * self._scale * (1 + 1j)
+        box = [*pixels.values(), pixels["O"] - turn, pixels["O"] + turn]
+        self._brush.smooth(canvas, box, 0.16 * self._scale + 2, paint)
+        for pivot, side, shift in (("O", "midbottom", -0.05j), ("C", "midleft", 0.06)):
+            letter = pixels[pivot] + shift * self._scale
+            self._brush.write(canvas, pivot, (letter.real, letter.imag), 18, INK, side)
+
     def _draw_paths(self, canvas: Any, pixels: dict[str, complex]) -> None:
-        for colour, path, point in (
-            (HEEL, self._heel, self._geometry.heel),
-            (TOE, self._toe, self._geometry.toe),
-        ):
-            if len(path) < 2:
-                continue
-            times, places = zip(*path, strict=True)
-            line = np.append(self._pixels(np.array(places)), pixels[point])
+        if len(self._paths) < 2:
+            return
+        times, *paths = zip(*self._paths, strict=True)
+        points_now = pixels[self._geometry.heel], pixels[self._geometry.toe]
+        for colour, places, end in zip((HEEL, TOE), paths, points_now, strict=True):
+            line = np.append(self._pixels(np.array(places)), end)
             points = list(zip(line.real.tolist(), line.imag.tolist(), strict=True))
             for first in range(0, len(points) - 1, 10):  # older parts fade into the sky
                 part = points[first : first + 11]

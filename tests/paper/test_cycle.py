@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from hoof_env.paper.measure import measure_stance
 from hoof_env.paper.reproduce import GAITS, run_cycle
 
 
@@ -44,6 +45,13 @@ def test_the_centre_of_pressure_lies_between_the_points_that_bear(trace):
         assert at["cop_x"][rows] == pytest.approx(at[f"{point}_x"][rows], rel=1e-14)
     moment = at["toe_normal"] * (at["toe_x"] - at["cop_x"]) + at["heel_normal"] * (at["heel_x"] - at["cop_x"])
     assert moment == pytest.approx(np.zeros(len(at)), abs=1e-9)
+
+
+def test_friction_changes_the_resultant_and_not_the_mean_force():
+    one, two = (measure_stance(run_cycle("run", "exact", friction=mu)) for mu in (0.0, 0.9))
+    assert one.mean == two.mean
+    assert one.peak == one.peak_resultant
+    assert two.peak_resultant == pytest.approx(one.peak * np.sqrt(1 + 0.9**2), rel=1e-6)
 
 
 # Golden: what the search that identified `first_fit` reported of it, an independent program, at 1 ms. Contact

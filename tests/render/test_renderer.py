@@ -22,7 +22,7 @@ from hoof_env.gait.gait import LIMITS, PARAMETERS, load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import load_geometry
-from hoof_env.render.body import Brush
+from hoof_env.render.brush import Brush
 from hoof_env.render.ground import find_patches, footprint
 from hoof_env.render.instant import Instant, columns_of_engine, instants
 from hoof_env.render.panel import Stances

@@ -1,0 +1,122 @@
+"""What everything in the picture is painted with: colours, lettering, smooth shapes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import pygame
+
+INK, GREY, FAINT, PAPER = (34, 43, 53), (88, 99, 111), (216, 222, 228), (255, 255, 255)
+FORCE, TOE, HEEL, CRANK = (213, 94, 0), (0, 114, 178), (204, 121, 167), (0, 158, 115)
+"""Vermilion, blue, reddish purple and bluish green of Okabe and Ito's palette, which any colour vision tells
+apart."""
+
+FINE = 2
+"""Resolution of smooth painting over that of the picture."""
+
+Colour = tuple[int, int, int]
+Position = tuple[float, float]
+
+
+_fonts: dict[int, Any] = {}
+
+
+def _font(size: int) -> Any:
+    """The font that pygame brings along, the same everywhere; made anew after anybody's `pygame.quit()`."""
+    if not pygame.font.get_init():  # a font of before crashes pygame; pygame-ce refuses it
+        _fonts.clear()
+        pygame.font.init()
+    if not _fonts:
+        pygame.register_quit(_fonts.clear)
+    if size not in _fonts:
+        _fonts[size] = pygame.font.Font(None, size)
+    return _fonts[size]
+
+
+class Brush:
+    """Lettering and smooth shapes for a picture of `size` pixels.
+
+    Attributes:
+        unit: 1 for a picture of 960 x 540 pixels; line widths and letters grow with it.
+    """
+
+    def __init__(self, size: tuple[int, int]) -> None:
+        self.unit = min(size[0] / 960, size[1] / 540)
+        self._letters = lru_cache(maxsize=1024)(self._paint_letters)
+        self._frame = pygame.Rect((0, 0), size)
+
+    def write(
+        self, canvas: Any, text: str, at: Position, size: int, colour: Colour, side: str = "midleft"
+    ) -> None:
+        """Write with the corner or edge `side` (a name of pygame.Rect's) of the text `at` a pixel."""
+        image = self._letters(text, size, colour)
+        place = image.get_rect(**{side: (round(at[0]), round(at[1]))})
+        canvas.blit(image, place, special_flags=pygame.BLEND_PREMULTIPLIED)
+
+    def _paint_letters(self, text: str, size: int, colour: Colour) -> Any:
+        image = _font(round(size * self.unit * FINE)).render(text, True, colour)
+        image = image.copy().premul_alpha()  # the copy: pygame (not pygame-ce) misreads rows with padding
+        return pygame.transform.smoothscale(image, (image.get_width() // FINE, image.get_height() // FINE))
+
+    def smooth(
+        self,
+        canvas: Any,
+        points: Any,
+        margin: float,
+        paint: Callable[[Any, Callable[[complex], Position]], None],
+    ) -> None:
+        """Paint at `FINE` times the resolution into the box around pixels (complex), `margin` wider on every
+        side, then scale down onto `canvas`; what lies outside the picture is left out.
+
+        `paint` is called with the fine surface and the map from a pixel (complex) to a position on it.
+        """
+        x, y = np.real(points), np.imag(points)
+        left, top = int(np.floor(x.min() - margin)), int(np.floor(y.min() - margin))
+        right, bottom = int(np.ceil(x.max() + margin)), int(np.ceil(y.max() + margin))
+        box = pygame.Rect(left, top, right - left, bottom - top).clip(self._frame)
+        if not box.width or not box.height:
+            return
+        fine = pygame.Surface((box.width * FINE, box.height * FINE), pygame.SRCALPHA, 32)
+        paint(fine, lambda z: ((z.real - box.left) * FINE, (z.imag - box.top) * FINE))
+        # opaque paint on transparent black is premultiplied by its alpha, and so is an average of it
+        small = pygame.transform.smoothscale(fine, box.size)
+        canvas.blit(small, box, special_flags=pygame.BLEND_PREMULTIPLIED)
+
+    def disc(self, canvas: Any, colour: Colour, at: Position, radius: float) -> None:
+        """Paint a smooth disc around a pixel."""
+
+        def paint(fine: Any, place: Callable[[complex], Position]) -> None:
+            pygame.draw.circle(fine, colour, place(complex(*at)), radius * FINE)
+
+        self.smooth(canvas, [complex(*at)], radius + 1, paint)
+
+
+def mix(one: Colour, two: Colour, part: float) -> Colour:
+    """The colour `part` of the way from `one` to `two`."""
+    red, green, blue = (round(a + part * (b - a)) for a, b in zip(one, two, strict=True))
+    return red, green, blue
+
+
+def bar(surface: Any, colour: Colour, a: Position, b: Position, radius_a: float, radius_b: float) -> None:
+    """A bar from `a` to `b` with round ends."""
+    one, two = complex(*a), complex(*b)
+    side = 1j * (two - one) / max(abs(two - one), 1e-9)
+    corners = (one + radius_a * side, two + radius_b * side, two - radius_b * side, one - radius_a * side)
+    pygame.draw.polygon(surface, colour, [(z.real, z.imag) for z in corners])
+    pygame.draw.circle(surface, colour, a, radius_a)
+    pygame.draw.circle(surface, colour, b, radius_b)
+
+
+def arrow(surface: Any, colour: Colour, a: Position, b: Position, width: float, grow: float = 0.0) -> None:
+    """An arrow from `a` to `b`, grown on all sides by `grow`; the head of a short one shrinks with it."""
+    tail, tip = complex(*a), complex(*b)
+    along = (tip - tail) / max(abs(tip - tail), 1e-9)
+    head = min(3.0 * width, abs(tip - tail))
+    neck = tip - (head + grow) * along
+    half, wide = (width / 2 + grow) * 1j * along, (0.45 * head + 1.6 * grow) * 1j * along
+    tip += 1.6 * grow * along
+    shape = (tail + half, neck + half, neck + wide, tip, neck - wide, neck - half, tail - half)
+    pygame.draw.polygon(surface, colour, [(z.real, z.imag) for z in shape])
