@@ -7,14 +7,15 @@ number of its neighbours: starts are drawn from a generator of its own, and the 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.advance import TRUNK_ROWS
+from hoof_env.dynamics.advance import LANES, TRUNK_ROWS
 from hoof_env.dynamics.constrained import INTEGRATORS
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.layout import LegMemory, TrunkMemory
@@ -38,12 +39,13 @@ from hoof_env.envs.parameters import (
 )
 from hoof_env.envs.reward import check_weights
 from hoof_env.envs.start import HIGHEST, LOWEST, check_options, draw_starts
-from hoof_env.envs.tasks import Settings, Task
+from hoof_env.envs.tasks import Settings, Task, task_of
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait.gait import GaitParameters, gait_names, load_gait
 from hoof_env.ground.contact import load_ground
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.profile import leg_profile
+from hoof_env.simd.cache import COMPILED, given_folder
 from hoof_env.simd.layout import views
 from hoof_env.simd.memory import COLUMNS
 from hoof_env.simd.user_functions import what_cannot_be_compiled
@@ -461,3 +463,30 @@ class EpisodeBatch:
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
         self._open()
+
+
+KERNELS: dict[str, tuple[str, int, dict[str, str]]] = {
+    "one environment": ("leg", 1, {}),
+    "many side by side": ("leg", LANES, {}),
+    "the paper's solver": ("fixed", 1, {"solver": "paper"}),
+}
+"""What uses kernels of its own, task, number and settings; all ids and all settings share these."""
+
+
+def compile_kernels(say: Callable[[str], None]) -> list[str]:
+    """Compile what is not in numba's cache, for images and before workers begin, telling of each of
+    `KERNELS`; returns the names of those kernels.
+
+    Raises:
+        OutputError: there is something to compile, and the cache folder is not writable.
+    """
+    first = len(COMPILED)
+    for name, (task, num_envs, settings) in KERNELS.items():
+        begun, count = time.monotonic(), len(COMPILED)
+        EpisodeBatch(task_of(task), task_of(task).settings(settings), num_envs)
+        if found := COMPILED[count:]:
+            say(f"{name}: {time.monotonic() - begun:.1f} s for {', '.join(found)}")
+    folder = given_folder() or "numba's own folders; NUMBA_CACHE_DIR names another"
+    compiled = COMPILED[first:]
+    say(f"{f'{len(compiled)} kernels compiled' if compiled else 'nothing to compile'}; they are in {folder}")
+    return compiled
