@@ -62,6 +62,9 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         rendered: how many are drawn, the first ones; frames of the others are black. None is all, of at most
             `MOST_DRAWN`.
 
+    Attributes:
+        drawn: how many are drawn.
+
     Rewards are float64, shape (num_envs,). Infos are those of the single environment as arrays; when an
     episode ends they have its figures, too, as "episode_summary", one array for each figure, with masks under
     "_episode_summary", and why it failed as "failure".
@@ -95,9 +98,8 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.metadata["autoreset_mode"] = self.autoreset_mode
         self.spec = None
-        drawn = self._check_drawn(rendered)
-        self._drawn = [Recording(self.batch, env) for env in range(drawn)]
-        self._watched: dict[int, Recording] = {recording.env: recording for recording in self._drawn}
+        self.drawn = self._check_drawn(rendered)
+        self._watched = {env: Recording(self.batch, env) for env in range(self.drawn)}
         self._marks: dict[str, list[Any]] = {}
         self._generators: list[np.random.Generator] = []
         self._ended = np.zeros(self.num_envs, bool)
@@ -197,22 +199,18 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
             gym.logger.warn("render() was called without a render_mode: pass render_mode='rgb_array'")
             return None
         self._check_started("render")
-        frames = [recording.frame("rgb_array", self.metadata["render_fps"]) for recording in self._drawn]
+        fps = self.metadata["render_fps"]
+        frames = [self._watched[env].frame("rgb_array", fps) for env in range(self.drawn)]
         black = np.broadcast_to(np.uint8(0), frames[0].shape)
         return (*frames, *[black] * (self.num_envs - len(frames)))
 
     def close_extras(self, **kwargs: Any) -> None:
         """Give the renderers back."""
         self._phase = "closed"
-        for recording in self._drawn:
+        for recording in self._watched.values():
             recording.close()
 
     # What one may ask of each
-
-    @property
-    def drawn(self) -> int:
-        """How many are drawn, the first ones."""
-        return len(self._drawn)
 
     @property
     def weight(self) -> Floats:
@@ -360,22 +358,23 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
 
     def _start(self, envs: NDArray[np.int64], options: Mapping[str, Any]) -> dict[str, Any]:
         """Start episodes; the parameters that were set or drawn for them, by name."""
-        for env in set(self._watched).intersection(envs.tolist()):
-            self._watched[env].start()
+        watched = [self._watched[env] for env in envs.tolist() if env in self._watched]
+        for recording in watched:
+            recording.start()
         start = self.batch.reset(envs, [self._generators[env] for env in envs], options)
         self._started[envs] = True
         if self._phase == "new" and self._started.all():
             self._phase = "running"
-        for recording in self._drawn:
-            if recording.env in envs:
+        for recording in watched:
+            if recording.env < self.drawn:
                 recording.keep(True)
         found: dict[str, Any] = start["parameters"]
         return found
 
     def _show(self) -> None:
-        for recording in self._drawn:
-            if not self._ended[recording.env]:
-                recording.keep(False)
+        for env in range(self.drawn):
+            if not self._ended[env]:
+                self._watched[env].keep(False)
 
     def _observed(self) -> NDArray[np.float32]:
         return self.batch.observations[: self.num_envs].copy()
