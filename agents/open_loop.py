@@ -30,7 +30,7 @@ from agents.command import parse_pairs, run
 from agents.evaluate import estimate
 from agents.score import make_rows, play_rows
 from hoof_env._output import check_folder
-from hoof_env.envs.policies import open_loop, stored
+from hoof_env.envs.policies import open_loop, open_loop_record
 from hoof_env.errors import DataFileError, HoofEnvError, ParameterError, check_number
 from hoof_env.gait.gait import PARAMETERS
 
@@ -185,7 +185,7 @@ def optimise(args: Args) -> dict[str, Any]:
         "env_id": args.env_id, "env_kwargs": parse_pairs("--env-kwargs", args.env_kwargs),
         "family": args.family, "objective": "return",
         "episodes_of_a_search": episodes, "test_episodes": args.test_episodes,
-        "start": stored(args.start)["parameters"]["constant"] if args.start else None,
+        "start": open_loop_record(args.start)["parameters"]["constant"] if args.start else None,
     }  # fmt: skip
     restarts = earlier(path, about)
     check_folder(path.parent)

@@ -22,11 +22,11 @@ if TYPE_CHECKING:
     from hoof_env.dynamics.parts import Trunk as Trunk
     from hoof_env.dynamics.step_length import StepWarning as StepWarning
     from hoof_env.envs.horse_leg import HorseLegEnv as HorseLegEnv
+    from hoof_env.envs.horse_leg import RandomizeParameters as RandomizeParameters
     from hoof_env.envs.multi_objective import HorseLegMOEnv as HorseLegMOEnv
     from hoof_env.envs.observation import Entry as Entry
     from hoof_env.envs.observation import Scale as Scale
     from hoof_env.envs.policies import make_policy as make_policy
-    from hoof_env.envs.randomize import RandomizeParameters as RandomizeParameters
     from hoof_env.envs.reward import Term as Term
     from hoof_env.envs.sb3 import Sb3VecEnv as Sb3VecEnv
     from hoof_env.envs.tasks import register as register
@@ -50,11 +50,10 @@ _MODULES = {
     "dynamics.engine": "TrunkEngine",
     "dynamics.parts": "Limb Motor Prescribed Result Trunk",
     "dynamics.step_length": "StepWarning",
-    "envs.horse_leg": "HorseLegEnv",
+    "envs.horse_leg": "HorseLegEnv RandomizeParameters",
     "envs.multi_objective": "HorseLegMOEnv",
     "envs.observation": "Entry Scale",
     "envs.policies": "make_policy",
-    "envs.randomize": "RandomizeParameters",
     "envs.reward": "Term",
     "envs.sb3": "Sb3VecEnv",
     "envs.tasks": "register",

@@ -150,7 +150,7 @@ def compile() -> None:
     They are kept in the folder NUMBA_CACHE_DIR. An engine with four legs and `reproduce` have more
     of their own.
     """
-    from hoof_env.envs.kernels import compile_kernels
+    from hoof_env.envs.batch import compile_kernels
 
     compile_kernels(_say)
 

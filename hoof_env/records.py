@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 import hoof_env
 from hoof_env._output import check_folder
 from hoof_env.dynamics.memory import LIFT_OFF
-from hoof_env.envs.policies import Scripted, load_open_loop, make_policy, policy_names, read_open_loop
+from hoof_env.envs.policies import Scripted, load_open_loop, make_policy, policy_names
 from hoof_env.errors import MissingExtraError, OutputError, ParameterError, check_number
 from hoof_env.gait.gait import PARAMETERS, GaitParameters
 from hoof_env.ground.terrain import Terrain
@@ -100,7 +100,7 @@ def find_policy(name: str, env: gym.Env[Any, Any], env_id: str, seed: int = 0) -
     if name in names:
         return make_policy(name, env, seed)
     if name.endswith(".json"):
-        return read_open_loop(Path(name), env)
+        return load_open_loop(name, env)
     if OnnxPolicy.stands_at(Path(name)):
         return OnnxPolicy(Path(name)).load(env, env_id)
     if name == "open-loop":

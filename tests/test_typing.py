@@ -12,8 +12,7 @@ from pathlib import Path
 import pytest
 
 import hoof_env
-from hoof_env.envs.arguments import Keywords, VectorKeywords
-from hoof_env.envs.tasks import TASKS, Settings, to_json
+from hoof_env.envs.tasks import TASKS, Keywords, Settings, VectorKeywords, to_json
 
 SCRIPT = """\
 from typing import assert_type

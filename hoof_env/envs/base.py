@@ -31,6 +31,14 @@ def fixed_setting(name: str) -> FixedSettingError:
     return FixedSettingError(f"{name}: expected no assignment, which would change nothing; set it by {how}")
 
 
+def array_of(given: Any) -> NDArray[Any]:
+    """An array of what a caller gave; an empty one of objects where it makes none."""
+    try:
+        return np.asarray(given)
+    except (ValueError, TypeError, RuntimeError):  # the last of a tensor that has a gradient
+        return np.empty(0, object)
+
+
 def generator_of(state: Any) -> np.random.Generator:
     """A generator in the state that a `PCG64` had.
 

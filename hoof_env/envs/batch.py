@@ -7,14 +7,15 @@ number of its neighbours: starts are drawn from a generator of its own, and the 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.advance import TRUNK_ROWS
+from hoof_env.dynamics.advance import LANES, TRUNK_ROWS
 from hoof_env.dynamics.constrained import INTEGRATORS
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.layout import LegMemory, TrunkMemory
@@ -38,12 +39,13 @@ from hoof_env.envs.parameters import (
 )
 from hoof_env.envs.reward import check_weights
 from hoof_env.envs.start import HIGHEST, LOWEST, check_options, draw_starts
-from hoof_env.envs.tasks import Settings, Task
+from hoof_env.envs.tasks import TASKS, Settings, Task
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait.gait import GaitParameters, gait_names, load_gait
 from hoof_env.ground.contact import load_ground
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.profile import leg_profile
+from hoof_env.simd.cache import COMPILED, given_folder
 from hoof_env.simd.layout import views
 from hoof_env.simd.memory import COLUMNS
 from hoof_env.simd.user_functions import what_cannot_be_compiled
@@ -390,18 +392,12 @@ class EpisodeBatch:
     # Actions
 
     def command_of(self, action: Any) -> Floats:
-        """Gait parameters that an action commands, shape (4,); the action is clipped to [-1, 1], and they to
-        their limits."""
+        """See `LegBase.command_of`; they are clipped to their limits."""
         wanted = self._base + HALF_RANGE * np.clip(np.asarray(action, np.float64), -1.0, 1.0)
         return np.clip(wanted, LOW, HIGH)
 
     def action_for(self, gaits: str | GaitParameters | Floats) -> NDArray[np.float32]:
-        """The action that commands a gait, or gaits of shape (n, 4), to float32 precision; the nearest one if
-        it is out of reach.
-
-        Raises:
-            ParameterError: neither a gait of the preset nor four parameters each.
-        """
+        """See `LegBase.action_for`."""
         if isinstance(gaits, str):
             gaits = self.gaits[check_choice("gait", gaits, self.gaits)]
         try:
@@ -433,14 +429,14 @@ class EpisodeBatch:
         try:
             episode = np.asarray(state["episode"], np.float64)
         except (TypeError, ValueError):
-            raise ParameterError(f"state['episode']: expected numbers, got {state['episode']!r}") from None
+            episode = np.array(np.nan)
+        if np.isnan(episode).any():
+            raise ParameterError(f"state['episode']: expected numbers, got {state['episode']!r:.60}")
         if episode.shape != expected:
             raise ParameterError(
                 f"state['episode']: expected shape {expected} for {self.num_envs} environments, "
                 f"got {episode.shape}"
             )
-        if np.isnan(episode).any():
-            raise ParameterError(f"state['episode']: expected numbers, got {episode.tolist()!r:.60}")
         begun = np.asarray(state.get("begun", np.nan))  # older states do not say
         if begun.dtype.kind != "f" or begun.shape not in ((), self.begun.shape):
             raise ParameterError(
@@ -461,3 +457,32 @@ class EpisodeBatch:
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
         self._open()
+
+
+KERNELS: dict[str, Callable[[], object]] = {
+    "one environment": lambda: EpisodeBatch(TASKS["leg"], TASKS["leg"].settings({}), 1),
+    "many side by side": lambda: EpisodeBatch(TASKS["leg"], TASKS["leg"].settings({}), LANES),
+    "the paper's solver": lambda: EpisodeBatch(
+        TASKS["fixed"], TASKS["fixed"].settings({"solver": "paper"}), 1
+    ),
+}
+"""What uses kernels of its own; all ids and all settings share these."""
+
+
+def compile_kernels(say: Callable[[str], None]) -> list[str]:
+    """Compile what is not in numba's cache, for images and before workers begin, telling of each of
+    `KERNELS`; returns the names of those kernels.
+
+    Raises:
+        OutputError: there is something to compile, and the cache folder is not writable.
+    """
+    first = len(COMPILED)
+    for name, make in KERNELS.items():
+        begun, count = time.monotonic(), len(COMPILED)
+        make()
+        if found := COMPILED[count:]:
+            say(f"{name}: {time.monotonic() - begun:.1f} s for {', '.join(found)}")
+    folder = given_folder() or "numba's own folders; NUMBA_CACHE_DIR names another"
+    compiled = COMPILED[first:]
+    say(f"{f'{len(compiled)} kernels compiled' if compiled else 'nothing to compile'}; they are in {folder}")
+    return compiled

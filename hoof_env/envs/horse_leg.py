@@ -8,15 +8,16 @@ from typing import Any, ClassVar, Unpack
 
 import gymnasium as gym
 import numpy as np
+from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
-from hoof_env.envs.arguments import Keywords, seed_of
-from hoof_env.envs.base import LegBase, generator_of
+from hoof_env.envs.base import LegBase, array_of, generator_of
 from hoof_env.envs.episode import ACTIONS, FAILED
 from hoof_env.envs.infos import AT_MEASURED, BEGUN, LAST_STEP, MEASURED, START, named
 from hoof_env.envs.recording import Recording
 from hoof_env.envs.reward import failure
-from hoof_env.errors import ParameterError
+from hoof_env.envs.tasks import Keywords
+from hoof_env.errors import ParameterError, count, flag
 from hoof_env.gait.gait import PARAMETERS
 
 _SHAPE = (ACTIONS,)
@@ -120,7 +121,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         """
         self._check_open("reset")
         checked = self.batch.check_options(options)  # before the generator is touched
-        super().reset(seed=seed_of(seed))
+        super().reset(seed=None if seed is None else count("seed", seed, low=0))
         if self._recording is not None:
             self._recording.start()
         start = self.batch.reset([0], [self.np_random], checked)
@@ -204,10 +205,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def _read_action(self, action: Any) -> None:
         """Put an action where the kernel finds it."""
-        try:
-            given = np.asarray(action)
-        except (ValueError, TypeError, RuntimeError):  # the last of a tensor that has a gradient
-            given = np.empty(0)
+        given = array_of(action)
         if given.shape != _SHAPE or given.dtype.kind not in "fiu":
             raise ParameterError(f"action: expected 4 finite numbers in [-1, 1], got {action!r}")
         with np.errstate(over="ignore"):  # to infinity, which is refused
@@ -272,3 +270,37 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         vars(self).update(state)
         self._attach()
         self._begin()
+
+
+class RandomizeParameters(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
+    """Draws physical parameters at each reset, from the environment's own generator.
+
+    They go to `reset(options={"parameters": ...})`, where a parameter that the caller names takes precedence.
+    What was drawn is in the info of the reset, under "parameters". Many environments at once have the
+    argument `randomize` instead.
+
+    Args:
+        env: an environment of this family, wrapped or not.
+        ranges: (lowest, highest) or a number, by the names of `tasks.PER_EPISODE`.
+        enabled: False leaves the parameters as the environment was made with; can be set at any time.
+
+    Raises:
+        ParameterError: not an environment of this package, an unknown parameter, or one out of range.
+    """
+
+    def __init__(self, env: gym.Env[Any, Any], ranges: Mapping[str, Any], enabled: bool = True) -> None:
+        leg = env.unwrapped
+        if not isinstance(leg, HorseLegEnv):
+            raise ParameterError(f"env: expected a leg of this package, got {type(leg).__name__}")
+        leg.batch.check_options({"parameters": ranges})
+        RecordConstructorArgs.__init__(self, ranges=dict(ranges), enabled=enabled)
+        gym.Wrapper.__init__(self, env)
+        self.ranges, self.enabled = dict(ranges), flag("enabled", enabled)
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, Any]:
+        """Start an episode with parameters of its own."""
+        given = {} if options is None else options
+        own = given.get("parameters", {}) if isinstance(given, Mapping) else None
+        if self.enabled and isinstance(own, Mapping):  # else the environment says what is wrong
+            options = {**given, "parameters": {**self.ranges, **own}}
+        return self.env.reset(seed=seed, options=options)

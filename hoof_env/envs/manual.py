@@ -24,7 +24,7 @@ from hoof_env.envs import observation, start
 from hoof_env.envs.infos import MEASURED
 from hoof_env.envs.multi_objective import HorseLegMOEnv
 from hoof_env.envs.parameters import HILLS, SPACING
-from hoof_env.envs.reward import Term, check_weights
+from hoof_env.envs.reward import check_weights
 from hoof_env.envs.tasks import PER_EPISODE, TASKS, Settings, Task, task_of, to_json
 from hoof_env.errors import OutputError, check_choice
 from hoof_env.gait.gait import LIMITS, FilterSettings
@@ -47,24 +47,24 @@ INDEX = "README.md"
 GAIT = [entry for entry in observation.ENTRIES if entry.group == "gait"]
 
 
-def tables() -> dict[str, dict[str, list[str]]]:
-    """What `manual.toml` says, by table and name: unit and meaning."""
+def tables() -> dict[str, dict[str, Any]]:
+    """What `manual.toml` says, by table and name: unit and meaning, or the words of a page."""
     names = {
         "presets": preset_names(), "trunks": ONE_LEG, "schemes": SCHEMES, "paper_schemes": INTEGRATORS,
         "normal_laws": NORMAL_LAWS, "friction_laws": FRICTION_LAWS,
     }  # fmt: skip
-    values = {name: ", ".join(f'"{one}"' for one in choices) for name, choices in names.items()}
-    numbers = {"lowest": start.LOWEST, "highest": start.HIGHEST, "spacing": SPACING}
+    values = {name: ", ".join(f'\\"{one}\\"' for one in choices) for name, choices in names.items()}
+    numbers = {
+        "lowest": start.LOWEST, "highest": start.HIGHEST, "spacing": SPACING, "margin": start.MARGIN,
+        "start_speed": start.START_SPEED,
+    }  # fmt: skip
     values |= {name: f"{number:g}" for name, number in numbers.items()}
-    return {
-        table: {name: [Template(cell).substitute(values) for cell in cells] for name, cells in rows.items()}
-        for table, rows in tomllib.loads((HERE / "manual.toml").read_text(encoding="utf-8")).items()
-    }
+    text = (HERE / "manual.toml").read_text(encoding="utf-8")
+    return tomllib.loads(Template(text).safe_substitute(values))
 
 
 TABLES = tables()
-
-MOVES = "The trunk moves by what friction gives it and feels every link swing. "
+WORDS = TABLES["words"]
 
 
 def page(task: str) -> str:
@@ -74,40 +74,48 @@ def page(task: str) -> str:
         ParameterError: there is no such page.
     """
     what = task_of("leg" if task == "mo" else task)
-    settings = what.settings({})
     if task == "mo":
         return Template(MO_PAGE).substitute(observations=_observations(what))
-    groups = observation.groups_of(what.entries)
+    s = what.settings({})
+    trunk, groups = TABLES[s.trunk], observation.groups_of(what.entries)
+    weights = check_weights(s.reward_weights, what.terms)
+    rewards = [(f"`{t.key}`", f"`{t.name}`", f"{weights[t.name]:g}", t.unit, t.meaning) for t in what.terms]
+    defaults = {name: literal(value) for name, value in to_json(s).items()}
+    settings = _rows("settings", defaults | {name: f"**{defaults[name]}**" for name in what.defaults})
+    hills = {name: literal(value) for name, value in HILLS.items()}
+    head = ("Name", "Default", "Unit", "Meaning")
+    height = s.hip_height or load_geometry(s.preset).hip_height
+    limits = [f"{low:.5g} to {high:.5g} {GAIT[k].unit}" for k, (low, high) in enumerate(LIMITS.values())]
     text = Template(PAGE).substitute(
         name=what.name,
         id=what.id,
         summary=what.summary,
         about=what.about,
-        trunk="" if settings.trunk == "fixed" else MOVES,
+        trunk=trunk["moves"],
         action_space=f"Box(-1, 1, ({len(LIMITS)},), float32)",
-        actions=_actions(settings),
-        offsets=_offsets(settings.gait) if settings.gait else "",
+        actions=_actions(s.gait),
+        offsets=Template(WORDS["offsets"]).substitute(gait=s.gait, limits=", ".join(limits))
+        if s.gait
+        else "",
         observation_space=f"Box(-1, 1, ({len(_observed(what))},), float32)",
         observations=_observations(what),
-        other_groups=", ".join(f"`{group}`" for group in groups if group not in settings.observation),
-        rewards=_rewards(settings, what.terms),
-        target_reward="Progress counts up to the commanded speed; what goes beyond it is subtracted."
-        if settings.target_speed
-        else "",
+        other_groups=", ".join(f"`{group}`" for group in groups if group not in s.observation),
+        rewards=markdown_table(("Term", "Weight", "Default", "Unit", "Meaning"), rewards),
+        target_reward=WORDS["target_reward"] if s.target_speed else "",
         lift_off=f"{100 * LIFT_OFF:g}",
-        start=_start(settings, what.start),
+        start=_start(s, what.start),
         options=markdown_table(("Option", "Unit", "Range", "Meaning"), _options()),
         parameters=", ".join(f"`{name}`" for name in PER_EPISODE),
-        infos=markdown_table(("Key", "Unit", "Meaning"), _quoted("info")),
+        infos=markdown_table(("Key", "Unit", "Meaning"), _rows("info")),
         measured=str(len(MEASURED)),
-        quantities=markdown_table(("Name", "In", "Unit", "Meaning"), _quantities()),
-        leaves=_leaves(settings),
-        seconds=literal(settings.episode_seconds),
-        figures=markdown_table(("Figure", "Unit", "Meaning"), _quoted("summary")),
+        quantities=markdown_table(("Name", "In", "Unit", "Meaning"), _rows("quantities")),
+        leaves=Template(trunk["leaves"]).substitute(height=f"{height:.4g}"),
+        seconds=literal(s.episode_seconds),
+        figures=markdown_table(("Figure", "Unit", "Meaning"), _rows("summary")),
         vector_arguments=markdown_table(("Argument", "Default", "Meaning"), _vector_arguments()),
-        bold=", **bold** where they are not those of [HorseLeg](HorseLeg.md)" if what.defaults else "",
-        settings=markdown_table(("Name", "Default", "Unit", "Meaning"), _settings(settings, what.defaults)),
-        terrain=_terrain() if settings.terrain else "",
+        bold=WORDS["bold"] if what.defaults else "",
+        settings=markdown_table(head, [*settings, RENDER_MODE]),
+        terrain=WORDS["terrain"] + markdown_table(head, _rows("hills", hills)) if s.terrain else "",
     )
     return re.sub(r"\n{3,}", "\n\n", text)
 
@@ -133,12 +141,7 @@ def index() -> str:
         link = f"[`hoof_env/{name}-v0`]({name}.md)"
         rows.append((link, summary, str(len(_observed(what))), what.reference, native))
     head = ("id", "what it is", "observation", "reference gait", "native vector environment")
-    return (
-        "# Environments\n\nWritten by `hoof-env manual --out docs/environments`.\n\n"
-        f"{markdown_table(head, rows)}\n\n"
-        "Actions are `Box(-1, 1, (4,), float32)`, observations boxes of so many numbers in [-1, 1]. Idle,"
-        " airborne, foot-dragging and bang-bang policies must stay below the reference gait.\n"
-    )
+    return Template(WORDS["index"]).substitute(table=markdown_table(head, rows))
 
 
 def write_pages(out: Path) -> list[Path]:
@@ -159,75 +162,51 @@ def write_pages(out: Path) -> list[Path]:
 
 # Parts of a page
 
+RENDER_MODE = ("`render_mode`", "None", "", '"rgb_array" or "human"')
+
+
+def _rows(table: str, values: Mapping[str, str] | None = None) -> list[tuple[str, ...]]:
+    """Rows of a table of `manual.toml`: names, what `values` has of them, and cells."""
+    return [
+        (", ".join(f"`{one}`" for one in name.split(", ")), *([values[name]] if values else []), *cells)
+        for name, cells in TABLES[table].items()
+    ]
+
 
 def _observed(what: Task) -> list[observation.Entry]:
     settings = what.settings({})
     return observation.observed(settings.observation, settings.trunk, what.entries)
 
 
-def _actions(settings: Settings) -> str:
+def _actions(gait: str | None) -> str:
     bounds = FilterSettings().to_array()[:, 1]
     rows = []
     for k, (low, high) in enumerate(LIMITS.values()):
-        name, unit = GAIT[k].name, GAIT[k].unit
-        if settings.gait:
+        if gait:
             low, high = -(high - low) / 2, (high - low) / 2
         fastest = f"{bounds[k]:g} {GAIT[len(LIMITS) + k].unit}"
-        rows.append((str(k), name, f"{low:.5g}", f"{high:.5g}", unit, fastest))
-    return markdown_table(
-        ("Num", "Offset of" if settings.gait else "Command", "At -1", "At +1", "Unit", "Fastest change"), rows
-    )
-
-
-def _offsets(gait: str) -> str:
-    limits = (f"{low:.5g} to {high:.5g} {GAIT[k].unit}" for k, (low, high) in enumerate(LIMITS.values()))
-    return (
-        f'It is added to the {gait}, and the sums are clipped to {", ".join(limits)}. What is observed "as'
-        ' action" is -1 and 1 at these limits. A gait out of reach has the nearest action.\n\n'
-    )
+        rows.append((str(k), GAIT[k].name, f"{low:.5g}", f"{high:.5g}", GAIT[k].unit, fastest))
+    head = ("Num", "Offset of" if gait else "Command", "At -1", "At +1", "Unit", "Fastest change")
+    return markdown_table(head, rows)
 
 
 def _observations(what: Task) -> str:
-    rows = [(e.name, e.scale.text, e.unit, e.group) for e in _observed(what)]
-    head = ("Num", "Observation", "Scaling", "Unit before scaling", "Group")
-    return markdown_table(head, [(str(k), *row) for k, row in enumerate(rows)])
-
-
-def _rewards(settings: Settings, terms: tuple[Term, ...]) -> str:
-    weights = check_weights(settings.reward_weights, terms)
-    rows = [(f"`{t.key}`", f"`{t.name}`", f"{weights[t.name]:g}", t.unit, t.meaning) for t in terms]
-    return markdown_table(("Term", "Weight", "Default", "Unit", "Meaning"), rows)
+    rows = [(str(k), e.name, e.scale.text, e.unit, e.group) for k, e in enumerate(_observed(what))]
+    return markdown_table(("Num", "Observation", "Scaling", "Unit before scaling", "Group"), rows)
 
 
 def _start(settings: Settings, options: Mapping[str, float]) -> str:
-    between = "gait parameters on the line between the preset's walk and run"
-    parts = [
-        f"Crank angle {options['crank_angle']:g}" if "crank_angle" in options else "Crank angle uniform",
-        f"{'the ' + settings.gait if settings.gait else between}, at rest in the filters",
-        "at rest" if settings.trunk == "fixed" else f"speed uniform in 0 to {start.START_SPEED:g} m/s",
-        {
-            "suspended": "the trunk at its nominal height, or higher where the hoof would be in the ground",
-            "rail": "a crank angle with the hoof in the ground is drawn again",
-            "fixed": "the trunk at its nominal height",
-        }[settings.trunk],
-        f"anywhere on the terrain but within {start.MARGIN:g} m of its ends"
-        if settings.terrain
-        else "at x = 0",
-    ]
-    if settings.target_speed:
-        parts.append(
-            "commanded speeds uniform in `target_speed`, each for a time uniform in `target_seconds`"
+    trunk = TABLES[settings.trunk]
+    return "; ".join(
+        (
+            f"Crank angle {options['crank_angle']:g}" if "crank_angle" in options else "Crank angle uniform",
+            f"the {settings.gait}, at rest in the filters" if settings.gait else WORDS["start_gait"],
+            trunk["speed"],
+            trunk["height"],
+            WORDS["start_terrain"] if settings.terrain else "at x = 0",
+            *([WORDS["start_target"]] if settings.target_speed else []),
         )
-    return "; ".join(parts)
-
-
-def _leaves(settings: Settings) -> str:
-    if settings.trunk == "fixed":
-        return ' the linkage comes apart, which `solver="paper"` does not rule out, or'
-    if settings.trunk != "suspended":
-        return ""
-    height = settings.hip_height or load_geometry(settings.preset).hip_height
-    return f" O leaves {start.LOWEST:g} to {start.HIGHEST:g} times its nominal height, {height:.4g} m, or"
+    )
 
 
 def _options() -> Iterable[tuple[str, ...]]:
@@ -237,37 +216,12 @@ def _options() -> Iterable[tuple[str, ...]]:
         yield f"`{name}`", unit, within, meaning
 
 
-def _quantities() -> Iterable[tuple[str, ...]]:
-    for names, cells in TABLES["quantities"].items():
-        yield ", ".join(f"`{name}`" for name in names.split(", ")), *cells
-
-
-def _vector_arguments() -> Iterable[tuple[str, ...]]:
+def _vector_arguments() -> list[tuple[str, ...]]:
     from hoof_env.envs.vector import HorseLegVectorEnv
 
-    for name, item in inspect.signature(HorseLegVectorEnv).parameters.items():
-        if name in TABLES["vector"]:
-            default = literal(getattr(item.default, "name", item.default))
-            yield f"`{name}`", default, TABLES["vector"][name][1]
-
-
-def _settings(settings: Settings, changed: Iterable[str]) -> Iterable[tuple[str, ...]]:
-    for name, value in to_json(settings).items():
-        default = f"**{literal(value)}**" if name in changed else literal(value)
-        yield f"`{name}`", default, *TABLES["settings"][name]
-    yield "`render_mode`", "None", "", '"rgb_array" or "human"'
-
-
-def _terrain() -> str:
-    rows = [(f"`{name}`", literal(value), *TABLES["hills"][name]) for name, value in HILLS.items()]
-    return (
-        "### Terrain\n\nHills go straight from one random height to the next, each at its own slope, over"
-        " patches of random stiffness and friction. They take:\n\n"
-        f"{markdown_table(('Name', 'Default', 'Unit', 'Meaning'), rows)}"
-    )
-
-
-# Markdown
+    arguments = inspect.signature(HorseLegVectorEnv).parameters
+    defaults = {name: arguments[name].default for name in TABLES["vector"]}
+    return _rows("vector", {name: literal(getattr(value, "name", value)) for name, value in defaults.items()})
 
 
 def literal(value: Any) -> str:
@@ -279,7 +233,3 @@ def literal(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:g}" if float(f"{value:g}") == value else repr(value)
     return "None" if value is None else json.dumps(value)
-
-
-def _quoted(table: str) -> Iterable[tuple[str, ...]]:
-    return ((f"`{name}`", *cells) for name, cells in TABLES[table].items())

@@ -10,8 +10,8 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from hoof_env.envs.arguments import Keywords
 from hoof_env.envs.horse_leg import HorseLegEnv
+from hoof_env.envs.tasks import Keywords
 
 OBJECTIVES = ("progress", "peak force", "energy")
 """What the entries of the vector reward stand for; more is better in each."""

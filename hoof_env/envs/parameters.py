@@ -34,13 +34,16 @@ def resolved(settings: Settings) -> Settings:
     return done
 
 
-def pair(name: str, value: Any, low: float) -> tuple[float, float]:
-    """A range, or one number as one, from `low` on; ParameterError of anything else."""
-    two = value if isinstance(value, (list, tuple)) else (value, value)
-    if len(two) != 2:
-        raise ParameterError(f"{name}: expected two numbers, got {value!r}")
-    first = check_number(f"{name}[0]", two[0], low=low, high=1e6)
-    return first, check_number(f"{name}[1]", two[1], low=first, high=1e6)
+def pair(name: str, value: Any, low: float, high: float = 1e6, *, or_one: bool = True) -> tuple[float, float]:
+    """A range from `low` to `high`, with `or_one` also one number as one; ParameterError of anything else."""
+    if or_one and not isinstance(value, (list, tuple)):
+        value = value, value
+    try:
+        first, last = value
+    except (TypeError, ValueError):
+        raise ParameterError(f"{name}: expected two numbers, got {value!r}") from None
+    first = check_number(f"{name}[0]", first, low=low, high=high)
+    return first, check_number(f"{name}[1]", last, low=first, high=high)
 
 
 def substeps_of(dt: float, sim_dt: float) -> int:
@@ -181,7 +184,7 @@ def _hills(given: dict[str, Any]) -> Terrain:
         height, k = there, k + many
     factors = {}
     for name in ("stiffness", "friction"):
-        low, high = np.log(_range(name, given[name]))
+        low, high = np.log(pair(f"terrain[{name!r}]", given[name], 1e-3, 1e3, or_one=False))
         factor, k = np.empty(knots), 0
         while k < knots:
             many = max(round(generator.exponential(patch) / SPACING), 5)
@@ -189,12 +192,3 @@ def _hills(given: dict[str, Any]) -> Terrain:
             k += many
         factors[name] = tuple(factor.tolist())
     return Terrain(tuple(row.tolist()), factors["stiffness"], factors["friction"], 0.0, SPACING)
-
-
-def _range(name: str, value: Any) -> tuple[float, float]:
-    try:
-        low, high = value
-    except (TypeError, ValueError):
-        raise ParameterError(f"terrain[{name!r}]: expected two numbers, got {value!r}") from None
-    low = check_number(f"terrain[{name!r}][0]", low, low=1e-3, high=1e3)
-    return low, check_number(f"terrain[{name!r}][1]", high, low=low, high=1e3)

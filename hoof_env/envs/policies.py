@@ -188,45 +188,20 @@ def open_loop_record(path: Path) -> dict[str, Any]:
     return found
 
 
-def read_open_loop(path: Path, env: Any = None) -> Scripted:
-    """The open-loop gait of a file; warns if it was found for another id.
-
-    Args:
-        path: as `open_loop_record` takes it.
-        env: what it is for, whose control step the clock then has; None for that of the file.
-
-    Raises:
-        DataFileError: as `open_loop_record`, or the environment's actions command other gaits.
-    """
-    found = open_loop_record(path)
-    given, dt, gait = found["parameters"], float(found["dt"]), np.array(list(found["gait"].values()), float)
-    if env is not None:
-        leg, dt = env.unwrapped, getattr(env.unwrapped, "dt", dt)
-        meant = getattr(leg, "command_of", lambda action: np.full(4, np.nan))(np.array(given["constant"]))
-        if not np.allclose(meant, gait, atol=1e-6):
-            raise DataFileError(
-                f"open-loop gait {path}: expected an environment whose actions command gaits as those of "
-                f"{found.get('env_id')} do, got {type(leg).__name__}, where this one is {meant.tolist()}"
-            )
-        here = leg.spec and leg.spec.id
-        if here and (there := found.get("env_id") or here) not in (here, STANDS_FOR.get(here)):
-            warnings.warn(f"open-loop gait {path}: found for {there}, here {here}", stacklevel=2)
-    return open_loop(given, dt)
-
-
 GAITS = Path(__file__).parents[1] / "data" / "gaits"
 """Open-loop gaits that come with the package, as `agents.open_loop` found them."""
 
 
 def load_open_loop(path_or_env_id: str | Path, env: Any = None) -> Scripted:
-    """The policy of a gait file; or, for the id of an environment, of the best gait that is stored.
+    """The policy of a gait file; or, for the id of an environment, of the best gait that is stored. Warns if
+    it was found for another id than that of `env`.
 
     Args:
-        path_or_env_id: path of a .json, or a registered id.
+        path_or_env_id: path of a .json, see `open_loop_record`, or a registered id.
         env: what it is for, whose control step the clock then has; None for that of the file.
 
     Raises:
-        DataFileError: there is none, it cannot be read, or it does not fit `env`.
+        DataFileError: there is none, it cannot be read, or actions of `env` command other gaits.
     """
     path = Path(path_or_env_id)
     if path.suffix != ".json":
@@ -236,17 +211,18 @@ def load_open_loop(path_or_env_id: str | Path, env: Any = None) -> Scripted:
         if not files:
             known = ", ".join(sorted(file.name for file in GAITS.glob("*.json"))) or "none"
             raise DataFileError(f"open-loop gait of {name}: expected one of those in {GAITS.name}/: {known}")
-        path = max(files, key=lambda file: stored(file)["score"]["mean"]["return"])
-    return read_open_loop(path, env)
-
-
-def stored(path: Path) -> dict[str, Any]:
-    """What a gait file holds.
-
-    Raises:
-        DataFileError: it is none.
-    """
+        path = max(files, key=lambda file: open_loop_record(file)["score"]["mean"]["return"])
     found = open_loop_record(path)
-    if "score" not in found:
-        raise DataFileError(f"{path}: expected the JSON object of agents.open_loop with its score")
-    return found
+    given, dt = found["parameters"], float(found["dt"])
+    if env is not None:
+        leg, dt = env.unwrapped, getattr(env.unwrapped, "dt", dt)
+        meant = getattr(leg, "command_of", lambda action: np.full(4, np.nan))(np.array(given["constant"]))
+        if not np.allclose(meant, list(found["gait"].values()), atol=1e-6):
+            raise DataFileError(
+                f"open-loop gait {path}: expected an environment whose actions command gaits as those of "
+                f"{found.get('env_id')} do, got {type(leg).__name__}, where this one is {meant.tolist()}"
+            )
+        here = leg.spec and leg.spec.id
+        if here and (there := found.get("env_id") or here) not in (here, STANDS_FOR.get(here)):
+            warnings.warn(f"open-loop gait {path}: found for {there}, here {here}", stacklevel=2)
+    return open_loop(given, dt)

@@ -11,10 +11,9 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
-from hoof_env.envs.arguments import VectorKeywords
 from hoof_env.envs.base import fixed_setting
 from hoof_env.envs.infos import row_of
-from hoof_env.envs.tasks import SETTINGS
+from hoof_env.envs.tasks import SETTINGS, VectorKeywords
 from hoof_env.envs.vector import OWN, HorseLegVectorEnv
 from hoof_env.errors import ParameterError
 

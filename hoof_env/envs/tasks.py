@@ -10,15 +10,16 @@ import difflib
 import math
 import re
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, TypeVar
+from typing import Any, TypedDict, TypeVar
 
 import gymnasium as gym
 import numpy as np
+from gymnasium.vector import AutoresetMode
 
 from hoof_env.envs.observation import ENTRIES, Entry, check_groups, groups_of
 from hoof_env.envs.reward import TERMS, Term, check_weights
@@ -73,6 +74,59 @@ class Settings:
     observation: tuple[str, ...] = ("crank", "gait", "trunk", "hoof", "action")
     reward_weights: Mapping[str, float] | None = None
     randomize: Mapping[str, Any] | None = None
+
+
+Range = float | Sequence[float]
+"""Lowest and highest, or one number for both."""
+
+
+class Keywords(TypedDict, total=False):
+    """Keywords of `HorseLegEnv`, beside its own: `Settings` as callers may give them."""
+
+    preset: Preset
+    gait: str | None
+    trunk: str
+    hip_height: float | None
+    trunk_mass: float
+    trunk_share: float
+    trunk_stiffness: float
+    trunk_damping: float
+    trunk_drag: float
+    stiffness: float | None
+    exponent: float | None
+    normal_law: str
+    restitution: float
+    approach_floor: float
+    friction_law: str
+    friction: float
+    friction_slow: float
+    friction_fast: float
+    terrain: Mapping[str, Any] | None
+    drive: str
+    motor_gain: float
+    motor_torque: float
+    motor_inertia: float
+    solver: str
+    baumgarte_alpha: float
+    baumgarte_beta: float
+    integrator: str | None
+    sim_dt: float | None
+    dt: float
+    episode_seconds: float
+    target_speed: Range | None
+    target_seconds: Range
+    observation: Sequence[str]
+    reward_weights: Mapping[str, float] | None
+    randomize: Mapping[str, Range] | None
+
+
+class VectorKeywords(Keywords, total=False):
+    """Of `Sb3VecEnv`, which hands them to `HorseLegVectorEnv`."""
+
+    autoreset_mode: AutoresetMode | str
+    max_episode_steps: int | None
+    render_mode: str | None
+    rendered: int
 
 
 SETTINGS = tuple(item.name for item in fields(Settings))

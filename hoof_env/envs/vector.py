@@ -19,11 +19,11 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from hoof_env.envs.arguments import Keywords, actions_of, drawn_of, ended_of, mask_of, mode_of, seeds_of
-from hoof_env.envs.base import LegBase, fixed_setting, generator_of
-from hoof_env.envs.episode import FAILED, TRUNCATED
+from hoof_env.envs.base import LegBase, array_of, fixed_setting, generator_of
+from hoof_env.envs.episode import ACTIONS, FAILED, TRUNCATED
 from hoof_env.envs.infos import named
 from hoof_env.envs.recording import Recording
+from hoof_env.envs.tasks import Keywords
 from hoof_env.errors import ParameterError, count
 
 Floats = NDArray[np.float64]
@@ -39,6 +39,16 @@ OWN = ("weight", "render", "episode_summary", "raw_observation", "record", "np_r
 SINGLE = {"action_space": "single_action_space", "observation_space": "single_observation_space"}
 
 
+def mode_of(value: Any) -> AutoresetMode:
+    """An `AutoresetMode`, given as such, by its name or by its value."""
+    known = {key: mode for mode in AutoresetMode for key in (mode, mode.name, mode.value)}
+    try:
+        return known[value]
+    except (KeyError, TypeError):
+        names = ", ".join(mode.name for mode in AutoresetMode)
+        raise ParameterError(f"autoreset_mode: expected one of {names}, got {value!r}") from None
+
+
 class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]):
     """`num_envs` environments of a task, stepped together.
 
@@ -51,6 +61,9 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         render_mode: "rgb_array"; `render` gives a frame of each environment.
         rendered: how many are drawn, the first ones; frames of the others are black. None is all, of at most
             `MOST_DRAWN`.
+
+    Attributes:
+        drawn: how many are drawn.
 
     Rewards are float64, shape (num_envs,). Infos are those of the single environment as arrays; when an
     episode ends they have its figures, too, as "episode_summary", one array for each figure, with masks under
@@ -85,11 +98,8 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.metadata["autoreset_mode"] = self.autoreset_mode
         self.spec = None
-        if rendered is not None and render_mode is None:
-            raise ParameterError(f"rendered: expected none without a render_mode, got {rendered!r}")
-        drawn = drawn_of(rendered, self.num_envs, MOST_DRAWN) if render_mode else 0
-        self._drawn = [Recording(self.batch, env) for env in range(drawn)]
-        self._watched: dict[int, Recording] = {recording.env: recording for recording in self._drawn}
+        self.drawn = self._check_drawn(rendered)
+        self._watched = {env: Recording(self.batch, env) for env in range(self.drawn)}
         self._marks: dict[str, list[Any]] = {}
         self._generators: list[np.random.Generator] = []
         self._ended = np.zeros(self.num_envs, bool)
@@ -114,7 +124,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         """
         self._check_open("reset")
         rest: Any = dict(options) if isinstance(options, Mapping) else options
-        mask = mask_of(rest.pop("reset_mask", None) if isinstance(rest, dict) else None, self.num_envs)
+        mask = self._check_mask(rest.pop("reset_mask", None) if isinstance(rest, dict) else None)
         checked = self.batch.check_options(rest)
         self._seed(seed, mask)
         parameters = self._start(np.flatnonzero(mask), checked)
@@ -144,7 +154,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
                 f"step() was called although episodes {np.flatnonzero(again).tolist()} ended: "
                 "expected reset(options={'reset_mask': ...})"
             )
-        batch.actions[:n] = actions_of(actions, n)
+        batch.actions[:n] = self._check_actions(actions)
         for recording in self._watched.values():
             recording.start()
         some_ended = batch.step(self._generators, again)
@@ -155,8 +165,11 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
             self._start(np.flatnonzero(again), {})
         done, infos = terminated | truncated, batch.infos(some_ended)
         rewards = batch.rewards[:n].copy()
-        if done.any():
-            self._sum_up(infos, np.flatnonzero(done))
+        for env in np.flatnonzero(done).tolist():
+            ending: dict[str, Any] = {"episode_summary": batch.summary(env)}
+            if terminated[env]:
+                ending["failure"] = batch.failure(env)
+            infos = self._add_info(infos, ending, env)
         if done.any() and self.autoreset_mode == AutoresetMode.SAME_STEP:
             infos = self._same_step(infos, done)
             done = np.zeros(n, bool)
@@ -186,22 +199,18 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
             gym.logger.warn("render() was called without a render_mode: pass render_mode='rgb_array'")
             return None
         self._check_started("render")
-        frames = [recording.frame("rgb_array", self.metadata["render_fps"]) for recording in self._drawn]
+        fps = self.metadata["render_fps"]
+        frames = [self._watched[env].frame("rgb_array", fps) for env in range(self.drawn)]
         black = np.broadcast_to(np.uint8(0), frames[0].shape)
         return (*frames, *[black] * (self.num_envs - len(frames)))
 
     def close_extras(self, **kwargs: Any) -> None:
         """Give the renderers back."""
         self._phase = "closed"
-        for recording in self._drawn:
+        for recording in self._watched.values():
             recording.close()
 
     # What one may ask of each
-
-    @property
-    def drawn(self) -> int:
-        """How many are drawn, the first ones."""
-        return len(self._drawn)
 
     @property
     def weight(self) -> Floats:
@@ -299,54 +308,86 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
 
     # Parts of it
 
+    def _check_drawn(self, rendered: Any) -> int:
+        """How many are drawn."""
+        n = self.num_envs
+        if self.render_mode is None:
+            if rendered is not None:
+                raise ParameterError(f"rendered: expected none without a render_mode, got {rendered!r}")
+            return 0
+        if rendered is None and n > MOST_DRAWN:
+            raise ParameterError(
+                f"rendered: expected how many of the {n} environments to draw, as they are more than"
+                f" {MOST_DRAWN}; for Gymnasium's RecordVideo rendered=1 goes with record_first_only=True"
+            )
+        drawn = n if rendered is None else count("rendered", rendered)
+        if drawn > n:
+            raise ParameterError(f"rendered: expected at most num_envs={n}, got {drawn}")
+        return drawn
+
+    def _check_mask(self, given: Any) -> NDArray[np.bool_]:
+        """The reset option "reset_mask", not all False; None is all."""
+        n = self.num_envs
+        if given is None:
+            return np.ones(n, bool)
+        good = isinstance(given, np.ndarray) and given.dtype == bool and given.shape == (n,)
+        if not (good and given.any()):
+            raise ParameterError(
+                f"options['reset_mask']: expected a bool array of shape ({n},) with at least one True, "
+                f"got {given!r}"
+            )
+        mask: NDArray[np.bool_] = given
+        return mask
+
+    def _check_actions(self, actions: Any) -> NDArray[np.float32]:
+        """Finite actions, shape (num_envs, 4)."""
+        given, shape = array_of(actions), (self.num_envs, ACTIONS)
+        if given.dtype.kind not in "fiu" or given.shape != shape:
+            raise ParameterError(
+                f"actions: expected finite numbers in [-1, 1], shape {shape}, "
+                f"got {given.dtype} of shape {given.shape}"
+            )
+        with np.errstate(over="ignore"):  # to infinity, which is refused
+            given = given.astype(np.float32, copy=False)
+        if not np.isfinite(given).all():
+            rows = np.flatnonzero(~np.isfinite(given).all(1)).tolist()
+            raise ParameterError(
+                f"actions: expected finite numbers in [-1, 1], got others in rows {rows[:8]}"
+            )
+        return given
+
     def _start(self, envs: NDArray[np.int64], options: Mapping[str, Any]) -> dict[str, Any]:
         """Start episodes; the parameters that were set or drawn for them, by name."""
-        for env in set(self._watched).intersection(envs.tolist()):
-            self._watched[env].start()
+        watched = [self._watched[env] for env in envs.tolist() if env in self._watched]
+        for recording in watched:
+            recording.start()
         start = self.batch.reset(envs, [self._generators[env] for env in envs], options)
         self._started[envs] = True
         if self._phase == "new" and self._started.all():
             self._phase = "running"
-        for recording in self._drawn:
-            if recording.env in envs:
+        for recording in watched:
+            if recording.env < self.drawn:
                 recording.keep(True)
         found: dict[str, Any] = start["parameters"]
         return found
 
-    def _of(self, envs: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """A mask of some environments."""
-        mask = np.zeros(self.num_envs, bool)
-        mask[envs] = True
-        return mask
-
-    def _rows(self, found: Mapping[str, Any], envs: NDArray[np.int64]) -> dict[str, Any]:
-        """Values of some environments as Gymnasium's infos: arrays of all, and masks."""
-        infos: dict[str, Any] = {}
-        for name, values in found.items():
-            infos[name], infos[f"_{name}"] = np.zeros(self.num_envs), self._of(envs)
-            infos[name][envs] = values
-        return infos
-
-    def _sum_up(self, infos: dict[str, Any], envs: NDArray[np.int64]) -> None:
-        summaries = [self.batch.summary(int(env)) for env in envs]
-        found = {name: [summary[name] for summary in summaries] for name in summaries[0]}
-        infos |= {"episode_summary": self._rows(found, envs), "_episode_summary": self._of(envs)}
-        failed = envs[self.batch.now.ended[envs] == FAILED]
-        if failed.size:
-            infos |= {"failure": np.full(self.num_envs, None, object), "_failure": self._of(failed)}
-            infos["failure"][failed] = [self.batch.failure(int(env)) for env in failed]
-
     def _show(self) -> None:
-        for recording in self._drawn:
-            if not self._ended[recording.env]:
-                recording.keep(False)
+        for env in range(self.drawn):
+            if not self._ended[env]:
+                self._watched[env].keep(False)
 
     def _observed(self) -> NDArray[np.float32]:
         return self.batch.observations[: self.num_envs].copy()
 
     def _seed(self, seed: Any, mask: NDArray[np.bool_]) -> None:
         """Give the environments of the mask their generators."""
-        seeds = seeds_of(seed, self.num_envs)
+        n = self.num_envs
+        if isinstance(seed, (list, tuple, np.ndarray)):
+            if len(seed) != n:
+                raise ParameterError(f"seed: expected one number or {n}, got {len(seed)}")
+            seeds = [None if value is None else count("seed", value, low=0) for value in seed]
+        else:
+            seeds = [None if seed is None else count("seed", seed, low=0) + env for env in range(n)]
         if not self._generators:
             self._generators = [seeding.np_random(value)[0] for value in seeds]
             return
@@ -373,7 +414,13 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         """
         self._check_state(state, "ended")
         n, states = self.num_envs, state["generator"]
-        ended = ended_of(state["ended"], n)
+        ended = array_of(state["ended"]).copy()
+        if ended.dtype != bool or ended.ndim != 1:
+            raise ParameterError(
+                f"state['ended']: expected a bool array of shape ({n},), got {state['ended']!r}"
+            )
+        if ended.size != n:
+            raise ParameterError(f"state: expected one of {n} environments, got one of {ended.size}")
         if not isinstance(states, (list, tuple)) or len(states) != n:
             raise ParameterError(f"state['generator']: expected a list of {n}, got {states!r:.60}")
         generators = [generator_of(values) for values in states]

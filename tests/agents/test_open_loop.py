@@ -14,7 +14,7 @@ from agents.open_loop import SIZES, Args, decode, main, optimise, search
 from agents.runs import make_env
 from agents.score import find_policy, play, score_vector
 from hoof_env import records
-from hoof_env.envs.policies import GAITS, load_open_loop, stored
+from hoof_env.envs.policies import GAITS, load_open_loop, open_loop_record
 from hoof_env.errors import DataFileError, HoofEnvError, ParameterError
 
 ENV_ID = "hoof_env/HorseLeg-v0"
@@ -180,7 +180,7 @@ HIGHEST = sorted((*GAITS.glob("*-constant.json"), *GAITS.glob("*-clocked.json"))
 
 @pytest.mark.parametrize("path", HIGHEST, ids=lambda path: path.stem)
 def test_stored_gaits_get_their_scores(path):
-    found = stored(path)
+    found = open_loop_record(path)
     with make_env(found["env_id"], **found["env_kwargs"]) as env:
         policy = load_open_loop(path, env)
     episodes = score_vector(policy, found["env_id"], range(1000, 1008), **found["env_kwargs"])
@@ -193,7 +193,7 @@ def test_stored_gaits_get_their_scores(path):
 
 def test_stored_gaits_of_the_trade_off_are_what_they_are_called():
     for path in GAITS.glob("*-peak-*.json"):
-        found = stored(path)
+        found = open_loop_record(path)
         assert path.stem.startswith(f"HorseLeg-v0-constant-peak-{found['speed']:g}")
         assert found["score"]["mean"]["speed_m_s"] > found["speed"] - 0.1
         if found.get("weight_share"):
@@ -203,7 +203,7 @@ def test_stored_gaits_of_the_trade_off_are_what_they_are_called():
 @pytest.mark.parametrize("env_id", [ENV_ID, "hoof_env/HorseLegMO-v0"])
 def test_an_id_names_its_best_stored_gait(env_id):
     files = [GAITS / f"HorseLeg-v0-{family}.json" for family in SIZES]
-    best = max(map(stored, files), key=lambda one: one["score"]["mean"]["return"])
+    best = max(map(open_loop_record, files), key=lambda one: one["score"]["mean"]["return"])
     with make_env(env_id) as env, warnings.catch_warnings():
         warnings.simplefilter("error", UserWarning)
         for policy in (find_policy("open-loop", env, env_id), records.find_policy("open-loop", env, env_id)):

@@ -29,10 +29,6 @@ ARGUMENTS = [
     ({"solver": "paper", "integrator": "euler"}, "trunk: expected 'fixed' with solver=\"paper\""),
     ({"observation": ["crank", "target"]}, "observation: 'target' is constant without target_speed"),
     ({"observation": ["crank", "ground"]}, "observation: 'ground' is constant without terrain"),
-    (
-        {"randomize": {"motor_gain": 3.0}},
-        "randomize: 'motor_gain': expected drive='motor' beside it, .* no effect, got drive='prescribed'",
-    ),
     ({"drive": "belt"}, "drive: expected one of motor, prescribed, got 'belt'"),
     ({"normal_law": "hertz"}, "normal_law: expected one of .*lankarani-nikravesh.*got 'hertz'"),
     ({"friction_law": "stick"}, "friction_law: expected one of ambrosio.*got 'stick'"),

@@ -121,7 +121,7 @@ def test_groups_are_the_same_numbers_in_the_order_that_was_asked_for():
         same(one[0][places], two[0])
 
 
-def test_recording_changes_nothing_and_says_what_is_observed():
+def test_recording_changes_nothing():
     plain, recorded = (gym.make(IDS[0]).unwrapped for _ in range(2))
     plain.reset(seed=1), recorded.reset(seed=1)
     assert recorded.record()["time"].shape == (1, 1)
@@ -130,11 +130,6 @@ def test_recording_changes_nothing_and_says_what_is_observed():
         same(one[:4], two[:4])
         record = recorded.record()
         np.testing.assert_allclose(record["time"][:, 0], 0.02 * k + 1e-3 * np.arange(1, 21), atol=1e-9)
-        seen = dict(zip(recorded.observation_names, two[0].tolist(), strict=True))
-        assert seen["forward speed"] == pytest.approx(np.tanh(record["vx"][-1].item() / 5), abs=1e-6)
-        assert seen["sin(crank angle)"] == pytest.approx(np.sin(record["theta"][-1].item()), abs=1e-6)
-        load = record["toe_normal"][-1].item() / (3 * recorded.weight)
-        assert seen["toe load"] == pytest.approx(np.tanh(load), abs=1e-6)
 
 
 def test_an_episode_that_a_wrapper_ends_has_its_figures_on_demand():

@@ -28,7 +28,7 @@ from hoof_env.envs.episode import Episode
 from hoof_env.envs.manual import page_of
 from hoof_env.envs.observation import Scene
 from hoof_env.envs.reward import Outcome
-from hoof_env.errors import ParameterError, UnknownArgumentError
+from hoof_env.errors import ParameterError
 from hoof_env.simd.user_functions import fingerprint, what_cannot_be_compiled
 
 PAGE = (Path(__file__).parents[2] / "docs" / "own_task.md").read_text(encoding="utf-8")
@@ -193,15 +193,6 @@ def test_a_spec_makes_it_again(own):
         gym.make(own.ID)  # its module is imported, but registers it no more
     with pytest.raises(ParameterError, match="No module named 'nobody'"):
         hoof_env.HorseLegEnv(task="nobody:own/Nothing-v0")
-
-
-def test_settings_without_effect_are_refused_as_of_any_id(own):
-    with pytest.raises(ParameterError, match="motor_gain: expected drive='motor' beside it"):
-        gym.make(own.ID, motor_gain=50.0)
-    with pytest.raises(
-        UnknownArgumentError, match=r"own/Everything-v0: .*'stiffnes'; did you mean stiffness"
-    ):
-        gym.make(own.ID, stiffnes=1.0)
 
 
 def test_its_manual_page_has_its_rows(own, capsys):

@@ -7,7 +7,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from hoof_env.envs.policies import POLICIES, make_policy, open_loop, policy_names, read_open_loop
+from hoof_env.envs.policies import POLICIES, load_open_loop, make_policy, open_loop, policy_names
 from hoof_env.errors import DataFileError, ParameterError
 
 ENV_ID = "hoof_env/HorseLeg-v0"
@@ -84,7 +84,7 @@ def test_a_gait_for_each_of_many():
 
 def test_a_file_has_its_own_clock_and_the_environments_where_there_is_one(env, tmp_path):
     path = write(tmp_path / "gait.json", env, dt=0.5)
-    seconds = {0.5: read_open_loop(path), 0.02: read_open_loop(path, env)}
+    seconds = {0.5: load_open_loop(path), 0.02: load_open_loop(path, env)}
     for dt, policy in seconds.items():
         twin = open_loop(CLOCKED, dt)
         for _ in range(3):
@@ -102,24 +102,24 @@ def test_a_file_has_its_own_clock_and_the_environments_where_there_is_one(env, t
 def test_a_file_that_is_no_gait(env, tmp_path, changes):
     path = write(tmp_path / "gait.json", env, **changes)
     with pytest.raises(DataFileError, match=r"gait\.json: expected the JSON object of agents\.open_loop"):
-        read_open_loop(path)
+        load_open_loop(path)
 
 
 @pytest.mark.parametrize("content", ["", "[]", "{}", "\x00"])
 def test_a_file_that_is_something_else(tmp_path, content):
     (tmp_path / "gait.json").write_text(content)
     with pytest.raises(DataFileError, match=r"gait\.json"):
-        read_open_loop(tmp_path / "gait.json")
+        load_open_loop(tmp_path / "gait.json")
     with pytest.raises(DataFileError, match=r"none\.json"):
-        read_open_loop(tmp_path / "none.json")
+        load_open_loop(tmp_path / "none.json")
 
 
 def test_an_environment_whose_actions_mean_something_else(env, tmp_path):
     path = write(tmp_path / "gait.json", env)
     with pytest.raises(DataFileError, match="whose actions command gaits as those of"):
-        read_open_loop(path, gym.make("hoof_env/HorseLegFixed-v0"))
+        load_open_loop(path, gym.make("hoof_env/HorseLegFixed-v0"))
     with pytest.raises(DataFileError, match="PendulumEnv"):
-        read_open_loop(path, gym.make("Pendulum-v1"))
+        load_open_loop(path, gym.make("Pendulum-v1"))
 
 
 def test_a_gait_of_another_id_is_told(env, tmp_path):
@@ -127,10 +127,10 @@ def test_a_gait_of_another_id_is_told(env, tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("error", UserWarning)
         for same in (env, gym.make("hoof_env/HorseLegMO-v0", disable_env_checker=True)):
-            read_open_loop(path, same)
-        read_open_loop(write(tmp_path / "bare.json", env, env_id=None), env)
+            load_open_loop(path, same)
+        load_open_loop(write(tmp_path / "bare.json", env, env_id=None), env)
     with pytest.warns(UserWarning, match=r"found for hoof_env/HorseLeg-v0, here hoof_env/HorseLegRail-v0"):
-        read_open_loop(path, gym.make("hoof_env/HorseLegRail-v0"))
+        load_open_loop(path, gym.make("hoof_env/HorseLegRail-v0"))
 
 
 FIXED = "hoof_env/HorseLegFixed-v0"

@@ -12,19 +12,18 @@ from hoof_env.envs.policies import make_policy
 TERMS = [f"reward_{name}" for name in ("progress", "peak", "energy", "action", "failure", "support")]
 
 
-def rollout(env, policy, seed, recorded=False):
-    """Return and list of infos of one episode, and with `recorded` its substeps by name."""
+def rollout(env, policy, seed):
+    """Infos of one episode, and its substeps by name."""
     observation, _ = env.reset(seed=seed)
-    total, infos, records, done = 0.0, [], [env.unwrapped.record()] if recorded else [], False
+    infos, records, done = [], [env.unwrapped.record()], False
     while not done:
         action, _ = policy.predict(observation, episode_start=not infos)
         observation, reward, terminated, truncated, info = env.step(action)
         assert reward == sum(info[term] for term in TERMS)
-        total, done = total + reward, terminated or truncated
+        done = terminated or truncated
         infos.append(info)
-        if recorded:
-            records.append(env.unwrapped.record())
-    return total, infos, together(records[1:]) if recorded else {}
+        records.append(env.unwrapped.record())
+    return infos, together(records[1:])
 
 
 def stance_peaks(trace, threshold):
@@ -46,7 +45,7 @@ def stance_peaks(trace, threshold):
 def test_terms_add_up_and_each_stance_pays_its_peak(name, trunk):
     weights = {"support": 2.0}
     env = gym.make("hoof_env/HorseLeg-v0", trunk=trunk, episode_seconds=4.0, reward_weights=weights)
-    _, infos, trace = rollout(env, make_policy(name, env), 4, recorded=True)
+    infos, trace = rollout(env, make_policy(name, env), 4)
     assert len(trace["time"]) == 4000
     paid = {term: sum(info[term] for info in infos) for term in TERMS}
     peaks = sum(stance_peaks(trace, 0.05 * env.unwrapped.weight))
@@ -76,7 +75,7 @@ def test_action_term_is_the_mean_square_of_the_change():
 
 def test_a_collapse_terminates_and_is_charged_once():
     env = gym.make("hoof_env/HorseLeg-v0", **FALLS, reward_weights={"failure": 7.0})
-    _, infos, trace = rollout(env, make_policy("airborne", env), 0, recorded=True)
+    infos, trace = rollout(env, make_policy("airborne", env), 0)
     assert "height" in infos[-1]["failure"]
     assert [info["reward_failure"] for info in infos[-2:]] == [0.0, -70.0]
     assert infos[-1]["episode_summary"]["failed"] == 1.0
@@ -85,7 +84,7 @@ def test_a_collapse_terminates_and_is_charged_once():
 
 def test_summary_agrees_with_the_substeps():
     env = gym.make("hoof_env/HorseLeg-v0")
-    _, infos, trace = rollout(env, make_policy("run", env), 1, recorded=True)
+    infos, trace = rollout(env, make_policy("run", env), 1)
     summary = infos[-1]["episode_summary"]
     assert summary["seconds"] == pytest.approx(10.0)
     assert summary["mean_grf_n"] == pytest.approx(trace["normal"].mean())

@@ -8,7 +8,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from family import FALLS, IDS, MODES, actions, both, same, steps
-from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers.vector import NormalizeReward, RecordEpisodeStatistics, RecordVideo
 
 SHORT = {"episode_seconds": 0.3}
@@ -160,28 +160,12 @@ def test_gymnasium_finds_what_it_asks_for():
 @pytest.mark.parametrize("mode", MODES, ids=lambda mode: mode.name)
 def test_it_owns_the_time_limit(mode):
     """As Gymnasium's TimeLimit around the single environment, without which that would go on."""
-    ours = gym.make_vec(IDS[0], num_envs=8, autoreset_mode=mode, max_episode_steps=6)
-    theirs = SyncVectorEnv([lambda: gym.make(IDS[0], max_episode_steps=6)] * 8, autoreset_mode=mode)
+    ours, theirs = both(IDS[0], 8, mode, max_episode_steps=6)
     same(ours.reset(seed=0)[0], theirs.reset(seed=0)[0])
-    for k, taken in enumerate(actions(0, 30, 8)):
-        one, two = ours.step(taken), theirs.step(taken)
-        for a, b in zip(one[:4], two[:4], strict=True):
-            same(a, b)
-        if mode == AutoresetMode.DISABLED and one[3].any():
-            assert k % 6 == 5
-            same(ours.reset()[0], theirs.reset()[0])
+    assert drive(ours, theirs, 30, mode) == 8 * (4 if mode == AutoresetMode.NEXT_STEP else 5)
     longer = gym.make_vec(IDS[0], num_envs=2, max_episode_steps=600, episode_seconds=0.1)
     longer.reset(seed=0)
     assert [longer.step(actions(k, 2))[3].all() for k in range(5)] == [False] * 4 + [True]
-
-
-def test_an_idle_row_draws_nothing():
-    """In NEXT_STEP the row whose episode ended is stepped along with the others."""
-    settings = {"episode_seconds": 0.1, "target_speed": (0.5, 3.0), "target_seconds": (0.12, 0.12)}
-    ours, theirs = both(IDS[0], 8, **settings)
-    same(ours.reset(seed=0)[0], theirs.reset(seed=0)[0])
-    for taken in actions(0, 20, 8):
-        check_step(ours, theirs, taken)
 
 
 def test_frames_of_the_first_environments_and_two_closes():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import json
 from dataclasses import replace
 
 import gymnasium as gym
@@ -93,10 +94,13 @@ def test_arguments(make, env_id, kwargs, message):
 
 @pytest.mark.parametrize("env_id", IDS)
 def test_what_an_environment_says_of_itself_makes_it_again(env_id):
-    """All its settings, those without effect with the values that they have anyway."""
-    env = gym.make(env_id, restitution=0.7).unwrapped
+    """All its settings as JSON, those without effect with the values that they have anyway; and its spec."""
+    made = gym.make(env_id, restitution=0.7)
+    env = made.unwrapped
     env.reset(seed=0)
-    again = gym.make(env_id, **env.get_state()["settings"]).unwrapped
+    from_spec = gym.make(gym.envs.registration.EnvSpec.from_json(made.spec.to_json())).unwrapped
+    same(from_spec.set_state(env.get_state()), env.batch.observations[0])
+    again = gym.make(env_id, **json.loads(json.dumps(env.get_state()["settings"]))).unwrapped
     same(again.set_state(env.get_state()), env.batch.observations[0])
 
 

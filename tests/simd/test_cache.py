@@ -289,10 +289,10 @@ def test_compiling_is_said_once_and_only_when_it_happens(start, tmp_path):
 def test_all_kernels_are_told_once_and_then_there_is_nothing_to_compile(start, tmp_path):
     (tmp_path / "go").touch()
     code = """
-        from hoof_env.envs import kernels
+        from hoof_env.envs import batch
         import tiny
-        kernels.CASES = {"two kernels": lambda: tiny.tiny(3.0)}
-        kernels.compile_kernels(print)
+        batch.KERNELS = {"two kernels": lambda: tiny.tiny(3.0)}
+        batch.compile_kernels(print)
     """
     out, _ = ended(start(code))
     first, second = out.splitlines()
