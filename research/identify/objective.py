@@ -17,7 +17,7 @@ from hoof_env.ground.contact import Ground
 from hoof_env.paper.rows import ILL_CONDITIONED, load_published
 from research.identify.demands import BOTH, DEMANDS, GAIT_DEMANDS, LEG, LEG_DEMANDS, MEASURED, Demand
 from research.identify.features import FEATURES, TOPS
-from research.identify.leg import LEVEL, OFFSET, Choice
+from research.identify.leg import LEVEL, NUMBER, OFFSET, STEPS, Choice
 from research.identify.measure import (
     PAPER_SAMPLES,
     Setup,
@@ -27,7 +27,6 @@ from research.identify.measure import (
     new_bodies,
 )
 from research.identify.minimax import Rating
-from research.identify.motion import NUMBER, STEPS
 
 Array = NDArray[np.float64]
 Columns = tuple[NDArray[np.int64], Array, Array, Array]
