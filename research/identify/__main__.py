@@ -15,12 +15,11 @@ import numpy as np
 
 from hoof_env.errors import HoofEnvError, ParameterError, check_number
 from hoof_env.simd.math import EXPONENT_UNIT
-from research.identify.command import check_counts, check_extras, load_start, provenance, run
+from research.identify.command import check_counts, check_extras, load_start, provenance, run_command
 from research.identify.confirm import Confirmation, confirm
 from research.identify.leg import to_preset
-from research.identify.problem import LegProblem
-from research.identify.search import BUDGET, SCHEDULE, Result, search
-from research.identify.state import digest_of, open_state, versions, write_json
+from research.identify.resume import digest_of, open_state, versions, write_json
+from research.identify.search import BUDGET, SCHEDULE, LegProblem, Phase, Result, search
 
 EXPONENT = 1.375
 """n of Eq. 14 unless told otherwise: with it a leg meets every published number, see docs/decisions.md."""
@@ -72,13 +71,13 @@ def identify(
     state = open_state(out, about, resume=resume, product="identified.json")
     with tqdm(total=budget, disable=None, dynamic_ncols=True) as bar:
 
-        def report(result: Result, spent: int) -> None:
+        def report(phase: Phase, result: Result) -> None:
             end = ", confirmed by the full system" if result.confirmed else ""
             bar.write(
-                f"job {result.id} ({result.phase}): {result.standing}; {result.evaluations} evaluations in "
+                f"job {result.id} ({phase.name}): {result.standing}; {result.evaluations} evaluations in "
                 f"{result.seconds:.0f} s{end}"
             )
-            bar.update(min(spent, budget - bar.n))
+            bar.update(min(phase.weight * result.evaluations, budget - bar.n))
 
         results = search(problem, x, SCHEDULE, state, report, seed=seed, budget=budget, workers=workers)
     data: dict[str, Any] = {"search": about, "reached": results[-1].confirmed}
@@ -113,7 +112,7 @@ def best_leg(
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit code."""
-    return run(identify, "research.identify", arguments)
+    return run_command(identify, "research.identify", arguments)
 
 
 if __name__ == "__main__":

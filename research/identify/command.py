@@ -11,7 +11,7 @@ from hoof_env.errors import HoofEnvError, MissingExtraError, check_number
 from research.identify.leg import Choice, encode
 
 
-def run(command: Callable[..., None], name: str, arguments: Sequence[str] | None = None) -> int:
+def run_command(command: Callable[..., None], name: str, arguments: Sequence[str] | None = None) -> int:
     """Call `command` with the options of the command line; returns the exit code: 0 done, 2 a wrong option or
     an error, told in one line, 130 interrupted."""
     import tyro

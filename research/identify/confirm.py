@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from hoof_env.paper.reproduce import reproduce
-from hoof_env.paper.rows import EXACT, PROBABLE, severity
+from hoof_env.paper.rows import EXACT, PROBABLE, counted, severity
 from hoof_env.paper.shapes import HOOF_ON_GROUND
 from research.identify.objective import MISSED_ROW
 
@@ -36,16 +36,11 @@ class Confirmation:
     def holds(self) -> bool:
         return not self.outside and not self.untrue
 
-    def within(self, solver: str) -> tuple[int, int]:
-        """Rows within their bars, and rows that have one, with a solver."""
-        judged = [row["within_bar"] for row in self.rows if row["solver"] == solver]
-        return judged.count(True), len(judged) - judged.count(None)
-
     def __str__(self) -> str:
-        counts = ("{1} of {2} with solver {0!r}".format(s, *self.within(s)) for s in COUNTED.values())
+        counts = (f"{solver}: {counted(self.rows, self.claims, solver)}" for solver in COUNTED.values())
         missing = ", ".join(f"{name} ({solver})" for name, solver in self.outside + self.untrue)
         verdict = "is met" if self.holds else f"is not met, missing: {missing}"
-        return f"the bar {verdict}; rows within their bars: {', '.join(counts)}"
+        return "; ".join([f"the bar {verdict}", *counts])
 
 
 def confirm(preset: Mapping[str, Any]) -> Confirmation:
@@ -56,13 +51,12 @@ def confirm(preset: Mapping[str, Any]) -> Confirmation:
     """
     content: Any = dict(preset)
     run = reproduce(preset=content)
-    counted = COUNTED.values()
-    rows = [row for row in run.rows if row["solver"] in counted]
+    rows = [row for row in run.rows if row["solver"] in COUNTED.values()]
     outside = [(row["id"], row["solver"]) for row in rows if row["within_bar"] is False]
     untrue = [
         (claim["id"], claim["solver"])
         for claim in run.shapes
-        if claim["solver"] in counted and not claim["readings"].get(HOOF_ON_GROUND, claim["holds"])
+        if claim["solver"] in COUNTED.values() and not claim["readings"].get(HOOF_ON_GROUND, claim["holds"])
     ]
     errors = {}
     for name, solver in COUNTED.items():

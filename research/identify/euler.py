@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from hoof_env.leg.kinematics import cross, dot, mirror, solve_points
 from hoof_env.leg.linkage import BODIES, CONSTRUCTION, DRIVER, LOCK, POINTS, Dyad
 from hoof_env.simd.compile import kernel
-from research.identify.motion import NUMBER, STEPS
+from research.identify.leg import NUMBER, STEPS
 
 _O, _C, _P, _G = (NUMBER[name] for name in "OCPG")
 _TAIL = np.array([NUMBER[body.tail] for body in BODIES])
@@ -110,7 +110,7 @@ def accelerate(pivot, values, motion, damping, spring, bodies, points):  # type:
     """Fill `bodies.qdd` by the second row of Eq. 8, and `points`; returns False where it is singular.
 
     Args:
-        pivot, values: as in `motion.leg_paths`.
+        pivot, values: as in `measure.leg_paths`.
         motion: (theta, its rate, phi, its rate, its acceleration); the crank's acceleration is 0.
         damping, spring: 2 alpha [1/s] and beta^2 [1/s^2].
     """
@@ -191,9 +191,9 @@ def euler_cycle(crank, pivot, values, setup, gait, theta, h, bodies, at, velocit
     """Integrate one steady gait by explicit Euler from closed loops; returns whether all stayed finite.
 
     Args:
-        crank, pivot, values: as in `motion.leg_paths`.
+        crank, pivot, values: as in `measure.leg_paths`.
         setup: the leg and its solver, see `measure.Setup`.
-        gait, at, velocity, ankle: as in `motion.swing_hoof`, at n instants from the start.
+        gait, at, velocity, ankle: as in `measure.swing_hoof`, at n instants from the start.
         theta: crank angle at the start [rad].
         h: time step [s].
         bodies: output, the state at the end.

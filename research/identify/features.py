@@ -69,7 +69,7 @@ class Cycle(NamedTuple):
     """One revolution of toe and heel, n instants.
 
     Attributes:
-        at, velocity: from `motion.swing_hoof`, or a simulation: complex, shape (2, n) [m, m/s].
+        at, velocity: from `measure.swing_hoof`, or a simulation: complex, shape (2, n) [m, m/s].
         ankle: shape (n,) [m].
         height: of the swing's centre above the ground [m].
         h: time between two instants [s].

@@ -14,14 +14,20 @@ from numpy.typing import NDArray
 from hoof_env.errors import ParameterError
 from hoof_env.gait.gait import LIMITS, GaitParameters, load_gait
 from hoof_env.ground.contact import load_ground
-from hoof_env.leg.geometry import Geometry, Preset, load_geometry
-from hoof_env.leg.linkage import DYADS, LENGTHS
+from hoof_env.leg.geometry import Geometry, Preset, load_geometry, tables
+from hoof_env.leg.linkage import DYADS, LENGTHS, POINTS
 
 Vector = NDArray[np.float64]
 
 GAITS = ("walk", "run")
 SIGNS = tuple(dyad.point for dyad in DYADS)
 """The points whose side of their dyad is a choice, in the order of `Choice.assembly`."""
+
+NUMBER = {name: i for i, name in enumerate(POINTS)}
+"""Points by name, as indices into arrays of all of them."""
+
+STEPS = tables(load_geometry("first_fit"))[0]
+"""The construction of any leg, `geometry.tables`."""
 
 SPEED = 2 * np.pi
 """The paper's crank speed in both gaits [rad/s]; not searched."""

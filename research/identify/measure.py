@@ -1,4 +1,10 @@
-"""From a vector x to every measured number: kernels, whose arrays `objective.Objective` keeps."""
+"""From a vector x to every measured number: kernels, whose arrays `objective.Objective` keeps.
+
+One crank revolution on a fixed trunk, thousands of times: crank and swing are prescribed, so the ground moves
+nothing and its force follows from the paths of toe and heel. `leg_paths` finds every point of the linkage; a
+dyad that cannot close is stretched out and the miss reported, so that a search can climb back to legs that
+assemble. `swing_hoof` turns and places the hoof; `features.measure_gait` reads off it what the paper prints.
+"""
 
 from __future__ import annotations
 
@@ -9,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.gait.gait import LIMITS
+from hoof_env.leg.kinematics import cross, dot
 from hoof_env.leg.linkage import BODIES, CONSTRUCTION, LENGTHS, POINTS, Dyad
 from hoof_env.simd.compile import kernel
 from research.identify.demands import LENGTH_RANGE
 from research.identify.euler import Bodies, euler_cycle
 from research.identify.features import Cycle, cubic, measure_gait
-from research.identify.leg import LEVEL, SPEED
-from research.identify.motion import STEPS, leg_paths, swing_hoof
+from research.identify.leg import LEVEL, NUMBER, SPEED, STEPS
 
 Array = NDArray[np.float64]
 
@@ -32,6 +38,7 @@ _MIDDLE = 0.5 * float(_LOW[0] + _HIGH[0])
 _USED = [(s.from_first, s.from_second) if isinstance(s, Dyad) else (s.distance, s.span) for s in CONSTRUCTION]
 _SOURCES = np.array([[LENGTHS.index(name) for name in pair] for pair in _USED])
 """For each step of the construction, the two lengths that it needs."""
+_O, _C, _P, _G = (NUMBER[name] for name in "OCPG")
 
 
 class Setup(NamedTuple):
@@ -83,6 +90,84 @@ def new_bodies() -> Bodies:
     """Of the paper's solver."""
     q, qd, qdd = np.zeros((3, len(BODIES), 3))
     return Bodies(q, qd, qdd, np.zeros(len(BODIES)))
+
+
+@kernel
+def close_dyad(p, a, b, r1, r2, side, k, z, dz):  # type: ignore[no-untyped-def]
+    """Point p at r1 from a and r2 from b, as in `kinematics.solve_points`; returns (miss, |sine|)."""
+    span = z[b, k] - z[a, k]
+    d2 = dot(span, span) + 1e-12
+    along = 0.5 + (r1 * r1 - r2 * r2) / (2.0 * d2)
+    d = np.sqrt(d2)
+    miss = max(d - r1 - r2, abs(r1 - r2) - d) / (r1 + r2)
+    across = np.sqrt(max(r1 * r1 / d2 - along * along, 1e-8))
+    z[p, k] = z[a, k] + span * complex(along, side * across)
+    e1, e2 = z[p, k] - z[a, k], z[p, k] - z[b, k]
+    k1, k2 = dot(e1, dz[a, k]), dot(e2, dz[b, k])
+    dz[p, k] = 1j * (k2 * e1 - k1 * e2) * (1.0 / (cross(e1, e2) + side * 1e-12))
+    return miss, d2 * across / (r1 * r2)
+
+
+@kernel
+def leg_paths(crank, pivot, values, z, dz):  # type: ignore[no-untyped-def]
+    """Fill `z`, `dz` (complex, shape (11, n)) over one revolution, column k at theta = 2 pi k / (n - 1), with
+    derivatives by theta. Returns the largest gap of a dyad over its reach [-], at most 0 where all close,
+    and the smallest |sine| of the angle between the links of a dyad [-].
+
+    Args:
+        crank: OP [m].
+        pivot: C relative to O, complex [m].
+        values: as from `geometry.tables`.
+    """
+    n = z.shape[1]
+    miss, transmission = 0.0, 1.0
+    for k in range(n):
+        theta = 2.0 * np.pi * k / (n - 1)
+        z[_O, k], dz[_O, k] = 0j, 0j
+        z[_C, k], dz[_C, k] = pivot, 0j
+        z[_P, k] = crank * complex(np.cos(theta), -np.sin(theta))
+        dz[_P, k] = -1j * z[_P, k]
+        for j in range(STEPS.shape[0]):
+            p, a, b, origin = STEPS[j, 1], STEPS[j, 2], STEPS[j, 3], STEPS[j, 4]
+            if STEPS[j, 0] == 1:
+                gap, sine = close_dyad(p, a, b, values[j, 0], values[j, 1], values[j, 2], k, z, dz)
+                miss, transmission = max(miss, gap), min(transmission, sine)
+            else:
+                z[p, k] = z[origin, k] + values[j, 0] * (z[b, k] - z[a, k])
+                dz[p, k] = dz[origin, k] + values[j, 0] * (dz[b, k] - dz[a, k])
+    return miss, transmission
+
+
+@kernel
+def swing_hoof(z, dz, gait, setup, at, velocity, ankle):  # type: ignore[no-untyped-def]
+    """Place toe and heel in the world for one gait; returns the lowest height of every other joint [m].
+
+    Args:
+        z, dz: from `leg_paths`.
+        gait: (crank speed [rad/s], offset, sine and cosine coefficient of the swing [rad]).
+        setup: the leg, see `Setup`.
+        at, velocity: outputs, complex, shape (2, n): toe and heel relative to O [m, m/s].
+        ankle: output, shape (n,): height of G relative to O [m].
+    """
+    n = z.shape[1]
+    lowest = np.inf
+    for k in range(n):
+        theta = 2.0 * np.pi * k / (n - 1)
+        s, c = np.sin(theta), np.cos(theta)
+        phi = gait[1] + gait[2] * s + gait[3] * c
+        slope = gait[2] * c - gait[3] * s
+        turn = complex(np.cos(phi), np.sin(phi))
+        for i in range(2):
+            p = setup.toe if i == 0 else setup.heel
+            placed = z[p, k] * turn
+            moving = (dz[p, k] + 1j * slope * z[p, k]) * turn * gait[0]
+            at[i, k] = complex(setup.travel * placed.real, placed.imag)
+            velocity[i, k] = complex(setup.travel * moving.real, moving.imag)
+        ankle[k] = (z[_G, k] * turn).imag
+        for p in range(z.shape[0]):
+            if p != setup.toe and p != setup.heel:
+                lowest = min(lowest, (z[p, k] * turn).imag)
+    return lowest
 
 
 @kernel

@@ -34,6 +34,9 @@ TOP = 10.0
 SMALLEST = 1e-5
 """Radius at which a descent ends."""
 
+STEP = 2e-5
+"""Of the difference quotients, in scales."""
+
 
 @dataclass(frozen=True)
 class Rating:
@@ -69,7 +72,6 @@ def descend(
     *,
     radius: float = 0.03,
     penalty: float = 2.0,
-    step: float = 2e-5,
     central: bool = False,
     iterations: int = 60,
     goal: float = 0.0,
@@ -78,8 +80,7 @@ def descend(
 
     Args:
         rate: what is to be improved.
-        scales: of the coordinates, shape as y; `radius`, of the first trust region, and `step`, of the
-            difference quotients, are in units of these.
+        scales: of the coordinates, shape as y; `radius`, of the first trust region, is in units of these.
         penalty: of a shortage, in bars.
         central: difference quotients of second order, at twice the price.
     """
@@ -88,7 +89,7 @@ def descend(
     for _ in range(iterations):
         if merit <= goal:
             break
-        model = _Model(rate, y, here, scales, penalty, step, central)
+        model = _Model(rate, y, here, scales, penalty, central)
         spent += model.evaluations
         improved = False
         while radius > SMALLEST and not improved:
@@ -127,7 +128,7 @@ class _Model:
     """Rows and demands linearised at y."""
 
     def __init__(
-        self, rate: Rate, y: Array, here: Rating, scales: Array, penalty: float, step: float, central: bool
+        self, rate: Rate, y: Array, here: Rating, scales: Array, penalty: float, central: bool
     ) -> None:
         n = y.size
         self.scales, self.penalty = scales, penalty
@@ -138,7 +139,7 @@ class _Model:
         base = self._parts(here)
         upper, lower, demands = (np.empty((n, v.size)) for v in base)
         for i in range(n):
-            h = step * scales[i]
+            h = STEP * scales[i]
             moved = y.copy()
             moved[i] = y[i] + h
             ahead, back, span = self._parts(rate(moved)), base, h

@@ -12,12 +12,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.errors import HoofEnvError, check_number
+from hoof_env.errors import check_number
 from hoof_env.ground.contact import Ground
 from hoof_env.paper.rows import ILL_CONDITIONED, load_published
 from research.identify.demands import BOTH, DEMANDS, GAIT_DEMANDS, LEG, LEG_DEMANDS, MEASURED, Demand
 from research.identify.features import FEATURES, TOPS
-from research.identify.leg import LEVEL, OFFSET, Choice
+from research.identify.leg import LEVEL, NUMBER, OFFSET, STEPS, Choice
 from research.identify.measure import (
     PAPER_SAMPLES,
     Setup,
@@ -27,7 +27,6 @@ from research.identify.measure import (
     new_bodies,
 )
 from research.identify.minimax import Rating
-from research.identify.motion import NUMBER, STEPS
 
 Array = NDArray[np.float64]
 Columns = tuple[NDArray[np.int64], Array, Array, Array]
@@ -41,6 +40,9 @@ MISSED_ROW, MISSED = 300.0, 20.0
 INSIDE = 0.01
 """By how much `rate` asks for more than a demand, because a descent ends on the border of it [bars].
 Those that cannot be exceeded are 0 where they are met."""
+
+TOE_DOWN = 0.35, -3.0
+"""When [s] and how fast [log m/s] a search puts down a walking toe that stays in the air."""
 
 ALPHA = 15.0
 BETA = math.sqrt(2) * ALPHA
@@ -210,21 +212,18 @@ class Objective:
         return dict(zip(MEASURED, self._numbers(x, paper_solver).tolist(), strict=True))
 
     def to_touch_down(self, x: Array) -> Array:
-        """x as an objective `by_toe` has it, by one that is not.
-
-        Raises:
-            HoofEnvError: the toe does not touch down in walking.
-        """
+        """x as an objective `by_toe` has it, by one that is not; a walking toe that stays in the air is put
+        down."""
         measured = self.measured(x)
         time = measured["walk.contact_start"] + max(measured["walk.toe_after_heel_in"], 0.0)
-        if not (0 <= time <= 1 and measured["walk.toe_speed"] > 0):
-            raise HoofEnvError("expected a walk whose toe touches down, got one whose toe stays in the air")
-        return with_toe(x, time, math.log(measured["walk.toe_speed"]))
+        if 0 <= time <= 1 and measured["walk.toe_speed"] > 0:
+            return with_toe(x, time, math.log(measured["walk.toe_speed"]))
+        return with_toe(x, *TOE_DOWN)
 
     def from_touch_down(self, y: Array) -> Array:
         """Inverse of `to_touch_down`, by an objective `by_toe`, of a walk whose toe comes in once."""
         height = self.measured(y)["leg.hip_height"]
-        return with_toe(y, height, float(self._arrays.gaits[0, 1]))
+        return _finite(with_toe(y, height, float(self._arrays.gaits[0, 1])), 0.0)
 
 
 def with_toe(x: Array, level: float, offset: float) -> Array:

@@ -10,15 +10,28 @@ import itertools
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 
-from research.identify.leg import Vector
+from hoof_env.errors import HoofEnvError
+from research.identify.confirm import confirm
+from research.identify.leg import SCALES, Choice, Vector, to_preset
 from research.identify.minimax import Rating, descend
-from research.identify.problem import PENALTY, SAMPLES, TOE_SCALES, LegProblem
-from research.identify.processes import processes
-from research.identify.state import State
+from research.identify.objective import Objective, with_toe
+from research.identify.resume import State, processes
+
+TOE_SCALES = with_toe(SCALES, 0.1, 0.3)
+"""The scales of a search by touch-down."""
+
+SPREADS, TRIES = (0.0, 0.15, 0.3, 0.5), 300
+"""How far a start may lie from the preset, in scales, and of how many random legs it is the best."""
+
+SAMPLES = 401
+"""Instants a revolution with which candidates of all phases are compared."""
+
+PENALTY = 2.0
+"""What a shortage of one counts for [bars]."""
 
 CLEAR = 0.995
 """Largest error with which a job ends at the bar [bars], so that the judge, who samples finer, agrees."""
@@ -28,6 +41,50 @@ POPULATION = 20
 
 PAPER_WEIGHT = 12
 """How many evaluations one with the paper's solver counts for: it takes that much longer."""
+
+
+@dataclass(frozen=True)
+class LegProblem:
+    """What is searched: legs of one choice that meet the paper's rows. A search goes by touch-down, in
+    coordinates y; see `Objective`."""
+
+    choice: Choice
+
+    def objective(self, samples: int, both: bool, by_toe: bool = False) -> Objective:
+        """The objective with the exact solver alone or both, kept for the next call."""
+        return _objective(self.choice, samples, both, by_toe)
+
+    def around(self, x: Vector, samples: int, rng: np.random.Generator) -> Vector:
+        """A start y near x: the best of many."""
+        y, spread = self.inward(x, samples), float(rng.choice(SPREADS))
+        if not spread:
+            return y
+        tries = [y + spread * TOE_SCALES * rng.standard_normal(y.size) for _ in range(TRIES)]
+        return min(tries, key=self.objective(samples, False, True).cost)
+
+    def inward(self, x: Vector, samples: int) -> Vector:
+        """The same candidate in the coordinates of a search."""
+        return self.objective(samples, False).to_touch_down(x)
+
+    def outward(self, y: Vector, samples: int) -> Vector:
+        """Inverse of `inward`."""
+        return self.objective(samples, False, True).from_touch_down(y)
+
+    def merit(self, x: Vector, both: bool) -> float:
+        """What compares candidates of different phases [bars], with the exact solver alone or both."""
+        return self.objective(SAMPLES, both).rate(x).merit(PENALTY)
+
+    def confirm(self, x: Vector) -> bool:
+        """Whether the full system finds every bar met and every claim true."""
+        try:
+            return confirm(to_preset(x, self.choice, "a candidate of a search")).holds
+        except HoofEnvError:  # a dead point between two samples, a gait beyond its limits
+            return False
+
+
+@lru_cache(maxsize=16)
+def _objective(choice: Choice, samples: int, both: bool, by_toe: bool) -> Objective:
+    return Objective(choice, samples=samples, paper_solver=both, by_toe=by_toe)
 
 
 @dataclass(frozen=True)
@@ -189,8 +246,6 @@ def run_job(problem: LegProblem, job: Job) -> Result:
 BUDGET = 10_000_000
 """Evaluations of a search unless told otherwise; one takes some 0.1 ms."""
 
-Schedule = tuple[Phase, ...]
-
 _DESCEND = Phase("descend", 8, 4_000, (0.003, 0.01, 0.03, 0.1), method="minimax", elite=8, samples=401)
 _POLISH = replace(_DESCEND, name="polish", jobs=4, elite=2, rounds=3, evaluations=16_000, ends_at_bar=True)
 _BOTH = replace(
@@ -198,7 +253,7 @@ _BOTH = replace(
     below=1.5, paper_solver=True,
 )  # fmt: skip
 
-SCHEDULE: Schedule = (
+SCHEDULE = (
     Phase("around", 24, 4_000, (0.1,)),
     Phase("settle", 8, 8_000, (0.05,), elite=8),
     _DESCEND,
@@ -207,7 +262,7 @@ SCHEDULE: Schedule = (
 )
 
 
-def rounds(schedule: Schedule) -> Iterator[tuple[int, Phase]]:
+def rounds(schedule: Sequence[Phase]) -> Iterator[tuple[int, Phase]]:
     """Endless: (number of the round, its phase)."""
     phases = itertools.chain.from_iterable(itertools.repeat(phase, phase.rounds) for phase in schedule)
     yield from enumerate(itertools.cycle(phases))
@@ -216,9 +271,9 @@ def rounds(schedule: Schedule) -> Iterator[tuple[int, Phase]]:
 def search(
     problem: LegProblem,
     start: tuple[float, ...],
-    schedule: Schedule,
+    schedule: Sequence[Phase],
     state: State,
-    report: Callable[[Result, int], None],
+    report: Callable[[Phase, Result], None],
     *,
     seed: int,
     budget: int,
@@ -228,7 +283,7 @@ def search(
     spent. The results are in the order of the jobs; if the full system confirmed a candidate, it is the last.
 
     Args:
-        report: called with each result and what it spent, by its weight.
+        report: called with each result as it comes.
         budget: evaluations, one with the paper's solver by its weight; the last round may exceed it a little.
 
     Raises:
@@ -241,28 +296,12 @@ def search(
             if spent >= budget:
                 break
             jobs = plan(number, phase, start, results, seed, budget - spent)
-            done = {job.id: kept for job in jobs if (kept := state.load(f"job-{job.id}", Result))}
-            for result in done.values():
-                report(result, phase.weight * result.evaluations)
-            missing = [job for job in _needed(jobs, done) if job.id not in done]
-            for result in run(partial(run_job, problem), missing):
-                state.save(f"job-{result.id}", result)
-                done[result.id] = result
-                report(result, phase.weight * result.evaluations)
-                if all(job.id in done for job in _needed(jobs, done)):
-                    break
-            for job in _needed(jobs, done):
-                results.append(done[job.id])
-                spent += phase.weight * done[job.id].evaluations
-                if done[job.id].confirmed:
+            for result in state.finish(jobs, partial(run_job, problem), Result, run, partial(report, phase)):
+                results.append(result)
+                spent += phase.weight * result.evaluations
+                if result.confirmed:
                     return results
     return results
-
-
-def _needed(jobs: list[Job], done: dict[str, Result]) -> list[Job]:
-    """The jobs up to the first that ends the search."""
-    ends = (job.index for job in jobs if job.id in done and done[job.id].confirmed)
-    return jobs[: min(ends, default=len(jobs)) + 1]
 
 
 def plan(

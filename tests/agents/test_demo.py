@@ -87,10 +87,6 @@ def test_nothing_is_fetched_from_outside(html, report):
     assert "</html>" in html
 
 
-def test_the_page_says_that_it_is_quick(report):
-    assert "Quick run." in report.text
-
-
 def test_every_published_number_stands_beside_both_solvers(folder, report):
     published = load_published()
     entries = json.loads((folder / "reproduction.json").read_text())
@@ -119,15 +115,13 @@ def test_scores_on_the_page_are_those_of_the_file(folder, report):
             assert cell.split()[0] == expected
 
 
-def test_pictures_and_films(report):
+def test_pictures_films_and_versions_of_a_quick_run(report):
+    assert "Quick run." in report.text
+    for word in ("python 3.", "numpy ", "gymnasium ", "numba ", "stable-baselines3 ", "torch ", "hoof-env "):
+        assert word in report.text
     assert {"figure1", "figure3", "figure4", "figure5", "figure6", "curve"} <= set(report.ids)
     assert report.tags.count("video") == 5
     assert sum(link.startswith("data:video/mp4;base64,") for link in report.links) == 5
-
-
-def test_versions_and_command(report):
-    for word in ("python 3.", "numpy ", "gymnasium ", "numba ", "stable-baselines3 ", "torch ", "hoof-env "):
-        assert word in report.text
 
 
 def test_the_agent_of_the_report_can_be_played(folder):

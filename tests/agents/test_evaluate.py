@@ -13,16 +13,9 @@ from agents.runs import make_env
 from agents.score import find_policy, play
 from hoof_env.envs.policies import GAITS
 from hoof_env.errors import DataFileError, OutputError, ParameterError
-from tests.agents.conftest import SHORT, train_tiny
+from tests.agents.conftest import ENV_ID, SHORT, train_tiny
 
-ENV_ID = "hoof_env/HorseLeg-v0"
 COLUMNS = set(METRICS) - {"loading_rate_n_s"}
-
-
-@pytest.fixture
-def env():
-    with make_env(ENV_ID, episode_seconds=0.4) as env:
-        yield env
 
 
 def test_interval_of_a_normal_sample():
@@ -162,22 +155,23 @@ def test_unusable_record(trained, tmp_path, env, content):
         find_policy(str(tmp_path), env, ENV_ID)
 
 
-def test_output_that_is_a_folder_is_refused_before_the_first_episode(tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"json": Path()}, "expected a file"),
+        ({"video": Path()}, "expected a file"),
+        ({"video": Path("film.xyz")}, r"ends in \.mp4, got .*film\.xyz"),
+        ({"policy": ()}, "got none"),
+        ({"episodes": 0}, "episodes"),
+        ({"seed": -1}, "seed"),
+        ({"env_id": "hoof_env/Cow-v0"}, "Cow"),
+    ],
+    ids=str,
+)
+def test_bad_input_is_refused_before_the_first_episode(monkeypatch, changes, said):
     monkeypatch.setattr("agents.evaluate.play", lambda *_: pytest.fail("was played"))
-    for changes in ({"json": tmp_path}, {"video": tmp_path}):
-        with pytest.raises(OutputError, match="expected a file"):
-            evaluate(Args(policy=("run",), **changes))
-
-
-def test_no_policy():
-    with pytest.raises(ParameterError, match="got none"):
-        evaluate(Args(policy=()))
-
-
-@pytest.mark.parametrize("changes", [{"episodes": 0}, {"seed": -1}, {"env_id": "hoof_env/Cow-v0"}])
-def test_bad_input(changes):
-    with pytest.raises(ParameterError, match="|".join((*changes, "Cow"))):
-        evaluate(Args(policy=("run",), **changes))
+    with pytest.raises((ParameterError, OutputError), match=said):
+        evaluate(Args(**{"policy": ("run",), **changes}))
 
 
 def test_an_environment_without_summaries(tmp_path):
@@ -185,12 +179,6 @@ def test_an_environment_without_summaries(tmp_path):
     (score,), setting = evaluate(Args(policy=(str(folder),), episodes=1))
     assert setting["env_id"] == "Pendulum-v1"
     assert set(score.estimates) == {"return"}
-
-
-def test_a_film_that_is_no_mp4_is_refused_before_the_first_episode(tmp_path, monkeypatch):
-    monkeypatch.setattr("agents.evaluate.play", lambda *_: pytest.fail("was played"))
-    with pytest.raises(ParameterError, match=r"ends in \.mp4, got .*film\.xyz"):
-        evaluate(Args(policy=("run",), video=tmp_path / "film.xyz"))
 
 
 def test_films_of_two_policies_never_share_a_file():

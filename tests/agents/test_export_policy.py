@@ -23,12 +23,13 @@ if not os.environ.get("CI"):  # which installs them, so that nothing may be left
 from agents import export
 from agents.export import main, write_policy
 from agents.runs import SavedModel, TrainedPolicy, make_env
+from agents.score import play
 from hoof_env.errors import DataFileError, HoofEnvError, OutputError, ParameterError
 from hoof_env.onnx_policy import OnnxPolicy
 from hoof_env.records import find_policy
+from tests.agents.conftest import ENV_ID, KWARGS
 
-ENV_ID, ROOT = "hoof_env/HorseLeg-v0", Path(__file__).parents[2]
-LEG = {"episode_seconds": 0.4}
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
@@ -75,8 +76,8 @@ def test_onnx_acts_as_the_model(tmp_path):
     assert (actions.shape, state) == ((5, 10, 1), "state")
 
 
-def test_an_exported_policy_plays_the_model_s_episode(trained, exported):
-    def play(policy, env):
+def test_an_exported_policy_plays_the_model_s_episode(env, trained, exported):
+    def rewards_of(policy):
         observation, _ = env.reset(seed=5)
         rewards, done = [], False
         while not done:
@@ -85,24 +86,22 @@ def test_an_exported_policy_plays_the_model_s_episode(trained, exported):
             done = terminated or truncated
         return rewards
 
-    with make_env(ENV_ID, **LEG) as env:
-        ours = play(find_policy(str(exported), env, ENV_ID), env)
-        assert ours == play(find_policy(str(exported.parent), env, ENV_ID), env)
-        assert ours == pytest.approx(play(SavedModel.find(trained.folder).load(env, ENV_ID), env), abs=1e-4)
+    ours = rewards_of(find_policy(str(exported), env, ENV_ID))
+    assert ours == rewards_of(find_policy(str(exported.parent), env, ENV_ID))
+    assert ours == pytest.approx(rewards_of(SavedModel.find(trained.folder).load(env, ENV_ID)), abs=1e-4)
 
 
-def test_metadata(exported):
+def test_metadata(env, exported):
     record = OnnxPolicy(exported).record
-    with make_env(ENV_ID, **LEG) as env:
-        assert record["observation_names"] == list(env.unwrapped.observation_names)
+    assert record["observation_names"] == list(env.unwrapped.observation_names)
     assert record["env_id"] == ENV_ID
-    assert record["env_kwargs"] == LEG
+    assert record["env_kwargs"] == KWARGS
     assert (record["algo"], record["seed"]) == ("ppo", "0")
     assert record["action_names"] == ["crank_speed", "swing_offset", "swing_sin", "swing_cos"]
     assert str(ROOT).encode() not in exported.read_bytes()
 
 
-def test_other_settings_and_another_version_are_told(exported, trained, tmp_path, monkeypatch):
+def test_other_settings_and_another_version_are_told(env, exported, trained, tmp_path, monkeypatch):
     import onnx
 
     old = tmp_path / "old.onnx"  # of before the settings were kept
@@ -114,31 +113,27 @@ def test_other_settings_and_another_version_are_told(exported, trained, tmp_path
     record = OnnxPolicy(exported).record
     monkeypatch.setattr("hoof_env.onnx_policy.__version__", record["hoof_env"])
     assert record["settings"] == json.loads((trained.folder / "run.json").read_text())["settings"]
-    with make_env(ENV_ID, **LEG) as env, warnings.catch_warnings():
+    with warnings.catch_warnings():
         warnings.simplefilter("error", UserWarning)
         for path in (exported, old):
             find_policy(str(path), env, ENV_ID)
     with (
-        make_env(ENV_ID, **LEG, target_speed=[1, 1]) as env,
+        make_env(ENV_ID, **KWARGS, target_speed=[1, 1]) as other,
         pytest.warns(UserWarning, match=r"trained with target_speed=None, here \[1, 1\]$"),
     ):
-        find_policy(str(exported), env, ENV_ID)
-    with make_env(ENV_ID) as env, pytest.warns(UserWarning, match=r"episode_seconds=0\.4, here 10\.0$"):
-        find_policy(str(old), env, ENV_ID)
+        find_policy(str(exported), other, ENV_ID)
+    with make_env(ENV_ID) as other, pytest.warns(UserWarning, match=r"episode_seconds=0\.4, here 10\.0$"):
+        find_policy(str(old), other, ENV_ID)
     monkeypatch.setattr("hoof_env.onnx_policy.__version__", "9.9.9")
-    with (
-        make_env(ENV_ID, **LEG) as env,
-        pytest.warns(UserWarning, match=r"trained with hoof-env \d\S*, here 9\.9\.9$"),
-    ):
+    with pytest.warns(UserWarning, match=r"trained with hoof-env \d\S*, here 9\.9\.9$"):
         find_policy(str(exported), env, ENV_ID)
 
 
-def test_a_file_names_the_version_that_trained(trained):
-    with make_env(ENV_ID, **LEG) as env:
-        there = {"versions": {"hoof-env": "0.0.1"}, "settings": {"dt": 0.5}}
-        assert export.about(env, ENV_ID, LEG, there)["hoof_env"] == "0.0.1"
-        assert export.about(env, ENV_ID, LEG, there)["settings"] == {"dt": 0.5}
-        assert export.about(env, ENV_ID, LEG, {})["settings"]["episode_seconds"] == 0.4
+def test_a_file_names_the_version_that_trained(env):
+    there = {"versions": {"hoof-env": "0.0.1"}, "settings": {"dt": 0.5}}
+    about = export.about(env, ENV_ID, KWARGS, there)
+    assert (about["hoof_env"], about["settings"]) == ("0.0.1", {"dt": 0.5})
+    assert export.about(env, ENV_ID, KWARGS, {})["settings"]["episode_seconds"] == 0.4
 
 
 def test_a_file_that_acts_otherwise_is_not_kept(tmp_path, monkeypatch):
@@ -199,7 +194,7 @@ def test_missing_packages_are_named(tmp_path, exported, monkeypatch):
                 act()
 
 
-def test_the_example_plays_a_policy_without_a_learning_library(trained, exported):
+def test_the_example_plays_a_policy_without_a_learning_library(env, trained, exported):
     script = ROOT / "examples" / "run_policy.py"
     code = [line for line in script.read_text().splitlines() if line.strip()]
     assert len(code) <= 20
@@ -212,10 +207,7 @@ def test_the_example_plays_a_policy_without_a_learning_library(trained, exported
     )
     assert not done.stderr
     found = [float(value) for value in re.findall(r"return (\S+)", done.stdout)]
-    with make_env(ENV_ID, **LEG) as env:
-        from agents.score import play
-
-        episodes = play(env, SavedModel.find(trained.folder).load(env, ENV_ID), range(1000, 1003))
+    episodes = play(env, SavedModel.find(trained.folder).load(env, ENV_ID), range(1000, 1003))
     assert found == pytest.approx([one["return"] for one in episodes], abs=0.01)
     bare = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, cwd=ROOT)
     assert bare.returncode == 1

@@ -16,10 +16,9 @@ from agents.score import find_policy, play, score_vector
 from hoof_env import records
 from hoof_env.envs.policies import GAITS, load_open_loop, open_loop_record
 from hoof_env.errors import DataFileError, HoofEnvError, ParameterError
+from tests.agents.conftest import ENV_ID, KWARGS, SHORT
 
-ENV_ID = "hoof_env/HorseLeg-v0"
 WAVES = (("sin", np.sin), ("cos", np.cos))
-SHORT = ("episode_seconds=0.4",)
 
 
 @pytest.fixture(autouse=True)
@@ -91,14 +90,14 @@ def test_decoding_reaches_all_frequencies():
 
 def test_a_cost_is_minus_the_mean_return():
     actions, seeds = np.random.default_rng(0).uniform(-1, 1, (16, 4)), range(7, 11)
-    costs = open_loop.Objective(ENV_ID, {"episode_seconds": 0.4}, "constant").costs(actions, seeds)
+    costs = open_loop.Objective(ENV_ID, KWARGS, "constant").costs(actions, seeds)
     for action, cost in zip(actions[:3], costs, strict=False):
-        episodes = score_vector(held(action), ENV_ID, seeds, episode_seconds=0.4)
+        episodes = score_vector(held(action), ENV_ID, seeds, **KWARGS)
         assert cost == pytest.approx(-np.mean([one["return"] for one in episodes]), abs=1e-6)
 
 
 @pytest.mark.parametrize("family", SIZES)
-def test_a_file_is_whole_and_its_gait_gets_the_score_it_names(tmp_path, family):
+def test_a_file_is_whole_and_its_gait_gets_the_score_it_names(tmp_path, env, family):
     args = arguments(tmp_path, family=family)
     found = optimise(args)
     assert json.loads(args.out.read_text()) == found
@@ -111,10 +110,9 @@ def test_a_file_is_whole_and_its_gait_gets_the_score_it_names(tmp_path, family):
     assert low < found["score"]["mean"]["return"] < high
     assert found["command"].startswith("python")
     assert {"cma", "numpy", "python"} <= set(found["versions"])
-    with make_env(ENV_ID, episode_seconds=0.4) as env:
-        episodes = play(env, find_policy(str(args.out), env, ENV_ID), range(1000, 1008))
+    episodes = play(env, find_policy(str(args.out), env, ENV_ID), range(1000, 1008))
     assert np.mean([one["return"] for one in episodes]) == pytest.approx(found["score"]["mean"]["return"])
-    assert score_vector(load_open_loop(args.out), ENV_ID, range(1000, 1008), episode_seconds=0.4) == episodes
+    assert score_vector(load_open_loop(args.out), ENV_ID, range(1000, 1008), **KWARGS) == episodes
 
 
 def test_searches_that_are_there_are_not_made_again(tmp_path, monkeypatch):

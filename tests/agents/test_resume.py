@@ -1,6 +1,5 @@
 """Trainings that are stopped, killed or diverge: what is left is whole and goes on as if nothing had been."""
 
-import csv
 import json
 import multiprocessing
 import os
@@ -16,12 +15,12 @@ import pytest
 from stable_baselines3.common.callbacks import BaseCallback
 
 from agents.checkpoints import REPLAY, STATE, checkpoints, whole
-from agents.runs import CHECKPOINTS, SavedModel, make_env
+from agents.runs import CHECKPOINTS, SavedModel
 from agents.train import Args, main, train
 from agents.watch import DivergedError
 from hoof_env.errors import DataFileError, OutputError, ParameterError
 from hoof_env.saved_policy import ABOUT, WEIGHTS
-from tests.agents.conftest import SHORT, TINY, train_tiny
+from tests.agents.conftest import ENV_ID, SHORT, TINY, train_tiny, training_episodes
 
 KILLS = 2
 ALWAYS = 1e-9  # seconds between two checkpoints: one between all rollouts
@@ -56,12 +55,6 @@ def interrupt(model):
     os.kill(os.getpid(), signal.SIGINT)
 
 
-def episodes(folder: Path) -> list[tuple[str, str]]:
-    with (folder / "monitor.csv").open() as file:
-        next(file)
-        return [(row["r"], row["l"]) for row in csv.DictReader(file)]
-
-
 def arguments(algo: str, out: Path, **changes) -> Args:
     common = {"n_envs": 4, "env_kwargs": SHORT, "steps": 512, "checkpoint_every": 1000.0, "out": out}
     return Args(algo=algo, **{**common, **CASES[algo], **changes})
@@ -78,7 +71,7 @@ def test_a_stopped_run_goes_on_as_if_it_had_not_been(algo, tmp_path):
     assert resumed.steps == whole.steps
     assert (resumed.folder / WEIGHTS).read_bytes() == (whole.folder / WEIGHTS).read_bytes()
     assert (resumed.folder / ABOUT).read_bytes() == (whole.folder / ABOUT).read_bytes()  # statistics
-    assert episodes(resumed.folder) == episodes(whole.folder)
+    assert training_episodes(resumed.folder) == training_episodes(whole.folder)
     assert json.loads((resumed.folder / "run.json").read_text())["resumed"] == [stopped.steps]
     assert not (resumed.folder / CHECKPOINTS).exists()
 
@@ -124,7 +117,7 @@ def test_killed_again_and_again(tmp_path):
     assert len(record["resumed"]) == KILLS
     whole = train_tiny(tmp_path / "whole", steps=steps, checkpoint_every=0)
     assert (folder / WEIGHTS).read_bytes() == (whole.folder / WEIGHTS).read_bytes()
-    assert episodes(folder) == episodes(whole.folder)
+    assert training_episodes(folder) == training_episodes(whole.folder)
     assert not list(folder.rglob(".unfinished-*"))
 
 
@@ -149,11 +142,12 @@ def stopped(tmp_path_factory):
         ({"env_kwargs": (*SHORT, "trunk=rail")}, "trunk"),
         ({"env_id": "hoof_env/HorseLegRail-v0"}, "HorseLegRail"),
         ({"out": None}, "--out"),
+        ({"resume": False}, "--resume"),
     ],
     ids=str,
 )
 def test_another_command_does_not_resume(stopped, changes, said):
-    with pytest.raises((ParameterError, DataFileError), match=said):
+    with pytest.raises((ParameterError, DataFileError, OutputError), match=said):
         train(arguments("sac", **{"out": stopped, "resume": True, **changes}))
 
 
@@ -191,11 +185,6 @@ def test_a_full_disk_is_told_and_the_last_checkpoint_stays(tmp_path):
     assert train(arguments("ppo", tmp_path / "run", params=params, resume=True)).steps == 512
 
 
-def test_a_run_is_gone_on_with_only_when_asked(stopped):
-    with pytest.raises(OutputError, match="--resume"):
-        train(arguments("sac", stopped))
-
-
 def test_a_model_without_checkpoints_is_not_written_over(tmp_path):
     train(arguments("ppo", tmp_path, checkpoint_every=0), At(90, interrupt))
     before = (tmp_path / WEIGHTS).read_bytes()
@@ -221,7 +210,7 @@ def test_environments_without_a_state_start_new_episodes(tmp_path):
     stopped = train(Args(out=tmp_path / "run", **pendulum), At(700, interrupt))
     assert stopped.steps == 704
     assert train(Args(out=tmp_path / "run", resume=True, **pendulum)).steps == 1024
-    assert {length for _, length in episodes(tmp_path / "run")} == {"200"}
+    assert {length for _, length in training_episodes(tmp_path / "run")} == {"200"}
 
 
 @pytest.mark.parametrize(
@@ -237,7 +226,7 @@ def test_divergence_stops_the_training(algo, rate, tmp_path):
 
 
 @pytest.mark.parametrize(("algo", "network"), [("ppo", "value_net"), ("sac", "critic_target")])
-def test_the_last_good_checkpoint_survives(algo, network, tmp_path):
+def test_the_last_good_checkpoint_survives(algo, network, env, tmp_path):
     """A value that is not finite in a network that does not act, which nothing else would notice."""
 
     def spoil(model):
@@ -245,9 +234,8 @@ def test_the_last_good_checkpoint_survives(algo, network, tmp_path):
 
     with pytest.raises(DivergedError, match=r"last good checkpoint is .*checkpoints/128"):
         train(arguments(algo, tmp_path / "run", checkpoint_every=ALWAYS), At(132, spoil))
-    with make_env("hoof_env/HorseLeg-v0", episode_seconds=0.4) as env:
-        saved = SavedModel.find(tmp_path / "run")
-        policy = saved.load(env, "hoof_env/HorseLeg-v0")
+    saved = SavedModel.find(tmp_path / "run")
+    policy = saved.load(env, ENV_ID)
     assert saved.path.parent.name == "128"
     assert all(bool(one.isfinite().all()) for one in policy.model.policy.parameters())
 

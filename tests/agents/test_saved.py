@@ -16,14 +16,7 @@ from agents.runs import STATISTICS, SavedModel, make_env, save_model
 from agents.settings import algorithm_class
 from hoof_env.errors import DataFileError
 from hoof_env.saved_policy import ABOUT, WEIGHTS
-
-ENV_ID, SHORT = "hoof_env/HorseLeg-v0", {"episode_seconds": 0.4}
-
-
-@pytest.fixture(scope="module")
-def env():
-    with make_env(ENV_ID, **SHORT) as env:
-        yield env
+from tests.agents.conftest import ENV_ID
 
 
 def save(folder, env, algo="ppo", seed=0, **policy_kwargs):
@@ -82,18 +75,14 @@ def test_a_record_of_other_kinds(env, tmp_path, values):
         SavedModel.find(tmp_path)
 
 
-def test_all_files_have_the_same_mode(env, tmp_path):
-    save(tmp_path, env)
-    (tmp_path / "usual").touch()
-    assert len({path.stat().st_mode for path in tmp_path.iterdir()}) == 1
-
-
-def test_nothing_is_unpickled(env, tmp_path):
+def test_all_files_have_the_same_mode_and_nothing_is_unpickled(env, tmp_path):
     class Bomb:
         def __reduce__(self):
             return pytest.fail, ("unpickled",)
 
     save(tmp_path, env)
+    (tmp_path / "usual").touch()
+    assert len({path.stat().st_mode for path in tmp_path.iterdir()}) == 1
     for name in ("model.zip", STATISTICS):
         (tmp_path / name).write_bytes(pickle.dumps(Bomb()))
     policy = SavedModel.find(tmp_path).load(env, ENV_ID)
@@ -180,16 +169,12 @@ def test_a_damaged_description(env, tmp_path, values):
         SavedModel.find(tmp_path).load(env, ENV_ID)
 
 
-def test_weights_that_are_not_finite(env, tmp_path):
+def test_damaged_weights(env, tmp_path):
     weights = save(tmp_path, env).policy.state_dict()
     weights["log_std"][0] = torch.nan
     save_file(weights, tmp_path / WEIGHTS)
     with pytest.raises(DataFileError, match="not finite"):
         SavedModel.find(tmp_path).load(env, ENV_ID)
-
-
-def test_damaged_weights(env, tmp_path):
-    save(tmp_path, env)
     (tmp_path / WEIGHTS).write_bytes((tmp_path / WEIGHTS).read_bytes()[:100])
     with pytest.raises(DataFileError, match=r"policy\.json"):
         SavedModel.find(tmp_path).load(env, ENV_ID)

@@ -12,8 +12,8 @@ from agents.evaluate import Args, evaluate
 from agents.runs import make_env
 from agents.score import find_policy, loading_rates, play, score_vector, stances, steepest
 from hoof_env.errors import ParameterError
+from tests.agents.conftest import ENV_ID, KWARGS
 
-ENV_ID = "hoof_env/HorseLeg-v0"
 SEEDS = [7, 3, 4, 11, 12]
 FALLS = {"trunk_share": 1.0, "trunk_stiffness": 0.0, "trunk_damping": 0.0}
 
@@ -38,28 +38,25 @@ def test_episodes_that_fail_count_once_and_only_up_to_their_end():
 
 
 def test_a_trained_policy(trained):
-    kwargs = {"episode_seconds": 0.4}  # as it was trained
     rows, alone = (
-        found(str(trained.folder), ENV_ID, SEEDS, **kwargs) for found in (score_vector, one_by_one)
+        found(str(trained.folder), ENV_ID, SEEDS, **KWARGS) for found in (score_vector, one_by_one)
     )
     for one, other in zip(rows, alone, strict=True):
         assert one == pytest.approx(other, rel=1e-3)
 
 
 def test_held_actions_for_all_or_for_each():
-    kwargs = {"episode_seconds": 0.4}
     actions = np.random.default_rng(0).uniform(-1, 1, (len(SEEDS), 4)).astype(np.float32)
-    rows = score_vector(held(actions), ENV_ID, SEEDS, **kwargs)
+    rows = score_vector(held(actions), ENV_ID, SEEDS, **KWARGS)
     for seed, action, row in zip(SEEDS, actions, rows, strict=True):
-        assert one_by_one(held(action), ENV_ID, [seed], **kwargs) == [row]
-        assert score_vector(held(action), ENV_ID, [seed], **kwargs) == [row]
+        assert one_by_one(held(action), ENV_ID, [seed], **KWARGS) == [row]
+        assert score_vector(held(action), ENV_ID, [seed], **KWARGS) == [row]
 
 
 def test_an_environment_without_rows_is_played_one_by_one(monkeypatch):
-    kwargs = {"episode_seconds": 0.4}
-    rows = score_vector("run", ENV_ID, SEEDS, **kwargs)
+    rows = score_vector("run", ENV_ID, SEEDS, **KWARGS)
     monkeypatch.setattr(score, "make_rows", lambda *_, **__: None)
-    assert score_vector("run", ENV_ID, SEEDS, **kwargs) == rows
+    assert score_vector("run", ENV_ID, SEEDS, **KWARGS) == rows
 
 
 @pytest.mark.parametrize("policy", [np.zeros(4), None, "gallop"])

@@ -1,6 +1,5 @@
 """Training on tiny numbers: what it writes, that it repeats, ends in good order and refuses what misfits."""
 
-import csv
 import errno
 import json
 import os
@@ -21,17 +20,10 @@ from stable_baselines3 import PPO
 from agents.command import parse_pairs, run
 from agents.runs import FILES, STATISTICS, read_episodes
 from hoof_env.errors import DataFileError, OutputError, ParameterError
-from tests.agents.conftest import SHORT, TINY, train_tiny
+from tests.agents.conftest import SHORT, TINY, train_tiny, training_episodes
 
 ROOT = Path(__file__).parents[2]
 GPU = torch.cuda.is_available()
-
-
-def curve(folder: Path) -> list[tuple[str, str]]:
-    """Return and length of every training episode."""
-    with (folder / "monitor.csv").open() as file:
-        next(file)
-        return [(row["r"], row["l"]) for row in csv.DictReader(file)]
 
 
 def test_run_folder(trained):
@@ -53,8 +45,8 @@ def test_run_folder(trained):
     assert (used["n_steps"], used["n_envs"], used["n_timesteps"]) == (32, 4, 256)
 
 
-def test_every_training_step_is_in_the_curve(trained):
-    episodes = curve(trained.folder)
+def test_every_training_step_is_in_the_training_episodes(trained):
+    episodes = training_episodes(trained.folder)
     assert {length for _, length in episodes} == {"20"}
     assert len(episodes) == 4 * (256 // 4 // 20)
 
@@ -66,8 +58,8 @@ def test_episodes_count_steps(tmp_path):
 
 def test_same_seed_same_run(trained, tmp_path):
     again, other = train_tiny(tmp_path / "again"), train_tiny(tmp_path / "other", seed=1)
-    assert curve(again.folder) == curve(trained.folder)
-    assert curve(other.folder) != curve(trained.folder)
+    assert training_episodes(again.folder) == training_episodes(trained.folder)
+    assert training_episodes(other.folder) != training_episodes(trained.folder)
 
 
 def test_time_limit(tmp_path):

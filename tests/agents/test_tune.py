@@ -12,11 +12,11 @@ from agents.train import train
 from agents.tune import SPACES, Args, TrialScorer, draw, finished, load_space, tune
 from agents.watch import DivergedError
 from hoof_env.errors import DataFileError, ParameterError
-from tests.agents.conftest import SHORT
+from tests.agents.conftest import KWARGS, SHORT, TINY
 
 optuna = pytest.importorskip("optuna")
 
-HELD = ("n_envs=4", "n_steps=32", "batch_size=64", "n_epochs=1", '{"policy_kwargs": {"net_arch": [8]}}')
+HELD = ("n_envs=4", *TINY)
 
 
 def tiny(out: Path, **changes) -> Args:
@@ -54,7 +54,7 @@ def test_what_a_study_leaves(folder):
 
 
 def test_the_best_settings_give_its_score_again(folder, tmp_path):
-    scorer = TrialScorer("hoof_env/HorseLeg-v0", {"episode_seconds": 0.4}, 128)
+    scorer = TrialScorer("hoof_env/HorseLeg-v0", KWARGS, 128)
     arguments = {"seed": best(folder).number, "env_kwargs": SHORT, "out": tmp_path / "run"}
     train(TrainArgs(hyperparams=folder / "best.yml", **arguments), scorer)
     assert scorer.curve == [tuple(row) for row in best(folder).user_attrs["curve"]]
@@ -101,7 +101,7 @@ def test_a_bad_trial_is_pruned(tmp_path):
         scores.append((steps, score))
         return True
 
-    scorer = TrialScorer("hoof_env/HorseLeg-v0", {"episode_seconds": 0.4}, 128, report)
+    scorer = TrialScorer("hoof_env/HorseLeg-v0", KWARGS, 128, report)
     trained = train(TrainArgs(steps=512, params=HELD, env_kwargs=SHORT, out=tmp_path / "run"), scorer)
     assert scorer.is_pruned
     assert trained.steps < 512

@@ -11,8 +11,7 @@ from hoof_env.paper.rows import EXACT, PROBABLE, load_published
 from research.identify.__main__ import best_leg
 from research.identify.command import load_start
 from research.identify.confirm import COUNTED, confirm
-from research.identify.problem import LegProblem
-from research.identify.search import Result
+from research.identify.search import LegProblem, Result
 
 ABOUT = {"start": "first_fit (0)", "seed": 0, "versions": {"cma": "4"}}
 

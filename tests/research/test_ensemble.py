@@ -10,17 +10,16 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from hoof_env.errors import DataFileError, HoofEnvError
+from hoof_env.errors import HoofEnvError
 from hoof_env.leg.geometry import read_preset
-from research.identify import collect as collecting
 from research.identify import ensemble as command
-from research.identify.collect import Aim, Attempt, Task, attempt, collect, distance, judge
 from research.identify.command import load_start
 from research.identify.confirm import confirm
+from research.identify.ensemble import Aim, Attempt, Task, attempt, collect, distance, judge
 from research.identify.leg import encode, to_preset
 from research.identify.objective import Objective
-from research.identify.problem import LegProblem
-from research.identify.state import open_state
+from research.identify.resume import open_state
+from research.identify.search import LegProblem
 from tests.research.commands import kill_when, refusal
 
 PRESET = "first_fit"
@@ -45,7 +44,7 @@ def silent(line):
 
 def gather(out, start, aim=AIM, resume=False, workers=1, size=3):
     state = open_state(out, {"a": 1}, resume=resume, product="ensemble.json")
-    with patch.object(collecting, "ROUND", 4):
+    with patch.object(command, "ROUND", 4):
         return collect({PRESET: start}, aim, state, silent, size=size, attempts=3, seed=3, workers=workers)
 
 
@@ -118,7 +117,7 @@ def test_the_number_of_processes_changes_nothing(start, whole, tmp_path):
 @pytest.mark.skipif(not hasattr(os, "killpg"), reason="no process groups")
 def test_a_collection_that_was_killed_goes_on_to_the_same_members(start, whole, tmp_path):
     code = ("from pathlib import Path", f"gather(Path({str(tmp_path)!r}), {start!r})")
-    kept = kill_when(code, "test_ensemble", tmp_path, "state/attempt-0001-*.json", 2)
+    kept = kill_when(code, "test_ensemble", tmp_path, "state/job-0001-*.json", 2)
     assert len(kept) < len(whole.attempts) - 1
     assert gather(tmp_path, start, resume=True) == whole
     assert all(file.read_bytes() == content for file, content in kept.items())
@@ -132,7 +131,7 @@ def test_a_leg_that_the_full_system_refuses_is_replaced(start, whole, folder, tm
         name, verdict = judge(made, aim)
         return name, replace(verdict, reasons=("it",)) if name == refused else verdict
 
-    monkeypatch.setattr(collecting, "judge", strict)
+    monkeypatch.setattr(command, "judge", strict)
     other = gather(tmp_path, start, resume=True)
     assert len(other.members) == 3
     assert other.verdicts[refused].reasons == ("it",)
@@ -143,26 +142,9 @@ def test_a_leg_that_the_full_system_refuses_is_replaced(start, whole, folder, tm
 
 
 def test_no_leg_within_the_bar_says_how_far_the_nearest_is(start, tmp_path, monkeypatch):
-    monkeypatch.setattr(collecting, "TRIES", 1)
+    monkeypatch.setattr(command, "TRIES", 1)
     with pytest.raises(HoofEnvError, match=r"no start comes within 0\.01 bars .* the nearest has \d+\.\d+"):
         gather(tmp_path, start, replace(AIM, bar=0.01))
-
-
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        ("{", "damaged; delete it to repeat attempt-0000-00"),
-        ('{"problem": "digest"}', "damaged; delete it to repeat attempt-0000-00"),
-        ('{"problem": "other", "content": {"id": "", "start": "", "y": [], "merit": 0}}', "another search"),
-    ],
-)
-def test_a_damaged_attempt_or_one_of_another_collection_is_named(start, tmp_path, content, message):
-    open_state(tmp_path, {"a": 1}, resume=False, product="ensemble.json")
-    file = tmp_path / "state" / "attempt-0000-00.json"
-    file.write_text(content)
-    with pytest.raises(DataFileError, match=rf"attempt-0000-00\.json.*{message}"):
-        gather(tmp_path, start, resume=True)
-    assert file.read_text() == content
 
 
 @pytest.mark.parametrize(

@@ -19,8 +19,8 @@ from hoof_env.leg.geometry import load_geometry, tables
 from hoof_env.leg.kinematics import FrameMotion, pose
 from hoof_env.leg.linkage import LENGTHS
 from research.identify.euler import Points, accelerate, euler_cycle
+from research.identify.leg import NUMBER
 from research.identify.measure import Setup, new_bodies
-from research.identify.motion import NUMBER
 
 GEOMETRY = load_geometry("first_fit")
 GAITS = {name: load_gait(name, "first_fit") for name in ("walk", "run")}

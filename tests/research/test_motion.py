@@ -9,8 +9,8 @@ from hoof_env.leg.geometry import load_geometry, tables
 from hoof_env.leg.kinematics import FrameMotion, pose
 from hoof_env.leg.linkage import LENGTHS, POINTS
 from research.identify.features import FEATURES, Cycle, measure_gait
-from research.identify.leg import encode
-from research.identify.motion import NUMBER, leg_paths, swing_hoof
+from research.identify.leg import NUMBER, encode
+from research.identify.measure import leg_paths, swing_hoof
 from research.identify.objective import Objective
 
 GEOMETRY = load_geometry("first_fit")

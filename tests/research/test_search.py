@@ -12,12 +12,14 @@ from research.identify.command import load_start
 from research.identify.leg import LEVEL, NAMES
 from research.identify.minimax import Rating
 from research.identify.objective import Standing
-from research.identify.problem import SAMPLES, TOE_SCALES, LegProblem
-from research.identify.processes import processes
+from research.identify.resume import open_state, processes
 from research.identify.search import (
     CLEAR,
+    SAMPLES,
     SCHEDULE,
+    TOE_SCALES,
     Job,
+    LegProblem,
     Phase,
     Result,
     elite,
@@ -26,7 +28,6 @@ from research.identify.search import (
     run_job,
     search,
 )  # fmt: skip
-from research.identify.state import open_state
 from tests.research.commands import kill_when
 
 PHASE = Phase("around", jobs=3, evaluations=400, sigmas=(0.02, 0.05))
@@ -175,7 +176,7 @@ def begin(out, resume=False):
 def run(leg, out, workers=1, resume=False):
     reported = []
     results = search(
-        *leg, TINY, begin(out, resume), lambda one, spent: reported.append(one.id), seed=5, budget=6000,
+        *leg, TINY, begin(out, resume), lambda phase, one: reported.append(one.id), seed=5, budget=6000,
         workers=workers,
     )  # fmt: skip
     assert sorted(reported) == sorted(one.id for one in results)
@@ -214,12 +215,10 @@ def test_a_search_that_was_killed_goes_on_to_the_same_result(leg, whole, tmp_pat
     assert all(file.read_bytes() == content for file, content in kept.items())
 
 
-@pytest.mark.parametrize("later", [(1,), (1, 2)])
-def test_a_confirmed_candidate_ends_the_search_whichever_jobs_were_faster(tmp_path, later):
+def test_a_confirmed_candidate_ends_the_search_whichever_jobs_were_faster(tmp_path):
     state = begin(tmp_path)
-    for index in later:
-        state.save(f"job-000-0{index}", result(f"000-0{index}", "000-01", 1.0, 1.0, confirmed=True))
-    state.save("job-000-00", result("000-00", "000-00", 2.0))
+    for index in (2, 1, 0):
+        state.save(result(f"000-0{index}", "000-01", 1.0, 1.0, confirmed=index > 0))
     results = search(Valley(), (), (PHASE,), state, lambda *_: None, seed=0, budget=10_000)
     assert [one.id for one in results] == ["000-00", "000-01"]
 
@@ -259,17 +258,17 @@ def test_a_damaged_job_is_named(tmp_path, content):
     path = tmp_path / "state" / "job-000-01.json"
     path.write_text(content)
     with pytest.raises(DataFileError, match=r"job-000-01\.json is damaged; delete it to repeat job-000-01"):
-        state.load("job-000-01", Result)
+        state.load("000-01", Result)
     assert path.read_text() == content
 
 
 def test_files_of_another_search_and_a_damaged_problem_are_named(tmp_path):
     state = begin(tmp_path)
     one = result("000-00", "000-00", 1.0)
-    state.save("job-000-00", one)
-    assert state.load("job-000-00", Result) == one
+    state.save(one)
+    assert state.load("000-00", Result) == one
     with pytest.raises(DataFileError, match=r"belongs to another search \(expected other, got '"):
-        replace(state, digest="other").load("job-000-00", Result)
+        replace(state, digest="other").load("000-00", Result)
     with pytest.raises(DataFileError, match=r"another search: a is 1 there and 2 here; name another"):
         open_state(tmp_path, {"a": 2}, resume=True, product="identified.json")
     for content, message in (("{", "damaged; nothing can be resumed"), ("[]", "another search: a is None")):
