@@ -36,9 +36,8 @@ from hoof_env.envs.policies import STANDS_FOR
 from hoof_env.envs.tasks import TASKS
 from hoof_env.errors import DataFileError, OutputError, ParameterError
 from hoof_env.film import render_episode
-from hoof_env.onnx_policy import FILE, OnnxPolicy
 from hoof_env.records import setting
-from hoof_env.saved_policy import ABOUT, WEIGHTS
+from hoof_env.saved_policy import ABOUT, FILE, WEIGHTS, OnnxPolicy
 
 POLICIES = Path(__file__).with_name("policies")
 SHOWN = ("return", "distance_m", "stance_peak_n", "weight_share", "cost_of_transport", "failed")

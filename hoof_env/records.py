@@ -18,12 +18,11 @@ import hoof_env
 from hoof_env._output import check_folder
 from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.envs.policies import Scripted, load_open_loop, make_policy, policy_names, read_open_loop
-from hoof_env.errors import MissingExtraError, OutputError, ParameterError, check_number
+from hoof_env.errors import OutputError, ParameterError, check_number
 from hoof_env.gait.gait import PARAMETERS, GaitParameters
 from hoof_env.ground.terrain import Terrain
-from hoof_env.onnx_policy import OnnxPolicy
 from hoof_env.render.instant import UNITS, Columns, Setting, columns_of_engine
-from hoof_env.saved_policy import SavedModel
+from hoof_env.saved_policy import find_saved
 
 RECORD = {name: unit for name, unit in UNITS.items() if name not in PARAMETERS[1:]} | {"free_moment": "N m"}
 """Columns of a record and their units: fields of `Instant` but for the swing's parameters, which are known at
@@ -101,17 +100,10 @@ def find_policy(name: str, env: gym.Env[Any, Any], env_id: str, seed: int = 0) -
         return make_policy(name, env, seed)
     if name.endswith(".json"):
         return read_open_loop(Path(name), env)
-    if OnnxPolicy.stands_at(Path(name)):
-        return OnnxPolicy(Path(name)).load(env, env_id)
     if name == "open-loop":
         return load_open_loop(env_id, env)
-    if name.endswith(".zip") or Path(name, "model.zip").is_file():
-        try:
-            return SavedModel.find(Path(name)).load(env, env_id)
-        except ModuleNotFoundError as error:
-            raise MissingExtraError(
-                f'policy {name}: reading it needs pip install "hoof-env[train]" ({error})'
-            ) from None
+    if name.endswith((".zip", ".onnx")) or Path(name).is_dir():
+        return find_saved(Path(name)).load(env, env_id)
     if len(numbers := name.split(",")) == len(PARAMETERS):
         try:
             gait = GaitParameters(*(float(number) for number in numbers))
