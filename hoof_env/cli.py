@@ -122,7 +122,7 @@ def export(
         overwrite: replace the file if there is one.
     """
     from hoof_env._output import new_file
-    from hoof_env.export import export_episode
+    from hoof_env.records import export_episode
 
     with new_file(out, overwrite) as made:
         rows = export_episode(out, policy, id, args, seed, seconds)

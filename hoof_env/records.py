@@ -1,11 +1,14 @@
-"""Episodes of any policy on any environment of the package, substep by substep: for files and for pictures.
+"""Episodes of any policy on any environment of the package, substep by substep: for pictures, and for files.
 
 `setting` and `substeps` are all that is read from behind an environment; the rest is written against them.
+The files are CSV, Parquet and OpenSim's .mot; `write` chooses by the suffix. In swing, force and centre of
+pressure are 0 in all of them, as force plates and gait-lab tools have it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -15,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import hoof_env
-from hoof_env._output import check_folder
+from hoof_env._output import check_folder, staged
 from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.envs.policies import Scripted, load_open_loop, make_policy, policy_names, read_open_loop
-from hoof_env.errors import OutputError, ParameterError, check_number
+from hoof_env.errors import HoofEnvError, OutputError, ParameterError, check_number, parse_pairs
 from hoof_env.gait.gait import PARAMETERS, GaitParameters
 from hoof_env.ground.terrain import Terrain
 from hoof_env.render.instant import UNITS, Columns, Setting, columns_of_engine
@@ -201,3 +204,100 @@ def check_place(path: Path, suffixes: Iterable[str]) -> None:
     if path.is_dir():
         raise OutputError(f"cannot write to {str(path)!r}: expected a file, got a folder")
     check_folder(path.parent)
+
+
+MOT_COLUMNS = {
+    "time": "time",
+    "ground_force_vx": "force_x", "ground_force_vy": "force_y", "ground_force_vz": "",
+    "ground_force_px": "cop_x", "ground_force_py": "cop_y", "ground_force_pz": "",
+    "ground_torque_x": "", "ground_torque_y": "", "ground_torque_z": "free_moment",
+}  # fmt: skip
+"""OpenSim's names, x forward, y up, z right: force [N], point of application [m], free moment [N m]; and the
+column of the record, none for zeros."""
+
+
+def write_csv(record: Columns, about: Mapping[str, Any], path: Path) -> None:
+    """One row a substep under one header line with name and unit; numbers keep their bits."""
+    units = about["units"]
+    header = ",".join(f"{name} [{units[name]}]" for name in record)
+    _write_table(path, [*record.values()], "%.17g", ",", header)
+
+
+def write_parquet(record: Columns, about: Mapping[str, Any], path: Path) -> None:
+    """Columns of float64; a field's metadata has its "unit", the schema's "hoof_env" has `about` as JSON."""
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    schema = pa.schema(
+        [pa.field(name, pa.float64(), False, {"unit": about["units"][name]}) for name in record],
+        {"hoof_env": json.dumps(about)},
+    )
+    parquet.write_table(pa.table(dict(record), schema=schema), path)
+
+
+def write_mot(record: Columns, about: Mapping[str, Any], path: Path) -> None:
+    """OpenSim's motion file for external loads: `MOT_COLUMNS`, tab separated, under its header.
+
+    The leg moves in the plane z = 0.
+    """
+    nothing = np.zeros(len(record["time"]))
+    table = [record[name] + 0.0 if name else nothing for name in MOT_COLUMNS.values()]  # no -0
+    header = (
+        f"{path.name}\nversion=1\nnRows={len(nothing)}\nnColumns={len(table)}\ninDegrees=yes\nendheader\n"
+    )
+    _write_table(path, table, "%.10g", "\t", header + "\t".join(MOT_COLUMNS))
+
+
+def _write_table(path: Path, columns: list[Any], number: str, between: str, header: str) -> None:
+    table = np.column_stack(columns)
+    np.savetxt(path, table, number, delimiter=between, header=header, comments="", encoding="utf-8")
+
+
+WRITERS: dict[str, Callable[[Columns, Mapping[str, Any], Path], None]]
+WRITERS = {".csv": write_csv, ".parquet": write_parquet, ".mot": write_mot}
+
+
+def check_export(path: Path) -> None:
+    """Raise unless `write` can write to `path`; before an episode is played.
+
+    Raises:
+        ParameterError, OutputError: as `check_place`. HoofEnvError: pyarrow is missing.
+    """
+    check_place(path, WRITERS)
+    if path.suffix.lower() == ".parquet":
+        try:
+            import pyarrow.parquet  # noqa: F401
+        except ImportError:
+            raise HoofEnvError('Parquet needs pyarrow: pip install "hoof-env[export]"') from None
+
+
+def write(record: Columns, about: Mapping[str, Any], path: Path) -> Path:
+    """Write what `record_episode` and `describe` return, in the format of the path's suffix;
+    an older file is replaced when this is complete. Errors are those of `check_export`."""
+    check_export(path)
+    with staged(path.parent) as stage:
+        WRITERS[path.suffix.lower()](record, about, stage / path.name)
+    return path
+
+
+def export_episode(
+    path: Path,
+    policy: str,
+    env_id: str,
+    arguments: Sequence[str] = (),
+    seed: int = 0,
+    seconds: float | None = None,
+) -> int:
+    """Play an episode and write its record; returns the number of rows. What `hoof-env export` does.
+
+    Raises:
+        ParameterError, DataFileError: as `make_env` and `find_policy`.
+        ParameterError, OutputError, HoofEnvError: as `write`, and before the episode is played.
+    """
+    check_export(path)
+    check_number("seed", seed, low=0)
+    with make_env(env_id, given := parse_pairs("--args", arguments)) as env:
+        record = record_episode(env, find_policy(policy, env, env_id, seed), seed, seconds)
+        about = describe(env, environment=env_id, arguments=given, policy=policy, seed=seed)
+    write(record, about, path)
+    return len(record["time"])
