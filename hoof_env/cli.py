@@ -27,13 +27,8 @@ def reproduce(out: Path, figures: bool = True, preset: str | None = None) -> Non
     from hoof_env._output import check_folder
     from hoof_env.paper.figures import check_matplotlib
 
-    options = [
-        "--out",
-        str(out),
-        *([] if figures else ["--no-figures"]),
-        *(["--preset", preset] if preset else []),
-    ]
-    command = shlex.join(["hoof-env", "reproduce", *options])
+    options = ([] if figures else ["--no-figures"]) + (["--preset", preset] if preset else [])
+    command = shlex.join(["hoof-env", "reproduce", "--out", str(out), *options])
     check_folder(out)
     if figures:
         check_matplotlib()

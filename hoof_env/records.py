@@ -107,16 +107,13 @@ def find_policy(name: str, env: gym.Env[Any, Any], env_id: str, seed: int = 0) -
         return load_open_loop(env_id, env)
     if name.endswith((".zip", ".onnx")) or Path(name).is_dir():
         return find_saved(Path(name)).load(env, env_id)
-    if len(numbers := name.split(",")) == len(PARAMETERS):
-        try:
-            gait = GaitParameters(*(float(number) for number in numbers))
-        except ParameterError:
-            raise
-        except ValueError:
-            pass
-        else:
-            action = env.unwrapped.action_for(gait)  # type: ignore[attr-defined]
-            return Scripted(lambda observation, time: action, setting(env).dt)
+    try:
+        numbers = [float(number) for number in name.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) == len(PARAMETERS):
+        action = env.unwrapped.action_for(GaitParameters(*numbers))  # type: ignore[attr-defined]
+        return Scripted(lambda observation, time: action, setting(env).dt)
     raise ParameterError(
         f"policy: expected a name ({', '.join(names)}, open-loop), four gait parameters as "
         f"6.28,0.7,-0.2,-0.3, or the path of a trained model or a gait's .json, got {name!r}"
