@@ -291,20 +291,22 @@ class SavedModel:
             MissingExtraError: the library that plays it is missing.
         """
         check_record(self.path, self.record, env, env_id)
-        if not self.is_plain:
-            warnings.warn(f"{self.path} is a pickle, which can run any code: trusted?", stacklevel=2)
-        file = self.path.with_name(ABOUT) if self.is_plain else self.path
         try:
-            policy = read_plain(self.path.parent) if self.is_plain else self._unpickle(env)
+            for library in ("stable_baselines3", "safetensors.torch"):
+                import_module(library)
         except ModuleNotFoundError as error:
             raise MissingExtraError(
                 f'policy {self.path}: reading it needs pip install "hoof-env[train]" ({error})'
             ) from None
+        file, origin = self.path.with_name(ABOUT), "a policy written by agents.train"
+        if not self.is_plain:
+            warnings.warn(f"{self.path} is a pickle, which can run any code: trusted?", stacklevel=2)
+            file, origin = self.path, "a model saved by Stable-Baselines3"
+        try:
+            policy = read_plain(self.path.parent) if self.is_plain else self._unpickle(env)
         except Exception as error:  # what is damaged may raise anything
             reason = f"{type(error).__name__}: {error}".splitlines()[0]
-            raise DataFileError(
-                f"model {file}: expected a policy written by agents.train, cannot read it ({reason})"
-            ) from None
+            raise DataFileError(f"model {file}: expected {origin}, cannot read it ({reason})") from None
         refuse_misfit(self.path, describe_spaces(policy.model), describe_spaces(env))
         return policy
 
