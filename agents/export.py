@@ -4,7 +4,7 @@
 
 The file maps observations of the environment, shape (batch, k), to deterministic actions, (batch, n), float32
 both: the normalisation of observations and the limits of actions are inside. It is kept only if it gives the
-actions of the model it was made from. What it is for stands in its metadata (`hoof_env/onnx_policy.py`).
+actions of the model it was made from. What it is for stands in its metadata (`hoof_env/saved_policy.py`).
 A .zip is a pickle and can run any code when it is loaded: give only files that you trust. ONNX is data.
 """
 
@@ -29,8 +29,8 @@ from agents import runs
 from agents.command import run
 from hoof_env._output import staged
 from hoof_env.errors import DataFileError, HoofEnvError, ParameterError
-from hoof_env.onnx_policy import INPUT, LISTS, OUTPUT, OnnxPolicy, describe, settings_of
 from hoof_env.records import check_place
+from hoof_env.saved_policy import INPUT, LISTS, OUTPUT, OnnxPolicy, describe, settings_of
 
 OPSET = 18  # of the file; onnxruntime reads it from 1.14 on
 TRIED = 1000  # random observations on which file and model must agree

@@ -54,6 +54,7 @@ def alone(folder: Path) -> Iterator[None]:
 
     made = [path for path in (folder / ".lock", folder, *folder.parents) if not path.exists()]
     check_folder(folder)
+    folder.mkdir(parents=True, exist_ok=True)
     lock = FileLock(folder / ".lock")
     try:
         lock.acquire(timeout=0)

@@ -21,7 +21,7 @@ from hoof_env import records
 from hoof_env.envs.policies import open_loop_record
 from hoof_env.envs.vector import HorseLegVectorEnv
 from hoof_env.errors import ParameterError
-from hoof_env.onnx_policy import OnnxPolicy
+from hoof_env.saved_policy import find_saved
 
 Floats = NDArray[np.float64]
 
@@ -150,25 +150,19 @@ def is_model(name: str) -> bool:
     return is_path and not name.endswith(".json")
 
 
-def saved_model(path: Path) -> OnnxPolicy | runs.SavedModel:
-    """A policy in a file or a folder: an exported one, or a model of agents.train; `DataFileError` if there
-    is none."""
-    return OnnxPolicy(path) if OnnxPolicy.stands_at(path) else runs.SavedModel.find(path)
-
-
 def read_policy_record(name: str) -> dict[str, Any]:
     """What a policy's file says of itself, env_id and env_kwargs among it; empty for a scripted policy.
     `DataFileError`: no such model or gait."""
     if name.endswith(".json"):
         return open_loop_record(Path(name))
-    return saved_model(Path(name)).record if is_model(name) else {}
+    return find_saved(Path(name)).record if is_model(name) else {}
 
 
 def find_policy(name: str, env: gym.Env[Any, Any], env_id: str) -> Any:
     """A policy as `hoof_env.records.find_policy` takes it, or a model of any environment by its path.
     `ParameterError`: unknown name. `DataFileError`: no such model or gait, or one that does not fit."""
     if is_model(name):
-        return saved_model(Path(name)).load(env, env_id)
+        return find_saved(Path(name)).load(env, env_id)
     if not hasattr(env.unwrapped, "gaits"):
         raise ParameterError(
             f"policy: expected the path of a trained model, for none is scripted for {env_id}, got {name!r}"

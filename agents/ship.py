@@ -14,8 +14,8 @@ from __future__ import annotations
 import json
 import shlex
 import shutil
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -36,9 +36,8 @@ from hoof_env.envs.policies import STANDS_FOR
 from hoof_env.envs.tasks import TASKS
 from hoof_env.errors import DataFileError, OutputError, ParameterError
 from hoof_env.film import render_episode
-from hoof_env.onnx_policy import FILE, OnnxPolicy
 from hoof_env.records import setting
-from hoof_env.saved_policy import ABOUT, WEIGHTS
+from hoof_env.saved_policy import ABOUT, FILE, WEIGHTS, OnnxPolicy
 
 POLICIES = Path(__file__).with_name("policies")
 SHOWN = ("return", "distance_m", "stance_peak_n", "weight_share", "cost_of_transport", "failed")
@@ -110,18 +109,6 @@ def choose(saved: Sequence[runs.SavedModel], env_id: str) -> Choice:
     return Choice(saved[int(np.argmax(values))], len(saved))
 
 
-@contextmanager
-def whole(folder: Path) -> Iterator[Path]:
-    """As `staged`; where nothing was written, no empty folder stays behind."""
-    try:
-        with staged(folder) as stage:
-            yield stage
-    finally:
-        with suppress(OSError):  # one that holds something
-            folder.rmdir()
-            folder.parent.rmdir()
-
-
 def ship(choice: Choice, env_id: str, out: Path) -> dict[str, Any]:
     """Write the folder of one policy beneath `out`, for its own id or one that `STANDS_FOR` it; returns its
     score.json. `DataFileError`: the model does not fit. `OutputError`: the folder gets too large."""
@@ -135,7 +122,7 @@ def ship(choice: Choice, env_id: str, out: Path) -> dict[str, Any]:
     with runs.make_env(env_id) as env:
         metadata = about(env, env_id, {}, record)
     folder = out / env_id.rpartition("/")[2]
-    with whole(folder) as stage:
+    with staged(folder) as stage:
         write_policy(trained, stage / FILE, metadata)
         policy = OnnxPolicy(stage / FILE)  # what is shipped is what is scored
         scores = [Score("policy", score_vector(policy, trained_on, SCORE_SEEDS)), *gaits(trained_on)]

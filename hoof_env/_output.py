@@ -15,58 +15,51 @@ from hoof_env.errors import OutputError
 @contextmanager
 def staged(folder: Path) -> Iterator[Path]:
     """A temporary folder inside `folder`, which is made if need be; if the block succeeds, its files replace
-    those of `folder`.
+    those of `folder`. Folders that were made and have stayed empty go again.
 
     Raises:
         OutputError: `folder` cannot be made or written.
     """
+    stage, made = None, []
     try:
+        made = [path for path in (folder, *folder.parents) if not path.exists()]
         folder.mkdir(parents=True, exist_ok=True)
         stage = Path(tempfile.mkdtemp(prefix=".unfinished-", dir=folder))
-    except OSError as error:
-        raise OutputError(
-            f"cannot write to {str(folder)!r} ({error.strerror}); expected a writable folder"
-        ) from None
-    try:
         yield stage
         for file in sorted(stage.iterdir()):
             os.replace(file, folder / file.name)
     except OSError as error:
+        if stage is None:
+            reason = f"({error.strerror}); expected a writable folder"
+            raise OutputError(f"cannot write to {str(folder)!r} {reason}") from None
         raise OutputError(f"cannot write to {str(folder)!r}: {error.strerror or error}") from None
     finally:
-        shutil.rmtree(stage, ignore_errors=True)
+        if stage is not None:
+            shutil.rmtree(stage, ignore_errors=True)
+        for path in made:
+            with suppress(OSError):  # one that holds something
+                path.rmdir()
 
 
 def check_folder(folder: Path) -> None:
-    """Make `folder` if need be and raise `OutputError` unless files can be written there."""
+    """Raise `OutputError` unless files can be written to `folder`, which may still have to be made."""
     with staged(folder):
         pass
 
 
-@contextmanager
-def new_file(path: Path, overwrite: bool) -> Iterator[str]:
-    """Guards the making of a file; if the block fails, the folders that were made for it go again.
-
-    Yields:
-        What to add to a report: the folder that is made, or nothing.
+def check_new(path: Path, overwrite: bool) -> str:
+    """What to add to a report of a new file: the folder that is made for it, or nothing.
 
     Raises:
         OutputError: there is a file already and `overwrite` is False, or there cannot be one.
     """
     try:
-        is_there = path.is_file()
-        missing = [folder for folder in path.parents if not folder.exists()]
+        is_there, has_folder = path.is_file(), path.parent.exists()
     except OSError as error:
         raise OutputError(f"cannot write to {str(path)!r}: {error.strerror}") from None
     if is_there and not overwrite:
         raise OutputError(f"{str(path)!r} exists already; name another file, or add --overwrite")
-    try:
-        yield f"; made the folder {path.parent}" if missing else ""
-    except BaseException:
-        for folder in missing:
-            with suppress(OSError):
-                folder.rmdir()
-        raise
+    return "" if has_folder else f"; made the folder {path.parent}"
 
 
 def markdown_table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:

@@ -27,13 +27,8 @@ def reproduce(out: Path, figures: bool = True, preset: str | None = None) -> Non
     from hoof_env._output import check_folder
     from hoof_env.paper.figures import check_matplotlib
 
-    options = [
-        "--out",
-        str(out),
-        *([] if figures else ["--no-figures"]),
-        *(["--preset", preset] if preset else []),
-    ]
-    command = shlex.join(["hoof-env", "reproduce", *options])
+    options = ([] if figures else ["--no-figures"]) + (["--preset", preset] if preset else [])
+    command = shlex.join(["hoof-env", "reproduce", "--out", str(out), *options])
     check_folder(out)
     if figures:
         check_matplotlib()
@@ -71,11 +66,11 @@ def render(
         size: width and height [pixels].
         overwrite: replace the file if there is one.
     """
-    from hoof_env._output import new_file
+    from hoof_env._output import check_new
     from hoof_env.film import render_episode
 
-    with new_file(out, overwrite) as made:
-        count = render_episode(out, policy, id, args, seed, seconds, slow, fps, size)
+    made = check_new(out, overwrite)
+    count = render_episode(out, policy, id, args, seed, seconds, slow, fps, size)
     _say(f"{out}: {count} frames, {count / fps:.1f} s, {_size(out)}{made}")
 
 
@@ -121,11 +116,11 @@ def export(
         seconds: of the episode at most; its own end otherwise.
         overwrite: replace the file if there is one.
     """
-    from hoof_env._output import new_file
-    from hoof_env.export import export_episode
+    from hoof_env._output import check_new
+    from hoof_env.records import export_episode
 
-    with new_file(out, overwrite) as made:
-        rows = export_episode(out, policy, id, args, seed, seconds)
+    made = check_new(out, overwrite)
+    rows = export_episode(out, policy, id, args, seed, seconds)
     _say(f"{out}: {rows} rows, {_size(out)}{made}")
 
 

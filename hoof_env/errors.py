@@ -59,15 +59,13 @@ def check_number(
 ) -> float:
     """Return `value` as a float, or raise `ParameterError` unless it is finite and within [low, high]."""
     bracket = "(" if exclusive_low else "["
-    bounds = f"a finite number in {bracket}{low:g}, {high:g}]"
     try:
-        number = float(value)
+        number = np.nan if isinstance(value, (bool, np.bool_, str, bytes)) else float(value)
     except (TypeError, ValueError, OverflowError):
-        raise ParameterError(f"{name}: expected {bounds}, got {value!r}") from None
-    if isinstance(value, (bool, np.bool_, str, bytes)) or not np.isfinite(number):
-        raise ParameterError(f"{name}: expected {bounds}, got {value!r}")
-    if number > high or number < low or (exclusive_low and number == low):
-        raise ParameterError(f"{name}: expected {bounds}, got {value!r}")
+        number = np.nan
+    if not (np.isfinite(number) and low <= number <= high) or (exclusive_low and number == low):
+        bounds = f"{bracket}{low:g}, {high:g}]"
+        raise ParameterError(f"{name}: expected a finite number in {bounds}, got {value!r}")
     return number
 
 

@@ -1,11 +1,14 @@
-"""Episodes of any policy on any environment of the package, substep by substep: for files and for pictures.
+"""Episodes of any policy on any environment of the package, substep by substep: for pictures, and for files.
 
 `setting` and `substeps` are all that is read from behind an environment; the rest is written against them.
+The files are CSV, Parquet and OpenSim's .mot; `write` chooses by the suffix. In swing, force and centre of
+pressure are 0 in all of them, as force plates and gait-lab tools have it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -15,15 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 import hoof_env
-from hoof_env._output import check_folder
+from hoof_env._output import check_folder, staged
 from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.envs.policies import Scripted, load_open_loop, make_policy, policy_names
-from hoof_env.errors import MissingExtraError, OutputError, ParameterError, check_number
+from hoof_env.errors import HoofEnvError, OutputError, ParameterError, check_number, parse_pairs
 from hoof_env.gait.gait import PARAMETERS, GaitParameters
 from hoof_env.ground.terrain import Terrain
-from hoof_env.onnx_policy import OnnxPolicy
 from hoof_env.render.instant import UNITS, Columns, Setting, columns_of_engine
-from hoof_env.saved_policy import SavedModel
+from hoof_env.saved_policy import find_saved
 
 RECORD = {name: unit for name, unit in UNITS.items() if name not in PARAMETERS[1:]} | {"free_moment": "N m"}
 """Columns of a record and their units: fields of `Instant` but for the swing's parameters, which are known at
@@ -101,27 +103,17 @@ def find_policy(name: str, env: gym.Env[Any, Any], env_id: str, seed: int = 0) -
         return make_policy(name, env, seed)
     if name.endswith(".json"):
         return load_open_loop(name, env)
-    if OnnxPolicy.stands_at(Path(name)):
-        return OnnxPolicy(Path(name)).load(env, env_id)
     if name == "open-loop":
         return load_open_loop(env_id, env)
-    if name.endswith(".zip") or Path(name, "model.zip").is_file():
-        try:
-            return SavedModel.find(Path(name)).load(env, env_id)
-        except ModuleNotFoundError as error:
-            raise MissingExtraError(
-                f'policy {name}: reading it needs pip install "hoof-env[train]" ({error})'
-            ) from None
-    if len(numbers := name.split(",")) == len(PARAMETERS):
-        try:
-            gait = GaitParameters(*(float(number) for number in numbers))
-        except ParameterError:
-            raise
-        except ValueError:
-            pass
-        else:
-            action = env.unwrapped.action_for(gait)  # type: ignore[attr-defined]
-            return Scripted(lambda observation, time: action, setting(env).dt)
+    if name.endswith((".zip", ".onnx")) or Path(name).is_dir():
+        return find_saved(Path(name)).load(env, env_id)
+    try:
+        numbers = [float(number) for number in name.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) == len(PARAMETERS):
+        action = env.unwrapped.action_for(GaitParameters(*numbers))  # type: ignore[attr-defined]
+        return Scripted(lambda observation, time: action, setting(env).dt)
     raise ParameterError(
         f"policy: expected a name ({', '.join(names)}, open-loop), four gait parameters as "
         f"6.28,0.7,-0.2,-0.3, or the path of a trained model or a gait's .json, got {name!r}"
@@ -209,3 +201,100 @@ def check_place(path: Path, suffixes: Iterable[str]) -> None:
     if path.is_dir():
         raise OutputError(f"cannot write to {str(path)!r}: expected a file, got a folder")
     check_folder(path.parent)
+
+
+MOT_COLUMNS = {
+    "time": "time",
+    "ground_force_vx": "force_x", "ground_force_vy": "force_y", "ground_force_vz": "",
+    "ground_force_px": "cop_x", "ground_force_py": "cop_y", "ground_force_pz": "",
+    "ground_torque_x": "", "ground_torque_y": "", "ground_torque_z": "free_moment",
+}  # fmt: skip
+"""OpenSim's names, x forward, y up, z right: force [N], point of application [m], free moment [N m]; and the
+column of the record, none for zeros."""
+
+
+def write_csv(record: Columns, about: Mapping[str, Any], path: Path) -> None:
+    """One row a substep under one header line with name and unit; numbers keep their bits."""
+    units = about["units"]
+    header = ",".join(f"{name} [{units[name]}]" for name in record)
+    _write_table(path, [*record.values()], "%.17g", ",", header)
+
+
+def write_parquet(record: Columns, about: Mapping[str, Any], path: Path) -> None:
+    """Columns of float64; a field's metadata has its "unit", the schema's "hoof_env" has `about` as JSON."""
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    schema = pa.schema(
+        [pa.field(name, pa.float64(), False, {"unit": about["units"][name]}) for name in record],
+        {"hoof_env": json.dumps(about)},
+    )
+    parquet.write_table(pa.table(dict(record), schema=schema), path)
+
+
+def write_mot(record: Columns, about: Mapping[str, Any], path: Path) -> None:
+    """OpenSim's motion file for external loads: `MOT_COLUMNS`, tab separated, under its header.
+
+    The leg moves in the plane z = 0.
+    """
+    nothing = np.zeros(len(record["time"]))
+    table = [record[name] + 0.0 if name else nothing for name in MOT_COLUMNS.values()]  # no -0
+    header = (
+        f"{path.name}\nversion=1\nnRows={len(nothing)}\nnColumns={len(table)}\ninDegrees=yes\nendheader\n"
+    )
+    _write_table(path, table, "%.10g", "\t", header + "\t".join(MOT_COLUMNS))
+
+
+def _write_table(path: Path, columns: list[Any], number: str, between: str, header: str) -> None:
+    table = np.column_stack(columns)
+    np.savetxt(path, table, number, delimiter=between, header=header, comments="", encoding="utf-8")
+
+
+WRITERS: dict[str, Callable[[Columns, Mapping[str, Any], Path], None]]
+WRITERS = {".csv": write_csv, ".parquet": write_parquet, ".mot": write_mot}
+
+
+def check_export(path: Path) -> None:
+    """Raise unless `write` can write to `path`; before an episode is played.
+
+    Raises:
+        ParameterError, OutputError: as `check_place`. HoofEnvError: pyarrow is missing.
+    """
+    check_place(path, WRITERS)
+    if path.suffix.lower() == ".parquet":
+        try:
+            import pyarrow.parquet  # noqa: F401
+        except ImportError:
+            raise HoofEnvError('Parquet needs pyarrow: pip install "hoof-env[export]"') from None
+
+
+def write(record: Columns, about: Mapping[str, Any], path: Path) -> Path:
+    """Write what `record_episode` and `describe` return, in the format of the path's suffix;
+    an older file is replaced when this is complete. Errors are those of `check_export`."""
+    check_export(path)
+    with staged(path.parent) as stage:
+        WRITERS[path.suffix.lower()](record, about, stage / path.name)
+    return path
+
+
+def export_episode(
+    path: Path,
+    policy: str,
+    env_id: str,
+    arguments: Sequence[str] = (),
+    seed: int = 0,
+    seconds: float | None = None,
+) -> int:
+    """Play an episode and write its record; returns the number of rows. What `hoof-env export` does.
+
+    Raises:
+        ParameterError, DataFileError: as `make_env` and `find_policy`.
+        ParameterError, OutputError, HoofEnvError: as `write`, and before the episode is played.
+    """
+    check_export(path)
+    check_number("seed", seed, low=0)
+    with make_env(env_id, given := parse_pairs("--args", arguments)) as env:
+        record = record_episode(env, find_policy(policy, env, env_id, seed), seed, seconds)
+        about = describe(env, environment=env_id, arguments=given, policy=policy, seed=seed)
+    write(record, about, path)
+    return len(record["time"])

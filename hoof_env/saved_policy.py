@@ -1,12 +1,13 @@
-"""Trained policies as `agents.train` leaves them: run folders, checkpoints and .zip files, found and read.
+"""Trained policies in files: what `agents.train`, `agents.export` and `agents.ship` leave, found and read.
 
-    policy.safetensors  the weights
+    policy.onnx         the policy alone, played by onnxruntime (extra "onnx"); its metadata say for what
+    policy.safetensors  the weights, played by Stable-Baselines3 (extra "train")
     policy.json         algorithm, kind of policy, its arguments, both spaces, statistics of the observations
     model.zip           what learns, too: optimiser, value of the exploration and counters
+    run.json            what the training was: env_id, settings, spaces, versions
 
-Needs the extra "train". Reading the first two, plain data, runs nothing that a file says (it may ask for a
-large network, and so for memory). A .zip or .pkl is a pickle and can run any code: load only files that you
-trust.
+Reading the first three, plain data, runs nothing that a file says (it may ask for a large network, and so for
+memory). A .zip or .pkl is a pickle and can run any code: load only files that you trust.
 """
 
 from __future__ import annotations
@@ -14,21 +15,35 @@ from __future__ import annotations
 import json
 import math
 import warnings
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, is_dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
 
-from hoof_env.errors import DataFileError, ParameterError, check_choice
-from hoof_env.onnx_policy import describe_spaces, settings_of, warn_of_differences
+from hoof_env._version import __version__
+from hoof_env.errors import DataFileError, HoofEnvError, MissingExtraError, ParameterError, check_choice
+from hoof_env.gait.gait import PARAMETERS
 
-STATISTICS = "vecnormalize.pkl"
+FILE, WEIGHTS, ABOUT, STATISTICS = "policy.onnx", "policy.safetensors", "policy.json", "vecnormalize.pkl"
 CHECKPOINTS = "checkpoints"
-WEIGHTS, ABOUT = "policy.safetensors", "policy.json"
-FORMAT = 1
+FORMAT = 1  # of policy.json
+
+INPUT, OUTPUT = "observation", "action"
+"""Names of the graph's input, shape (batch, k), and output, shape (batch, n), float32 both."""
+
+OBJECTS = ("env_kwargs", "settings")
+LISTS = (*OBJECTS, "observation_names", "action_names")
+"""Metadata of an .onnx that is JSON; all other is text."""
+
+RECORD = {
+    "env_kwargs": dict, "settings": dict, "args": dict, "versions": dict, "finished": dict, "resumed": list,
+}  # fmt: skip
+"""What run.json may hold besides env_id and algo, where its kind matters."""
 
 ALGORITHMS = {
     "ppo": "stable_baselines3", "sac": "stable_baselines3", "td3": "stable_baselines3", "tqc": "sb3_contrib",
@@ -51,16 +66,61 @@ def algorithm_class(name: str) -> Any:
         ) from None
 
 
-RECORD = {
-    "env_kwargs": dict, "settings": dict, "args": dict, "versions": dict, "finished": dict, "resumed": list,
-}  # fmt: skip
-"""What run.json may hold besides env_id and algo, where its kind matters."""
+# -- what a policy is for ----------------------------------------------------------------------
+
+
+def describe_spaces(env: Any) -> dict[str, Any]:
+    """Both spaces of an environment or a model as text, to be kept beside a policy and compared."""
+    return {"observation_space": str(env.observation_space), "action_space": str(env.action_space)}
+
+
+def describe(env: Any) -> dict[str, Any]:
+    """What an environment says of what it takes and gives: spaces, and names where it has them."""
+    names = getattr(env.unwrapped, "observation_names", None)
+    told = {} if names is None else {"observation_names": list(names), "action_names": list(PARAMETERS)}
+    return describe_spaces(env) | told
 
 
 def describe_env(env: gym.Env[Any, Any]) -> dict[str, Any]:
-    """What a policy for an environment depends on, as JSON gives it back: spaces and all settings."""
+    """What run.json says of an environment: spaces and all settings."""
     settings = settings_of(env)
     return describe_spaces(env) | ({"settings": settings} if settings else {})
+
+
+def settings_of(env: Any) -> dict[str, Any]:
+    """All settings of an environment of this package, as JSON gives them back; empty for another
+    package's."""
+    settings = getattr(env.unwrapped, "settings", None)
+    if not is_dataclass(settings) or isinstance(settings, type):
+        return {}
+    plain: dict[str, Any] = json.loads(json.dumps(asdict(settings), default=str))
+    return plain
+
+
+def refuse_misfit(path: Path, there: dict[str, Any], here: dict[str, Any]) -> None:
+    """`DataFileError` where a policy was trained for something else than what is `here`."""
+    unlike = [f"{key} {there[key]}, expected {x}" for key, x in here.items() if there.get(key, x) != x]
+    if unlike:
+        (one, old), (other, new) = (str(of.get("env_id")).rpartition("-v")[::2] for of in (there, here))
+        if one == other != "" and old != new:
+            unlike.append("another version of an id is another task")
+        raise DataFileError(f"policy {path}: trained for {'; '.join(unlike)}")
+
+
+def check_record(path: Path, record: dict[str, Any], env: Any, env_id: str) -> None:
+    """Refuse a policy whose record does not fit an environment; warn where settings, or the version of
+    hoof-env, were others where it was trained."""
+    refuse_misfit(path, record, {"env_id": env_id, **describe(env)})
+    here = settings_of(env)
+    there = record.get("settings", here | record.get("env_kwargs", {}))
+    unlike = [
+        f"{key}={there.get(key)!r}, here {x!r}" for key, x in sorted(here.items()) if there.get(key) != x
+    ]
+    made_with = record.get("hoof_env", record.get("versions", {}).get("hoof-env", __version__))
+    if made_with != __version__:
+        unlike.append(f"hoof-env {made_with}, here {__version__}")
+    if unlike:
+        warnings.warn(f"policy {path}: trained with {'; '.join(unlike)}", stacklevel=3)
 
 
 def read_record(folder: Path) -> dict[str, Any]:
@@ -73,18 +133,115 @@ def read_record(folder: Path) -> dict[str, Any]:
     if not path.is_file():
         return {}
     try:
-        record = json.loads(path.read_text(encoding="utf-8"))
+        record: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
         kinds = {"env_id": str, "algo": str} | {key: kind for key, kind in RECORD.items() if key in record}
         if unlike := [key for key, kind in kinds.items() if not isinstance(record[key], kind)]:
             raise TypeError(f"{unlike[0]}: {record[unlike[0]]!r}")
         if "finished" in record:
             steps, seconds = record["finished"]["steps"], record["finished"]["seconds"]
             record["finished"] |= {"steps": int(steps), "seconds": float(seconds)}
-        return dict(record)
+        return record
     except (OSError, ValueError, TypeError, KeyError) as error:
         raise DataFileError(
             f"{path}: expected the JSON object of agents.train with env_id and algo: {error!r}"
         ) from None
+
+
+def find_saved(path: Path) -> OnnxPolicy | SavedModel:
+    """The policy in a file or a folder: an exported one where there is one, else a model of agents.train.
+
+    Raises:
+        DataFileError: there is none, or it cannot be read.
+    """
+    is_onnx = path.suffix == ".onnx" or (path / FILE).is_file()
+    return OnnxPolicy(path) if is_onnx else SavedModel.find(path)
+
+
+# -- policies in ONNX --------------------------------------------------------------------------
+
+
+class OnnxPolicy:
+    """A policy with Stable-Baselines3's `predict`, in a file of `agents.export`.
+
+    Args:
+        path: of an .onnx file, or of a folder that holds `FILE`.
+
+    Attributes:
+        path: of the file.
+        record: its metadata: env_id, env_kwargs, settings, both spaces, names of observations and actions,
+            algo, and the version of hoof_env that trained.
+
+    Raises:
+        DataFileError: no such file, or not one of `agents.export`.
+        HoofEnvError: onnxruntime is missing.
+    """
+
+    def __init__(self, path: Path) -> None:
+        try:
+            import onnxruntime
+        except ImportError:
+            raise HoofEnvError(
+                f'policy {path}: reading it needs onnxruntime: pip install "hoof-env[onnx]"'
+            ) from None
+        self.path = path / FILE if path.is_dir() else path
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = options.inter_op_num_threads = 1  # a small network waits for threads
+        options.log_severity_level = 3
+        try:
+            content = self.path.read_bytes()
+            self._session = onnxruntime.InferenceSession(content, options, ["CPUExecutionProvider"])
+            found = self._session.get_modelmeta().custom_metadata_map
+            self.record = {key: json.loads(text) if key in LISTS else text for key, text in found.items()}
+            names = [node.name for node in (*self._session.get_inputs(), *self._session.get_outputs())]
+            objects = all(isinstance(self.record.get(key, {}), dict) for key in OBJECTS)
+            if names != [INPUT, OUTPUT] or "env_id" not in self.record or not objects:
+                raise ValueError(f"tensors {names}, metadata {self.record}")
+        except Exception as error:  # onnxruntime has an exception for everything, with no common base
+            said = (getattr(error, "strerror", None) or str(error) or type(error).__name__).splitlines()[0]
+            raise DataFileError(
+                f"policy {self.path}: expected an ONNX file of agents.export, cannot read it ({said})"
+            ) from None
+
+    def load(self, env: Any, env_id: str) -> OnnxPolicy:
+        """This policy, if it fits an environment. Warns of other settings or another hoof-env.
+
+        Raises:
+            DataFileError: it is for another environment, other spaces, or observes other things.
+        """
+        check_record(self.path, self.record, env, env_id)
+        return self
+
+    def predict(
+        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
+    ) -> tuple[NDArray[np.float32], Any]:
+        """Actions for observations of shape (..., k), always the deterministic ones; `state` comes back."""
+        rows = np.asarray(observation, np.float32)
+        (actions,) = self._session.run([OUTPUT], {INPUT: rows.reshape(-1, rows.shape[-1])})
+        return actions.reshape(*rows.shape[:-1], actions.shape[-1]), state
+
+
+# -- policies of Stable-Baselines3 -------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class TrainedPolicy:
+    """A trained policy that sees observations as it saw them in training.
+
+    Attributes:
+        model: of Stable-Baselines3; nothing but its policy is there when it was read from plain data.
+        normalize: observations as the policy saw them in training, or None.
+    """
+
+    model: Any
+    normalize: Any
+
+    def predict(
+        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
+    ) -> tuple[Any, Any]:
+        """Action for an observation of the environment."""
+        if self.normalize is not None:
+            observation = self.normalize(observation)
+        return self.model.predict(observation, state, episode_start, deterministic)
 
 
 @dataclass(frozen=True)
@@ -131,69 +288,41 @@ class SavedModel:
 
         Raises:
             DataFileError: not a model, or one for another environment or other spaces.
+            MissingExtraError: the library that plays it is missing.
         """
-        here = {"env_id": env_id, **describe_env(env)}
-        self._refuse(self.record, here)
-        there = self.record.get("settings", settings_of(env))
-        made_with = self.record.get("versions", {}).get("hoof-env")
-        warn_of_differences(f"model {self.path}", there, settings_of(env) or there, made_with)
-        if self.is_plain:
-            model, normalize = load_policy(self.path.parent)
-        else:
+        check_record(self.path, self.record, env, env_id)
+        try:
+            for library in ("stable_baselines3", "safetensors.torch"):
+                import_module(library)
+        except ModuleNotFoundError as error:
+            raise MissingExtraError(
+                f'policy {self.path}: reading it needs pip install "hoof-env[train]" ({error})'
+            ) from None
+        file, origin = self.path.with_name(ABOUT), "a policy written by agents.train"
+        if not self.is_plain:
             warnings.warn(f"{self.path} is a pickle, which can run any code: trusted?", stacklevel=2)
-            model, normalize = self._unpickle(env)
-        self._refuse(describe_spaces(model), here)
-        return TrainedPolicy(model, normalize)
+            file, origin = self.path, "a model saved by Stable-Baselines3"
+        try:
+            policy = read_plain(self.path.parent) if self.is_plain else self._unpickle(env)
+        except Exception as error:  # what is damaged may raise anything
+            reason = f"{type(error).__name__}: {error}".splitlines()[0]
+            raise DataFileError(f"model {file}: expected {origin}, cannot read it ({reason})") from None
+        refuse_misfit(self.path, describe_spaces(policy.model), describe_spaces(env))
+        return policy
 
-    def _unpickle(self, env: gym.Env[Any, Any]) -> tuple[Any, Any]:
+    def _unpickle(self, env: gym.Env[Any, Any]) -> TrainedPolicy:
         from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
-        algorithm = algorithm_class(self.record.get("algo", "ppo"))
-        statistics, normalize = self.path.with_name(STATISTICS), None
-        try:
-            model = algorithm.load(self.path, device="cpu")
-            if statistics.is_file():
-                normalize = VecNormalize.load(str(statistics), DummyVecEnv([lambda: env])).normalize_obs
-        except Exception as error:  # a damaged pickle may raise anything
-            reason = f"{type(error).__name__}: {error}".splitlines()[0]
-            raise DataFileError(
-                f"model {self.path}: expected a model saved by Stable-Baselines3, cannot read it ({reason})"
-            ) from None
-        return model, normalize
-
-    def _refuse(self, there: dict[str, Any], here: dict[str, Any]) -> None:
-        keys = ("env_id", "observation_space", "action_space")
-        unlike = [
-            f"{key} {there[key]}, expected {here[key]}"
-            for key in keys
-            if there.get(key, here[key]) != here[key]
-        ]
-        if unlike:
-            versions = [str(one.get("env_id")).rpartition("-v") for one in (there, here)]
-            if versions[0][0] == versions[1][0] != "" and versions[0][2] != versions[1][2]:
-                unlike.append("another version of an id is another task")
-            raise DataFileError(f"model {self.path}: trained for {'; '.join(unlike)}")
+        model = algorithm_class(self.record.get("algo", "ppo")).load(self.path, device="cpu")
+        statistics = self.path.with_name(STATISTICS)
+        if not statistics.is_file():
+            return TrainedPolicy(model, None)
+        return TrainedPolicy(
+            model, VecNormalize.load(str(statistics), DummyVecEnv([lambda: env])).normalize_obs
+        )
 
 
-@dataclass(frozen=True)
-class TrainedPolicy:
-    """A trained policy that sees observations as it saw them in training.
-
-    Attributes:
-        model: of Stable-Baselines3; nothing but its policy is there when it was read from plain data.
-        normalize: observations as the policy saw them in training, or None.
-    """
-
-    model: Any
-    normalize: Any
-
-    def predict(
-        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
-    ) -> tuple[Any, Any]:
-        """Action for an observation of the environment."""
-        if self.normalize is not None:
-            observation = self.normalize(observation)
-        return self.model.predict(observation, state, episode_start, deterministic)
+# -- the same as plain data --------------------------------------------------------------------
 
 
 def save_policy(model: Any, folder: Path) -> bool:
@@ -201,16 +330,23 @@ def save_policy(model: Any, folder: Path) -> bool:
     are not plain data or its spaces are not boxes."""
     from safetensors.torch import save
 
-    normalize = model.get_vec_normalize_env()
+    seen: Any = model.get_vec_normalize_env()
     try:
         about = {
             "format": FORMAT,
             "algo": type(model).__name__.lower(),
             "policy": next(name for name, kind in model.policy_aliases.items() if kind is model.policy_class),
             "policy_kwargs": _plain(({"use_sde": True} if model.use_sde else {}) | model.policy_kwargs),
-            "observation_space": _box(model.observation_space),
-            "action_space": _box(model.action_space),
-            "normalize": _statistics(normalize) if normalize is not None and normalize.norm_obs else None,
+            "observation_space": _plain_box(model.observation_space),
+            "action_space": _plain_box(model.action_space),
+            "normalize": {
+                "mean": seen.obs_rms.mean.tolist(),
+                "var": seen.obs_rms.var.tolist(),
+                "epsilon": float(seen.epsilon),
+                "clip": float(seen.clip_obs),
+            }
+            if seen is not None and seen.norm_obs
+            else None,
         }
         text = json.dumps(about, indent=1, allow_nan=False) + "\n"
     except (TypeError, ValueError, AttributeError, StopIteration):
@@ -224,49 +360,27 @@ def save_policy(model: Any, folder: Path) -> bool:
     return True
 
 
-def load_policy(folder: Path) -> tuple[Any, Any]:
-    """The model, with nothing in it but its policy, and the function that normalises observations, or None.
-
-    Raises:
-        DataFileError: a file is missing or damaged, or does not describe a policy.
-    """
-    from gymnasium import spaces
+def read_plain(folder: Path) -> TrainedPolicy:
+    """What `save_policy` wrote; the model holds nothing but its policy. Any exception if it is damaged."""
     from safetensors.torch import load_file
 
-    def box(about: dict[str, Any]) -> spaces.Box:
-        kind: Any = np.dtype(about["dtype"]).type
-        low, high = (
-            np.array([default if x is None else x for x in about[name]], kind).reshape(about["shape"])
-            for name, default in (("low", -np.inf), ("high", np.inf))
-        )
-        return spaces.Box(low, high, dtype=kind)
-
-    try:
-        about = json.loads((folder / ABOUT).read_text(encoding="utf-8"))
-        if about["format"] != FORMAT:
-            raise ValueError(f"format {about['format']!r}, expected {FORMAT}")
-        model = algorithm_class(about["algo"])(about["policy"], None, device="cpu", _init_setup_model=False)
-        model.observation_space = box(about["observation_space"])
-        model.action_space = box(about["action_space"])
-        model.policy_kwargs = _built(about["policy_kwargs"])
-        model.policy = model.policy_class(
-            model.observation_space, model.action_space, lambda _: 0.0, **model.policy_kwargs
-        )
-        weights = load_file(folder / WEIGHTS)
-        if not all(bool(one.isfinite().all()) for one in weights.values()):
-            raise ValueError(f"{WEIGHTS} holds numbers that are not finite")
-        model.policy.load_state_dict(weights)
-        shape = model.observation_space.shape
-        normalize = _Normalizer(shape, **about["normalize"]) if about["normalize"] else None
-    except ParameterError as error:
-        raise DataFileError(f"model {folder / ABOUT}: {error}") from None
-    except Exception as error:  # a damaged description may raise anything
-        reason = f"{type(error).__name__}: {error}".splitlines()[0]
-        raise DataFileError(
-            f"model {folder / ABOUT}: expected a policy written by agents.train, cannot read it ({reason})"
-        ) from None
+    about = json.loads((folder / ABOUT).read_text(encoding="utf-8"))
+    if about["format"] != FORMAT:
+        raise ValueError(f"format {about['format']!r}, expected {FORMAT}")
+    model = algorithm_class(about["algo"])(about["policy"], None, device="cpu", _init_setup_model=False)
+    model.observation_space = _built_box(**about["observation_space"])
+    model.action_space = _built_box(**about["action_space"])
+    model.policy_kwargs = _built(about["policy_kwargs"])
+    model.policy = model.policy_class(
+        model.observation_space, model.action_space, lambda _: 0.0, **model.policy_kwargs
+    )
+    weights = load_file(folder / WEIGHTS)
+    if not all(bool(one.isfinite().all()) for one in weights.values()):
+        raise ValueError(f"{WEIGHTS} holds numbers that are not finite")
+    model.policy.load_state_dict(weights)
     model.policy.set_training_mode(False)
-    return model, normalize
+    shape = model.observation_space.shape
+    return TrainedPolicy(model, _Normalizer(shape, **about["normalize"]) if about["normalize"] else None)
 
 
 class _Normalizer:
@@ -286,12 +400,7 @@ class _Normalizer:
         return np.clip(scaled, -self.clip, self.clip).astype(np.float32)
 
 
-def _statistics(normalize: Any) -> dict[str, Any]:
-    found = {"mean": normalize.obs_rms.mean.tolist(), "var": normalize.obs_rms.var.tolist()}
-    return {**found, "epsilon": float(normalize.epsilon), "clip": float(normalize.clip_obs)}
-
-
-def _box(space: Any) -> dict[str, Any]:
+def _plain_box(space: Any) -> dict[str, Any]:
     """A box as JSON; None for an infinite bound. `AttributeError` for another space."""
     low, high = (
         [float(x) if math.isfinite(x) else None for x in bound.ravel()] for bound in (space.low, space.high)
@@ -299,11 +408,19 @@ def _box(space: Any) -> dict[str, Any]:
     return {"low": low, "high": high, "shape": list(space.shape), "dtype": str(space.dtype)}
 
 
+def _built_box(low: list[Any], high: list[Any], shape: list[int], dtype: str) -> spaces.Box:
+    kind: Any = np.dtype(dtype).type
+    least, most = (
+        np.array([default if x is None else x for x in bound], kind).reshape(shape)
+        for bound, default in ((low, -np.inf), (high, np.inf))
+    )
+    return spaces.Box(least, most, dtype=kind)
+
+
 def _plain(value: Any) -> Any:
     """Arguments of a policy as JSON; `TypeError` if one cannot be told."""
-    import torch
+    from torch import nn
 
-    nn: Any = torch.nn
     if isinstance(value, dict):
         return {str(key): _plain(inner) for key, inner in value.items()}
     if isinstance(value, (list, tuple)):

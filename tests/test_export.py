@@ -16,9 +16,17 @@ from hoof_env.dynamics.layout import TRUNK_STATE
 from hoof_env.dynamics.parts import GRAVITY
 from hoof_env.envs.policies import make_policy
 from hoof_env.errors import HoofEnvError, OutputError, ParameterError, parse_pairs
-from hoof_env.export import MOT_COLUMNS, export_episode, write
 from hoof_env.leg.geometry import load_geometry
-from hoof_env.records import RECORD, describe, find_policy, make_env, record_episode
+from hoof_env.records import (
+    MOT_COLUMNS,
+    RECORD,
+    describe,
+    export_episode,
+    find_policy,
+    make_env,
+    record_episode,
+    write,
+)
 
 LEG = "hoof_env/HorseLeg-v0"
 
@@ -76,7 +84,7 @@ def test_mot_is_what_opensim_reads(episode, tmp_path):
     record, about = episode
     header, columns = read_mot(write(record, about, tmp_path / "run.mot"))
     assert header == {"version": "1", "nRows": "2001", "nColumns": "10", "inDegrees": "yes"}
-    assert tuple(columns) == MOT_COLUMNS
+    assert [*columns] == [*MOT_COLUMNS]
     for name, source in (("vx", "force_x"), ("vy", "force_y"), ("px", "cop_x"), ("py", "cop_y")):
         np.testing.assert_allclose(columns[f"ground_force_{name}"], record[source], rtol=1e-9)
     np.testing.assert_allclose(columns["time"], record["time"], rtol=1e-9)

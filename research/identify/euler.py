@@ -169,7 +169,7 @@ def swing_motion(theta, gait):  # type: ignore[no-untyped-def]
 
 @kernel
 def close_loops(theta, crank, pivot, values, gait, bodies, points):  # type: ignore[no-untyped-def]
-    """Fill `bodies.q`, `bodies.qd` with the closed form, as `constraints.closed_form`."""
+    """Fill `bodies.q`, `bodies.qd` with the closed form, as `constrained.closed_form`."""
     z, dz, q, qd = points.z, points.dz, bodies.q, bodies.qd
     solve_points(theta, crank, pivot, STEPS, values, z, dz, points.ddz)
     _, w, phi, phi_rate, _ = swing_motion(theta, gait)

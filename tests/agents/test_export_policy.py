@@ -25,8 +25,8 @@ from agents.export import main, write_policy
 from agents.runs import SavedModel, TrainedPolicy, make_env
 from agents.score import play
 from hoof_env.errors import DataFileError, HoofEnvError, OutputError, ParameterError
-from hoof_env.onnx_policy import OnnxPolicy
 from hoof_env.records import find_policy
+from hoof_env.saved_policy import OnnxPolicy
 from tests.agents.conftest import ENV_ID, KWARGS
 
 ROOT = Path(__file__).parents[2]
@@ -111,7 +111,7 @@ def test_other_settings_and_another_version_are_told(env, exported, trained, tmp
     graph.metadata_props.extend(kept)
     onnx.save(graph, old)
     record = OnnxPolicy(exported).record
-    monkeypatch.setattr("hoof_env.onnx_policy.__version__", record["hoof_env"])
+    monkeypatch.setattr("hoof_env.saved_policy.__version__", record["hoof_env"])
     assert record["settings"] == json.loads((trained.folder / "run.json").read_text())["settings"]
     with warnings.catch_warnings():
         warnings.simplefilter("error", UserWarning)
@@ -124,7 +124,7 @@ def test_other_settings_and_another_version_are_told(env, exported, trained, tmp
         find_policy(str(exported), other, ENV_ID)
     with make_env(ENV_ID) as other, pytest.warns(UserWarning, match=r"episode_seconds=0\.4, here 10\.0$"):
         find_policy(str(old), other, ENV_ID)
-    monkeypatch.setattr("hoof_env.onnx_policy.__version__", "9.9.9")
+    monkeypatch.setattr("hoof_env.saved_policy.__version__", "9.9.9")
     with pytest.warns(UserWarning, match=r"trained with hoof-env \d\S*, here 9\.9\.9$"):
         find_policy(str(exported), env, ENV_ID)
 

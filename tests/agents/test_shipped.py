@@ -17,7 +17,7 @@ from agents import ship
 from agents.runs import SavedModel, make_env
 from agents.score import score_vector
 from hoof_env.errors import DataFileError
-from hoof_env.onnx_policy import OnnxPolicy
+from hoof_env.saved_policy import OnnxPolicy
 from tests.agents.conftest import train_tiny
 
 FOLDERS = sorted(path.parent for path in ship.POLICIES.glob("*/score.json"))

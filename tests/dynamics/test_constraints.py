@@ -8,7 +8,7 @@ import sympy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hoof_env.dynamics.constraints import SIZE, Constraints, closed_form
+from hoof_env.dynamics.constrained import SIZE, Constraints, closed_form
 from hoof_env.gait.gait import MOTION
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.linkage import BODIES, BODY_LENGTHS, JOINTS

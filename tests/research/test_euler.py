@@ -9,8 +9,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from hoof_env.dynamics.constrained import ConstrainedLeg, new_trace
-from hoof_env.dynamics.constraints import Constraints
+from hoof_env.dynamics.constrained import ConstrainedLeg, Constraints, new_trace
 from hoof_env.dynamics.parts import Result
 from hoof_env.errors import GeometryError
 from hoof_env.gait.gait import LIMITS, MOTION, GaitParameters, evaluate_motion, load_gait, steady_filters
