@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from hoof_env.dynamics.parts import Trunk as Trunk
     from hoof_env.dynamics.step_length import StepWarning as StepWarning
     from hoof_env.envs.horse_leg import HorseLegEnv as HorseLegEnv
+    from hoof_env.envs.horse_leg import HorseLegMOEnv as HorseLegMOEnv
     from hoof_env.envs.horse_leg import RandomizeParameters as RandomizeParameters
-    from hoof_env.envs.multi_objective import HorseLegMOEnv as HorseLegMOEnv
     from hoof_env.envs.observation import Entry as Entry
     from hoof_env.envs.observation import Scale as Scale
     from hoof_env.envs.policies import make_policy as make_policy
@@ -50,8 +50,7 @@ _MODULES = {
     "dynamics.engine": "TrunkEngine",
     "dynamics.parts": "Limb Motor Prescribed Result Trunk",
     "dynamics.step_length": "StepWarning",
-    "envs.horse_leg": "HorseLegEnv RandomizeParameters",
-    "envs.multi_objective": "HorseLegMOEnv",
+    "envs.horse_leg": "HorseLegEnv HorseLegMOEnv RandomizeParameters",
     "envs.observation": "Entry Scale",
     "envs.policies": "make_policy",
     "envs.reward": "Term",
@@ -127,7 +126,7 @@ for _name, _task in _TASKS.items():
     )
 _register(
     "HorseLegMO-v0",
-    entry_point="hoof_env.envs.multi_objective:HorseLegMOEnv",
-    vector_entry_point="hoof_env.envs.multi_objective:refuse_many",
+    entry_point="hoof_env.envs.horse_leg:HorseLegMOEnv",
+    vector_entry_point="hoof_env.envs.horse_leg:refuse_many",
     disable_env_checker=True,  # it expects a number for a reward
 )

@@ -23,7 +23,6 @@ from hoof_env.dynamics.parts import GRAVITY, LARGEST, ONE_LEG, Limb, Result
 from hoof_env.dynamics.step_length import StepLength
 from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.envs import step as kernels
-from hoof_env.envs.episode import ACTIONS, SUMS, episode_layout, summary_of
 from hoof_env.envs.infos import AT_MEASURED, BEGUN, GAIT, LAST_STEP, MEASUREMENTS, START, named
 from hoof_env.envs.observation import HALF_RANGE, HIGH, LOW, MIDDLE, check_groups, groups_of, observed
 from hoof_env.envs.paper_solver import PaperSolver, check_paper
@@ -39,6 +38,7 @@ from hoof_env.envs.parameters import (
 )
 from hoof_env.envs.reward import check_weights
 from hoof_env.envs.start import HIGHEST, LOWEST, check_options, draw_starts
+from hoof_env.envs.step import ACTIONS, SUMS, episode_layout, summary_of
 from hoof_env.envs.tasks import TASKS, Settings, Task
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait.gait import GaitParameters, gait_names, load_gait
@@ -68,7 +68,7 @@ class EpisodeBatch:
         entries, names: of the observation.
         terms: keys of the reward's terms in infos.
         kernel, addresses: one control step of all is `kernel(addresses)`; then comes `follow`.
-        episode: memory of the episodes, rows as in `episode.Episode`, shape (rows, columns).
+        episode: memory of the episodes, rows as in `step.Episode`, shape (rows, columns).
         now: the same by name, shape (columns,) or (rows, columns) each.
         actions, observations, rewards: what a step takes and gives, shapes (columns, 4), (columns, entries),
             (columns,).
@@ -379,7 +379,7 @@ class EpisodeBatch:
         return found
 
     def summary(self, env: int) -> dict[str, float]:
-        """Figures of an episode, see `episode.summary_of`."""
+        """Figures of an episode, see `step.summary_of`."""
         return summary_of(self.now, env, self.dt)
 
     def failure(self, env: int) -> str:

@@ -21,8 +21,8 @@ from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.dynamics.parts import ONE_LEG
 from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.envs import observation, start
+from hoof_env.envs.horse_leg import HorseLegMOEnv
 from hoof_env.envs.infos import MEASURED
-from hoof_env.envs.multi_objective import HorseLegMOEnv
 from hoof_env.envs.parameters import HILLS, SPACING
 from hoof_env.envs.reward import check_weights
 from hoof_env.envs.tasks import PER_EPISODE, TASKS, Settings, Task, task_of, to_json

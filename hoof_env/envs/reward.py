@@ -32,7 +32,7 @@ class Outcome(NamedTuple):
         episode_seconds: of a whole episode [s].
         weight: of trunk and leg [N].
         trunk, leg, episode: all that the engine and the episode have in memory after the step, fields as in
-            `dynamics.layout.TrunkMemory` and `LegMemory` and `episode.Episode`.
+            `dynamics.layout.TrunkMemory` and `LegMemory` and `step.Episode`.
     """
 
     seconds: Any

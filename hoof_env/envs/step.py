@@ -10,15 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from hoof_env.dynamics.advance import LANES, MODEL, TRUNK_ROWS, advance_kernels
 from hoof_env.dynamics.layout import LegMemory, TrunkMemory
-from hoof_env.envs.episode import ACTIONS, FAILED, TRUNCATED, episode_layout
 from hoof_env.envs.observation import Entry, Scene
 from hoof_env.envs.reward import TERMS, Outcome, Term
+from hoof_env.gait.gait import PARAMETERS
 from hoof_env.simd import (
     anywhere,
     choose,
@@ -34,6 +34,7 @@ from hoof_env.simd import (
     write,
 )
 from hoof_env.simd.compile import inlined, kernel, pasted
+from hoof_env.simd.layout import Block, Layout, Row
 from hoof_env.simd.math import clip, tanh
 from hoof_env.simd.memory import (
     COLUMNS,
@@ -61,6 +62,77 @@ ADDRESSES = Addresses(
 AT = ADDRESSES.slots
 
 SHIPPED = tuple(term.name for term in TERMS)
+
+
+ACTIONS = len(PARAMETERS)
+FAILED, TRUNCATED = 1, 2
+"""How an episode ended, in the place of 0."""
+
+SUMS = ("time", "distance", "work", "impulse", "loaded_time", "stances", "peak_sum", "highest")
+"""Fields of `Episode` that begin at 0 and are added to."""
+
+
+class Episode(Layout):
+    """Memory of an episode."""
+
+    action: Annotated[Block, ACTIONS]  # the last one, clipped to its limits
+    steps: Row  # control steps so far
+    x_before: Row  # x of the trunk before this step [m]
+    target: Row  # commanded speed [m/s]; infinite if there is none
+    weight: Row  # of trunk and leg [N]
+    time: Row  # simulated [s]
+    distance: Row  # forward [m]
+    work: Row  # positive, of both drives [J]
+    impulse: Row  # of the normal force [N s]
+    loaded_time: Row  # [s]
+    stances: Row
+    peak_sum: Row  # of the stances' peaks [N]
+    highest: Row  # force of the episode [N]
+    terms: Annotated[Block, len(TERMS)]  # of the last reward
+    ended: Row  # 0, `FAILED` or `TRUNCATED`
+    switch: Row  # the control step after which another speed is commanded
+    next_target: Row  # and which [m/s]
+
+
+@cache
+def episode_layout(terms: int) -> Any:
+    """`Episode` with room for so many terms."""
+    if terms == len(TERMS):
+        return Episode
+    fields = {**Episode.__annotations__, "terms": Annotated[Block, terms]}
+    make: Any = type(Layout)
+    return make(f"Episode{terms}", (Layout,), {"__annotations__": fields, "__module__": __name__})
+
+
+def summary_of(now: Any, env: int, dt: float) -> dict[str, float]:
+    """Figures of the episode of an environment from `EpisodeBatch.now` and the control step [s].
+
+    seconds, distance_m, speed_m_s, peak_grf_n (highest of the episode), mean_grf_n (normal force over the
+    whole time), stance_peak_sum_n, stances, duty_factor, drive_work_j (braking is not recovered),
+    cost_of_transport (work per weight and distance; infinite without forward progress), weight_share (mean
+    normal force over weight: what the leg bore), support_share (the rest: what the rail or the suspension
+    bore), failed (0 or 1).
+    """
+    seconds, distance, work, impulse, loaded, stances, peaks, highest = (
+        float(getattr(now, name)[env]) for name in SUMS
+    )
+    weight, time = float(now.weight[env]), max(seconds, 1e-12)
+    mean = impulse / time
+    return {
+        "seconds": round(round(seconds / dt) * dt, 12),  # a sum of steps, each rounded, is 9.99..., not 10
+        "distance_m": distance,
+        "speed_m_s": distance / time,
+        "peak_grf_n": highest,
+        "mean_grf_n": mean,
+        "stance_peak_sum_n": peaks,
+        "stances": stances,
+        "duty_factor": loaded / time,
+        "drive_work_j": work,
+        "cost_of_transport": work / (weight * distance) if distance > 0 else float("inf"),
+        "weight_share": mean / weight,
+        "support_share": 1 - mean / weight,
+        "failed": float(now.ended[env] == FAILED),
+    }
 
 
 def task_type(terms: int, entries: int) -> np.dtype[Any]:

@@ -15,7 +15,7 @@ collect_ignore = ["third_party"]  # somebody else's project
 
 sys.path.insert(0, str(Path(__file__).parent))  # for `alone`
 
-MULTI_OBJECTIVE = "hoof_env.envs.multi_objective:"
+MULTI_OBJECTIVE = "hoof_env.envs.horse_leg:HorseLegMOEnv"
 
 OURS = sorted(
     (spec for spec in gym.registry.values() if spec.namespace == "hoof_env"), key=lambda spec: spec.id
@@ -25,5 +25,5 @@ OURS = sorted(
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     for name, vector_reward in ("env_id", False), ("mo_id", True):
         if name in metafunc.fixturenames:
-            chosen = [s.id for s in OURS if str(s.entry_point).startswith(MULTI_OBJECTIVE) is vector_reward]
+            chosen = [s.id for s in OURS if (s.entry_point == MULTI_OBJECTIVE) is vector_reward]
             metafunc.parametrize(name, chosen)

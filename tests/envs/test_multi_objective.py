@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 from family import FALLS
 
-from hoof_env.envs.horse_leg import HorseLegEnv
-from hoof_env.envs.multi_objective import OBJECTIVES, HorseLegMOEnv, vector_reward
+from hoof_env.envs.horse_leg import OBJECTIVES, HorseLegEnv, HorseLegMOEnv, vector_reward
 
 TERMS = {
     "reward_progress": 0.5,
