@@ -40,11 +40,7 @@ def array_of(given: Any) -> NDArray[Any]:
 
 
 def generator_of(state: Any) -> np.random.Generator:
-    """A generator in the state that a `PCG64` had.
-
-    Raises:
-        ParameterError: no such state.
-    """
+    """A generator in the state that a `PCG64` had; `ParameterError` if it is none."""
     generator = np.random.Generator(np.random.PCG64())
     try:
         generator.bit_generator.state = state
@@ -83,11 +79,7 @@ class LegBase:
         return [spaces.Box(-1.0, 1.0, (size,), np.float32) for size in (len(self.batch.names), ACTIONS)]
 
     def __setattr__(self, name: str, value: Any) -> None:
-        """As of any object, but for settings and what follows from them.
-
-        Raises:
-            FixedSettingError: a setting, or a property that cannot be set.
-        """
+        """As of any object; `FixedSettingError` for settings and what follows from them."""
         fixed = getattr(type(self), name, None)
         if name in SETTINGS or (isinstance(fixed, property) and fixed.fset is None):
             raise fixed_setting(name)
@@ -159,6 +151,32 @@ class LegBase:
         """Of what `raw_observation` gives, in the observation's order."""
         return tuple(entry.unit for entry in self.batch.entries)
 
+    def episode_summary(self) -> dict[str, Any]:
+        """Figures of the episode so far by name, those of `info["episode_summary"]`; of many, shape
+        (num_envs,). The info lacks them where a wrapper ends an episode, as that of
+        `gymnasium.make(..., max_episode_steps=...)` does.
+
+        Raises:
+            ResetNeeded: there is no episode yet.
+        """
+        self._check_started("episode_summary")
+        each = [self.batch.summary(env) for env in range(self.batch.num_envs)]
+        return {name: self._each([summary[name] for summary in each]) for name in each[0]}
+
+    def raw_observation(self) -> dict[str, Any]:
+        """What is observed now, before it is scaled: by name, in `observation_units`; of many, shape
+        (num_envs,).
+
+        Raises:
+            ResetNeeded: there is no episode yet.
+        """
+        self._check_started("raw_observation")
+        return {name: self._each(values) for name, values in self.batch.measured().items()}
+
+    def _each(self, values: Any) -> Any:
+        """What every environment has, as an array; a single environment gives its own."""
+        return np.array(values)
+
     def command_of(self, action: Any) -> NDArray[np.float64]:
         """Gait parameters that an action commands, shape (4,); the action is clipped to [-1, 1]."""
         return self.batch.command_of(action)
@@ -184,11 +202,7 @@ class LegBase:
             raise ResetNeeded(f"{call}() was called before reset(): expected reset() first")
 
     def _check_state(self, state: Any, *parts: str) -> None:
-        """Raise unless `state` is one that `get_state` of such an environment gave.
-
-        Raises:
-            ParameterError: it lacks a part, or is of another id or of other settings.
-        """
+        """`ParameterError` unless `state` is one that `get_state` of such an environment gave."""
         self._check_open("set_state")
         names = ("id", "settings", "engine", "episode", "generator", *parts)
         missing = [name for name in names if not isinstance(state, Mapping) or name not in state]

@@ -72,24 +72,8 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         """Weight of trunk and leg [N]."""
         return float(self.batch.now.weight[0])
 
-    def episode_summary(self) -> dict[str, float]:
-        """Figures of the episode so far, those of `info["episode_summary"]`. That is missing where a wrapper
-        ends an episode, as that of `gymnasium.make(..., max_episode_steps=...)` does.
-
-        Raises:
-            ResetNeeded: there is no episode yet.
-        """
-        self._check_started("episode_summary")
-        return self.batch.summary(0)
-
-    def raw_observation(self) -> dict[str, np.float64]:
-        """What is observed now, before it is scaled: by name, in `observation_units`.
-
-        Raises:
-            ResetNeeded: there is no episode yet.
-        """
-        self._check_started("raw_observation")
-        return {name: values[0] for name, values in self.batch.measured().items()}
+    def _each(self, values: Any) -> Any:
+        return values[0]
 
     def record(self) -> dict[str, NDArray[np.float64]]:
         """State and report of the engine at every substep of the last control step, or at the start, by name,
@@ -186,7 +170,6 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         return observe(), rewards[0], failed, truncated, info
 
     def _warn_ended(self) -> None:
-        """As Gymnasium's own environments do, once after each end."""
         if self._phase == "ended":
             self._phase = "warned"
             gym.logger.warn(
@@ -206,7 +189,6 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._begun = info.copy, gait.copy
 
     def _read_action(self, action: Any) -> None:
-        """Put an action where the kernel finds it."""
         given = array_of(action)
         if given.shape != _SHAPE or given.dtype.kind not in "fiu":
             raise ParameterError(f"action: expected 4 finite numbers in [-1, 1], got {action!r}")
@@ -326,11 +308,7 @@ def vector_reward(terms: Mapping[str, Any]) -> NDArray[np.float32]:
 
 
 def refuse_many(**kwargs: Any) -> NoReturn:
-    """The id's vector entry point: without one Gymnasium would make many, and the first step would break.
-
-    Raises:
-        gymnasium.error.Error: always.
-    """
+    """The id's vector entry point: without one Gymnasium would make many, and the first step would break."""
     raise gym.error.Error(
         "hoof_env/HorseLegMO-v0: Gymnasium's vector environments keep one number for a reward, this one gives"
         " three: use mo_gymnasium.wrappers.vector.MOSyncVectorEnv([lambda: mo_gymnasium.make(id)] * n)"

@@ -108,10 +108,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
     # Gymnasium
 
     def reset(
-        self,
-        *,
-        seed: int | Sequence[int | None] | None = None,
-        options: dict[str, Any] | None = None,
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Start episodes: in all environments, or in those of `options["reset_mask"]`.
 
@@ -217,25 +214,6 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         """Weight of trunk and leg [N], shape (num_envs,)."""
         return self.batch.now.weight[: self.num_envs].copy()
 
-    def raw_observation(self) -> dict[str, Floats]:
-        """What is observed now, before it is scaled: by name, shape (num_envs,), in `observation_units`.
-
-        Raises:
-            ResetNeeded: an environment has no episode yet.
-        """
-        self._check_started("raw_observation")
-        return self.batch.measured()
-
-    def episode_summary(self) -> dict[str, Floats]:
-        """Figures of the episodes so far by name, shape (num_envs,); those of `infos["episode_summary"]`.
-
-        Raises:
-            ResetNeeded: an environment has no episode yet.
-        """
-        self._check_started("episode_summary")
-        each = [self.batch.summary(env) for env in range(self.num_envs)]
-        return {name: np.array([summary[name] for summary in each]) for name in each[0]}
-
     def record(self, env: int = 0) -> dict[str, Floats]:
         """State and report of an environment at every substep of the last control step, see
         `HorseLegEnv.record`. From the first call on its substeps are kept, which takes time in every step.
@@ -309,7 +287,6 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
     # Parts of it
 
     def _check_drawn(self, rendered: Any) -> int:
-        """How many are drawn."""
         n = self.num_envs
         if self.render_mode is None:
             if rendered is not None:
@@ -340,7 +317,6 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         return mask
 
     def _check_actions(self, actions: Any) -> NDArray[np.float32]:
-        """Finite actions, shape (num_envs, 4)."""
         given, shape = array_of(actions), (self.num_envs, ACTIONS)
         if given.dtype.kind not in "fiu" or given.shape != shape:
             raise ParameterError(
@@ -380,7 +356,6 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         return self.batch.observations[: self.num_envs].copy()
 
     def _seed(self, seed: Any, mask: NDArray[np.bool_]) -> None:
-        """Give the environments of the mask their generators."""
         n = self.num_envs
         if isinstance(seed, (list, tuple, np.ndarray)):
             if len(seed) != n:
