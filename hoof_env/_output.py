@@ -15,11 +15,8 @@ from hoof_env.errors import OutputError
 @contextmanager
 def staged(folder: Path) -> Iterator[Path]:
     """A temporary folder inside `folder`, which is made if need be; if the block succeeds, its files replace
-    those of `folder`. Folders that were made and have stayed empty go again.
-
-    Raises:
-        OutputError: `folder` cannot be made or written.
-    """
+    those of `folder`. Folders that were made and have stayed empty go again. `OutputError` if it cannot
+    be."""
     stage, made = None, []
     try:
         made = [path for path in (folder, *folder.parents) if not path.exists()]
@@ -48,11 +45,8 @@ def check_folder(folder: Path) -> None:
 
 
 def check_new(path: Path, overwrite: bool) -> str:
-    """What to add to a report of a new file: the folder that is made for it, or nothing.
-
-    Raises:
-        OutputError: there is a file already and `overwrite` is False, or there cannot be one.
-    """
+    """What to add to a report of a new file: the folder that is made for it, or nothing. `OutputError` where
+    there is a file already and `overwrite` is False, or there cannot be one."""
     try:
         is_there, has_folder = path.is_file(), path.parent.exists()
     except OSError as error:

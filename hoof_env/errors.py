@@ -50,12 +50,7 @@ class OutputError(HoofEnvError, OSError):
 
 
 def check_number(
-    name: str,
-    value: Any,
-    *,
-    low: float = -np.inf,
-    high: float = np.inf,
-    exclusive_low: bool = False,
+    name: str, value: Any, *, low: float = -np.inf, high: float = np.inf, exclusive_low: bool = False
 ) -> float:
     """Return `value` as a float, or raise `ParameterError` unless it is finite and within [low, high]."""
     bracket = "(" if exclusive_low else "["

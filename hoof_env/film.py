@@ -45,12 +45,7 @@ TELL_SECONDS = 5.0  # time between two lines about how far a film is, where ther
 
 
 def check_film(path: Path, fps: float) -> None:
-    """Raise unless a film of this kind and pace can be written here.
-
-    Raises:
-        ParameterError: `fps` out of range, or frames of a GIF not whole hundredths of a second apart.
-        HoofEnvError: a package is missing.
-    """
+    """Raise unless a film of this kind and pace can be written here: a GIF counts hundredths of a second."""
     check_number("fps", fps, low=0, high=1000, exclusive_low=True)
     for name, package, extra in (
         ("pygame", "pygame-ce", "render"),
@@ -93,12 +88,7 @@ def frames(
 
 def write_film(pictures: Iterable[NDArray[np.uint8]], path: Path, fps: float) -> int:
     """Write pictures of one shape (height, width, 3) to an .mp4 or a .gif and return how many; an older file
-    is replaced when this is whole.
-
-    Raises:
-        ParameterError, HoofEnvError: as `check_film`.
-        OutputError: the folder cannot be written, or the disk is full.
-    """
+    is replaced when this is whole. `OutputError` where the folder cannot be written, or the disk is full."""
     check_film(path, fps)
     with staged(path.parent) as stage:
         writer: Any = None
@@ -130,7 +120,6 @@ def _count_frames(path: Path) -> int:
 
 
 def _writer(path: Path, shape: tuple[int, ...], fps: float) -> Any:
-    """A generator that takes frames."""
     import imageio_ffmpeg
 
     options: dict[str, Any] = FFMPEG[path.suffix.lower()]
@@ -152,12 +141,8 @@ def render_episode(
     fps: float = 50.0,
     size: tuple[int, int] = (960, 540),
 ) -> int:
-    """Film an episode; returns the number of frames. What `hoof-env render` does.
-
-    Raises:
-        ParameterError, DataFileError: as `records.make_env` and `records.find_policy`, or a value is out of
-            range. OutputError, HoofEnvError: as `write_film`, and before the episode is played.
-    """
+    """Film an episode; returns the number of frames. What `hoof-env render` does; errors are those of
+    `records.make_env`, `records.find_policy` and `write_film`."""
     from hoof_env.render.renderer import new_renderer
 
     records.check_place(path, FFMPEG)

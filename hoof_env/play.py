@@ -122,12 +122,8 @@ def play(
     most_ticks: int | None = None,
 ) -> Game:
     """Open a window and let a person play, `slow` times slower than life and `most_ticks` control steps at
-    most; returns the game when it is left.
-
-    Raises:
-        ParameterError: as `records.make_env`, or a value out of range.
-        HoofEnvError: no pygame, or no display (`renderer.open_window`).
-    """
+    most; returns the game when it is left. Errors are those of `records.make_env` and
+    `renderer.open_window`."""
     check_number("slow", slow, low=0.1, high=100)
     check_number("seed", seed, low=0)
     try:
@@ -172,7 +168,6 @@ def _strip(size: tuple[int, int]) -> int:
 
 
 def _draw_strip(window: Any, renderer: Any, game: Game, size: tuple[int, int]) -> None:
-    """Score, state and keys, below the picture."""
     from hoof_env.render.brush import CRANK, FORCE, GREY, INK, PAPER
 
     brush = renderer.brush

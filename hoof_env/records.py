@@ -33,11 +33,7 @@ the end of a control step only. The free moment about the centre of pressure is 
 
 
 def setting(env: Any) -> Setting:
-    """The setting of an environment of this package, wrapped or not.
-
-    Raises:
-        ParameterError: not an environment of this package.
-    """
+    """The setting of an environment of this package, wrapped or not; `ParameterError` of another."""
     leg = env.unwrapped
     try:
         return Setting(
@@ -63,12 +59,7 @@ def substeps(env: Any, command: NDArray[np.float64] | None = None) -> Columns:
 
 
 def make_env(env_id: str, arguments: Mapping[str, Any] | None = None) -> gym.Env[Any, Any]:
-    """`gymnasium.make`, refusals in our words.
-
-    Raises:
-        ParameterError: unknown id, an argument that the environment does not take, or an environment of
-            another package.
-    """
+    """`gymnasium.make`, refusals in our words, environments of other packages among them."""
     arguments = dict(arguments or {})
     if "render_mode" in arguments:
         raise ParameterError("render_mode: expected none here, where the environment need not draw itself")
@@ -164,9 +155,7 @@ def record_episode(
     options: Mapping[str, Any] | None = None,
 ) -> Columns:
     """The record of an episode at every substep: arrays of shape (n,), names and units as in `RECORD`.
-
-    Arguments and errors are those of `episode`.
-    """
+    Arguments and errors are those of `episode`."""
     parts = list(episode(env, policy, seed, seconds, options))
     record = {name: np.concatenate([part[name] for part in parts]) for name in RECORD if name in parts[0]}
     return record | {"free_moment": np.zeros(len(record["time"]))}
@@ -190,11 +179,7 @@ def describe(env: gym.Env[Any, Any], **about: Any) -> dict[str, Any]:
 
 
 def check_place(path: Path, suffixes: Iterable[str]) -> None:
-    """Raise unless a file can be written at `path` and its suffix is one of `suffixes`.
-
-    Raises:
-        ParameterError: another suffix. OutputError: a folder is in its place, or its folder is not writable.
-    """
+    """Raise unless a file can be written at `path` and its suffix is one of `suffixes`."""
     known = sorted(suffixes)
     if path.suffix.lower() not in known:
         raise ParameterError(f"out: expected a file that ends in {', '.join(known)}, got {str(path)!r}")
@@ -233,10 +218,8 @@ def write_parquet(record: Columns, about: Mapping[str, Any], path: Path) -> None
 
 
 def write_mot(record: Columns, about: Mapping[str, Any], path: Path) -> None:
-    """OpenSim's motion file for external loads: `MOT_COLUMNS`, tab separated, under its header.
-
-    The leg moves in the plane z = 0.
-    """
+    """OpenSim's motion file for external loads, the leg in the plane z = 0: `MOT_COLUMNS` under its
+    header."""
     nothing = np.zeros(len(record["time"]))
     table = [record[name] + 0.0 if name else nothing for name in MOT_COLUMNS.values()]  # no -0
     header = (
@@ -255,11 +238,7 @@ WRITERS = {".csv": write_csv, ".parquet": write_parquet, ".mot": write_mot}
 
 
 def check_export(path: Path) -> None:
-    """Raise unless `write` can write to `path`; before an episode is played.
-
-    Raises:
-        ParameterError, OutputError: as `check_place`. HoofEnvError: pyarrow is missing.
-    """
+    """Raise unless `write` can write to `path`; before an episode is played."""
     check_place(path, WRITERS)
     if path.suffix.lower() == ".parquet":
         try:
@@ -285,12 +264,8 @@ def export_episode(
     seed: int = 0,
     seconds: float | None = None,
 ) -> int:
-    """Play an episode and write its record; returns the number of rows. What `hoof-env export` does.
-
-    Raises:
-        ParameterError, DataFileError: as `make_env` and `find_policy`.
-        ParameterError, OutputError, HoofEnvError: as `write`, and before the episode is played.
-    """
+    """Play an episode and write its record; returns the number of rows. What `hoof-env export` does; errors
+    are those of `make_env`, `find_policy` and, before the episode is played, `write`."""
     check_export(path)
     check_number("seed", seed, low=0)
     with make_env(env_id, given := parse_pairs("--args", arguments)) as env:

@@ -52,11 +52,7 @@ ALGORITHMS = {
 
 
 def algorithm_class(name: str) -> Any:
-    """The class of an algorithm of `ALGORITHMS`.
-
-    Raises:
-        ParameterError: another name, or its library is not installed.
-    """
+    """The class of an algorithm of `ALGORITHMS`; `ParameterError` if its library is not installed."""
     module = ALGORITHMS[check_choice("algo", name, ALGORITHMS)]
     try:
         return getattr(import_module(module), name.upper())
@@ -124,11 +120,7 @@ def check_record(path: Path, record: dict[str, Any], env: Any, env_id: str) -> N
 
 
 def read_record(folder: Path) -> dict[str, Any]:
-    """The content of run.json in `folder`; empty if there is none.
-
-    Raises:
-        DataFileError: it cannot be read, or is not what agents.train writes.
-    """
+    """The content of run.json in `folder`, empty if there is none; `DataFileError` if it cannot be read."""
     path = folder / "run.json"
     if not path.is_file():
         return {}
@@ -148,11 +140,7 @@ def read_record(folder: Path) -> dict[str, Any]:
 
 
 def find_saved(path: Path) -> OnnxPolicy | SavedModel:
-    """The policy in a file or a folder: an exported one where there is one, else a model of agents.train.
-
-    Raises:
-        DataFileError: there is none, or it cannot be read.
-    """
+    """The policy in a file or a folder: an exported one where there is one, else a model of agents.train."""
     is_onnx = path.suffix == ".onnx" or (path / FILE).is_file()
     return OnnxPolicy(path) if is_onnx else SavedModel.find(path)
 
@@ -203,11 +191,7 @@ class OnnxPolicy:
             ) from None
 
     def load(self, env: Any, env_id: str) -> OnnxPolicy:
-        """This policy, if it fits an environment. Warns of other settings or another hoof-env.
-
-        Raises:
-            DataFileError: it is for another environment, other spaces, or observes other things.
-        """
+        """This policy, `DataFileError` if it does not fit. Warns of other settings or another hoof-env."""
         check_record(self.path, self.record, env, env_id)
         return self
 
@@ -258,11 +242,8 @@ class SavedModel:
 
     @classmethod
     def find(cls, path: Path) -> SavedModel:
-        """The model at `path`: a .zip, or a run folder, whose last checkpoint serves until it has a model.
-
-        Raises:
-            DataFileError: there is none, or its run.json cannot be read.
-        """
+        """The model at `path`: a .zip, or a run folder, whose last checkpoint serves until it has a model;
+        `DataFileError` if there is none."""
         saved = cls(path / "model.zip" if path.is_dir() else path, {})
         if path.is_dir() and not (saved.path.is_file() or saved.is_plain):
             found = [one for one in (path / CHECKPOINTS).glob("*") if one.name.isdigit()]
@@ -285,11 +266,7 @@ class SavedModel:
     def load(self, env: gym.Env[Any, Any], env_id: str) -> TrainedPolicy:
         """The policy for `env`, from plain data where there is some; else a .zip is unpickled, which can run
         any code that it holds, and a warning says so. Warns, too, of other settings or another hoof-env.
-
-        Raises:
-            DataFileError: not a model, or one for another environment or other spaces.
-            MissingExtraError: the library that plays it is missing.
-        """
+        `DataFileError` if it does not fit, `MissingExtraError` without the library that plays it."""
         check_record(self.path, self.record, env, env_id)
         try:
             for library in ("stable_baselines3", "safetensors.torch"):

@@ -184,8 +184,7 @@ class EpisodeBatch:
         )
 
     def _compile(self) -> None:
-        """Have every kernel of a step compiled, or loaded, by running it on no environment: what a parent
-        makes warms the cache for its workers."""
+        """Have every kernel of a step compiled, or loaded, by running it on no environment."""
         gait = GaitParameters.from_array(MIDDLE)
         if self.paper:
             self._run_idle(self._kernels.apply_one, self._kernels.finish_one)
@@ -211,7 +210,6 @@ class EpisodeBatch:
         return compiled.entry_point
 
     def _step_paper(self, addresses: NDArray[np.int64]) -> int:
-        """As `StepKernels.step_one`, with the paper's solver."""
         assert self.paper
         if not self._kernels.apply_one(addresses):
             return kernels.NOT_A_NUMBER
@@ -233,12 +231,8 @@ class EpisodeBatch:
         self._task["episode_steps"] = self.steps_per_episode
 
     def check_options(self, options: Any) -> dict[str, Any]:
-        """Reset options as `reset` takes them; whatever can be wrong with them is found here, so that a
-        refused reset changes nothing.
-
-        Raises:
-            ParameterError: an unknown option, or a value out of range.
-        """
+        """Reset options as `reset` takes them; `ParameterError` of whatever can be wrong with them, so that a
+        refused reset changes nothing."""
         s = self.settings
         checked = check_options(options, self.gaits, self.engine.trunk, s)
         if self.paper and checked.get("parameters"):
@@ -269,16 +263,10 @@ class EpisodeBatch:
         generators: Sequence[np.random.Generator],
         options: Mapping[str, Any],
     ) -> dict[str, Any]:
-        """Start episodes in some environments.
+        """Start episodes in `envs`, with a generator each and options as `check_options` gives them.
 
-        Args:
-            envs: which.
-            generators: of each of them.
-            options: as `check_options` gives them.
-
-        Returns:
-            What was drawn, by name, one row an environment: gaits, crank_angle, speed, height, x; and
-            "parameters", those of this episode by name.
+        Returns what was drawn, by name, one row an environment: gaits, crank_angle, speed, height, x; and
+        "parameters", those of this episode by name.
         """
         which, now = np.asarray(envs, np.int64), self.now
         options = {**self.task.start, **options}
@@ -319,7 +307,6 @@ class EpisodeBatch:
         return {**vars(start), "parameters": drawn}
 
     def _draw_target(self, env: int, generator: np.random.Generator) -> None:
-        """Draw the next commanded speed, and when."""
         assert self.target_speed
         steps = round(generator.uniform(*self.target_seconds) / self.dt)
         self.now.switch[env] = self.now.steps[env] + steps
@@ -328,12 +315,8 @@ class EpisodeBatch:
     def step(self, generators: Sequence[np.random.Generator], idle: NDArray[np.bool_] | None = None) -> bool:
         """One control step under `actions`; returns whether any episode ended.
 
-        Args:
-            generators: of all environments.
-            idle: those whose episode is over, shape (num_envs,): nothing is drawn for them.
-
-        Raises:
-            ParameterError: an action is not a number; nothing has happened then.
+        Nothing is drawn for environments that are `idle`, shape (num_envs,), as their episode is over. Where
+        an action is not a number there is a `ParameterError`, and nothing has happened.
         """
         return self.follow(self.kernel(self.addresses), generators, idle)
 
@@ -420,11 +403,7 @@ class EpisodeBatch:
         return found | ({"paper": self.paper.get_state()} if self.paper else {})
 
     def set_state(self, state: Mapping[str, Any]) -> None:
-        """Put back what `get_state` gave.
-
-        Raises:
-            ParameterError: the state is of another task, geometry or setting.
-        """
+        """Put back what `get_state` gave; `ParameterError` for one of another task, geometry or setting."""
         expected = (len(self.episode), self.num_envs)
         try:
             episode = np.asarray(state["episode"], np.float64)
@@ -470,12 +449,8 @@ KERNELS: dict[str, Callable[[], object]] = {
 
 
 def compile_kernels(say: Callable[[str], None]) -> list[str]:
-    """Compile what is not in numba's cache, for images and before workers begin, telling of each of
-    `KERNELS`; returns the names of those kernels.
-
-    Raises:
-        OutputError: there is something to compile, and the cache folder is not writable.
-    """
+    """Compile what is not in numba's cache, telling of each of `KERNELS`; returns the names of those kernels.
+    `OutputError` where there is something to compile and the cache folder is not writable."""
     first = len(COMPILED)
     for name, make in KERNELS.items():
         begun, count = time.monotonic(), len(COMPILED)

@@ -13,14 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hoof_env.dynamics.layout import (
-    LEG_STATE,
-    STRIDE_SUMS,
-    STRIDES,
-    TRUNK_REPORT,
-    LegMemory,
-    TrunkMemory,
-)
+from hoof_env.dynamics.layout import LEG_STATE, STRIDE_SUMS, STRIDES, TRUNK_REPORT, LegMemory, TrunkMemory
 from hoof_env.gait.gait import PARAMETERS
 
 START = ("crank_angle", "speed", "height", "x")

@@ -68,11 +68,7 @@ WORDS = TABLES["words"]
 
 
 def page(task: str) -> str:
-    """The manual page of a task in Markdown; `task` is one of `PAGES`, or an id of one's own.
-
-    Raises:
-        ParameterError: there is no such page.
-    """
+    """The manual page of a task in Markdown; `task` is one of `PAGES`, or an id of one's own."""
     what = task_of("leg" if task == "mo" else task)
     if task == "mo":
         return Template(MO_PAGE).substitute(observations=_observations(what))
@@ -121,11 +117,7 @@ def page(task: str) -> str:
 
 
 def page_of(id: str) -> str:
-    """The manual page of a registered id, of one's own as "module:id", too.
-
-    Raises:
-        ParameterError: not an id of this package, or one's own that is not registered.
-    """
+    """The manual page of a registered id, of one's own as "module:id", too; `ParameterError` of another."""
     ids = {f"hoof_env/{name}-v0": task for task, name in _NAMES.items()}
     if isinstance(id, str) and "/" in id and not id.startswith("hoof_env/"):
         return page(id)
@@ -145,11 +137,7 @@ def index() -> str:
 
 
 def write_pages(out: Path) -> list[Path]:
-    """Write all pages and the index into a folder, which is made if need be; returns the files.
-
-    Raises:
-        OutputError: the folder cannot be made or written to.
-    """
+    """Write all pages and the index into a folder, which is made if need be; returns the files."""
     texts = {INDEX: index(), **{f"{name}.md": page(task) for task, name in _NAMES.items()}}
     try:
         out.mkdir(parents=True, exist_ok=True)

@@ -221,11 +221,7 @@ def observed(groups: Iterable[str], trunk: str, entries: tuple[Entry, ...] = ENT
 
 
 def check_groups(groups: Any, known: Iterable[str]) -> tuple[str, ...]:
-    """The groups to observe, each once.
-
-    Raises:
-        ParameterError: not a row of known names, or none, or one twice.
-    """
+    """The groups to observe, each once; `ParameterError` unless they are a row of known names."""
     names = tuple(known)
     given = tuple(groups) if isinstance(groups, (list, tuple)) else ()
     if not given or not all(group in names and given.count(group) == 1 for group in given):

@@ -38,11 +38,7 @@ finite, up to 1e300."""
 
 
 def check_paper(settings: Settings) -> None:
-    """Raise where settings ask of the paper's solver what it cannot do.
-
-    Raises:
-        ParameterError: a trunk that moves, a motor, ground that is not level, parameters that are drawn.
-    """
+    """`ParameterError` where settings ask of the paper's solver what it cannot do."""
     for name, expected in (
         ("trunk", "fixed"),
         ("drive", "prescribed"),
@@ -126,11 +122,7 @@ class PaperSolver:
         }
 
     def read_state(self, state: Any) -> tuple[list[ConstrainedState], Records, Records]:
-        """What `get_state` gave, as `set_state` takes it.
-
-        Raises:
-            ParameterError: the state is not of such a solver.
-        """
+        """What `get_state` gave, as `set_state` takes it; `ParameterError` of anything else."""
         try:
             legs = [_state_like(leg.state, one) for leg, one in zip(self.legs, state["legs"], strict=True)]
             accounts, last = np.array(state["accounts"], ACCOUNT), np.array(state["last"], TRACE)
@@ -157,7 +149,6 @@ class PaperSolver:
         return memory_of(data, self.engine.num_envs, constants, reactions)
 
     def _put(self, env: int, memory: Memory) -> None:
-        """Write where a leg is, as the kernels do."""
         now = self.traces[env][-1]
         memory.trunk[:, env] = [now[name] for name in TRUNK_STATE]
         memory.trunk_report[:, env] = [now[name] for name in TRUNK_REPORT]

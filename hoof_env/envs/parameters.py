@@ -76,12 +76,8 @@ def physics(settings: Settings, height: float, changes: Mapping[str, float]) -> 
 
 
 def check_parameters(name: str, given: Any, settings: Settings) -> dict[str, float | tuple[float, float]]:
-    """Physical parameters of an episode: a number each, or two to draw between.
-
-    Raises:
-        ParameterError: not a mapping, a parameter that cannot change or has no effect beside the settings, or
-            values that are none.
-    """
+    """Physical parameters of an episode, a number each or two to draw between; `ParameterError` where one
+    cannot change, has no effect beside the settings, or is none."""
     if not isinstance(given, Mapping) or not set(given) <= set(PER_EPISODE):
         raise ParameterError(
             f"{name}: expected a mapping with some of {', '.join(PER_EPISODE)}, got {given!r}"

@@ -161,15 +161,9 @@ STANDS_FOR = {"hoof_env/HorseLegMO-v0": "hoof_env/HorseLeg-v0"}
 
 
 def open_loop_record(path: Path) -> dict[str, Any]:
-    """What the file of an open-loop gait holds, which `agents.open_loop` writes.
-
-    Args:
-        path: a JSON object with "parameters" as `open_loop` takes them, of one environment; "dt", control
-            step [s]; and "gait", the four gait parameters that the constant commands.
-
-    Raises:
-        DataFileError: it cannot be read or lacks a part.
-    """
+    """What the file of an open-loop gait holds, which `agents.open_loop` writes: "parameters" of one
+    environment as `open_loop` takes them, "dt", control step [s], and "gait", the four parameters that the
+    constant commands."""
     try:
         found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
         given, _, _ = found["parameters"], float(found["dt"]), np.array(list(found["gait"].values()), float)

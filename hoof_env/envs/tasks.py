@@ -150,16 +150,8 @@ NEEDED: Mapping[str, tuple[str, tuple[str, ...]]] = MappingProxyType(
 
 
 def check_effect(name: str, settings: Settings, within: str = "") -> None:
-    """Raise where a setting that somebody names has no effect beside the others.
-
-    Args:
-        name: of the setting.
-        settings: all of them.
-        within: the argument or option that names it, if it is no argument itself.
-
-    Raises:
-        ParameterError: it has none.
-    """
+    """Raise `ParameterError` where a setting that somebody names, perhaps `within` another argument or
+    option, has no effect beside the others."""
     needed, values = NEEDED.get(name, ("", ()))
     given = getattr(settings, needed, None)
     if needed and (given not in values if values else given is None):
@@ -354,7 +346,6 @@ def _task_like(name: str, names: tuple[list[str], ...]) -> Task:
 
 
 def _several(name: str, values: Any, kind: type[Part]) -> tuple[Part, ...]:
-    """Some terms or entries, perhaps none."""
     parts = tuple(values) if isinstance(values, Iterable) else (values,)
     for part in parts:
         if not isinstance(values, Iterable) or not isinstance(part, kind):

@@ -535,11 +535,8 @@ DRAWINGS: dict[str, Callable[[Any, Reproduction], None]] = {
 
 
 def draw_all(reproduction: Reproduction, folder: Path | str) -> list[Path]:
-    """Draw figures 1 and 3 to 6 as PNG and SVG, the same bytes for the same reproduction; returns the paths.
-
-    Raises:
-        HoofEnvError: matplotlib is missing. OutputError: the folder cannot be written.
-    """
+    """Draw figures 1 and 3 to 6 as PNG and SVG, the same bytes for the same reproduction; returns the
+    paths."""
     check_matplotlib()
     from matplotlib import style
     from matplotlib.figure import Figure

@@ -107,11 +107,8 @@ class Stance:
 
 
 def contact_intervals(t: NDArray[np.float64], penetration: NDArray[np.float64]) -> tuple[Interval, ...]:
-    """Intervals [s] in which a penetration [m], sampled at `t`, is positive, its zeros interpolated linearly.
-
-    Raises:
-        ParameterError: a contact that the cycle cuts in two (it starts or ends in the ground).
-    """
+    """Intervals [s] in which a penetration [m], sampled at `t`, is positive, its zeros interpolated linearly;
+    `ParameterError` for a contact that the cycle cuts in two."""
     inside = penetration > 0
     if inside[0] or inside[-1]:
         raise ParameterError(
@@ -140,11 +137,7 @@ def integral(trace: Trace, values: NDArray[np.float64], start: float, end: float
 
 
 def measure_stance(trace: Trace) -> Stance:
-    """Measure one cycle of dtype `CYCLE`, from its start to its end, both included.
-
-    Raises:
-        ParameterError: no contact, or a contact that the cycle cuts in two.
-    """
+    """Measure one cycle of dtype `CYCLE`, both ends included; `ParameterError` without a whole contact."""
     t = trace["time"]
     toe, heel = (contact_intervals(t, trace[f"{name}_penetration"]) for name in POINTS)
     if not toe + heel:

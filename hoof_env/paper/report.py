@@ -117,7 +117,6 @@ def _rows_table(reproduction: Reproduction, solvers: list[str]) -> str:
 
 
 def _ill_conditioned(reproduction: Reproduction) -> str:
-    """A section, if there are such rows."""
     spared = dict.fromkeys(row["id"] for row in _of(reproduction.rows, spared=ILL))
     if not spared:
         return ""

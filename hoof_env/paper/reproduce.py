@@ -19,15 +19,7 @@ from hoof_env._output import staged
 from hoof_env.errors import HoofEnvError
 from hoof_env.paper import report
 from hoof_env.paper.measure import Trace, cycle_of, measure_stance
-from hoof_env.paper.rows import (
-    CONDITIONS,
-    EXACT,
-    Published,
-    compare,
-    counted,
-    load_published,
-    settings_of,
-)
+from hoof_env.paper.rows import CONDITIONS, EXACT, Published, compare, counted, load_published, settings_of
 from hoof_env.paper.rows import SOLVERS as SOLVERS
 from hoof_env.paper.rows import Reproduction as Reproduction
 from hoof_env.paper.shapes import DEPTHS, judge, sole_velocity, walk_brakes
@@ -50,15 +42,8 @@ FIGURES = {
 
 
 def run_cycle(gait: str, solver: str, **settings: Any) -> Trace:
-    """One cycle of a gait on a fixed trunk under the zero action: one row a substep and one for t = 0.
-
-    Args:
-        gait, settings: as `hoof_env/HorseLegFixed-v0` takes them.
-        solver: one of `SOLVERS`.
-
-    Raises:
-        ParameterError: what the environment refuses. HoofEnvError: the simulation stopped before its end.
-    """
+    """One cycle of a gait on a fixed trunk under the zero action, with one of `SOLVERS`: one row a substep
+    and one for t = 0. `HoofEnvError` where the simulation stopped before its end."""
     with gymnasium.make(ENVIRONMENT, gait=gait, **settings_of(solver) | settings) as env:
         env.reset(seed=0)
         action = np.zeros(env.action_space.shape or (), np.float32)

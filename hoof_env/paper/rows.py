@@ -58,11 +58,8 @@ class Bar:
 
 
 def parse_bar(text: str, unit: str) -> Bar:
-    """Read the bar of a row in a unit: "0.005 s", "1 deg", "2 %", "1 point", "0.01" or "reported".
-
-    Raises:
-        ParameterError: another form, or a measure that does not fit the unit.
-    """
+    """The bar of a row in a unit: "0.005 s", "1 deg", "2 %", "1 point", "0.01" or "reported"; else
+    `ParameterError`."""
     measure = _BAR_OF_UNIT.get(unit)
     if measure is None:
         raise ParameterError(f"unit: expected one of {', '.join(_BAR_OF_UNIT)}, got {unit!r}")

@@ -122,7 +122,6 @@ class GroundPainter:
                 self._brush.write(canvas, f"{half // 2} m", (at, top + 13 * unit), 17, SOIL_LINE, "midtop")
 
     def _draw_labels(self, canvas: Any, corner: complex) -> None:
-        """Name the factors of every patch that is wide enough."""
         unit, left = self._brush.unit, corner.real
         right = left + self._clear / self._scale
         for patch in self._labelled:

@@ -113,10 +113,7 @@ def instants(columns: Mapping[str, NDArray[np.float64]]) -> list[Instant]:
 
 
 def columns_of_engine(
-    record: Mapping[str, NDArray[Any]],
-    terrain: Terrain | None = None,
-    *,
-    command: ArrayLike | None = None,
+    record: Mapping[str, NDArray[Any]], terrain: Terrain | None = None, *, command: ArrayLike | None = None
 ) -> Columns:
     """Columns from what `TrunkEngine` says of an environment with one leg, whose O is the trunk's own place.
 

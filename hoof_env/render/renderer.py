@@ -145,11 +145,7 @@ class Renderer:
             self._pygame.display.quit()
 
     def draw(self) -> Any:
-        """Draw the latest instant; returns the surface, which the next call paints over.
-
-        Raises:
-            ResetNeeded: as `frame`.
-        """
+        """Draw the latest instant; returns the surface, which the next call paints over."""
         now = self.latest
         self._scene.draw(self._canvas, now, self._panel.full_scale)
         self._panel.draw(self._canvas, now)
@@ -171,14 +167,10 @@ class Renderer:
 
 
 def open_window(size: tuple[int, int], title: str, *, may_be_unseen: bool = False) -> Any:
-    """Open pygame's window; returns its surface.
+    """Open pygame's window; returns its surface. `HoofEnvError` where there is no display.
 
-    Without a display SDL falls back to a driver that shows nothing. That counts as a window if
-    SDL_VIDEODRIVER asks for it; otherwise it is warned of where the window `may_be_unseen`, and refused
-    elsewhere.
-
-    Raises:
-        HoofEnvError: there is no display.
+    Without one SDL falls back to a driver that shows nothing. That counts as a window if SDL_VIDEODRIVER asks
+    for it; otherwise it is warned of where the window `may_be_unseen`, and refused elsewhere.
     """
     import pygame
 

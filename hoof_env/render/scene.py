@@ -22,20 +22,7 @@ from hoof_env.leg.geometry import Geometry, tables
 from hoof_env.leg.kinematics import pose, solve_points
 from hoof_env.leg.linkage import BODIES, POINTS
 from hoof_env.leg.linkage import CRANK as CRANK_BODY
-from hoof_env.render.brush import (
-    CRANK,
-    FINE,
-    FORCE,
-    GREY,
-    HEEL,
-    INK,
-    PAPER,
-    TOE,
-    Brush,
-    arrow,
-    bar,
-    mix,
-)
+from hoof_env.render.brush import CRANK, FINE, FORCE, GREY, HEEL, INK, PAPER, TOE, Brush, arrow, bar, mix
 from hoof_env.render.ground import SOIL_LINE, GroundPainter
 from hoof_env.render.instant import Instant
 
@@ -196,7 +183,6 @@ class Scene:
         canvas.blit(image, at, special_flags=pygame.BLEND_PREMULTIPLIED)
 
     def _draw_leg(self, canvas: Any, pixels: dict[str, complex]) -> None:
-        """Draw the leg; `pixels` holds every named point."""
         metre, crank = self._scale * FINE, self._geometry.lengths["OP"]  # metre: on the fine surface
         edge = 1.5 * FINE
 
