@@ -10,7 +10,6 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from family import FALLS, IDS, actions, effective, make, roll, same, steps
-from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 from stable_baselines3.common.env_checker import check_env as sb3_check_env
 
@@ -130,19 +129,6 @@ def test_recording_changes_nothing():
         same(one[:4], two[:4])
         record = recorded.record()
         np.testing.assert_allclose(record["time"][:, 0], 0.02 * k + 1e-3 * np.arange(1, 21), atol=1e-9)
-
-
-def test_an_episode_that_a_wrapper_ends_has_its_figures_on_demand():
-    """What the environment's own limit puts in `info` after as many steps."""
-    limited, own = gym.make(IDS[0], max_episode_steps=8), gym.make(IDS[0], episode_seconds=0.16)
-    with pytest.raises(ResetNeeded, match="episode_summary"):
-        limited.unwrapped.episode_summary()
-    for env in (limited, own):
-        env.reset(seed=3)
-    ends = [[env.step(np.ones(4, np.float32)) for _ in range(8)][-1] for env in (limited, own)]
-    assert ends[0][3]
-    assert "episode_summary" not in ends[0][4]
-    assert limited.unwrapped.episode_summary() == ends[1][4]["episode_summary"]
 
 
 def test_a_state_fits_the_environment_that_a_json_spec_makes():

@@ -134,16 +134,6 @@ def test_reward_weights_that_are_not_named_keep_the_values_of_the_task(env_id):
             assert (leg.get_state()["settings"]["reward_weights"] or {}) == shown
 
 
-def test_the_weight_that_is_not_named_is_paid():
-    """What found it: `HorseLegSpeed-v0` pays 2 a metre, also beside another charge for peaks."""
-    paid = []
-    for weights in (None, {"peak": 1.0}):
-        env = gym.make("hoof_env/HorseLegSpeed-v0", reward_weights=weights)
-        env.reset(seed=0)
-        paid.append([env.step(action)[4]["reward_progress"] for action in actions(0, 20)])
-    same(*paid)
-
-
 @pytest.mark.parametrize("kind", ["single", "vector"])
 def test_settings_and_what_follows_from_them_are_not_assigned(kind):
     env = (gym.make(LEG) if kind == "single" else gym.make_vec(LEG, num_envs=2)).unwrapped
