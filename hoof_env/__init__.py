@@ -86,13 +86,10 @@ if not TYPE_CHECKING:  # else a type checker would believe in any name
         try:
             return getattr(import_module(_PUBLIC[name]), name)
         except ModuleNotFoundError as error:
-            if name not in _EXTRAS:
+            if name != "Sb3VecEnv":
                 raise
-            globals()[name] = _stand_in(name, _EXTRAS[name], error)
+            globals()[name] = _stand_in(name, "train", error)
             return globals()[name]
-
-
-_EXTRAS = {"Sb3VecEnv": "train"}
 
 
 def _stand_in(name: str, extra: str, error: ModuleNotFoundError) -> type:

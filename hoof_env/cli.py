@@ -151,12 +151,7 @@ def compile() -> None:
 
 
 COMMANDS: dict[str, Callable[..., None]] = {
-    "reproduce": reproduce,
-    "render": render,
-    "play": play,
-    "export": export,
-    "manual": manual,
-    "compile": compile,
+    command.__name__: command for command in (reproduce, render, play, export, manual, compile)
 }
 
 

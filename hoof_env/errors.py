@@ -53,13 +53,12 @@ def check_number(
     name: str, value: Any, *, low: float = -np.inf, high: float = np.inf, exclusive_low: bool = False
 ) -> float:
     """Return `value` as a float, or raise `ParameterError` unless it is finite and within [low, high]."""
-    bracket = "(" if exclusive_low else "["
     try:
         number = np.nan if isinstance(value, (bool, np.bool_, str, bytes)) else float(value)
     except (TypeError, ValueError, OverflowError):
         number = np.nan
     if not (np.isfinite(number) and low <= number <= high) or (exclusive_low and number == low):
-        bounds = f"{bracket}{low:g}, {high:g}]"
+        bounds = f"{'(' if exclusive_low else '['}{low:g}, {high:g}]"
         raise ParameterError(f"{name}: expected a finite number in {bounds}, got {value!r}")
     return number
 

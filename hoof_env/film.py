@@ -61,14 +61,8 @@ def check_film(path: Path, fps: float) -> None:
 def frames(
     renderer: Renderer, episode: Iterable[Columns], fps: float, slow: float = 1.0
 ) -> Iterator[NDArray[np.uint8]]:
-    """Pictures of an episode, 1 / (fps slow) of its seconds apart, each at the last substep before its time.
-
-    Args:
-        renderer: in mode "rgb_array"; it is reset.
-        episode: columns in the order of time, as `records.episode` yields them.
-        fps: frames a second of the film.
-        slow: how many times slower than life it plays.
-    """
+    """Pictures of an episode, 1 / (fps slow) of its seconds apart, each at the last substep before its time;
+    `renderer` is in mode "rgb_array" and is reset, `episode` as `records.episode` yields it."""
     renderer.reset()
     step = 1 / (fps * slow)
     shown = 0

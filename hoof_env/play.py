@@ -110,9 +110,6 @@ class Game:
         return instants(records.substeps(self._env, self._leg.command_of(self.action)))
 
 
-STRIP = 96  # height of the strip with keys and score below a picture of 540 pixels [pixels]
-
-
 def play(
     env_id: str,
     arguments: Sequence[str] = (),
@@ -164,7 +161,8 @@ def play(
 
 
 def _strip(size: tuple[int, int]) -> int:
-    return round(STRIP * min(size[0] / 960, size[1] / 540))
+    """Height of the strip with keys and score below a picture [pixels]."""
+    return round(96 * min(size[0] / 960, size[1] / 540))
 
 
 def _draw_strip(window: Any, renderer: Any, game: Game, size: tuple[int, int]) -> None:

@@ -74,20 +74,12 @@ def make_env(env_id: str, arguments: Mapping[str, Any] | None = None) -> gym.Env
 
 
 def find_policy(name: str, env: gym.Env[Any, Any], env_id: str, seed: int = 0) -> Any:
-    """A policy by its name: a gait or another scripted one, four gait parameters, or the path of one.
+    """A policy for an environment by its name: a gait or another scripted one, "6.28,0.7,-0.2,-0.3" (crank
+    speed [rad/s], swing offset, sine and cosine coefficient [rad]), "open-loop", the best gait that comes
+    with this package for the id, or a path.
 
-    Args:
-        name: as "run", as "6.28,0.7,-0.2,-0.3" (crank speed [rad/s], swing offset, sine and cosine
-            coefficient [rad]), or the .zip or run folder of a model. A model is a pickle: it can run code.
-            A policy's .onnx file, the folder of one that is shipped, or a gait's .json are data. "open-loop"
-            is the best gait that comes with this package for the id.
-        env, env_id: what it is for.
-        seed: of "random".
-
-    Raises:
-        ParameterError: unknown name, or gait parameters out of range.
-        DataFileError: a model that cannot be read or does not fit.
-        MissingExtraError, HoofEnvError: the library that plays it is missing.
+    The .zip or run folder of a model is a pickle: it can run code. A policy's .onnx file, the folder of one
+    that is shipped, or a gait's .json are data. `seed` is that of "random".
     """
     names = policy_names(env)
     if name in names:
@@ -120,14 +112,8 @@ def episode(
 ) -> Iterator[Columns]:
     """Play an episode; yields the columns of its start (one row) and of every control step.
 
-    Args:
-        env: an environment of this package, wrapped or not.
-        policy: anything with Stable-Baselines3's `predict`.
-        seed, options: of `reset`.
-        seconds: when to stop; None for its own end.
-
-    Raises:
-        ParameterError: as `reset` and `step` do, or `seconds` is not positive.
+    `policy` is anything with Stable-Baselines3's `predict`; `seed` and `options` are those of `reset`. It
+    stops after some `seconds`, or at its own end.
     """
     if seconds is not None:
         check_number("seconds", seconds, low=0, exclusive_low=True)

@@ -149,19 +149,11 @@ def find_saved(path: Path) -> OnnxPolicy | SavedModel:
 
 
 class OnnxPolicy:
-    """A policy with Stable-Baselines3's `predict`, in a file of `agents.export`.
+    """A policy with Stable-Baselines3's `predict`, in a file of `agents.export` or a folder that holds one;
+    `DataFileError` of anything else.
 
-    Args:
-        path: of an .onnx file, or of a folder that holds `FILE`.
-
-    Attributes:
-        path: of the file.
-        record: its metadata: env_id, env_kwargs, settings, both spaces, names of observations and actions,
-            algo, and the version of hoof_env that trained.
-
-    Raises:
-        DataFileError: no such file, or not one of `agents.export`.
-        HoofEnvError: onnxruntime is missing.
+    Its `record`, the file's metadata, has env_id, env_kwargs, settings, both spaces, names of observations
+    and actions, algo, and the version of hoof_env that trained.
     """
 
     def __init__(self, path: Path) -> None:
@@ -209,12 +201,8 @@ class OnnxPolicy:
 
 @dataclass(frozen=True)
 class TrainedPolicy:
-    """A trained policy that sees observations as it saw them in training.
-
-    Attributes:
-        model: of Stable-Baselines3; nothing but its policy is there when it was read from plain data.
-        normalize: observations as the policy saw them in training, or None.
-    """
+    """A trained policy that sees observations as it saw them in training, normalised or not. Of a `model`
+    that was read from plain data nothing but its policy is there."""
 
     model: Any
     normalize: Any

@@ -22,8 +22,6 @@ from hoof_env.envs.tasks import Keywords
 from hoof_env.errors import ParameterError, count, flag
 from hoof_env.gait.gait import PARAMETERS
 
-_SHAPE = (ACTIONS,)
-
 
 class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     """A horse's leg: commands of its gait in, a trunk that moves, a ground reaction force that costs.
@@ -190,7 +188,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def _read_action(self, action: Any) -> None:
         given = array_of(action)
-        if given.shape != _SHAPE or given.dtype.kind not in "fiu":
+        if given.shape != (ACTIONS,) or given.dtype.kind not in "fiu":
             raise ParameterError(f"action: expected 4 finite numbers in [-1, 1], got {action!r}")
         with np.errstate(over="ignore"):  # to infinity, which is refused
             self.batch.actions[0] = given

@@ -42,8 +42,6 @@ _NAMES = {name: task.name for name, task in TASKS.items()} | {"mo": "HorseLegMO"
 PAGES = tuple(_NAMES)
 """The tasks, and the id with three rewards."""
 
-INDEX = "README.md"
-
 GAIT = [entry for entry in observation.ENTRIES if entry.group == "gait"]
 
 
@@ -138,7 +136,7 @@ def index() -> str:
 
 def write_pages(out: Path) -> list[Path]:
     """Write all pages and the index into a folder, which is made if need be; returns the files."""
-    texts = {INDEX: index(), **{f"{name}.md": page(task) for task, name in _NAMES.items()}}
+    texts = {"README.md": index(), **{f"{name}.md": page(task) for task, name in _NAMES.items()}}
     try:
         out.mkdir(parents=True, exist_ok=True)
         for name, text in texts.items():

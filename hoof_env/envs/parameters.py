@@ -137,14 +137,11 @@ patch [m]; ranges of the factors of stiffness and friction."""
 
 def make_terrain(description: Any) -> Terrain:
     """A terrain from None (level), {"kind": "hills", ...}, {"kind": "slope", "angle": rad} or what
-    `Terrain.to_dict` gives.
+    `Terrain.to_dict` gives; `ParameterError` from anything else.
 
     Hills go straight from one random height to the next, each at a slope of its own, over patches of random
     stiffness and friction; the same for the same seed. They begin at x = 0. The rest of the animal, which a
     suspended trunk hangs from, does not follow them: they are low.
-
-    Raises:
-        ParameterError: an unknown kind or entry, or a bad value.
     """
     if description is None:
         return Terrain.flat()

@@ -187,15 +187,10 @@ GAITS = Path(__file__).parents[1] / "data" / "gaits"
 
 
 def load_open_loop(path_or_env_id: str | Path, env: Any = None) -> Scripted:
-    """The policy of a gait file; or, for the id of an environment, of the best gait that is stored. Warns if
-    it was found for another id than that of `env`.
+    """The policy of a gait file; or, for the id of an environment, of the best gait that is stored. Its clock
+    has the control step of `env`, or that of the file. Warns if it was found for another id.
 
-    Args:
-        path_or_env_id: path of a .json, see `open_loop_record`, or a registered id.
-        env: what it is for, whose control step the clock then has; None for that of the file.
-
-    Raises:
-        DataFileError: there is none, it cannot be read, or actions of `env` command other gaits.
+    `DataFileError` if there is none, it cannot be read, or actions of `env` command other gaits.
     """
     path = Path(path_or_env_id)
     if path.suffix != ".json":

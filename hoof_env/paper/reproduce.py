@@ -62,12 +62,7 @@ def run_cycle(gait: str, solver: str, **settings: Any) -> Trace:
 def reproduce(progress: Callable[[str], None] | None = None, *, preset: str | None = None) -> Reproduction:
     """Run the four conditions with every solver and compare them with the paper.
 
-    Args:
-        progress: called with one line after each run.
-        preset: geometry and gaits, a name or a file; the environment's default if None.
-
-    Raises:
-        HoofEnvError: a preset that is unknown or does not walk and run.
+    After each run `progress` is called with one line; `preset` is that of the environment if None.
     """
     tell = progress or (lambda line: None)
     settings: dict[str, Any] = {} if preset is None else {"preset": preset}
@@ -134,11 +129,7 @@ def write_reproduction(
     command: str = "hoof-env reproduce --out DIR",
 ) -> list[Path]:
     """Write `reproduction.json`, `reproduction.md`, which names `command` as what wrote it, and the figures
-    into a folder; returns their paths. An older result is replaced only when all of them could be written.
-
-    Raises:
-        OutputError: the folder cannot be written. HoofEnvError: figures without matplotlib.
-    """
+    into a folder; returns their paths. An older result is replaced only when all of them could be written."""
     out_dir = Path(out_dir)
     with staged(out_dir) as stage:
         entries = [*reproduction.rows, *reproduction.shapes]

@@ -66,7 +66,6 @@ class Stances:
         return self._stance.peak
 
     def add(self, now: Instant) -> None:
-        """Take the next instant."""
         force = now.grf
         self.highest = max(self.highest, force)
         grown = self._stance.add(now.crank_angle, now.normal, force)
@@ -80,15 +79,10 @@ class Stances:
 
 
 class Panel:
-    """Numbers, gait and force curve in one box (left, top, width, height) of the picture.
+    """Numbers, gait and force curve in one box (left, top, width, height) of the picture, with the weight of
+    trunk and leg [N] as a line, if there is one, and stances from `lift_off_n` [N] on.
 
-    Args:
-        weight_n: weight of trunk and leg [N], a line in the curve; or None.
-        lift_off_n: normal force that tells stance from swing [N].
-
-    Attributes:
-        stances: stances and peaks so far.
-        full_scale: force at the top of the curve's axis [N]; during an episode it only grows.
+    Its `full_scale`, the force at the top of the curve's axis [N], only grows during an episode.
     """
 
     def __init__(
@@ -105,13 +99,11 @@ class Panel:
         self.reset()
 
     def reset(self) -> None:
-        """Forget the forces."""
         self.stances = Stances(self._lift_off)
         self._curve: deque[tuple[float, float]] = deque()  # time [s], force [N]
         self.full_scale = _nice(max(4 * (self._weight or 0.0), SMALLEST_SCALE))
 
     def add(self, instants: Sequence[Instant]) -> None:
-        """Take instants in the order of time."""
         curve = self._curve
         for now in instants:
             self.stances.add(now)
@@ -124,7 +116,6 @@ class Panel:
             curve.popleft()
 
     def draw(self, canvas: Any, now: Instant) -> None:
-        """Draw the panel for an instant."""
         canvas.blit(self._card(self.full_scale), self._box, special_flags=pygame.BLEND_PREMULTIPLIED)
         stances = self.stances
         values = now.time, now.trunk_vx, now.grf / 1000, stances.running_peak / 1000, stances.highest / 1000

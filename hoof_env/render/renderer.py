@@ -103,7 +103,6 @@ class Renderer:
 
     @property
     def is_empty(self) -> bool:
-        """Whether there is nothing to draw yet."""
         return self._now is None
 
     def reset(self) -> None:
@@ -123,12 +122,8 @@ class Renderer:
     def frame(self) -> NDArray[np.uint8] | None:
         """Draw the latest instant.
 
-        Returns:
-            "rgb_array": a fresh array of shape (height, width, 3). "human": None; the window shows the
-            picture and the call waits so that frames come at `fps`. A window that was closed stays closed.
-
-        Raises:
-            ResetNeeded: there is none yet. HoofEnvError: "human" where there is no display.
+        "rgb_array" gives a fresh array of shape (height, width, 3), "human" None; the window shows the
+        picture and the call waits so that frames come at `fps`. A window that was closed stays closed.
         """
         picture = self.draw()
         if self.mode == "human":

@@ -76,7 +76,6 @@ class Scene:
         self._key = lru_cache(maxsize=8)(self._paint_key)
 
     def reset(self) -> None:
-        """Forget the paths."""
         self._paths.clear()
 
     def add(self, instants: Sequence[Instant]) -> None:
