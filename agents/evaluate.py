@@ -54,7 +54,7 @@ METRICS = {
     "failed": Metric("failed"),
     "loading_rate_n_s": Metric("loading rate\nkN/s", 1e-3, 1),
 }
-"""The columns: "return", figures of the episode summary (`hoof_env.envs.step.summary_of`), and two means
+"""The columns: "return", figures of the episode (`hoof_env.envs.batch.EpisodeBatch.summary`), and two means
 over the stances of an episode, 0 without a stance: "stance_peak_n", of their highest force, and, where it is
 asked for, "loading_rate_n_s" (`agents.score.LoadingRate`), of the steepest rise of the force at impact."""
 

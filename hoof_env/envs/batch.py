@@ -38,7 +38,7 @@ from hoof_env.envs.parameters import (
 )
 from hoof_env.envs.reward import check_weights
 from hoof_env.envs.start import HIGHEST, LOWEST, check_options, draw_starts
-from hoof_env.envs.step import ACTIONS, SUMS, episode_layout, summary_of
+from hoof_env.envs.step import ACTIONS, FAILED, SUMS, episode_layout
 from hoof_env.envs.tasks import TASKS, Settings, Task
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait.gait import GaitParameters, gait_names, load_gait
@@ -52,11 +52,8 @@ from hoof_env.simd.user_functions import what_cannot_be_compiled
 
 Floats = NDArray[np.float64]
 
-LONGEST_EPISODE = 1e6
-"""Seconds of an episode at most."""
-
-MOST_BAUMGARTE = 1e6
-"""Largest parameter of Baumgarte's [1/s]; a substep of 1 us integrates no larger one."""
+LONGEST_EPISODE = 1e6  # seconds of an episode at most
+MOST_BAUMGARTE = 1e6  # largest of his parameters [1/s]; a substep of 1 us integrates no larger one
 
 
 class EpisodeBatch:
@@ -362,8 +359,34 @@ class EpisodeBatch:
         return found
 
     def summary(self, env: int) -> dict[str, float]:
-        """Figures of an episode, see `step.summary_of`."""
-        return summary_of(self.now, env, self.dt)
+        """Figures of an episode.
+
+        seconds, distance_m, speed_m_s, peak_grf_n (highest of the episode), mean_grf_n (normal force over the
+        whole time), stance_peak_sum_n, stances, duty_factor, drive_work_j (braking is not recovered),
+        cost_of_transport (work per weight and distance; infinite without forward progress), weight_share
+        (mean normal force over weight: what the leg bore), support_share (the rest: what the rail or the
+        suspension bore), failed (0 or 1).
+        """
+        seconds, distance, work, impulse, loaded, stances, peaks, highest = (
+            float(getattr(self.now, name)[env]) for name in SUMS
+        )
+        weight, time = float(self.now.weight[env]), max(seconds, 1e-12)
+        mean = impulse / time
+        return {
+            "seconds": round(round(seconds / self.dt) * self.dt, 12),  # the sum of rounded steps is 9.99...
+            "distance_m": distance,
+            "speed_m_s": distance / time,
+            "peak_grf_n": highest,
+            "mean_grf_n": mean,
+            "stance_peak_sum_n": peaks,
+            "stances": stances,
+            "duty_factor": loaded / time,
+            "drive_work_j": work,
+            "cost_of_transport": work / (weight * distance) if distance > 0 else float("inf"),
+            "weight_share": mean / weight,
+            "support_share": 1 - mean / weight,
+            "failed": float(self.now.ended[env] == FAILED),
+        }
 
     def failure(self, env: int) -> str:
         """Why an episode failed, for people."""

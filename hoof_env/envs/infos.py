@@ -19,8 +19,7 @@ from hoof_env.gait.gait import PARAMETERS
 START = ("crank_angle", "speed", "height", "x")
 """What an episode starts with, besides its gait and the parameters that are drawn."""
 
-BEGUN = len(START) + len(PARAMETERS)
-"""How many numbers these are; those drawn follow."""
+BEGUN = len(START) + len(PARAMETERS)  # how many numbers these are; those drawn follow
 
 MEASURED = (*TRUNK_REPORT, "result", *LEG_STATE, *STRIDES, *STRIDE_SUMS)
 """What an info measures, neighbours in the engine's memory: read with one copy."""
@@ -41,7 +40,6 @@ class Named(np.ndarray[Any, np.dtype[np.float64]]):
     names: tuple[str, ...] = ()
 
     def __getitem__(self, key: Any) -> Any:
-        """By name or by position."""
         if isinstance(key, str):
             if key not in self.names:
                 raise KeyError(key)
@@ -53,22 +51,18 @@ class Named(np.ndarray[Any, np.dtype[np.float64]]):
         return array[()] if return_scalar else np.asarray(array)
 
     def get(self, key: str, default: Any = None) -> Any:
-        """As of a mapping."""
         return self[key] if key in self.names else default
 
     def _mapping(self) -> dict[str, Any]:
         return {name: self[name] for name in self.names}
 
     def keys(self) -> KeysView[str]:
-        """The names."""
         return self._mapping().keys()
 
     def values(self) -> ValuesView[Any]:
-        """The numbers of each name."""
         return self._mapping().values()
 
     def items(self) -> ItemsView[str, Any]:
-        """Both."""
         return self._mapping().items()
 
     def __contains__(self, key: Any) -> bool:

@@ -39,8 +39,7 @@ PAGE, MO_PAGE = (
 
 _NAMES = {name: task.name for name, task in TASKS.items()} | {"mo": "HorseLegMO"}
 
-PAGES = tuple(_NAMES)
-"""The tasks, and the id with three rewards."""
+PAGES = tuple(_NAMES)  # the tasks, and the id with three rewards
 
 GAIT = [entry for entry in observation.ENTRIES if entry.group == "gait"]
 

@@ -21,8 +21,7 @@ LOW, HIGH = (np.array([limit[i] for limit in LIMITS.values()]) for i in (0, 1))
 MIDDLE, HALF_RANGE = (LOW + HIGH) / 2, (HIGH - LOW) / 2
 """Limits, middle and half range of the gait parameters, shape (4,)."""
 
-AHEAD = (0.25, 0.5, 0.75, 1.0)
-"""Where the height of the ground is seen, from O forward [m]."""
+AHEAD = (0.25, 0.5, 0.75, 1.0)  # where the height of the ground is seen, from O forward [m]
 
 
 class Scene(NamedTuple):

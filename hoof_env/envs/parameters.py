@@ -15,8 +15,7 @@ from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.ground.contact import Ground, load_ground
 from hoof_env.ground.terrain import Terrain
 
-MOST_SUBSTEPS = 100_000
-"""Of a control step."""
+MOST_SUBSTEPS = 100_000  # of a control step
 
 
 def resolved(settings: Settings) -> Settings:
@@ -124,8 +123,7 @@ def draw_parameters(
 
 
 KINDS = ("hills", "slope")
-SPACING = 0.1
-"""Between knots of hills [m]."""
+SPACING = 0.1  # between knots of hills [m]
 
 HILLS: dict[str, Any] = {
     "seed": 0, "length": 400.0, "rise": 0.15, "slope": 0.15, "patch": 2.0,

@@ -18,8 +18,7 @@ from hoof_env.dynamics.parts import Result
 from hoof_env.envs.batch import EpisodeBatch
 from hoof_env.render.instant import columns_of_engine, instants
 
-SHOWN = 4.0
-"""Seconds before a picture that it can show."""
+SHOWN = 4.0  # seconds before a picture that it can show
 
 
 class Recording:

@@ -38,8 +38,7 @@ FLAT, MARGIN, REACH = Terrain.flat(), 50.0, 1.0
 """Level ground; how far from its ends an episode on a terrain begins [m], for it goes somewhere; how far
 ahead and behind O a hoof may come down [m]."""
 
-MOST_TRIES = 100
-"""Draws of a crank angle at which the hoof is above the ground."""
+MOST_TRIES = 100  # draws of a crank angle at which the hoof is above the ground
 
 
 @dataclass

@@ -31,8 +31,7 @@ PRINTED_BETA = math.sqrt(2 * 15.0)
 """Baumgarte's beta as the paper's Table 1 prints it, sqrt(2 alpha) [1/s]; sqrt(2) alpha = 21.2 is probably
 meant."""
 
-SOLVERS = ("exact", "paper")
-"""The closed form, and Eq. 8 as the paper solves it."""
+SOLVERS = ("exact", "paper")  # the closed form, and Eq. 8 as the paper solves it
 
 
 @dataclass(frozen=True)
@@ -310,8 +309,6 @@ TASKS: Mapping[str, Task] = MappingProxyType(
         ),
     }
 )
-"""The tasks by name."""
-
 
 Part = TypeVar("Part", Term, Entry)
 

@@ -30,8 +30,7 @@ Floats = NDArray[np.float64]
 
 MOST_ENVS = 1_000_000
 
-MOST_DRAWN = 16
-"""So many are drawn by default; a picture takes as long as some hundred steps."""
+MOST_DRAWN = 16  # so many are drawn by default; a picture takes as long as some hundred steps
 
 OWN = ("weight", "render", "episode_summary", "raw_observation", "record", "np_random")
 """What each environment has of its own; the rest is of all."""

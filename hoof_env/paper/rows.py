@@ -182,8 +182,7 @@ ILL_CONDITIONED = ("walk.peak_inelastic", "walk.mean_inelastic", "walk.reduction
 """Rows without a bar for the paper's solver, with either beta: the walk grazes, and they depend on how its
 loop samples touch-down (docs/evidence/conditions.md has how far they move)."""
 
-REPORTED, ILL = "reported", "ill-conditioned"
-"""Why a row is spared."""
+REPORTED, ILL = "reported", "ill-conditioned"  # why a row is spared
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,7 @@ FORCE, TOE, HEEL, CRANK = (213, 94, 0), (0, 114, 178), (204, 121, 167), (0, 158,
 """Vermilion, blue, reddish purple and bluish green of Okabe and Ito's palette, which any colour vision tells
 apart."""
 
-FINE = 2
-"""Resolution of smooth painting over that of the picture."""
+FINE = 2  # resolution of smooth painting over that of the picture
 
 Colour = tuple[int, int, int]
 Position = tuple[float, float]
