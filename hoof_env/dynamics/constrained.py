@@ -292,11 +292,7 @@ class ConstrainedLeg:
         return self.constraints(self.state.q, self.state.qd, self.state.motion)
 
     def solve(self, ground: bool = True) -> tuple[Vector, Vector]:
-        """qdd and lambda of Eq. 8 at the present state, shape (42,) each, with or without ground forces.
-
-        Raises:
-            numpy.linalg.LinAlgError: Eq. 8 is singular.
-        """
+        """qdd and lambda of Eq. 8 at the present state, shape (42,) each, with or without ground forces."""
         return self._solve(self.closure(), self._ground_load() if ground else 0.0)
 
     def reactions(self) -> Reactions:

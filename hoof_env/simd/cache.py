@@ -56,16 +56,8 @@ class _FilesInGivenFolder(_caching.CompileResultCacheImpl):
 
 
 class KernelCache(_caching.FunctionCache):
-    """The files of one kernel.
-
-    Args:
-        function: the kernel.
-        say: takes a line about what is waited for.
-        identity: tells apart kernels of one source that contain different functions.
-
-    Raises:
-        OutputError: NUMBA_CACHE_DIR is not set, and no folder that numba tries is writable.
-    """
+    """The files of one kernel; `identity` tells apart kernels of one source that contain different functions.
+    Raises OutputError where no folder is writable."""
 
     def __init__(self, function: Callable[..., Any], say: Callable[[str], None], identity: str = "") -> None:
         if given_folder():
@@ -85,11 +77,7 @@ class KernelCache(_caching.FunctionCache):
         return sig, codegen.magic_tuple(), self._identity
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """As numba's; where there is nothing to load, it returns once this process may compile.
-
-        Raises:
-            OutputError: nothing can be written to the cache folder.
-        """
+        """As numba's; where there is nothing to load, it returns once this process may compile."""
         if (found := self._load(sig, target_context)) is not None:
             return found
         try:
@@ -104,7 +92,6 @@ class KernelCache(_caching.FunctionCache):
             return super().load_overload(sig, target_context)
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """As numba's. Raises OutputError: the cache folder cannot be written, or the disk is full."""
         COMPILED.append(self._kernel)
         try:
             super().save_overload(sig, data)
