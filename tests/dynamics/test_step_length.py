@@ -173,7 +173,3 @@ def test_stiff_ground_gets_the_substeps_that_it_needs(scheme):
     error, too_long = np.abs(way - fine), np.abs(coarse - fine)
     assert error.max() < 1e-3
     assert too_long.max() > 4 * error.max()
-
-
-def test_soft_ground_needs_no_more_than_the_step():
-    assert TrunkEngine(Limb(LEG), Trunk("free", mass=100.0)).substeps == 1
