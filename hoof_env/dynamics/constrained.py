@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from hoof_env.dynamics.layout import LEG_REPORT, LEG_STATE, TRUNK_REPORT, TRUNK_STATE
 from hoof_env.dynamics.parts import GRAVITY, Reactions, Result, Trunk
 from hoof_env.errors import ParameterError, check_choice, check_number
-from hoof_env.gait.gait import (
+from hoof_env.gait import (
     MOTION,
     PARAMETERS,
     FilterSettings,

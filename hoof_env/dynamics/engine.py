@@ -34,7 +34,7 @@ from hoof_env.errors import (
     flag,
     one_of,
 )
-from hoof_env.gait.gait import FilterSettings, GaitParameters
+from hoof_env.gait import FilterSettings, GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.profile import by_name, cross, leg_profile

@@ -20,7 +20,7 @@ from __future__ import annotations
 from hoof_env.dynamics.hoof import meet_ground
 from hoof_env.dynamics.layout import FARTHEST, LegRows, Moving
 from hoof_env.dynamics.parts import FIXED, FREE, RAIL, SUSPENDED
-from hoof_env.gait.gait import COS, OFFSET, SIN, SPEED
+from hoof_env.gait import COS, OFFSET, SIN, SPEED
 from hoof_env.leg.profile import look_up
 from hoof_env.simd import across, choose, cross, dot, lane_sum, level, nth, plane, size
 from hoof_env.simd.compile import inlined, pasted

@@ -19,7 +19,7 @@ from hoof_env.dynamics.parts import FREE, GRAVITY, RAIL, SUSPENDED, TRUNKS, Limb
 from hoof_env.dynamics.reactions import Reactions, leg_constants
 from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.errors import Floats, ParameterError, all_of, finite, spread
-from hoof_env.gait.gait import FilterSettings, GaitParameters
+from hoof_env.gait import FilterSettings, GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.laws import FRICTION_LAWS
 from hoof_env.ground.terrain import Terrain

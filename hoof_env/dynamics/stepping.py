@@ -16,7 +16,7 @@ from types import MappingProxyType
 from hoof_env.dynamics.layout import LegRows
 from hoof_env.dynamics.mechanics import MOVING
 from hoof_env.dynamics.parts import FIXED, FREE
-from hoof_env.gait.gait import INNER, SPEED
+from hoof_env.gait import INNER, SPEED
 from hoof_env.simd import choose, nth
 from hoof_env.simd.compile import inlined
 from hoof_env.simd.math import clip

@@ -7,7 +7,7 @@ from functools import cache
 from typing import Annotated, Any
 
 from hoof_env.envs.reward import TERMS
-from hoof_env.gait.gait import PARAMETERS
+from hoof_env.gait import PARAMETERS
 from hoof_env.simd.layout import Block, Layout, Row
 
 ACTIONS = len(PARAMETERS)

@@ -18,7 +18,7 @@ from hoof_env.envs.recording import Recording
 from hoof_env.envs.reward import failure
 from hoof_env.envs.tasks import Keywords
 from hoof_env.errors import ParameterError, count, flag
-from hoof_env.gait.gait import PARAMETERS
+from hoof_env.gait import PARAMETERS
 
 _SHAPE = (ACTIONS,)
 

@@ -21,7 +21,7 @@ from hoof_env.dynamics.layout import (
     LegMemory,
     TrunkMemory,
 )
-from hoof_env.gait.gait import PARAMETERS
+from hoof_env.gait import PARAMETERS
 
 START = ("crank_angle", "speed", "height", "x")
 """What an episode starts with, besides its gait and the parameters that are drawn."""

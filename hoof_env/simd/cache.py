@@ -25,7 +25,7 @@ from numba.core.compiler_lock import global_compiler_lock
 from hoof_env.errors import OutputError
 
 MECHANICS = ("simd", "leg", "ground", "gait", "dynamics")
-"""The rooms of this package whose sources end up in kernels."""
+"""The rooms of this package whose sources end up in kernels, folders or files."""
 
 LONGEST_WAIT = 600.0
 """Seconds to wait for another process, which may be stopped; then the kernel is compiled here."""
@@ -154,14 +154,16 @@ def _no_folder(folder: str, error: Exception) -> OutputError:
 @cache
 def _sources() -> str:
     """Digest of everything in this package that kernels are made from."""
-    package = Path(__file__).parents[1]
-    return "".join(_digest(package / room) for room in MECHANICS)
+    rooms = [Path(__file__).parents[1] / room for room in MECHANICS]
+    files = [room.with_suffix(".py") for room in rooms]
+    return "".join(_digest(file if file.is_file() else room) for room, file in zip(rooms, files, strict=True))
 
 
 @cache
-def _digest(folder: Path) -> str:
-    """Digest of the modules in a folder: a kernel may call any that lies beside it."""
+def _digest(room: Path) -> str:
+    """Digest of a module, or of those in a folder: a kernel may call any that lies beside it."""
     digest = hashlib.sha256()
-    for path in sorted(path for path in folder.glob("*.py") if path.is_file()):
+    modules = [room] if room.is_file() else room.glob("*.py")
+    for path in sorted(path for path in modules if path.is_file()):
         digest.update(path.read_bytes())
     return digest.hexdigest()

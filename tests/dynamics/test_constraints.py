@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hoof_env.dynamics.constrained import SIZE, Constraints, closed_form
-from hoof_env.gait.gait import MOTION
+from hoof_env.gait import MOTION
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.linkage import BODY_LENGTHS
 

@@ -11,7 +11,7 @@ from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import TRUNKS, Limb, Motor, Prescribed, Trunk
 from hoof_env.dynamics.step_length import MOST_SUBSTEPS, StepWarning
 from hoof_env.dynamics.stepping import SCHEMES
-from hoof_env.gait.gait import GaitParameters
+from hoof_env.gait import GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from tests.dynamics.scenes import LEG, LOWEST, NATURAL, THETA, WALK, drives_less_losses, energy, horse

@@ -6,7 +6,7 @@ import pytest
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import GRAVITY, Limb, Prescribed, Trunk
 from hoof_env.errors import ParameterError
-from hoof_env.gait.gait import GaitParameters
+from hoof_env.gait import GaitParameters
 from tests.dynamics.scenes import LEG
 
 STILL = GaitParameters(0.0, 0.4, 0.0, 0.0)

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import TRUNKS, Limb, Motor, Prescribed, Result, Trunk
-from hoof_env.gait.gait import FILTER, LIMITS, PARAMETERS, FilterSettings, GaitParameters, command_filters
+from hoof_env.gait import FILTER, LIMITS, PARAMETERS, FilterSettings, GaitParameters, command_filters
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.laws import FRICTION_LAWS
 from hoof_env.ground.terrain import Terrain
