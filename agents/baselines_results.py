@@ -35,7 +35,7 @@ from hoof_env._output import markdown_table
 from hoof_env.envs.policies import GAITS as STORED
 from hoof_env.envs.policies import open_loop
 from hoof_env.errors import DataFileError, HoofEnvError
-from hoof_env.gait.gait import LIMITS, GaitParameters
+from hoof_env.gait import LIMITS, GaitParameters
 
 Floats = NDArray[np.float64]
 

@@ -32,7 +32,7 @@ from agents.score import make_rows, play_rows
 from hoof_env._output import check_folder
 from hoof_env.envs.policies import open_loop, open_loop_record
 from hoof_env.errors import DataFileError, HoofEnvError, ParameterError, check_number
-from hoof_env.gait.gait import PARAMETERS
+from hoof_env.gait import PARAMETERS
 
 Floats = NDArray[np.float64]
 Episodes = list[dict[str, float]]

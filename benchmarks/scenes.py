@@ -19,7 +19,7 @@ from benchmarks.common import Start
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limb, Motor, Trunk
 from hoof_env.dynamics.step_length import StepWarning
-from hoof_env.gait.gait import GaitParameters, load_gait
+from hoof_env.gait import GaitParameters, load_gait
 from hoof_env.ground.contact import load_ground
 from hoof_env.leg.geometry import load_geometry
 

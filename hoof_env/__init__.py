@@ -37,8 +37,8 @@ if TYPE_CHECKING:
     from hoof_env.errors import MissingExtraError as MissingExtraError
     from hoof_env.errors import OutputError as OutputError
     from hoof_env.errors import ParameterError as ParameterError
-    from hoof_env.gait.gait import GaitParameters as GaitParameters
-    from hoof_env.gait.gait import load_gait as load_gait
+    from hoof_env.gait import GaitParameters as GaitParameters
+    from hoof_env.gait import load_gait as load_gait
     from hoof_env.ground.contact import Ground as Ground
     from hoof_env.ground.terrain import Terrain as Terrain
     from hoof_env.leg.geometry import Geometry as Geometry
@@ -58,7 +58,7 @@ _MODULES = {
     "envs.tasks": "register",
     "envs.vector": "HorseLegVectorEnv",
     "errors": "DataFileError GeometryError HoofEnvError MissingExtraError OutputError ParameterError",
-    "gait.gait": "GaitParameters load_gait",
+    "gait": "GaitParameters load_gait",
     "ground.contact": "Ground",
     "ground.terrain": "Terrain",
     "leg.geometry": "Geometry load_geometry read_preset",

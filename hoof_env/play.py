@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from hoof_env import records
 from hoof_env.errors import HoofEnvError, check_number, parse_pairs
-from hoof_env.gait.gait import GaitParameters
+from hoof_env.gait import GaitParameters
 from hoof_env.render.instant import Instant, instants
 
 HELD = {

@@ -22,7 +22,7 @@ from hoof_env._output import check_folder, staged
 from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.envs.policies import Scripted, load_open_loop, make_policy, policy_names
 from hoof_env.errors import HoofEnvError, OutputError, ParameterError, check_number, parse_pairs
-from hoof_env.gait.gait import PARAMETERS, GaitParameters
+from hoof_env.gait import PARAMETERS, GaitParameters
 from hoof_env.ground.terrain import Terrain
 from hoof_env.render.instant import UNITS, Columns, Setting, columns_of_engine
 from hoof_env.saved_policy import find_saved

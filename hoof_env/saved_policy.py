@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from hoof_env._version import __version__
 from hoof_env.errors import DataFileError, HoofEnvError, MissingExtraError, ParameterError, check_choice
-from hoof_env.gait.gait import PARAMETERS
+from hoof_env.gait import PARAMETERS
 
 FILE, WEIGHTS, ABOUT, STATISTICS = "policy.onnx", "policy.safetensors", "policy.json", "vecnormalize.pkl"
 CHECKPOINTS = "checkpoints"

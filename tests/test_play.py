@@ -10,7 +10,7 @@ import pytest
 
 from hoof_env import cli
 from hoof_env.errors import HoofEnvError, ParameterError
-from hoof_env.gait.gait import PARAMETERS
+from hoof_env.gait import PARAMETERS
 from hoof_env.play import HELD, HELP, RATE, Game, play
 from hoof_env.records import make_env
 

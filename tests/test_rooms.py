@@ -15,7 +15,7 @@ FLOORS = (
     ("hoof_env/_output.py",),
     ("hoof_env/simd",),
     ("hoof_env/leg",),
-    ("hoof_env/ground", "hoof_env/gait"),
+    ("hoof_env/ground", "hoof_env/gait.py"),
     ("hoof_env/dynamics",),
     ("hoof_env/render",),
     ("hoof_env/envs", "hoof_env/__init__.py"),

@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from hoof_env.dynamics.layout import LEG_REPORT, LEG_STATE, TRUNK_REPORT, TRUNK_STATE
 from hoof_env.dynamics.parts import GRAVITY, Reactions, Result, Trunk
 from hoof_env.errors import ParameterError, check_choice, check_number
-from hoof_env.gait.gait import (
+from hoof_env.gait import (
     MOTION,
     PARAMETERS,
     FilterSettings,
@@ -292,11 +292,7 @@ class ConstrainedLeg:
         return self.constraints(self.state.q, self.state.qd, self.state.motion)
 
     def solve(self, ground: bool = True) -> tuple[Vector, Vector]:
-        """qdd and lambda of Eq. 8 at the present state, shape (42,) each, with or without ground forces.
-
-        Raises:
-            numpy.linalg.LinAlgError: Eq. 8 is singular.
-        """
+        """qdd and lambda of Eq. 8 at the present state, shape (42,) each, with or without ground forces."""
         return self._solve(self.closure(), self._ground_load() if ground else 0.0)
 
     def reactions(self) -> Reactions:

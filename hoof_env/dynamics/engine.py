@@ -34,10 +34,10 @@ from hoof_env.errors import (
     flag,
     one_of,
 )
-from hoof_env.gait.gait import FilterSettings, GaitParameters
+from hoof_env.gait import FilterSettings, GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
-from hoof_env.leg.profile import by_name, leg_profile
+from hoof_env.leg.profile import by_name, cross, leg_profile
 from hoof_env.simd.user_functions import check_function, what_cannot_be_compiled
 
 FEW = 6
@@ -432,7 +432,7 @@ class TrunkEngine(Scene):
         place, velocity = r["x"] + 1j * r["y"], r["vx"] + 1j * r["vy"]
         pitch_rate, turn = r["pitch_rate"], np.exp(1j * s["pitch"])
         moment, momentum = own.mass * place, own.mass * velocity  # first moment about the origin
-        spin = own.pitch_inertia * pitch_rate + own.mass * _cross(place, velocity)  # about the origin
+        spin = own.pitch_inertia * pitch_rate + own.mass * cross(place, velocity)  # about the origin
         kinetic = 0.5 * own.mass * np.abs(velocity) ** 2 + 0.5 * own.pitch_inertia * pitch_rate**2
         for i, limb in enumerate(self.limbs):
             theta_rate = s["theta_rate"][i]
@@ -451,7 +451,7 @@ class TrunkEngine(Scene):
             hip, hip_rate, mass = place + arm, velocity + 1j * arm * pitch_rate, limb.geometry.mass
             moment = moment + mass * hip + first_moment
             momentum = momentum + mass * hip_rate + own_rate
-            spin = spin + _cross(hip, mass * hip_rate + own_rate) + _cross(first_moment, hip_rate)
+            spin = spin + cross(hip, mass * hip_rate + own_rate) + cross(first_moment, hip_rate)
             spin = spin + b * theta_rate + c * frame_rate
             kinetic = kinetic + 0.5 * mass * np.abs(hip_rate) ** 2 + (hip_rate.conj() * own_rate).real
             rates = a * theta_rate**2 + 2 * b * theta_rate * frame_rate + c * frame_rate**2
@@ -462,7 +462,7 @@ class TrunkEngine(Scene):
         if own.kind == "suspended":
             potential = potential + 0.5 * own.stiffness * (r["y"] - own.height) ** 2
             potential = potential - (1 - own.share) * total * GRAVITY * r["y"]
-        return Tally(centre, momentum, spin - _cross(centre, momentum), kinetic, potential)
+        return Tally(centre, momentum, spin - cross(centre, momentum), kinetic, potential)
 
     def messages(self) -> list[str]:
         """How each environment ended, for people."""
@@ -471,8 +471,3 @@ class TrunkEngine(Scene):
             "this environment was never reset" if new else Result(int(code)).message
             for code, new in zip(self._memory.result, np.atleast_1d(never), strict=True)
         ]
-
-
-def _cross(a: Any, b: Any) -> Floats:
-    found: Floats = (np.conj(a) * b).imag
-    return found

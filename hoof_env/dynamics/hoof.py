@@ -40,11 +40,8 @@ def meet_ground(trunk, leg, model):  # type: ignore[no-untyped-def]
 
 @inlined
 def meet_point(trunk, leg, point, memory, arm, arm_by_theta, hip, hip_velocity, model):  # type: ignore[no-untyped-def]
-    """Where a hoof point is, how deep in the ground, how fast it goes in and slides, and so the force of the
-    ground on it and that force's part along theta and beta.
-
-    `memory` is what the point remembers; `arm` goes to it from O in the leg's frame; `hip` is O's place [m].
-    """
+    """The motion of a hoof point, the force of the ground on it and that force's part along theta and beta;
+    `arm` goes to it from O in the leg's frame, `hip` is O's place [m]."""
     arm, by_theta = leg.turn * arm, leg.turn * arm_by_theta
     place = hip + arm
     velocity = hip_velocity + (leg.theta_rate * by_theta + leg.beta_rate * across(arm))

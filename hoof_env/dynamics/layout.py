@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from hoof_env.gait.gait import PARAMETERS
+from hoof_env.gait import PARAMETERS
 from hoof_env.leg.profile import Functions, Slopes
 from hoof_env.simd.layout import Block, Layout, Row, Vector
 

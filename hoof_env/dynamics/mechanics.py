@@ -20,7 +20,7 @@ from __future__ import annotations
 from hoof_env.dynamics.hoof import meet_ground
 from hoof_env.dynamics.layout import FARTHEST, LegRows, Moving
 from hoof_env.dynamics.parts import FIXED, FREE, RAIL, SUSPENDED
-from hoof_env.gait.gait import COS, OFFSET, SIN, SPEED
+from hoof_env.gait import COS, OFFSET, SIN, SPEED
 from hoof_env.leg.profile import look_up
 from hoof_env.simd import across, choose, cross, dot, lane_sum, level, nth, plane, size
 from hoof_env.simd.compile import inlined, pasted
@@ -74,11 +74,8 @@ def look_up_functions(trunk, leg, model):  # type: ignore[no-untyped-def]
 
 @inlined
 def place_frame(trunk, leg, elapsed):  # type: ignore[no-untyped-def]
-    """The leg's frame (E1): its turn, how that changes with crank angle and time, and first moment and
-    inertia in the world.
-
-    The swing is phi = offset + A sin(theta) + B cos(theta), each parameter moving as its filter does.
-    """
+    """The leg's frame (E1), its first moment and inertia in the world. The swing is phi = offset +
+    A sin(theta) + B cos(theta), each parameter moving as its filter does."""
     sine, cosine, w = leg.functions.sine, leg.functions.cosine, leg.theta_rate
     offset, rate, bend = filtered(leg, OFFSET, elapsed)
     part_a, rate_a, bend_a = filtered(leg, SIN, elapsed)
@@ -139,8 +136,7 @@ def clear_trunk(trunk, kind):  # type: ignore[no-untyped-def]
 
 @inlined
 def gather_leg(trunk, leg, kind, together):  # type: ignore[no-untyped-def]
-    """Add a leg to the first moment, momentum, inertia and spin of all about the trunk's centre of mass
-    (E6)."""
+    """Add a leg to first moment, momentum, inertia and spin about the trunk's centre of mass (E6)."""
     s, w, sway = leg.first_moment, leg.theta_rate, leg.swing_rate
     drift = w * leg.moment_by_crank + sway * across(s)
     if kind == FREE:
@@ -160,11 +156,8 @@ def gather_leg(trunk, leg, kind, together):  # type: ignore[no-untyped-def]
 
 @inlined
 def move_trunk(trunk, kind):  # type: ignore[no-untyped-def]
-    """Place and velocity of the trunk from centre of mass and momentum of all (E7); what acts on it
-    besides its legs.
-
-    On a rail the place along y is given and the velocity along y 0.
-    """
+    """Place and velocity of the trunk from centre of mass and momentum of all (E7), on a rail along x only;
+    what acts on it besides its legs."""
     centre, moment, momentum = trunk.stage.centre, trunk.first_moment, trunk.stage.momentum
     drift, per_mass = trunk.relative_momentum, trunk.settings.inverse_mass
     place = centre - per_mass * moment
@@ -228,8 +221,7 @@ def set_up_crank(trunk, leg, elapsed):  # type: ignore[no-untyped-def]
 
         crank_inertia theta_tt + moment_by_crank . a + crank_pitch_coupling pitch_tt = torque + ground - rest.
 
-    Here a motor's crank is solved for theta_tt as if the trunk kept still; a
-    prescribed one's is given.
+    Here a motor's crank is solved for theta_tt as if the trunk kept still; a prescribed one's is given.
     """
     w, frame_rate, k = leg.theta_rate, leg.beta_rate, leg.beta_by_theta
     hip, frame, coupling = leg.hip, leg.frame_inertia, leg.crank_coupling
@@ -259,8 +251,7 @@ def set_up_crank(trunk, leg, elapsed):  # type: ignore[no-untyped-def]
 
 @inlined
 def load_trunk(trunk, leg, kind, together):  # type: ignore[no-untyped-def]
-    """A leg's part in the trunk's equations, its crank eliminated (E8), and in the outer force and
-    moment."""
+    """A leg's part in the trunk's equations, its crank eliminated (E8), and in outer force and moment."""
     w, frame_rate, pitch_rate = leg.theta_rate, leg.beta_rate, trunk.rates.pitch_rate
     s, hip, u, ground_force = leg.first_moment, leg.hip, leg.moment_by_crank, leg.ground_force
     mass, coupling = leg.settings.mass, leg.crank_pitch_coupling

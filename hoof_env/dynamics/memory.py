@@ -14,19 +14,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.dynamics import layout
 from hoof_env.dynamics.advance import LANES, LEG_ROWS, MODEL, TRUNK_ROWS
-from hoof_env.dynamics.layout import (
-    FARTHEST,
-    LegMemory,
-    LegState,
-    Moving,
-    TrunkMemory,
-    TrunkState,
-)
+from hoof_env.dynamics.layout import FARTHEST, LegMemory, LegState, Moving, TrunkMemory, TrunkState
 from hoof_env.dynamics.parts import FREE, GRAVITY, RAIL, SUSPENDED, TRUNKS, Limb, Motor, Scene, Trunk
 from hoof_env.dynamics.reactions import Reactions, leg_constants
 from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.errors import Floats, ParameterError, all_of, finite, spread
-from hoof_env.gait.gait import FilterSettings, GaitParameters
+from hoof_env.gait import FilterSettings, GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.laws import FRICTION_LAWS
 from hoof_env.ground.terrain import Terrain
@@ -98,8 +91,7 @@ def new_memory(scene: Scene, num_envs: int, columns: int, reacts: bool) -> Memor
 
 
 def new_model(scene: Scene, filters: FilterSettings, strides: bool) -> tuple[NDArray[Any], Floats, Floats]:
-    """What does not change while it runs: a record of dtype `MODEL`, the legs' tables, the terrain's
-    cells."""
+    """What does not change while it runs: a record `MODEL`, the legs' tables, the terrain's cells."""
     ground, terrain = scene.ground, scene.terrain
     cells = max(profile.cells for profile in scene.profiles)
     tables = [profile.with_cells(cells).table for profile in dict.fromkeys(scene.profiles)]
@@ -171,11 +163,7 @@ def _limb_settings(limb: Limb, first_row: int, lift_off: float) -> Floats:
 
 
 def which(envs: ArrayLike | None, num_envs: int) -> NDArray[np.int64]:
-    """Environments of `num_envs` as indices; they are given as such, as a mask, or as None for all.
-
-    Raises:
-        ParameterError: neither, or there is no such environment.
-    """
+    """Environments of `num_envs` as indices; they are given as such, as a mask, or as None for all."""
     if envs is None:
         return np.arange(num_envs)
     given = np.asarray(envs)
@@ -191,12 +179,7 @@ def which(envs: ArrayLike | None, num_envs: int) -> NDArray[np.int64]:
 
 
 def gaits_of(gaits: Any, legs: int, n: int) -> Floats:
-    """Gait parameters, given as numbers or as `GaitParameters` for all legs or each, as numbers of shape
-    (legs, 4, n).
-
-    Raises:
-        ParameterError: not as many as legs, of another shape or type, or beyond `FARTHEST`.
-    """
+    """`gaits` of `TrunkEngine.reset` as numbers of shape (legs, 4, n)."""
     if isinstance(gaits, np.ndarray):
         given = finite("gaits", gaits, FARTHEST)
         if given.shape != (legs, 4, n):
@@ -219,10 +202,8 @@ def start(
     """State of `n` environments with filters at rest: of the trunk, shape (7, n), and legs, (legs, 16, n).
 
     In the place of centre of mass, momentum and spin of all are the trunk's place, velocity and rate of
-    pitch: the kernels make the one of the other (`mechanics.settle`).
-
-    `gaits` has shape (legs, 4, n), `trunk` holds x, y, pitch, vx, vy and pitch_rate of `TrunkEngine.reset`,
-    which says what is refused.
+    pitch: the kernels make the one of the other (`mechanics.settle`). `TrunkEngine.reset` says what `trunk`
+    holds and what is refused.
     """
     legs = len(scene.limbs)
     angle = spread("theta", theta, (legs, n), FARTHEST)

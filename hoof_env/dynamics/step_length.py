@@ -74,11 +74,8 @@ class StepLength(Scene):
         }
 
     def choose(self, sim_dt: float, asked: int | None, stacklevel: int = 3) -> int:
-        """Into how many parts `sim_dt` [s] is cut: those asked for, or those needed, up to `MOST_SUBSTEPS`.
-
-        Warns:
-            StepWarning: these are too few.
-        """
+        """Into how many parts `sim_dt` [s] is cut: those asked for, or those needed, up to `MOST_SUBSTEPS`;
+        warns if these are too few."""
         cause = min(CAUSES, key=self.limits.__getitem__)
         needed = max(1, math.ceil(sim_dt / self.limits[cause]))
         chosen = min(needed, MOST_SUBSTEPS) if asked is None else asked

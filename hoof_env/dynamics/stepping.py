@@ -16,7 +16,7 @@ from types import MappingProxyType
 from hoof_env.dynamics.layout import LegRows
 from hoof_env.dynamics.mechanics import MOVING
 from hoof_env.dynamics.parts import FIXED, FREE
-from hoof_env.gait.gait import INNER, SPEED
+from hoof_env.gait import INNER, SPEED
 from hoof_env.simd import choose, nth
 from hoof_env.simd.compile import inlined
 from hoof_env.simd.math import clip
@@ -24,10 +24,7 @@ from hoof_env.simd.math import clip
 
 @inlined
 def filter_accelerations(leg, settings):  # type: ignore[no-untyped-def]
-    """Accelerations of the command filters: bounded, towards a bounded rate, towards the command.
-
-    `settings` points to gain, bound of the rate and bound of the acceleration of each filter.
-    """
+    """Accelerations of the command filters: bounded, towards a bounded rate, towards the command."""
     for k in range(4):
         gain, rate_bound, acc_bound = settings[3 * k], settings[3 * k + 1], settings[3 * k + 2]
         wanted = clip(gain * (leg.command[k] - leg.state.gait[k]), rate_bound)

@@ -18,7 +18,7 @@ from hoof_env.envs.batch import EpisodeBatch
 from hoof_env.envs.step import ACTIONS
 from hoof_env.envs.tasks import PER_EPISODE, SETTINGS, Settings, Task, task_of, to_json
 from hoof_env.errors import FixedSettingError, ParameterError, check_choice
-from hoof_env.gait.gait import GaitParameters
+from hoof_env.gait import GaitParameters
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
 

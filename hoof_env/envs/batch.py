@@ -41,7 +41,7 @@ from hoof_env.envs.start import HIGHEST, LOWEST, check_options, draw_starts
 from hoof_env.envs.step import ACTIONS, FAILED, SUMS, episode_layout
 from hoof_env.envs.tasks import TASKS, Settings, Task
 from hoof_env.errors import ParameterError, check_choice, check_number
-from hoof_env.gait.gait import GaitParameters, gait_names, load_gait
+from hoof_env.gait import GaitParameters, gait_names, load_gait
 from hoof_env.ground.contact import load_ground
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.profile import leg_profile

@@ -20,7 +20,7 @@ from hoof_env.envs.reward import failure
 from hoof_env.envs.step import ACTIONS, FAILED
 from hoof_env.envs.tasks import Keywords
 from hoof_env.errors import ParameterError, count, flag
-from hoof_env.gait.gait import PARAMETERS
+from hoof_env.gait import PARAMETERS
 
 
 class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hoof_env.dynamics.layout import LEG_STATE, STRIDE_SUMS, STRIDES, TRUNK_REPORT, LegMemory, TrunkMemory
-from hoof_env.gait.gait import PARAMETERS
+from hoof_env.gait import PARAMETERS
 
 START = ("crank_angle", "speed", "height", "x")
 """What an episode starts with, besides its gait and the parameters that are drawn."""

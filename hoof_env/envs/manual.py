@@ -27,7 +27,7 @@ from hoof_env.envs.parameters import HILLS, SPACING
 from hoof_env.envs.reward import check_weights
 from hoof_env.envs.tasks import PER_EPISODE, TASKS, Settings, Task, task_of, to_json
 from hoof_env.errors import OutputError, check_choice
-from hoof_env.gait.gait import LIMITS, FilterSettings
+from hoof_env.gait import LIMITS, FilterSettings
 from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS
 from hoof_env.leg.geometry import load_geometry, preset_names
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hoof_env.errors import ParameterError
-from hoof_env.gait.gait import LIMITS
+from hoof_env.gait import LIMITS
 from hoof_env.ground.terrain import surface
 from hoof_env.simd import choose
 from hoof_env.simd.compile import inlined

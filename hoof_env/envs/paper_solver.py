@@ -21,7 +21,7 @@ from hoof_env.dynamics.observables import StanceCounter
 from hoof_env.dynamics.parts import Result
 from hoof_env.envs.tasks import Settings
 from hoof_env.errors import ParameterError
-from hoof_env.gait.gait import GaitParameters
+from hoof_env.gait import GaitParameters
 
 Floats = NDArray[np.float64]
 Records = NDArray[np.void]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from hoof_env.envs.start import extreme_posture
 from hoof_env.errors import DataFileError, ParameterError, check_choice
-from hoof_env.gait.gait import paper_gaits
+from hoof_env.gait import paper_gaits
 from hoof_env.leg.profile import leg_profile
 
 Action = NDArray[np.float32]

@@ -14,7 +14,7 @@ from hoof_env.dynamics.parts import Trunk
 from hoof_env.envs.parameters import check_parameters
 from hoof_env.envs.tasks import Settings
 from hoof_env.errors import ParameterError, check_choice, check_number
-from hoof_env.gait.gait import GaitParameters, paper_gaits
+from hoof_env.gait import GaitParameters, paper_gaits
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.profile import LegProfile, by_name
 

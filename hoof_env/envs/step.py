@@ -18,7 +18,7 @@ from hoof_env.dynamics.advance import LANES, MODEL, TRUNK_ROWS, advance_kernels
 from hoof_env.dynamics.layout import LegMemory, TrunkMemory
 from hoof_env.envs.observation import Entry, Scene
 from hoof_env.envs.reward import TERMS, Outcome, Term
-from hoof_env.gait.gait import PARAMETERS
+from hoof_env.gait import PARAMETERS
 from hoof_env.simd import (
     anywhere,
     choose,

@@ -136,13 +136,8 @@ def latch(contact, penetration, rate, ground):  # type: ignore[no-untyped-def]
 
 @kernel
 def touch(contact, position, velocity, ground):  # type: ignore[no-untyped-def]
-    """Force of the ground on one hoof point, as the complex number friction + i normal [N].
-
-    Args:
-        contact: record of dtype `CONTACT`, updated.
-        position, velocity: of the point, complex [m, m/s]; the ground is y = 0.
-        ground: record of dtype `GROUND`.
-    """
+    """Force of the ground, y = 0, on one hoof point, as the complex number friction + i normal [N]; `contact`
+    is updated, position and velocity of the point are complex [m, m/s]."""
     latch(contact, -position.imag, -velocity.imag, ground)
     contact.x = position.real
     contact.vx = velocity.real

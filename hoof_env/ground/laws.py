@@ -62,9 +62,6 @@ def damping(law: str, restitution: float, stiffness: float, reference_mass: floa
         stiffness: K [N/m^n]; used by "kelvin-voigt" only.
         reference_mass: mass [kg] for which "kelvin-voigt" with exponent 1 returns `restitution`; a linear
             dashpot has one restitution for each mass.
-
-    Raises:
-        ParameterError: unknown law, or a restitution that the law cannot represent.
     """
     check_choice("normal_law", law, NORMAL_LAWS)
     cr = check_number("restitution", restitution, low=0, high=1)
@@ -118,14 +115,8 @@ def _bisect(f: Callable[[float], float], low: float, high: float) -> float:
 
 @inlined
 def normal_force(spring, damping, dashpot):  # type: ignore[no-untyped-def]
-    """Normal force [N] on a point inside the ground (Eq. 14): S (1 + damping) + dashpot. The ground does not
-    pull.
-
-    Args:
-        spring: S = K d^n [N].
-        damping: chi v / v0 [-].
-        dashpot: c v [N].
-    """
+    """Normal force [N] on a point inside the ground (Eq. 14) from K d^n [N], chi v / v0 [-] and c v [N]. The
+    ground does not pull."""
     return larger(spring * (1.0 + damping) + dashpot, 0.0)
 
 
@@ -139,12 +130,9 @@ AMBROSIO, THRELFALL, TANH = range(3)
 def friction_part(speed, law, slow, fast):  # type: ignore[no-untyped-def]
     """Friction coefficient over its kinetic value, mu(|v|) / mu_k [-], 0 to 1; 0 at rest.
 
-    Args:
-        speed: sliding speed |v| [m/s].
-        law: index into `FRICTION_LAWS`, the same in all lanes. Ambrosio: c_d = 0 below `slow`, 1 above
-            `fast`, linear between. Threlfall: 1 - exp(-3 |v| / v0) up to v0 = `fast`, constant above. The
-            last: tanh(|v| / `fast`).
-        slow, fast: threshold speeds v0 and v1 [m/s]; the paper does not print them.
+    Speeds are |v| and the thresholds of `Ground` [m/s]; `law`, an index into `FRICTION_LAWS`, is the same in
+    all lanes. Ambrosio: c_d = 0 below `slow`, 1 above `fast`, linear between. Threlfall: 1 - exp(-3 |v| / v0)
+    up to v0 = `fast`, constant above. The last: tanh(|v| / `fast`).
     """
     if law == AMBROSIO:
         part = (speed - slow) / (fast - slow)

@@ -38,17 +38,11 @@ from hoof_env.ground.terrain import Terrain
 
 
 class SchemeLimits(NamedTuple):
-    """What a fixed-step scheme does in a contact.
+    """What a fixed-step scheme does in a contact."""
 
-    Attributes:
-        order: of the scheme on a smooth force [-].
-        error: C of the module's text [-].
-        decay: longest step times the rate of a damped motion [-].
-    """
-
-    order: int
-    error: float
-    decay: float
+    order: int  # of the scheme on a smooth force
+    error: float  # C of the module's text [-]
+    decay: float  # longest step times the rate of a damped motion [-]
 
 
 SCHEMES: Mapping[str, SchemeLimits] = MappingProxyType(
@@ -75,15 +69,8 @@ class ContactRates:
     exponent: float
 
     def longest_steps(self, scheme: str, tolerance: float = 1e-2) -> dict[str, float]:
-        """Longest step [s] that each of the three allows; infinite for a rate of zero.
-
-        Args:
-            scheme: one of `SCHEMES`.
-            tolerance: error of the state after a contact [-], see the module's text.
-
-        Raises:
-            ParameterError: an unknown scheme or a tolerance out of range.
-        """
+        """Longest step [s] that each of the three allows; infinite for a rate of zero. `tolerance` is the
+        error of the state after a contact [-], see the module's text."""
         limits = SCHEMES[check_choice("scheme", scheme, SCHEMES)]
         tolerance = check_number("tolerance", tolerance, low=0, high=1, exclusive_low=True)
         order = min(limits.order, self.exponent + 1)
@@ -112,9 +99,6 @@ def contact_rates(
             where both occur, ask for both and take the larger rates.
         sliding_mass: that it sets against friction [kg]; None, the same.
         terrain: whose stiffest and roughest places count; None, flat.
-
-    Raises:
-        ParameterError: a value is not finite or out of range.
     """
     mass = check_number("mass", mass, low=0, exclusive_low=True)
     load = check_number("load", load, low=0)

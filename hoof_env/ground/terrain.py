@@ -225,27 +225,20 @@ def _short(value: Any) -> str:
 class TerrainGrid(NamedTuple):
     """A terrain for the kernels: the arguments of `surface` after x.
 
-    Attributes:
-        cells: one row for each cell, from the level one before the first knot to that behind the last, shape
-            (knots + 1, 8): height, its rise over the cell, normal x and y, factor of stiffness and its rise,
-            factor of friction and its rise.
-        origin: where the first cell begins [m].
-        per_metre: cells in a metre [1/m].
+    `cells` has a row for each cell, from the level one before the first knot to that behind the last, shape
+    (knots + 1, 8): height, its rise over the cell, normal x and y, factor of stiffness and its rise, factor
+    of friction and its rise.
     """
 
     cells: NDArray[np.float64]
-    origin: float
-    per_metre: float
+    origin: float  # where the first cell begins [m]
+    per_metre: float  # cells in a metre [1/m]
 
 
 @inlined
 def surface(x, cells, origin, per_metre):  # type: ignore[no-untyped-def]
-    """The ground at `x` [m]: height [m], normal x and y [-], factors of stiffness and friction [-].
-
-    Args:
-        x: any number, or lanes; what is not finite gives heights and factors that are none.
-        cells, origin, per_metre: a `TerrainGrid`.
-    """
+    """The ground at `x` [m], which may be lanes: height [m], normal x and y [-], factors of stiffness and
+    friction [-]. An x that is not finite gives heights and factors that are none."""
     place = (x - origin) * per_metre
     cell = floor(smaller(larger(0.0, place), cells.shape[0] - 1.0))  # this order sends NaN to cell 0
     part = place - cell  # the level cells at the ends have no rises: any part will do

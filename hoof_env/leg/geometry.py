@@ -306,12 +306,7 @@ def wrong(preset: Preset) -> type[ParameterError] | type[DataFileError]:
 
 
 def read_preset(source: Preset) -> dict[str, Any]:
-    """The content of a preset by name, or of a file by path (ends in .json); content comes back as it is.
-
-    Raises:
-        ParameterError: unknown preset name, or content with unknown entries.
-        DataFileError: the file is missing, is not a JSON object or has unknown entries.
-    """
+    """The content of a preset by name, or of a file by path (ends in .json); content comes back as it is."""
     data = source if isinstance(source, Mapping) else _read_file(source)
     if unknown := sorted(str(name) for name in data if name not in PARTS):
         said = f"unknown entries {', '.join(unknown)}; expected some of {', '.join(PARTS)}"

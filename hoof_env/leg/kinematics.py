@@ -40,14 +40,11 @@ def intersect(e1: complex, e2: complex, k1: float, k2: float) -> complex:
 
 @kernel
 def solve_points(theta, crank, pivot, steps, values, z, dz, ddz):  # type: ignore[no-untyped-def]
-    """Fill `z`, `dz`, `ddz` (complex, shape (11,)) with every point and its derivatives by the crank angle.
+    """Fill `z`, `dz`, `ddz` (complex, shape (11,)) with every point and its derivatives by the crank angle,
+    in the frame of the leg with O at the origin [m, m/rad, m/rad^2].
 
-    Args:
-        theta: crank angle [rad]; the crank turns clockwise, P = crank * exp(-i theta).
-        crank: crank radius OP [m].
-        pivot: C relative to O, complex [m].
-        steps, values: the construction of the leg, `geometry.tables`.
-        z, dz, ddz: outputs, in the frame of the leg with O at the origin [m, m/rad, m/rad^2].
+    The crank turns clockwise, P = crank * exp(-i theta); `pivot` is C, `steps` and `values` are
+    `geometry.tables`.
     """
     z[_O], dz[_O], ddz[_O] = 0.0, 0.0, 0.0
     z[_C], dz[_C], ddz[_C] = pivot, 0.0, 0.0
@@ -85,8 +82,8 @@ def mirror(z: complex, travel: float) -> complex:
 def place(z, dz, ddz, theta_rate, theta_acc, phi, phi_rate, phi_acc, travel):  # type: ignore[no-untyped-def]
     """Motion relative to O, in world axes, of a point given in the frame of the leg.
 
-    The frame has turned by phi (in its own sense, before the mirror). Returns position [m], velocity [m/s],
-    acceleration [m/s^2] and the partial velocities by theta_rate and by phi_rate [m/rad], all complex.
+    The frame has turned by phi (in its own sense, before the mirror). Returns position [m], velocity [m/s]
+    and acceleration [m/s^2], all complex.
     """
     turn = complex(np.cos(phi), np.sin(phi))
     by_theta = dz * turn
@@ -97,13 +94,7 @@ def place(z, dz, ddz, theta_rate, theta_acc, phi, phi_rate, phi_acc, travel):  #
         + by_phi * phi_acc
         + turn * (ddz * theta_rate**2 + 2j * dz * theta_rate * phi_rate - z * phi_rate**2)
     )
-    return (
-        mirror(z * turn, travel),
-        mirror(velocity, travel),
-        mirror(acceleration, travel),
-        mirror(by_theta, travel),
-        mirror(by_phi, travel),
-    )
+    return mirror(z * turn, travel), mirror(velocity, travel), mirror(acceleration, travel)
 
 
 @dataclass(frozen=True)

@@ -100,17 +100,17 @@ def functions(
     r, v, acc = ((w[:, TAILS] + w[:, HEADS]) / 2 for w in (z, dz, ddz))
     link, dlink, ddlink = (w[:, HEADS] - w[:, TAILS] for w in (z, dz, ddz))
     length2 = geometry.body_lengths**2
-    turn, dturn = _cross(link, dlink) / length2, _cross(link, ddlink) / length2
+    turn, dturn = cross(link, dlink) / length2, cross(link, ddlink) / length2
     toe, heel = NUMBER[geometry.toe], NUMBER[geometry.heel]
     s, ds, dds = r @ m, v @ m, acc @ m
     value = [
         z[:, toe].real, z[:, toe].imag, z[:, heel].real, z[:, heel].imag, ds.real, ds.imag,
-        np.abs(v) ** 2 @ m + turn**2 @ inertia, _cross(r, v) @ m + turn @ inertia,
+        np.abs(v) ** 2 @ m + turn**2 @ inertia, cross(r, v) @ m + turn @ inertia,
         s.real, s.imag, np.abs(r) ** 2 @ m + inertia.sum(), 2 * _dot(r, v) @ m, np.sin(theta), np.cos(theta),
     ]  # fmt: skip
     slope = [
         dz[:, toe].real, dz[:, toe].imag, dz[:, heel].real, dz[:, heel].imag, dds.real, dds.imag,
-        2 * (_dot(v, acc) @ m + (turn * dturn) @ inertia), _cross(r, acc) @ m + dturn @ inertia,
+        2 * (_dot(v, acc) @ m + (turn * dturn) @ inertia), cross(r, acc) @ m + dturn @ inertia,
     ]  # fmt: skip
     return np.stack(value, 1), np.stack(slope, 1)
 
@@ -119,7 +119,8 @@ def _dot(a: NDArray[np.complex128], b: NDArray[np.complex128]) -> NDArray[np.flo
     return (a.conj() * b).real
 
 
-def _cross(a: NDArray[np.complex128], b: NDArray[np.complex128]) -> NDArray[np.float64]:
+def cross(a: Any, b: Any) -> Any:
+    """a x b of planar vectors, positive if b is to the left of a."""
     return (a.conj() * b).imag
 
 
@@ -248,15 +249,8 @@ def _polynomials(builder: Any, first: Any, x: Any, sloped: bool) -> tuple[Any, A
     )
 )
 def look_up(code: Code, functions: Any, slopes: Any, table: Any, first: Any, cells: Any, theta: Any) -> None:
-    """Look up all functions and derivatives.
-
-    Args:
-        functions, slopes: `Rows` to fill.
-        table: pointer to the coefficients.
-        first: `Lanes`: number of the row where the leg's table begins.
-        cells: of a table.
-        theta: `Lanes`, crank angle; what is not a number gives values that are none [rad].
-    """
+    """Fill `Rows` with all functions and derivatives at the crank angles `theta` [rad]; what is not a number
+    gives values that are none. The table has so many `cells` and begins at row `first` behind the pointer."""
     builder, count = code.builder, code.args[0].count
     whole = wide(INDEX, count)
     # The sum's last bits are the number of the cell, turns included: those of one turn are its row.

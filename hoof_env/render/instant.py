@@ -8,7 +8,7 @@ from typing import Annotated, Any, NamedTuple, get_type_hints
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hoof_env.gait.gait import PARAMETERS
+from hoof_env.gait import PARAMETERS
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
 

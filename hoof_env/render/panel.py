@@ -12,7 +12,7 @@ import numpy as np
 import pygame
 
 from hoof_env.dynamics.observables import StanceCounter
-from hoof_env.gait.gait import LIMITS
+from hoof_env.gait import LIMITS
 from hoof_env.render.brush import CRANK, FAINT, FINE, FORCE, GREY, INK, PAPER, Brush
 from hoof_env.render.instant import Instant
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pygame
 
-from hoof_env.gait.gait import LIMITS
+from hoof_env.gait import LIMITS
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry, tables
 from hoof_env.leg.kinematics import pose, solve_points

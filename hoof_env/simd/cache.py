@@ -25,7 +25,7 @@ from numba.core.compiler_lock import global_compiler_lock
 from hoof_env.errors import OutputError
 
 MECHANICS = ("simd", "leg", "ground", "gait", "dynamics")
-"""The rooms of this package whose sources end up in kernels."""
+"""The rooms of this package whose sources end up in kernels, folders or files."""
 
 LONGEST_WAIT = 600.0
 """Seconds to wait for another process, which may be stopped; then the kernel is compiled here."""
@@ -56,16 +56,8 @@ class _FilesInGivenFolder(_caching.CompileResultCacheImpl):
 
 
 class KernelCache(_caching.FunctionCache):
-    """The files of one kernel.
-
-    Args:
-        function: the kernel.
-        say: takes a line about what is waited for.
-        identity: tells apart kernels of one source that contain different functions.
-
-    Raises:
-        OutputError: NUMBA_CACHE_DIR is not set, and no folder that numba tries is writable.
-    """
+    """The files of one kernel; `identity` tells apart kernels of one source that contain different functions.
+    Raises OutputError where no folder is writable."""
 
     def __init__(self, function: Callable[..., Any], say: Callable[[str], None], identity: str = "") -> None:
         if given_folder():
@@ -85,11 +77,7 @@ class KernelCache(_caching.FunctionCache):
         return sig, codegen.magic_tuple(), self._identity
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """As numba's; where there is nothing to load, it returns once this process may compile.
-
-        Raises:
-            OutputError: nothing can be written to the cache folder.
-        """
+        """As numba's; where there is nothing to load, it returns once this process may compile."""
         if (found := self._load(sig, target_context)) is not None:
             return found
         try:
@@ -104,7 +92,6 @@ class KernelCache(_caching.FunctionCache):
             return super().load_overload(sig, target_context)
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """As numba's. Raises OutputError: the cache folder cannot be written, or the disk is full."""
         COMPILED.append(self._kernel)
         try:
             super().save_overload(sig, data)
@@ -167,14 +154,16 @@ def _no_folder(folder: str, error: Exception) -> OutputError:
 @cache
 def _sources() -> str:
     """Digest of everything in this package that kernels are made from."""
-    package = Path(__file__).parents[1]
-    return "".join(_digest(package / room) for room in MECHANICS)
+    rooms = [Path(__file__).parents[1] / room for room in MECHANICS]
+    files = [room.with_suffix(".py") for room in rooms]
+    return "".join(_digest(file if file.is_file() else room) for room, file in zip(rooms, files, strict=True))
 
 
 @cache
-def _digest(folder: Path) -> str:
-    """Digest of the modules in a folder: a kernel may call any that lies beside it."""
+def _digest(room: Path) -> str:
+    """Digest of a module, or of those in a folder: a kernel may call any that lies beside it."""
     digest = hashlib.sha256()
-    for path in sorted(path for path in folder.glob("*.py") if path.is_file()):
+    modules = [room] if room.is_file() else room.glob("*.py")
+    for path in sorted(path for path in modules if path.is_file()):
         digest.update(path.read_bytes())
     return digest.hexdigest()

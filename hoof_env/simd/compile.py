@@ -24,17 +24,10 @@ QUIET = "HOOF_ENV_QUIET"
 
 def kernel(function: F, identity: str = "") -> F:
     """Compile `function` with numba at its first call, and keep the result in numba's cache folder, which the
-    environment variable NUMBA_CACHE_DIR names.
+    environment variable NUMBA_CACHE_DIR names. Of several processes that need it at once one compiles.
 
-    Args:
-        function: the kernel.
-        identity: of the functions from outside this package that it contains, see `user_functions`.
-
-    Of several processes that need it at once one compiles. The first call raises OutputError if the kernel
-    has to be compiled and the folder is not writable.
-
-    Raises:
-        HoofEnvError: numba is told not to compile.
+    `identity` is that of the functions from outside this package that it contains, see `user_functions`. The
+    first call raises OutputError if the kernel has to be compiled and the folder is not writable.
     """
     compiled: Any = numba.njit(error_model="numpy")(function)
     if not hasattr(compiled, "_cache"):  # records have no attributes outside compiled code

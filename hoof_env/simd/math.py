@@ -30,12 +30,8 @@ ROUNDER = 1.5 * 2.0**52  # adding and subtracting it rounds to the nearest whole
 
 @inlined
 def root_power(d, eighths):  # type: ignore[no-untyped-def]
-    """d^(eighths / 8) by square roots; 0 for negative d, relative error below 1e-15.
-
-    Args:
-        d: base [any unit].
-        eighths: exponent in eighths, a whole number from 8 to 24, the same in all lanes.
-    """
+    """d^(eighths / 8) by square roots; 0 for negative d, relative error below 1e-15. `eighths` is a whole
+    number from 8 to 24, the same in all lanes."""
     base = larger(d, 0.0)
     power = base
     if eighths >= 16:
@@ -58,10 +54,8 @@ def root_power(d, eighths):  # type: ignore[no-untyped-def]
 
 @inlined
 def exp_of_negative(x):  # type: ignore[no-untyped-def]
-    """exp(x) for x <= 0, relative error below 1e-13; exp(-40) below -40.
-
-    The series of exp(x / 256), squared eight times.
-    """
+    """exp(x) for x <= 0, relative error below 1e-13; exp(-40) below -40. The series of exp(x / 256), squared
+    eight times."""
     y = larger(x, LOWEST_EXPONENT) * (1 / 256)
     e = 1 / 3628800
     e = e * y + 1 / 362880

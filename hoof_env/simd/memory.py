@@ -91,13 +91,8 @@ class Addresses:
     """Where some arrays are, in one array of whole numbers.
 
     A call from Python takes a tenth of a microsecond for each array; one array of addresses replaces many.
-    Whoever makes it keeps the arrays alive, and makes it anew for a copy.
-
-    Args:
-        names: of the arrays.
-
-    Attributes:
-        slots: by name, where the address of each is; behind it its shape.
+    Whoever makes it keeps the arrays alive, and makes it anew for a copy. `slots` says by the arrays' names
+    where the address of each is; behind it is its shape.
     """
 
     def __init__(self, *names: str) -> None:

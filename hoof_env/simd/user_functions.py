@@ -96,11 +96,7 @@ def number_of(what: str) -> Any:
 
 
 def check_function(name: str, function: Any, arguments: int) -> None:
-    """Raise unless something is a plain function of so many arguments.
-
-    Raises:
-        ParameterError: it is not.
-    """
+    """Raise ParameterError unless something is a plain function of so many arguments."""
     if not isinstance(function, FunctionType) or function.__code__.co_flags & 0x0C:  # *args, **kwargs
         raise ParameterError(f"{name}: expected a plain function of {arguments} arguments, got {function!r}")
     code = function.__code__
@@ -111,8 +107,7 @@ def check_function(name: str, function: Any, arguments: int) -> None:
 
 
 def what_cannot_be_compiled(error: Exception) -> str:
-    """What numba does not compile of a function from outside, in a line: the operation, the function and the
-    line."""
+    """What numba does not compile of a function from outside: the operation, the function and the line."""
     text = str(error)
     if refused := re.search(r"\{([^{}]* returns [^{}]*; expected a number)\}", text):
         return refused[1]

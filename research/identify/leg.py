@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.errors import ParameterError
-from hoof_env.gait.gait import LIMITS, GaitParameters, load_gait
+from hoof_env.gait import LIMITS, GaitParameters, load_gait
 from hoof_env.ground.contact import load_ground
 from hoof_env.leg.geometry import Geometry, Preset, load_geometry, tables
 from hoof_env.leg.linkage import DYADS, LENGTHS, POINTS

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.gait.gait import LIMITS
+from hoof_env.gait import LIMITS
 from hoof_env.leg.kinematics import cross, dot
 from hoof_env.leg.linkage import BODIES, CONSTRUCTION, LENGTHS, POINTS, Dyad
 from hoof_env.simd.compile import kernel

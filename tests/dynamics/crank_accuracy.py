@@ -18,7 +18,7 @@ from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limb, Motor, Trunk
 from hoof_env.dynamics.step_length import StepWarning
 from hoof_env.errors import ParameterError
-from hoof_env.gait.gait import load_gait
+from hoof_env.gait import load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
 from tests.dynamics.scenes import NATURAL

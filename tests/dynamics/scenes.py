@@ -5,7 +5,7 @@ import numpy as np
 from hoof_env.dynamics.constrained import SOLE
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import GRAVITY, Limb, Motor, Trunk
-from hoof_env.gait.gait import load_gait
+from hoof_env.gait import load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.linkage import CRANK, FRAME, JOINTS, LOCK

@@ -134,11 +134,8 @@ def test_powers_add_up_to_the_change_of_energy(kind):
         return then.kinetic + then.potential
 
     assert slope_of(energy) == pytest.approx(sum(now.power.values()), rel=1e-8)
-    idle = {"drag": kind == "fixed", "damping": kind != "suspended"}
-    assert {name: power == 0 for name, power in now.power.items()} == {
-        **dict.fromkeys(now.power, False),
-        **idle,
-    }
+    idle = dict.fromkeys(now.power, False) | {"drag": kind == "fixed", "damping": kind != "suspended"}
+    assert {name: power == 0 for name, power in now.power.items()} == idle
 
 
 def test_a_limp_horse_falls_as_one():

@@ -7,7 +7,7 @@ from hoof_env.dynamics.constrained import ConstrainedLeg
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import GRAVITY, Limb, Motor, Prescribed, Trunk
 from hoof_env.errors import ParameterError
-from hoof_env.gait.gait import load_gait
+from hoof_env.gait import load_gait
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
 from hoof_env.leg.linkage import FRAME, JOINTS

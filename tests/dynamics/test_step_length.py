@@ -11,7 +11,7 @@ from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import TRUNKS, Limb, Motor, Prescribed, Trunk
 from hoof_env.dynamics.step_length import MOST_SUBSTEPS, StepWarning
 from hoof_env.dynamics.stepping import SCHEMES
-from hoof_env.gait.gait import GaitParameters
+from hoof_env.gait import GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from tests.dynamics.scenes import LEG, LOWEST, NATURAL, THETA, WALK, drives_less_losses, energy, horse
@@ -173,7 +173,3 @@ def test_stiff_ground_gets_the_substeps_that_it_needs(scheme):
     error, too_long = np.abs(way - fine), np.abs(coarse - fine)
     assert error.max() < 1e-3
     assert too_long.max() > 4 * error.max()
-
-
-def test_soft_ground_needs_no_more_than_the_step():
-    assert TrunkEngine(Limb(LEG), Trunk("free", mass=100.0)).substeps == 1

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import TRUNKS, Limb, Motor, Prescribed, Result, Trunk
-from hoof_env.gait.gait import FILTER, LIMITS, PARAMETERS, FilterSettings, GaitParameters, command_filters
+from hoof_env.gait import FILTER, LIMITS, PARAMETERS, FilterSettings, GaitParameters, command_filters
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.laws import FRICTION_LAWS
 from hoof_env.ground.terrain import Terrain
@@ -89,10 +89,8 @@ def put_somewhere(engine, rng, depth):
     motors = np.array([isinstance(limb.drive, Motor) for limb in engine.limbs])[:, None]
     rows["theta_rate"][:] = np.where(motors, rng.normal(5, 4, (legs, n)), rows["crank_speed"])
     for point in ("toe", "heel"):
-        rows[f"{point}_penetration"][:], rows[f"{point}_slowness"][:] = (
-            1.0,
-            1 / rng.uniform(0.1, 1.5, (legs, n)),
-        )
+        rows[f"{point}_penetration"][:] = 1.0
+        rows[f"{point}_slowness"][:] = 1 / rng.uniform(0.1, 1.5, (legs, n))
     engine.set_state(state)
     fallen = Result.FALLEN  # a state put together at random may have the trunk in the ground: it is reported
     assert np.isin(engine.advance(command, 0), (Result.OK, fallen)).all()

@@ -6,7 +6,7 @@ import pytest
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import GRAVITY, TRUNKS, Limb, Prescribed, Trunk
 from hoof_env.dynamics.stepping import SCHEMES
-from hoof_env.gait.gait import GaitParameters, load_gait
+from hoof_env.gait import GaitParameters, load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
 from tests.dynamics.scenes import HIPS, LOWEST, NATURAL, RUN, THETA, WALK, drives_less_losses, energy, horse

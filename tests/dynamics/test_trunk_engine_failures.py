@@ -6,7 +6,7 @@ import pytest
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limb, Motor, Prescribed, Result, Trunk
 from hoof_env.errors import ParameterError
-from hoof_env.gait.gait import GaitParameters
+from hoof_env.gait import GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.profile import functions

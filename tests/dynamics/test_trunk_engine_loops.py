@@ -6,7 +6,7 @@ import pytest
 from hoof_env.dynamics.constrained import SOLE
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limb, Motor, Prescribed, Trunk
-from hoof_env.gait.gait import LIMITS
+from hoof_env.gait import LIMITS
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose

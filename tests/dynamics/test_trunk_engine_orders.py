@@ -8,7 +8,7 @@ import pytest
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limb, Motor, Prescribed, Trunk
 from hoof_env.dynamics.stepping import SCHEMES
-from hoof_env.gait.gait import GaitParameters
+from hoof_env.gait import GaitParameters
 from tests.dynamics.scenes import FAR, LEG, RUN, WALK
 from tests.oracle.horse import PlainHorse
 from tests.oracle.run import simulate

@@ -11,7 +11,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from hoof_env.envs.tasks import TASKS, Settings, check_effect
 from hoof_env.errors import ParameterError
-from hoof_env.gait.gait import LIMITS
+from hoof_env.gait import LIMITS
 
 IDS = sorted(
     name for name, spec in gym.registry.items() if str(spec.entry_point).endswith("horse_leg:HorseLegEnv")

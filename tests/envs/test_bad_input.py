@@ -12,7 +12,7 @@ from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 
 from hoof_env import Sb3VecEnv, make_policy
 from hoof_env.errors import ParameterError
-from hoof_env.gait.gait import load_gait
+from hoof_env.gait import load_gait
 
 LEG, NAN = "hoof_env/HorseLeg-v0", float("nan")
 

@@ -8,7 +8,7 @@ from family import substeps
 
 from hoof_env.envs.horse_leg import HorseLegEnv
 from hoof_env.envs.policies import make_policy, policy_names
-from hoof_env.gait.gait import gait_names, load_gait
+from hoof_env.gait import gait_names, load_gait
 from hoof_env.leg.geometry import preset_names, read_preset
 
 FOUND = "carrying_walk"

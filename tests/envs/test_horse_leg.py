@@ -11,7 +11,7 @@ from hoof_env.dynamics.layout import TRUNK_STATE
 from hoof_env.envs.observation import MIDDLE
 from hoof_env.envs.policies import make_policy, policy_names
 from hoof_env.errors import ParameterError
-from hoof_env.gait.gait import LIMITS, GaitParameters, load_gait
+from hoof_env.gait import LIMITS, GaitParameters, load_gait
 
 LEG, FIXED = "hoof_env/HorseLeg-v0", "hoof_env/HorseLegFixed-v0"
 

@@ -14,7 +14,7 @@ from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 from hoof_env.envs.infos import MEASURED, START, Named, named, row_of
 from hoof_env.envs.reward import TERMS as TABLE
 from hoof_env.errors import ParameterError
-from hoof_env.gait.gait import PARAMETERS
+from hoof_env.gait import PARAMETERS
 
 LEG = "hoof_env/HorseLeg-v0"
 TERMS = tuple(term.key for term in TABLE)

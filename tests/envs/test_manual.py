@@ -22,7 +22,7 @@ from hoof_env.envs.start import OPTIONS
 from hoof_env.envs.tasks import PER_EPISODE, TASKS, Settings, to_json
 from hoof_env.envs.vector import HorseLegVectorEnv
 from hoof_env.errors import ParameterError
-from hoof_env.gait.gait import LIMITS, load_gait
+from hoof_env.gait import LIMITS, load_gait
 
 DOCS = Path(__file__).parents[2] / "docs" / "environments"
 IDS = {page: re.search(r'gym.make\("(.+?)"', manual.page(page))[1] for page in manual.PAGES}

@@ -15,7 +15,7 @@ from gymnasium.envs.registration import EnvSpec
 
 from hoof_env import Geometry, read_preset
 from hoof_env.errors import DataFileError, ParameterError
-from hoof_env.gait.gait import LIMITS
+from hoof_env.gait import LIMITS
 from hoof_env.ground import contact as ground
 from hoof_env.leg.geometry import PARTS
 from hoof_env.leg.linkage import DYADS, LENGTHS

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hoof_env.errors import ParameterError
-from hoof_env.gait.gait import (
+from hoof_env.gait import (
     LIMITS,
     MOTION,
     FilterSettings,

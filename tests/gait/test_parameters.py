@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hoof_env.errors import DataFileError, ParameterError
-from hoof_env.gait.gait import LIMITS, PARAMETERS, GaitParameters, gait_names, load_gait, paper_gaits
+from hoof_env.gait import LIMITS, PARAMETERS, GaitParameters, gait_names, load_gait, paper_gaits
 from hoof_env.leg.geometry import read_preset
 
 inside = st.tuples(*(st.floats(low, high) for low, high in LIMITS.values()))

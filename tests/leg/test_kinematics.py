@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hoof_env.errors import ParameterError
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
-from hoof_env.leg.linkage import BODIES, CONSTRUCTION, LOCK, POINTS, Dyad
+from hoof_env.leg.linkage import BODIES, CONSTRUCTION, LOCK, NUMBER, Dyad
 
 LEG = load_geometry("first_fit")
 THETAS = np.linspace(-7.0, 7.0, 500)
@@ -114,13 +114,12 @@ def test_rates_and_accelerations_are_the_derivatives_of_the_motion(motion, trave
 @settings(deadline=None, max_examples=40)
 def test_every_body_moves_rigidly(motion):
     at = pose_at(LEG, motion, 0.0)
-    number = {name: i for i, name in enumerate(POINTS)}
     for k, body in enumerate(BODIES):
-        arm = (at.points[number[body.head]] - at.points[number[body.tail]]) / 2
+        arm = (at.point(body.head) - at.point(body.tail)) / 2
         turned = np.array([-arm[1], arm[0]])
         rate, acc = at.angular_velocities[k], at.angular_accelerations[k]
         for end, sign in ((body.head, 1), (body.tail, -1)):
-            i = number[end]
+            i = NUMBER[end]
             assert at.points[i] == pytest.approx(at.centres[k] + sign * arm, abs=1e-12)
             assert at.point_velocities[i] == pytest.approx(
                 at.centre_velocities[k] + sign * rate * turned, rel=1e-9, abs=1e-9

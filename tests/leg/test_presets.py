@@ -5,7 +5,7 @@ import json
 import pytest
 
 from hoof_env.errors import DataFileError, GeometryError, OutputError, ParameterError
-from hoof_env.gait.gait import load_gait
+from hoof_env.gait import load_gait
 from hoof_env.ground.contact import Ground, load_ground
 from hoof_env.leg.geometry import Geometry, load_geometry, preset_names, read_preset
 

@@ -7,7 +7,7 @@ leg, and `Jet` carries their two derivatives by time along.
 import numpy as np
 
 from hoof_env.dynamics.parts import Motor
-from hoof_env.gait.gait import COS, OFFSET, SIN
+from hoof_env.gait import COS, OFFSET, SIN
 from hoof_env.leg.linkage import BODIES, CONSTRUCTION, Dyad
 from tests.oracle.jet import Jet, concatenate, direction, inverse, root, stack, turn
 

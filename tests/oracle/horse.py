@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.parts import GRAVITY, TRUNKS, Motor
-from hoof_env.gait.gait import SPEED
+from hoof_env.gait import SPEED
 from tests.oracle.bodies import PlainBodies
 from tests.oracle.ground import PlainGround
 from tests.oracle.jet import Jet
@@ -71,7 +71,7 @@ class PlainHorse(PlainBodies):
             trunk, trunk_rate: x, y, pitch and their rates, shape (3,) [m, rad, s].
             theta, theta_rate: of each crank, shape (N,) [rad, rad/s]; a prescribed rate is the filter's.
             filters: value, rate and acceleration of each leg's gait parameters, shape (N, 4, 3) in the order
-                of `gait.gait.PARAMETERS`; shape (N, 4) where they are steady.
+                of `gait.PARAMETERS`; shape (N, 4) where they are steady.
             approach: v0 of each hoof point in the ground, NaN of one that is not, shape (N, 2) [m/s]; None
                 where all are in the air.
         """

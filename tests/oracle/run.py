@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.errors import HoofEnvError
-from hoof_env.gait.gait import SPEED, GaitParameters
+from hoof_env.gait import SPEED, GaitParameters
 from tests.oracle.horse import WORKS
 
 Array = NDArray[np.generic]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hoof_env.errors import OutputError
-from hoof_env.gait.gait import load_gait
+from hoof_env.gait import load_gait
 from hoof_env.ground.contact import load_ground
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose

@@ -8,7 +8,7 @@ import numpy as np
 
 from benchmarks.common import GroundForces, Start, corners
 from hoof_env.dynamics.parts import Drive, Limb, Motor, Prescribed, Trunk
-from hoof_env.gait.gait import load_gait
+from hoof_env.gait import load_gait
 from hoof_env.ground.contact import Ground, load_ground
 from hoof_env.leg.geometry import load_geometry
 from tests.peers.trunk_legs import TrunkLegs

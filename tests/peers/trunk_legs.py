@@ -5,7 +5,7 @@ import numpy as np
 from benchmarks.common import Record
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Result
-from hoof_env.gait.gait import GaitParameters
+from hoof_env.gait import GaitParameters
 from hoof_env.leg.kinematics import FrameMotion, pose
 
 POINTS = ("toe", "heel")

@@ -5,7 +5,7 @@ import pytest
 
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limb, Prescribed, Trunk
-from hoof_env.gait.gait import load_gait
+from hoof_env.gait import load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import load_geometry

@@ -18,7 +18,7 @@ from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limb, Trunk
 from hoof_env.envs.policies import make_policy
 from hoof_env.errors import HoofEnvError, ParameterError
-from hoof_env.gait.gait import LIMITS, PARAMETERS, load_gait
+from hoof_env.gait import LIMITS, PARAMETERS, load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import load_geometry

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from hoof_env.dynamics.constrained import ConstrainedLeg, Constraints, new_trace
 from hoof_env.dynamics.parts import Result
 from hoof_env.errors import GeometryError
-from hoof_env.gait.gait import LIMITS, MOTION, GaitParameters, evaluate_motion, load_gait, steady_filters
+from hoof_env.gait import LIMITS, MOTION, GaitParameters, evaluate_motion, load_gait, steady_filters
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry, tables
 from hoof_env.leg.kinematics import FrameMotion, pose

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hoof_env.errors import GeometryError, ParameterError
-from hoof_env.gait.gait import load_gait
+from hoof_env.gait import load_gait
 from hoof_env.leg.geometry import load_geometry, read_preset
 from research.identify.leg import GAITS, NAMES, SCALES, encode, to_preset
 

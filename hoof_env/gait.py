@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.leg.geometry import DEFAULT_PRESET, Preset, named, read_preset, wrong
 from hoof_env.simd.compile import kernel
+from hoof_env.simd.math import clip
 
 Gait = TypeVar("Gait")
 
@@ -179,12 +180,6 @@ class FilterSettings:
         crank = (self.gain, self.crank_rate, self.crank_acc)
         swing = (self.gain, self.swing_rate, self.swing_acc)
         return np.array([crank, swing, swing, swing])
-
-
-@kernel
-def clip(x: float, bound: float) -> float:
-    """`x` limited to [-bound, bound]."""
-    return min(max(x, -bound), bound)
 
 
 @kernel
