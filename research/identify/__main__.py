@@ -13,23 +13,20 @@ from typing import Any
 
 import numpy as np
 
-from hoof_env.errors import HoofEnvError, ParameterError, check_number
-from hoof_env.simd.math import EXPONENT_UNIT
+from hoof_env.errors import HoofEnvError
 from research.identify.command import check_counts, check_extras, load_start, provenance, run_command
 from research.identify.confirm import Confirmation, confirm
 from research.identify.leg import to_preset
 from research.identify.resume import digest_of, open_state, versions, write_json
 from research.identify.search import BUDGET, SCHEDULE, LegProblem, Phase, Result, search
 
-EXPONENT = 1.375
-"""n of Eq. 14 unless told otherwise: with it a leg meets every published number, see docs/decisions.md."""
+EXPONENT = 1.375  # n of Eq. 14, not printed: with it a leg meets every number, see docs/decisions.md
 
 
 def identify(
     out: Path,
     start: str = "first_fit",
     seed: int = 0,
-    exponent: float = EXPONENT,
     workers: int = 2,
     budget: int = BUDGET,
     resume: bool = False,
@@ -43,7 +40,6 @@ def identify(
             folder state holds what a killed search is resumed from.
         start: a preset to search around, a name or a JSON file.
         seed: the same seed and options find the same leg, with any number of workers.
-        exponent: of the contact law (Eq. 14), which the paper does not print.
         workers: processes.
         budget: evaluations at most; one with the paper's solver counts for several.
         resume: go on with a search in this folder that was interrupted or killed.
@@ -52,17 +48,11 @@ def identify(
     from tqdm import tqdm
 
     seed, workers, budget = check_counts(seed=seed, workers=workers, budget=budget)
-    exponent = check_number("exponent", exponent, low=1, high=3)
-    if exponent * EXPONENT_UNIT % 1:
-        raise ParameterError(
-            f"exponent: expected a multiple of 1/{EXPONENT_UNIT}, for no environment takes another, "
-            f"got {exponent!r}"
-        )
-    choice, x = load_start(start, exponent)
+    choice, x = load_start(start, EXPONENT)
     problem = LegProblem(choice)
     about = {
         "start": f"{Path(start).stem} ({digest_of([asdict(choice), x])})",
-        "exponent": exponent,
+        "exponent": EXPONENT,
         "seed": seed,
         "budget": budget,
         "schedule": digest_of([asdict(phase) for phase in SCHEDULE]),
@@ -95,11 +85,7 @@ def identify(
 def best_leg(
     problem: LegProblem, results: Sequence[Result], about: Mapping[str, Any]
 ) -> tuple[Result, dict[str, Any], Confirmation] | None:
-    """What was confirmed, else the best that the full system can run, as a preset with that system's verdict.
-
-    Args:
-        about: what was searched, for the provenance.
-    """
+    """What was confirmed, else the best that the full system can run, with its preset and verdict."""
     for result in sorted(results, key=lambda result: (not result.confirmed, result.both)):
         origin = provenance(f"research.identify, job {result.id}", about)
         try:
@@ -111,7 +97,6 @@ def best_leg(
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; returns the exit code."""
     return run_command(identify, "research.identify", arguments)
 
 

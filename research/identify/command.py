@@ -12,8 +12,7 @@ from research.identify.leg import Choice, encode
 
 
 def run_command(command: Callable[..., None], name: str, arguments: Sequence[str] | None = None) -> int:
-    """Call `command` with the options of the command line; returns the exit code: 0 done, 2 a wrong option or
-    an error, told in one line, 130 interrupted."""
+    """Call `command` with the options of the command line; returns 0, 2 after an error, 130 interrupted."""
     import tyro
 
     try:
@@ -28,7 +27,6 @@ def run_command(command: Callable[..., None], name: str, arguments: Sequence[str
 
 
 def check_extras() -> None:
-    """Raise `MissingExtraError` with the way out unless the optimisers can be imported."""
     for name in ("cma", "scipy", "tqdm"):
         try:
             importlib.import_module(name)
@@ -37,11 +35,7 @@ def check_extras() -> None:
 
 
 def check_counts(**counts: Any) -> list[int]:
-    """Whole numbers: seed and attempts 0 or more, all others 1 or more.
-
-    Raises:
-        ParameterError: one is out of range; the message names it.
-    """
+    """Whole numbers: seed and attempts 0 or more, all others 1 or more."""
     return [
         int(check_number(n, v, low=n not in ("seed", "attempts"), high=1024 if n == "workers" else 2**53))
         for n, v in counts.items()
@@ -49,7 +43,6 @@ def check_counts(**counts: Any) -> list[int]:
 
 
 def provenance(how: str, about: Mapping[str, Any]) -> str:
-    """Where the numbers of a leg come from: found how, with what settings."""
     settings = {**about, **about["versions"]}
     words = (f"{name} {value}" for name, value in settings.items() if name not in ("versions", "schedule"))
     return (
@@ -60,11 +53,7 @@ def provenance(how: str, about: Mapping[str, Any]) -> str:
 
 
 def load_start(start: str, exponent: float) -> tuple[Choice, tuple[float, ...]]:
-    """Choice and x of a preset, by name or file, on ground with this exponent.
-
-    Raises:
-        HoofEnvError: there is no such preset, or its leg does not turn; the message names it.
-    """
+    """Choice and x of a preset, by name or file, on ground with this exponent; errors name the preset."""
     try:
         choice, x = encode(start, exponent)
     except HoofEnvError as error:

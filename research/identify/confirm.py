@@ -17,20 +17,13 @@ COUNTED = {"exact": EXACT, "paper": PROBABLE}
 
 @dataclass(frozen=True)
 class Confirmation:
-    """What the full system says of a preset.
-
-    Attributes:
-        rows, claims: as `hoof_env.paper.reproduce.Reproduction` has them.
-        errors: by `COUNTED`, the largest error of a row, without the ill-conditioned rows [bars].
-        outside: (id, solver) of the rows outside their bars, of the solvers that count.
-        untrue: likewise of the claims that do not hold.
-    """
+    """What the full system says of a preset; rows and claims as `hoof_env.paper.reproduce` has them."""
 
     rows: list[dict[str, Any]]
     claims: list[dict[str, Any]]
-    errors: dict[str, float]
-    outside: list[tuple[str, str]]
-    untrue: list[tuple[str, str]]
+    errors: dict[str, float]  # by `COUNTED`, the largest of a row, without the ill-conditioned [bars]
+    outside: list[tuple[str, str]]  # (id, solver) of rows outside their bars, of the solvers that count
+    untrue: list[tuple[str, str]]  # likewise of the claims that do not hold
 
     @property
     def holds(self) -> bool:
@@ -44,11 +37,8 @@ class Confirmation:
 
 
 def confirm(preset: Mapping[str, Any]) -> Confirmation:
-    """Run the content of a preset file through the full system and compare it with the paper.
-
-    Raises:
-        HoofEnvError: the leg does not turn, or its simulation stops.
-    """
+    """Run the content of a preset file through the full system and compare it with the paper; raises
+    `HoofEnvError` where the leg does not turn or its simulation stops."""
     content: Any = dict(preset)
     run = reproduce(preset=content)
     rows = [row for row in run.rows if row["solver"] in COUNTED.values()]

@@ -13,8 +13,7 @@ import numpy as np
 
 from research.identify.features import FEATURES
 
-LENGTH_RANGE = (0.08, 3.0)
-"""Shortest and longest link [m]: none vanishes, none is longer than the animal."""
+LENGTH_RANGE = (0.08, 3.0)  # of a link [m]: none vanishes, none is longer than the animal
 
 LEG = np.dtype(
     [
@@ -31,7 +30,6 @@ LEG = np.dtype(
         )
     ]
 )  # fmt: skip
-"""What is measured on the leg."""
 
 BOTH = np.dtype(
     [
@@ -41,7 +39,6 @@ BOTH = np.dtype(
         ("turn", "f8"),  # running: push over load in the second half of stance minus the first half [-]
     ]
 )
-"""What compares the two gaits or halves."""
 
 GROUPS = (("leg", LEG), ("walk", FEATURES), ("run", FEATURES), ("both", BOTH))
 MEASURED = tuple(f"{group}.{name}" for group, kind in GROUPS for name in kind.names or ())

@@ -2,14 +2,13 @@
 
     python -m research.identify.ensemble --preset identified --both --out runs/ensemble
 
-The region of legs that fit is thin and bent: at the bar a dozen rows are at their limits at once, and a leg
-that is moved at random and then repaired hardly ever comes back to it. So an attempt pushes a leg inside it,
-as far in a given direction as it goes, by sequential linear programming with the rows and demands as limits
-(`minimax.descend` with the push as its only row and everything else as a demand). What it starts from depends
-on earlier rounds alone, as in `search`.
+The region of legs that fit is thin and bent: a leg that is moved at random and then repaired hardly ever
+comes back to it. So an attempt pushes a leg inside it, as far in a given direction as it goes, with the rows
+and demands as limits (`minimax.descend` with the push as its only row and everything else as a demand). What
+it starts from depends on earlier rounds alone, as in `search`.
 
-The ensemble of a preset lies in `ensembles` beside this file, under the preset's name. A member is the
-content of a preset file, with how well it fits:
+The ensemble of a preset lies in `ensembles` beside this file. A member is the content of a preset file, with
+how well it fits:
 
     {"provenance": ..., "units": ..., "ground": {"exponent": ...},
      "bar": {"exact": 0.97, "paper": 0.99},
@@ -17,7 +16,7 @@ content of a preset file, with how well it fits:
 
 Errors are those of the worst row, in units of its own bar; with the paper's solver the walking inelastic
 rows, which are ill-conditioned, do not count. "short" names the demands on plausibility that a leg misses.
-All legs share the preset's ground, written as in a preset file; without it they have the default one.
+All legs share the preset's ground.
 """
 
 from __future__ import annotations
@@ -51,17 +50,10 @@ from research.identify.resume import (
 )
 from research.identify.search import CLEAR, TOE_SCALES, LegProblem
 
-HOPS = (0.002, 0.005, 0.01, 0.03)
-"""Sizes of the hops, in a search's scales, between descents of a start that is outside the bar."""
-
-TRIES = 12
-"""Descents at most of such a start, with each solver."""
-
-REACH = 0.5
-"""How far a push wants to go, in a search's scales: further than it ever gets."""
-
-FIRM = 100.0
-"""What a shortage of one costs a push, in scales: enough that none is worth its while."""
+HOPS = (0.002, 0.005, 0.01, 0.03)  # in scales, between descents of a start that is outside the bar
+TRIES = 12  # descents at most of such a start, with each solver
+REACH = 0.5  # how far a push wants to go, in a search's scales: further than it ever gets
+FIRM = 100.0  # what a shortage of one costs a push, in scales: enough that none is worth its while
 
 SAMPLES, FINE = 801, 2001
 """Instants a revolution, and those at which the demands on a member are checked. At the bar 401 are up to
@@ -70,14 +62,8 @@ SAMPLES, FINE = 801, 2001
 
 @dataclass(frozen=True)
 class Aim:
-    """What a member must meet.
-
-    Attributes:
-        problem: rows and demands.
-        bar: largest error of a row, in units of its own bar.
-        both: the paper's solver counts too, all rows but the ill-conditioned.
-        steps: of a push, at most.
-    """
+    """What a member must meet: rows and demands of a problem; the largest error of a row, in units of its own
+    bar; and whether the paper's solver counts too, all rows but the ill-conditioned. `steps`: of a push."""
 
     problem: LegProblem
     bar: float
@@ -86,12 +72,10 @@ class Aim:
 
     @property
     def penalty(self) -> float:
-        """Of a shortage of one [bars]: a merit within the bar leaves no demand short, since `Objective.rate`
-        asks for `INSIDE` more than they do."""
+        """Of a shortage of one [bars], so that a merit within the bar leaves no demand short."""
         return self.bar / INSIDE
 
     def rate(self, both: bool) -> Rate:
-        """Rating of y, with the exact solver alone or with both."""
         return self.problem.objective(SAMPLES, both, by_toe=True).rate
 
     def runs(self, y: Vector) -> bool:
@@ -103,14 +87,13 @@ class Aim:
 
 @dataclass(frozen=True)
 class Task:
-    """An attempt to be made: its place, which with the seed makes its random numbers; the name of the start
-    that it goes back to; the leg y that it goes on from, for a start x; and the direction of the push, a unit
-    vector in a search's scales, empty for a start."""
+    """An attempt to be made: its place, which with the seed makes its random numbers; the leg y that it goes
+    on from, x for the start; and the direction of the push, a unit vector in a search's scales, empty for the
+    start."""
 
     round: int
     index: int
     seed: int
-    start: str
     y: tuple[float, ...]
     direction: tuple[float, ...] = ()
 
@@ -121,11 +104,10 @@ class Task:
 
 @dataclass(frozen=True)
 class Attempt:
-    """A made attempt; see `Task`. Its merit is the largest error [bars] and what shortages cost, see
-    `Aim.penalty`; `MISSED_ROW` if the paper's solver cannot simulate the leg."""
+    """What a `Task` came to. Its merit is the largest error [bars] and what shortages cost; `MISSED_ROW` if
+    the paper's solver cannot simulate the leg."""
 
     id: str
-    start: str
     y: tuple[float, ...]
     merit: float
 
@@ -133,8 +115,7 @@ class Attempt:
 @dataclass(frozen=True)
 class Verdict:
     """What the full system says of an attempt: the content of a preset file, empty if the leg does not turn;
-    by solver the largest error of a row [bars]; shortages by name of the demand; and in words why the leg is
-    no member, empty for a member."""
+    largest errors by solver [bars]; shortages by demand; and in words why the leg is no member."""
 
     preset: Mapping[str, Any]
     errors: Mapping[str, float]
@@ -143,7 +124,6 @@ class Verdict:
 
 
 def attempt(task: Task, aim: Aim) -> Attempt:
-    """Make an attempt; the same task and aim give the same result."""
     if task.direction:
         y = _push(task, aim)
     else:
@@ -151,7 +131,7 @@ def attempt(task: Task, aim: Aim) -> Attempt:
         for both in (False, True) if aim.both else (False,):
             y = _enter(task, both, y, aim)
     merit = aim.rate(aim.both)(y).merit(aim.penalty) if aim.runs(y) else MISSED_ROW
-    return Attempt(task.id, task.start, tuple(y.tolist()), merit)
+    return Attempt(task.id, tuple(y.tolist()), merit)
 
 
 def _enter(task: Task, both: bool, y: Vector, aim: Aim) -> Vector:
@@ -170,12 +150,11 @@ def _enter(task: Task, both: bool, y: Vector, aim: Aim) -> Vector:
 
 
 def _push(task: Task, aim: Aim) -> Vector:
-    """The leg that a push ends with; that which it goes on from unless the new one is within the bar."""
+    """The leg that a push ends with, or that it goes on from where the new one is not within the bar."""
     rate, origin, limit = aim.rate(aim.both), np.array(task.y), CLEAR * aim.bar
     direction = np.array(task.direction) / TOE_SCALES
 
     def missing(y: Vector) -> Rating:
-        """What is still missing to `REACH` from the origin, limited by rows and demands."""
         rating = rate(y)
         errors = [rating.rows, -rating.rows, *rating.peaks.values()]
         limits = np.concatenate([*(error - limit for error in errors), rating.demands])
@@ -202,20 +181,14 @@ def judge(made: Attempt, aim: Aim) -> tuple[str, Verdict]:
     return made.id, Verdict(preset, run.errors, short, (*far, *short, *untrue))
 
 
-ROUND = 8
-"""Attempts a round; more processes than that have nothing to do."""
-
-ALONG_ONE = 0.6
-"""Part of the pushes along a single coordinate of the leg; the rest go along all at random."""
-
-FROM_EDGE = 0.6
-"""Part of the pushes that go on from the leg that is furthest in their direction; the rest from any leg."""
+ROUND = 8  # attempts; more processes than that have nothing to do
+ALONG_ONE = 0.6  # part of the pushes along a single coordinate of the leg; the rest go along all at random
+FROM_EDGE = 0.6  # part of the pushes from the leg that is furthest in their direction; the rest from any leg
 
 
 class Collection(NamedTuple):
-    """Members, confirmed by the full system: the first that of the first start that has one, then each the
-    furthest from those before it; all attempts, those of the starts first; and by id the verdicts of members
-    and of legs within the bar by kinematics that are none."""
+    """Members, confirmed by the full system, each the furthest from those before it; all attempts, the start
+    first; and by id the verdicts of members and of legs within the bar by kinematics that are none."""
 
     members: list[Attempt]
     attempts: list[Attempt]
@@ -232,7 +205,7 @@ def _body(made: Attempt) -> Vector:
 
 
 def collect(
-    starts: dict[str, tuple[float, ...]],
+    start: tuple[float, ...],
     aim: Aim,
     state: State,
     say: Callable[[str], None],
@@ -242,18 +215,8 @@ def collect(
     seed: int = 0,
     workers: int = 2,
 ) -> Collection:
-    """Make attempts, then choose `size` legs within the bar that are far apart.
-
-    Args:
-        starts: legs x to begin with, by name; each is first brought within the bar, and may be a member.
-        say: takes a line for each round.
-        size: members wanted; there may be fewer.
-        attempts: beside the starts; the last round is made whole.
-
-    Raises:
-        HoofEnvError: no start comes within the bar, a damaged file, a folder that cannot be written, or a
-            process that died.
-    """
+    """Bring the leg x `start` within the bar, make as many attempts, the last round whole, then choose at
+    most `size` legs that are far apart; `say` takes a line for each round."""
     made: list[Attempt] = []
     inside: list[Attempt] = []
     rounds = -(-attempts // ROUND)
@@ -262,22 +225,20 @@ def collect(
             if number:
                 tasks = [_push_from(inside, number, index, seed) for index in range(ROUND)]
             else:
-                tasks = [Task(0, i, seed, name, x) for i, (name, x) in enumerate(starts.items())]
+                tasks = [Task(0, 0, seed, start)]
             made += state.finish(tasks, partial(attempt, aim=aim), Attempt, run)
             inside = [one for one in made if one.merit <= aim.bar]
             say(f"round {number} of {rounds}: {len(inside)} of {len(made)} legs within {aim.bar:g} bars")
             if not inside:
-                nearest = min(one.merit for one in made)
                 raise HoofEnvError(
-                    f"no start comes within {aim.bar:g} bars without a shortage, the nearest has "
-                    f"{nearest:.3f}: expected a better start or a wider --bar"
+                    f"the start does not come within {aim.bar:g} bars without a shortage, it has "
+                    f"{made[0].merit:.3f}: expected a better start or a wider --bar"
                 )
         members, verdicts = _choose(inside, aim, run, size)
     return Collection(members, made, verdicts)
 
 
 def _push_from(inside: Sequence[Attempt], number: int, index: int, seed: int) -> Task:
-    """The next push: along one coordinate or all, from the leg that is furthest that way or from any."""
     rng = np.random.default_rng([seed, number, index])
     direction = rng.standard_normal(len(inside[0].y))
     if rng.random() < ALONG_ONE:
@@ -288,7 +249,7 @@ def _push_from(inside: Sequence[Attempt], number: int, index: int, seed: int) ->
         parent = max(inside, key=lambda leg: (float(_body(leg) @ direction[:BODY]), leg.id))
     else:
         parent = inside[int(rng.integers(len(inside)))]
-    return Task(number, index, seed, parent.start, parent.y, tuple(direction.tolist()))
+    return Task(number, index, seed, parent.y, tuple(direction.tolist()))
 
 
 def _choose(
@@ -317,7 +278,7 @@ def _far_apart(legs: Sequence[Attempt], size: int) -> list[Attempt]:
 
 
 def load_ensemble(preset: str) -> list[dict[str, Any]]:
-    """The members of a preset's ensemble, each the content of a preset."""
+    """The members of a preset's ensemble, as contents of preset files."""
     path = Path(__file__).with_name("ensembles") / f"{preset}.json"
     data = read_json(path, "take it from the repository again")
     about = {"provenance": f"a member of the ensemble of {preset}", "ground": data["ground"]}
@@ -332,7 +293,6 @@ def largest(errors: Sequence[Mapping[str, float]]) -> dict[str, float]:
 def ensemble(
     out: Path,
     preset: str,
-    starts: tuple[str, ...] = (),
     size: int = 24,
     bar: float = 1.0,
     both: bool = False,
@@ -347,7 +307,6 @@ def ensemble(
         out: folder for ensemble.json; made if need be. Its folder state holds what a killed collection is
             resumed from.
         preset: the leg to begin with, a name or a JSON file; all members stand on its ground.
-        starts: more of them, as identified.json of other searches.
         size: members wanted.
         bar: largest error of a row, in units of its own bar.
         both: rows count with the paper's solver too, all but the ill-conditioned.
@@ -365,20 +324,10 @@ def ensemble(
             f"preset {preset}: expected a ground with the paper's stiffness, {Ground().stiffness:g} N/m^n, "
             f"got {ground.stiffness:g}"
         )
-    choice, _ = load_start(preset, ground.exponent)
-    legs: dict[str, tuple[float, ...]] = {}
-    for source in (preset, *starts):
-        other, x = load_start(source, ground.exponent)
-        if other != choice:
-            raise ParameterError(
-                f"start {source}: expected assembly, toe and travel of {preset}, got {other}"
-            )
-        if x in legs.values():
-            raise ParameterError(f"starts: expected different legs, got one twice: {source}")
-        legs[f"{Path(source).stem} ({digest_of([asdict(choice), x])})"] = x
+    choice, x = load_start(preset, ground.exponent)
     aim = Aim(LegProblem(choice), bar, both)
     about = {
-        "starts": [*legs],
+        "start": f"{Path(preset).stem} ({digest_of([asdict(choice), x])})",
         "bar": bar,
         "both": both,
         "seed": seed,
@@ -388,7 +337,7 @@ def ensemble(
     }
     say = partial(print, flush=True)
     state = open_state(out, about, resume=resume, product="ensemble.json")
-    found = collect(legs, aim, state, say, size=size, attempts=attempts, seed=seed, workers=workers)
+    found = collect(x, aim, state, say, size=size, attempts=attempts, seed=seed, workers=workers)
     if not found.members:
         why = Counter(reason for verdict in found.verdicts.values() for reason in verdict.reasons)
         raise HoofEnvError(
@@ -398,15 +347,13 @@ def ensemble(
     for one in found.members:
         verdict = found.verdicts[one.id]
         parts = {name: verdict.preset[name] for name in ("geometry", "gaits")}
-        origin = {"attempt": one.id, "start": one.start}
-        members.append({**parts, "errors": verdict.errors, "short": verdict.short, "found": origin})
-    counts = Counter(one.start for one in found.members)
-    shares = ", ".join(f"{count} from {start}" for start, count in counts.items())
+        parts |= {"errors": verdict.errors, "short": verdict.short, "found": {"attempt": one.id}}
+        members.append(parts)
     how = (
         "research.identify.ensemble: legs known to fit were pushed in random directions, along one length or "
-        f"all, as far as the bar let them, {len(found.attempts) - len(legs)} times; of all that fit, the "
-        f"{len(members)} members ({shares}) are chosen far apart, so that extremes are more frequent among "
-        "them than among all legs that fit, and their range is a lower limit of what the numbers leave open"
+        f"all, as far as the bar let them, {len(found.attempts) - 1} times; of all that fit, the "
+        f"{len(members)} members are chosen far apart, so that extremes are more frequent among them than "
+        "among all legs that fit, and their range is a lower limit of what the numbers leave open"
     )
     content = {
         "provenance": provenance(how, about),
@@ -421,7 +368,6 @@ def ensemble(
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; returns the exit code."""
     return run_command(ensemble, "research.identify.ensemble", arguments)
 
 

@@ -52,17 +52,13 @@ _SOLE = _link("I", "J")[0]
 
 
 class Bodies(NamedTuple):
-    """The 14 links in the frame of the paper's drawing.
-
-    Attributes:
-        q, qd, qdd: centre and orientation (x, y, angle), rates and accelerations, shape (14, 3) [m, rad, s].
-        length: shape (14,) [m]; `accelerate` fills all but the crank's.
-    """
+    """The 14 links in the frame of the paper's drawing: centre and orientation (x, y, angle), rates and
+    accelerations, shape (14, 3) [m, rad, s]."""
 
     q: NDArray[np.float64]
     qd: NDArray[np.float64]
     qdd: NDArray[np.float64]
-    length: NDArray[np.float64]
+    length: NDArray[np.float64]  # shape (14,) [m]; `accelerate` fills all but the crank's
 
 
 class Points(NamedTuple):
@@ -109,10 +105,8 @@ def carry(bodies, i, spin, held, held_acc, arm, p, points):  # type: ignore[no-u
 def accelerate(pivot, values, motion, damping, spring, bodies, points):  # type: ignore[no-untyped-def]
     """Fill `bodies.qdd` by the second row of Eq. 8, and `points`; returns False where it is singular.
 
-    Args:
-        pivot, values: as in `measure.leg_paths`.
-        motion: (theta, its rate, phi, its rate, its acceleration); the crank's acceleration is 0.
-        damping, spring: 2 alpha [1/s] and beta^2 [1/s^2].
+    `pivot`, `values`: as in `measure.leg_paths`; `motion`: from `swing_motion`, at a steady crank; `damping`,
+    `spring`: 2 alpha [1/s] and beta^2 [1/s^2].
     """
     theta, theta_rate, phi, phi_rate, phi_acc = motion
     q, qd, qdd, length = bodies.q, bodies.qd, bodies.qdd, bodies.length
@@ -190,15 +184,9 @@ def close_loops(theta, crank, pivot, values, gait, bodies, points):  # type: ign
 def euler_cycle(crank, pivot, values, setup, gait, theta, h, bodies, at, velocity, ankle):  # type: ignore[no-untyped-def]
     """Integrate one steady gait by explicit Euler from closed loops; returns whether all stayed finite.
 
-    Args:
-        crank, pivot, values: as in `measure.leg_paths`.
-        setup: the leg and its solver, see `measure.Setup`.
-        gait, at, velocity, ankle: as in `measure.swing_hoof`, at n instants from the start.
-        theta: crank angle at the start [rad].
-        h: time step [s].
-        bodies: output, the state at the end.
-
-    If a dyad does not close at the start or is singular, or anything stops being finite, all outputs are NaN.
+    `theta`: crank angle at the start [rad]; `h`: time step [s]; `bodies`: the state at the end; all else as
+    in `measure.leg_paths` and `swing_hoof`, at n instants from the start. If a dyad does not close at the
+    start or is singular, or anything stops being finite, all outputs are NaN.
     """
     q, qd = bodies.q, bodies.qd
     empty = np.empty((3, _SIZE), np.complex128)

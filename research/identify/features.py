@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.laws import AMBROSIO, friction_part, normal_force
+from hoof_env.paper.shapes import BACKWARD
 from hoof_env.simd.compile import kernel
 
 FEATURES = np.dtype(
@@ -48,17 +49,11 @@ FEATURES = np.dtype(
 )  # fmt: skip
 """What `measure_gait` fills in; NaN where there is no contact, except the last four."""
 
-BACKWARD = 0.3
-"""How fast the sole must move back under half of the load [m/s]."""
+NEAR_TOP = 0.9  # a maximum of the samples from this part of the highest may be the highest between them [-]
 
-GROUND = Ground(restitution=0.0)
-"""The paper's at cr = 0; stiffness and exponent are the leg's."""
-
+GROUND = Ground(restitution=0.0)  # the paper's at cr = 0; stiffness and exponent are the leg's
 CHI = float(GROUND.to_record()["chi"])
 FLOOR, MU, SLOW, FAST = GROUND.approach_floor, GROUND.friction, GROUND.friction_slow, GROUND.friction_fast
-
-NEAR_TOP = 0.9
-"""A maximum of the samples from this part of the highest may be the highest between samples [-]."""
 
 EL, INEL, PUSH, TOE_IN, HEEL_IN, TOPS = range(6)
 """Rows of the scratch array of `measure_gait`: forces [N], the elastic one's friction [N], approach speeds
@@ -68,24 +63,18 @@ EL, INEL, PUSH, TOE_IN, HEEL_IN, TOPS = range(6)
 class Cycle(NamedTuple):
     """One revolution of toe and heel, n instants.
 
-    Attributes:
-        at, velocity: from `measure.swing_hoof`, or a simulation: complex, shape (2, n) [m, m/s].
-        ankle: shape (n,) [m].
-        height: of the swing's centre above the ground [m].
-        h: time between two instants [s].
-        sampled: as the paper's solver does it, the approach speed is that of the first sample inside, not of
-            the crossing, and the highest force that of a sample.
-        stiffness, exponent: K [N/m^n] and n [-] of Eq. 14.
+    With `sampled`, as the paper's solver does it, the approach speed is that of the first sample inside, not
+    of the crossing, and the highest force that of a sample.
     """
 
-    at: NDArray[np.complex128]
-    velocity: NDArray[np.complex128]
-    ankle: NDArray[np.float64]
-    height: float
-    h: float
+    at: NDArray[np.complex128]  # toe and heel, complex, shape (2, n) [m]
+    velocity: NDArray[np.complex128]  # likewise [m/s]
+    ankle: NDArray[np.float64]  # shape (n,) [m]
+    height: float  # of the swing's centre above the ground [m]
+    h: float  # time between two instants [s]
     sampled: bool
-    stiffness: float
-    exponent: float
+    stiffness: float  # K of Eq. 14 [N/m^n]
+    exponent: float  # n of Eq. 14 [-]
 
 
 @kernel
@@ -120,10 +109,8 @@ def crossing(d0, d1, v0, v1, h):  # type: ignore[no-untyped-def]
 
 @kernel
 def force_within(cycle, approach, chi, k, s):  # type: ignore[no-untyped-def]
-    """Normal force [N] at part s of the sample that begins at k, by Eq. 14 with the factor `chi`.
-
-    `approach`: speeds of toe and heel at touch-down, shape (2, n) [m/s].
-    """
+    """Normal force [N] at part s of the sample that begins at k, by Eq. 14 with the factor `chi`; `approach`:
+    speeds of toe and heel at touch-down, shape (2, n) [m/s]."""
     at, velocity, height, total = cycle.at, cycle.velocity, cycle.height, 0.0
     for i in range(2):
         speed = approach[i, k + 1] if approach[i, k + 1] > 0.0 else approach[i, k]
@@ -157,10 +144,8 @@ def refine(cycle, approach, chi, top):  # type: ignore[no-untyped-def]
 
 @kernel
 def peak(cycle, approach, chi, force, tops):  # type: ignore[no-untyped-def]
-    """Highest force [N] and when [s]: of the samples, or between them around each maximum near it.
-
-    `tops`: output, the force with those maxima in place of the samples.
-    """
+    """Highest force [N] and when [s]: of the samples, or between them around each maximum near it; fills
+    `tops` with the force with those maxima in place of the samples."""
     top = np.argmax(force)
     highest, when = force[top], top * cycle.h
     tops[:] = force
@@ -190,10 +175,8 @@ def average(cycle, approach, chi, force):  # type: ignore[no-untyped-def]
 
 @kernel
 def prominences(force):  # type: ignore[no-untyped-def]
-    """Prominence of the second and third peak over the highest force, and samples of the first two in time.
-
-    Peaks and prominence as in `paper.shapes.find_peaks`; sample -1 if there is no second peak.
-    """
+    """Prominence of the second and third peak over the highest force, and samples of the first two in time,
+    -1 if there is no second; as in `paper.shapes.find_peaks`."""
     n = force.shape[0]
     largest = np.zeros(3)
     at = np.full(3, -1)
@@ -340,12 +323,8 @@ def measure_halves(cycle, start, end, work, out):  # type: ignore[no-untyped-def
 
 @kernel
 def measure_gait(cycle, work, out):  # type: ignore[no-untyped-def]
-    """Fill `out` from one revolution of toe and heel; returns whether there is a stance.
-
-    Args:
-        work: scratch, shape (6, n).
-        out: record of dtype `FEATURES`.
-    """
+    """Fill `out`, a record of dtype `FEATURES`, by the scratch `work`, shape (6, n); returns whether there is
+    a stance."""
     at, h, n = cycle.at, cycle.h, cycle.at.shape[1]
     enter, leave = press(cycle, work, out)
     start, end = enter.min(), leave.max()

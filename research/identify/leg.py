@@ -20,17 +20,10 @@ from hoof_env.leg.linkage import DYADS, LENGTHS, POINTS
 Vector = NDArray[np.float64]
 
 GAITS = ("walk", "run")
-SIGNS = tuple(dyad.point for dyad in DYADS)
-"""The points whose side of their dyad is a choice, in the order of `Choice.assembly`."""
-
-NUMBER = {name: i for i, name in enumerate(POINTS)}
-"""Points by name, as indices into arrays of all of them."""
-
-STEPS = tables(load_geometry("first_fit"))[0]
-"""The construction of any leg, `geometry.tables`."""
-
-SPEED = 2 * np.pi
-"""The paper's crank speed in both gaits [rad/s]; not searched."""
+SIGNS = tuple(dyad.point for dyad in DYADS)  # their side is a choice, in the order of `Choice.assembly`
+NUMBER = {name: i for i, name in enumerate(POINTS)}  # of a point, in arrays of all of them
+STEPS = tables(load_geometry("first_fit"))[0]  # the construction of any leg
+SPEED = 2 * np.pi  # the paper's crank speed in both gaits [rad/s]; not searched
 
 _BODY = (*(f"log {name}" for name in LENGTHS), "pivot_x", "pivot_y")
 _SWING = tuple(name for name in LIMITS if name != "crank_speed")
@@ -38,23 +31,16 @@ _SWING = tuple(name for name in LIMITS if name != "crank_speed")
 NAMES = (*_BODY, "hip_height", *(f"{gait}.{name}" for gait in GAITS for name in _SWING))
 """Names of the entries of x: log [m], m, and rad."""
 
-BODY = len(_BODY)
-"""So many first entries are the leg's own; the ground level is not among them."""
-
+BODY = len(_BODY)  # so many first entries are the leg's own; the ground level is not among them
 LEVEL, OFFSET = NAMES.index("hip_height"), NAMES.index("walk.swing_offset")
 
-SCALES = np.array([1.0] * len(LENGTHS) + [0.6, 0.6, 0.5] + [0.6] * 6)
-"""How far each entry of x ranges, beside one: the scales of a search."""
+SCALES = np.array([1.0] * len(LENGTHS) + [0.6, 0.6, 0.5] + [0.6] * 6)  # how far each entry of x ranges
 
 
 @dataclass(frozen=True)
 class Choice:
-    """What a search cannot change continuously.
-
-    Attributes:
-        assembly: +1 or -1 for each of `SIGNS`; toe, heel, travel: as in `Geometry`.
-        exponent: n of Eq. 14, which the paper does not print [-].
-    """
+    """What a search cannot change continuously: +1 or -1 for each of `SIGNS`; toe, heel and travel, as in
+    `Geometry`; and n of Eq. 14, which the paper does not print [-]."""
 
     assembly: tuple[int, ...]
     toe: str
@@ -64,12 +50,7 @@ class Choice:
 
 
 def encode(preset: Preset, exponent: float | None = None) -> tuple[Choice, Vector]:
-    """The leg and the two gaits of a preset as (choice, x), on its own ground or one with this exponent.
-
-    Raises:
-        HoofEnvError: there is no such preset, its leg does not turn, or a crank has another speed than the
-            paper's.
-    """
+    """The leg and the two gaits of a preset as (choice, x), on its own ground or one with this exponent."""
     geometry, ground = load_geometry(preset), load_ground(preset)
     gaits = {name: load_gait(name, preset) for name in GAITS}
     for name, gait in gaits.items():
@@ -86,16 +67,8 @@ def encode(preset: Preset, exponent: float | None = None) -> tuple[Choice, Vecto
 
 
 def to_preset(x: Vector, choice: Choice, provenance: str) -> dict[str, Any]:
-    """The content of a preset file, as those in `hoof_env/data`.
-
-    Args:
-        x, choice: the leg.
-        provenance: where its numbers come from.
-
-    Raises:
-        ParameterError: x has another length or a number that is not finite, or a gait is outside its limits.
-        GeometryError: the leg cannot turn.
-    """
+    """The content of a preset file, as those in `hoof_env/data`; raises `ParameterError` where x is not
+    finite numbers or a gait is outside its limits, `GeometryError` where the leg cannot turn."""
     if x.shape != (len(NAMES),) or not np.isfinite(x).all():
         raise ParameterError(f"x: expected {len(NAMES)} finite numbers, got {x!r}")
     values = dict(zip(NAMES, x.tolist(), strict=True))

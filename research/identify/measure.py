@@ -25,8 +25,7 @@ from research.identify.leg import LEVEL, NUMBER, SPEED, STEPS
 
 Array = NDArray[np.float64]
 
-PAPER_SAMPLES, PAPER_STEP = 1001, 1e-3
-"""Instants of the paper's solver in its one second, and its time step [s]."""
+PAPER_SAMPLES, PAPER_STEP = 1001, 1e-3  # of the paper's solver: instants in one second, time step [s]
 
 _LOG_RANGE = (math.log(LENGTH_RANGE[0]), math.log(LENGTH_RANGE[1]))
 _COUNT, _SOLE = len(LENGTHS), LENGTHS.index("IJ")
@@ -36,31 +35,22 @@ _LOW, _HIGH = (
 )
 _MIDDLE = 0.5 * float(_LOW[0] + _HIGH[0])
 _USED = [(s.from_first, s.from_second) if isinstance(s, Dyad) else (s.distance, s.span) for s in CONSTRUCTION]
-_SOURCES = np.array([[LENGTHS.index(name) for name in pair] for pair in _USED])
-"""For each step of the construction, the two lengths that it needs."""
+_SOURCES = np.array([[LENGTHS.index(name) for name in pair] for pair in _USED])  # of each step
 _O, _C, _P, _G = (NUMBER[name] for name in "OCPG")
 
 
 class Setup(NamedTuple):
-    """What a search does not change.
+    """What a search does not change."""
 
-    Attributes:
-        signs: side of each step's dyad, 0 for an extension, shape (8,).
-        travel, toe, heel: as in `Geometry`, the corners as point numbers.
-        stiffness, exponent: K [N/m^n] and n [-] of Eq. 14.
-        alpha, beta: Baumgarte's, of the paper's solver [1/s].
-        by_toe: see `measure_exact`.
-    """
-
-    signs: Array
+    signs: Array  # side of each step's dyad, 0 for an extension, shape (8,)
     travel: float
-    toe: int
+    toe: int  # number of the point
     heel: int
-    stiffness: float
-    exponent: float
-    alpha: float
+    stiffness: float  # K of Eq. 14 [N/m^n]
+    exponent: float  # n of Eq. 14 [-]
+    alpha: float  # Baumgarte's, of the paper's solver [1/s]
     beta: float
-    by_toe: bool
+    by_toe: bool  # see `measure_exact`
 
 
 class Arrays(NamedTuple):
@@ -78,7 +68,6 @@ class Arrays(NamedTuple):
 
 
 def new_arrays(n: int) -> Arrays:
-    """For n instants a revolution."""
     gaits = np.zeros((2, 4))
     gaits[:, 0] = SPEED
     z, dz = np.zeros((2, len(POINTS), n), np.complex128)
@@ -87,7 +76,6 @@ def new_arrays(n: int) -> Arrays:
 
 
 def new_bodies() -> Bodies:
-    """Of the paper's solver."""
     q, qd, qdd = np.zeros((3, len(BODIES), 3))
     return Bodies(q, qd, qdd, np.zeros(len(BODIES)))
 
@@ -114,10 +102,7 @@ def leg_paths(crank, pivot, values, z, dz):  # type: ignore[no-untyped-def]
     derivatives by theta. Returns the largest gap of a dyad over its reach [-], at most 0 where all close,
     and the smallest |sine| of the angle between the links of a dyad [-].
 
-    Args:
-        crank: OP [m].
-        pivot: C relative to O, complex [m].
-        values: as from `geometry.tables`.
+    `crank`: OP [m]; `pivot`: C relative to O, complex [m]; `values`: as from `geometry.tables`.
     """
     n = z.shape[1]
     miss, transmission = 0.0, 1.0
@@ -142,12 +127,8 @@ def leg_paths(crank, pivot, values, z, dz):  # type: ignore[no-untyped-def]
 def swing_hoof(z, dz, gait, setup, at, velocity, ankle):  # type: ignore[no-untyped-def]
     """Place toe and heel in the world for one gait; returns the lowest height of every other joint [m].
 
-    Args:
-        z, dz: from `leg_paths`.
-        gait: (crank speed [rad/s], offset, sine and cosine coefficient of the swing [rad]).
-        setup: the leg, see `Setup`.
-        at, velocity: outputs, complex, shape (2, n): toe and heel relative to O [m, m/s].
-        ankle: output, shape (n,): height of G relative to O [m].
+    `gait`: (crank speed [rad/s], offset, sine and cosine coefficient of the swing [rad]). Outputs: `at` and
+    `velocity` of toe and heel, complex, shape (2, n), and the height `ankle` of G, relative to O [m, m/s].
     """
     n = z.shape[1]
     lowest = np.inf
@@ -172,7 +153,6 @@ def swing_hoof(z, dz, gait, setup, at, velocity, ankle):  # type: ignore[no-unty
 
 @kernel
 def excess(value, low, high):  # type: ignore[no-untyped-def]
-    """How far a value lies beyond its limits."""
     return max(value - high, low - value, 0.0)
 
 
@@ -238,7 +218,6 @@ def height_at(at, velocity, h, t):  # type: ignore[no-untyped-def]
 
 @kernel
 def compare_gaits(walk, run, both):  # type: ignore[no-untyped-def]
-    """Fill `both`, a record of dtype `BOTH`."""
     both.angle_variation = run.angle_variation / walk.angle_variation
     both.step = run.step - walk.step
     both.heel_gap = run.heel_gap - walk.heel_gap

@@ -22,20 +22,11 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-CORRECTIONS = 3
-"""At most so many second-order corrections of a step."""
-
-NEAR = 6.0
-"""Demands that are satisfied by more than this many bars are left out of the programme."""
-
-TOP = 10.0
-"""Likewise samples further below the highest."""
-
-SMALLEST = 1e-5
-"""Radius at which a descent ends."""
-
-STEP = 2e-5
-"""Of the difference quotients, in scales."""
+CORRECTIONS = 3  # second-order corrections of a step, at most
+NEAR = 6.0  # demands that are satisfied by more than this are left out of the programme [bars]
+TOP = 10.0  # likewise samples further below the highest [bars]
+SMALLEST = 1e-5  # radius at which a descent ends
+STEP = 2e-5  # of the difference quotients, in scales
 
 
 @dataclass(frozen=True)
@@ -55,8 +46,6 @@ class Rating:
 
 @dataclass(frozen=True)
 class Descent:
-    """Where a descent ended, its rating there, and the evaluations spent."""
-
     y: Array
     rating: Rating
     evaluations: int
@@ -78,11 +67,8 @@ def descend(
 ) -> Descent:
     """Go down from y until nothing improves, `iterations` are over or the merit is at or below `goal`.
 
-    Args:
-        rate: what is to be improved.
-        scales: of the coordinates, shape as y; `radius`, of the first trust region, is in units of these.
-        penalty: of a shortage, in bars.
-        central: difference quotients of second order, at twice the price.
+    `radius`, of the first trust region, is in `scales`, shape as y; `penalty`: of a shortage, in bars;
+    `central`: difference quotients of second order, at twice the price.
     """
     here = rate(y)
     merit, spent = here.merit(penalty), 1

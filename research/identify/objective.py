@@ -31,22 +31,16 @@ from research.identify.minimax import Rating
 Array = NDArray[np.float64]
 Columns = tuple[NDArray[np.int64], Array, Array, Array]
 
-DEAD_ZONE = 0.6
-"""An error below this costs nothing [bars], so that no row is pressed while another is outside its bar."""
-
-MISSED_ROW, MISSED = 300.0, 20.0
-"""Error [bars] of a row, and shortage of a demand, that cannot be measured."""
+DEAD_ZONE = 0.6  # a smaller error costs nothing [bars]: no row is pressed while another is outside its bar
+MISSED_ROW, MISSED = 300.0, 20.0  # error [bars] of a row, shortage of a demand, that cannot be measured
 
 INSIDE = 0.01
 """By how much `rate` asks for more than a demand, because a descent ends on the border of it [bars].
 Those that cannot be exceeded are 0 where they are met."""
 
-TOE_DOWN = 0.35, -3.0
-"""When [s] and how fast [log m/s] a search puts down a walking toe that stays in the air."""
-
-ALPHA = 15.0
-BETA = math.sqrt(2) * ALPHA
-"""Baumgarte's parameters of the paper's solver [1/s], beta as it is probably meant."""
+TOE_DOWN = 0.35, -3.0  # when [s] and how fast [log m/s] a search puts down a toe that stays in the air
+ALPHA = 15.0  # Baumgarte's, of the paper's solver [1/s]
+BETA = math.sqrt(2) * ALPHA  # as it is probably meant
 
 
 def _columns(demands: tuple[Demand, ...]) -> Columns:
@@ -61,8 +55,7 @@ _TRANSMISSION = _NAMES.index("transmission")
 
 
 class Standing(NamedTuple):
-    """Whether every row is within its bar and nothing falls short, the error that is furthest out [bars], and
-    the same in words."""
+    """Whether every row is within its bar and nothing falls short; the furthest error [bars]; in words."""
 
     met: bool
     error: float
@@ -82,20 +75,11 @@ class _Measured:
 class Objective:
     """What a search minimises for one choice. One object serves one thread.
 
-    Args:
-        choice: assembly and law of the legs.
-        samples: instants a revolution of the exact solver.
-        paper_solver: the paper's solver counts too, all rows but `ILL_CONDITIONED` and all demands on gaits.
-        by_toe: x holds instead of the hip's height the time [s] at which the toe touches down in walking, and
-            instead of the walk's offset the logarithm of the toe's approach speed there [log m/s]; level and
-            offset follow: for searches. That contact grazes: a tenth of a millimetre of height, or a
-            milliradian, is a large step of the inelastic force. See `to_touch_down`, `from_touch_down`.
-
-    Attributes:
-        row_ids: the paper's rows that have a bar, in the order of `rows`.
-
-    Raises:
-        ParameterError: samples out of range.
+    With `samples` instants a revolution of the exact solver; with `paper_solver` the paper's counts too, all
+    rows but `ILL_CONDITIONED` and all demands on gaits. `by_toe`, for searches: x holds instead of the hip's
+    height the time [s] at which the toe touches down in walking, and instead of the walk's offset the
+    logarithm of its approach speed there [log m/s]. That contact grazes: a tenth of a millimetre of height,
+    or a milliradian, is a large step of the inelastic force. `row_ids`: the paper's rows that have a bar.
     """
 
     def __init__(
@@ -171,7 +155,6 @@ class Objective:
         return Rating(rows, np.where(short == 0.0, 0.0, short + INSIDE), peaks)
 
     def _dyads(self) -> Array:
-        """Shortage of each dyad's transmission; that of the leg is the largest of these."""
         at, (_, sense, bound, scale) = self._arrays.z, (column[_TRANSMISSION] for column in _DEMANDS)
         dyads = STEPS[STEPS[:, 0] == 1]
         one, two = (at[dyads[:, 1]] - at[dyads[:, i]] for i in (2, 3))
@@ -196,7 +179,6 @@ class Objective:
         return {name: shortage for name, shortage in short.items() if shortage > 0}
 
     def standing(self, x: Array) -> Standing:
-        """Where a candidate stands, with the solvers that the cost counts."""
         errors = dict(zip(self.row_ids, self.rows(x).tolist(), strict=True))
         if self.paper_solver:
             paper = zip(self.row_ids, self.rows(x, paper_solver=True).tolist(), self._counts, strict=True)

@@ -27,8 +27,7 @@ from hoof_env.errors import DataFileError, HoofEnvError, OutputError
 
 T = TypeVar("T")
 
-Run = Callable[[Callable[[Any], Any], Sequence[Any]], Iterable[Any]]
-"""A function and its tasks to results, as they come."""
+Run = Callable[[Callable[[Any], Any], Sequence[Any]], Iterable[Any]]  # function and tasks to results
 
 _HINT = "name another folder or delete this one"
 _ONE_THREAD = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
@@ -50,12 +49,7 @@ class State:
         report: Callable[[T], None] = lambda _: None,
     ) -> list[T]:
         """What `jobs` come to, in their order: what is kept here, and the rest by `work`, kept as it comes.
-
-        Args:
-            work: from a job to a dataclass of this `kind` with the job's `id`.
-            run: from `processes`.
-            report: called with each as it is there.
-        """
+        `work` makes of a job a dataclass of this `kind` with the job's `id`; `run` is from `processes`."""
         done: dict[str, Any] = {job.id: kept for job in jobs if (kept := self.load(job.id, kind))}
         for kept in done.values():
             report(kept)
@@ -66,11 +60,7 @@ class State:
         return [done[job.id] for job in jobs]
 
     def load(self, job: str, kind: type[T]) -> T | None:
-        """What was kept of a job; None if there is nothing.
-
-        Raises:
-            DataFileError: the file is damaged or of another search.
-        """
+        """What was kept of a job; None if there is nothing."""
         path = self.folder / f"job-{job}.json"
         if not path.exists():
             return None
@@ -93,16 +83,8 @@ class State:
 
 
 def open_state(out: Path, problem: Mapping[str, Any], *, resume: bool, product: str) -> State:
-    """Begin a search in `out`, or go on with the one that is there.
-
-    Args:
-        problem: JSON object, what tells this search from another.
-        product: the file that it ends with.
-
-    Raises:
-        DataFileError: nothing to resume, or a search for something else, or a damaged file.
-        OutputError: the folder holds a search that would be overwritten, or cannot be written.
-    """
+    """Begin a search in `out`, or go on with the one that is there. `problem`, a JSON object, tells this
+    search from another; `product` is the file that it ends with."""
     state = State(out / "state", digest_of(problem))
     file = state.folder / "problem.json"
     try:
@@ -140,11 +122,7 @@ def versions() -> dict[str, str]:
 
 
 def read_json(path: Path, hint: str) -> Any:
-    """The content of a JSON file.
-
-    Raises:
-        DataFileError: it cannot be read, or is damaged; the `hint` says what to do then.
-    """
+    """The content of a JSON file; where it is damaged the `hint` says what to do."""
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
@@ -165,11 +143,8 @@ def write_json(folder: Path, name: str, content: Any) -> Path:
 def processes(count: int) -> Iterator[Run]:
     """A function that maps over tasks in up to `count` processes; one is this process itself.
 
-    The results come as they are done; tasks begin in their order. At the end of the block, tasks that run
-    are stopped and those that wait are dropped. The processes end with their parent, however it ends.
-
-    Raises:
-        HoofEnvError: a process died.
+    Tasks begin in their order, results come as they are done. At the end of the block, tasks that run are
+    stopped and those that wait are dropped. The processes end with their parent, however it ends.
     """
     if count == 1:
         yield map

@@ -21,26 +21,14 @@ from research.identify.minimax import Rating, descend
 from research.identify.objective import Objective, with_toe
 from research.identify.resume import State, processes
 
-TOE_SCALES = with_toe(SCALES, 0.1, 0.3)
-"""The scales of a search by touch-down."""
-
-SPREADS, TRIES = (0.0, 0.15, 0.3, 0.5), 300
-"""How far a start may lie from the preset, in scales, and of how many random legs it is the best."""
-
-SAMPLES = 401
-"""Instants a revolution with which candidates of all phases are compared."""
-
-PENALTY = 2.0
-"""What a shortage of one counts for [bars]."""
-
-CLEAR = 0.995
-"""Largest error with which a job ends at the bar [bars], so that the judge, who samples finer, agrees."""
-
-POPULATION = 20
-"""Of CMA-ES."""
-
-PAPER_WEIGHT = 12
-"""How many evaluations one with the paper's solver counts for: it takes that much longer."""
+TOE_SCALES = with_toe(SCALES, 0.1, 0.3)  # of a search by touch-down
+SPREADS = (0.0, 0.15, 0.3, 0.5)  # how far a start may lie from the preset, in scales
+TRIES = 300  # random legs of which a start is the best
+SAMPLES = 401  # instants a revolution with which candidates of all phases are compared
+PENALTY = 2.0  # what a shortage of one counts for [bars]
+CLEAR = 0.995  # largest error with which a job ends at the bar [bars]; the judge, who samples finer, agrees
+POPULATION = 20  # of CMA-ES
+PAPER_WEIGHT = 12  # evaluations that one with the paper's solver counts for: it takes that much longer
 
 
 @dataclass(frozen=True)
@@ -51,7 +39,6 @@ class LegProblem:
     choice: Choice
 
     def objective(self, samples: int, both: bool, by_toe: bool = False) -> Objective:
-        """The objective with the exact solver alone or both, kept for the next call."""
         return _objective(self.choice, samples, both, by_toe)
 
     def around(self, x: Vector, samples: int, rng: np.random.Generator) -> Vector:
@@ -67,15 +54,13 @@ class LegProblem:
         return self.objective(samples, False).to_touch_down(x)
 
     def outward(self, y: Vector, samples: int) -> Vector:
-        """Inverse of `inward`."""
         return self.objective(samples, False, True).from_touch_down(y)
 
     def merit(self, x: Vector, both: bool) -> float:
-        """What compares candidates of different phases [bars], with the exact solver alone or both."""
+        """What compares candidates of different phases [bars]."""
         return self.objective(SAMPLES, both).rate(x).merit(PENALTY)
 
     def confirm(self, x: Vector) -> bool:
-        """Whether the full system finds every bar met and every claim true."""
         try:
             return confirm(to_preset(x, self.choice, "a candidate of a search")).holds
         except HoofEnvError:  # a dead point between two samples, a gait beyond its limits
@@ -91,53 +76,33 @@ def _objective(choice: Choice, samples: int, both: bool, by_toe: bool) -> Object
 class Phase:
     """One or more rounds of equal jobs, each from a start of its own.
 
-    Attributes:
-        name: in reports.
-        jobs, rounds: jobs a round, and rounds.
-        evaluations: at most, a job; a descent that has begun is finished.
-        sigmas: one is drawn for a job of CMA-ES, or for each hop between descents; in scales.
-        method: "cma" (CMA-ES on the cost of all errors) or "minimax" (descents of the largest error, each
-            from beside the best so far, see `minimax`).
-        elite: how many independent starts are refined, job i from the best result of the i-th best of them;
-            0: a job is an independent start, from a leg around the preset.
-        below: results of other phases that are further out with the exact solver [bars] are not refined.
-        samples: instants a revolution.
-        paper_solver: the objective contains the paper's solver too.
-        ends_at_bar: a job ends as soon as all rows are clear within their bars and nothing falls short.
+    The `method` is "cma" (CMA-ES on the cost of all errors) or "minimax" (descents of the largest error, each
+    from beside the best so far). Job i refines the best result of the i-th best of `elite` independent
+    starts; with 0 it is such a start itself, from a leg around the preset.
     """
 
     name: str
-    jobs: int
-    evaluations: int
-    sigmas: tuple[float, ...]
+    jobs: int  # a round
+    evaluations: int  # at most, a job; a descent that has begun is finished
+    sigmas: tuple[float, ...]  # one is drawn for a job of CMA-ES, or for each hop; in scales
     method: str = "cma"
     rounds: int = 1
     elite: int = 0
-    below: float = float("inf")
-    samples: int = 101
-    paper_solver: bool = False
-    ends_at_bar: bool = False
+    below: float = float("inf")  # results of other phases further out, exact solver, are not refined [bars]
+    samples: int = 101  # instants a revolution
+    paper_solver: bool = False  # the objective contains the paper's solver too
+    ends_at_bar: bool = False  # as soon as all rows are clear within their bars and nothing falls short
 
     @property
     def weight(self) -> int:
-        """What an evaluation counts for."""
         return PAPER_WEIGHT if self.paper_solver else 1
 
 
 @dataclass(frozen=True)
 class Result:
-    """What a job found.
-
-    Attributes:
-        id: round and index.
-        phase: its name.
-        root: id of the independent start that it goes back to.
-        x: the best leg, see `leg`.
-        evaluations, seconds: spent.
-        exact, both: merit [bars] with the exact solver alone and with both.
-        standing: in words, with both solvers once the leg meets every bar with the exact one.
-        confirmed: the full system finds every bar met and every claim true.
-    """
+    """What a job found: the best leg x; its merit [bars] with the exact solver alone and with both; in words
+    where it stands, with both once it meets every bar with the exact one; and whether the full system finds
+    every bar met and every claim true. `root`: id of the independent start that it goes back to."""
 
     id: str
     phase: str
@@ -169,8 +134,7 @@ class Job:
         return f"{self.round:03d}-{self.index:02d}"
 
 
-Progress = Iterator[tuple[Vector, float, int]]
-"""The best y so far, its value and the evaluations spent, again and again."""
+Progress = Iterator[tuple[Vector, float, int]]  # the best y so far, its value and the evaluations spent
 
 
 def evolve(cost: Callable[[Vector], float], y: Vector, sigma: float, rng: np.random.Generator) -> Progress:
@@ -209,7 +173,6 @@ def hop(
 
 
 def run_job(problem: LegProblem, job: Job) -> Result:
-    """Run a job; the same job gives the same result, bit for bit."""
     began, phase, rng = time.monotonic(), job.phase, np.random.default_rng([job.seed, job.round, job.index])
     sigma, x = float(rng.choice(phase.sigmas)), np.array(job.x)
     y = problem.inward(x, phase.samples) if job.root else problem.around(x, phase.samples, rng)
@@ -243,8 +206,7 @@ def run_job(problem: LegProblem, job: Job) -> Result:
     )
 
 
-BUDGET = 10_000_000
-"""Evaluations of a search unless told otherwise; one takes some 0.1 ms."""
+BUDGET = 10_000_000  # evaluations of a search unless told otherwise; one takes some 0.1 ms
 
 _DESCEND = Phase("descend", 8, 4_000, (0.003, 0.01, 0.03, 0.1), method="minimax", elite=8, samples=401)
 _POLISH = replace(_DESCEND, name="polish", jobs=4, elite=2, rounds=3, evaluations=16_000, ends_at_bar=True)
@@ -262,12 +224,6 @@ SCHEDULE = (
 )
 
 
-def rounds(schedule: Sequence[Phase]) -> Iterator[tuple[int, Phase]]:
-    """Endless: (number of the round, its phase)."""
-    phases = itertools.chain.from_iterable(itertools.repeat(phase, phase.rounds) for phase in schedule)
-    yield from enumerate(itertools.cycle(phases))
-
-
 def search(
     problem: LegProblem,
     start: tuple[float, ...],
@@ -279,20 +235,14 @@ def search(
     budget: int,
     workers: int = 2,
 ) -> list[Result]:
-    """Run or resume a search from `start`, x of the preset, until a candidate is confirmed or the budget is
-    spent. The results are in the order of the jobs; if the full system confirmed a candidate, it is the last.
-
-    Args:
-        report: called with each result as it comes.
-        budget: evaluations, one with the paper's solver by its weight; the last round may exceed it a little.
-
-    Raises:
-        HoofEnvError: a damaged file, a folder that cannot be written, a job that failed.
-    """
+    """Run or resume a search from `start`, x of the preset, until a candidate is confirmed or the budget of
+    evaluations, each by its phase's weight, is spent. The results are in the order of the jobs; a confirmed
+    candidate is the last. `report` is called with each as it comes."""
     results: list[Result] = []
     spent = 0
+    phases = itertools.chain.from_iterable(itertools.repeat(phase, phase.rounds) for phase in schedule)
     with processes(workers) as run:
-        for number, phase in rounds(schedule):
+        for number, phase in enumerate(itertools.cycle(phases)):
             if spent >= budget:
                 break
             jobs = plan(number, phase, start, results, seed, budget - spent)

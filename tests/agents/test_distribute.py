@@ -14,12 +14,6 @@ from hoof_env.errors import HoofEnvError, ParameterError
 ROOT = Path(__file__).parents[2]
 
 
-def test_space():
-    assert parse_space(["n_steps=[16, 32]", 'env.trunk=["rail"]']) == {
-        "n_steps": [16, 32], "env.trunk": ["rail"]
-    }  # fmt: skip
-
-
 @pytest.mark.parametrize(
     "item", ["gamma", "gamma=", "gamma=0.9", "gamma=[]", "=[1]", "gamma=uniform(0,1)", "gamma=[1", "gamma={}"]
 )
@@ -29,7 +23,7 @@ def test_bad_space(item):
 
 
 def test_plan():
-    plan = prepare(Trials(seeds=3, steps=1000, space=("gamma=[0.9]", "env.trunk=['rail']".replace("'", '"'))))
+    plan = prepare(Trials(seeds=3, steps=1000, space=("gamma=[0.9]", 'env.trunk=["rail"]')))
     assert plan["seed"] == [0, 1, 2]
     assert plan["train"]["steps"] == 1000
     assert (plan["gamma"], plan["env.trunk"]) == ([0.9], ["rail"])

@@ -153,16 +153,7 @@ def test_a_refusal_on_the_way_leaves_nothing(tmp_path, trained, monkeypatch):
     assert not [*tmp_path.iterdir()]
 
 
-@pytest.mark.parametrize(
-    ("command", "shown"),
-    [
-        ("python -m agents.train --seed 3 --out runs/x", "python -m agents.train --seed 3"),
-        (
-            "python -m agents.train --hyperparams /srv/a/ppo.yml",
-            "python -m agents.train --hyperparams ppo.yml",
-        ),
-        ("", ""),
-    ],
-)
-def test_commands_name_no_folder_of_a_machine(command, shown):
-    assert ship.shown_command(command) == shown
+def test_commands_name_no_folder_of_a_machine():
+    given = "python -m agents.train --hyperparams /srv/a/ppo.yml --out runs/x"
+    assert ship.shown_command(given) == "python -m agents.train --hyperparams ppo.yml"
+    assert ship.shown_command("") == ""

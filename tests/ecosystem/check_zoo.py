@@ -6,7 +6,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import gymnasium as gym
 import pytest
 
 SETTINGS = Path(__file__).resolve().parents[2] / "agents" / "hyperparams"
@@ -42,10 +41,3 @@ def test_ppo(env_id, tmp_path):
 def test_off_policy(algorithm, tmp_path):
     """`rl_zoo3 train` and `enjoy`, SAC, TD3 and TQC with their files, 300 steps of HorseLeg-v0."""
     train_and_enjoy(algorithm, "hoof_env/HorseLeg-v0", tmp_path)
-
-
-def test_every_id_has_settings(env_id):
-    """An entry of `ppo.yml` for the id, or its `default`."""
-    assert gym.spec(env_id)
-    text = (SETTINGS / "ppo.yml").read_text()
-    assert f"\n{env_id}:" in text or "\ndefault:" in text

@@ -165,16 +165,14 @@ SINGLE = [
     (wrappers.TransformObservation, {"func": twice, "observation_space": None}, HELD, seen(twice)),
     (wrappers.TransformReward, {"func": twice}, HELD, paid(twice)),
 ]
+BOTH = (
+    "ClipAction", "ClipReward", "DtypeObservation", "FlattenObservation", "RecordEpisodeStatistics",
+    "RescaleAction", "RescaleObservation", "ReshapeObservation", "TransformReward",
+)  # fmt: skip
+"""Wrappers that are there for vector environments too, under the same names."""
+
 VECTOR = [
-    (vector.ClipAction, {}, HELD, same),
-    (vector.ClipReward, {"min_reward": -0.01, "max_reward": 0.01}, HELD, paid(small)),
-    (vector.DtypeObservation, {"dtype": np.float64}, HELD, same),
-    (vector.FlattenObservation, {}, HELD, same),
-    (vector.RecordEpisodeStatistics, {}, HELD, same),
-    (vector.RescaleAction, TWO, 2 * HELD, same),
-    (vector.RescaleObservation, BOUNDS, HELD, seen(positive)),
-    (vector.ReshapeObservation, {"shape": (-1, 1)}, HELD, seen(upright)),
-    (vector.TransformReward, {"func": twice}, HELD, paid(twice)),
+    *((getattr(vector, case[0].__name__), *case[1:]) for case in SINGLE if case[0].__name__ in BOTH),
     (
         functools.partial(vector.VectorizeTransformAction, wrapper=wrappers.TransformAction),
         HALVES, 2 * HELD, same,

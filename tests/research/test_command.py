@@ -59,7 +59,6 @@ def test_a_finished_search_is_neither_begun_anew_nor_mixed_with_another(searched
         ([], "already holds a search"),
         (["--resume", "--seed", "1"], "seed is 0 there and 1 here"),
         (["--resume", "--budget", "300"], "budget is 200 there and 300 here"),
-        (["--resume", "--exponent", "1.5"], "exponent is 1.375 there and 1.5 here"),
         (["--resume", "--start", str(preset)], "start is 'first_fit ("),
     ]:
         options = arguments if "--budget" in arguments else [*arguments, "--budget", "200"]
@@ -90,7 +89,6 @@ def test_a_leg_found_alone_is_not_written_over(tmp_path, capsys):
         (["--start", "SLOW"], "run.crank_speed: expected the paper's 6.283185 rad/s, got 3.0"),
         (["--workers", "0"], "workers: expected a finite number in [1, 1024], got 0"),
         (["--budget", "0"], "budget: expected"),
-        (["--exponent", "1.4142"], "exponent: expected a multiple of 1/8, for no environment takes another"),
         (["--seed", "-1"], "seed: expected"),
         (["--resume"], "holds no search to resume"),
     ],

@@ -10,7 +10,7 @@ import pytest
 from hoof_env.errors import GeometryError, ParameterError
 from hoof_env.gait import load_gait
 from hoof_env.leg.geometry import load_geometry, read_preset
-from research.identify.leg import GAITS, NAMES, SCALES, encode, to_preset
+from research.identify.leg import GAITS, encode, to_preset
 
 GEOMETRY = load_geometry("first_fit")
 CHOICE, X = encode("first_fit")
@@ -37,13 +37,6 @@ def test_a_preset_has_the_parts_of_the_shipped_one():
     assert preset.keys() == there.keys() - {"gait_provenance"}
     assert preset["geometry"].keys() == there["geometry"].keys()
     assert preset["gaits"]["run"].keys() == there["gaits"]["run"].keys()
-
-
-def test_every_number_has_a_name_and_a_scale():
-    assert len(NAMES) == len(set(NAMES)) == len(X) == len(SCALES)
-    assert (SCALES > 0).all()
-    assert NAMES[0] == "log OP"
-    assert X[NAMES.index("run.swing_offset")] == load_gait("run", "first_fit").swing_offset
 
 
 @pytest.mark.parametrize("x", [X[:-1], np.append(X[:-1], np.nan)])

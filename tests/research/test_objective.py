@@ -10,15 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hoof_env.errors import ParameterError
-from hoof_env.paper import shapes
 from hoof_env.paper.measure import measure_stance
 from hoof_env.paper.reproduce import run_cycle
 from hoof_env.paper.rows import CONDITIONS, ILL_CONDITIONED, compare, load_published
 from hoof_env.paper.shapes import PROMINENCE, find_peaks, half_impulses, sole_velocity, step_length
 from research.identify.confirm import COUNTED
 from research.identify.demands import DEMANDS, MEASURED
-from research.identify.features import BACKWARD, prominences
+from research.identify.features import prominences
 from research.identify.leg import LEVEL, NAMES, OFFSET, encode, to_preset
 from research.identify.objective import MISSED_ROW, Objective
 
@@ -207,7 +205,6 @@ def test_a_leg_in_the_air_has_no_rows_and_is_put_down_by_a_search():
 
 
 def test_the_demands_ask_for_what_the_claims_do():
-    assert BACKWARD == shapes.BACKWARD
     for demand in DEMANDS:
         assert demand.measured in MEASURED
         assert demand.scale > 0
@@ -225,8 +222,3 @@ def test_any_vector_has_a_finite_cost_and_rating():
             x = FIRST * rng.normal(1, 1, FIRST.size)
             assert np.isfinite(search.cost(x))
             assert np.isfinite(search.rate(x).merit(2.0))
-
-
-def test_too_few_samples_are_refused():
-    with pytest.raises(ParameterError, match="samples"):
-        Objective(CHOICE, samples=3)

@@ -16,7 +16,6 @@ from research.identify.resume import open_state, processes
 from research.identify.search import (
     CLEAR,
     SAMPLES,
-    SCHEDULE,
     TOE_SCALES,
     Job,
     LegProblem,
@@ -24,7 +23,6 @@ from research.identify.search import (
     Result,
     elite,
     plan,
-    rounds,
     run_job,
     search,
 )  # fmt: skip
@@ -135,12 +133,6 @@ def test_a_leg_keeps_its_ground_level_through_a_search_by_touch_down(leg):
 
 
 # --- rounds ----------------------------------------------------------------------------------------------
-
-
-def test_phases_come_round_and_round():
-    order = [phase.name for _, phase in zip(range(10), (p for _, p in rounds(SCHEDULE)), strict=False)]
-    once = ["around", "settle", "descend", "polish", "polish", "polish", "both solvers", "both solvers"]
-    assert order == [*once, "around", "settle"]
 
 
 def test_the_elite_is_the_best_result_of_each_of_the_best_starts():
