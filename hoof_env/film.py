@@ -145,9 +145,9 @@ def render_episode(
     check_number("seed", seed, low=0)
     check_number("seconds", seconds, low=0, exclusive_low=True)
     with records.make_env(env_id, parse_pairs("--args", arguments)) as env:
-        found = records.find_policy(policy, env, env_id, seed)
+        player = records.find_policy(policy, env, env_id, seed)
         renderer = new_renderer(records.setting(env), fps, size)
-        pictures = frames(renderer, records.episode(env, found, seed, seconds), fps, slow)
+        pictures = frames(renderer, records.episode(env, player, seed, seconds), fps, slow)
         count = write_film(_with_progress(pictures, round(seconds * slow * fps) + 1), path, fps)
     return count
 

@@ -234,8 +234,8 @@ class SavedModel:
         `DataFileError` if there is none."""
         saved = cls(path / "model.zip" if path.is_dir() else path, {})
         if path.is_dir() and not (saved.path.is_file() or saved.is_plain):
-            found = [one for one in (path / CHECKPOINTS).glob("*") if one.name.isdigit()]
-            saved = cls(max(found, key=lambda one: int(one.name), default=path) / "model.zip", {})
+            folders = [one for one in (path / CHECKPOINTS).glob("*") if one.name.isdigit()]
+            saved = cls(max(folders, key=lambda one: int(one.name), default=path) / "model.zip", {})
         if not (saved.path.is_file() or saved.is_plain):
             raise DataFileError(
                 f"model {path}: expected a .zip of agents.train or its run folder, found no {saved.path}"

@@ -420,9 +420,9 @@ class TrunkEngine(Scene):
         """
         if not self.reacts:
             raise ParameterError("reactions: expected an engine made with reactions=True, got one without")
-        found = self._memory.reactions[:, :, : self.num_envs]
-        legs, _, n = found.shape
-        parts = {name: found[:, ReactionRows.rows(name)].copy() for name in ReactionRows.fields}
+        rows = self._memory.reactions[:, :, : self.num_envs]
+        legs, _, n = rows.shape
+        parts = {name: rows[:, ReactionRows.rows(name)].copy() for name in ReactionRows.fields}
         joints = parts.pop("joints").reshape(legs, -1, 2, n)
         return Reactions(joints, **{name: part[:, 0] for name, part in parts.items()})
 

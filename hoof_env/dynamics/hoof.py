@@ -94,7 +94,7 @@ def inverse_entry_speed(trunk, memory, penetration, rate, model):  # type: ignor
 
 
 @inlined
-def push_back(ground, stiffness_scale, penetration, rate, inverse_speed, eighths):  # type: ignore[no-untyped-def]
+def contact_force(ground, stiffness_scale, penetration, rate, inverse_speed, eighths):  # type: ignore[no-untyped-def]
     """Normal force on a point inside the ground (Eq. 14), and its spring's part [N]."""
     if eighths == 12:  # the usual exponent, 3/2
         power = root_power(penetration, 12)
@@ -114,7 +114,7 @@ class GroundHere(NamedTuple):
 
 
 def law_of(contact_law: Callable[..., Any] | None) -> Any:
-    """What the kernels take for the normal force: `push_back`, or somebody's own law in the same place.
+    """What the kernels take for the normal force: `contact_force`, or somebody's own law in the same place.
 
     Args:
         contact_law: function of penetration [m], its rate [m/s], the inverse of the approach speed [s/m] and
@@ -122,7 +122,7 @@ def law_of(contact_law: Callable[..., Any] | None) -> Any:
             stored in the ground.
     """
     if contact_law is None:
-        return push_back
+        return contact_force
     force, number = inlined(contact_law), number_of(f"the contact law {named(contact_law)}")
 
     @inlined

@@ -67,9 +67,9 @@ def memory_of(data: Floats, num_envs: int, constants: Floats, reactions: Floats)
 def named_rows(memory: Memory) -> dict[str, Floats]:
     """State and report by name, as views."""
     parts = ((layout.TRUNK_STATE, memory.trunk), (layout.TRUNK_REPORT, memory.trunk_report))
-    found = {name: values[k] for names, values in parts for k, name in enumerate(names)}
+    columns = {name: values[k] for names, values in parts for k, name in enumerate(names)}
     limbs = ((layout.LEG_STATE, memory.limbs), (layout.LEG_REPORT, memory.limb_report))
-    return found | {name: values[:, k] for names, values in limbs for k, name in enumerate(names)}
+    return columns | {name: values[:, k] for names, values in limbs for k, name in enumerate(names)}
 
 
 def columns_for(num_envs: int) -> int:
@@ -277,17 +277,17 @@ def read_state(
 
 def identity_of(scene: Scene, filters: FilterSettings, **numbers: float) -> dict[str, Any]:
     """Everything on which the bits of a run depend, by name, as values that JSON can hold."""
-    found: dict[str, Any] = {**numbers, "integrator": scene.integrator}
+    identity: dict[str, Any] = {**numbers, "integrator": scene.integrator}
     for name, part in (("trunk", scene.trunk), ("ground", scene.ground), ("filters", filters)):
-        found |= {f"{name}.{key}": value for key, value in asdict(part).items()}
-    found["terrain"] = _digest(scene.terrain.to_dict())
+        identity |= {f"{name}.{key}": value for key, value in asdict(part).items()}
+    identity["terrain"] = _digest(scene.terrain.to_dict())
     for i, limb in enumerate(scene.limbs):
         shape = limb.geometry.to_dict()
-        found |= {f"limbs[{i}].hip": list(limb.hip), f"limbs[{i}].drive": repr(limb.drive)}
-        found[f"limbs[{i}].geometry"] = _digest(
+        identity |= {f"limbs[{i}].hip": list(limb.hip), f"limbs[{i}].drive": repr(limb.drive)}
+        identity[f"limbs[{i}].geometry"] = _digest(
             {key: value for key, value in shape.items() if key not in ("name", "provenance")}
         )
-    return found
+    return identity
 
 
 def _differences(expected: dict[str, Any], given: dict[str, Any]) -> str:

@@ -147,8 +147,8 @@ class EpisodeBatch:
 
     def _task_record(self) -> NDArray[Any]:
         slots, _, count = kernels.slots_of(self.task.entries)
-        found = np.zeros(1, kernels.task_type(len(self.task.terms), count))
-        task = found[0]
+        constants = np.zeros(1, kernels.task_type(len(self.task.terms), count))
+        task = constants[0]
         task["base"], task["middle"] = self._base, MIDDLE
         task["half"], task["low"], task["high"] = HALF_RANGE, LOW, HIGH
         task["rate_bound"] = self.engine.filters.to_array()[:, 1]
@@ -163,7 +163,7 @@ class EpisodeBatch:
         for entry, slot in zip(self.task.entries, slots, strict=True):
             if entry.name in self.names:
                 task["places"][slot] = self.names.index(entry.name)
-        return found
+        return constants
 
     def _open(self) -> None:
         """Find the arrays where they are now, and the kernels."""
@@ -350,13 +350,13 @@ class EpisodeBatch:
         if ended:
             broken = self.engine.results != 0
             measured[LAST_STEP, broken] = 0.0  # nothing happened there
-        found: dict[str, NDArray[Any]] = dict(zip(START, begun, strict=False))
-        found["gait"] = begun[len(START) : BEGUN].T.view(GAIT)
+        infos: dict[str, NDArray[Any]] = dict(zip(START, begun, strict=False))
+        infos["gait"] = begun[len(START) : BEGUN].T.view(GAIT)
         if self.randomize:
-            found["parameters"] = named(begun[BEGUN:].T, tuple(self.randomize))
-        found["measured"] = measured.T.view(MEASUREMENTS)
-        found.update(zip(self.terms, self.now.terms[:, :n].copy(), strict=True))
-        return found
+            infos["parameters"] = named(begun[BEGUN:].T, tuple(self.randomize))
+        infos["measured"] = measured.T.view(MEASUREMENTS)
+        infos.update(zip(self.terms, self.now.terms[:, :n].copy(), strict=True))
+        return infos
 
     def summary(self, env: int) -> dict[str, float]:
         """Figures of an episode.
@@ -421,9 +421,9 @@ class EpisodeBatch:
 
     def get_state(self) -> dict[str, Any]:
         """Everything that changes, but for the generators."""
-        found = {"engine": self.engine.get_state(), "episode": self.episode[:, : self.num_envs].copy()}
-        found["begun"] = self.begun.copy()
-        return found | ({"paper": self.paper.get_state()} if self.paper else {})
+        state = {"engine": self.engine.get_state(), "episode": self.episode[:, : self.num_envs].copy()}
+        state["begun"] = self.begun.copy()
+        return state | ({"paper": self.paper.get_state()} if self.paper else {})
 
     def set_state(self, state: Mapping[str, Any]) -> None:
         """Put back what `get_state` gave; `ParameterError` for one of another task, geometry or setting."""

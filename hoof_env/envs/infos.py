@@ -104,9 +104,9 @@ GAIT, MEASUREMENTS = _kind(PARAMETERS), _kind(MEASURED)
 
 def row_of(infos: Mapping[str, Any], env: int) -> dict[str, Any]:
     """The info of one environment from those of many, where they are about it."""
-    found = {}
+    row = {}
     for key, values in infos.items():
         if not key.startswith("_") and infos.get(f"_{key}", np.ones(env + 1, bool))[env]:
             is_named = isinstance(values, Named)
-            found[key] = named(values[env].copy(), values.names) if is_named else values[env]
-    return found
+            row[key] = named(values[env].copy(), values.names) if is_named else values[env]
+    return row

@@ -83,7 +83,7 @@ def check_parameters(name: str, given: Any, settings: Settings) -> dict[str, flo
         )
     for key in given:
         check_effect(key, settings, name)
-    found: dict[str, float | tuple[float, float]] = {}
+    checked: dict[str, float | tuple[float, float]] = {}
     for key, value in given.items():
         if isinstance(value, (list, tuple)):
             if len(value) != 2:
@@ -91,10 +91,10 @@ def check_parameters(name: str, given: Any, settings: Settings) -> dict[str, flo
             low, high = (check_number(f"{name}[{key!r}][{k}]", v) for k, v in enumerate(value))
             if low > high:
                 raise ParameterError(f"{name}[{key!r}]: expected the lower one first, got {value!r}")
-            found[key] = low, high
+            checked[key] = low, high
         else:
-            found[key] = check_number(f"{name}[{key!r}]", value)
-    return found
+            checked[key] = check_number(f"{name}[{key!r}]", value)
+    return checked
 
 
 def extremes(given: Mapping[str, float | tuple[float, float]]) -> list[dict[str, float]]:

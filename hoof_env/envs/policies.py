@@ -165,8 +165,12 @@ def open_loop_record(path: Path) -> dict[str, Any]:
     environment as `open_loop` takes them, "dt", control step [s], and "gait", the four parameters that the
     constant commands."""
     try:
-        found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        given, _, _ = found["parameters"], float(found["dt"]), np.array(list(found["gait"].values()), float)
+        record: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        given, _, _ = (
+            record["parameters"],
+            float(record["dt"]),
+            np.array(list(record["gait"].values()), float),
+        )
         shapes = {"constant": (4,), "sin": (4,), "cos": (4,), "frequency_hz": ()}
         clocked = "frequency_hz" in given
         if set(given) != (set(shapes) if clocked else {"constant"}):
@@ -179,7 +183,7 @@ def open_loop_record(path: Path) -> dict[str, Any]:
             f"open-loop gait {path}: expected the JSON object of agents.open_loop with parameters, dt and "
             f"gait: {error!r}"
         ) from None
-    return found
+    return record
 
 
 GAITS = Path(__file__).parents[1] / "data" / "gaits"
@@ -201,17 +205,17 @@ def load_open_loop(path_or_env_id: str | Path, env: Any = None) -> Scripted:
             known = ", ".join(sorted(file.name for file in GAITS.glob("*.json"))) or "none"
             raise DataFileError(f"open-loop gait of {name}: expected one of those in {GAITS.name}/: {known}")
         path = max(files, key=lambda file: open_loop_record(file)["score"]["mean"]["return"])
-    found = open_loop_record(path)
-    given, dt = found["parameters"], float(found["dt"])
+    record = open_loop_record(path)
+    given, dt = record["parameters"], float(record["dt"])
     if env is not None:
         leg, dt = env.unwrapped, getattr(env.unwrapped, "dt", dt)
         meant = getattr(leg, "command_of", lambda action: np.full(4, np.nan))(np.array(given["constant"]))
-        if not np.allclose(meant, list(found["gait"].values()), atol=1e-6):
+        if not np.allclose(meant, list(record["gait"].values()), atol=1e-6):
             raise DataFileError(
                 f"open-loop gait {path}: expected an environment whose actions command gaits as those of "
-                f"{found.get('env_id')} do, got {type(leg).__name__}, where this one is {meant.tolist()}"
+                f"{record.get('env_id')} do, got {type(leg).__name__}, where this one is {meant.tolist()}"
             )
         here = leg.spec and leg.spec.id
-        if here and (there := found.get("env_id") or here) not in (here, STANDS_FOR.get(here)):
+        if here and (there := record.get("env_id") or here) not in (here, STANDS_FOR.get(here)):
             warnings.warn(f"open-loop gait {path}: found for {there}, here {here}", stacklevel=2)
     return open_loop(given, dt)

@@ -275,13 +275,13 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         owner: Any = self if hasattr(self, name) else self.batch
         if name.startswith("_") or not hasattr(owner, name):
             raise AttributeError(f"{type(self).__name__}: the environments have no attribute {name!r}")
-        found = getattr(owner, name)
-        found = found(*args, **kwargs) if callable(found) else found
-        if name not in OWN or found is None:
-            return [found] * len(chosen)
-        if isinstance(found, dict):
-            return [{key: values[env] for key, values in found.items()} for env in chosen]
-        return [found[env] for env in chosen]
+        value = getattr(owner, name)
+        value = value(*args, **kwargs) if callable(value) else value
+        if name not in OWN or value is None:
+            return [value] * len(chosen)
+        if isinstance(value, dict):
+            return [{key: values[env] for key, values in value.items()} for env in chosen]
+        return [value[env] for env in chosen]
 
     # Parts of it
 

@@ -150,12 +150,12 @@ class Geometry:
 
     def to_dict(self) -> dict[str, Any]:
         """Everything that `from_dict` needs, JSON-serialisable."""
-        found = {item.name: getattr(self, item.name) for item in fields(self)}
-        found |= {name: dict(found[name]) for name in ("lengths", "assembly")}
-        found |= {"pivot": list(self.pivot), "masses": None if self.masses is None else list(self.masses)}
-        if found.pop("full_turn"):
-            return found
-        return {**found, "full_turn": False}
+        content = {item.name: getattr(self, item.name) for item in fields(self)}
+        content |= {name: dict(content[name]) for name in ("lengths", "assembly")}
+        content |= {"pivot": list(self.pivot), "masses": None if self.masses is None else list(self.masses)}
+        if content.pop("full_turn"):
+            return content
+        return {**content, "full_turn": False}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Geometry:

@@ -52,15 +52,15 @@ def find_peaks(force: NDArray[np.float64]) -> list[int]:
     steps = np.diff(force)
     moving = np.flatnonzero(steps)
     turns = (steps[moving[:-1]] > 0) & (steps[moving[1:]] < 0)
-    found = []
+    places = []
     for k in (moving[:-1][turns] + 1).tolist():
         higher = np.flatnonzero(force > force[k])
         left, right = higher[higher < k], higher[higher > k]
         base_left = force[left[-1] if left.size else 0 : k].min()
         base_right = force[k : right[0] + 1 if right.size else None].min()
         if force[k] - max(base_left, base_right) >= PROMINENCE * force.max():
-            found.append(k)
-    return found
+            places.append(k)
+    return places
 
 
 def _first(stance: Stance) -> str:

@@ -78,8 +78,8 @@ class KernelCache(_caching.FunctionCache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """As numba's; where there is nothing to load, it returns once this process may compile."""
-        if (found := self._load(sig, target_context)) is not None:
-            return found
+        if (overload := self._load(sig, target_context)) is not None:
+            return overload
         try:
             os.makedirs(self.cache_path, exist_ok=True)
             tempfile.TemporaryFile(dir=self.cache_path).close()

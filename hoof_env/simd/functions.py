@@ -129,10 +129,10 @@ def lane_sum(code: Code, start: Any, x: Any) -> Any:
     builder, count = code.builder, code.result.count
 
     def total(start: Any, x: Any) -> Any:
-        found = pick(builder, start, 0, count)
+        total = pick(builder, start, 0, count)
         for lane in range(count):
-            found = builder.fadd(found, pick(builder, x, lane, count))
-        return spread(builder, found, count)
+            total = builder.fadd(total, pick(builder, x, lane, count))
+        return spread(builder, total, count)
 
     if isinstance(code.result, Lanes):
         return total(start, x)
@@ -182,9 +182,9 @@ def transposed(builder: Any, rows: list[Any], width: int) -> list[Any]:
 def gather_eight(code: Code, pointer: Any, index: Any) -> Any:
     """pointer[index] to pointer[index + 7] in every lane, eight results; the index is a double that holds a
     whole number. One conversion and one load of a vector a lane."""
-    builder, count, found = code.builder, getattr(code.args[1], "count", 1), []
+    builder, count, loaded = code.builder, getattr(code.args[1], "count", 1), []
     for lane in range(count):
         at = builder.fptosi(pick(builder, index, lane, count), INDEX)
         place = builder.bitcast(builder.gep(pointer, [at]), ir.VectorType(DOUBLE, 8).as_pointer())
-        found.append(builder.load(place, align=8))
-    return code.context.make_tuple(builder, code.result, transposed(builder, found, 8))
+        loaded.append(builder.load(place, align=8))
+    return code.context.make_tuple(builder, code.result, transposed(builder, loaded, 8))

@@ -147,9 +147,9 @@ def rows(code: Code, pointer: Any, count: Any, layout: Any) -> Any:
 def columns(code: Code, pointer: Any, count: Any, layout: Any, start: Any, row: Any, stride: Any) -> Any:
     """Columns of an array of doubles, `stride` apart; its rows are `row` apart, and the first number of the
     first one is pointer[start]. They have the names of a layout, or None."""
-    found = code.context.make_helper(code.builder, code.result)
-    found.first, found.row, found.stride = code.builder.gep(pointer, [start]), row, stride
-    return found._getvalue()
+    record = code.context.make_helper(code.builder, code.result)
+    record.first, record.row, record.stride = code.builder.gep(pointer, [start]), row, stride
+    return record._getvalue()
 
 
 @instruction(lambda rows, number, layout: type(rows)(rows.count, layout.layout)(rows, types.intp, layout))
@@ -163,9 +163,9 @@ def part_of(code: Code, memory: Any, value: Any, first: Any) -> Any:
     builder = code.builder
     if isinstance(memory, Rows):
         return builder.gep(value, [builder.mul(first, INDEX(memory.count))], inbounds=True)
-    found = code.context.make_helper(builder, memory, value=value)
-    found.first = builder.gep(found.first, [builder.mul(first, found.row)])
-    return found._getvalue()
+    record = code.context.make_helper(builder, memory, value=value)
+    record.first = builder.gep(record.first, [builder.mul(first, record.row)])
+    return record._getvalue()
 
 
 def row_type(memory: Any) -> Any:
@@ -177,9 +177,9 @@ def read_row(code: Code, memory: Any, value: Any, row: Any) -> Any:
     """The lanes of a row."""
     if isinstance(memory, Rows):
         return code.builder.load(_place(code.builder, value, row, memory.count), align=8 * memory.count)
-    found = code.context.make_helper(code.builder, memory, value=value)
-    at = code.builder.mul(row, found.row)
-    return _read(code.builder, found.first, at, found.stride, max(memory.count, 1))
+    record = code.context.make_helper(code.builder, memory, value=value)
+    at = code.builder.mul(row, record.row)
+    return _read(code.builder, record.first, at, record.stride, max(memory.count, 1))
 
 
 def write_row(code: Code, memory: Any, value: Any, row: Any, x: Any) -> None:
@@ -187,9 +187,9 @@ def write_row(code: Code, memory: Any, value: Any, row: Any, x: Any) -> None:
     if isinstance(memory, Rows):
         code.builder.store(x, _place(code.builder, value, row, memory.count), align=8 * memory.count)
         return
-    found = code.context.make_helper(code.builder, memory, value=value)
-    at = code.builder.mul(row, found.row)
-    _write(code.builder, x, found.first, at, found.stride, max(memory.count, 1))
+    record = code.context.make_helper(code.builder, memory, value=value)
+    at = code.builder.mul(row, record.row)
+    _write(code.builder, x, record.first, at, record.stride, max(memory.count, 1))
 
 
 def _place(builder: Any, rows: Any, row: Any, count: int) -> Any:
@@ -201,7 +201,7 @@ def _read(builder: Any, pointer: Any, at: Any, stride: Any, count: int) -> Any:
     """`count` doubles from pointer[at] on, `stride` apart: one load if they are neighbours."""
     first, element = builder.gep(pointer, [at]), pointer.type.pointee
     if count == 1:
-        found = builder.load(first)
+        loaded = builder.load(first)
     else:
         with builder.if_else(builder.icmp_signed("==", stride, INDEX(1))) as (near, far):
             with near:
@@ -211,10 +211,10 @@ def _read(builder: Any, pointer: Any, at: Any, stride: Any, count: int) -> Any:
                 places = [builder.add(at, builder.mul(stride, INDEX(lane))) for lane in range(count)]
                 many = gathered(builder, [builder.load(builder.gep(pointer, [place])) for place in places])
                 after_far = builder.block
-        found = builder.phi(one.type)
-        found.add_incoming(one, after_near)
-        found.add_incoming(many, after_far)
-    return builder.fpext(found, wide(DOUBLE, count)) if element == SINGLE else found
+        loaded = builder.phi(one.type)
+        loaded.add_incoming(one, after_near)
+        loaded.add_incoming(many, after_far)
+    return builder.fpext(loaded, wide(DOUBLE, count)) if element == SINGLE else loaded
 
 
 def _write(builder: Any, x: Any, pointer: Any, at: Any, stride: Any, count: int) -> None:

@@ -103,10 +103,10 @@ def gathered(builder: Any, scalars: list[Any]) -> Any:
     """Scalars as lanes."""
     if len(scalars) == 1:
         return scalars[0]
-    found = ir.Constant(ir.VectorType(scalars[0].type, len(scalars)), ir.Undefined)
+    vector = ir.Constant(ir.VectorType(scalars[0].type, len(scalars)), ir.Undefined)
     for lane, x in enumerate(scalars):
-        found = builder.insert_element(found, x, ir.Constant(_POSITION, lane))
-    return found
+        vector = builder.insert_element(vector, x, ir.Constant(_POSITION, lane))
+    return vector
 
 
 def count_of(*kinds: Any) -> int:
@@ -140,8 +140,8 @@ class Code(NamedTuple):
 
     def split(self, kind: Any, value: Any) -> tuple[Any, Any]:
         """x and y of planar vectors."""
-        found = self.context.make_helper(self.builder, kind, value=value)
-        return found.real, found.imag
+        pair = self.context.make_helper(self.builder, kind, value=value)
+        return pair.real, pair.imag
 
     def planes(self, *values: Any) -> list[tuple[Any, Any]]:
         """x and y of each argument."""
@@ -149,9 +149,9 @@ class Code(NamedTuple):
 
     def join(self, x: Any, y: Any, kind: Any = None) -> Any:
         """Planar vectors, of the result's type unless `kind` is given."""
-        found = self.context.make_helper(self.builder, kind or self.result)
-        found.real, found.imag = x, y
-        return found._getvalue()
+        pair = self.context.make_helper(self.builder, kind or self.result)
+        pair.real, pair.imag = x, y
+        return pair._getvalue()
 
 
 def instruction(typed: Callable[..., Any], literal: bool = False) -> Callable[[Callable[..., Any]], Any]:
@@ -163,8 +163,8 @@ def instruction(typed: Callable[..., Any], literal: bool = False) -> Callable[[C
         @wraps(write)
         def intrinsic(context: Any, *kinds: Any) -> Any:
             def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-                found = write(Code(context, builder, signature.args, signature.return_type), *values)
-                return context.get_dummy_value() if found is None else found
+                result = write(Code(context, builder, signature.args, signature.return_type), *values)
+                return context.get_dummy_value() if result is None else result
 
             return typed(*kinds), emit
 
