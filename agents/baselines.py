@@ -39,6 +39,8 @@ class Args:
     """trainings at a time, one thread each"""
     out: Path | None = None
     """folder of trainings and page; otherwise runs/baselines-nightly, or runs/baselines and docs/"""
+    report: bool = True
+    """write the page when nothing is left"""
 
 
 def train_all(args: Args) -> list[Run]:
@@ -115,7 +117,8 @@ def main(argv: list[str] | None = None) -> int:
     signal.signal(signal.SIGTERM, interrupt)
     args = tyro.cli(Args, args=argv, prog="python -m agents.baselines", description=__doc__)
     failed = train_all(args)
-    print(f"written: {baselines_report.report(baselines_report.Args(args.subset, args.out))}")
+    if args.report:
+        print(f"written: {baselines_report.report(baselines_report.Args(args.subset, args.out))}")
     for one in failed:
         print(f"failed: {one.name}", file=sys.stderr)
     return 1 if failed else 0

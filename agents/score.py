@@ -146,7 +146,11 @@ def mean_figures(episodes: Sequence[Mapping[str, float]]) -> dict[str, float]:
 
 def is_model(name: str) -> bool:
     """Whether a policy's name is the path of a model rather than that of a scripted policy or of a gait."""
-    is_path = name.endswith((".zip", ".onnx")) or Path(name).name != name or Path(name, runs.MODEL).is_file()
+    is_path = (
+        name.lower().endswith((".zip", ".onnx"))
+        or Path(name).name != name
+        or Path(name, runs.MODEL).is_file()
+    )
     return is_path and not name.endswith(".json")
 
 

@@ -34,7 +34,7 @@ from agents.score import score_vector
 from hoof_env._output import check_folder, markdown_table, staged
 from hoof_env.envs.policies import STANDS_FOR
 from hoof_env.envs.tasks import TASKS
-from hoof_env.errors import DataFileError, OutputError, ParameterError
+from hoof_env.errors import DataFileError, OutputError, ParameterError, check_choice
 from hoof_env.film import render_episode
 from hoof_env.records import setting
 from hoof_env.saved_policy import ABOUT, FILE, WEIGHTS, OnnxPolicy
@@ -63,6 +63,8 @@ COPIED = (WEIGHTS, ABOUT, runs.CONFIG)
 class Args:
     runs: Positional[Path]
     """a run folder of agents.train, or a folder with several beneath it"""
+    ids: tuple[str, ...] = ()
+    """only these ids"""
     out: Path = POLICIES
     """folder for the policies' folders"""
 
@@ -271,10 +273,11 @@ def main(argv: list[str] | None = None) -> None:
     models = find_runs(args.runs)
     sources = {env_id: env_id for env_id in models}
     sources |= {one: other for one, other in STANDS_FOR.items() if one not in models and other in models}
+    ids = [check_choice("ids", env_id, sources) for env_id in args.ids] or list(sources)
     check_folder(args.out)
-    choices = {source: choose(models[source], source) for source in models}
-    for env_id, source in sources.items():
-        score = ship(choices[source], env_id, args.out)
+    choices = {source: choose(models[source], source) for source in {sources[env_id] for env_id in ids}}
+    for env_id in ids:
+        score = ship(choices[sources[env_id]], env_id, args.out)
         means = {name: one["mean"]["return"] for name, one in score["policies"].items()}
         write_index(args.out)
         print(f"{env_id}: " + ", ".join(f"{name} {value:.2f}" for name, value in means.items()), flush=True)

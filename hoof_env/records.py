@@ -88,7 +88,7 @@ def find_policy(name: str, env: gym.Env[Any, Any], env_id: str, seed: int = 0) -
         return load_open_loop(name, env)
     if name == "open-loop":
         return load_open_loop(env_id, env)
-    if name.endswith((".zip", ".onnx")) or Path(name).is_dir():
+    if name.lower().endswith((".zip", ".onnx")) or Path(name).is_dir():
         return find_saved(Path(name)).load(env, env_id)
     try:
         numbers = [float(number) for number in name.split(",")]

@@ -109,8 +109,11 @@ def check_record(path: Path, record: dict[str, Any], env: Any, env_id: str) -> N
     refuse_misfit(path, record, {"env_id": env_id, **describe(env)})
     here = settings_of(env)
     there = record.get("settings", here | record.get("env_kwargs", {}))
+    names = sorted({*here, *record.get("settings", {})}) if here else []  # another package's has none
     unlike = [
-        f"{key}={there.get(key)!r}, here {x!r}" for key, x in sorted(here.items()) if there.get(key) != x
+        f"{key}={there.get(key)!r}, here {here.get(key)!r}"
+        for key in names
+        if there.get(key) != here.get(key)
     ]
     made_with = record.get("hoof_env", record.get("versions", {}).get("hoof-env", __version__))
     if made_with != __version__:
@@ -141,7 +144,7 @@ def read_record(folder: Path) -> dict[str, Any]:
 
 def find_saved(path: Path) -> OnnxPolicy | SavedModel:
     """The policy in a file or a folder: an exported one where there is one, else a model of agents.train."""
-    is_onnx = path.suffix == ".onnx" or (path / FILE).is_file()
+    is_onnx = path.suffix.lower() == ".onnx" or (path / FILE).is_file()
     return OnnxPolicy(path) if is_onnx else SavedModel.find(path)
 
 

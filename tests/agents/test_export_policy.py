@@ -26,7 +26,7 @@ from agents.runs import SavedModel, TrainedPolicy, make_env
 from agents.score import play
 from hoof_env.errors import DataFileError, HoofEnvError, OutputError, ParameterError
 from hoof_env.records import find_policy
-from hoof_env.saved_policy import OnnxPolicy
+from hoof_env.saved_policy import OnnxPolicy, check_record
 from tests.agents.conftest import ENV_ID, KWARGS
 
 ROOT = Path(__file__).parents[2]
@@ -104,7 +104,7 @@ def test_metadata(env, exported):
 def test_other_settings_and_another_version_are_told(env, exported, trained, tmp_path, monkeypatch):
     import onnx
 
-    old = tmp_path / "old.onnx"  # of before the settings were kept
+    old = tmp_path / "old.ONNX"  # of before the settings were kept
     graph = onnx.load(exported)
     kept = [entry for entry in graph.metadata_props if entry.key != "settings"]
     del graph.metadata_props[:]
@@ -124,6 +124,8 @@ def test_other_settings_and_another_version_are_told(env, exported, trained, tmp
         find_policy(str(exported), other, ENV_ID)
     with make_env(ENV_ID) as other, pytest.warns(UserWarning, match=r"episode_seconds=0\.4, here 10\.0$"):
         find_policy(str(old), other, ENV_ID)
+    with pytest.warns(UserWarning, match="trained with gone=1, here None$"):
+        check_record(exported, {**record, "settings": {**record["settings"], "gone": 1}}, env, ENV_ID)
     monkeypatch.setattr("hoof_env.saved_policy.__version__", "9.9.9")
     with pytest.warns(UserWarning, match=r"trained with hoof-env \d\S*, here 9\.9\.9$"):
         find_policy(str(exported), env, ENV_ID)

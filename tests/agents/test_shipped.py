@@ -16,7 +16,7 @@ if not os.environ.get("CI"):  # which installs it, so that nothing may be left o
 from agents import ship
 from agents.runs import SavedModel, make_env
 from agents.score import score_vector
-from hoof_env.errors import DataFileError
+from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.saved_policy import OnnxPolicy
 from tests.agents.conftest import train_tiny
 
@@ -108,7 +108,11 @@ def test_a_run_is_shipped_by_one_command(tmp_path, monkeypatch, capsys):
         train_tiny(tmp_path / "runs" / f"s{seed}", env_kwargs=(), steps=2048, seed=seed)
     (tmp_path / "runs" / "unfinished").mkdir()
     (tmp_path / "runs" / "unfinished" / "run.json").write_text("{}")
-    ship.main([str(tmp_path / "runs"), "--out", str(tmp_path / "out")])
+    command = [str(tmp_path / "runs"), "--out", str(tmp_path / "out"), "--ids"]
+    with pytest.raises(ParameterError, match="ids"):
+        ship.main([*command, "hoof_env/HorseLegRail-v0"])
+    ship.main([*command, "hoof_env/HorseLeg-v0"])
+    assert [path.name for path in (tmp_path / "out").glob("HorseLeg*")] == ["HorseLeg-v0"]
     folder = tmp_path / "out" / "HorseLeg-v0"
     test_folder(folder)
     score = read(folder / "score.json")
