@@ -157,12 +157,15 @@ class Strides(Layout):
     stance_open: Row  # 1 in a stance, else 0
     stance_began: Row  # crank angle there [rad]
     stance_peak: Row  # highest resultant force of this stance [N]
+    steepest_rise: Row  # of the normal force while this stance's peak grew [N/s]
+    load: Row  # normal force on the hoof [N]
 
 
 class StrideSums(Layout):
     """Of one call of the engine."""
 
     peak_grf_increase: Row  # increases of the running peaks of stances [N]
+    loading_rate_increase: Row  # increases of the running steepest rises of stances [N/s]
     highest_grf: Row  # [N]
     positive_work: Row  # of both drives [J]
     normal_impulse: Row  # [N s]
@@ -297,6 +300,6 @@ LEG_STATE = (
 LEG_REPORT = LegReport.names
 STRIDES = Strides.names
 STRIDE_SUMS = (
-    "peak_increase", "highest", "positive_work", "load_impulse", "loaded_time", "stances", "travel",
+    "peak_increase", "loading_rate_increase", "highest", "positive_work", "load_impulse", "loaded_time", "stances", "travel",
 )  # fmt: skip
 ACCOUNT = Account.names

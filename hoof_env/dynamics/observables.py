@@ -4,7 +4,8 @@ Behind that the rule of a stance for other solvers.
 A stance opens when the normal force on the hoof rises above a threshold, as on a force plate. It closes when
 the force falls below it (lift-off), or after one crank revolution, whichever comes first, so that a hoof that
 never lifts has a peak every revolution. While it is open its peak is the highest resultant ground reaction
-force of any step; the increases of a stance's running peak add up to that peak."""
+force of any step; the increases of a stance's running peak add up to that peak. Its loading rate is the steepest
+rise of the normal force from one step to the next among the steps that raise the peak."""
 
 from __future__ import annotations
 
@@ -115,6 +116,11 @@ def count_stride(trunk, leg, h):  # type: ignore[no-untyped-def]
     leg.strides.stance_open = choose(loaded, 1.0, 0.0)
     leg.strides.stance_began = choose(begins > 0.0, leg.state.theta, leg.strides.stance_began)
     leg.strides.stance_peak = higher
+    rise = choose(higher > peak, (load - leg.strides.load) * (1.0 / h), 0.0)
+    steepest = choose(goes_on, leg.strides.steepest_rise, 0.0)
+    steeper = choose(loaded, larger(steepest, rise), 0.0)
+    leg.strides.steepest_rise, leg.strides.load = steeper, load
+    leg.sums.loading_rate_increase = leg.sums.loading_rate_increase + (steeper - steepest)
     leg.sums.stances = leg.sums.stances + begins
     leg.sums.peak_grf_increase = leg.sums.peak_grf_increase + (higher - peak)
     leg.sums.highest_grf = larger(leg.sums.highest_grf, force)
@@ -135,15 +141,20 @@ class StanceCounter:
     is_open: bool = False  # whether the hoof is in stance
     began: float = 0.0  # crank angle where the last stance opened [rad]
     peak: float = 0.0  # highest resultant force of the open stance [N], 0 between stances
+    steepest: float = 0.0  # rise of the normal force while that peak grew [N/s]
+    load: float = 0.0  # normal force of the last substep [N]
     count: int = 0  # how many have opened
 
-    def add(self, theta: float, normal: float, force: float) -> float:
-        """Take the next substep: crank angle [rad], normal and resultant force on the hoof [N]. Returns how
-        much the running peak has grown [N]; over a stance that adds up to its peak."""
+    def add(self, theta: float, normal: float, force: float, h: float = math.inf) -> tuple[float, float]:
+        """Take the next substep: crank angle [rad], normal and resultant force on the hoof [N], and its
+        length [s]. Returns how much the running peak [N] and the steepest rise [N/s] have grown; over a
+        stance that adds up to both."""
         loaded = normal > self.threshold
         goes_on = loaded and self.is_open and theta - self.began < REVOLUTION
-        before = self.peak if goes_on else 0.0
+        before, steepest = (self.peak, self.steepest) if goes_on else (0.0, 0.0)
         if loaded and not goes_on:
             self.began, self.count = theta, self.count + 1
         self.is_open, self.peak = loaded, max(before, force) if loaded else 0.0
-        return self.peak - before
+        rise = (normal - self.load) * (1.0 / h) if self.peak > before else 0.0
+        self.steepest, self.load = max(steepest, rise) if loaded else 0.0, normal
+        return self.peak - before, self.steepest - steepest

@@ -295,6 +295,8 @@ class EpisodeBatch:
         self.rewards[which] = 0.0
         now.terms[:, which], now.target[which], now.switch[which] = 0.0, np.inf, np.inf
         if self.target_speed:
+            now.target[which] = self.target_speed[0]
+        if self.target_speed and self.target_speed[0] < self.target_speed[1]:  # else it never changes
             for env, generator in zip(which, generators, strict=True):
                 now.target[env] = generator.uniform(*self.target_speed)
                 self._draw_target(int(env), generator)
@@ -362,12 +364,12 @@ class EpisodeBatch:
         """Figures of an episode.
 
         seconds, distance_m, speed_m_s, peak_grf_n (highest of the episode), mean_grf_n (normal force over the
-        whole time), stance_peak_sum_n, stances, duty_factor, drive_work_j (braking is not recovered),
+        whole time), stance_peak_sum_n, stances, loading_rate_n_s (mean over stances), duty_factor, drive_work_j (braking is not recovered),
         cost_of_transport (work per weight and distance; infinite without forward progress), weight_share
         (mean normal force over weight: what the leg bore), support_share (the rest: what the rail or the
         suspension bore), failed (0 or 1).
         """
-        seconds, distance, work, impulse, loaded, stances, peaks, highest = (
+        seconds, distance, work, impulse, loaded, stances, peaks, rates, highest = (
             float(getattr(self.now, name)[env]) for name in SUMS
         )
         weight, time = float(self.now.weight[env]), max(seconds, 1e-12)
@@ -380,6 +382,7 @@ class EpisodeBatch:
             "mean_grf_n": mean,
             "stance_peak_sum_n": peaks,
             "stances": stances,
+            "loading_rate_n_s": rates / max(stances, 1.0),
             "duty_factor": loaded / time,
             "drive_work_j": work,
             "cost_of_transport": work / (weight * distance) if distance > 0 else float("inf"),

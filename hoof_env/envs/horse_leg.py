@@ -295,12 +295,13 @@ OBJECTIVES = ("progress", "peak force", "energy")
 def vector_reward(terms: Mapping[str, Any]) -> NDArray[np.float32]:
     """The reward of each objective, shape (3,), from the terms that `info` holds.
 
-    Energy takes the charge for changing the action, which is effort too, and progress what is paid for
-    bearing weight, nothing by default. A failure is charged to all three in equal parts: under
+    Energy takes the charge for changing the action, which is effort too, the peak force that for its rate,
+    and progress what is paid for bearing weight and charged for speed beyond the commanded one. A failure is charged to all three in equal parts: under
     preference weights that sum to 1 a fall costs the same, whatever the weights, so that falling early to
     save force or energy pays under none.
     """
-    progress, peak = terms["reward_progress"] + terms["reward_support"], terms["reward_peak"]
+    progress = terms["reward_progress"] + terms["reward_support"] + terms["reward_overspeed"]
+    peak = terms["reward_peak"] + terms["reward_loading"]
     energy = terms["reward_energy"] + terms["reward_action"]
     return np.array([progress, peak, energy], np.float32) + np.float32(terms["reward_failure"] / 3)
 

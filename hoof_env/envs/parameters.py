@@ -14,6 +14,7 @@ from hoof_env.envs.tasks import PER_EPISODE, SOLVERS, Settings, check_effect
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.ground.contact import Ground, load_ground
 from hoof_env.ground.terrain import Terrain
+from hoof_env.leg.geometry import named, read_preset, wrong
 
 MOST_SUBSTEPS = 100_000  # of a control step
 
@@ -23,6 +24,12 @@ def resolved(settings: Settings) -> Settings:
     is_paper = check_choice("solver", settings.solver, SOLVERS) == "paper"
     s: Any = settings
     if s.stiffness is None or s.exponent is None:
+        if "ground" not in read_preset(s.preset):
+            raise wrong(s.preset)(
+                f"{named(s.preset)}: expected an entry 'ground' with stiffness and exponent of the ground that"
+                f" its gaits are for, {{}} for those of hoof_env.Ground, or both as arguments; got"
+                f" stiffness={s.stiffness!r}, exponent={s.exponent!r}"
+            )
         ground = load_ground(s.preset, stiffness=s.stiffness, exponent=s.exponent)
         s = replace(s, stiffness=ground.stiffness, exponent=ground.exponent)
     if s.integrator is None:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from hoof_env.envs.start import extreme_posture
 from hoof_env.errors import DataFileError, ParameterError, check_choice
-from hoof_env.gait import paper_gaits
+from hoof_env.gait import LIMITS, paper_gaits
 from hoof_env.leg.profile import leg_profile
 
 Action = NDArray[np.float32]
@@ -98,7 +98,7 @@ def make_policy(name: str, env: Any, seed: int = 0) -> Scripted:
         return Scripted(lambda observation, time: np.where(high(time), np.ones(4), -np.ones(4)), leg.dt)
     offsets = [gait.swing_offset for gait in paper_gaits(leg.gaits).values()]
     middle = sum(offsets) / len(offsets)
-    offsets = np.linspace(0.0, 1.4, 15).tolist() if name == "airborne" else [middle]
+    offsets = np.linspace(*LIMITS["swing_offset"], 14).tolist() if name == "airborne" else [middle]
     rests = _in_reach(leg, np.array([(0.0, offset, 0.0, 0.0) for offset in offsets]))
     if rests[0, 0] > 0.0:
         raise ParameterError(

@@ -9,8 +9,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from hoof_env.errors import ParameterError, check_number
-from hoof_env.simd import choose
+from hoof_env.simd import choose, larger, smaller
 from hoof_env.simd.user_functions import check_function
 
 
@@ -22,6 +24,7 @@ class Outcome(NamedTuple):
         progress: forward [m].
         commanded_progress: at the commanded speed; infinite without one [m].
         peak_grf_increase: of the running peaks of stances [N]; they add up to every stance's peak.
+        loading_rate_increase: of the steepest rises of the force in stances [N/s]; they add up likewise.
         highest_grf: [N].
         positive_work: of both drives; braking is not recovered [J].
         normal_impulse: of the ground on the hoof [N s].
@@ -39,6 +42,7 @@ class Outcome(NamedTuple):
     progress: Any
     commanded_progress: Any
     peak_grf_increase: Any
+    loading_rate_increase: Any
     highest_grf: Any
     positive_work: Any
     normal_impulse: Any
@@ -53,15 +57,28 @@ class Outcome(NamedTuple):
     episode: Any
 
 
+MOST_BEARING = 1.2
+"""Of the weight, which is paid for at most: a leg that bears its animal bears 1 on the average."""
+
+
 def progress(step, weight):  # type: ignore[no-untyped-def]
-    """Paid up to the commanded speed; what goes beyond costs as much."""
-    beyond = step.commanded_progress - (step.progress - step.commanded_progress)
-    return weight * choose(step.progress > step.commanded_progress, beyond, step.progress)
+    """Paid up to the commanded speed."""
+    return weight * smaller(step.progress, step.commanded_progress)
+
+
+def overspeed(step, weight):  # type: ignore[no-untyped-def]
+    """What goes beyond the commanded speed."""
+    return -weight * larger(step.progress - step.commanded_progress, 0.0)
 
 
 def peak(step, weight):  # type: ignore[no-untyped-def]
     """Weight in 1/kN."""
     return -0.001 * weight * step.peak_grf_increase
+
+
+def loading(step, weight):  # type: ignore[no-untyped-def]
+    """Weight in s/MN."""
+    return -1e-6 * weight * step.loading_rate_increase
 
 
 def energy(step, weight):  # type: ignore[no-untyped-def]
@@ -80,8 +97,12 @@ def failure(step, weight):  # type: ignore[no-untyped-def]
 
 
 def support(step, weight):  # type: ignore[no-untyped-def]
-    """Impulse in units of the weight's."""
-    return weight * (step.normal_impulse / step.weight)
+    """Impulse in units of the weight's, in proportion to the speed, up to the commanded one: who stands and
+    presses is not paid, and who rubs to and fro gets nothing in the end."""
+    commanded = larger(step.commanded_progress, 1e-9)
+    pace = smaller(larger(step.progress / commanded, -1.0), 1.0)
+    pace = choose(commanded < np.inf, pace, 1.0)
+    return weight * pace * smaller(step.normal_impulse / step.weight, MOST_BEARING * step.seconds)
 
 
 @dataclass(frozen=True)
@@ -129,21 +150,28 @@ class Term:
 
 
 TERMS = (
-    Term("progress", 1.0, "1/m", "forward travel of the trunk", progress),
+    Term("progress", 2.5, "1/m", "forward travel of the trunk, up to the commanded speed", progress),
     Term(
-        "peak", 0.3, "1/kN",
+        "peak", 0.75, "1/kN",
         "minus the increase of the stance's running peak GRF, the highest of all substeps; the charges of"
         " one stance add up to its peak", peak,
     ),
     Term(
-        "energy", 0.1, "1/kJ",
+        "energy", 2.0, "1/kJ",
         "minus the positive work of crank and swing drive; braking is not recovered", energy,
     ),
     Term("action", 0.03, "-", "minus the mean squared change of the action", action),
     Term("failure", 30.0, "1/s", "once, minus `episode_seconds`, when the episode fails", failure),
     Term(
-        "support", 0.0, "1/s",
-        "normal force over the weight of trunk and leg, integrated over the step", support,
+        "support", 15.0, "1/s",
+        "normal force over the weight of trunk and leg, integrated over the step, at most"
+        f" {MOST_BEARING:g} times its length; times the speed over the commanded one, within +-1", support,
+    ),
+    Term("overspeed", 0.0, "1/m", "minus the forward travel beyond the commanded speed", overspeed),
+    Term(
+        "loading", 0.0, "s/MN",
+        "minus the increase of the stance's running loading rate, the steepest rise of the normal force from"
+        " one substep to the next while the peak grows", loading,
     ),
 )  # fmt: skip
 """The terms of all ids, in the order in which they are added up."""

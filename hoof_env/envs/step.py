@@ -68,7 +68,7 @@ ACTIONS = len(PARAMETERS)
 FAILED, TRUNCATED = 1, 2
 """How an episode ended, in the place of 0."""
 
-SUMS = ("time", "distance", "work", "impulse", "loaded_time", "stances", "peak_sum", "highest")
+SUMS = ("time", "distance", "work", "impulse", "loaded_time", "stances", "peak_sum", "loading_rate_sum", "highest")
 """Fields of `Episode` that begin at 0 and are added to."""
 
 
@@ -87,6 +87,7 @@ class Episode(Layout):
     loaded_time: Row  # [s]
     stances: Row
     peak_sum: Row  # of the stances' peaks [N]
+    loading_rate_sum: Row  # of the stances' loading rates [N/s]
     highest: Row  # force of the episode [N]
     terms: Annotated[Block, len(TERMS)]  # of the last reward
     ended: Row  # 0, `FAILED` or `TRUNCATED`
@@ -155,6 +156,7 @@ def find_outcome(task, trunk, leg, episode, action_change):  # type: ignore[no-u
         progress=choose(works, progress, 0.0),
         commanded_progress=task.dt * episode.target,
         peak_grf_increase=choose(works, sums.peak_grf_increase, 0.0),
+        loading_rate_increase=choose(works, sums.loading_rate_increase, 0.0),
         highest_grf=choose(works, sums.highest_grf, 0.0),
         positive_work=choose(works, sums.positive_work, 0.0),
         normal_impulse=choose(works, sums.normal_impulse, 0.0),
@@ -180,6 +182,7 @@ def add_up(outcome, episode):  # type: ignore[no-untyped-def]
     episode.loaded_time = episode.loaded_time + outcome.loaded_time
     episode.stances = episode.stances + outcome.stances
     episode.peak_sum = episode.peak_sum + outcome.peak_grf_increase
+    episode.loading_rate_sum = episode.loading_rate_sum + outcome.loading_rate_increase
     episode.highest = larger(episode.highest, outcome.highest_grf)
 
 
@@ -213,6 +216,7 @@ def outcome_of_one(outcome, lane, trunk, leg, episode):  # type: ignore[no-untyp
     return Outcome(
         lane_of(outcome.seconds, lane), lane_of(outcome.progress, lane),
         lane_of(outcome.commanded_progress, lane), lane_of(outcome.peak_grf_increase, lane),
+        lane_of(outcome.loading_rate_increase, lane),
         lane_of(outcome.highest_grf, lane), lane_of(outcome.positive_work, lane),
         lane_of(outcome.normal_impulse, lane), lane_of(outcome.loaded_time, lane),
         lane_of(outcome.stances, lane), lane_of(outcome.action_change, lane), lane_of(outcome.failed, lane),

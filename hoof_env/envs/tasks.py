@@ -38,17 +38,17 @@ SOLVERS = ("exact", "paper")  # the closed form, and Eq. 8 as the paper solves i
 class Settings:
     """Everything that can be set, plain values that JSON can hold; `HorseLegEnv` says what they mean."""
 
-    preset: Preset = "first_fit"
+    preset: Preset = DEFAULT_PRESET
     gait: str | None = None
     trunk: str = "suspended"
     hip_height: float | None = None
-    trunk_mass: float = 80.0
+    trunk_mass: float = 50.0
     trunk_share: float = 0.8
-    trunk_stiffness: float = 4000.0
-    trunk_damping: float = 1130.0
+    trunk_stiffness: float = 12000.0
+    trunk_damping: float = 1590.0
     trunk_drag: float = 20.0
-    stiffness: float = 2e4  # this and three more may be None until `parameters.resolved`
-    exponent: float = 1.5
+    stiffness: float | None = None
+    exponent: float | None = None
     normal_law: str = "lankarani-nikravesh"
     restitution: float = 0.5
     approach_floor: float = 0.1
@@ -68,7 +68,7 @@ class Settings:
     sim_dt: float = 1e-3
     dt: float = 0.02
     episode_seconds: float = 10.0
-    target_speed: tuple[float, float] | None = None
+    target_speed: tuple[float, float] | None = (2.5, 2.5)
     target_seconds: tuple[float, float] = (2.0, 4.0)
     observation: tuple[str, ...] = ("crank", "gait", "trunk", "hoof", "action")
     reward_weights: Mapping[str, float] | None = None
@@ -245,6 +245,14 @@ class Task:
         return settings
 
 
+RACING: Mapping[str, Any] = MappingProxyType(
+    {
+        "target_speed": None,
+        "reward_weights": {"progress": 1.0, "peak": 0.3, "energy": 0.1, "support": 0.0},
+    }
+)
+"""Settings of a task that pays for every metre, however fast, and not for bearing weight."""
+
 _SUSPENDED = (
     "The trunk moves along x and y. The leg must bear `trunk_share` of the weight of trunk and leg; a"
     " constant force carries the rest, a vertical spring and damper stands for the animal's other legs."
@@ -257,17 +265,17 @@ TASKS: Mapping[str, Task] = MappingProxyType(
             "HorseLegRail",
             "A horse's leg that pulls its trunk along a rail.",
             "The trunk slides along x at fixed height: nobody has to be carried, only moved.",
-            {"trunk": "rail"},
+            {"trunk": "rail", **RACING},
         ),
         "speed": Task(
             "HorseLegSpeed",
             "A horse's leg that keeps a commanded speed, which changes.",
             _SUSPENDED
-            + " Every 2 to 4 s a new speed is commanded. Progress is paid up to it; what goes beyond costs"
-            " as much; a metre pays twice what it pays elsewhere, for here it is asked for.",
+            + " Every 2 to 4 s a new speed is commanded. Progress is paid up to it, what goes beyond costs as"
+            " much, and both weigh more than elsewhere, for here the speed is asked for.",
             {
                 "target_speed": (1.0, 4.0),
-                "reward_weights": {"progress": 2.0},
+                "reward_weights": {"progress": 6.0, "overspeed": 6.0},
                 "observation": ("crank", "gait", "trunk", "hoof", "action", "target"),
             },
         ),
@@ -292,11 +300,9 @@ TASKS: Mapping[str, Task] = MappingProxyType(
             " approach speed at the first step inside the ground. Restitution 1 is the paper's elastic"
             " condition, 0 its inelastic one.",
             {
-                "preset": DEFAULT_PRESET,
                 "gait": "walk",
                 "trunk": "fixed",
-                "stiffness": None,
-                "exponent": None,
+                **RACING,
                 "restitution": 1.0,
                 "approach_floor": 1e-4,
                 "friction_fast": 1e-2,
