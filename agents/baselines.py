@@ -34,7 +34,7 @@ class Args:
     subset: Plan = "full"
     """which plan; the nightly one is written beside its runs and never over the full table"""
     only: tuple[str, ...] = ()
-    """only trainings with one of these in their names, which are ALGO-ENV-sSEED or ALGO-ENV-LABEL-sSEED"""
+    """only trainings with one of these in their names, which are ALGO-ENV-sSEED"""
     workers: int = 2
     """trainings at a time, one thread each"""
     out: Path | None = None

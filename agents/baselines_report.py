@@ -19,14 +19,11 @@ from matplotlib.ticker import EngFormatter, NullFormatter
 
 from agents import runs
 from agents.baselines_results import (
-    GAIT_COLUMNS,
     OPEN_LOOP,
-    Floats,
+    SPEED,
     Row,
-    Scored,
-    cells,
     compare,
-    iqm,
+    following,
     read_results,
     references,
     versions_of,
@@ -34,7 +31,9 @@ from agents.baselines_results import (
 from agents.baselines_run import COLUMNS, CURVE, FOLDERS, LEG, Plan, load_plan, read_curve
 from agents.command import run
 from agents.evaluate import Score
+from agents.score import FINAL_SEEDS
 from agents.settings import load_settings
+from agents.statistics import FIGURES, TABLE, Floats, Scored, cells, iqm
 from hoof_env._output import markdown_table
 from hoof_env.paper.figures import BLUE, GREEN, GREY, ORANGE, PURPLE, STYLE
 
@@ -53,9 +52,8 @@ class Args:
     """folder of the trainings, and of report.md; otherwise runs/baselines or runs/baselines-nightly"""
 
 
-def unlabelled(rows: Sequence[Row], env_id: str) -> list[Row]:
-    """Entries of an id that are trained for its own reward."""
-    return [row for row in rows if row.entry.env_id == env_id and not row.entry.label]
+def of_id(rows: Sequence[Row], env_id: str) -> list[Row]:
+    return [row for row in rows if row.entry.env_id == env_id]
 
 
 def results_table(rows: Sequence[Row], gaits: References) -> str:
@@ -69,7 +67,7 @@ def results_table(rows: Sequence[Row], gaits: References) -> str:
             [f"`{env_id}`", one.name, "", "", "", "", one.intervals["return"].text()]
             for one in known.values()
         ]
-        lines += [[f"`{env_id}`", row.title, *row_cells(row, known)] for row in unlabelled(rows, env_id)]
+        lines += [[f"`{env_id}`", row.title, *row_cells(row, known)] for row in of_id(rows, env_id)]
     return markdown_table(titles, lines)
 
 
@@ -96,9 +94,18 @@ def figures_table(rows: Sequence[Row], gaits: References) -> str:
     lines = [
         [f"`{env_id}`", one.name, *cells(one)]
         for env_id, known in gaits.items()
-        for one in (*known.values(), *(row.scored for row in unlabelled(rows, env_id)))
+        for one in (*known.values(), *(row.scored for row in of_id(rows, env_id)))
     ]
-    return markdown_table(["id", "policy", *(title for title, *_ in GAIT_COLUMNS.values())], lines)
+    return markdown_table(["id", "policy", *(title for title, *_ in TABLE.values())], lines)
+
+
+def following_table(rows: Sequence[Row]) -> str:
+    lines = []
+    for row in rows:
+        one = following(row)
+        each = ", ".join(f"{seed['follows']:.2f}" for seed in one.seeds)
+        lines.append([row.title, one.intervals["follows"].text(2), each])
+    return markdown_table(["", "change of speed / change of command", "each seed"], lines)
 
 
 def made_text(rows: Sequence[Row]) -> str:
@@ -108,12 +115,15 @@ def made_text(rows: Sequence[Row]) -> str:
 
 
 def write_data(rows: Sequence[Row], folder: Path) -> None:
-    """curves.csv, the learning curves of all, and runs.csv, a line for each training."""
-    curves, ends = [], []
+    """curves.csv, the learning curves of all, runs.csv, a line for each training, and episodes.csv, a line
+    for each episode of the final scores."""
+    curves, ends, episodes = [], [], []
     for row in rows:
         for one in row.results:
             about = {"policy": row.title, "env_id": row.entry.env_id, "seed": one.final["seed"]}
             curves += [about | line for line in one.curve]
+            played = zip(FINAL_SEEDS, one.final["episodes"], strict=True)
+            episodes += [about | {"episode": seed} | short(episode) for seed, episode in played]
             clock = {key: one.final[key] for key in ("steps", "wall_s", "cpu_s")}
             numbers = {key: round(value, 4) for key, value in (clock | one.figures).items()}
             settings = load_settings(one.folder / runs.CONFIG, row.entry.env_id)
@@ -121,6 +131,12 @@ def write_data(rows: Sequence[Row], folder: Path) -> None:
     columns = ("policy", "env_id", "seed", *COLUMNS)
     runs.write_csv(folder / "curves.csv", columns, curves)
     runs.write_csv(folder / "runs.csv", (*columns, "config"), ends)
+    runs.write_csv(folder / "episodes.csv", ("policy", "env_id", "seed", "episode", *FIGURES), episodes)
+
+
+def short(episode: Mapping[str, float]) -> dict[str, str]:
+    """The `FIGURES` of an episode with five digits."""
+    return {key: f"{episode[key]:.5g}" for key in FIGURES if key in episode}
 
 
 def over_time(row: Row, key: str) -> tuple[Floats, Floats]:
@@ -224,27 +240,20 @@ def report(args: Args) -> Path:
     page, beside = folder / "report.md", folder / "report"
     beside.mkdir(parents=True, exist_ok=True)
     gaits = {row.entry.env_id: references(row.entry.env_id) for row in rows}
-    pictures = []
+    parts = [f"# Baselines: the {args.subset} plan", "## Returns", results_table(rows, gaits)]
     for env_id, known in gaits.items():
-        if shown := unlabelled(rows, env_id):
-            name = env_id.rpartition("/")[2]
-            draw_curves(shown, known, beside / f"{name}.png")
-            pictures.append(f"![{name}]({beside.name}/{name}.png)")
+        name = env_id.rpartition("/")[2]
+        draw_curves(of_id(rows, env_id), known, beside / f"{name}.png")
+        parts.append(f"![{name}]({beside.name}/{name}.png)")
     write_data(rows, beside)
-    known = gaits.get(LEG) or references(LEG)
-    best = max(unlabelled(rows, LEG), key=lambda row: row.scored.intervals["return"].mean, default=None)
-    parts = [
-        f"# Baselines: the {args.subset} plan",
-        "## Returns",
-        results_table(rows, gaits),
-        *pictures,
-        "## What the gaits are like",
-        figures_table(rows, gaits),
-        "## At matched speed",
-        compare(rows, best, known["run"]),
-        "## How it was made",
-        made_text(rows),
-    ]
+    parts += ["## What the gaits are like", figures_table(rows, gaits)]
+    if LEG in gaits:
+        others = [one for name, one in gaits[LEG].items() if name != "run"]
+        agents = others + [row.scored for row in of_id(rows, LEG)]
+        parts += ["## Beside the paper's run", compare(agents, gaits[LEG]["run"])]
+    if SPEED in gaits:
+        parts += ["## How a command is followed", following_table(of_id(rows, SPEED))]
+    parts += ["## How it was made", made_text(rows)]
     runs.write_text(page, "\n\n".join(parts) + "\n")
     return page
 

@@ -23,8 +23,9 @@ import yaml
 
 from agents import runs
 from agents.command import parse_pairs, run
-from agents.score import CURVE_SEEDS, FIGURES, FINAL_SEEDS, mean_figures, score_vector
+from agents.score import CURVE_SEEDS, FINAL_SEEDS, score_vector
 from agents.settings import FOLDER, TrainingArgs, load_settings
+from agents.statistics import FIGURES, mean_figures
 from agents.train import Args as TrainArgs
 from agents.train import train
 from agents.watch import Scorer
@@ -55,12 +56,10 @@ class Entry:
     steps: int | None = None
     points: int = 30
     env_kwargs: Mapping[str, Any] = field(default_factory=dict, hash=False)
-    label: str = ""
-    paid: str = ""
 
     @property
     def name(self) -> str:
-        return "-".join(filter(None, (self.algo, self.env_id.rpartition("/")[2], self.label)))
+        return f"{self.algo}-{self.env_id.rpartition('/')[2]}"
 
 
 @dataclass(frozen=True)

@@ -25,11 +25,11 @@ import numpy as np
 from agents import runs
 from agents.command import parse_pairs, run
 from agents.score import find_policy, play, read_policy_record
+from agents.statistics import Interval, estimate
 from hoof_env import records
 from hoof_env._output import check_folder
 from hoof_env.errors import OutputError, ParameterError, check_number
 
-DEFAULT_ENV = "hoof_env/HorseLeg-v0"
 FPS = 50.0  # of films
 
 
@@ -54,33 +54,8 @@ METRICS = {
     "failed": Metric("failed"),
     "loading_rate_n_s": Metric("loading rate\nkN/s", 1e-3, 1),
 }
-"""The columns: "return", figures of the episode (`hoof_env.envs.batch.EpisodeBatch.summary`), and two means
-over the stances of an episode, 0 without a stance: "stance_peak_n", of their highest force, and, where it is
-asked for, "loading_rate_n_s" (`agents.score.LoadingRate`), of the steepest rise of the force at impact."""
-
-
-@dataclass(frozen=True)
-class Interval:
-    """A mean and the bounds of its 95 % interval; NaN where there is none."""
-
-    mean: float
-    low: float = math.nan
-    high: float = math.nan
-
-    def parts(self, digits: int = 1, factor: float = 1.0) -> tuple[str, str]:
-        """Mean and interval as a person reads them; nothing for a mean that is NaN, and no interval where
-        there is none or it has no width."""
-        if not math.isfinite(self.mean):
-            return "" if math.isnan(self.mean) else "∞", ""
-        mean, low, high = (f"{factor * x:.{digits}f}" for x in (self.mean, self.low, self.high))
-        return mean, "" if self.low == self.high or math.isnan(self.low) else f"[{low}, {high}]"
-
-    def text(self, digits: int = 1, factor: float = 1.0) -> str:
-        return " ".join(filter(None, self.parts(digits, factor)))
-
-    def above(self, other: Interval) -> bool:
-        """Whether the whole interval lies above another; False where one is not known."""
-        return self.low > other.high
+"""The columns: "return", figures of the episode (`hoof_env.envs.batch.EpisodeBatch.summary`), and
+"stance_peak_n", the mean over its stances of their highest force, 0 without a stance."""
 
 
 @dataclass(frozen=True)
@@ -96,20 +71,6 @@ class Score:
         return {
             key: estimate([one[key] for one in self.episodes]) for key in METRICS if key in self.episodes[0]
         }
-
-
-def estimate(values: Sequence[float]) -> Interval:
-    """The mean of `values` and the bias-corrected bootstrap's 95 % interval of it."""
-    from scipy.stats import bootstrap
-
-    sample = np.asarray(values, dtype=float)
-    mean = float(sample.mean())
-    if len(sample) < 2 or not math.isfinite(mean):
-        return Interval(mean)
-    if np.ptp(sample) <= 1e-12 * abs(mean):  # the bootstrap is undefined without variance
-        return Interval(mean, mean, mean)
-    bounds = bootstrap((sample,), np.mean, rng=np.random.default_rng(0)).confidence_interval
-    return Interval(mean, float(bounds.low), float(bounds.high))
 
 
 def film_paths(video: Path, names: Sequence[str]) -> dict[str, Path]:
@@ -140,8 +101,6 @@ class Args:
     """environment; otherwise that of the first model or gait file, or hoof_env/HorseLeg-v0"""
     env_kwargs: tuple[str, ...] = ()
     """its arguments: key=value ..., or one JSON object; otherwise those of the first model or gait file"""
-    loading_rate: bool = False
-    """also how steeply the force rises at impact; every substep is recorded, which takes 0.2 s an episode"""
     json: Path | None = None
     """write all figures of all episodes to this file"""
     video: Path | None = None
@@ -159,9 +118,8 @@ def evaluate(args: Args) -> tuple[list[Score], dict[str, Any]]:
     env_id, env_kwargs = _environment(args)
     scores = []
     with runs.make_env(env_id, **env_kwargs) as env:
-        if (args.loading_rate or args.video) and not hasattr(env.unwrapped, "record"):
-            option = "--loading-rate" if args.loading_rate else "--video"
-            raise ParameterError(f"{option}: expected an environment of hoof_env, got {env_id}")
+        if args.video and not hasattr(env.unwrapped, "record"):
+            raise ParameterError(f"--video: expected an environment of hoof_env, got {env_id}")
         runs.warm_up(env)
         # All are found before the first is played
         policies = {name: find_policy(name, env, env_id) for name in args.policy}
@@ -169,9 +127,7 @@ def evaluate(args: Args) -> tuple[list[Score], dict[str, Any]]:
             for name, policy in policies.items():
                 bar.set_description(name)
                 seeds = range(args.seed, args.seed + args.episodes)
-                scores.append(
-                    Score(name, play(env, policy, seeds, bar.update, loading_rate=args.loading_rate))
-                )
+                scores.append(Score(name, play(env, policy, seeds, bar.update)))
         for name, path in films.items():
             film(env, find_policy(name, env, env_id), path, args.seed)
             print(f"filmed {name}: {path}")
@@ -193,7 +149,7 @@ def _environment(args: Args) -> tuple[str, dict[str, Any]]:
     """The id and the arguments of the environment: those that are given, else those of the first policy that
     is a file."""
     record = next(filter(None, [read_policy_record(name) for name in args.policy]), {})
-    env_id = args.env_id or record.get("env_id", DEFAULT_ENV)
+    env_id = args.env_id or record.get("env_id", runs.DEFAULT_ENV)
     own = record.get("env_kwargs", {}) if env_id == record.get("env_id") else {}
     return env_id, parse_pairs("--env-kwargs", args.env_kwargs) or own
 

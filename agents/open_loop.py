@@ -27,8 +27,8 @@ from numpy.typing import NDArray
 
 from agents import runs
 from agents.command import parse_pairs, run
-from agents.evaluate import estimate
 from agents.score import make_rows, play_rows
+from agents.statistics import estimate
 from hoof_env._output import check_folder
 from hoof_env.envs.policies import open_loop, open_loop_record
 from hoof_env.errors import DataFileError, HoofEnvError, ParameterError, check_number
@@ -58,8 +58,8 @@ OPTIONS = {
 EPISODES = {"constant": 10_240, "clocked": 30_720}  # of a search, by family
 
 KEPT = (
-    "return", "speed_m_s", "stance_peak_n", "cost_of_transport", "peak_grf_n", "weight_share", "stances",
-    "failed",
+    "return", "speed_m_s", "stance_peak_n", "loading_rate_n_s", "cost_of_transport", "peak_grf_n",
+    "weight_share", "stances", "failed",
 )  # fmt: skip
 """Figures of an episode whose means are kept."""
 

@@ -43,6 +43,8 @@ MODEL, CONFIG, RECORD, MONITOR = "model.zip", "config.yml", "run.json", "monitor
 FILES = (MODEL, WEIGHTS, ABOUT, CONFIG, RECORD, MONITOR)
 """What a run without normalisation leaves, TensorBoard's files aside."""
 
+DEFAULT_ENV = "hoof_env/HorseLeg-v0"
+
 PACKAGES = ("hoof-env", "numpy", "gymnasium", "numba", "stable-baselines3", "sb3-contrib", "torch")
 
 

@@ -1,29 +1,44 @@
-"""Episodes of any policy, one after the other or as rows of the native vector environment.
+"""Score any policy on the episodes that the reported tables are made of.
 
-A row is the episode that `play` gives with the same seed, to the bit where the policy acts in a batch as
-alone: scripted policies do, but for "random", which draws for all rows at once; a network does to its last
-bits. The loading rate of an episode, after its first seconds, is the steepest rise of the force at impact.
+    python -m agents.score run open-loop runs/ppo-HorseLeg-v0-s0
+    python -m agents.score policy.onnx --csv episodes.csv
+    python -m agents.score my_module:act --env-id hoof_env/HorseLegRail-v0
+
+A policy is what agents.evaluate takes, or MODULE:NAME, a Python function of observations, shape (n, k), that
+returns actions, shape (n, 4). Each gets the line that it would have in docs/baselines.md; several trained
+ones, as the seeds of one algorithm, also a line for all of them. A policy that was trained for another id,
+leg, setting or version is refused. A model file is a pickle and can run any code when it is loaded, and a
+module is code: give only what you trust.
+
+Episodes are rows of the native vector environment where the id has one. A row is the episode that `play`
+gives with the same seed, to the bit where the policy acts in a batch as alone: scripted policies do, but for
+"random", which draws for all rows at once; a network does to its last bits.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import sys
+import warnings
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
-from numpy.typing import NDArray
+from tyro.conf import Positional
 
 from agents import runs
+from agents.command import parse_pairs, run
+from agents.statistics import FIGURES, TABLE, Scored, cells, mean_figures, over_episodes, over_seeds
 from hoof_env import records
+from hoof_env._output import check_folder, markdown_table
 from hoof_env.envs.policies import open_loop_record
 from hoof_env.envs.vector import HorseLegVectorEnv
-from hoof_env.errors import ParameterError
+from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.saved_policy import find_saved
-
-Floats = NDArray[np.float64]
 
 ROWS = 1024  # episodes side by side at most; more are played one batch after the other
 
@@ -33,46 +48,24 @@ CURVE_SEEDS = range(1000, 1020)
 FINAL_SEEDS = range(1_000_000, 1_000_100)
 """Episodes of the final scores, on which nothing else is played: no training, curve, tuning or search."""
 
-FIGURES = (
-    "return", "speed_m_s", "peak_grf_n", "stance_peak_n", "cost_of_transport", "weight_share", "failed",
-)  # fmt: skip
-"""Figures whose means `mean_figures` gives."""
-
-TRANSPORT = ("distance_m", "drive_work_j", "mean_grf_n", "weight_share")
-"""What a cost of transport over several episodes is made of; the force by the share is the weight."""
-
-
-SETTLED = 3.0  # seconds of an episode that are left out, where it is at least twice as long
-WINDOW = 0.005  # the loading rate is the steepest rise of the force over so many seconds
-
-FORCES = ("toe_normal", "heel_normal", "toe_friction", "heel_friction")
-
 
 def play(
     env: gym.Env[Any, Any],
     policy: Any,
     seeds: Sequence[int],
     tick: Any = lambda: None,
-    *,
-    loading_rate: bool = False,
 ) -> list[dict[str, float]]:
-    """One episode per seed; its return and its summary. `tick` is called after each. The loading rate needs
-    an environment of this package, whose substeps it records."""
+    """One episode per seed; its return and its summary. `tick` is called after each."""
     episodes = []
     for seed in seeds:
         observation, info = env.reset(seed=seed)
-        rate = LoadingRate(env) if loading_rate else None
         total, start, done = 0.0, np.ones(1, bool), False
         while not done:
             action, _ = policy.predict(observation, episode_start=start, deterministic=True)
             observation, reward, terminated, truncated, info = env.step(action)
             total += float(np.asarray(reward).sum())  # of a vector, all objectives
-            if rate:
-                rate.add()
             start, done = np.zeros(1, bool), terminated or truncated
         episodes.append({"return": total, **_with_stance_peak(info.get("episode_summary", {}))})
-        if rate:
-            episodes[-1]["loading_rate_n_s"] = rate.mean()
         tick()
     return episodes
 
@@ -133,17 +126,6 @@ def _with_stance_peak(summary: Mapping[str, float]) -> dict[str, float]:
     return {**summary, "stance_peak_n": summary["stance_peak_sum_n"] / max(summary["stances"], 1.0)}
 
 
-def mean_figures(episodes: Sequence[Mapping[str, float]]) -> dict[str, float]:
-    """Means over episodes of `FIGURES`, those that an id has; the cost of transport is that of the distance
-    and work of all of them, NaN if they do not get forward."""
-    means = {name: float(np.mean([one[name] for one in episodes])) for name in FIGURES if name in episodes[0]}
-    if "cost_of_transport" in means:
-        distance, work, force, share = (sum(one[name] for one in episodes) for name in TRANSPORT)
-        moved = share and distance > 0
-        means["cost_of_transport"] = work * share / (force * distance) if moved else float("nan")
-    return means
-
-
 def is_model(name: str) -> bool:
     """Whether a policy's name is the path of a model rather than that of a scripted policy or of a gait."""
     is_path = (
@@ -174,50 +156,124 @@ def find_policy(name: str, env: gym.Env[Any, Any], env_id: str) -> Any:
     return records.find_policy(name, env, env_id)
 
 
-class LoadingRate:
-    """The mean loading rate of an episode, from the substeps that an environment of this package, just reset,
-    records. Call `add` after each step."""
-
-    def __init__(self, env: Any) -> None:
-        self._leg, self._setting = env.unwrapped, records.setting(env)
-        self._parts: list[dict[str, Floats]] = []
-        self._leg.record()  # substeps are kept from here on
-
-    def add(self) -> None:
-        record = self._leg.record()
-        self._parts.append({name: record[name].ravel() for name in ("time", *FORCES)})
-
-    def mean(self) -> float:
-        """Mean over the whole stances of the episode [N/s], 0 without a stance."""
-        columns = {name: np.concatenate([part[name] for part in self._parts]) for name in self._parts[0]}
-        is_long = self._leg.settings.episode_seconds >= 2 * SETTLED
-        late = columns["time"] > (SETTLED if is_long else 0.0)
-        toe, heel, toe_friction, heel_friction = (columns[name][late] for name in FORCES)
-        friction = toe_friction + heel_friction
-        rates = loading_rates(toe + heel, friction, self._setting.lift_off_n, self._setting.sim_dt)
-        return float(rates.mean()) if len(rates) else 0.0
+# The command
 
 
-def loading_rates(normal: Floats, friction: Floats, lift_off: float, dt: float) -> Floats:
-    """Loading rate of each whole stance [N/s], shape (stances,): the steepest rise of the normal force from
-    touch-down to the highest ground reaction force. Forces on the hoof, shape (substeps,) [N], are `dt` [s]
-    apart; a normal force above `lift_off` [N] is stance."""
-    grf = np.hypot(normal, friction)
-    rates = []
-    for first, end in stances(normal, lift_off):
-        top = first + int(np.argmax(grf[first:end]))
-        rates.append(steepest(normal[max(first - 1, 0) : top + 1], dt))
-    return np.array(rates)
+@dataclass(frozen=True)
+class Args:
+    policy: Positional[tuple[str, ...]]
+    """names of scripted policies, paths of gaits and trained models, or MODULE:NAME"""
+    env_id: str | None = None
+    """environment; otherwise that of the first model or gait file, or hoof_env/HorseLeg-v0"""
+    env_kwargs: tuple[str, ...] = ()
+    """its arguments: key=value ..., or one JSON object; what was trained with others is refused"""
+    csv: Path | None = None
+    """write a line for each episode to this file"""
 
 
-def stances(normal: Floats, lift_off: float) -> NDArray[np.int64]:
-    """First substep of each whole stance and the first after it, shape (stances, 2)."""
-    loaded = np.concatenate([[True], normal > lift_off, [True]])
-    down, up = (np.flatnonzero(np.diff(loaded.astype(int)) == sign) for sign in (1, -1))
-    return np.stack([down[:-1], up[1:]], 1) if len(down) > 1 else np.zeros((0, 2), np.int64)
+@dataclass(frozen=True)
+class Function:
+    """A policy from a Python function of observations, shape (n, k), that returns actions, shape (n, 4)."""
+
+    name: str
+    act: Callable[[Any], Any]
+    actions: int
+
+    def predict(
+        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
+    ) -> tuple[Any, Any]:
+        """Actions for observations, shape (n, k) or (k,)."""
+        rows = np.atleast_2d(observation)
+        try:
+            actions = np.asarray(self.act(rows), np.float32)
+        except (TypeError, ValueError) as error:
+            raise ParameterError(
+                f"policy {self.name}: expected a function of observations: {error}"
+            ) from error
+        if actions.shape != (len(rows), self.actions) or not np.isfinite(actions).all():
+            raise ParameterError(
+                f"policy {self.name}: expected finite actions of shape {(len(rows), self.actions)} for"
+                f" observations of shape {rows.shape}, got {actions.shape}"
+            )
+        return actions.reshape(*np.shape(observation)[:-1], self.actions), state
 
 
-def steepest(force: Floats, dt: float) -> float:
-    """Steepest rise [N/s] of a force, shape (n,) [N], over `WINDOW`, or all of it where that is shorter."""
-    width = min(max(1, round(WINDOW / dt)), len(force) - 1)
-    return float((force[width:] - force[:-width]).max() / (width * dt)) if width > 0 else 0.0
+def is_function(name: str) -> bool:
+    module, _, function = name.partition(":")
+    return function.isidentifier() and all(part.isidentifier() for part in module.split("."))
+
+
+def find_function(name: str, actions: int) -> Function:
+    """The function MODULE:NAME, of this folder or installed. `ParameterError` if there is none."""
+    module, _, function = name.partition(":")
+    if "" not in sys.path:
+        sys.path.insert(0, "")
+    try:
+        act = getattr(import_module(module), function)
+    except (ImportError, AttributeError) as error:
+        raise ParameterError(f"policy: expected MODULE:NAME, got {name!r}: {error}") from error
+    if not callable(act):
+        raise ParameterError(f"policy {name}: expected a function of observations, got {act!r}")
+    return Function(name, act, actions)
+
+
+def find_same(name: str, env: gym.Env[Any, Any], env_id: str) -> Any:
+    """A policy that was made for just this environment, or for none. `DataFileError`: for another id, leg,
+    setting or version."""
+    if is_function(name):
+        return find_function(name, gym.spaces.flatdim(env.action_space))
+    with warnings.catch_warnings():
+        warnings.filterwarnings("error", ".*(trained with|found for)", UserWarning)
+        try:
+            return find_policy(name, env, env_id)
+        except UserWarning as unlike:
+            raise DataFileError(f"{unlike}: its score would be that of another task") from None
+
+
+def score(args: Args) -> list[tuple[str, list[dict[str, float]]]]:
+    """The episodes of each policy. `ParameterError`, `DataFileError`: an argument or a policy does not fit;
+    then nothing has been played. `OutputError`: the file cannot be written."""
+    from tqdm import tqdm
+
+    if args.csv:
+        check_folder(args.csv.parent)
+    read = [read_policy_record(name) for name in args.policy if not is_function(name)]
+    record = next(filter(None, read), {})
+    env_id = args.env_id or record.get("env_id", runs.DEFAULT_ENV)
+    own = record.get("env_kwargs", {}) if env_id == record.get("env_id") else {}
+    env_kwargs = parse_pairs("--env-kwargs", args.env_kwargs) or own
+    with runs.make_env(env_id, **env_kwargs) as env:
+        policies = {name: find_same(name, env, env_id) for name in args.policy}
+    bar = tqdm(policies.items(), unit=" policies", leave=False, disable=None)
+    return [(name, score_vector(policy, env_id, FINAL_SEEDS, **env_kwargs)) for name, policy in bar]
+
+
+def lines(scored: Sequence[tuple[str, list[dict[str, float]]]]) -> str:
+    """The table: a line for each policy, with intervals over episodes, and one for all trained ones, the
+    interquartile mean over these with its interval."""
+    rows = [Scored(name, over_episodes(episodes)) for name, episodes in scored]
+    trained = [mean_figures(episodes) for name, episodes in scored if is_model(name)]
+    if len(trained) > 1:
+        rows.append(Scored(f"IQM of {len(trained)}", over_seeds(trained), trained))
+    titles = ["policy", "return", *(title for title, *_ in TABLE.values())]
+    return markdown_table(titles, [[one.name, one.intervals["return"].text(), *cells(one)] for one in rows])
+
+
+def main(argv: list[str] | None = None) -> None:
+    import tyro
+
+    args = tyro.cli(Args, args=argv, prog="python -m agents.score", description=__doc__)
+    scored = score(args)
+    print(lines(scored))
+    if args.csv:
+        rows = [
+            {"policy": name, "episode": seed, **{key: one[key] for key in FIGURES if key in one}}
+            for name, episodes in scored
+            for seed, one in zip(FINAL_SEEDS, episodes, strict=True)
+        ]
+        runs.write_csv(args.csv, ("policy", "episode", *FIGURES), rows)
+        print(f"written: {args.csv}")
+
+
+if __name__ == "__main__":
+    run(main)

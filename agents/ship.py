@@ -27,10 +27,11 @@ from tyro.conf import Positional
 from agents import runs
 from agents.baselines_report import draw_learning_curve, render_template, training_length
 from agents.command import run
-from agents.evaluate import METRICS, Interval, Score, cell, to_json
+from agents.evaluate import METRICS, Score, cell, to_json
 from agents.export import about, write_policy
 from agents.score import FINAL_SEEDS as SCORE_SEEDS
 from agents.score import score_vector
+from agents.statistics import Interval
 from hoof_env._output import check_folder, markdown_table, staged
 from hoof_env.envs.policies import STANDS_FOR
 from hoof_env.envs.tasks import TASKS

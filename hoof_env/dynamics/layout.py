@@ -159,12 +159,14 @@ class Strides(Layout):
     stance_peak: Row  # highest resultant force of this stance [N]
     steepest_rise: Row  # of the normal force while this stance's peak grew [N/s]
     load: Row  # normal force on the hoof [N]
+    running_peak: Row  # of the resultant force, at most twice that force [N]
 
 
 class StrideSums(Layout):
     """Of one call of the engine."""
 
     peak_grf_increase: Row  # increases of the running peaks of stances [N]
+    running_peak_increase: Row  # what it rose [N]
     loading_rate_increase: Row  # increases of the running steepest rises of stances [N/s]
     highest_grf: Row  # [N]
     positive_work: Row  # of both drives [J]
@@ -300,6 +302,6 @@ LEG_STATE = (
 LEG_REPORT = LegReport.names
 STRIDES = Strides.names
 STRIDE_SUMS = (
-    "peak_increase", "loading_rate_increase", "highest", "positive_work", "load_impulse", "loaded_time", "stances", "travel",
+    "peak_increase", "running_peak_increase", "loading_rate_increase", "highest", "positive_work", "load_impulse", "loaded_time", "stances", "travel",
 )  # fmt: skip
 ACCOUNT = Account.names

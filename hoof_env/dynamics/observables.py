@@ -5,7 +5,11 @@ A stance opens when the normal force on the hoof rises above a threshold, as on 
 the force falls below it (lift-off), or after one crank revolution, whichever comes first, so that a hoof that
 never lifts has a peak every revolution. While it is open its peak is the highest resultant ground reaction
 force of any step; the increases of a stance's running peak add up to that peak. Its loading rate is the steepest
-rise of the normal force from one step to the next among the steps that raise the peak."""
+rise of the normal force from one step to the next among the steps that raise the peak.
+
+The running peak is the highest force so far, but never more than twice the present one: what rises, falls by
+more than half and rises again is charged again, whether the hoof lifts or not, and a stance with one peak is
+charged just that."""
 
 from __future__ import annotations
 
@@ -14,7 +18,7 @@ from dataclasses import dataclass
 
 from hoof_env.dynamics.layout import LegRows
 from hoof_env.dynamics.mechanics import add
-from hoof_env.simd import across, choose, dot, larger, nth, root
+from hoof_env.simd import across, choose, dot, larger, nth, root, smaller
 from hoof_env.simd.compile import inlined
 
 REVOLUTION = 2 * math.pi
@@ -123,6 +127,9 @@ def count_stride(trunk, leg, h):  # type: ignore[no-untyped-def]
     leg.sums.loading_rate_increase = leg.sums.loading_rate_increase + (steeper - steepest)
     leg.sums.stances = leg.sums.stances + begins
     leg.sums.peak_grf_increase = leg.sums.peak_grf_increase + (higher - peak)
+    running = smaller(leg.strides.running_peak, 2.0 * force)
+    leg.strides.running_peak = larger(running, force)
+    leg.sums.running_peak_increase = leg.sums.running_peak_increase + larger(force - running, 0.0)
     leg.sums.highest_grf = larger(leg.sums.highest_grf, force)
     work = larger(leg.crank_power, 0.0) + larger(leg.swing_power, 0.0)
     leg.sums.positive_work = leg.sums.positive_work + h * work
@@ -135,7 +142,7 @@ def count_stride(trunk, leg, h):  # type: ignore[no-untyped-def]
 
 @dataclass
 class StanceCounter:
-    """Stances of one leg so far."""
+    """Stances and running peak of one leg so far."""
 
     threshold: float  # normal force that tells stance from swing [N]
     is_open: bool = False  # whether the hoof is in stance
@@ -143,12 +150,13 @@ class StanceCounter:
     peak: float = 0.0  # highest resultant force of the open stance [N], 0 between stances
     steepest: float = 0.0  # rise of the normal force while that peak grew [N/s]
     load: float = 0.0  # normal force of the last substep [N]
+    running: float = 0.0  # peak [N]
     count: int = 0  # how many have opened
 
-    def add(self, theta: float, normal: float, force: float, h: float = math.inf) -> tuple[float, float]:
+    def add(self, theta: float, normal: float, force: float, h: float = math.inf) -> tuple[float, ...]:
         """Take the next substep: crank angle [rad], normal and resultant force on the hoof [N], and its
-        length [s]. Returns how much the running peak [N] and the steepest rise [N/s] have grown; over a
-        stance that adds up to both."""
+        length [s]. Returns how much the stance's peak [N], the running peak [N] and the steepest rise [N/s]
+        have grown."""
         loaded = normal > self.threshold
         goes_on = loaded and self.is_open and theta - self.began < REVOLUTION
         before, steepest = (self.peak, self.steepest) if goes_on else (0.0, 0.0)
@@ -157,4 +165,6 @@ class StanceCounter:
         self.is_open, self.peak = loaded, max(before, force) if loaded else 0.0
         rise = (normal - self.load) * (1.0 / h) if self.peak > before else 0.0
         self.steepest, self.load = max(steepest, rise) if loaded else 0.0, normal
-        return self.peak - before, self.steepest - steepest
+        running = min(self.running, 2 * force)
+        self.running = max(running, force)
+        return self.peak - before, max(force - running, 0.0), self.steepest - steepest

@@ -193,7 +193,7 @@ ENTRIES = (
     Entry("heel load", "hoof", "N", lambda s: s.leg.report.heel.normal, IN_WEIGHTS),
     Entry("toe approach speed", "hoof", "m/s", lambda s: _approach_speed(s.leg.state.toe), tanh_of(2.0)),
     Entry("heel approach speed", "hoof", "m/s", lambda s: _approach_speed(s.leg.state.heel), tanh_of(2.0)),
-    Entry("running peak force", "hoof", "N", lambda s: s.leg.strides.stance_peak, IN_WEIGHTS),
+    Entry("running peak force", "hoof", "N", lambda s: s.leg.strides.running_peak, IN_WEIGHTS),
     *(
         Entry(f"previous action: {name}", "action", "-", _action(k), PLAIN)
         for k, name in enumerate(_PARAMETERS)

@@ -28,8 +28,8 @@ Floats = NDArray[np.float64]
 Records = NDArray[np.void]
 
 ACCOUNT = np.dtype(
-    [("open", "?"), ("began", "f8"), ("peak", "f8"), ("steepest", "f8"), ("load", "f8"), ("count", "i8")]
-    + [("impulse", "f8"), ("loaded", "f8")]
+    [("open", "?"), ("began", "f8"), ("peak", "f8"), ("steepest", "f8"), ("load", "f8")]
+    + [("running", "f8"), ("count", "i8"), ("impulse", "f8"), ("loaded", "f8")]
 )
 """A stance as `dynamics.observables.StanceCounter` has it, and over the episode the impulse of the normal
 force [N s] and the time under load [s]."""
@@ -153,7 +153,7 @@ class PaperSolver:
         memory.limbs[0, :, env] = [now[name] for name in LEG_STATE]
         memory.limb_report[0, :, env] = [now[name] for name in LEG_REPORT]
         account = self._accounts[env]
-        memory.strides[0, :, env] = account[["open", "began", "peak", "steepest", "load"]].item()
+        memory.strides[0, :, env] = account[["open", "began", "peak", "steepest", "load", "running"]].item()
 
     def _sum(self, env: int, trace: Records) -> tuple[float, ...]:
         """The rows `layout.StrideSums` of a control step; the account goes on."""
@@ -166,16 +166,16 @@ class PaperSolver:
         force = np.sqrt(normal * normal + friction * friction)
         sliding = trace["toe_normal"] * trace["toe_slide"] + trace["heel_normal"] * trace["heel_slide"]
         columns = trace["theta"], normal, force, sliding, trace["crank_power"], trace["hip_power"]
-        growth = steeper = work = travel = 0.0
+        growth = higher = steeper = work = travel = 0.0
         for theta, n, f, slid, crank, hip in zip(*(values.tolist() for values in columns), strict=True):
-            higher, more = since.add(theta, n, f, h)
-            growth, steeper = growth + higher, steeper + more
+            grown = since.add(theta, n, f, h)
+            growth, higher, steeper = growth + grown[0], higher + grown[1], steeper + grown[2]
             work += h * (max(crank, 0.0) + max(hip, 0.0))
             impulse += h * n
             if n > 0.0:
                 loaded += h
                 travel -= h * slid / n
-        sums = growth, steeper, force.max(), work, impulse - impulse_before, loaded - loaded_before
+        sums = growth, higher, steeper, force.max(), work, impulse - impulse_before, loaded - loaded_before
         self._accounts[env] = *astuple(since)[1:], impulse, loaded
         return *sums, since.count - stances, travel
 

@@ -23,7 +23,8 @@ class Outcome(NamedTuple):
         seconds: simulated [s].
         progress: forward [m].
         commanded_progress: at the commanded speed; infinite without one [m].
-        peak_grf_increase: of the running peaks of stances [N]; they add up to every stance's peak.
+        running_peak_increase: of the running peak, see `dynamics.observables` [N].
+        peak_grf_increase: of the peaks of stances [N]; they add up to every stance's peak.
         loading_rate_increase: of the steepest rises of the force in stances [N/s]; they add up likewise.
         highest_grf: [N].
         positive_work: of both drives; braking is not recovered [J].
@@ -41,6 +42,7 @@ class Outcome(NamedTuple):
     seconds: Any
     progress: Any
     commanded_progress: Any
+    running_peak_increase: Any
     peak_grf_increase: Any
     loading_rate_increase: Any
     highest_grf: Any
@@ -73,7 +75,7 @@ def overspeed(step, weight):  # type: ignore[no-untyped-def]
 
 def peak(step, weight):  # type: ignore[no-untyped-def]
     """Weight in 1/kN."""
-    return -0.001 * weight * step.peak_grf_increase
+    return -0.001 * weight * step.running_peak_increase
 
 
 def loading(step, weight):  # type: ignore[no-untyped-def]
@@ -153,8 +155,8 @@ TERMS = (
     Term("progress", 2.5, "1/m", "forward travel of the trunk, up to the commanded speed", progress),
     Term(
         "peak", 0.75, "1/kN",
-        "minus the increase of the stance's running peak GRF, the highest of all substeps; the charges of"
-        " one stance add up to its peak", peak,
+        "minus the increase of the running peak GRF, the highest of all substeps but at most twice the present"
+        " one; the charges of a stance add up to its peak, and to each further one behind a fall by half", peak,
     ),
     Term(
         "energy", 2.0, "1/kJ",

@@ -68,7 +68,17 @@ ACTIONS = len(PARAMETERS)
 FAILED, TRUNCATED = 1, 2
 """How an episode ended, in the place of 0."""
 
-SUMS = ("time", "distance", "work", "impulse", "loaded_time", "stances", "peak_sum", "loading_rate_sum", "highest")
+SUMS = (
+    "time",
+    "distance",
+    "work",
+    "impulse",
+    "loaded_time",
+    "stances",
+    "peak_sum",
+    "loading_rate_sum",
+    "highest",
+)
 """Fields of `Episode` that begin at 0 and are added to."""
 
 
@@ -155,6 +165,7 @@ def find_outcome(task, trunk, leg, episode, action_change):  # type: ignore[no-u
         seconds=choose(works, task.dt, 0.0),
         progress=choose(works, progress, 0.0),
         commanded_progress=task.dt * episode.target,
+        running_peak_increase=choose(works, sums.running_peak_increase, 0.0),
         peak_grf_increase=choose(works, sums.peak_grf_increase, 0.0),
         loading_rate_increase=choose(works, sums.loading_rate_increase, 0.0),
         highest_grf=choose(works, sums.highest_grf, 0.0),
@@ -215,8 +226,8 @@ def outcome_of_one(outcome, lane, trunk, leg, episode):  # type: ignore[no-untyp
     """One lane of an `Outcome`, ordinary numbers."""
     return Outcome(
         lane_of(outcome.seconds, lane), lane_of(outcome.progress, lane),
-        lane_of(outcome.commanded_progress, lane), lane_of(outcome.peak_grf_increase, lane),
-        lane_of(outcome.loading_rate_increase, lane),
+        lane_of(outcome.commanded_progress, lane), lane_of(outcome.running_peak_increase, lane),
+        lane_of(outcome.peak_grf_increase, lane), lane_of(outcome.loading_rate_increase, lane),
         lane_of(outcome.highest_grf, lane), lane_of(outcome.positive_work, lane),
         lane_of(outcome.normal_impulse, lane), lane_of(outcome.loaded_time, lane),
         lane_of(outcome.stances, lane), lane_of(outcome.action_change, lane), lane_of(outcome.failed, lane),

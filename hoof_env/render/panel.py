@@ -68,7 +68,7 @@ class Stances:
     def add(self, now: Instant) -> None:
         force = now.grf
         self.highest = max(self.highest, force)
-        grown, _ = self._stance.add(now.crank_angle, now.normal, force)
+        grown, *_ = self._stance.add(now.crank_angle, now.normal, force)
         if self._stance.count > len(self.peaks):
             self.opened = now.time
             self.peaks.append(Peak(now.time, force))
