@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from agents import runs
-from agents.baselines_run import CURVE, FINAL, LEG, Entry, Run, read_curve
+from agents.baselines_run import CURVE, FINAL, Entry, Run, read_curve
 from agents.score import FINAL_SEEDS, score_vector
 from agents.settings import FOLDER, load_settings
 from agents.statistics import TABLE, Scored, cells, mean_figures, over_episodes, over_seeds

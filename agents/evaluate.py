@@ -20,8 +20,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from agents import runs
 from agents.command import parse_pairs, run
 from agents.score import find_policy, play, read_policy_record

@@ -302,6 +302,7 @@ LEG_STATE = (
 LEG_REPORT = LegReport.names
 STRIDES = Strides.names
 STRIDE_SUMS = (
-    "peak_increase", "running_peak_increase", "loading_rate_increase", "highest", "positive_work", "load_impulse", "loaded_time", "stances", "travel",
+    "peak_increase", "running_peak_increase", "loading_rate_increase", "highest", "positive_work",
+    "load_impulse", "loaded_time", "stances", "travel",
 )  # fmt: skip
 ACCOUNT = Account.names

@@ -364,10 +364,10 @@ class EpisodeBatch:
         """Figures of an episode.
 
         seconds, distance_m, speed_m_s, peak_grf_n (highest of the episode), mean_grf_n (normal force over the
-        whole time), stance_peak_sum_n, stances, loading_rate_n_s (mean over stances), duty_factor, drive_work_j (braking is not recovered),
-        cost_of_transport (work per weight and distance; infinite without forward progress), weight_share
-        (mean normal force over weight: what the leg bore), support_share (the rest: what the rail or the
-        suspension bore), failed (0 or 1).
+        whole time), stance_peak_sum_n, stances, loading_rate_n_s (mean over stances), duty_factor,
+        drive_work_j (braking is not recovered), cost_of_transport (work per weight and distance; infinite
+        without forward progress), weight_share (mean normal force over weight: what the leg bore),
+        support_share (the rest: what the rail or the suspension bore), failed (0 or 1).
         """
         seconds, distance, work, impulse, loaded, stances, peaks, rates, highest = (
             float(getattr(self.now, name)[env]) for name in SUMS

@@ -296,9 +296,9 @@ def vector_reward(terms: Mapping[str, Any]) -> NDArray[np.float32]:
     """The reward of each objective, shape (3,), from the terms that `info` holds.
 
     Energy takes the charge for changing the action, which is effort too, the peak force that for its rate,
-    and progress what is paid for bearing weight and charged for speed beyond the commanded one. A failure is charged to all three in equal parts: under
-    preference weights that sum to 1 a fall costs the same, whatever the weights, so that falling early to
-    save force or energy pays under none.
+    and progress what is paid for bearing weight and charged for speed beyond the commanded one. A failure is
+    charged to all three in equal parts: under preference weights that sum to 1 a fall costs the same,
+    whatever the weights, so that falling early to save force or energy pays under none.
     """
     progress = terms["reward_progress"] + terms["reward_support"] + terms["reward_overspeed"]
     peak = terms["reward_peak"] + terms["reward_loading"]

@@ -28,9 +28,11 @@ Floats = NDArray[np.float64]
 Records = NDArray[np.void]
 
 ACCOUNT = np.dtype(
-    [("open", "?"), ("began", "f8"), ("peak", "f8"), ("steepest", "f8"), ("load", "f8")]
-    + [("running", "f8"), ("count", "i8"), ("impulse", "f8"), ("loaded", "f8")]
-)
+    [
+        ("open", "?"), ("began", "f8"), ("peak", "f8"), ("steepest", "f8"), ("load", "f8"),
+        ("running", "f8"), ("count", "i8"), ("impulse", "f8"), ("loaded", "f8"),
+    ]
+)  # fmt: skip
 """A stance as `dynamics.observables.StanceCounter` has it, and over the episode the impulse of the normal
 force [N s] and the time under load [s]."""
 

@@ -26,8 +26,8 @@ def resolved(settings: Settings) -> Settings:
     if s.stiffness is None or s.exponent is None:
         if "ground" not in read_preset(s.preset):
             raise wrong(s.preset)(
-                f"{named(s.preset)}: expected an entry 'ground' with stiffness and exponent of the ground that"
-                f" its gaits are for, {{}} for those of hoof_env.Ground, or both as arguments; got"
+                f"{named(s.preset)}: expected an entry 'ground' with the stiffness and the exponent that its"
+                " gaits are for, {} for those of hoof_env.Ground, or both as arguments; got"
                 f" stiffness={s.stiffness!r}, exponent={s.exponent!r}"
             )
         ground = load_ground(s.preset, stiffness=s.stiffness, exponent=s.exponent)
@@ -67,7 +67,7 @@ def substeps_of(dt: float, sim_dt: float) -> int:
 
 def physics(settings: Settings, height: float, changes: Mapping[str, float]) -> tuple[Trunk, Ground, Drive]:
     """Trunk at a height [m], ground and drive of some `resolved` settings with others changed."""
-    s = replace(settings, **dict(changes))  # type: ignore[arg-type]
+    s: Any = replace(settings, **dict(changes))  # type: ignore[arg-type]
     trunk = Trunk(
         s.trunk, s.trunk_mass, s.trunk_share, s.trunk_stiffness, s.trunk_damping, s.trunk_drag, height
     )  # fmt: skip

@@ -155,8 +155,8 @@ TERMS = (
     Term("progress", 2.5, "1/m", "forward travel of the trunk, up to the commanded speed", progress),
     Term(
         "peak", 0.75, "1/kN",
-        "minus the increase of the running peak GRF, the highest of all substeps but at most twice the present"
-        " one; the charges of a stance add up to its peak, and to each further one behind a fall by half", peak,
+        "minus the increase of the running peak GRF, the highest of all substeps but at most twice the"
+        " present one; it adds up to a stance's peak, and to each further one behind a fall by half", peak,
     ),
     Term(
         "energy", 2.0, "1/kJ",

@@ -69,16 +69,9 @@ FAILED, TRUNCATED = 1, 2
 """How an episode ended, in the place of 0."""
 
 SUMS = (
-    "time",
-    "distance",
-    "work",
-    "impulse",
-    "loaded_time",
-    "stances",
-    "peak_sum",
-    "loading_rate_sum",
+    "time", "distance", "work", "impulse", "loaded_time", "stances", "peak_sum", "loading_rate_sum",
     "highest",
-)
+)  # fmt: skip
 """Fields of `Episode` that begin at 0 and are added to."""
 
 
