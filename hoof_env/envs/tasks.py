@@ -271,11 +271,12 @@ TASKS: Mapping[str, Task] = MappingProxyType(
             "HorseLegSpeed",
             "A horse's leg that keeps a commanded speed, which changes.",
             _SUSPENDED
-            + " Every 2 to 4 s a new speed is commanded. Progress is paid up to it, what goes beyond costs as"
+            + " Every 3 to 5 s a new speed is commanded. Progress is paid up to it, what goes beyond costs as"
             " much, and both weigh more than elsewhere, for here the speed is asked for.",
             {
-                "target_speed": (1.0, 4.0),
-                "reward_weights": {"progress": 6.0, "overspeed": 6.0},
+                "target_speed": (1.0, 3.5),
+                "target_seconds": (3.0, 5.0),
+                "reward_weights": {"progress": 12.0, "overspeed": 12.0},
                 "observation": ("crank", "gait", "trunk", "hoof", "action", "target"),
             },
         ),
