@@ -112,7 +112,8 @@ def over_episodes(episodes: Sequence[Mapping[str, float]]) -> dict[str, Interval
 
             def cost(drawn: Any, axis: int = -1) -> Any:
                 distance, work, force, share = parts[:, drawn].sum(axis)
-                return work * share / (force * distance)
+                with np.errstate(divide="ignore", invalid="ignore"):  # of a draw that gets nowhere
+                    return work * share / (force * distance)
 
             rng, rows = np.random.default_rng(0), np.arange(len(episodes))
             bounds = bootstrap((rows,), cost, vectorized=True, rng=rng).confidence_interval

@@ -15,7 +15,7 @@ from hoof_env.envs.policies import GAITS
 from hoof_env.errors import DataFileError, OutputError, ParameterError
 from tests.agents.conftest import ENV_ID, SHORT, train_tiny
 
-COLUMNS = set(METRICS) - {"loading_rate_n_s"}
+COLUMNS = set(METRICS)
 
 
 def test_interval_of_a_normal_sample():

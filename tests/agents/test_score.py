@@ -1,18 +1,19 @@
-"""Episodes as rows are the episodes one by one: returns and summaries, whatever the policy. The loading rate:
-on made forces, and as a figure of agents.evaluate."""
+"""Episodes as rows are the episodes one by one: returns and summaries, whatever the policy; and the command
+that scores anybody's policy."""
 
-from pathlib import Path
+import csv
+import json
+import shutil
 
 import numpy as np
 import pytest
 
 from agents import score
-from agents.baselines_results import held
-from agents.evaluate import Args, evaluate
 from agents.runs import make_env
-from agents.score import find_policy, loading_rates, play, score_vector, stances, steepest
-from hoof_env.errors import ParameterError
-from tests.agents.conftest import ENV_ID, KWARGS
+from agents.score import Args, find_policy, play, score_vector
+from hoof_env.envs.policies import GAITS, open_loop
+from hoof_env.errors import DataFileError, HoofEnvError, ParameterError
+from tests.agents.conftest import ENV_ID, KWARGS, SHORT
 
 SEEDS = [7, 3, 4, 11, 12]
 FALLS = {"trunk_share": 1.0, "trunk_stiffness": 0.0, "trunk_damping": 0.0}
@@ -47,10 +48,10 @@ def test_a_trained_policy(trained):
 
 def test_held_actions_for_all_or_for_each():
     actions = np.random.default_rng(0).uniform(-1, 1, (len(SEEDS), 4)).astype(np.float32)
-    rows = score_vector(held(actions), ENV_ID, SEEDS, **KWARGS)
+    rows = score_vector(open_loop({"constant": actions}, 1.0), ENV_ID, SEEDS, **KWARGS)
     for seed, action, row in zip(SEEDS, actions, rows, strict=True):
-        assert one_by_one(held(action), ENV_ID, [seed], **KWARGS) == [row]
-        assert score_vector(held(action), ENV_ID, [seed], **KWARGS) == [row]
+        assert one_by_one(open_loop({"constant": action}, 1.0), ENV_ID, [seed], **KWARGS) == [row]
+        assert score_vector(open_loop({"constant": action}, 1.0), ENV_ID, [seed], **KWARGS) == [row]
 
 
 def test_an_environment_without_rows_is_played_one_by_one(monkeypatch):
@@ -65,66 +66,73 @@ def test_bad_policy(policy):
         score_vector(policy, ENV_ID, SEEDS)
 
 
-# The loading rate
-
-KEY = "loading_rate_n_s"
+# The command
 
 
-def test_the_steepest_rise_is_over_five_milliseconds():
-    force = np.r_[np.zeros(10), np.arange(1.0, 11.0) * 20, np.full(10, 200.0)]
-    assert steepest(force, 1e-3) == pytest.approx(20e3)
-    assert steepest(np.r_[0.0, 0.0, 50.0, 50.0, 50.0, 50.0], 1e-3) == pytest.approx(10e3)  # a jump
-    assert steepest(force[:1], 1e-3) == 0
+def act(observations):
+    """A policy that somebody wrote: pulls harder the slower it is."""
+    return np.repeat(-0.1 * observations[:, :1], 4, axis=1)
 
 
-def test_whole_stances_alone_count():
-    force = np.zeros(100)
-    force[:5] = force[95:] = 500.0  # began before, ends after
-    force[20:30] = 300.0
-    force[40] = 40.0  # grazes, less than the threshold
-    force[60:80], force[65] = 200.0, 900.0
-    assert stances(force, 50.0).tolist() == [[20, 30], [60, 80]]
-    rates = loading_rates(force, np.zeros(100), 50.0, 1e-3)
-    assert rates == pytest.approx([300 / 1e-3, 900 / 5e-3 - 200 / 5e-3])
-    friction = np.zeros(100)
-    friction[62] = 1e4  # the highest ground reaction force, and so the end of the rise
-    assert loading_rates(force, friction, 50.0, 1e-3)[1] == pytest.approx(200 / 3e-3)
+def refuses(observations):
+    return np.full((len(observations), 3), np.nan)
 
 
-def rate_of(policy, **env_kwargs):
-    kwargs = tuple(f"{name}={value}" for name, value in env_kwargs.items())
-    (score,), _ = evaluate(Args(policy=(policy,), episodes=1, env_kwargs=kwargs, loading_rate=True))
-    return score.episodes[0][KEY]
+RAIL = "hoof_env/HorseLegRail-v0"
+RUN_GAIT = GAITS / "HorseLegRail-v0-constant.json"
 
 
-def test_a_harder_ground_loads_faster():
-    soft, hard = (rate_of("run", episode_seconds=6.0, stiffness=by * 2e4) for by in (0.25, 4.0))
-    assert hard > 1.5 * soft > 0
-
-
-def test_without_a_stance_it_is_zero():
-    assert rate_of("airborne", episode_seconds=0.4) == 0
-
-
-def test_one_cycle_of_the_paper_is_not_left_out():
-    fixed = "hoof_env/HorseLegFixed-v0"
-    (score,), _ = evaluate(Args(policy=("run",), episodes=1, env_id=fixed, loading_rate=True))
-    assert score.estimates[KEY].mean > 0
+def test_each_policy_gets_the_line_of_the_table(capsys, tmp_path, monkeypatch, trained):
+    monkeypatch.setattr(score, "FINAL_SEEDS", range(1_000_000, 1_000_005))
+    other = shutil.copytree(trained.folder, tmp_path / "other")
+    given = ["run", f"{__name__}:act", str(trained.folder), str(other), "--csv", str(tmp_path / "all.csv")]
+    given += ["--env-kwargs", *SHORT]
+    score.main(given)
+    head, _, *table = capsys.readouterr().out.splitlines()
+    assert [cell.strip() for cell in head.split("|")[1:4]] == ["policy", "return", "speed m/s"]
+    assert [line.split("|")[1].strip() for line in table[:5]] == [*given[:4], "IQM of 2"]
+    episodes = score_vector("run", ENV_ID, range(1_000_000, 1_000_005), **KWARGS)
+    mean = np.mean([one["return"] for one in episodes])
+    assert f"| run | {mean:.1f} [" in table[0]
+    with (tmp_path / "all.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 4 * 5
+    assert [float(row["return"]) for row in rows[:5]] == [one["return"] for one in episodes]
 
 
 @pytest.mark.parametrize(
-    ("option", "given"),
-    [("--loading-rate", {"loading_rate": True}), ("--video", {"video": Path("film.mp4")})],
-)
-def test_an_environment_without_records_is_refused(option, given):
-    with pytest.raises(
-        ParameterError, match=f"{option}: expected an environment of hoof_env, got Pendulum-v1"
+    ("policy", "kwargs", "message"),
+    [
+        ("trained", {"env_id": RAIL, "env_kwargs": SHORT}, "trained for env_id hoof_env/HorseLeg-v0"),
+        ("trained", {"env_kwargs": ("episode_seconds=1",)}, "episode_seconds=0.4, here .* another task"),
+        ("trained", {"env_kwargs": (*SHORT, "friction=0.1")}, "trained with friction"),
+        (str(RUN_GAIT), {"env_id": ENV_ID}, " found for hoof_env/HorseLegRail-v0"),
+        ("nobody:act", {}, "expected MODULE:NAME, got 'nobody:act'"),
+        (f"{__name__}:walk", {}, "expected MODULE:NAME"),
+        (f"{__name__}:RUN_GAIT", {}, "expected a function of observations"),
+        (f"{__name__}:refuses", {}, r"expected finite actions of shape \(100, 4\)"),
+        ("gallop", {}, "policy: expected a name"),
+    ],
+)  # fmt: skip
+def test_a_policy_for_something_else_is_refused(policy, kwargs, message, trained, monkeypatch):
+    if "refuses" not in policy:
+        monkeypatch.setattr(score, "score_vector", lambda *_, **__: pytest.fail("was played"))
+    with pytest.raises(HoofEnvError, match=message):
+        score.score(Args((str(trained.folder) if policy == "trained" else policy,), **kwargs))
+
+
+def test_a_policy_of_another_leg_or_version_is_refused(trained, tmp_path):
+    for change, said in (
+        (
+            lambda record: record["settings"].update(preset="pony.json"),
+            "preset='pony.json', here 'identified'",
+        ),
+        (lambda record: record["versions"].update({"hoof-env": "0.0.1"}), "hoof-env 0.0.1, here"),
     ):
-        evaluate(Args(policy=("random",), env_id="Pendulum-v1", **given))
-
-
-def test_to_measure_it_changes_nothing_else():
-    with make_env(ENV_ID, episode_seconds=1.0) as env:
-        (plain,) = play(env, find_policy("run", env, ENV_ID), [7])
-        (measured,) = play(env, find_policy("run", env, ENV_ID), [7], loading_rate=True)
-    assert measured == plain | {KEY: measured[KEY]}
+        folder = tmp_path / said[:6]
+        shutil.copytree(trained.folder, folder)
+        record = json.loads((folder / "run.json").read_text())
+        change(record)
+        (folder / "run.json").write_text(json.dumps(record))
+        with pytest.raises(DataFileError, match=said):
+            score.score(Args((str(folder),)))
