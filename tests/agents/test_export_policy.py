@@ -119,7 +119,7 @@ def test_other_settings_and_another_version_are_told(env, exported, trained, tmp
             find_policy(str(path), env, ENV_ID)
     with (
         make_env(ENV_ID, **KWARGS, target_speed=[1, 1]) as other,
-        pytest.warns(UserWarning, match=r"trained with target_speed=None, here \[1, 1\]$"),
+        pytest.warns(UserWarning, match=r"trained with target_speed=\[2.5, 2.5\], here \[1, 1\]$"),
     ):
         find_policy(str(exported), other, ENV_ID)
     with make_env(ENV_ID) as other, pytest.warns(UserWarning, match=r"episode_seconds=0\.4, here 10\.0$"):
