@@ -201,10 +201,14 @@ def draw_learning_curve(folder: Path, scores: Sequence[Score], path: Path, **opt
         policy, *others = [(score.policy, score.estimates["return"].mean) for score in scores]
         label = f"this policy, without noise: {policy[1]:.1f}"
         axes.plot(1e-6 * training_length(folder)[0], policy[1], "o", color=GREEN, label=label)
-        for name, level in others:
+        for _, level in others:
             axes.axhline(level, color=ORANGE, lw=1, ls="--")
+        height = 0.05 * np.ptp(axes.get_ylim())  # of a line of text
+        below = -np.inf
+        for name, level in sorted(others, key=lambda one: one[1]):
+            below = max(level, below + height)
             axes.annotate(
-                f"{name} {level:.1f}", (1, level), (4, 0), xycoords=axes.get_yaxis_transform(),
+                f"{name} {level:.1f}", (1, below), (4, 0), xycoords=axes.get_yaxis_transform(),
                 textcoords="offset points", va="center", color=ORANGE,
             )  # fmt: skip
         axes.set(xlabel="environment steps [millions]", ylabel="return of an episode")
