@@ -40,8 +40,8 @@ class Memory(NamedTuple):
     limbs: Floats  # (legs, 16, n)
     trunk_settings: Floats  # (17, n)
     limb_settings: Floats  # (legs, 12, n)
-    strides: Floats  # (legs, 3, n)
-    stride_sums: Floats  # (legs, 7, n)
+    strides: Floats  # (legs, 6, n)
+    stride_sums: Floats  # (legs, 9, n)
     command: Floats  # (legs, 4, n)
     account: Floats  # (9, n), added to
     trunk_report: Floats  # at the end, (8, n)

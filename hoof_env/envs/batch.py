@@ -110,7 +110,8 @@ class EpisodeBatch:
         self.height = check_number("hip_height", height, low=LOWEST * nominal, high=HIGHEST * nominal)
         self.groups = check_groups(s.observation, groups_of(task.entries))
         self.target_speed = None if s.target_speed is None else pair("target_speed", s.target_speed, -20.0)
-        self.target_seconds = pair("target_seconds", s.target_seconds, self.dt if self.target_speed else 0.0)
+        self.speed_changes = self.target_speed is not None and self.target_speed[0] < self.target_speed[1]
+        self.target_seconds = pair("target_seconds", s.target_seconds, self.dt if self.speed_changes else 0.0)
         for group, needed in (("target", "target_speed"), ("ground", "terrain")):
             given = getattr(s, needed)
             if group in self.groups and given in (None, {}):
@@ -296,7 +297,7 @@ class EpisodeBatch:
         now.terms[:, which], now.target[which], now.switch[which] = 0.0, np.inf, np.inf
         if self.target_speed:
             now.target[which] = self.target_speed[0]
-        if self.target_speed and self.target_speed[0] < self.target_speed[1]:  # else it never changes
+        if self.target_speed and self.speed_changes:
             for env, generator in zip(which, generators, strict=True):
                 now.target[env] = generator.uniform(*self.target_speed)
                 self._draw_target(int(env), generator)

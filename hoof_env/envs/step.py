@@ -250,7 +250,7 @@ def _with_terms(terms: tuple[Term, ...], k: int = 0) -> Callable[..., Any]:
 
     @inlined
     def compute_term(addresses, lanes, task, outcome, episode, n, total):  # type: ignore[no-untyped-def]
-        episode.terms[k] = number(compute(outcome, task.weights[k]))
+        episode.terms[k] = number(compute(outcome, task.weights[k])) + 0.0  # no -0 where it weighs nothing
         return add_term(addresses, lanes, task, outcome, episode, n, total)
 
     @inlined
@@ -258,7 +258,7 @@ def _with_terms(terms: tuple[Term, ...], k: int = 0) -> Callable[..., Any]:
         for lane in range(lanes):
             trunk, leg, own = memories(addresses, 0, layout, n + lane)
             one = outcome_of_one(outcome, lane, trunk, leg, own)
-            own.terms[k] = number(compute(one, task.weights[k]))
+            own.terms[k] = number(compute(one, task.weights[k])) + 0.0
         return add_term(addresses, lanes, task, outcome, episode, n, total)
 
     return compute_one_by_one if terms[k].scalar else compute_term

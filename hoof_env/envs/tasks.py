@@ -145,20 +145,26 @@ NEEDED: Mapping[str, tuple[str, tuple[str, ...]]] = MappingProxyType(
     | dict.fromkeys(("baumgarte_alpha", "baumgarte_beta"), ("solver", ("paper",)))
     | {"target_seconds": ("target_speed", ())}
 )
-"""Settings that have an effect only beside certain values of another one; () stands for any but None."""
+"""Settings that have an effect only beside certain values of another one; () stands for any range."""
 
 
 def check_effect(name: str, settings: Settings, within: str = "") -> None:
     """Raise `ParameterError` where a setting that somebody names, perhaps `within` another argument or
     option, has no effect beside the others."""
     needed, values = NEEDED.get(name, ("", ()))
-    given = getattr(settings, needed, None)
-    if needed and (given not in values if values else given is None):
-        good = " or ".join(f"{needed}={value!r}" for value in values) or f"a {needed}"
+    given: Any = getattr(settings, needed, None)
+    if needed and (given not in values if values else _is_one(given)):
+        good = " or ".join(f"{needed}={value!r}" for value in values) or f"a range of {needed}"
         named = f"{within}: {name!r}" if within else name
         raise ParameterError(
             f"{named}: expected {good} beside it, without which it has no effect, got {needed}={given!r}"
         )
+
+
+def _is_one(given: Any) -> bool:
+    """Whether nothing can be drawn: no range, or one whose ends are the same."""
+    ends = tuple(given) if isinstance(given, Iterable) else (given, given)
+    return len(ends) == 2 and bool(ends[0] == ends[1])
 
 
 @dataclass(frozen=True)

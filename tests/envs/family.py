@@ -100,6 +100,16 @@ def substeps(env, action) -> dict[str, np.ndarray]:
     return together(records[1:])
 
 
+def running_peak_charge(forces):
+    """What a running peak rises in all that never is more than twice the present force."""
+    running = charge = 0.0
+    for force in forces:
+        fallen = min(running, 2 * force)
+        running = max(force, fallen)
+        charge += max(force - fallen, 0.0)
+    return charge
+
+
 MODES = list(AutoresetMode)
 
 

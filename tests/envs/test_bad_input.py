@@ -10,11 +10,12 @@ import pytest
 from family import IDS, actions, same
 from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 
-from hoof_env import Sb3VecEnv, make_policy
+from hoof_env import Sb3VecEnv, make_policy, read_preset
 from hoof_env.errors import ParameterError
 from hoof_env.gait import load_gait
 
 LEG, NAN = "hoof_env/HorseLeg-v0", float("nan")
+OTHER_LEG = {**read_preset("identified"), "provenance": "another"}
 
 ARGUMENTS = [
     ({"trunk_mas": 80.0}, "HorseLeg-v0: unexpected keyword argument 'trunk_mas'; did you mean trunk_mass?"),
@@ -24,10 +25,13 @@ ARGUMENTS = [
     ({"trunk": "floating"}, "trunk: expected one of fixed, rail, suspended, got 'floating'"),
     ({"trunk": "free"}, "trunk: expected one of fixed, rail, suspended, got 'free'"),
     ({"trunk": 3}, "trunk: expected one of fixed, rail, suspended, got 3"),
-    ({"gait": "trot"}, "gait: expected one of run, walk, got 'trot'"),
+    ({"gait": "trot"}, "gait: expected one of carrying_walk, run, walk, got 'trot'"),
     ({"solver": "fast"}, "solver: expected one of exact, paper, got 'fast'"),
     ({"solver": "paper", "integrator": "euler"}, "trunk: expected 'fixed' with solver=\"paper\""),
-    ({"observation": ["crank", "target"]}, "observation: 'target' is constant without target_speed"),
+    (
+        {"observation": ["crank", "target"], "target_speed": None},
+        "observation: 'target' is constant without target_speed",
+    ),
     ({"observation": ["crank", "ground"]}, "observation: 'ground' is constant without terrain"),
     ({"drive": "belt"}, "drive: expected one of motor, prescribed, got 'belt'"),
     ({"normal_law": "hertz"}, "normal_law: expected one of .*lankarani-nikravesh.*got 'hertz'"),
@@ -134,15 +138,18 @@ OPTIONS = [
     ({"phase": 1.0}, "options: expected a mapping with some of gait, parameters, crank_angle, speed, height"),
     (["gait"], r"options: expected a mapping with some of.*got \['gait'\]"),
     (7, "options: expected a mapping.*got 7"),
-    ({"gait": "trot"}, r"options\['gait'\]: expected one of run, walk, got 'trot'"),
-    ({"gait": {"speed": 1}}, r"options\['gait'\]: expected a gait name \(run, walk\) or a mapping"),
+    ({"gait": "trot"}, r"options\['gait'\]: expected one of carrying_walk, run, walk, got 'trot'"),
+    (
+        {"gait": {"speed": 1}},
+        r"options\['gait'\]: expected a gait name \(carrying_walk, run, walk\) or a mapping",
+    ),
     ({"gait": 7}, r"options\['gait'\]: expected a gait name"),
     ({"gait": {**vars(load_gait("run")), "crank_speed": 99.0}}, "crank_speed: expected.*got 99.0"),
     ({"crank_angle": NAN}, r"options\['crank_angle'\]: expected.*got nan"),
     ({"speed": 1e3}, r"options\['speed'\]: expected.*got 1000.0"),
     ({"x": "here"}, r"options\['x'\]: expected.*got 'here'"),
     ({"height": -1}, r"options\['height'\]: expected.*got -1"),
-    ({"height": 9.0}, r"options\['height'\]: expected 0.6 to 2 times 1.718.* m, .*got 9"),
+    ({"height": 9.0}, r"options\['height'\]: expected 0.6 to 2 times 1.6975 m, .*got 9"),
     ({"parameters": 5}, r"options\['parameters'\]: expected a mapping with some of trunk_mass.*got 5"),
     ({"parameters": {"wings": 2}}, r"options\['parameters'\]: expected a mapping with some of trunk_mass"),
     ({"parameters": {"trunk_mass": -5.0}}, "trunk_mass: expected.*got -5.0"),
@@ -156,7 +163,7 @@ RESETS = [(({"options": options}), message) for options, message in OPTIONS] + [
     ({"seed": 1.5}, "seed: expected a whole number, 0 or more, got 1.5"),
     ({"seed": True}, "seed: expected a whole number, 0 or more, got True"),
     ({"seed": "zero"}, "seed: expected a whole number, 0 or more, got 'zero'"),
-    ({"seed": 1, "options": {"gait": "trot"}}, "expected one of run, walk"),
+    ({"seed": 1, "options": {"gait": "trot"}}, "expected one of carrying_walk, run, walk"),
 ]
 MASKS = [
     ({"seed": [1, 2]}, "seed: expected one number or 3, got 2"),
@@ -210,7 +217,7 @@ def test_resets_of_the_vector_environment(arguments, message):
 @pytest.mark.parametrize("kind", BOTH)
 def test_a_trunk_that_cannot_rise_or_move_refuses_it(kind, trunk):
     env, twin = going(kind, trunk=trunk)
-    message = rf"options\['height'\]: a {trunk} trunk is at 1.718.* m, got 3 m"
+    message = rf"options\['height'\]: a {trunk} trunk is at 1.6975 m, got 3 m"
     check_nothing_lost(env, twin, lambda e: e.reset(options={"height": 3.0}), message)
     if trunk == "fixed":
         message = r"options\['speed'\]: expected 0 of a fixed trunk, got 1"
@@ -312,7 +319,7 @@ STATES = {
     "a version": (
         lambda state: {**state, "id": "hoof_env/HorseLeg-v1"}, "got one of hoof_env/HorseLeg-v1",
     ),
-    "no settings": (lambda state: {**state, "settings": 5}, "of other settings; preset: 'first_fit' here"),
+    "no settings": (lambda state: {**state, "settings": 5}, "of other settings; preset: 'identified' here"),
     "no engine": (lambda state: {**state, "engine": {}}, "state: .* is missing"),
     "not a number": (
         lambda state: {**state, "engine": {**state["engine"], "trunk": state["engine"]["trunk"] * NAN}},
@@ -338,8 +345,8 @@ def test_states(kind, name):
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"preset": "identified"}, "preset: 'first_fit' here, 'identified' there"),
-        ({"trunk_mass": 90.0}, "trunk_mass: 80.0 here, 90.0 there"),
+        ({"preset": OTHER_LEG}, "preset: 'identified' here, .*'provenance': 'another'.* there"),
+        ({"trunk_mass": 90.0}, "trunk_mass: 50.0 here, 90.0 there"),
         ({"observation": ["hoof"]}, "observation: .* here, .'hoof'. there"),
         ({"terrain": {"kind": "hills"}}, "terrain: None here, .*hills.* there"),
     ],
@@ -369,11 +376,11 @@ def test_states_of_other_numbers_of_environments():
 
 def test_gaits_and_policies_by_name_or_refused_in_words():
     env = gym.make(LEG)
-    leg, run = env.unwrapped, load_gait("run", "first_fit")
+    leg, run = env.unwrapped, load_gait("run")
     for gait in ("run", run.to_array(), run.to_array().tolist()):
         same(leg.action_for(gait), leg.action_for(run))
     for gait in ("trot", None, 3, [1.0, 2.0], {"crank_speed": 1.0}, [1.0, 2.0, 3.0, NAN]):
-        with pytest.raises(ParameterError, match=r"gait: expected one of run, walk.*got"):
+        with pytest.raises(ParameterError, match=r"gait: expected one of carrying_walk, run, walk.*got"):
             leg.action_for(gait)
     for arguments in ((env, "run"), ("run", "walk"), ("run", gym.make("CartPole-v1"))):
         with pytest.raises(ParameterError, match=r"env: expected an environment of this package, make_pol"):

@@ -13,6 +13,8 @@ from family import FALLS, IDS, actions, effective, make, roll, same, steps
 from gymnasium.utils.env_checker import check_env
 from stable_baselines3.common.env_checker import check_env as sb3_check_env
 
+from hoof_env.envs.reward import TERMS
+
 SETUPS = [
     *((env_id, {}) for env_id in IDS),
     ("hoof_env/HorseLeg-v0", FALLS),
@@ -92,7 +94,7 @@ def test_types_and_infos_of_a_step(env_id, settings):
         _, reward, terminated, truncated, info = env.step(env.action_space.sample())
         assert (type(reward), type(terminated), type(truncated)) == (float, bool, bool)
         assert reward == sum(value for key, value in info.items() if key.startswith("reward_"))
-        assert len(info) <= 14
+        assert len(info) <= 8 + len(TERMS)
         done = terminated or truncated
         assert set(started) <= set(info)
         assert set(info) - set(started) == (
@@ -143,10 +145,12 @@ def test_a_state_fits_the_environment_that_a_json_spec_makes():
 
 
 def test_a_speed_of_nought_is_commanded():
-    env = gym.make(IDS[0], target_speed=0.0, trunk_drag=0.0, reward_weights={"peak": 0.0, "energy": 0.0})
+    weights = {"peak": 0.0, "energy": 0.0, "overspeed": 1.0}
+    env = gym.make(IDS[0], target_speed=0.0, trunk_drag=0.0, reward_weights=weights)
     env.reset(seed=0, options={"speed": 1.0, "crank_angle": 0.0, "height": 2.0})
     info = env.step(np.zeros(4, np.float32))[4]
-    assert info["reward_progress"] == pytest.approx(-0.02, rel=0.1)
+    assert info["reward_overspeed"] == pytest.approx(-0.02, rel=0.1)
+    assert info["reward_progress"] == 0.0
 
 
 def test_the_slowest_pictures_are_one_a_second():

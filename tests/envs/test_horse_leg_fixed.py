@@ -1,17 +1,19 @@
-"""The paper's set-up stands on the ground of its preset; the training environment keeps its own."""
+"""All ids stand on the ground of their preset; and the paper's set-up with the paper's solver."""
 
 import copy
 import json
 import pickle
+from dataclasses import replace
 
 import gymnasium as gym
 import numpy as np
 import pytest
-from family import actions, same, substeps, together
+from family import IDS, actions, running_peak_charge, same, together
 
 import hoof_env  # noqa: F401
+from hoof_env.envs.tasks import Settings
 from hoof_env.errors import DataFileError, ParameterError
-from hoof_env.ground.contact import load_ground
+from hoof_env.ground.contact import Ground, load_ground
 from hoof_env.leg.geometry import preset_names, read_preset
 
 FIXED, LEG = "hoof_env/HorseLegFixed-v0", "hoof_env/HorseLeg-v0"
@@ -38,7 +40,10 @@ def test_the_ground_is_the_presets_unless_it_is_given(soft, solver):
 
 
 def test_by_default_it_is_what_the_default_preset_says():
-    assert ground(FIXED) == load_ground()
+    assert ground(FIXED) == load_ground(reference_mass=Settings.trunk_mass)
+    for env_id in IDS:
+        found = ground(env_id)
+        assert (found.stiffness, found.exponent) == (load_ground().stiffness, load_ground().exponent)
 
 
 def test_the_force_is_that_of_the_presets_ground(soft):
@@ -56,8 +61,28 @@ def test_the_force_is_that_of_the_presets_ground(soft):
     assert highest > 0
 
 
-def test_the_training_environment_keeps_its_own(soft):
-    assert ground(LEG, preset=soft) == ground(LEG)
+def test_the_training_environment_stands_on_the_presets_too(soft):
+    own, given = ground(LEG, preset=soft), ground(LEG, preset=soft, stiffness=1e4)
+    assert (own.stiffness, own.exponent) == (3e4, 1.375)
+    assert (given.stiffness, given.exponent) == (1e4, 1.375)
+    both = ground(LEG, preset=soft, stiffness=1e4, exponent=1.25)
+    assert replace(both, stiffness=3e4, exponent=1.375) == own
+
+
+@pytest.mark.parametrize("env_id", [LEG, FIXED])
+def test_a_preset_without_a_ground_needs_one(soft, tmp_path, env_id):
+    """Its gaits are for some ground, and nobody says which; {} are those of `Ground`."""
+    content = {name: part for name, part in read_preset(soft).items() if name != "ground"}
+    path = tmp_path / "bare.json"
+    path.write_text(json.dumps(content), encoding="utf-8")
+    for given in ({}, {"stiffness": 1e4}, {"exponent": 1.5}):
+        for preset, error in ((content, ParameterError), (str(path), DataFileError)):
+            with pytest.raises(error, match="expected an entry 'ground' with the stiffness and the exponent"):
+                gym.make(env_id, preset=preset, **given)
+    given = ground(env_id, preset=content, stiffness=1e4, exponent=1.25)
+    assert (given.stiffness, given.exponent) == (1e4, 1.25)
+    default = ground(env_id, preset={**content, "ground": {}})
+    assert (default.stiffness, default.exponent) == (Ground.stiffness, Ground.exponent)
 
 
 def test_bad_values_are_refused(soft, tmp_path):
@@ -128,8 +153,11 @@ def test_the_papers_solver_counts_strides_as_the_kernels_do():
         settings = {"integrator": "rk4"} if solver == "paper" else {}
         env = gym.make(FIXED, solver=solver, gait="run", sim_dt=1e-3, **settings)
         env.reset(seed=0, options={"crank_angle": 1.0})
-        trace = substeps(env, np.zeros(4, np.float32))
-        summary = env.unwrapped.batch.summary(0)
+        records, paid = [env.unwrapped.record()], 0.0
+        for _ in range(50):
+            paid += env.step(np.zeros(4, np.float32))[4]["reward_peak"]
+            records.append(env.unwrapped.record())
+        trace, summary = together(records[1:]), env.unwrapped.batch.summary(0)
         slid = sum(trace[f"{point}_normal"] * trace[f"{point}_slide"] for point in ("toe", "heel"))
         down = trace["normal"] > 0
         assert summary["distance_m"] == pytest.approx(-1e-3 * np.sum(slid[down] / trace["normal"][down]))
@@ -137,8 +165,9 @@ def test_the_papers_solver_counts_strides_as_the_kernels_do():
         work = 1e-3 * np.sum(np.maximum(trace["crank_power"], 0) + np.maximum(trace["hip_power"], 0))
         assert summary["drive_work_j"] == pytest.approx(work)
         assert summary["peak_grf_n"] == pytest.approx(trace["grf"].max())
+        assert paid == pytest.approx(-0.3e-3 * running_peak_charge(trace["grf"]))
         measured[solver], distance[solver] = summary, summary["distance_m"]
-    for name in ("stances", "stance_peak_sum_n", "mean_grf_n", "duty_factor"):
+    for name in ("stances", "stance_peak_sum_n", "loading_rate_n_s", "mean_grf_n", "duty_factor"):
         assert measured["paper"][name] == pytest.approx(measured["exact"][name], rel=0.02), name
 
 

@@ -12,12 +12,16 @@ TERMS = {
     "reward_peak": -0.2,
     "reward_energy": -0.1,
     "reward_action": -0.02,
-    "reward_support": 0.0,
+    "reward_support": 0.3,
+    "reward_overspeed": -0.04,
+    "reward_loading": -0.05,
 }
 
 
 def test_each_objective_has_its_terms():
-    np.testing.assert_allclose(vector_reward({**TERMS, "reward_failure": 0.0}), [0.5, -0.2, -0.12], rtol=1e-6)
+    np.testing.assert_allclose(
+        vector_reward({**TERMS, "reward_failure": 0.0}), [0.76, -0.25, -0.12], rtol=1e-6
+    )
 
 
 @pytest.mark.parametrize("weights", [(1, 0, 0), (0, 1, 0), (0, 0, 1), (0.2, 0.3, 0.5)])
@@ -26,7 +30,9 @@ def test_a_fall_costs_every_preference_the_same(weights):
     assert np.dot(weights, fell - stood) == pytest.approx(-100.0, rel=1e-6)
 
 
-@pytest.mark.parametrize("kwargs", [{}, {"reward_weights": {"peak": 2.0}}, FALLS])
+@pytest.mark.parametrize(
+    "kwargs", [{}, {"reward_weights": {"peak": 2.0, "overspeed": 3.0, "loading": 0.5}}, FALLS]
+)
 def test_objectives_add_up_to_the_scalar_reward_and_all_else_is_the_same(kwargs):
     one, many = HorseLegEnv(**kwargs), HorseLegMOEnv(**kwargs)
     generator = np.random.default_rng(0)

@@ -143,7 +143,7 @@ def test_impulse_over_a_stride_is_the_change_of_momentum(name):
         "x": impulse(friction - s.trunk_drag * stride["vx"]),
     }
     scale = impulse(stride["normal"])
-    assert scale > 300.0
+    assert scale > 100.0  # the walk hardly bears on this trunk
     for axis in "xy":
         gained = stride[f"momentum_{axis}"][-1] - stride[f"momentum_{axis}"][0]
         assert abs(gained) == change[axis]
@@ -178,7 +178,7 @@ def test_a_record_is_what_the_step_did():
         _, _, terminated, _, info = env.step(taken)
         trace = together([env.record()])
         work = np.sum(np.maximum(trace["crank_power"], 0) + np.maximum(trace["hip_power"], 0)) * 1e-3
-        assert info["reward_energy"] == pytest.approx(-1e-4 * work, rel=1e-9, abs=1e-15)
+        assert info["reward_energy"] == pytest.approx(-2e-3 * work, rel=1e-9, abs=1e-15)
         assert trace["theta"][-1] == env.engine.state["theta"].item() >= before
         if terminated:
             break

@@ -126,7 +126,8 @@ def test_infos_sums_weights_names_and_units(own):
         assert observation[-2] == pytest.approx(raw["load angle"] / np.pi, abs=1e-6)
         assert observation[-1] == pytest.approx(raw["episode seconds"] / 10, abs=1e-6)
     assert len(slipped) > 10
-    with pytest.raises(ParameterError, match=r"some of .*support, slip, comfort, got \{'slop': 1\}"):
+    names = "some of .*support, overspeed, loading, slip, comfort"
+    with pytest.raises(ParameterError, match=rf"{names}, got \{{'slop': 1\}}"):
         gym.make(own.ID, reward_weights={"slop": 1})
 
 

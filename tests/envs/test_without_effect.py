@@ -20,7 +20,7 @@ from hoof_env.envs.tasks import NEEDED, PER_EPISODE, TASKS, Settings, check_effe
 from hoof_env.errors import FixedSettingError, ParameterError
 from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS
 
-LEG, RAIL, FIXED = (f"hoof_env/{name}-v0" for name in ("HorseLeg", "HorseLegRail", "HorseLegFixed"))
+LEG, RAIL, FIXED, SPEED = (f"hoof_env/HorseLeg{name}-v0" for name in ("", "Rail", "Fixed", "Speed"))
 
 
 def episode(settings, steps=150):
@@ -38,6 +38,7 @@ def episode(settings, steps=150):
 
 CONTEXTS = [
     *itertools.product(ONE_LEG, ("ambrosio",), NORMAL_LAWS[:1], ("prescribed", "motor"), (None, (0.5, 3.0))),
+    ("suspended", "ambrosio", NORMAL_LAWS[0], "prescribed", (2.5, 2.5)),
     *(
         ("suspended", friction, normal, "prescribed", None)
         for friction, normal in itertools.product(FRICTION_LAWS, NORMAL_LAWS)
@@ -79,7 +80,9 @@ def test_all_are_tried():
         (RAIL, {"trunk_share": 0.5}, "trunk_share: expected trunk='suspended' beside it.*got trunk='rail'"),
         (LEG, {"trunk": "fixed", "trunk_drag": 1.0}, "trunk_drag: .* or trunk='rail' beside"),
         (FIXED, {"trunk_stiffness": 1.0}, "trunk_stiffness: expected.*got trunk='fixed'"),
-        (LEG, {"target_seconds": (1.0, 2.0)}, "target_seconds: expected a target_speed beside.*=None"),
+        (LEG, {"target_seconds": (1.0, 2.0)}, r"target_seconds: .* a range of target_speed.*=\(2.5, 2.5\)"),
+        (LEG, {"target_seconds": (1.0, 2.0), "target_speed": 2.0}, "a range of target_speed beside.*=2.0"),
+        (RAIL, {"target_seconds": (1.0, 2.0)}, "target_seconds: expected a range of target_speed.*=None"),
         (LEG, {"friction_slow": 1e-4, "friction_law": "tanh"}, "friction_slow: .* friction_law='ambrosio'"),
         (FIXED, {"baumgarte_alpha": 5.0}, "baumgarte_alpha: expected solver='paper'.*got solver='exact'"),
         (RAIL, {"randomize": {"trunk_share": 0.5}}, "randomize: 'trunk_share': expected trunk='suspended'"),
@@ -120,9 +123,13 @@ def test_a_friction_law_without_a_lower_threshold_does_not_compare_with_one():
         )
 
 
+RACING = {"progress": 1.0, "peak": 0.3, "energy": 0.1, "support": 0.0}
+OWN_WEIGHTS = {RAIL: RACING, FIXED: RACING, SPEED: {"progress": 12.0, "overspeed": 12.0}}
+
+
 @pytest.mark.parametrize("env_id", IDS)
 def test_reward_weights_that_are_not_named_keep_the_values_of_the_task(env_id):
-    plain = check_weights({"progress": 2.0} if "Speed" in env_id else None)
+    plain = check_weights(OWN_WEIGHTS.get(env_id))
     assert gym.make(env_id).unwrapped.batch.weights == plain
     for given in ({"peak": 1.0}, {}, None, {"progress": 3.0, "support": 1.0}):
         for env in (gym.make(env_id, reward_weights=given), gym.make_vec(env_id, reward_weights=given)):
