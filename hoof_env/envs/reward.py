@@ -5,6 +5,7 @@ for the weights and what they lead to."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -62,6 +63,9 @@ class Outcome(NamedTuple):
 MOST_BEARING = 1.2
 """Of the weight, which is paid for at most: a leg that bears its animal bears 1 on the average."""
 
+STEPPING = math.pi
+"""Rate of the crank from which a leg counts as stepping: half that of the paper's gaits [rad/s]."""
+
 
 def progress(step, weight):  # type: ignore[no-untyped-def]
     """Paid up to the commanded speed."""
@@ -99,11 +103,12 @@ def failure(step, weight):  # type: ignore[no-untyped-def]
 
 
 def support(step, weight):  # type: ignore[no-untyped-def]
-    """Impulse in units of the weight's, in proportion to the speed, up to the commanded one: who stands and
-    presses is not paid, and who rubs to and fro gets nothing in the end."""
+    """Impulse in units of the weight's, in proportion to the speed, up to the commanded one, and to the
+    crank's rate, up to `STEPPING`: who stands and presses, or trembles with the swing, is not paid, and who
+    rubs to and fro gets nothing in the end."""
     commanded = larger(step.commanded_progress, 1e-9)
     pace = smaller(larger(step.progress / commanded, -1.0), 1.0)
-    pace = choose(commanded < np.inf, pace, 1.0)
+    pace = smaller(choose(commanded < np.inf, pace, 1.0), step.leg.state.theta_rate * (1.0 / STEPPING))
     return weight * pace * smaller(step.normal_impulse / step.weight, MOST_BEARING * step.seconds)
 
 
@@ -163,11 +168,12 @@ TERMS = (
         "minus the positive work of crank and swing drive; braking is not recovered", energy,
     ),
     Term("action", 0.03, "-", "minus the mean squared change of the action", action),
-    Term("failure", 30.0, "1/s", "once, minus `episode_seconds`, when the episode fails", failure),
+    Term("failure", 70.0, "1/s", "once, minus `episode_seconds`, when the episode fails", failure),
     Term(
         "support", 15.0, "1/s",
         "normal force over the weight of trunk and leg, integrated over the step, at most"
-        f" {MOST_BEARING:g} times its length; times the speed over the commanded one, within +-1", support,
+        f" {MOST_BEARING:g} times its length; times the speed over the commanded one, within"
+        " +-1, and no more than the crank's rate over pi", support,
     ),
     Term("overspeed", 0.0, "1/m", "minus the forward travel beyond the commanded speed", overspeed),
     Term(
