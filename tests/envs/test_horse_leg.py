@@ -133,7 +133,7 @@ def test_a_step_that_could_not_be_simulated_pays_for_nothing_but_the_failure():
     assert terminated
     np.testing.assert_array_equal(seen, there)
     assert "finite" in info["failure"]
-    assert reward == info["reward_failure"] == -300.0
+    assert reward == info["reward_failure"] == -700.0
     assert info["episode_summary"] == {**before, "failed": 1.0}
     assert env.record()["time"].ravel().tolist() == [pytest.approx(0.4)]  # where it is
     assert np.isfinite(env.reset()[0]).all()

@@ -184,7 +184,7 @@ def test_a_linkage_that_diverges_ends_the_episode_and_pays_nothing(settings):
         assert np.isfinite(observation).all()
         assert done or abs(reward) < 10
     assert "last good" in info["failure"]
-    assert reward == info["reward_failure"] == -30.0
+    assert reward == info["reward_failure"] == -70.0
     assert info["episode_summary"] == {**before, "failed": 1.0}
     assert env.record()["time"].ravel() == pytest.approx([time])  # where it is
 

@@ -26,8 +26,8 @@ def test_each_objective_has_its_terms():
 
 @pytest.mark.parametrize("weights", [(1, 0, 0), (0, 1, 0), (0, 0, 1), (0.2, 0.3, 0.5)])
 def test_a_fall_costs_every_preference_the_same(weights):
-    fell, stood = (vector_reward({**TERMS, "reward_failure": failure}) for failure in (-300.0, 0.0))
-    assert np.dot(weights, fell - stood) == pytest.approx(-100.0, rel=1e-6)
+    fell, stood = (vector_reward({**TERMS, "reward_failure": failure}) for failure in (-700.0, 0.0))
+    assert np.dot(weights, fell - stood) == pytest.approx(-700.0 / 3, rel=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -332,7 +332,8 @@ def test_a_term_takes_the_place_of_one_of_the_base(own):
     task = tasks._OWN["own/Instead-v0"]
     assert [term.name for term in task.terms] == [term.name for term in tasks.TASKS["speed"].terms]
     assert task.terms[0] is mine
-    assert task.settings({}).reward_weights == {"progress": 2.0, "peak": 0.5}, "those of the base stay"
+    kept = {"progress": 12.0, "overspeed": 12.0}
+    assert task.settings({}).reward_weights == {**kept, "peak": 0.5}, "those of the base stay"
 
 
 def test_a_step_that_could_not_be_simulated_pays_for_nothing_but_the_failure(own):
@@ -345,7 +346,7 @@ def test_a_step_that_could_not_be_simulated_pays_for_nothing_but_the_failure(own
     assert terminated
     assert info["reward_slip"] == info["reward_comfort"] == 0.0
     assert reward == info["reward_failure"] + info["reward_action"]
-    assert info["reward_failure"] == -60.0
+    assert info["reward_failure"] == -140.0
     assert np.isfinite(observation).all()
 
 

@@ -51,6 +51,16 @@ def steps_of(values):
     return values.reshape(-1, round(DT / H)).sum(axis=1)
 
 
+def ends_of(values):
+    """At the end of each control step."""
+    return values[round(DT / H) - 1 :: round(DT / H)]
+
+
+def borne(trace, weight):
+    """Impulse over the weight, at most 1.2 of it, of each control step."""
+    return np.minimum(steps_of(H * trace["normal"]) / weight, 1.2 * DT)
+
+
 @pytest.mark.parametrize("name", ["walk", "run", "drag", "random"])
 @pytest.mark.parametrize("trunk", ["suspended", "rail", "fixed"])
 def test_terms_are_what_they_say_of_the_substeps(name, trunk):
@@ -74,25 +84,25 @@ def test_terms_are_what_they_say_of_the_substeps(name, trunk):
         down = trace["normal"] > 0
         progress = steps_of(-H * np.where(down, slid, 0.0) / np.where(down, trace["normal"], 1.0))
     else:
-        progress = np.diff(trace["x"][round(DT / H) - 1 :: round(DT / H)], prepend=0.0)
+        progress = np.diff(ends_of(trace["x"]), prepend=0.0)
     commanded = 2.5 * DT
+    pace = np.minimum(np.clip(progress / commanded, -1, 1), ends_of(trace["theta_rate"]) / np.pi)
     expected = {
         "reward_progress": 2.5 * np.minimum(progress, commanded),
         "reward_overspeed": -3.0 * np.maximum(progress - commanded, 0.0),
-        "reward_support": 15.0
-        * np.clip(progress / commanded, -1, 1)
-        * np.minimum(steps_of(H * trace["normal"]) / env.unwrapped.weight, 1.2 * DT),
+        "reward_support": 15.0 * pace * borne(trace, env.unwrapped.weight),
     }
     for term, values in expected.items():
         np.testing.assert_allclose(paid[term], values, rtol=1e-9, atol=1e-12, err_msg=term)
 
 
 def test_bearing_without_a_commanded_speed_pays_at_any():
+    """But only a leg whose crank turns."""
     env = gym.make("hoof_env/HorseLegRail-v0", episode_seconds=4.0, reward_weights={"support": 2.0})
     infos, trace = rollout(env, make_policy("run", env), 4)
-    borne = np.minimum(steps_of(H * trace["normal"]) / env.unwrapped.weight, 1.2 * DT)
+    expected = np.minimum(1.0, ends_of(trace["theta_rate"]) / np.pi) * borne(trace, env.unwrapped.weight)
     found = [info["reward_support"] for info in infos]
-    np.testing.assert_allclose(found, 2.0 * borne, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(found, 2.0 * expected, rtol=1e-9, atol=1e-12)
     assert sum(info["reward_progress"] for info in infos) == pytest.approx(trace["x"][-1], rel=1e-9)
     assert all(info["reward_overspeed"] == 0.0 for info in infos)
 

@@ -87,7 +87,7 @@ def test_hopping_on_the_swing_with_the_crank_stopped_stays_below_the_reference(t
 
 def paddle(_, time):
     """A swing paddle at 3 Hz with the crank stopped and the hoof never out of the ground, found by a search
-    for what pays where only the peaks of stances are charged."""
+    for what pays where only the peaks of stances are charged and bearing is paid to a stopped crank."""
     turn = 2 * np.pi * 3.037 * time
     offset = 3.188 + 1.368 * np.sin(turn + 2.928 * np.sin(turn))
     wave = np.sin(turn - 0.909)
@@ -95,19 +95,21 @@ def paddle(_, time):
 
 
 def test_paddling_under_one_held_peak_does_not_pay():
-    """Nor is the peak held: a charge for the peaks of stances would be a tenth of this one and let the paddle
-    return 147. From the starts of episodes it stays below the run. From its own it does not, see below."""
+    """From the start that it was found for it is faster than the run, in two stances. The peak is not held: a
+    charge for the peaks of stances would be a tenth of this one."""
     env = gym.make("hoof_env/HorseLeg-v0").unwrapped
     env.reset(seed=0, options={"crank_angle": 7.835, "speed": 0.5, "gait": "run"})
-    records = [env.record()]
+    total, records = 0.0, [env.record()]
     for step in range(500):
-        info = env.step(paddle(None, step * DT).astype(np.float32))[4]
+        _, reward, _, _, info = env.step(paddle(None, step * DT).astype(np.float32))
+        total += reward
         records.append(env.record())
     summary, forces = info["episode_summary"], together(records[1:])["grf"]
     assert summary["duty_factor"] > 0.95
-    assert summary["distance_m"] > 20
+    assert summary["distance_m"] > 25
     assert summary["stances"] <= 3
     assert running_peak_charge(forces) > 10 * summary["stance_peak_sum_n"]
+    assert total < reference("leg") - MARGIN["leg"]
     assert mean_return("leg", paddle) < reference("leg") - MARGIN["leg"]
 
 
@@ -120,8 +122,8 @@ STANDING = {
 
 def test_trembling_in_place_of_steps_does_not_pay():
     """The swing at 4 to 8 Hz, and the hoof never lifts: one stance an episode, whose peak would be charged
-    once. Each rise to more than twice the force before it is, and the mean of such policies stays below the
-    run. A choice among them does not, see below."""
+    once. Each rise to more than twice the force before it is, and the best of such policies stays below the
+    run."""
     envs = gym.make_vec(TASKS["leg"].id, num_envs=SEEDS, autoreset_mode="DISABLED").unwrapped
     envs.reset(seed=0, options=STANDING)
     generator = np.random.default_rng(0)
@@ -145,17 +147,15 @@ def test_trembling_in_place_of_steps_does_not_pay():
         troughs, crests = turns[:-1], turns[1:]
         assert charge[env] == pytest.approx(0.75e-3 * running_peak_charge(forces), rel=1e-9)
         assert charge[env] >= 0.75e-3 * np.maximum(crests - 2 * troughs, 0.0).sum()
-    run, once = reference("leg"), 0.75e-3 * summary["stance_peak_sum_n"]
-    assert (total + charge - once)[never_lift].mean() > run + MARGIN["leg"]  # it is this charge that does it
-    assert total[never_lift].mean() < run - MARGIN["leg"]
+    assert charge[never_lift].mean() > 10 * 0.75e-3 * summary["stance_peak_sum_n"][never_lift].mean()
+    assert total[never_lift].max() < reference("leg") - MARGIN["leg"]
 
 
-@pytest.mark.xfail(strict=True, reason="a hole: under pressure the force no more falls by half")
-@pytest.mark.parametrize("task", ["leg", "terrain", "speed"])
+@pytest.mark.parametrize("task", [task for task in TASKS if task != "fixed"])
 def test_trembling_under_pressure_stays_below_the_reference(task):
-    """The worst trick that is known, found by a search: turn the crank to where the leg lifts the trunk
-    against its spring, stop there, and tremble at 5.6 Hz. The leg bears twice the weight, so that the force
-    hardly falls by half, and bearing is paid. The mean is 74, 30 and 138, the run's 24, 23 and 134."""
+    """Found by a search: turn the crank to where the leg lifts the trunk against its spring, stop there, and
+    tremble at 5.6 Hz. The leg bears twice the weight, so that the force hardly falls by half; were bearing
+    paid to a stopped crank, the mean would be 74 where the run has 24."""
     names = gym.make(TASKS[task].id).unwrapped.observation_names
     sine, cosine = (names.index(f"{function}(crank angle)") for function in ("sin", "cos"))
 
@@ -169,7 +169,6 @@ def test_trembling_under_pressure_stays_below_the_reference(task):
     assert mean_return(task, tremble) < reference(task) - MARGIN[task]
 
 
-@pytest.mark.xfail(strict=True, reason="the worst of them loses 425, and the charge is 300")
 def test_failing_never_pays_more_than_going_on_badly():
     """The charge for failing exceeds the worst loss over a whole episode among 60 wild feedback policies."""
     generator = np.random.default_rng(0)

@@ -117,7 +117,7 @@ def test_a_step_after_the_end_warns_once_and_returns_what_it_did(env_id, setting
             warnings.simplefilter("error")
             env.step(STILL)
         if terminated:
-            assert first[4]["reward_failure"] == -300.0
+            assert first[4]["reward_failure"] == -700.0
         env.set_state(state)  # of an episode that ended
         with pytest.warns(UserWarning, match="already returned"):
             same(env.step(STILL), first)
