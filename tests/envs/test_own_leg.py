@@ -100,7 +100,7 @@ def without(name):
             "expected an entry 'geometry' beside the others, an object; found provenance, ",
         ),
         (without("gaits"), "expected an object 'gaits' with at least one gait, got None"),
-        (without("ground"), "expected an entry 'ground' with stiffness and exponent of the ground that its"),
+        (without("ground"), "expected an entry 'ground' with the stiffness and the exponent that its gaits"),
         ({**CONTENT, "gait": {}}, "unknown entries gait; expected some of provenance, units, geometry"),
         ({**CONTENT, "geometry": {**CONTENT["geometry"], "colour": "bay"}}, "geometry: .*; unknown colour"),
         ({**CONTENT, "gaits": {"trot": {"speed": 1.0}}}, "gait 'trot': expected crank_speed.*'speed'"),
