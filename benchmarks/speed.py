@@ -35,7 +35,8 @@ ROUNDS = 40
 BATCH = 1024
 
 PRESET = "identified"
-"""With its swing held, its walk meets the ground under a fixed trunk too; that of `first_fit` does not."""
+"""With its swing held, its walk meets the ground under a fixed trunk too; that of
+`research/identify/first_fit.json` does not."""
 
 ASSEMBLIES = {"ALL": ALL, "RIGID": RIGID}
 

@@ -9,18 +9,17 @@ from hoof_env.envs.batch import compile_kernels
 from hoof_env.paper.reproduce import run_cycle
 from research.identify.leg import encode
 from research.identify.objective import Objective
-
-PRESET = "first_fit"
+from tests.legs import FIRST_FIT
 
 
 def horse():
     """Four legs on one trunk."""
-    engine(scenes(PRESET)["horse"], PRESET).advance(steps=1)
+    engine(scenes(FIRST_FIT)["horse"], FIRST_FIT).advance(steps=1)
 
 
 def search():
     """Costs of a leg."""
-    choice, x = encode(PRESET)
+    choice, x = encode(FIRST_FIT)
     Objective(choice, paper_solver=True).rate(x)
 
 

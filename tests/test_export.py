@@ -27,13 +27,16 @@ from hoof_env.records import (
     record_episode,
     write,
 )
+from tests.legs import FIRST_FIT, OLD_HORSE
 
 LEG = "hoof_env/HorseLeg-v0"
+LOOSE = OLD_HORSE | {"trunk_drag": 0.0, "trunk_stiffness": 0.0, "trunk_damping": 0.0}
+"""Its run bears the trunk alone."""
 
 
 @pytest.fixture(scope="module")
 def episode():
-    with make_env(LEG, {"trunk_drag": 0.0, "trunk_stiffness": 0.0, "trunk_damping": 0.0}) as env:
+    with make_env(LEG, LOOSE) as env:
         record = record_episode(env, make_policy("run", env), seed=3, seconds=2.0, options={"gait": "run"})
         return record, describe(env, environment=LEG, policy="run", seed=3)
 
@@ -76,7 +79,7 @@ def test_parquet_has_units_version_and_geometry(episode, tmp_path):
         assert table.schema.field(name).metadata == {b"unit": RECORD[name].encode()}
     said = json.loads(table.schema.metadata[b"hoof_env"])
     assert said["hoof_env"] == __version__
-    assert said["geometry"] == load_geometry("first_fit").to_dict()
+    assert said["geometry"] == load_geometry(FIRST_FIT).to_dict()
     assert (said["environment"], said["policy"], said["seed"]) == (LEG, "run", 3)
 
 
@@ -107,7 +110,7 @@ def test_the_impulse_in_the_file_is_the_change_of_momentum(episode, tmp_path):
     """Over one turn of the crank the leg comes back to where it was, so all of it has sped up by as much."""
     record, about = episode
     _, columns = read_mot(write(record, about, tmp_path / "run.mot"))
-    mass = 80.0 + load_geometry("first_fit").mass
+    mass = LOOSE["trunk_mass"] + load_geometry(FIRST_FIT).mass
     first, last = 700, 1700  # the run's crank turns once a second
     turn = record["crank_angle"][last] - record["crank_angle"][first]
     assert turn == pytest.approx(2 * math.pi, abs=1e-6)
@@ -216,7 +219,7 @@ def test_arguments_are_pairs_or_objects():
 
 
 def test_a_wrapped_environment_is_recorded_alike(episode):
-    with gym.make(LEG, trunk_drag=0.0, trunk_stiffness=0.0, trunk_damping=0.0) as env:
+    with gym.make(LEG, **LOOSE) as env:
         wrapped = gym.wrappers.RecordEpisodeStatistics(env)
         again = record_episode(wrapped, make_policy("run", wrapped), 3, 0.5, {"gait": "run"})
     for name, column in again.items():

@@ -1,8 +1,7 @@
 """What a leg is: its lengths, pivot, assembly, masses and how it stands in the world.
 
-A `Geometry` is a frozen value; building one checks it. Presets are JSON files with a provenance line in
-`hoof_env/data`. Both are *identified* from the paper's results, for the paper prints no lengths: the
-default, `identified`, meets them, and `first_fit`, from which the search for it set out, nearly does.
+A `Geometry` is a frozen value; building one checks it. Presets are JSON files with a provenance line. The one
+in `hoof_env/data`, `identified`, is *identified* from the paper's results, for the paper prints no lengths.
 """
 
 from __future__ import annotations
@@ -34,8 +33,8 @@ PARTS = ("provenance", "units", "geometry", "ground", "gaits", "gait_provenance"
 
 LINEAR_DENSITY = 1.0
 """Default mass per length of a link [kg/m]. The paper prints no masses. One kilogram a metre gives the
-leg of `HorseLeg-v0` 7.3 kg, 9 % of its trunk; on a fixed trunk masses change torques and reactions only,
-never motion or ground force."""
+leg of `HorseLeg-v0` 7.6 kg; on a fixed trunk masses change torques and reactions only, never motion or ground
+force."""
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ import numpy as np
 from hoof_env.errors import HoofEnvError
 from research.identify.command import check_counts, check_extras, load_start, provenance, run_command
 from research.identify.confirm import Confirmation, confirm
-from research.identify.leg import to_preset
+from research.identify.leg import FIRST_FIT, to_preset
 from research.identify.resume import digest_of, open_state, versions, write_json
 from research.identify.search import BUDGET, SCHEDULE, LegProblem, Phase, Result, search
 
@@ -25,7 +25,7 @@ EXPONENT = 1.375  # n of Eq. 14, not printed: with it a leg meets every number, 
 
 def identify(
     out: Path,
-    start: str = "first_fit",
+    start: str = FIRST_FIT,
     seed: int = 0,
     workers: int = 2,
     budget: int = BUDGET,

@@ -6,6 +6,7 @@ x holds log lengths [m], the pivot and the hip's height [m] and the swing of bot
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,8 @@ Vector = NDArray[np.float64]
 GAITS = ("walk", "run")
 SIGNS = tuple(dyad.point for dyad in DYADS)  # their side is a choice, in the order of `Choice.assembly`
 NUMBER = {name: i for i, name in enumerate(POINTS)}  # of a point, in arrays of all of them
-STEPS = tables(load_geometry("first_fit"))[0]  # the construction of any leg
+FIRST_FIT = str(Path(__file__).with_name("first_fit.json"))  # what a search sets out from
+STEPS = tables(load_geometry())[0]  # the construction of any leg
 SPEED = 2 * np.pi  # the paper's crank speed in both gaits [rad/s]; not searched
 
 _BODY = (*(f"log {name}" for name in LENGTHS), "pivot_x", "pivot_y")

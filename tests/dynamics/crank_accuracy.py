@@ -22,6 +22,7 @@ from hoof_env.gait import load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
 from tests.dynamics.scenes import NATURAL
+from tests.legs import PRESETS
 from tests.oracle.crank import PlainCrank
 
 PHASES = np.arange(24) * 2 * np.pi / 24
@@ -37,16 +38,16 @@ PATH = Path(__file__).parent / "data" / "crank_reference.json"
 class Case:
     """One leg over one ground, from all `PHASES`."""
 
-    preset: str
+    preset: str  # of `PRESETS`, by name
     ground: str
 
     @property
     def limb(self):
-        return Limb(load_geometry(self.preset))
+        return Limb(load_geometry(PRESETS[self.preset]))
 
     @property
     def gait(self):
-        return load_gait("walk", self.preset)
+        return load_gait("walk", PRESETS[self.preset])
 
     @property
     def height(self):
@@ -79,7 +80,7 @@ class Case:
         return np.where(results == 0, np.abs(engine.state["theta"][0] - ends), np.inf)
 
 
-CASES = tuple(Case(preset, ground) for preset in ("first_fit", "identified") for ground in GROUNDS)
+CASES = tuple(Case(preset, ground) for preset in PRESETS for ground in GROUNDS)
 
 
 def write_references():

@@ -9,9 +9,10 @@ from hoof_env.gait import load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.linkage import CRANK, FRAME, JOINTS, LOCK
+from tests.legs import FIRST_FIT
 
-LEG = load_geometry("first_fit")
-RUN, WALK = load_gait("run", "first_fit"), load_gait("walk", "first_fit")
+LEG = load_geometry(FIRST_FIT)
+RUN, WALK = load_gait("run", FIRST_FIT), load_gait("walk", FIRST_FIT)
 NATURAL = Ground(restitution=0.5, approach_floor=0.1, friction_fast=0.05)  # that of `HorseLeg-v0`
 FAR = Ground(stiffness=100.0)  # out of reach, and soft enough for any step
 THETA, LOWEST = np.array([4.02, 4.18, 4.1, 4.14]), 1.389  # soles level, and how far they are below O [m]

@@ -12,8 +12,9 @@ from hoof_env.dynamics.constrained import SIZE, Constraints, closed_form
 from hoof_env.gait import MOTION
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.linkage import BODY_LENGTHS
+from tests.legs import FIRST_FIT
 
-GEOMETRY = load_geometry("first_fit")
+GEOMETRY = load_geometry(FIRST_FIT)
 CONSTRAINTS = Constraints(GEOMETRY)
 
 # The joints of Eq. 2 as the paper shares them out: T and H are the tail and the head of a link, A8 is the

@@ -13,6 +13,7 @@ from hoof_env.leg.kinematics import FrameMotion, pose
 from hoof_env.leg.linkage import FRAME, JOINTS
 from research.identify.ensemble import load_ensemble
 from tests.dynamics.scenes import LEG, NATURAL, RUN, WALK, horse, inertia, loads
+from tests.legs import PRESETS
 
 OTHER = load_geometry("identified")
 LEGS = {
@@ -69,7 +70,7 @@ def test_every_body_obeys_newton_and_euler(geometry, height):
     assert (highest > 100) == (height < 0)
 
 
-@pytest.mark.parametrize("preset", ["first_fit", "identified"])
+@pytest.mark.parametrize("preset", PRESETS.values(), ids=PRESETS)
 @pytest.mark.parametrize("theta", [0.3, 2.0, 4.4])
 def test_a_prescribed_crank_has_the_reactions_of_eq_8(preset, theta):
     leg, gait = load_geometry(preset), load_gait("run", preset)

@@ -11,9 +11,10 @@ from hoof_env.ground.contact import Ground
 from hoof_env.ground.laws import FRICTION_LAWS
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import load_geometry
+from tests.legs import FIRST_FIT
 from tests.oracle.horse import PlainHorse
 
-FIRST, IDENTIFIED = load_geometry("first_fit"), load_geometry("identified")
+FIRST, IDENTIFIED = load_geometry(FIRST_FIT), load_geometry("identified")
 LEGS = (
     FIRST,
     IDENTIFIED,

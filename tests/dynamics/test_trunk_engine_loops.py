@@ -19,7 +19,7 @@ LOW, HIGH = np.array(list(LIMITS.values())).T
 
 @pytest.mark.parametrize("drive", [Motor(), Prescribed()], ids=["motor", "prescribed"])
 @pytest.mark.parametrize("kind", ["fixed", "free"])
-@pytest.mark.parametrize("geometry", LEGS, ids=["first fit", "identified", "mirrored"])
+@pytest.mark.parametrize("geometry", LEGS, ids=["first_fit", "identified", "mirrored"])
 def test_loops_stay_closed(geometry, kind, drive):
     """Half a minute under commands on the move: links keep their lengths, toe and heel are in place."""
     hips = (0.6, 0.1), (-0.6, -0.1)

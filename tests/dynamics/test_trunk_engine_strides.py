@@ -25,24 +25,45 @@ def engine(kind="suspended", legs=1, strides=True):
     return made
 
 
-def peaks_of(loads, angles, forces, threshold):
-    """Peaks of all stances: split where the load ends or after a revolution."""
-    peaks, opened = [], None
-    for normal, theta, grf in zip(loads, angles, forces, strict=True):
+def stances_of(loads, angles, threshold):
+    """Steps of all stances: split where the load ends or after a revolution."""
+    stances, opened = [], None
+    for k, (normal, theta) in enumerate(zip(loads, angles, strict=True)):
         if normal <= threshold:
             opened = None
         elif opened is None or theta - opened >= 2 * np.pi:
             opened = theta
-            peaks.append(grf)
+            stances.append([k])
         else:
-            peaks[-1] = max(peaks[-1], grf)
-    return peaks
+            stances[-1].append(k)
+    return stances
 
 
-def play(loads, angles, forces, threshold):
-    """The stance after all, and what its running peaks have grown by."""
+def peaks_and_rates(loads, angles, forces, threshold, h=1e-3):
+    """Peak and loading rate of all stances; before the first step nothing is loaded."""
+    rises = np.diff(loads, prepend=0.0) / h
+    peaks, rates = [], []
+    for steps in stances_of(loads, angles, threshold):
+        peaks.append(max(forces[k] for k in steps))
+        grows = [k for i, k in enumerate(steps) if all(forces[k] > forces[j] for j in steps[:i])]
+        rates.append(max(0.0, *(rises[k] for k in grows)))
+    return peaks, rates
+
+
+def running_charge(forces):
+    """What the running peak rises: above the highest force before, each at most twice the lowest since."""
+    charge, before = 0.0, np.empty(0)
+    for force in forces:
+        charge += max(0.0, force - before.max(initial=0.0))
+        before = np.append(np.minimum(before, 2 * force), force)
+    return charge
+
+
+def play(loads, angles, forces, threshold, h=1e-3):
+    """The stance after all, and what peaks, running peak and steepest rises have grown by."""
     stance = StanceCounter(threshold)
-    return stance, sum(stance.add(*now) for now in zip(angles, loads, forces, strict=True))
+    grown = [stance.add(*now, h) for now in zip(angles, loads, forces, strict=True)]
+    return stance, *(sum(column) for column in zip(*grown, strict=True))
 
 
 @given(st.lists(st.floats(0, 1e4), min_size=1, max_size=60), st.floats(0.01, 1.5),
@@ -50,24 +71,36 @@ def play(loads, angles, forces, threshold):
 @draws(max_examples=100, deadline=None)
 def test_over_any_load_the_increases_add_up_to_the_peaks(loads, turn, threshold):
     angles, forces = turn * np.arange(len(loads)), 1.1 * np.array(loads)
-    stance, grown = play(loads, angles, forces, threshold)
-    peaks = peaks_of(loads, angles, forces, threshold)
+    stance, grown, higher, steeper = play(loads, angles, forces, threshold)
+    peaks, rates = peaks_and_rates(loads, angles, forces, threshold)
     assert stance.count == len(peaks)
     assert np.isclose(grown, sum(peaks), rtol=1e-9, atol=1e-9)
+    assert np.isclose(higher, running_charge(forces), rtol=1e-9, atol=1e-9)
+    assert np.isclose(steeper, sum(rates), rtol=1e-9, atol=1e-6)
     assert stance.is_open == (loads[-1] > threshold)
     assert stance.peak == (peaks[-1] if stance.is_open else 0.0)
+    assert stance.steepest == pytest.approx(rates[-1] if stance.is_open else 0.0, rel=1e-12)
 
 
-def test_a_hoof_that_never_lifts_pays_every_revolution():
-    stance, grown = play([690.0] * 1000, np.linspace(0.0, 6 * np.pi - 1e-6, 1000), [700.0] * 1000, 40.0)
-    assert (stance.count, grown) == (3, 3 * 700.0)
+def test_a_hoof_that_never_lifts_has_a_peak_every_revolution():
+    stance, grown, higher, _ = play(
+        [690.0] * 1000, np.linspace(0.0, 6 * np.pi - 1e-6, 1000), [700.0] * 1000, 40.0
+    )
+    assert (stance.count, grown, higher) == (3, 3 * 700.0, 700.0)
 
 
 def test_grazing_the_ground_between_two_pushes_ends_a_stance():
     """Or a policy could hold one peak for ever and push under it."""
     loads = [900.0, 30.0, 900.0, 900.0]
-    stance, grown = play(loads, [0.0] * 4, loads, 40.0)
-    assert (stance.count, grown) == (2, 1800.0)
+    stance, grown, higher, _ = play(loads, [0.0] * 4, loads, 40.0)
+    assert (stance.count, grown, higher) == (2, 1800.0, 900.0 + 840.0)
+
+
+def test_a_rise_under_the_peak_is_no_loading_rate():
+    """A hoof that rocks under a peak that it has had is not charged for it again."""
+    loads = [100.0, 500.0, 300.0, 480.0, 700.0]
+    *_, steeper = play(loads, [0.0] * 5, [100.0, 500.0, 300.0, 480.0, 490.0], 40.0, 0.5)
+    assert steeper == 800.0
 
 
 @pytest.mark.parametrize("kind", TRUNKS)
@@ -92,9 +125,12 @@ def test_strides_are_those_of_the_record(kind, legs):
     assert total["travel"] == pytest.approx(-1e-3 * slid.sum(0), rel=1e-10)
     for leg in range(legs):
         history = load[:, leg], record["theta"][:, leg], force[:, leg]
-        peaks = peaks_of(*history, 0.05 * made.weight / legs)
+        peaks, rates = peaks_and_rates(*history, 0.05 * made.weight / legs)
         assert total["stances"][leg] == len(peaks) > 2
         assert total["peak_increase"][leg] == pytest.approx(sum(peaks), rel=1e-12)
+        running = running_charge(force[:, leg])
+        assert total["running_peak_increase"][leg] == pytest.approx(running, rel=1e-12)
+        assert total["loading_rate_increase"][leg] == pytest.approx(sum(rates), rel=1e-12)
 
 
 def test_a_stance_goes_on_from_a_state_that_was_put_back():
@@ -111,6 +147,13 @@ def test_a_stance_goes_on_from_a_state_that_was_put_back():
     made.advance(steps=20)
     for name, value in made.strides.items():
         np.testing.assert_array_equal(value, after[name], err_msg=name)
+
+
+def test_a_push_behind_a_fall_by_half_is_charged_without_a_lift_too():
+    """Or a policy could keep the hoof down and hammer."""
+    loads = [1000.0, 600.0, 1000.0, 300.0, 1000.0]
+    stance, grown, higher, _ = play(loads, [0.0] * 5, loads, 40.0)
+    assert (stance.count, grown, higher) == (1, 1000.0, 1000.0 + 400.0)
 
 
 def test_strides_change_nothing_else():

@@ -21,7 +21,7 @@ ARGUMENTS = [
     ({"trunk_mas": 80.0}, "HorseLeg-v0: unexpected keyword argument 'trunk_mas'; did you mean trunk_mass?"),
     ({"wings": 2}, r"unexpected keyword argument 'wings' \(known: preset, gait, trunk, "),
     ({"task": "fly"}, "task: expected one of fixed, leg, .*got 'fly'"),
-    ({"preset": "no_such_leg"}, "preset: expected one of first_fit, identified, got 'no_such_leg'"),
+    ({"preset": "no_such_leg"}, "preset: expected one of identified, got 'no_such_leg'"),
     ({"trunk": "floating"}, "trunk: expected one of fixed, rail, suspended, got 'floating'"),
     ({"trunk": "free"}, "trunk: expected one of fixed, rail, suspended, got 'free'"),
     ({"trunk": 3}, "trunk: expected one of fixed, rail, suspended, got 3"),

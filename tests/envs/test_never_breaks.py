@@ -16,6 +16,7 @@ from hoof_env.dynamics.parts import GRAVITY
 from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.envs.tasks import PER_EPISODE
 from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS
+from tests.legs import PRESETS
 
 STEPS = int(float(os.environ.get("HOOF_ENV_STEPS", "1e5")))
 """Random steps of each id, in all environments together; a million take seconds."""
@@ -61,7 +62,7 @@ def between(low, high):
 SETTINGS = st.fixed_dictionaries(
     {},
     optional={
-        "preset": st.sampled_from(["first_fit", "identified"]),
+        "preset": st.sampled_from(list(PRESETS.values())),
         "trunk": st.sampled_from(["suspended", "rail", "fixed"]),
         "trunk_mass": between(1.0, 1000.0),
         "trunk_share": between(0.0, 1.0),

@@ -29,7 +29,7 @@ def test_the_example_runs(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (block,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
     exec(compile(block, "own_leg.md", "exec"), {})
-    assert json.loads((tmp_path / "pony.json").read_text())["provenance"] == "first_fit at half its size"
+    assert json.loads((tmp_path / "pony.json").read_text())["provenance"] == "identified at half its size"
 
 
 def entries(heading: str) -> dict[str, list[str]]:
@@ -100,6 +100,7 @@ def without(name):
             "expected an entry 'geometry' beside the others, an object; found provenance, ",
         ),
         (without("gaits"), "expected an object 'gaits' with at least one gait, got None"),
+        (without("ground"), "expected an entry 'ground' with the stiffness and the exponent that its gaits"),
         ({**CONTENT, "gait": {}}, "unknown entries gait; expected some of provenance, units, geometry"),
         ({**CONTENT, "geometry": {**CONTENT["geometry"], "colour": "bay"}}, "geometry: .*; unknown colour"),
         ({**CONTENT, "gaits": {"trot": {"speed": 1.0}}}, "gait 'trot': expected crank_speed.*'speed'"),

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.gait import LIMITS, PARAMETERS, GaitParameters, gait_names, load_gait, paper_gaits
 from hoof_env.leg.geometry import read_preset
+from tests.legs import FIRST_FIT
 
 inside = st.tuples(*(st.floats(low, high) for low, high in LIMITS.values()))
 
@@ -45,7 +46,7 @@ def test_each_limit_is_kept(name):
     ],
 )
 def test_the_gaits_of_first_fit(name, offset, amplitude, phase):
-    gait = load_gait(name, "first_fit")
+    gait = load_gait(name, FIRST_FIT)
     assert gait.crank_speed == 2 * np.pi
     for theta in np.linspace(0, 6, 7):
         swing = gait.swing_offset + gait.swing_sin * np.sin(theta) + gait.swing_cos * np.cos(theta)
@@ -53,10 +54,10 @@ def test_the_gaits_of_first_fit(name, offset, amplitude, phase):
 
 
 def test_an_unknown_gait():
-    assert gait_names("first_fit") == ["run", "walk"]
+    assert gait_names(FIRST_FIT) == ["run", "walk"]
     assert {"run", "walk"} <= set(gait_names())
     with pytest.raises(ParameterError, match="gait: expected one of run, walk, got 'trot'"):
-        load_gait("trot", "first_fit")
+        load_gait("trot", FIRST_FIT)
 
 
 @pytest.mark.parametrize(
@@ -81,16 +82,16 @@ def test_a_bad_preset_is_named(tmp_path, gaits, error, message):
 
 
 def test_a_preset_holds_more_gaits_than_the_papers(tmp_path):
-    preset = read_preset("first_fit")
+    preset = read_preset(FIRST_FIT)
     given = {"crank_speed": 5.0, "swing_offset": 0.7, "swing_sin": 0.1, "swing_cos": -0.3}
     preset["gaits"]["carrying_walk"] = given
     path = tmp_path / "three.json"
     path.write_text(json.dumps(preset))
     assert gait_names(path) == ["carrying_walk", "run", "walk"]
     assert load_gait("carrying_walk", path) == GaitParameters(**given)
-    assert load_gait("walk", path) == load_gait("walk", "first_fit")
+    assert load_gait("walk", path) == load_gait("walk", FIRST_FIT)
     with pytest.raises(ParameterError, match="gait: expected one of run, walk, got 'carrying_walk'"):
-        load_gait("carrying_walk", "first_fit")
+        load_gait("carrying_walk", FIRST_FIT)
 
 
 @pytest.mark.parametrize(

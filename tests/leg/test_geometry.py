@@ -15,8 +15,9 @@ from hoof_env.errors import GeometryError, ParameterError
 from hoof_env.leg.geometry import Geometry, load_geometry, tables
 from hoof_env.leg.kinematics import pose, solve_points
 from hoof_env.leg.linkage import BODIES, CONSTRUCTION, DYADS, LENGTHS, POINTS, Dyad
+from tests.legs import FIRST_FIT
 
-LEG = load_geometry("first_fit")
+LEG = load_geometry(FIRST_FIT)
 
 
 def centre_distance(values, pivot, assembly, point, theta):
@@ -120,7 +121,7 @@ def test_most_small_changes_still_turn():
 
 
 def test_it_is_a_value():
-    other = load_geometry("first_fit")
+    other = load_geometry(FIRST_FIT)
     assert other == LEG
     assert hash(other) == hash(LEG)
     longer = LEG.replace(lengths={"FG": 0.66})

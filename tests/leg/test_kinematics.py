@@ -9,8 +9,9 @@ from hoof_env.errors import ParameterError
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
 from hoof_env.leg.linkage import BODIES, CONSTRUCTION, LOCK, NUMBER, Dyad
+from tests.legs import FIRST_FIT
 
-LEG = load_geometry("first_fit")
+LEG = load_geometry(FIRST_FIT)
 THETAS = np.linspace(-7.0, 7.0, 500)
 
 # Central differences of eighth order: their error is far below the bars here, and they know nothing of the

@@ -9,11 +9,11 @@ from hoof_env.gait import load_gait
 from hoof_env.ground.contact import Ground, load_ground
 from hoof_env.leg.geometry import Geometry, load_geometry, preset_names, read_preset
 
-LEG = load_geometry("first_fit")
+LEG = load_geometry()
 
 
 def preset_file(tmp_path, change=None, text=None):
-    data = read_preset("first_fit")
+    data = read_preset("identified")
     if change:
         change(data)
     path = tmp_path / "leg.json"
@@ -24,12 +24,12 @@ def preset_file(tmp_path, change=None, text=None):
 def test_a_preset_by_path_is_the_preset_by_name(tmp_path):
     path = preset_file(tmp_path)
     for source in (path, str(path)):
-        assert load_geometry(source).replace(name="first_fit") == LEG
+        assert load_geometry(source).replace(name="identified") == LEG
 
 
 def test_every_preset_is_identified_not_published():
     assert load_geometry().name == "identified"
-    assert {"first_fit", "identified"} <= set(preset_names())
+    assert preset_names() == ["identified"]
     for name in preset_names():
         assert load_geometry(name).provenance.startswith("Identified, not published")
 
@@ -39,8 +39,8 @@ def test_a_missing_file_and_an_unknown_name(tmp_path):
         load_geometry(tmp_path / "none.json")
     with pytest.raises(DataFileError, match="cannot read"):
         load_geometry(tmp_path)  # a folder
-    with pytest.raises(ParameterError, match=r"preset: expected one of .*first_fit.*, got 'second_fit'"):
-        load_geometry("second_fit")
+    with pytest.raises(ParameterError, match=r"preset: expected one of identified, got 'first_fit'"):
+        load_geometry("first_fit")
 
 
 @pytest.mark.parametrize(
@@ -76,9 +76,9 @@ def test_a_file_with_an_unknown_entry_or_a_bad_value(tmp_path):
 
 
 def test_content_is_taken_as_a_file_is_and_its_errors_are_those_of_an_argument():
-    content = read_preset("first_fit")
+    content = read_preset("identified")
     leg = load_geometry(content)
-    assert leg.replace(name="first_fit") == LEG
+    assert leg.replace(name="identified") == LEG
     assert (leg.name, leg.provenance) == ("custom", LEG.provenance)
     with pytest.raises(ParameterError, match="preset: unknown entries colour; expected some of provenance, "):
         load_geometry({**content, "colour": "bay"})
@@ -94,12 +94,12 @@ def test_content_is_taken_as_a_file_is_and_its_errors_are_those_of_an_argument()
 def test_a_geometry_goes_through_a_dictionary_and_a_file(tmp_path):
     own = LEG.replace(masses=tuple(range(1, 15)), travel=1, name="mine", provenance="drawn by hand")
     assert Geometry.from_dict(json.loads(json.dumps(own.to_dict()))) == own
-    gaits = {"trot": load_gait("run", "first_fit"), "walk": vars(load_gait("walk", "first_fit"))}
+    gaits = {"trot": load_gait("run", "identified"), "walk": vars(load_gait("walk", "identified"))}
     path = tmp_path / "new" / "mine.json"
     own.save(path, gaits, {"exponent": 1.25})
     again = load_geometry(path)
     assert (again, again.provenance) == (own, own.provenance)
-    assert [load_gait(name, path) for name in gaits] == [gaits["trot"], load_gait("walk", "first_fit")]
+    assert [load_gait(name, path) for name in gaits] == [gaits["trot"], load_gait("walk", "identified")]
     assert load_ground(path) == Ground(exponent=1.25)
     own.save(path)
     assert set(read_preset(path)) == {"provenance", "units", "geometry"}

@@ -12,8 +12,9 @@ from hoof_env.errors import GeometryError, ParameterError
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import Geometry, load_geometry
 from hoof_env.leg.profile import DERIVATIVE_ERROR, LegProfile, functions, leg_profile
+from tests.legs import FIRST_FIT, PRESETS
 
-LEG = load_geometry("first_fit")
+LEG = load_geometry(FIRST_FIT)
 SHORT = {"CF": 0.8 * LEG.lengths["CF"]}
 ROCKER = LEG.replace(lengths=SHORT, full_turn=False)
 
@@ -24,7 +25,7 @@ def errors(profile, theta):
     return [(np.abs(a - b).max(0) / np.abs(b).max(0)).max() for a, b in zip(found, exact, strict=True)]
 
 
-@pytest.mark.parametrize("preset", ["first_fit", "identified"])
+@pytest.mark.parametrize("preset", PRESETS.values(), ids=PRESETS)
 def test_it_is_the_closed_form(preset):
     profile = leg_profile(load_geometry(preset))
     value, slope = errors(profile, np.random.default_rng(0).uniform(-10, 10, 5000))

@@ -5,6 +5,7 @@ import pytest
 
 from hoof_env.paper.measure import measure_stance
 from hoof_env.paper.reproduce import GAITS, run_cycle
+from tests.legs import FIRST_FIT
 
 
 @pytest.fixture(scope="module", params=GAITS)
@@ -81,7 +82,7 @@ def inelastic_force(penetrations, h):
 @pytest.mark.parametrize("name", GAITS)
 def test_the_leg_is_the_one_that_was_identified(name):
     golden, h = IDENTIFIED[name], 1e-3
-    cycle = run_cycle(name, "exact", preset="first_fit", restitution=1.0, sim_dt=h)[1:]
+    cycle = run_cycle(name, "exact", preset=FIRST_FIT, restitution=1.0, sim_dt=h)[1:]
     inside = np.flatnonzero((cycle["toe_penetration"] > 0) | (cycle["heel_penetration"] > 0))
     assert (np.diff(inside) == 1).all()
     assert cycle["time"][[inside[0], inside[-1] + 1]] == pytest.approx(golden["contact"], abs=1e-9)

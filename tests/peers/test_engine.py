@@ -9,6 +9,7 @@ pytest.importorskip("exudyn")
 
 from benchmarks.common import ALL
 from hoof_env.dynamics.parts import Motor
+from tests.legs import FIRST_FIT, PRESETS
 from tests.peers.agreement import PEERS, compare, quantities
 from tests.peers.cases import CASES, Case
 from tests.peers.trunk_legs import TrunkLegs
@@ -32,7 +33,7 @@ def assert_agreement(rows, forces, motion):
 
 
 def test_a_leg_on_a_rail_is_that_of_the_peers():
-    rows = compare("first_fit", Case("rail", drive=Motor(), duration=0.5), COARSE)
+    rows = compare(FIRST_FIT, Case("rail", drive=Motor(), duration=0.5), COARSE)
     assert {row.engine for row in rows} >= set(PEERS)
     assert_agreement(rows, forces=5e-3, motion=1e-5)
 
@@ -42,7 +43,7 @@ def test_the_comparison_sees_a_rotor_that_is_a_hundredth_heavier():
     heavier = replace(case, drive=Motor(rotor_inertia=1.01 * Motor().rotor_inertia))
     for quantity in ("crank angle", "crank torque"):
         one, two, coarse = (
-            quantities(case, some.horse("first_fit").ours(dt), ALL, ALL)[quantity]
+            quantities(case, some.horse(FIRST_FIT).ours(dt), ALL, ALL)[quantity]
             for some, dt in ((case, 1e-4), (heavier, 1e-4), (case, 2e-4))
         )
         assert abs(one - two).max() > 1e3 * abs(one - coarse).max()
@@ -50,7 +51,7 @@ def test_the_comparison_sees_a_rotor_that_is_a_hundredth_heavier():
 
 @pytest.mark.peers
 @pytest.mark.parametrize("case", [case for case in CASES if not case.ground], ids=lambda case: case.name)
-@pytest.mark.parametrize("preset", ["first_fit", "identified"])
+@pytest.mark.parametrize("preset", PRESETS.values(), ids=PRESETS)
 def test_engine_agrees_with_the_peers_in_the_air(preset, case):
     steps = {"ours": 1e-4, "MuJoCo": 2e-4, "Exudyn": 2e-4}
     assert_agreement(compare(preset, case, steps), forces=2e-4, motion=1e-6)
@@ -72,7 +73,7 @@ def test_engine_agrees_with_the_peers_on_the_ground(case):
 
 @pytest.mark.peers
 @pytest.mark.parametrize("case", GROUND, ids=lambda case: case.name)
-@pytest.mark.parametrize("preset", ["first_fit", "identified"])
+@pytest.mark.parametrize("preset", PRESETS.values(), ids=PRESETS)
 def test_every_case_feels_the_ground(preset, case):
     horse = case.horse(preset)
     legs = TrunkLegs(horse.limbs, horse.trunk, horse.start, 1e-3, horse.ground, "midpoint")

@@ -17,6 +17,7 @@ pytest.importorskip("exudyn")
 
 from benchmarks.exudyn_legs import ExudynLegs  # noqa: E402
 from benchmarks.mujoco_legs import MujocoLegs  # noqa: E402
+from tests.legs import PRESETS  # noqa: E402
 
 HIGH, SPEED, THETA = 5.0, 2 * np.pi, 0.3
 HIPS = ((0.6, 0.0), (0.55, -0.05), (-0.6, 0.0), (-0.65, 0.03))
@@ -54,7 +55,7 @@ def assert_right(record, assembly, geometry, gait, within):
 
 
 @pytest.mark.parametrize("assembly", [RIGID, ALL], ids=["9 hinges", "14 hinges"])
-@pytest.mark.parametrize("preset", ["first_fit", "identified"])
+@pytest.mark.parametrize("preset", PRESETS.values(), ids=PRESETS)
 def test_mujoco_finds_positions_torques_and_reactions(preset, assembly):
     geometry, gait = load_geometry(preset), GaitParameters(SPEED, 0.4, 0, 0)
     peer = MujocoLegs([Limb(geometry, drive=Prescribed())], HELD, beginning(gait), dt=1e-3, assembly=assembly)
@@ -69,7 +70,7 @@ def test_mujoco_finds_positions_torques_and_reactions(preset, assembly):
 
 @pytest.mark.peers
 @pytest.mark.parametrize("swing", [(0.0, 0.0), (-0.6, -0.2)], ids=["held", "swung"])
-@pytest.mark.parametrize("preset", ["first_fit", "identified"])
+@pytest.mark.parametrize("preset", PRESETS.values(), ids=PRESETS)
 def test_exudyn_converges_to_torques_and_reactions(preset, swing):
     geometry, gait = load_geometry(preset), GaitParameters(SPEED, 0.4, *swing)
     for dt, within in ((1e-3, 4e-3), (2e-4, 1.6e-4)):  # second order: 25 times nearer

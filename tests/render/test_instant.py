@@ -11,8 +11,9 @@ from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
 from hoof_env.render.instant import POINTS, UNITS, Instant, columns_of_engine, ground_at, instants
+from tests.legs import FIRST_FIT
 
-LEG, RUN = load_geometry("first_fit"), load_gait("run", "first_fit")
+LEG, RUN = load_geometry(FIRST_FIT), load_gait("run", FIRST_FIT)
 HILLS = Terrain.through([-1.0, 0.4, 1.0, 2.0], [0.0, 0.0, 0.1, -0.05], friction=[1.0, 1.0, 0.5, 2.0])
 
 

@@ -27,10 +27,11 @@ from hoof_env.render.ground import find_patches, footprint
 from hoof_env.render.instant import Instant, columns_of_engine, instants
 from hoof_env.render.panel import Stances
 from hoof_env.render.renderer import Renderer, open_window
+from tests.legs import FIRST_FIT
 
 pygame = pytest.importorskip("pygame")
 
-GEOMETRY = load_geometry("first_fit")
+GEOMETRY = load_geometry(FIRST_FIT)
 SCENE = (slice(90, None), slice(0, 640))  # rows and columns of the scene, below its key and left of the panel
 KEY = (slice(10, 31), slice(0, 64))  # of the key's arrow
 VERMILION, BLUE, PURPLE, LINE = (213, 94, 0), (0, 114, 178), (204, 121, 167), (112, 95, 66)

@@ -11,6 +11,7 @@ import pytest
 
 from hoof_env.leg.geometry import load_geometry, read_preset
 from research.identify.__main__ import main
+from tests.legs import FIRST_FIT
 from tests.research.commands import refusal, wait_for_end, wait_until
 
 COMMAND = [sys.executable, "-m", "research.identify"]
@@ -52,7 +53,7 @@ def test_a_finished_search_is_neither_begun_anew_nor_mixed_with_another(searched
     out, _ = searched
     before = contents(out)
     preset = tmp_path / "other.json"
-    moved = read_preset("first_fit")
+    moved = read_preset(FIRST_FIT)
     moved["geometry"]["hip_height"] += 0.001
     preset.write_text(json.dumps(moved))
     for arguments, message in [
@@ -83,7 +84,7 @@ def test_a_leg_found_alone_is_not_written_over(tmp_path, capsys):
     ("arguments", "message"),
     [
         (["--start", "STUCK"], "stuck.json: dyad 1 (C-B-P"),
-        (["--start", "nobody"], "start nobody: preset: expected one of first_fit"),
+        (["--start", "nobody"], "start nobody: preset: expected one of identified"),
         (["--start", "GROUND"], "ground.json: preset"),
         (["--start", "GAITLESS"], "gait: expected one of walk, got 'run'"),
         (["--start", "SLOW"], "run.crank_speed: expected the paper's 6.283185 rad/s, got 3.0"),
@@ -94,11 +95,11 @@ def test_a_leg_found_alone_is_not_written_over(tmp_path, capsys):
     ],
 )
 def test_bad_input_is_one_line_before_anything_is_written(tmp_path, capsys, arguments, message):
-    stuck, gaitless, slow = read_preset("first_fit"), read_preset("first_fit"), read_preset("first_fit")
+    stuck, gaitless, slow = read_preset(FIRST_FIT), read_preset(FIRST_FIT), read_preset(FIRST_FIT)
     stuck["geometry"]["lengths"]["CB"] = 0.05
     del gaitless["gaits"]["run"]
     slow["gaits"]["run"]["crank_speed"] = 3.0
-    ground = {**read_preset("first_fit"), "ground": {"exponent": -1}}
+    ground = {**read_preset(FIRST_FIT), "ground": {"exponent": -1}}
     files = {"GROUND": ground, "STUCK": stuck, "GAITLESS": gaitless, "SLOW": slow}
     for name, content in files.items():
         (tmp_path / f"{name.lower()}.json").write_text(json.dumps(content))

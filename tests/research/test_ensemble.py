@@ -20,10 +20,10 @@ from research.identify.leg import encode, to_preset
 from research.identify.objective import Objective
 from research.identify.resume import open_state
 from research.identify.search import LegProblem
+from tests.legs import FIRST_FIT
 from tests.research.commands import kill_when, refusal
 
-PRESET = "first_fit"
-CHOICE, X = load_start(PRESET, 1.5)
+CHOICE, X = load_start(FIRST_FIT, 1.5)
 AIM = Aim(LegProblem(CHOICE), 20.0, False, steps=1)
 
 
@@ -83,7 +83,7 @@ def test_a_start_comes_within_the_bar_and_a_push_stays_there_and_goes_its_way(en
 def test_the_verdict_is_that_of_the_full_system():
     made = Attempt("0", tuple(AIM.problem.inward(np.array(X), 801).tolist()), 0.0)
     _, judged = judge(made, AIM)
-    verdict = confirm(read_preset(PRESET))
+    verdict = confirm(read_preset(FIRST_FIT))
     assert judged.errors == pytest.approx(verdict.errors, rel=1e-4)
     assert set(judged.reasons) >= {f"{n} ({s})" for n, s in verdict.untrue if s == "exact"}
     short = Objective(CHOICE, samples=2001).plausibility(np.array(X))
@@ -160,14 +160,14 @@ def test_no_leg_within_the_bar_says_how_far_the_nearest_is(start, tmp_path, monk
     ],
 )
 def test_bad_input_is_one_line_before_anything_is_written(tmp_path, capsys, arguments, message):
-    stuck = read_preset(PRESET)
+    stuck = read_preset(FIRST_FIT)
     stuck["geometry"]["lengths"]["CB"] = 0.05
-    files = {"STUCK": stuck, "STIFF": {**read_preset(PRESET), "ground": {"stiffness": 3e4}}}
+    files = {"STUCK": stuck, "STIFF": {**read_preset(FIRST_FIT), "ground": {"stiffness": 3e4}}}
     for name, content in files.items():
         (tmp_path / f"{name}.json").write_text(json.dumps(content))
     given = [str(tmp_path / f"{a}.json") if a in files else a for a in arguments]
     if "--preset" not in given:
-        given += ["--preset", PRESET]
+        given += ["--preset", FIRST_FIT]
     assert message in refusal(command.main, ["--out", tmp_path / "out", *given], capsys)
     assert not (tmp_path / "out").exists()
 

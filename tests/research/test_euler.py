@@ -20,9 +20,10 @@ from hoof_env.leg.linkage import LENGTHS
 from research.identify.euler import Points, accelerate, euler_cycle
 from research.identify.leg import NUMBER
 from research.identify.measure import Setup, new_bodies
+from tests.legs import FIRST_FIT
 
-GEOMETRY = load_geometry("first_fit")
-GAITS = {name: load_gait(name, "first_fit") for name in ("walk", "run")}
+GEOMETRY = load_geometry(FIRST_FIT)
+GAITS = {name: load_gait(name, FIRST_FIT) for name in ("walk", "run")}
 PAPER_BETA = math.sqrt(30)
 
 

@@ -11,9 +11,10 @@ from hoof_env.errors import GeometryError, ParameterError
 from hoof_env.gait import load_gait
 from hoof_env.leg.geometry import load_geometry, read_preset
 from research.identify.leg import GAITS, encode, to_preset
+from tests.legs import FIRST_FIT
 
-GEOMETRY = load_geometry("first_fit")
-CHOICE, X = encode("first_fit")
+GEOMETRY = load_geometry(FIRST_FIT)
+CHOICE, X = encode(FIRST_FIT)
 
 
 def test_a_preset_is_a_vector_and_back(tmp_path):
@@ -25,7 +26,7 @@ def test_a_preset_is_a_vector_and_back(tmp_path):
     for name in ("assembly", "toe", "heel", "travel", "hip_height"):
         assert getattr(again, name) == getattr(GEOMETRY, name)
     assert again.provenance == "a test"
-    assert all(load_gait(gait, file) == load_gait(gait, "first_fit") for gait in GAITS)
+    assert all(load_gait(gait, file) == load_gait(gait, FIRST_FIT) for gait in GAITS)
     choice, x = encode(file)
     assert choice == CHOICE
     np.testing.assert_allclose(x, X, rtol=1e-14)

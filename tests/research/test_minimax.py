@@ -9,6 +9,7 @@ from scipy.optimize import brentq
 from research.identify.leg import encode
 from research.identify.minimax import Rating, descend
 from research.identify.objective import Objective
+from tests.legs import FIRST_FIT
 
 MET = np.array([-1.0])
 
@@ -93,7 +94,7 @@ def test_a_goal_ends_it_early_and_a_rating_without_numbers_is_survived():
 
 
 def test_a_rating_is_the_objectives_rows_and_shortages():
-    choice, x = encode("first_fit")
+    choice, x = encode(FIRST_FIT)
     for paper_solver in (False, True):
         objective = Objective(choice, samples=2001, paper_solver=paper_solver)
         rating = objective.rate(x)

@@ -12,9 +12,10 @@ from research.identify.features import FEATURES, Cycle, measure_gait
 from research.identify.leg import NUMBER, encode
 from research.identify.measure import leg_paths, swing_hoof
 from research.identify.objective import Objective
+from tests.legs import FIRST_FIT
 
-GEOMETRY = load_geometry("first_fit")
-SETUP = Objective(encode("first_fit")[0])._setup
+GEOMETRY = load_geometry(FIRST_FIT)
+SETUP = Objective(encode(FIRST_FIT)[0])._setup
 
 
 def paths(n=9, **longer):

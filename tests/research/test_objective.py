@@ -19,8 +19,9 @@ from research.identify.demands import DEMANDS, MEASURED
 from research.identify.features import prominences
 from research.identify.leg import LEVEL, NAMES, OFFSET, encode, to_preset
 from research.identify.objective import MISSED_ROW, Objective
+from tests.legs import FIRST_FIT
 
-CHOICE, FIRST = encode("first_fit")
+CHOICE, FIRST = encode(FIRST_FIT)
 PUBLISHED = load_published()
 LEGS = ("first_fit", "perturbed")
 

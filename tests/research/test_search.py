@@ -26,6 +26,7 @@ from research.identify.search import (
     run_job,
     search,
 )  # fmt: skip
+from tests.legs import FIRST_FIT
 from tests.research.commands import kill_when
 
 PHASE = Phase("around", jobs=3, evaluations=400, sigmas=(0.02, 0.05))
@@ -71,7 +72,7 @@ class Valley:
 
 @pytest.fixture(scope="module")
 def leg():
-    choice, x = load_start("first_fit", 1.375)
+    choice, x = load_start(FIRST_FIT, 1.375)
     return LegProblem(choice), x
 
 
@@ -198,7 +199,7 @@ def test_the_number_of_processes_changes_nothing(leg, whole, tmp_path):
 def test_a_search_that_was_killed_goes_on_to_the_same_result(leg, whole, tmp_path):
     code = (
         "from pathlib import Path",
-        "choice, x = load_start('first_fit', 1.375)",
+        "choice, x = load_start(FIRST_FIT, 1.375)",
         f"run((LegProblem(choice), x), Path({str(tmp_path)!r}), workers=2)",
     )
     kept = kill_when(code, "test_search", tmp_path, "state/job-*.json", 2)

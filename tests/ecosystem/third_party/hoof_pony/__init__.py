@@ -6,7 +6,8 @@ import gymnasium as gym
 from gymnasium.envs.registration import WrapperSpec
 
 PONY = str(Path(__file__).with_name("pony.json"))
-LEG = {"preset": PONY, "trunk_mass": 30.0, "reward_weights": {"peak": 0.5}}
+WEIGHTS = {"progress": 1.0, "peak": 0.5, "energy": 0.1, "support": 0.0}
+LEG = {"preset": PONY, "trunk_mass": 30.0, "target_speed": None, "reward_weights": WEIGHTS}
 
 
 class OnTime(gym.Wrapper, gym.utils.RecordConstructorArgs):
