@@ -5,7 +5,6 @@ for the weights and what they lead to."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -63,8 +62,9 @@ class Outcome(NamedTuple):
 MOST_BEARING = 1.2
 """Of the weight, which is paid for at most: a leg that bears its animal bears 1 on the average."""
 
-STEPPING = math.pi
-"""Rate of the crank from which a leg counts as stepping: half that of the paper's gaits [rad/s]."""
+STEPPING = 1.0
+"""Rate of the crank from which a leg counts as stepping, a sixth of that of the paper's gaits [rad/s]: agents
+slow the crank down in a stance, and those who stop it tremble."""
 
 
 def progress(step, weight):  # type: ignore[no-untyped-def]
@@ -173,7 +173,7 @@ TERMS = (
         "support", 15.0, "1/s",
         "normal force over the weight of trunk and leg, integrated over the step, at most"
         f" {MOST_BEARING:g} times its length; times the speed over the commanded one, within"
-        " +-1, and no more than the crank's rate over pi", support,
+        " +-1, and no more than the crank's rate in rad/s", support,
     ),
     Term("overspeed", 0.0, "1/m", "minus the forward travel beyond the commanded speed", overspeed),
     Term(
