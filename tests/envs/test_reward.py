@@ -86,7 +86,7 @@ def test_terms_are_what_they_say_of_the_substeps(name, trunk):
     else:
         progress = np.diff(ends_of(trace["x"]), prepend=0.0)
     commanded = 2.5 * DT
-    pace = np.minimum(np.clip(progress / commanded, -1, 1), ends_of(trace["theta_rate"]) / np.pi)
+    pace = np.minimum(np.clip(progress / commanded, -1, 1), ends_of(trace["theta_rate"]))
     expected = {
         "reward_progress": 2.5 * np.minimum(progress, commanded),
         "reward_overspeed": -3.0 * np.maximum(progress - commanded, 0.0),
@@ -100,7 +100,7 @@ def test_bearing_without_a_commanded_speed_pays_at_any():
     """But only a leg whose crank turns."""
     env = gym.make("hoof_env/HorseLegRail-v0", episode_seconds=4.0, reward_weights={"support": 2.0})
     infos, trace = rollout(env, make_policy("run", env), 4)
-    expected = np.minimum(1.0, ends_of(trace["theta_rate"]) / np.pi) * borne(trace, env.unwrapped.weight)
+    expected = np.minimum(1.0, ends_of(trace["theta_rate"])) * borne(trace, env.unwrapped.weight)
     found = [info["reward_support"] for info in infos]
     np.testing.assert_allclose(found, 2.0 * expected, rtol=1e-9, atol=1e-12)
     assert sum(info["reward_progress"] for info in infos) == pytest.approx(trace["x"][-1], rel=1e-9)
