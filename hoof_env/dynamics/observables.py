@@ -4,8 +4,8 @@ Behind that the rule of a stance for other solvers.
 A stance opens when the normal force on the hoof rises above a threshold, as on a force plate. It closes when
 the force falls below it (lift-off), or after one crank revolution, whichever comes first, so that a hoof that
 never lifts has a peak every revolution. While it is open its peak is the highest resultant ground reaction
-force of any step; the increases of a stance's running peak add up to that peak. Its loading rate is the
-steepest rise of the normal force from one step to the next among the steps that raise the peak.
+force of any step; its increases add up to that peak. Its loading rate is the steepest rise of the normal
+force from one step to the next among the steps that raise the peak.
 
 The running peak is the highest force so far, but never more than twice the present one: what rises, falls by
 more than half and rises again is charged again, whether the hoof lifts or not, and a stance with one peak is

@@ -105,7 +105,7 @@ def failure(step, weight):  # type: ignore[no-untyped-def]
 def support(step, weight):  # type: ignore[no-untyped-def]
     """Impulse in units of the weight's, in proportion to the speed, up to the commanded one, and to the
     crank's rate, up to `STEPPING`: who stands and presses, or trembles with the swing, is not paid, and who
-    rubs to and fro gets nothing in the end."""
+    rubs to and fro earns nothing."""
     commanded = larger(step.commanded_progress, 1e-9)
     pace = smaller(larger(step.progress / commanded, -1.0), 1.0)
     pace = smaller(choose(commanded < np.inf, pace, 1.0), step.leg.state.theta_rate * (1.0 / STEPPING))
