@@ -184,7 +184,7 @@ def print_table(scores: Sequence[Score]) -> None:
     """Print the scores; as wide as they need where the output is not a terminal."""
     from rich.console import Console
 
-    Console(width=None if sys.stdout.isatty() else 160).print(table(scores))
+    Console(width=None if sys.stdout.isatty() else 180).print(table(scores))
 
 
 def to_json(scores: Sequence[Score], **about: Any) -> dict[str, Any]:
