@@ -170,7 +170,7 @@ TERMS = (
     Term("action", 0.03, "-", "minus the mean squared change of the action", action),
     Term("failure", 70.0, "1/s", "once, minus `episode_seconds`, when the episode fails", failure),
     Term(
-        "support", 15.0, "1/s",
+        "support", 17.0, "1/s",
         "normal force over the weight of trunk and leg, integrated over the step, at most"
         f" {MOST_BEARING:g} times its length; times the speed over the commanded one, within"
         " +-1, and no more than the crank's rate in rad/s", support,

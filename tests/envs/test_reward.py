@@ -90,7 +90,7 @@ def test_terms_are_what_they_say_of_the_substeps(name, trunk):
     expected = {
         "reward_progress": 2.5 * np.minimum(progress, commanded),
         "reward_overspeed": -3.0 * np.maximum(progress - commanded, 0.0),
-        "reward_support": 15.0 * pace * borne(trace, env.unwrapped.weight),
+        "reward_support": 17.0 * pace * borne(trace, env.unwrapped.weight),
     }
     for term, values in expected.items():
         np.testing.assert_allclose(paid[term], values, rtol=1e-9, atol=1e-12, err_msg=term)
