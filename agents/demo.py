@@ -47,7 +47,7 @@ class Budget:
     params: tuple[str, ...] = ()
 
 
-FULL = Budget(steps=1_000_000, max_minutes=3.0, episodes=20, film_seconds=8.0)
+FULL = Budget(steps=3_000_000, max_minutes=3.0, episodes=20, film_seconds=8.0)
 QUICK = Budget(2_048, 1.0, 2, 0.4, params=("n_envs=4", "n_steps=512", "batch_size=512", "n_epochs=1"))
 
 
@@ -112,8 +112,8 @@ def train_agent(args: Args, budget: Budget, stage: Path) -> train.Trained:
     folder = stage / "training"
     trained = train.train(
         train.Args(
-            env_id=ENV_ID, seed=args.seed, steps=budget.steps, max_minutes=budget.max_minutes,
-            params=budget.params, out=folder, checkpoint_every=0,
+            env_id=ENV_ID, algo="ppo_flat", seed=args.seed, steps=budget.steps,
+            max_minutes=budget.max_minutes, params=budget.params, out=folder, checkpoint_every=0,
         )
     )  # fmt: skip
     if trained.stopped_by:

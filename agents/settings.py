@@ -13,9 +13,18 @@ import yaml
 
 from hoof_env.errors import DataFileError
 from hoof_env.saved_policy import ALGORITHMS as ALGORITHMS
-from hoof_env.saved_policy import algorithm_class as algorithm_class
+from hoof_env.saved_policy import algorithm_class as library_class
 
-Algorithm = Literal["ppo", "sac", "td3", "tqc"]  # names of `ALGORITHMS`, for the commands
+Algorithm = Literal["ppo", "ppo_flat", "sac", "td3", "tqc"]  # `ALGORITHMS` and our own, for the commands
+
+
+def algorithm_class(name: str) -> Any:
+    """As `saved_policy.algorithm_class`, and `agents.ppo_flat`."""
+    if name != "ppo_flat":
+        return library_class(name)
+    from agents.ppo_flat import FlatPPO
+
+    return FlatPPO
 
 
 @dataclass(frozen=True)

@@ -302,7 +302,7 @@ def save_policy(model: Any, folder: Path) -> bool:
     try:
         about = {
             "format": FORMAT,
-            "algo": type(model).__name__.lower(),
+            "algo": getattr(model, "plays_as", type(model).__name__.lower()),
             "policy": next(name for name, kind in model.policy_aliases.items() if kind is model.policy_class),
             "policy_kwargs": _plain(({"use_sde": True} if model.use_sde else {}) | model.policy_kwargs),
             "observation_space": _plain_box(model.observation_space),

@@ -183,11 +183,12 @@ def run_steps(  # type: ignore[no-untyped-def]
 
 @pasted
 def run(  # type: ignore[no-untyped-def]
-    data, model, tables, ground, constants, reactions, h, steps, keeps_account,
+    data, model, tables, ground, constants, reactions, h, steps, keeps_account, begin, end,
     leg_count, lanes, together, reacts, law,
 ):  # fmt: skip
-    """Advance all environments: `lanes` at a time, or one whose legs the lanes are. With `steps` below 0
-    those start whose result is `STARTS`. Unless `reacts`, a constant, no code for reactions is made."""
+    """Advance environments `begin` to `end`: `lanes` at a time, or one whose legs the lanes are. With `steps`
+    below 0 those start whose result is `STARTS`. Unless `reacts`, a constant, there is no code for
+    reactions."""
     trunk = rows(doubles(TRUNK_SIZE * lanes), lanes, TrunkRows)
     legs = rows(doubles(leg_count * LEG_SIZE * lanes), lanes, None)
     account = rows(doubles(ACCOUNT_SIZE * lanes), lanes, Account)
@@ -203,7 +204,7 @@ def run(  # type: ignore[no-untyped-def]
         own = columns(address(constants), lanes, None, 0, 1, CONSTANTS_SIZE if together else 0)
         for k in range(leg_count * CONSTANTS_SIZE):
             shapes[k] = own[k]
-    for n in range(0, row, envs):
+    for n in range(begin, end, envs):
         memory = columns(at, lanes, TrunkMemory, n, row, near)
         read_trunk(trunk, memory)
         for k in range(ACCOUNT_SIZE):
@@ -261,15 +262,17 @@ def advance_kernels(contact_law: Callable[..., Any] | None = None) -> SimpleName
     law, identity = law_of(contact_law), fingerprint(contact_law)
 
     def made(name: str, legs: int, lanes: int, together: bool, reacts: bool) -> Any:
-        def advance(data, model, tables, ground, constants, reactions, h, steps, keeps_account):  # type: ignore[no-untyped-def]
+        def advance(  # type: ignore[no-untyped-def]
+            data, model, tables, ground, constants, reactions, h, steps, keeps_account, begin, end
+        ):
             count = legs if legs else model[0].legs
             run(
-                data, model, tables, ground, constants, reactions, h, steps, keeps_account,
+                data, model, tables, ground, constants, reactions, h, steps, keeps_account, begin, end,
                 count, lanes, together, reacts, law,
             )  # fmt: skip
 
         advance.__name__ = name
-        return kernel(advance, f"{name} {identity}")
+        return kernel(advance, f"{name} {identity}", threads=not together and lanes > 1)
 
     names = {f"{does}_{which}": which for does in ("advance", "react") for which in KERNELS}
     return SimpleNamespace(**{

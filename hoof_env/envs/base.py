@@ -68,13 +68,15 @@ class LegBase:
     _phase = "new"
     """Then "running", and "closed"; a single environment also has "ended" and "warned"."""
 
-    def _make(self, task: str, given: Mapping[str, Any], n: int, render_mode: str | None) -> list[Any]:
+    def _make(
+        self, task: str, given: Mapping[str, Any], n: int, render_mode: str | None, num_threads: int = 1
+    ) -> list[Any]:
         """Make `n` environments; returns the space of an observation and of an action."""
         if render_mode is not None:
             check_choice("render_mode", render_mode, self.metadata["render_modes"])
         self.task, self.render_mode = task_of(task), render_mode
         self.settings = self.task.settings(given)
-        self.batch = EpisodeBatch(self.task, self.settings, n)
+        self.batch = EpisodeBatch(self.task, self.settings, n, num_threads)
         self.metadata = {**self.metadata, "render_fps": max(1, round(1 / self.batch.dt))}
         return [spaces.Box(-1.0, 1.0, (size,), np.float32) for size in (len(self.batch.names), ACTIONS)]
 

@@ -47,7 +47,7 @@ from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.profile import leg_profile
 from hoof_env.simd.cache import COMPILED, given_folder
 from hoof_env.simd.layout import views
-from hoof_env.simd.memory import COLUMNS
+from hoof_env.simd.threads import run_together
 from hoof_env.simd.user_functions import what_cannot_be_compiled
 
 Floats = NDArray[np.float64]
@@ -76,7 +76,7 @@ class EpisodeBatch:
         ParameterError: a setting is out of range or of the wrong type.
     """
 
-    def __init__(self, task: Task, settings: Settings, num_envs: int) -> None:
+    def __init__(self, task: Task, settings: Settings, num_envs: int, num_threads: int = 1) -> None:
         self.task, self.num_envs = task, num_envs
         self.settings = s = resolved(settings)
         is_paper = s.solver == "paper"
@@ -125,7 +125,7 @@ class EpisodeBatch:
         self.engine = TrunkEngine(
             Limb(self.geometry, drive=drive), trunk, ground, self._terrain, substeps=substeps,
             sim_dt=s.sim_dt, integrator="midpoint" if is_paper else s.integrator,
-            num_envs=num_envs, strides=True, contact_law=task.contact_law,
+            num_envs=num_envs, num_threads=num_threads, strides=True, contact_law=task.contact_law,
         )  # fmt: skip
         self.paper = PaperSolver(s, self.engine, self.substeps) if is_paper else None
         self._varied = np.zeros(num_envs, bool)
@@ -177,9 +177,12 @@ class EpisodeBatch:
         )
         if self.paper:
             self.kernel = self._step_paper
-        self.addresses = kernels.ADDRESSES.of(
+        arrays = (
             *self.engine.arrays, self.episode, self._task, self.actions, self.observations, self.rewards
-        )
+        )  # fmt: skip
+        self.addresses = kernels.ADDRESSES.of(*arrays, columns=range(self.engine.columns))
+        blocks = self.engine.blocks[:1] if self.paper else self.engine.blocks
+        self._blocks = [(kernels.ADDRESSES.of(*arrays, columns=block),) for block in blocks]
 
     def _compile(self) -> None:
         """Have every kernel of a step compiled, or loaded, by running it on no environment."""
@@ -194,7 +197,7 @@ class EpisodeBatch:
 
     def _run_idle(self, *step_kernels: Any) -> None:
         idle = self.addresses.copy()
-        idle[kernels.AT.data + COLUMNS] = 0
+        idle[kernels.END] = 0
         for run in step_kernels:
             run(idle)
 
@@ -318,7 +321,8 @@ class EpisodeBatch:
         Nothing is drawn for environments that are `idle`, shape (num_envs,), as their episode is over. Where
         an action is not a number there is a `ParameterError`, and nothing has happened.
         """
-        return self.follow(self.kernel(self.addresses), generators, idle)
+        happened = np.bitwise_or.reduce(run_together(self.kernel, self._blocks))
+        return self.follow(int(happened), generators, idle)
 
     def follow(
         self, happened: int, generators: Sequence[np.random.Generator], idle: NDArray[np.bool_] | None = None
@@ -457,7 +461,7 @@ class EpisodeBatch:
         self._observe(self.addresses)
 
     def __getstate__(self) -> dict[str, Any]:
-        found_again = ("addresses", "entries", "kernel", "now", "_kernels", "_observe")
+        found_again = ("addresses", "_blocks", "entries", "kernel", "now", "_kernels", "_observe")
         return {key: value for key, value in vars(self).items() if key not in found_again}
 
     def __setstate__(self, state: dict[str, Any]) -> None:

@@ -29,7 +29,7 @@ class Sb3VecEnv(VecEnv):
     Args:
         env_id: registered id of the family.
         num_envs: how many.
-        settings: arguments of the environment.
+        settings: arguments of the environment, and `num_threads`.
 
     Attributes:
         terms: of the last rewards by name, shape (num_envs,) each.

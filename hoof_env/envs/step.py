@@ -59,7 +59,7 @@ ADDRESSES = Addresses(
 )  # fmt: skip
 """The arrays of a step, those of the engine first."""
 
-AT = ADDRESSES.slots
+AT, BEGIN, END = ADDRESSES.slots, ADDRESSES.begin, ADDRESSES.end
 
 SHIPPED = tuple(term.name for term in TERMS)
 
@@ -354,13 +354,13 @@ def step_kernels(
 
     @pasted
     def apply_actions(addresses, lanes):  # type: ignore[no-untyped-def]
-        """All, or none: returns whether they are numbers."""
+        """All, or none: returns whether they are numbers, those of other blocks, too."""
         actions, count = singles_at(addresses[AT.actions]), addresses[AT.data + COLUMNS]
         task, good = task_at(addresses[AT.task])[0], True
         for k in range(count * ACTIONS):
             good &= size(float(actions[k])) < np.inf
         if good:
-            for n in range(0, count, lanes):
+            for n in range(addresses[BEGIN], addresses[END], lanes):
                 apply_action(task, actions, memories(addresses, lanes, Episode, n)[1], n)
         return good
 
@@ -388,7 +388,7 @@ def step_kernels(
         """What follows the engine: reward, end and observation."""
         task, actions = task_at(addresses[AT.task])[0], singles_at(addresses[AT.actions])
         rewards, memory, happened = doubles_at(addresses[AT.rewards]), doubles(slots * lanes), 0
-        for n in range(0, addresses[AT.data + COLUMNS], lanes):
+        for n in range(addresses[BEGIN], addresses[END], lanes):
             trunk, leg, episode = memories(addresses, lanes, Episode, n)
             outcome = find_outcome(task, trunk, leg, episode, remember_action(actions, episode, n))
             add_up(outcome, episode)
@@ -411,14 +411,14 @@ def step_kernels(
         advance(
             matrix_at(addresses, AT.data), model_at(addresses[AT.model]), matrix_at(addresses, AT.tables),
             matrix_at(addresses, AT.ground), matrix_at(addresses, AT.constants),
-            cube_at(addresses, AT.reactions), task.h, task.substeps, False,
+            cube_at(addresses, AT.reactions), task.h, task.substeps, False, addresses[BEGIN], addresses[END],
         )  # fmt: skip
         return finish(addresses, lanes)
 
     @pasted
     def observe_all(addresses, lanes):  # type: ignore[no-untyped-def]
         task, memory = task_at(addresses[AT.task])[0], doubles(slots * lanes)
-        for n in range(0, addresses[AT.data + COLUMNS], lanes):
+        for n in range(addresses[BEGIN], addresses[END], lanes):
             observe(addresses, lanes, task, n, memory)
 
     def step_one(addresses):  # type: ignore[no-untyped-def]
@@ -448,4 +448,4 @@ def step_kernels(
                     write(numbers[slot], address(out), task.places[slot] * out.shape[1] + n, 1)
 
     functions = (step_one, step_batch, apply_one, finish_one, observe_one, observe_batch, measure_one)
-    return StepKernels(*(kernel(function, identity) for function in functions))
+    return StepKernels(*(kernel(function, identity, function is step_batch) for function in functions))

@@ -122,6 +122,7 @@ class Keywords(TypedDict, total=False):
 class VectorKeywords(Keywords, total=False):
     """Of `Sb3VecEnv`, which hands them to `HorseLegVectorEnv`."""
 
+    num_threads: int
     autoreset_mode: AutoresetMode | str
     max_episode_steps: int | None
     render_mode: str | None

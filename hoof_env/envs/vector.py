@@ -53,6 +53,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
 
     Args:
         num_envs: how many, 1 to `MOST_ENVS`.
+        num_threads: threads that share them in `step`; they change no bit.
         task, settings: as of `HorseLegEnv`.
         autoreset_mode: an `AutoresetMode`, its name or its value: NEXT_STEP, SAME_STEP or DISABLED.
         max_episode_steps: episodes are no longer than so many control steps, as under Gymnasium's TimeLimit;
@@ -80,6 +81,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         self,
         num_envs: int = 1,
         *,
+        num_threads: int = 1,
         task: str = "leg",
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         max_episode_steps: int | None = None,
@@ -89,7 +91,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
     ) -> None:
         self.num_envs = count("num_envs", num_envs, most=MOST_ENVS)
         self.autoreset_mode = mode_of(autoreset_mode)
-        one = self._make(task, settings, self.num_envs, render_mode)
+        one = self._make(task, settings, self.num_envs, render_mode, num_threads)
         if max_episode_steps is not None:
             self.batch.limit(count("max_episode_steps", max_episode_steps))
         self.single_observation_space, self.single_action_space = one

@@ -22,14 +22,15 @@ QUIET = "HOOF_ENV_QUIET"
 """Environment variable; set to 1 it silences what is said while kernels compile."""
 
 
-def kernel(function: F, identity: str = "") -> F:
+def kernel(function: F, identity: str = "", threads: bool = False) -> F:
     """Compile `function` with numba at its first call, and keep the result in numba's cache folder, which the
     environment variable NUMBA_CACHE_DIR names. Of several processes that need it at once one compiles.
 
     `identity` is that of the functions from outside this package that it contains, see `user_functions`. The
-    first call raises OutputError if the kernel has to be compiled and the folder is not writable.
+    first call raises OutputError if the kernel has to be compiled and the folder is not writable. `threads`:
+    several may run it at once, for Python goes on meanwhile; a call takes a little longer.
     """
-    compiled: Any = numba.njit(error_model="numpy")(function)
+    compiled: Any = numba.njit(error_model="numpy", nogil=threads)(function)
     if not hasattr(compiled, "_cache"):  # records have no attributes outside compiled code
         raise HoofEnvError("NUMBA_DISABLE_JIT is set, but kernels run compiled only: unset it")
     keep(compiled, _say, identity)

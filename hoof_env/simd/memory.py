@@ -92,17 +92,19 @@ class Addresses:
 
     A call from Python takes a tenth of a microsecond for each array; one array of addresses replaces many.
     Whoever makes it keeps the arrays alive, and makes it anew for a copy. `slots` says by the arrays' names
-    where the address of each is; behind it is its shape.
+    where the address of each is; behind it is its shape. In slots `begin` and `end` is which columns a call
+    is about.
     """
 
     def __init__(self, *names: str) -> None:
         self.slots: Any = namedtuple("Slots", names)(*range(0, 4 * len(names), 4))
+        self.begin, self.end = 4 * len(names), 4 * len(names) + 1
 
-    def of(self, *arrays: NDArray[Any]) -> NDArray[np.int64]:
+    def of(self, *arrays: NDArray[Any], columns: range) -> NDArray[np.int64]:
         """The array of addresses; the arrays in the order of the names, each of three axes at most."""
         rows = [[a.ctypes.data, *a.shape, *[0] * (3 - a.ndim)] for a in arrays]
         assert len(rows) == len(self.slots)
-        return np.array(rows, np.int64).ravel()
+        return np.array([*np.ravel(rows), columns.start, columns.stop], np.int64)
 
 
 @inlined

@@ -1,17 +1,22 @@
-"""The flat PPO: its arithmetic over time limits, that it learns, repeats and refuses what misfits."""
+"""The flat PPO: arithmetic beside torch's, values over time limits, that it learns, repeats and refuses."""
 
-import csv
-import errno
 from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
 import pytest
 import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from stable_baselines3 import PPO
+from stable_baselines3.common.vec_env import DummyVecEnv
 
-from agents import ppo_flat
-from agents.ppo_flat import Args, estimate_advantages, learn
-from hoof_env.errors import HoofEnvError, OutputError, ParameterError
+from agents.ppo_flat import CHUNK, FlatPPO, Gradient, Scale, estimate_advantages, tanh
+from agents.train import Args, train
+from agents.watch import DivergedError
+from hoof_env.errors import ParameterError
+from hoof_env.saved_policy import find_saved
+from hoof_env.simd.compile import kernel
 
 GAMMA, LAMBDA = 0.9, 0.8
 
@@ -37,33 +42,104 @@ class Guess(gym.Env):
         return np.ones(2, np.float32), 1.0 - float(action[0] - 0.5) ** 2, *ended, {}
 
 
-@pytest.fixture(autouse=True)
-def guess(monkeypatch):
-    spec = gym.envs.registration.EnvSpec("Guess-v0", Guess)
-    monkeypatch.setitem(gym.registry, "Guess-v0", spec)
+def model(net_arch=(8,), envs=2, ends="truncated", **changes) -> FlatPPO:
+    usual = {"n_steps": 32, "batch_size": 64, "gamma": GAMMA, "learning_rate": 0.01, "seed": 0}
+    kwargs = {"net_arch": [*net_arch], "log_std_init": -2.0}
+    many = DummyVecEnv([lambda: Guess(ends)] * envs)
+    return FlatPPO("MlpPolicy", many, policy_kwargs=kwargs, **{**usual, **changes})
 
 
-def guessing(**changes) -> Args:
-    usual = {"env_id": "Guess-v0", "n_envs": 8, "n_steps": 32, "batch_size": 64, "net_arch": (8,)}
-    return Args(**{**usual, "gamma": GAMMA, "log_std_init": -2.0, "learning_rate": 0.01, **changes})
+def test_tanh():
+    def fill(x, y):
+        for i in range(len(x)):
+            y[i] = tanh(x[i])
+
+    x = np.linspace(-30, 30, 10_001, dtype=np.float32)
+    y = np.empty_like(x)
+    kernel(fill)(x, y)
+    np.testing.assert_allclose(y, np.tanh(x.astype(float)), atol=8e-6)
 
 
-def test_advantages_are_those_of_every_episode_alone():
-    generator = torch.Generator().manual_seed(0)
-    rewards, values = torch.rand(40, 3, generator=generator), torch.rand(41, 3, generator=generator)
-    terminated = torch.rand(40, 3, generator=generator) < 0.1
-    truncated = (torch.rand(40, 3, generator=generator) < 0.1) & ~terminated
-    found = estimate_advantages(rewards, values, terminated, truncated, GAMMA, LAMBDA)
+@pytest.mark.parametrize("count", [2, 64, CHUNK, CHUNK + 1, 2 * CHUNK + 500])
+@pytest.mark.parametrize("net_arch", [(), (8,), (64, 64), (5, 7, 3)])
+def test_the_gradient_is_that_of_torch_and_stable_baselines(net_arch, count):
+    """The loss as PPO.train has it, differentiated by torch."""
+    generator = np.random.default_rng(0)
+    one = model(net_arch, batch_size=count, n_steps=-(-count // 2), ent_coef=0.01, vf_coef=0.7)
+    observations = generator.normal(size=(3 * count, 2)).astype(np.float32)
+    actions = generator.normal(size=(3 * count, 1)).astype(np.float32) * 0.3
+    with torch.no_grad():
+        _, log_probs, _ = one.policy.evaluate_actions(torch.tensor(observations), torch.tensor(actions))
+    old = log_probs.numpy() + 0.3 * generator.normal(size=3 * count).astype(np.float32)
+    advantages, targets = generator.normal(size=(2, 3 * count)).astype(np.float32)
+    chosen = generator.permutation(3 * count)[:count]
+    half = 0.5 * np.log(2 * np.pi)  # each action's, which ours leaves out of both probabilities
+    steps = np.column_stack([old + half, advantages, targets, actions]).astype(np.float32)
+    gradient = Gradient(one)
+    policy_loss, value_loss = gradient.compute(observations, steps, chosen, map)
+
+    x, a, b, adv, v = (torch.tensor(row[chosen]) for row in (observations, actions, old, advantages, targets))
+    values, log_prob, entropy = one.policy.evaluate_actions(x, a)
+    adv, ratio = (adv - adv.mean()) / (adv.std() + 1e-8), (log_prob - b).exp()
+    of_policy = -torch.min(adv * ratio, adv * ratio.clamp(0.8, 1.2)).mean()
+    of_value = torch.nn.functional.mse_loss(values.flatten(), v)
+    (of_policy + 0.7 * of_value - 0.01 * entropy.mean()).backward()
+    expected = torch.cat([parameter.grad.flatten() for parameter in one.policy.parameters()]).numpy()
+    assert policy_loss == pytest.approx(of_policy.item(), abs=2e-5)
+    assert value_loss == pytest.approx(of_value.item(), rel=2e-5)
+    np.testing.assert_allclose(gradient.vector, expected, atol=2e-5 * np.abs(expected).max())
+
+
+def test_steps_are_those_of_adam():
+    """torch's, with its own clipping of the norm."""
+    one, generator = model(), np.random.default_rng(0)
+    copies = [parameter.detach().clone().requires_grad_() for parameter in one.policy.parameters()]
+    adam = torch.optim.Adam(copies, lr=0.01, eps=1e-5)
+    for size in (0.01, 1.0, 0.1, 10.0, 1e-4):
+        gradient = (size * generator.normal(size=one.weights.vector.size)).astype(np.float32)
+        for copy, part in zip(
+            copies, np.split(gradient, np.cumsum([c.numel() for c in copies])[:-1]), strict=True
+        ):
+            copy.grad = torch.tensor(part.reshape(tuple(copy.shape)))
+        torch.nn.utils.clip_grad_norm_(copies, 0.5)
+        adam.step()
+        one.descend(gradient, 0.01)
+        expected = torch.cat([copy.detach().flatten() for copy in copies]).numpy()
+        np.testing.assert_allclose(one.weights.vector, expected, rtol=1e-4, atol=1e-6)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 10**6))
+def test_advantages_are_those_of_every_episode_alone(seed):
+    generator = np.random.default_rng(seed)
+    rewards = generator.normal(size=(40, 3)).astype(np.float32)
+    values = generator.normal(size=(41, 3)).astype(np.float32)
+    ended = generator.random((40, 3)) < 0.2
+    found = estimate_advantages(rewards, values, ended, GAMMA, LAMBDA)
     for env in range(3):
         for start in range(40):
             expected, weight = 0.0, 1.0
             for t in range(start, 40):
-                future = 0.0 if terminated[t, env] else GAMMA * values[t + 1, env]
+                future = 0.0 if ended[t, env] else GAMMA * values[t + 1, env]
                 expected += weight * (rewards[t, env] + future - values[t, env])
                 weight *= GAMMA * LAMBDA
-                if terminated[t, env] or truncated[t, env]:
+                if ended[t, env]:
                     break
             assert found[start, env] == pytest.approx(float(expected), abs=1e-5)
+
+
+def test_the_scale_is_the_deviation_of_all_returns_so_far():
+    generator, scale = np.random.default_rng(0), Scale(GAMMA)
+    seen, running = [], np.zeros(4)
+    for _ in range(6):
+        rewards = (5 + 3 * generator.normal(size=(50, 4))).astype(np.float32)
+        ended = generator.random((50, 4)) < 0.1
+        found = scale.after(rewards, ended)
+        for reward, over in zip(rewards, ended, strict=True):
+            running = running + reward
+            seen.append(running)
+            running = np.where(over, 0.0, GAMMA * running)
+    assert found == pytest.approx(np.std(seen), rel=1e-3)
 
 
 FOR_EVER = 1 / (1 - GAMMA)
@@ -73,127 +149,56 @@ UNTIL_THE_END = np.mean([(1 - GAMMA**left) / (1 - GAMMA) for left in range(1, 6)
 @pytest.mark.parametrize(("ends", "value"), [("truncated", FOR_EVER), ("terminated", UNTIL_THE_END)])
 def test_a_time_limit_is_not_the_end_but_a_termination_is(ends, value):
     """At a reward of 1; the observation does not tell the time, so that the value is a mean over it."""
-    learned = learn(guessing(steps=10_000, learning_rate=0.03, env_kwargs=(f"ends={ends}",)))
-    with torch.no_grad():
-        assert float(learned.agent.value(torch.ones(2))) == pytest.approx(value, rel=0.1)
+    one = model(ends=ends, envs=8, learning_rate=0.03).learn(10_000)
+    assert one.weights.critic(np.ones((1, 2), np.float32)) == pytest.approx(value, rel=0.1)
 
 
 def test_learns_the_action_that_pays():
-    learned = learn(guessing(steps=8_000))
-    with torch.no_grad():
-        assert float(learned.agent.policy(torch.ones(2)).mean) == pytest.approx(0.5, abs=0.1)
-    assert learned.progress[-1]["episodic_return"] > learned.progress[0]["episodic_return"] + 0.5
-    assert learned.progress[-1]["steps"] >= 8_000
+    one = model(envs=8, norm_reward=True).learn(8_000)
+    assert one.weights.actor(np.ones((1, 2), np.float32)) == pytest.approx(0.5, abs=0.1)
+    assert one.num_timesteps >= 8_000
 
 
-@pytest.fixture
-def sizes(monkeypatch):
-    """Of all batches that are learnt from."""
-    found, loss = [], ppo_flat._loss
+@pytest.mark.parametrize("num_threads", [1, 2, 5])
+def test_same_seed_same_bits_on_any_number_of_threads(num_threads):
+    def learned(**changes):
+        return model(envs=8, n_steps=400, batch_size=2500, **changes).learn(6400).weights.vector
 
-    def note(agent, batch, args):
-        found.append(len(batch["target"]))
-        return loss(agent, batch, args)
-
-    monkeypatch.setattr(ppo_flat, "_loss", note)
-    return found
+    np.testing.assert_array_equal(learned(num_threads=num_threads), learned())
+    assert (learned(seed=1) != learned()).any()
 
 
-@pytest.mark.parametrize(
-    ("steps", "n_steps", "left"),
-    [(24, 12, [20]), (20, 5, [10, 8])],  # five steps, a restart, five steps, a restart
-    ids=["in a rollout", "from one to the next"],
-)
-def test_steps_that_restart_are_left_out(sizes, steps, n_steps, left):
-    learn(guessing(steps=steps, n_envs=2, n_steps=n_steps, n_epochs=1))
-    assert sizes == left
-
-
-def test_same_arguments_same_agent():
-    one, two, other = (learn(guessing(steps=512, seed=seed)).agent.state_dict() for seed in (3, 3, 4))
-    assert all(torch.equal(one[key], two[key]) for key in one)
-    assert any(not torch.equal(one[key], other[key]) for key in one)
-
-
-def test_leg_writes_its_folder_and_says_how_it_goes(tmp_path, capsys):
-    arguments = ["--n-envs", "2", "--n-steps", "64", "--steps", "256", "--env-kwargs", "episode_seconds=0.4"]
-    ppo_flat.main([*arguments, "--out", str(tmp_path / "run")])
-    assert "SPS" in capsys.readouterr().out
-    rows = list(csv.DictReader((tmp_path / "run" / "progress.csv").open()))
-    assert [row["steps"] for row in rows] == ["128", "256"]
-    assert np.isfinite(float(rows[-1]["episodic_return"]))
-    agent = ppo_flat.Agent(24, 4, (64, 64), 0.0)
-    agent.load_state_dict(torch.load(tmp_path / "run" / "model.pt", weights_only=True))
+def test_what_it_leaves_is_played_as_stable_baselines_plays(tmp_path):
+    """Weights by name, so that the library builds its own PPO with them."""
+    folder = tmp_path / "run"
+    small = ("n_envs=4", "n_steps=32", "batch_size=64", 'policy_kwargs={"net_arch": [8, 8]}')
+    train(Args(algo="ppo_flat", steps=256, params=small, env_kwargs=("episode_seconds=0.4",), out=folder))
+    with gym.make("hoof_env/HorseLeg-v0", episode_seconds=0.4) as env:
+        played = find_saved(folder).load(env, "hoof_env/HorseLeg-v0")
+        observations = np.random.default_rng(0).uniform(-1, 1, (50, 24)).astype(np.float32)
+    assert type(played.model) is PPO
+    kept = FlatPPO.load(folder / "model.zip")
+    expected = np.clip(kept.weights.actor(observations), -1, 1)
+    assert np.abs(expected).max() > 1e-4
+    np.testing.assert_allclose(played.predict(observations)[0], expected, atol=1e-5)
 
 
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"env_id": "hoof_env/None-v0"}, "hoof_env/None-v0"),
-        ({"env_id": "CartPole-v1", "vectorization": "sync"}, "expected boxes of one dimension, got Discrete"),
-        ({"env_kwargs": ("hooves=4",)}, "hooves"),
-        ({"vectorization": "vector_entry_point"}, "Guess-v0"),
-        ({"n_envs": 0}, "n_envs"),
-        ({"steps": 0}, "steps"),
-        ({"batch_size": 1}, "batch_size"),
-        ({"seed": -1}, "seed"),
-        ({"seed": 10**20}, "seed"),
-        ({"torch_threads": 10**10}, "torch_threads"),
-        ({"torch_threads": 0}, "torch_threads"),
-        ({"learning_rate": np.nan}, "learning_rate"),
-        ({"learning_rate": 1e6}, "learning_rate"),
-        ({"learning_rate": -1.0}, "learning_rate"),
-        ({"gamma": 5.0}, "gamma"),
-        ({"net_arch": (8, 0)}, "net_arch"),
-        ({"device": "foo"}, "device: expected one that torch has, got 'foo'"),
-        ({"device": "meta"}, "device: expected one that torch has, got 'meta'"),
+        ({"params": ('policy_kwargs={"activation_fn": "nn.ReLU"}',)}, "expected nn.Tanh"),
+        ({"params": ("normalize=true", "use_sde=true")}, "use_sde"),
+        ({"device": "cuda"}, "device"),
+        ({"env_id": "CartPole-v1"}, "Discrete"),
     ],
 )
-def test_refuses(changes, said):
+def test_refuses(changes, said, tmp_path):
     with pytest.raises(ParameterError, match=said):
-        learn(guessing(**{"steps": 256, **changes}))
+        train(Args(**{"algo": "ppo_flat", "steps": 256, "out": tmp_path / "run", **changes}))
+    assert not (tmp_path / "run").exists()
 
 
-def test_refuses_environments_that_restart_at_once(monkeypatch):
-    same_step = gym.vector.AutoresetMode.SAME_STEP
-    sync = lambda **_: gym.vector.SyncVectorEnv([Guess], autoreset_mode=same_step)  # noqa: E731
-    spec = gym.envs.registration.EnvSpec("Hasty-v0", Guess, vector_entry_point=sync)
-    monkeypatch.setitem(gym.registry, "Hasty-v0", spec)
-    with pytest.raises(ParameterError, match="next step"):
-        learn(guessing(env_id="Hasty-v0"))
-
-
-@pytest.mark.parametrize(
-    "changes", [{"steps": 1_000}, {"steps": 1, "n_steps": 1, "n_epochs": 1}], ids=["at once", "at the last"]
-)
-def test_a_training_that_diverges_leaves_nothing(tmp_path, changes):
-    with pytest.raises(HoofEnvError, match="diverged"):
-        learn(guessing(vf_coef=1e38, out=tmp_path, **changes))
-    assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize("log_std", [np.nan, -1e6])
-def test_a_policy_that_diverged_says_so(log_std):
-    with pytest.raises(HoofEnvError, match="diverged"):
-        ppo_flat.Agent(2, 1, (8,), log_std).policy(torch.ones(2))
-
-
-def test_a_model_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
-    learn(guessing(steps=1, n_steps=1, out=tmp_path))
-    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
-    write = Path.write_bytes
-
-    def half(path, data):
-        write(path, data[:100])
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    monkeypatch.setattr(Path, "write_bytes", half)
-    with pytest.raises(OutputError, match="No space left"):
-        learn(guessing(steps=1, n_steps=1, seed=1, out=tmp_path))
-    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
-
-
-def test_refuses_a_file_for_a_folder(tmp_path):
-    (tmp_path / "file").touch()
-    with pytest.raises(OutputError):
-        learn(guessing(out=tmp_path / "file"))
+def test_a_training_that_diverges_says_so(tmp_path):
+    params = ("n_envs=4", "n_steps=32", "batch_size=64", "vf_coef=1e38", "learning_rate=1e30")
+    with pytest.raises(DivergedError, match="diverged"):
+        train(Args(algo="ppo_flat", steps=1024, params=params, out=Path(tmp_path, "run")))

@@ -31,6 +31,7 @@ TINY_OFF = (
 NOISE = ("noise_type=ornstein-uhlenbeck", "noise_std=0.3")
 CASES = {
     "ppo": {"params": (*TINY, "learning_rate=lin_0.01")},
+    "ppo_flat": {"params": (*TINY, "learning_rate=lin_0.01", "norm_reward=true")},
     "sac": {"params": TINY_OFF, "steps": 160},
     "td3": {"params": (*TINY_OFF, *NOISE), "steps": 160},
     "tqc": {"params": (*TINY_OFF, "learning_starts=100"), "steps": 160},

@@ -29,7 +29,16 @@ OF_ZOO = {"n_envs", "n_timesteps", "normalize", "env_wrapper", "frame_stack", "c
 
 
 def test_the_commands_name_every_algorithm():
-    assert set(get_args(Algorithm)) == set(ALGORITHMS)
+    assert set(get_args(Algorithm)) == {*ALGORITHMS, "ppo_flat"}
+
+
+@pytest.mark.parametrize("env_id", ["hoof_env/HorseLeg-v0", "hoof_env/HorseLegFixed-v0", "Pendulum-v1"])
+def test_the_flat_trainer_has_the_settings_of_ppo(env_id):
+    ours, theirs = (load_settings(FOLDER / f"{name}.yml", env_id) for name in ("ppo_flat", "ppo"))
+    assert theirs.pop("normalize") == {"norm_obs": False, "norm_reward": ours.pop("norm_reward")}
+    assert ours == theirs
+    model = algorithm_class("ppo_flat")(env="Pendulum-v1", **model_arguments(ours | {"n_steps": 8}))
+    assert model.n_epochs == theirs["n_epochs"]
 
 
 @pytest.mark.parametrize("entries", FILES.values(), ids=FILES)

@@ -10,6 +10,7 @@ from hoof_env.ground.contact import Ground
 from hoof_env.ground.laws import FRICTION_LAWS
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import load_geometry
+from hoof_env.simd import threads
 from tests.dynamics.scenes import LEG, RUN, WALK
 
 OTHER = load_geometry("identified")
@@ -130,3 +131,15 @@ def test_some_environments_start_anew_and_the_others_do_not_notice(n):
     e.reset(RUN, [0.5, 0.7], envs=[n - 1])
     assert e.state["time"].tolist() == pytest.approx([0.2] * (n - 1) + [0.0])
     assert e.account["impulse_y"][-1] == 0
+
+
+@pytest.mark.parametrize("legs", [1, 2, 4])
+@pytest.mark.parametrize("kind", TRUNKS)
+def test_on_any_number_of_threads(kind, legs, monkeypatch):
+    monkeypatch.setattr(threads, "available", lambda: 32)
+    expected = run(kind, np.arange(ALL), legs, reactions=True, strides=True)
+    for num_threads in (2, 5, 32):
+        found = run(kind, np.arange(ALL), legs, reactions=True, strides=True, num_threads=num_threads)
+        np.testing.assert_array_equal(bits(found), bits(expected))
+        np.testing.assert_array_equal(found.reactions().joints, expected.reactions().joints)
+        np.testing.assert_array_equal(found._memory.data, expected._memory.data)

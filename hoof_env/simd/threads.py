@@ -1,0 +1,77 @@
+"""Kernels on several threads: each call works on columns of its own, so any number of threads gives the same
+bits."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from functools import cache
+from itertools import pairwise
+from typing import Any
+
+from hoof_env.errors import ParameterError, count
+
+MOST_THREADS = 1024
+
+
+def available() -> int:
+    """Processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def check_threads(num_threads: Any) -> int:
+    """The number of threads; `ParameterError` below 1 or above what there is."""
+    threads, most = count("num_threads", num_threads), min(available(), MOST_THREADS)
+    if threads > most:
+        raise ParameterError(
+            f"num_threads: expected 1 to {most}, the processors that there are, got {threads}"
+        )
+    return threads
+
+
+def blocks(columns: int, lanes: int, num_threads: int) -> list[range]:
+    """Columns in so many equal parts, or fewer, that begin with a group of lanes."""
+    groups = -(-columns // lanes)
+    parts = min(num_threads, groups)
+    ends = [min(columns, groups * part // parts * lanes) for part in range(parts + 1)]
+    return [range(*pair) for pair in pairwise(ends)]
+
+
+@cache
+def _workers() -> ThreadPoolExecutor:
+    """The threads of this process, each started when it is needed; they stay."""
+    return ThreadPoolExecutor(MOST_THREADS, "hoof-env")
+
+
+if hasattr(os, "register_at_fork"):  # a child has none of its parent's threads
+    os.register_at_fork(after_in_child=_workers.cache_clear)
+
+
+def run_together(kernel: Any, calls: Sequence[tuple[Any, ...]]) -> list[Any]:
+    """Call a kernel with each of these arguments, at once; what the calls returned, in their order.
+
+    The first call is this thread's. All have ended when this returns, and when it raises, as at Ctrl-C.
+    """
+    if len(calls) == 1 or not kernel.overloads:  # it is compiled by this thread
+        return [kernel(*call) for call in calls]
+    others: list[Future[Any]] = []
+    try:
+        for call in calls[1:]:
+            others.append(_workers().submit(kernel, *call))  # noqa: PERF401  # those before an interrupt count
+        own = kernel(*calls[0])
+    finally:
+        _wait(others)
+    return [own, *(other.result() for other in others)]
+
+
+def _wait(futures: list[Future[Any]]) -> None:
+    interrupt: BaseException | None = None
+    while True:
+        try:
+            wait(futures)
+            break
+        except KeyboardInterrupt as error:
+            interrupt = error
+    if interrupt:
+        raise interrupt

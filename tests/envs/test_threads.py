@@ -1,0 +1,150 @@
+"""Environments on several threads are the environments on one, whatever is done with them."""
+
+from __future__ import annotations
+
+import copy
+import os
+import pickle
+import subprocess
+import sys
+import textwrap
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from family import IDS, MODES, actions, same
+
+from hoof_env import Sb3VecEnv
+from hoof_env.errors import ParameterError
+from hoof_env.simd import threads
+
+LEG = "hoof_env/HorseLeg-v0"
+SIZES = (3, 7, 8, 65, 200)
+"""Numbers of environments: one by one, one group of lanes, and several."""
+
+
+@pytest.fixture(autouse=True)
+def many_processors(monkeypatch):
+    monkeypatch.setattr(threads, "available", lambda: 8)
+
+
+def make(n, num_threads, env_id=LEG, **settings):
+    return gym.make_vec(env_id, num_envs=n, num_threads=num_threads, episode_seconds=0.3, **settings)
+
+
+def rolled(envs, steps=40, seed=1):
+    """All that a rollout gives; episodes end and begin in it."""
+    return [envs.step(taken) for taken in actions(seed, steps, envs.num_envs)]
+
+
+@pytest.mark.parametrize("mode", MODES[:2], ids=lambda mode: mode.name)
+@pytest.mark.parametrize("env_id", IDS)
+def test_any_number_of_threads_gives_the_same_bits(env_id, mode):
+    for n in SIZES if env_id == LEG else SIZES[-1:]:
+        expected = None
+        for num_threads in (1, 2, 3, 8):
+            envs = make(n, num_threads, env_id, autoreset_mode=mode)
+            found = [envs.reset(seed=5), rolled(envs)]
+            expected = expected or found
+            same(found, expected)
+
+
+def test_stable_baselines_environment():
+    one, many = (Sb3VecEnv(num_envs=40, num_threads=k, episode_seconds=0.3) for k in (1, 4))
+    for envs in (one, many):
+        envs.seed(3)
+    same(one.reset(), many.reset())
+    for taken in actions(2, 40, 40):
+        same(one.step(taken), many.step(taken))
+
+
+def test_a_bad_action_stops_all_blocks():
+    envs = make(40, 4).unwrapped
+    envs.reset(seed=0)
+    before = envs.get_state()
+    envs.batch.actions[:] = 0.0
+    envs.batch.actions[39, 2] = np.nan  # of the last block alone
+    with pytest.raises(ParameterError, match="finite"):
+        envs.batch.step(envs._generators)
+    same(envs.get_state(), before)
+
+
+def test_a_state_goes_on_under_another_number_of_threads():
+    one, many = make(40, 1).unwrapped, make(40, 5).unwrapped
+    many.reset(seed=4)
+    rolled(many, 9)
+    same(one.set_state(many.get_state()), many._observed())
+    same(rolled(one), rolled(many))
+
+
+@pytest.mark.parametrize("again", [copy.deepcopy, lambda envs: pickle.loads(pickle.dumps(envs))])
+def test_copies_go_on_by_themselves(again):
+    envs = make(40, 4).unwrapped
+    envs.reset(seed=4)
+    rolled(envs, 9)
+    twin = again(envs)
+    expected = rolled(copy.deepcopy(envs))
+    same(rolled(twin), expected)
+    same(rolled(envs), expected)
+
+
+@pytest.mark.parametrize("given", [0, 9, 2.0])
+def test_bad_numbers_of_threads(given):
+    with pytest.raises(ParameterError, match=r"num_threads: expected.*got"):
+        make(40, given)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+def test_a_forked_process_has_threads_of_its_own():
+    """Its parent's are not in it; a pool that it thought it had would never answer."""
+    script = """
+        import os, sys, warnings
+        sys.path.insert(0, "tests/envs")
+        import gymnasium as gym, hoof_env
+        from hoof_env.simd import threads
+        threads.available = lambda: 2
+        from family import actions, same
+        envs = gym.make_vec("hoof_env/HorseLeg-v0", num_envs=40, num_threads=2).unwrapped
+        envs.reset(seed=0)
+        envs.step(actions(0, 40))
+        kept = envs.get_state()
+        expected = envs.step(actions(1, 40))
+        envs.set_state(kept)
+        warnings.simplefilter("ignore", DeprecationWarning)  # fork beside threads
+        child = os.fork()
+        same(envs.step(actions(1, 40)), expected)
+        if not child:
+            os._exit(0)
+        sys.exit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+    """
+    subprocess.run([sys.executable, "-c", textwrap.dedent(script)], check=True, timeout=120)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT to send")
+def test_an_interrupt_leaves_an_environment_that_goes_on():
+    """Ctrl-C between and in steps: whenever it comes, a state is put back and goes on to the same bits."""
+    script = """
+        import os, signal, sys, threading, time
+        sys.path.insert(0, "tests/envs")
+        import gymnasium as gym, hoof_env
+        from hoof_env.simd import threads
+        threads.available = lambda: 2
+        from family import actions, same
+        envs = gym.make_vec("hoof_env/HorseLeg-v0", num_envs=400, num_threads=2).unwrapped
+        envs.reset(seed=0)
+        kept, taken = envs.get_state(), actions(1, 400)
+        expected = envs.step(taken)
+        heard = 0
+        for k in range(20):
+            threading.Timer(0.01 + 0.001 * k, os.kill, (os.getpid(), signal.SIGINT)).start()
+            try:
+                begun = time.monotonic()
+                while time.monotonic() < begun + 10.0:
+                    envs.step(taken)
+            except KeyboardInterrupt:
+                heard += time.monotonic() < begun + 2.0
+            envs.set_state(kept)
+            same(envs.step(taken), expected)
+        sys.exit(heard != 20)
+    """
+    subprocess.run([sys.executable, "-c", textwrap.dedent(script)], check=True, timeout=120)

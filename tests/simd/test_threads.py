@@ -1,0 +1,82 @@
+"""Columns are shared among threads without gap or overlap, and no call goes on behind its caller's back."""
+
+import signal
+import threading
+import time
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hoof_env.errors import ParameterError
+from hoof_env.simd import threads
+from hoof_env.simd.threads import available, blocks, check_threads, run_together
+
+
+@given(st.integers(1, 5000), st.sampled_from([1, 4, 8]), st.integers(1, 70))
+def test_blocks_are_all_columns_in_equal_groups_of_lanes(columns, lanes, num_threads):
+    parts = blocks(columns, lanes, num_threads)
+    assert [column for part in parts for column in part] == list(range(columns))
+    groups = [-(-len(part) // lanes) for part in parts]
+    assert len(parts) == min(num_threads, -(-columns // lanes))
+    assert max(groups) - min(groups) <= 1
+    assert all(part.start % lanes == 0 for part in parts)
+
+
+@pytest.mark.parametrize("given", [0, -1, 1.5, True, "2", None, available() + 1])
+def test_what_is_no_number_of_threads(given):
+    with pytest.raises(ParameterError, match="num_threads: expected"):
+        check_threads(given)
+
+
+class Slow:
+    """In the place of a compiled kernel: waits, and says who called."""
+
+    overloads = (None,)
+
+    def __init__(self, seconds=0.0):
+        self.seconds, self.ended, self.callers = seconds, [], set()
+
+    def __call__(self, number):
+        self.callers.add(threading.get_ident())
+        time.sleep(self.seconds if number else 0.0)
+        self.ended.append(number)
+        return number**2
+
+
+def test_what_calls_return_is_in_their_order_and_the_first_is_the_callers():
+    slow = Slow(0.01)
+    assert run_together(slow, [(number,) for number in range(6)]) == [0, 1, 4, 9, 16, 25]
+    assert threading.get_ident() in slow.callers
+    assert 2 <= len(slow.callers) <= 6
+
+
+def test_an_interrupt_is_raised_when_all_calls_have_ended():
+    slow, main = Slow(0.3), threading.main_thread().ident
+    timers = [threading.Timer(wait, signal.pthread_kill, (main, signal.SIGINT)) for wait in (0.05, 0.1)]
+    for timer in timers:
+        timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        run_together(slow, [(number,) for number in range(3)])
+    assert sorted(slow.ended) == [0, 1, 2]
+
+
+def test_an_error_is_raised_when_all_calls_have_ended():
+    slow = Slow(0.1)
+    with pytest.raises(TypeError, match="unsupported"):
+        run_together(slow, [("first",), (1,), (2,)])
+    assert {1, 2} < {*slow.ended}
+
+
+def test_a_kernel_that_is_not_compiled_is_called_by_one_thread():
+    slow = Slow()
+    slow.overloads = ()
+    assert run_together(slow, [(1,), (2,)]) == [1, 4]
+    assert slow.callers == {threading.get_ident()}
+
+
+def test_more_threads_than_ever_are_refused(monkeypatch):
+    monkeypatch.setattr(threads, "available", lambda: 10**6)
+    assert check_threads(threads.MOST_THREADS) == threads.MOST_THREADS
+    with pytest.raises(ParameterError, match=f"1 to {threads.MOST_THREADS}"):
+        check_threads(threads.MOST_THREADS + 1)
