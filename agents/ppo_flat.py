@@ -317,6 +317,8 @@ class FlatPPO(BaseAlgorithm):
             raise ParameterError(
                 f"ppo_flat: expected nn.Tanh on the CPU, got {kwargs['activation_fn']!r} on {device!r}"
             )
+        if batch_size < 2:
+            raise ParameterError(f"batch_size: expected 2 or more, for its advantages, got {batch_size!r}")
         super().__init__(
             policy, env, learning_rate, kwargs, seed=seed, device="cpu", support_multi_env=True,
             supported_action_spaces=(spaces.Box,),
@@ -405,8 +407,8 @@ class FlatPPO(BaseAlgorithm):
         return rollout
 
     def experience(self, rollout: Rollout) -> tuple[Floats, Floats]:
-        """What is learnt from, in one row for each step: observations; and actions, log probabilities,
-        advantages and the targets of the value."""
+        """What is learnt from, in one row for each step: observations, and log probabilities, advantages,
+        targets of the value and actions."""
         critic = self.weights.critic
         values, rewards = critic(rollout.observations)[..., 0], rollout.rewards
         if self.norm_reward:

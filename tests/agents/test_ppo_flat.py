@@ -188,6 +188,7 @@ def test_what_it_leaves_is_played_as_stable_baselines_plays(tmp_path):
     [
         ({"params": ('policy_kwargs={"activation_fn": "nn.ReLU"}',)}, "expected nn.Tanh"),
         ({"params": ("normalize=true", "use_sde=true")}, "use_sde"),
+        ({"params": ("batch_size=1",)}, "batch_size: expected 2 or more"),
         ({"device": "cuda"}, "device"),
         ({"env_id": "CartPole-v1"}, "Discrete"),
     ],
