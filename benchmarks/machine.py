@@ -25,7 +25,7 @@ def machine() -> dict[str, str]:
     """Processor, vector width, system, versions, date and commit."""
     installed = {d.metadata["Name"]: d.version for d in metadata.distributions()}
     return {
-        "processor": f"{_processor()}, {os.cpu_count()} cores, one used",
+        "processor": f"{_processor()}, {os.cpu_count()} cores",
         "compiled for": f"{compiled_for()}, vectors of {vector_bits()} bits",
         "system": f"{platform.system()} {platform.machine()}, Python {platform.python_version()}",
         "versions": ", ".join(f"{package} {installed.get(package, 'not installed')}" for package in PACKAGES),

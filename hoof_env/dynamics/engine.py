@@ -368,7 +368,8 @@ class TrunkEngine(Scene):
     def _go(self, steps: int, account: bool = False) -> None:
         try:
             common = (*self.arrays, self.substep, steps * self.substeps, account)
-            run_together(self._run, [(*common, block.start, block.stop) for block in self.blocks])
+            calls = [(*common, block.start, block.stop) for block in self.blocks]
+            run_together(self._run, calls, self.num_threads)
         except NumbaError as error:
             if self.contact_law is None:
                 raise

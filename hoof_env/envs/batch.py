@@ -321,7 +321,7 @@ class EpisodeBatch:
         Nothing is drawn for environments that are `idle`, shape (num_envs,), as their episode is over. Where
         an action is not a number there is a `ParameterError`, and nothing has happened.
         """
-        happened = np.bitwise_or.reduce(run_together(self.kernel, self._blocks))
+        happened = np.bitwise_or.reduce(run_together(self.kernel, self._blocks, self.engine.num_threads))
         return self.follow(int(happened), generators, idle)
 
     def follow(

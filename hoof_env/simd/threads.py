@@ -4,6 +4,7 @@ bits."""
 from __future__ import annotations
 
 import os
+from collections import deque
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from functools import cache
@@ -13,6 +14,8 @@ from typing import Any
 from hoof_env.errors import ParameterError, count
 
 MOST_THREADS = 1024
+
+PARTS = 8  # blocks of columns for each thread
 
 
 def available() -> int:
@@ -31,9 +34,10 @@ def check_threads(num_threads: Any) -> int:
 
 
 def blocks(columns: int, lanes: int, num_threads: int) -> list[range]:
-    """Columns in so many equal parts, or fewer, that begin with a group of lanes."""
+    """Columns in equal parts that begin with a group of lanes: one for a thread alone, else `PARTS` a thread
+    where there are enough, since the processors of a busy machine are not equally fast."""
     groups = -(-columns // lanes)
-    parts = min(num_threads, groups)
+    parts = min(num_threads * PARTS if num_threads > 1 else 1, groups)
     ends = [min(columns, groups * part // parts * lanes) for part in range(parts + 1)]
     return [range(*pair) for pair in pairwise(ends)]
 
@@ -48,21 +52,33 @@ if hasattr(os, "register_at_fork"):  # a child has none of its parent's threads
     os.register_at_fork(after_in_child=_workers.cache_clear)
 
 
-def run_together(kernel: Any, calls: Sequence[tuple[Any, ...]]) -> list[Any]:
-    """Call a kernel with each of these arguments, at once; what the calls returned, in their order.
+def run_together(kernel: Any, calls: Sequence[tuple[Any, ...]], num_threads: int) -> list[Any]:
+    """Call a kernel with each of these arguments, so many at once; what the calls returned, in their order.
 
-    The first call is this thread's. All have ended when this returns, and when it raises, as at Ctrl-C.
+    This thread is one of them. All have ended when this returns, and when it raises, as at Ctrl-C.
     """
-    if len(calls) == 1 or not kernel.overloads:  # it is compiled by this thread
+    if num_threads == 1 or len(calls) == 1 or not kernel.overloads:  # it is compiled by this thread
         return [kernel(*call) for call in calls]
-    others: list[Future[Any]] = []
+    waiting, results = deque(enumerate(calls)), [None] * len(calls)
+
+    def work() -> None:
+        while waiting:
+            try:
+                place, call = waiting.popleft()
+            except IndexError:  # another thread was faster
+                return
+            results[place] = kernel(*call)
+
+    others: list[Future[None]] = []
     try:
-        for call in calls[1:]:
-            others.append(_workers().submit(kernel, *call))  # noqa: PERF401  # those before an interrupt count
-        own = kernel(*calls[0])
+        for _ in range(min(num_threads, len(calls)) - 1):
+            others.append(_workers().submit(work))  # noqa: PERF401  # those before an interrupt count
+        work()
     finally:
         _wait(others)
-    return [own, *(other.result() for other in others)]
+    for other in others:
+        other.result()
+    return results
 
 
 def _wait(futures: list[Future[Any]]) -> None:

@@ -1,0 +1,216 @@
+"""What threads gain: one, two or more that share 1024 legs, beside as many separate processes.
+
+    python -m benchmarks.threads          writes threads.json and .md, where `benchmarks.speed` does
+
+A round has each case once, in a new order: one thread, T threads that are joined after each control step, and
+T processes with a T-th of the legs each, which are told to begin and wait for nobody. Then what a call to a
+thread costs and what a group of columns takes, from which the table of more cores is computed, not measured.
+"""
+
+from __future__ import annotations
+
+import benchmarks.one_thread  # noqa: F401  # isort: skip
+
+import argparse
+import multiprocessing
+import time
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import numba
+import numpy as np
+
+from benchmarks.history import RESULTS, write
+from benchmarks.machine import machine, vector_bits
+from benchmarks.rounds import bar_text, describe, interleave, spread
+from hoof_env._output import markdown_table
+from hoof_env.dynamics.advance import LANES
+from hoof_env.envs.vector import HorseLegVectorEnv
+from hoof_env.simd.threads import available, run_together
+
+LEGS, STEPS = 1024, 60
+BESIDE_PROCESSES, BESIDE_ONE = 0.9, 1.5
+CORES, MODELLED = (2, 4, 8, 16, 32, 64), (1024, 8192)
+CALLS = 8
+
+INTRO = """\
+# What threads gain
+
+Written by `python -m benchmarks.threads`. {legs} legs, random actions, {steps} control steps of 20 substeps a
+case, {rounds} interleaved rounds of wall time: median (quartiles; extremes). A process has its share of the
+legs and waits for nobody; threads are joined after each control step."""
+
+MODEL = """\
+## More cores: computed, not measured
+
+A control step of n legs on p threads takes s + g ceil(n / 8 p) + c (p - 1): s is what one thread does for all
+legs (actions, observations, rewards, resets), g the time of a group of eight columns, c that of
+a call to a thread and its answer. Here s = {serial:.0f} us for 1024 legs and in proportion to them,
+g = {group:.1f} us and c = {call:.0f} us (medians; c from {calls} calls at once of an empty kernel). Memory
+and clock rate are taken to be those of one core, which is kind to many."""
+
+
+class Legs:
+    """Environments that are stepped with random actions."""
+
+    def __init__(self, count: int, **options: Any) -> None:
+        self.envs = HorseLegVectorEnv(num_envs=count, task="leg", **options)
+        self.envs.reset(seed=0)
+        shape, uniform = self.envs.action_space.shape or (), np.random.default_rng(0).uniform
+        self.actions = [
+            uniform(-1, 1, shape).astype(np.float32) for _ in range(8)
+        ]
+
+    def run(self) -> float:
+        """Wall time [s] of `STEPS` steps."""
+        begin = time.perf_counter()
+        for k in range(STEPS):
+            self.envs.step(self.actions[k % 8])
+        return time.perf_counter() - begin
+
+    def serial_and_kernel(self) -> tuple[float, float]:
+        """Wall time [s] of a step outside the kernel and in it."""
+        batch_step, spent = self.envs.batch.step, 0.0
+
+        def step(*arguments: Any) -> bool:
+            nonlocal spent
+            begin = time.perf_counter()
+            ended = batch_step(*arguments)
+            spent += time.perf_counter() - begin
+            return ended
+
+        with patch.object(self.envs.batch, "step", step):
+            whole = self.run()
+        return (whole - spent) / STEPS, spent / STEPS
+
+
+def work(pipe: Connection, count: int) -> None:
+    """Of a process: run whenever it is told to."""
+    legs = Legs(count)
+    legs.run()
+    pipe.send(None)
+    while pipe.recv():
+        legs.run()
+        pipe.send(None)
+
+
+class Processes:
+    """So many processes with their share of the legs."""
+
+    def __init__(self, count: int) -> None:
+        context = multiprocessing.get_context("spawn")
+        self.pipes = []
+        for _ in range(count):
+            ours, theirs = context.Pipe()
+            context.Process(target=work, args=(theirs, LEGS // count), daemon=True).start()
+            self.pipes.append(ours)
+        self.wait()
+
+    def end(self) -> None:
+        for pipe in self.pipes:
+            pipe.send(False)
+
+    def wait(self) -> None:
+        for pipe in self.pipes:
+            pipe.recv()
+
+    def run(self) -> float:
+        """Wall time [s] from telling them until the last is done."""
+        begin = time.perf_counter()
+        for pipe in self.pipes:
+            pipe.send(True)
+        self.wait()
+        return time.perf_counter() - begin
+
+
+def call_cost(calls: int) -> float:
+    """Time [s] of each call more at once of a kernel that does nothing."""
+
+    @numba.njit(nogil=True)
+    def nothing(x):  # type: ignore[no-untyped-def]
+        return x
+
+    def timed(count: int) -> float:
+        begin = time.perf_counter()
+        run_together(nothing, [(1,)] * count, count)
+        return time.perf_counter() - begin
+
+    timed(1), timed(calls)
+    return float(np.median([timed(calls) - timed(1) for _ in range(500)])) / (calls - 1)
+
+
+def gain(legs: int, threads: int, serial: float, group: float, call: float) -> float:
+    """How many times as fast so many threads are by the page's model; `serial` is for `LEGS`."""
+    groups = -(-legs // LANES)
+
+    def seconds(p: int) -> float:
+        return serial * legs / LEGS + group * -(-groups // p) + call * (p - 1)
+
+    return seconds(1) / seconds(threads)
+
+
+def measure(rounds: int, threads: int) -> dict[str, Any]:
+    """Rates, ratios, and what the model takes."""
+    one, several, processes = Legs(LEGS), Legs(LEGS, num_threads=threads), Processes(threads)
+    shared, apart = f"{threads} threads", f"{threads} processes"
+    runs: dict[str, Callable[[], float]] = {
+        "1 thread": one.run, shared: several.run, apart: processes.run
+    }  # fmt: skip
+    seconds = interleave(runs, rounds)
+    processes.end()
+    parts = np.array([one.serial_and_kernel() for _ in range(rounds)])
+    serial, kernel = np.median(parts, 0).tolist()
+    ratios = [
+        (shared, "1 thread", seconds["1 thread"] / seconds[shared], BESIDE_ONE),
+        (apart, "1 thread", seconds["1 thread"] / seconds[apart], None),
+        (shared, apart, seconds[apart] / seconds[shared], BESIDE_PROCESSES),
+    ]
+    return {
+        "machine": machine(), "bits": vector_bits(), "rounds": rounds, "legs": LEGS, "steps": STEPS,
+        "rate": {name: spread(LEGS * STEPS / each) for name, each in seconds.items()},
+        "ratios": [(case, beside, spread(ratio), bar) for case, beside, ratio, bar in ratios],
+        "calls": CALLS, "serial": serial, "group": kernel * LANES / LEGS, "call": call_cost(CALLS),
+    }  # fmt: skip
+
+
+def page(result: dict[str, Any]) -> str:
+    """The tables as Markdown."""
+    rates = [[name, f"{each['median']:,.0f}", describe(each)] for name, each in result["rate"].items()]
+    ratios = [
+        [case, beside, describe(ratio), bar_text(bar, ratio) if bar else ""]
+        for case, beside, ratio, bar in result["ratios"]
+    ]
+    model = [result[key] for key in ("serial", "group", "call")]
+    more = [[str(p), *(f"{gain(legs, p, *model):.1f}" for legs in MODELLED)] for p in CORES]
+    micro = {key: 1e6 * result[key] for key in ("serial", "group", "call")}
+    about = markdown_table(["", ""], [[key, value] for key, value in result["machine"].items()])
+    return "\n\n".join(
+        (
+            INTRO.format(**result), about,
+            markdown_table(["", "environment steps/s", "spread"], rates),
+            markdown_table(["case", "beside", "ratio", "bar"], ratios),
+            MODEL.format(**result | micro),
+            markdown_table(["threads", *(f"{legs} legs" for legs in MODELLED)], more),
+        )
+    ) + "\n"  # fmt: skip
+
+
+def main() -> None:
+    """Measure, print and write."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--rounds", type=int, default=40)
+    parser.add_argument("--threads", type=int, default=2, help="and processes")
+    parser.add_argument("--out", type=Path, default=RESULTS, help="folder for those of all vector widths")
+    given = parser.parse_args()
+    if not 2 <= given.threads <= available():
+        parser.error(f"--threads: expected 2 to {available()}, the processors here, got {given.threads}")
+    result = measure(given.rounds, given.threads)
+    print(page(result))
+    write(given.out, "threads", result, page(result), result["ratios"])
+
+
+if __name__ == "__main__":
+    main()
