@@ -3,6 +3,7 @@
     python -m agents.baselines                        all of docs/baselines.md: hours on two cores
     python -m agents.baselines --subset nightly       a small one in minutes, into a folder of its own
     python -m agents.baselines --only sac td3         some rows of it
+    python -m agents.baselines --subset trainers --workers 1      how fast PPO and PPO_FLAT train, by turns
 
 What is trained is in agents/plans. A training that is done is not repeated; Ctrl-C, or kill -9, and the same
 command go on where it was. Each has its log beside its results, RUN/log.txt.
@@ -32,13 +33,13 @@ from hoof_env.errors import ParameterError, check_number
 @dataclass(frozen=True)
 class Args:
     subset: Plan = "full"
-    """which plan; the nightly one is written beside its runs and never over the full table"""
+    """which plan; each has a folder of its own"""
     only: tuple[str, ...] = ()
     """only trainings with one of these in their names, which are ALGO-ENV-sSEED"""
     workers: int = 2
     """trainings at a time, one thread each"""
     out: Path | None = None
-    """folder of trainings and page; otherwise runs/baselines-nightly, or runs/baselines and docs/"""
+    """folder of trainings and page; otherwise runs/baselines, or the plan's own"""
     report: bool = True
     """write the page when nothing is left"""
 

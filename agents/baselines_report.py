@@ -26,6 +26,7 @@ from agents.baselines_results import (
     following,
     read_results,
     references,
+    seconds_to,
     versions_of,
 )
 from agents.baselines_run import COLUMNS, CURVE, FOLDERS, LEG, Plan, load_plan, read_curve
@@ -40,6 +41,7 @@ from hoof_env.paper.figures import BLUE, GREEN, GREY, ORANGE, PURPLE, STYLE
 TEMPLATES = Path(__file__).with_name("templates")
 
 POINTS = 40  # of a curve
+SOON = 0.4  # of the first row's time to the open-loop gait's return
 BINS = 60  # of training episodes in the picture of one training
 References = Mapping[str, Mapping[str, Scored]]  # policies without learning, by id and name
 
@@ -49,7 +51,7 @@ class Args:
     subset: Plan = "full"
     """which plan"""
     runs: Path | None = None
-    """folder of the trainings, and of report.md; otherwise runs/baselines or runs/baselines-nightly"""
+    """folder of the trainings, and of report.md; otherwise runs/baselines, or the plan's own"""
 
 
 def of_id(rows: Sequence[Row], env_id: str) -> list[Row]:
@@ -97,6 +99,59 @@ def figures_table(rows: Sequence[Row], gaits: References) -> str:
         for one in (*known.values(), *(row.scored for row in of_id(rows, env_id)))
     ]
     return markdown_table(["id", "policy", *(title for title, *_ in TABLE.values())], lines)
+
+
+def pace_table(rows: Sequence[Row], known: Mapping[str, Scored]) -> str:
+    """Steps a second, and seconds until the open-loop gait's return: beside the first row, seed by seed."""
+    level = known[OPEN_LOOP].intervals["return"].mean
+    rates, times = [], []
+    for row in rows:
+        rates.append(np.array([one.final["steps"] / one.final["wall_s"] for one in row.results]))
+        times.append(np.array([seconds_to(level, one) for one in row.results]))
+    lines = []
+    for row, rate, time in zip(rows, rates, times, strict=True):
+        n = min(len(rate), len(rates[0]))
+        parts = time[:n] / times[0][:n]
+        lines.append(
+            [row.title, str(len(rate)), span(rate, 0), span(rate[:n] / rates[0][:n], 2),
+             row.scored.intervals["return"].text(), span(time, 0), f"{np.isfinite(time).sum()}/{len(time)}",
+             span(parts, 2), f"{np.sum(parts <= SOON)}/{n}"]
+        )  # fmt: skip
+    titles = (
+        "policy", "seeds", "steps/s", f"beside {rows[0].title}", "return: IQM [95 %]", f"s to {level:.1f}",
+        "reached", f"beside {rows[0].title}", f"at most {SOON}",
+    )  # fmt: skip
+    return markdown_table(titles, lines)
+
+
+def span(values: Floats, digits: int) -> str:
+    """Median, least and greatest."""
+    texts = [f"{x:,.{digits}f}" for x in (np.median(values), values.min(), values.max())]
+    return "{} ({} to {})".format(*texts)
+
+
+def draw_frontier(rows: Sequence[Row], known: Mapping[str, Scored], path: Path) -> None:
+    """Return over steps a second, a point for each row."""
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(7, 4), layout="constrained")
+        axes = figure.subplots()
+        for row in rows:
+            rate = np.median([one.final["steps"] / one.final["wall_s"] for one in row.results])
+            of = row.scored.intervals["return"]
+            bars = np.nan_to_num([[of.mean - of.low], [of.high - of.mean]])
+            colour = BLUE if row.entry.algo == "ppo_flat" else ORANGE
+            axes.errorbar([rate], [of.mean], bars, fmt="o", color=colour, capsize=3)
+            axes.annotate(
+                f"{row.title}, {len(row.results)} seeds", (rate, of.mean), (6, 4), fontsize=8,
+                textcoords="offset points", color=colour,
+            )  # fmt: skip
+        axes.axhline(known[OPEN_LOOP].intervals["return"].mean, color=GREY, lw=1.2, ls="--", label=OPEN_LOOP)
+        axes.set(xlabel="environment steps a second of training", ylabel="return: IQM, 95 % interval")
+        axes.xaxis.set_major_formatter(EngFormatter(sep=" "))
+        axes.margins(x=0.25)
+        axes.grid(axis="y", color=GREY, alpha=0.15)
+        axes.legend()
+        figure.savefig(path, dpi=130)
 
 
 def following_table(rows: Sequence[Row]) -> str:
@@ -150,6 +205,12 @@ def over_time(row: Row, key: str) -> tuple[Floats, Floats]:
     return x, iqm(each)
 
 
+def most(rows: Sequence[Row]) -> list[Row]:
+    """Those with as many seeds as any."""
+    count = max(row.entry.seeds for row in rows)
+    return [row for row in rows if row.entry.seeds == count]
+
+
 def draw_curves(rows: Sequence[Row], known: Mapping[str, Scored], path: Path) -> None:
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(9, 3.6), layout="constrained")
@@ -158,7 +219,7 @@ def draw_curves(rows: Sequence[Row], known: Mapping[str, Scored], path: Path) ->
         for axes, key, label in zip(
             panels, ("steps", "wall_s"), ("environment steps", "wall time of training [s]"), strict=True
         ):
-            for row, colour in zip(rows, (BLUE, ORANGE, GREEN, PURPLE), strict=False):
+            for row, colour in zip(most(rows), (BLUE, ORANGE, GREEN, PURPLE), strict=False):
                 x, (mean, low, high) = over_time(row, key)
                 lowest = min(lowest, float(mean.min()))
                 axes.fill_between(x, low, high, color=colour, alpha=0.2, lw=0)
@@ -255,6 +316,10 @@ def report(args: Args) -> Path:
         others = [one for name, one in gaits[LEG].items() if name != "run"]
         agents = others + [row.scored for row in of_id(rows, LEG)]
         parts += ["## Beside the paper's run", compare(agents, gaits[LEG]["run"])]
+        if OPEN_LOOP in gaits[LEG]:
+            parts += ["## How fast they train", pace_table(of_id(rows, LEG), gaits[LEG])]
+            draw_frontier(of_id(rows, LEG), gaits[LEG], beside / "frontier.png")
+            parts.append(f"![Return over steps a second]({beside.name}/frontier.png)")
     if SPEED in gaits:
         parts += ["## How a command is followed", following_table(of_id(rows, SPEED))]
     parts += ["## How it was made", made_text(rows)]

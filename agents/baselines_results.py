@@ -59,7 +59,7 @@ class Row:
 
     @property
     def title(self) -> str:
-        return self.entry.algo.upper()
+        return self.entry.title
 
     @cached_property
     def scored(self) -> Scored:
@@ -108,7 +108,18 @@ def read_result(entry: Entry, folder: Path) -> Result:
 
 def expected_settings(entry: Entry) -> dict[str, Any]:
     settings = load_settings(FOLDER / f"{entry.algo}.yml", entry.env_id)
-    return settings if entry.steps is None else settings | {"n_timesteps": entry.steps}
+    return settings | dict(entry.params) | ({} if entry.steps is None else {"n_timesteps": entry.steps})
+
+
+def seconds_to(level: float, result: Result) -> float:
+    """Wall time of training [s] until the learning curve first reaches a return; infinite if it does not."""
+    before, *later = result.curve
+    for row in later:
+        if row["return"] >= level:
+            part = (level - before["return"]) / (row["return"] - before["return"])
+            return before["wall_s"] + max(part, 0.0) * (row["wall_s"] - before["wall_s"])
+        before = row
+    return float("inf")
 
 
 def versions_of(rows: Sequence[Row]) -> dict[str, str]:

@@ -32,10 +32,15 @@ from agents.watch import Scorer
 from hoof_env.errors import DataFileError, check_number
 
 PLANS = Path(__file__).with_name("plans")
-Plan = Literal["full", "nightly"]
-"""The published table, and a small part of it that runs in minutes: files of `PLANS`."""
+Plan = Literal["full", "nightly", "trainers"]
+"""The published table, a small part of it that runs in minutes, and the trainers of PPO beside each other:
+files of `PLANS`."""
 
-FOLDERS = {"full": Path("runs/baselines"), "nightly": Path("runs/baselines-nightly")}
+FOLDERS = {
+    "full": Path("runs/baselines"),
+    "nightly": Path("runs/baselines-nightly"),
+    "trainers": Path("runs/trainers"),
+}
 """Of the trainings, by plan."""
 
 LEG = "hoof_env/HorseLeg-v0"
@@ -56,10 +61,17 @@ class Entry:
     steps: int | None = None
     points: int = 30
     env_kwargs: Mapping[str, Any] = field(default_factory=dict, hash=False)
+    params: Mapping[str, Any] = field(default_factory=dict, hash=False)
+    variant: str = ""
+
+    @property
+    def title(self) -> str:
+        return " ".join(filter(None, (self.algo.upper(), self.variant)))
 
     @property
     def name(self) -> str:
-        return f"{self.algo}-{self.env_id.rpartition('/')[2]}"
+        words = self.algo, *self.variant.split(), self.env_id.rpartition("/")[2]
+        return "-".join(words)
 
 
 @dataclass(frozen=True)
@@ -78,8 +90,10 @@ class Run:
         words += ["--seed", str(self.seed), "--points", str(entry.points)]
         words += ["--out", str(folder / self.name)] if folder else []
         words += ["--steps", str(entry.steps)] if entry.steps is not None else []
-        pairs = [f"{key}={json.dumps(value)}" for key, value in entry.env_kwargs.items()]
-        return words + (["--env-kwargs", *pairs] if pairs else [])
+        for option, given in (("--env-kwargs", entry.env_kwargs), ("--params", entry.params)):
+            pairs = [f"{key}={json.dumps(value)}" for key, value in given.items()]
+            words += [option, *pairs] if pairs else []
+        return words
 
 
 def load_plan(name: str) -> tuple[Entry, ...]:

@@ -29,6 +29,7 @@ from torch import nn
 
 from hoof_env.errors import ParameterError
 from hoof_env.simd.compile import inlined, kernel
+from hoof_env.simd.threads import check_threads
 
 Floats = NDArray[np.float32]
 
@@ -326,7 +327,8 @@ class FlatPPO(BaseAlgorithm):
         self.n_steps, self.batch_size, self.n_epochs = n_steps, batch_size, n_epochs
         self.gamma, self.gae_lambda, self.clip_range = gamma, gae_lambda, clip_range
         self.ent_coef, self.vf_coef, self.max_grad_norm = ent_coef, vf_coef, max_grad_norm
-        self.norm_reward, self.num_threads = norm_reward, num_threads
+        self.norm_reward = norm_reward
+        self.num_threads = None if num_threads is None else check_threads(num_threads)
         self.random, self.scale = np.random.default_rng(seed), Scale(gamma)
         self.moments: Floats | None = None  # of the gradient, for Adam
         if _init_setup_model:

@@ -60,9 +60,7 @@ class Legs:
         self.envs = HorseLegVectorEnv(num_envs=count, task="leg", **options)
         self.envs.reset(seed=0)
         shape, uniform = self.envs.action_space.shape or (), np.random.default_rng(0).uniform
-        self.actions = [
-            uniform(-1, 1, shape).astype(np.float32) for _ in range(8)
-        ]
+        self.actions = [uniform(-1, 1, shape).astype(np.float32) for _ in range(8)]
 
     def run(self) -> float:
         """Wall time [s] of `STEPS` steps."""

@@ -283,7 +283,7 @@ TASKS: Mapping[str, Task] = MappingProxyType(
             {
                 "target_speed": (1.0, 3.5),
                 "target_seconds": (3.0, 5.0),
-                "reward_weights": {"progress": 30.0, "overspeed": 30.0},
+                "reward_weights": {"progress": 12.0, "overspeed": 12.0},
                 "observation": ("crank", "gait", "trunk", "hoof", "action", "target"),
             },
         ),
