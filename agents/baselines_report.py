@@ -111,7 +111,8 @@ def pace_table(rows: Sequence[Row], known: Mapping[str, Scored]) -> str:
     lines = []
     for row, rate, time in zip(rows, rates, times, strict=True):
         n = min(len(rate), len(rates[0]))
-        parts = time[:n] / times[0][:n]
+        with np.errstate(invalid="ignore"):  # where both never reach it
+            parts = time[:n] / times[0][:n]
         lines.append(
             [row.title, str(len(rate)), span(rate, 0), span(rate[:n] / rates[0][:n], 2),
              row.scored.intervals["return"].text(), span(time, 0), f"{np.isfinite(time).sum()}/{len(time)}",
@@ -125,7 +126,9 @@ def pace_table(rows: Sequence[Row], known: Mapping[str, Scored]) -> str:
 
 
 def span(values: Floats, digits: int) -> str:
-    """Median, least and greatest."""
+    """Median, least and greatest; nothing where one is not known."""
+    if np.isnan(values).any():
+        return ""
     texts = [f"{x:,.{digits}f}" for x in (np.median(values), values.min(), values.max())]
     return "{} ({} to {})".format(*texts)
 

@@ -24,6 +24,7 @@ from agents.baselines_results import (
     following,
     meets,
     read_results,
+    seconds_to,
 )
 from agents.baselines_run import (
     CURVE,
@@ -80,6 +81,22 @@ def test_a_training_is_told_its_arguments_as_the_command_takes_them():
     words = Run(entry, 3).command(Path("out"))
     assert words[words.index("--out") + 1] == str(Path("out", "ppo-HorseLeg-v0-s3"))
     assert words[-2:] == ["--env-kwargs", "target_speed=[2.1, 2.1]"]
+
+
+def test_a_variant_has_a_name_and_hyperparameters_of_its_own():
+    entry = Entry("ppo_flat", LEG, 1, params={"n_epochs": 2}, variant="2 epochs")
+    assert (entry.title, Run(entry, 0).name) == ("PPO_FLAT 2 epochs", "ppo_flat-2-epochs-HorseLeg-v0-s0")
+    assert Run(entry, 0).command()[-2:] == ["--params", "n_epochs=2"]
+    assert expected_settings(entry)["n_epochs"] == 2
+
+
+def test_the_time_to_a_return_is_that_of_the_first_crossing(tmp_path):
+    rows = [(0.0, -5.0), (10.0, 10.0), (20.0, 30.0), (30.0, 5.0), (40.0, 90.0)]
+    (tmp_path / CURVE).write_text("wall_s,return\n" + "".join(f"{t},{r}\n" for t, r in rows))
+    one = baselines_results.Result(tmp_path, {})
+    assert seconds_to(20.0, one) == pytest.approx(15.0)
+    assert seconds_to(60.0, one) == pytest.approx(30.0 + 10 * 55 / 85)
+    assert seconds_to(91.0, one) == np.inf
 
 
 def test_the_cost_of_transport_is_that_of_the_whole():
