@@ -24,7 +24,8 @@ FLOORS = (
     ("hoof_env/film.py", "hoof_env/play.py"),
     ("hoof_env/cli.py",),
     ("hoof_env/__main__.py",),
-    ("research", "agents", "benchmarks", "examples"),
+    ("research", "agents", "examples"),
+    ("benchmarks",),
 )
 """Rooms from the foundation up; those of a floor do not import each other. `import hoof_env` registers the
 environments, so it stands beside them, although by name it has everything."""

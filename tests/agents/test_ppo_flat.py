@@ -16,6 +16,7 @@ from agents.train import Args, train
 from agents.watch import DivergedError
 from hoof_env.errors import ParameterError
 from hoof_env.saved_policy import find_saved
+from hoof_env.simd import threads
 from hoof_env.simd.compile import kernel
 
 GAMMA, LAMBDA = 0.9, 0.8
@@ -160,7 +161,9 @@ def test_learns_the_action_that_pays():
 
 
 @pytest.mark.parametrize("num_threads", [1, 2, 5])
-def test_same_seed_same_bits_on_any_number_of_threads(num_threads):
+def test_same_seed_same_bits_on_any_number_of_threads(num_threads, monkeypatch):
+    monkeypatch.setattr(threads, "available", lambda: 5)
+
     def learned(**changes):
         return model(envs=8, n_steps=400, batch_size=2500, **changes).learn(6400).weights.vector
 
