@@ -14,7 +14,6 @@ The networks' weights are one vector, `weights`; those of the library's policy a
 from __future__ import annotations
 
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -29,7 +28,7 @@ from torch import nn
 
 from hoof_env.errors import ParameterError
 from hoof_env.simd.compile import inlined, kernel
-from hoof_env.simd.threads import check_threads
+from hoof_env.simd.threads import check_threads, run_together
 
 Floats = NDArray[np.float32]
 
@@ -427,14 +426,11 @@ class FlatPPO(BaseAlgorithm):
     def improve(self, observations: Floats, steps: Floats) -> None:
         """Steps of Adam on shuffled batches."""
         rate = self.lr_schedule(self._current_progress_remaining)
-        threads = self.num_threads or torch.get_num_threads()
         gradient, losses = Gradient(self), []
-        with ThreadPoolExecutor(threads) as pool:
-            for _ in range(self.n_epochs):
-                for chosen in self.batches(len(steps)):
-                    call_all = pool.map if threads > 1 else map
-                    losses.append(gradient.compute(observations, steps, chosen, call_all))
-                    self.descend(gradient.vector, rate)
+        for _ in range(self.n_epochs):
+            for chosen in self.batches(len(steps)):
+                losses.append(gradient.compute(observations, steps, chosen))
+                self.descend(gradient.vector, rate)
         policy_loss, value_loss = np.mean(losses, 0)
         self.logger.record("train/policy_gradient_loss", float(policy_loss))
         self.logger.record("train/value_loss", float(value_loss))
@@ -476,9 +472,7 @@ class Gradient:
         self.model = model
         self.parts: dict[tuple[int, int], tuple[Any, ...]] = {}  # rooms, by chunk and its size
 
-    def compute(
-        self, observations: Floats, steps: Floats, chosen: NDArray[np.int64], call_all: Any
-    ) -> Floats:
+    def compute(self, observations: Floats, steps: Floats, chosen: NDArray[np.int64]) -> Floats:
         """Compute it for the chosen rows; returns the losses of policy and value."""
         model, log_std = self.model, self.model.weights.log_std
         advantages = steps[chosen, ADVANTAGE]
@@ -488,15 +482,14 @@ class Gradient:
         chunks = [chosen[begin : begin + CHUNK] for begin in range(0, len(chosen), CHUNK)]
         parts = [self.part(k, len(rows)) for k, rows in enumerate(chunks)]
 
-        def add(rows: NDArray[np.int64], part: tuple[Any, ...]) -> None:
-            own, room, losses = part
-            log_stds = (log_std, own.log_std)
-            compiled_gradient(
-                observations, steps, rows, scale, *room, log_stds, clip_range, vf_coef, count, losses
+        calls = [
+            (
+                observations, steps, rows, scale, *room, (log_std, own.log_std), clip_range, vf_coef, count,
+                losses,
             )
-
-        for _ in call_all(add, chunks, parts):
-            pass
+            for rows, (own, room, losses) in zip(chunks, parts, strict=True)
+        ]  # fmt: skip
+        run_together(compiled_gradient, calls, model.num_threads or torch.get_num_threads())
         self.vector = np.sum([own.vector for own, _, _ in parts], 0)
         self.vector[model.places] -= np.float32(model.ent_coef)  # of the entropy, the sum of log_std and more
         return np.sum([losses for *_, losses in parts], 0)

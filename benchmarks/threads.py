@@ -50,8 +50,8 @@ A control step of n legs on p threads takes s + g ceil(n / 8 p) + c (p - 1): s i
 legs (actions, observations, rewards, resets), g the time of a group of eight columns, c that of
 a call to a thread and its answer. Here s = {serial:.0f} us for 1024 legs and in proportion to them,
 g = {group:.1f} us and c = {call:.0f} us (medians; c from {calls} calls at once of an empty kernel). Memory
-and clock rate are taken to be those of one core, and no processor waits for a slower one: compare its row of two
-threads with what was measured."""
+and clock rate are taken to be those of one core, and no processor waits for a slower one: compare the row of
+two threads with what was measured."""
 
 
 class Legs:

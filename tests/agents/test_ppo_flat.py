@@ -77,7 +77,7 @@ def test_the_gradient_is_that_of_torch_and_stable_baselines(net_arch, count):
     half = 0.5 * np.log(2 * np.pi)  # each action's, which ours leaves out of both probabilities
     steps = np.column_stack([old + half, advantages, targets, actions]).astype(np.float32)
     gradient = Gradient(one)
-    policy_loss, value_loss = gradient.compute(observations, steps, chosen, map)
+    policy_loss, value_loss = gradient.compute(observations, steps, chosen)
 
     x, a, b, adv, v = (torch.tensor(row[chosen]) for row in (observations, actions, old, advantages, targets))
     values, log_prob, entropy = one.policy.evaluate_actions(x, a)

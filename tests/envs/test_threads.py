@@ -94,18 +94,29 @@ def test_bad_numbers_of_threads(given):
         make(40, given)
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
-def test_a_forked_process_has_threads_of_its_own():
-    """Its parent's are not in it; a pool that it thought it had would never answer."""
-    script = """
-        import os, sys, warnings
+def in_a_process(n, program):
+    """Run a program with `envs`, n environments on two threads that have been reset, in a process of its
+    own."""
+    begin = f"""
+        import os, signal, sys, threading, time, warnings
         sys.path.insert(0, "tests/envs")
         import gymnasium as gym, hoof_env
         from hoof_env.simd import threads
         threads.available = lambda: 2
         from family import actions, same
-        envs = gym.make_vec("hoof_env/HorseLeg-v0", num_envs=40, num_threads=2).unwrapped
+        envs = gym.make_vec("{LEG}", num_envs={n}, num_threads=2).unwrapped
         envs.reset(seed=0)
+    """
+    code = textwrap.dedent(begin) + textwrap.dedent(program)
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=120)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+def test_a_forked_process_has_threads_of_its_own():
+    """Its parent's are not in it; a pool that it thought it had would never answer."""
+    in_a_process(
+        40,
+        """
         envs.step(actions(0, 40))
         kept = envs.get_state()
         expected = envs.step(actions(1, 40))
@@ -116,22 +127,16 @@ def test_a_forked_process_has_threads_of_its_own():
         if not child:
             os._exit(0)
         sys.exit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
-    """
-    subprocess.run([sys.executable, "-c", textwrap.dedent(script)], check=True, timeout=120)
+        """,
+    )
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT to send")
 def test_an_interrupt_leaves_an_environment_that_goes_on():
     """Ctrl-C between and in steps: whenever it comes, a state is put back and goes on to the same bits."""
-    script = """
-        import os, signal, sys, threading, time
-        sys.path.insert(0, "tests/envs")
-        import gymnasium as gym, hoof_env
-        from hoof_env.simd import threads
-        threads.available = lambda: 2
-        from family import actions, same
-        envs = gym.make_vec("hoof_env/HorseLeg-v0", num_envs=400, num_threads=2).unwrapped
-        envs.reset(seed=0)
+    in_a_process(
+        400,
+        """
         kept, taken = envs.get_state(), actions(1, 400)
         expected = envs.step(taken)
         heard = 0
@@ -146,5 +151,5 @@ def test_an_interrupt_leaves_an_environment_that_goes_on():
             envs.set_state(kept)
             same(envs.step(taken), expected)
         sys.exit(heard != 20)
-    """
-    subprocess.run([sys.executable, "-c", textwrap.dedent(script)], check=True, timeout=120)
+        """,
+    )
