@@ -4,11 +4,10 @@ bits."""
 from __future__ import annotations
 
 import os
-from collections import deque
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from functools import cache
-from itertools import pairwise
+from itertools import pairwise, starmap
 from typing import Any
 
 from hoof_env.errors import ParameterError, count
@@ -53,32 +52,22 @@ if hasattr(os, "register_at_fork"):  # a child has none of its parent's threads
 
 
 def run_together(kernel: Any, calls: Sequence[tuple[Any, ...]], num_threads: int) -> list[Any]:
-    """Call a kernel with each of these arguments, so many at once; what the calls returned, in their order.
+    """Call a kernel with each of these arguments, so many at once; what the calls returned, in any order.
 
     This thread is one of them. All have ended when this returns, and when it raises, as at Ctrl-C.
     """
     if num_threads == 1 or len(calls) == 1 or not kernel.overloads:  # it is compiled by this thread
         return [kernel(*call) for call in calls]
-    waiting, results = deque(enumerate(calls)), [None] * len(calls)
-
-    def work() -> None:
-        while waiting:
-            try:
-                place, call = waiting.popleft()
-            except IndexError:  # another thread was faster
-                return
-            results[place] = kernel(*call)
-
-    others: list[Future[None]] = []
+    # No bytecode runs between taking a call and making it, so Ctrl-C does not lose one
+    waiting = starmap(kernel, iter(calls))
+    others: list[Future[list[Any]]] = []
     try:
         for _ in range(min(num_threads, len(calls)) - 1):
-            others.append(_workers().submit(work))  # noqa: PERF401  # those before an interrupt count
-        work()
+            others.append(_workers().submit(list, waiting))  # noqa: PERF401  # those before an interrupt count
+        own = list(waiting)
     finally:
         _wait(others)
-    for other in others:
-        other.result()
-    return results
+    return own + [result for other in others for result in other.result()]
 
 
 def _wait(futures: list[Future[Any]]) -> None:
