@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from benchmarks import compare, speed
+from benchmarks import compare, speed, threads
 from benchmarks.history import keep, read
 from benchmarks.machine import compiled_for, vector_bits
 from benchmarks.rounds import interleave, spread
@@ -119,3 +119,9 @@ def test_a_slower_work_tree_is_named(capsys, monkeypatch):
     assert leg.endswith("| slower |")
     assert "0.96 (" in horse
     assert horse.endswith("|  |")
+
+
+def test_threads_gain_what_the_model_says():
+    assert threads.gain(1024, 4, serial=0.0, group=1e-5, call=0.0) == pytest.approx(4.0)
+    assert threads.gain(1024, 256, serial=0.0, group=1e-5, call=0.0) == pytest.approx(128.0)  # groups of 8
+    assert threads.gain(2048, 2, serial=1e-3, group=1e-5, call=1e-4) == pytest.approx(4.56 / 3.38)
