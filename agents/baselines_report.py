@@ -267,7 +267,7 @@ def draw_learning_curve(folder: Path, scores: Sequence[Score], path: Path, **opt
         axes.plot(1e-6 * training_length(folder)[0], policy[1], "o", color=GREEN, label=label)
         for _, level in others:
             axes.axhline(level, color=ORANGE, lw=1, ls="--")
-        height = 0.05 * np.ptp(axes.get_ylim())  # of a line of text
+        height = 0.065 * np.ptp(axes.get_ylim())  # of a line of text
         below = -np.inf
         for name, level in sorted(others, key=lambda one: one[1]):
             below = max(level, below + height)
