@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -136,24 +137,22 @@ def span(values: Floats, digits: int) -> str:
 def draw_frontier(rows: Sequence[Row], known: Mapping[str, Scored], path: Path) -> None:
     """Return over steps a second, a point for each row."""
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(7, 4), layout="constrained")
+        figure = Figure(figsize=(8, 3.6), layout="constrained")
         axes = figure.subplots()
-        for row in rows:
+        for row, marker in zip(rows, cycle("osD^vP*X")):
             rate = np.median([one.final["steps"] / one.final["wall_s"] for one in row.results])
             of = row.scored.intervals["return"]
             bars = np.nan_to_num([[of.mean - of.low], [of.high - of.mean]])
-            colour = BLUE if row.entry.algo == "ppo_flat" else ORANGE
-            axes.errorbar([rate], [of.mean], bars, fmt="o", color=colour, capsize=3)
-            axes.annotate(
-                f"{row.title}, {len(row.results)} seeds", (rate, of.mean), (6, 4), fontsize=8,
-                textcoords="offset points", color=colour,
+            axes.errorbar(
+                [rate], [of.mean], bars, fmt=marker, capsize=3,
+                color=BLUE if row.entry.algo == "ppo_flat" else ORANGE,
+                label=f"{row.title}, {len(row.results)} seeds",
             )  # fmt: skip
         axes.axhline(known[OPEN_LOOP].intervals["return"].mean, color=GREY, lw=1.2, ls="--", label=OPEN_LOOP)
         axes.set(xlabel="environment steps a second of training", ylabel="return: IQM, 95 % interval")
         axes.xaxis.set_major_formatter(EngFormatter(sep=" "))
-        axes.margins(x=0.25)
         axes.grid(axis="y", color=GREY, alpha=0.15)
-        axes.legend()
+        figure.legend(loc="outside right upper")
         figure.savefig(path, dpi=130)
 
 

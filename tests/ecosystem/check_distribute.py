@@ -17,6 +17,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+import pytest
+
+from agents.settings import Algorithm
 from agents.train import Args, train
 
 ROOT = Path(__file__).parents[2]
@@ -64,9 +67,10 @@ def table(out: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-def test_worker_killed(tmp_path):
+@pytest.mark.parametrize("algo", ["ppo", "ppo_flat"])
+def test_worker_killed(tmp_path, algo):
     """Seeds: SIGKILL for a worker in the middle; its trial goes on from its checkpoint, none is lost"""
-    process = start(tmp_path, *TRIALS, *SLOW)
+    process = start(tmp_path, *TRIALS, *SLOW, "--algo", algo)
     wait_for(process, tmp_path, 3)
     victim = reports(tmp_path)[-1]
     os.kill(int(victim["pid"]), signal.SIGKILL)
@@ -84,12 +88,12 @@ def test_worker_killed(tmp_path):
     for row in table(tmp_path):
         (run,) = tmp_path.glob(f"*/{row['run']}")
         assert (run / "model.zip").is_file()
-    assert_undisturbed(tmp_path, int(seed), 60_000)
+    assert_undisturbed(tmp_path, int(seed), 60_000, algo)
 
 
-def assert_undisturbed(out: Path, seed: int, steps: int) -> None:
+def assert_undisturbed(out: Path, seed: int, steps: int, algo: Algorithm) -> None:
     """A trial has the bits of a run that nobody killed."""
-    asked = {"env_kwargs": ("episode_seconds=1",), "params": TINY}
+    asked = {"algo": algo, "env_kwargs": ("episode_seconds=1",), "params": TINY}
     whole = train(Args(seed=seed, steps=steps, out=out / f"whole{seed}", **asked))
     (retried,) = out.glob(f"*/*seed={seed}/checkpoint_*")
     assert curve(retried) == curve(whole.folder)
@@ -121,13 +125,14 @@ def test_interrupted(tmp_path):
     assert code == 0
 
 
-def test_node_killed(tmp_path):
+@pytest.mark.parametrize("algo", ["ppo_flat"])
+def test_node_killed(tmp_path, algo):
     """A cluster of two nodes, both at work: SIGKILL for all of one; its trial goes on on the other"""
     with nodes(2) as (address, environment, (_, lost)):
         assert "working_dir_files" in where(address, environment), "the checkout was not sent"
         # Kernels of a checkout that was sent would have to be compiled first
         here = ("--address", address, "--runtime-env", json.dumps({"working_dir": str(tmp_path)}))
-        asked = ("--seeds", "2", "--steps", "40000", "--report-every", "10000")
+        asked = ("--algo", algo, "--seeds", "2", "--steps", "40000", "--report-every", "10000")
         process = start(tmp_path, *TRIALS, *asked, *here, environment=environment)
         wait_for(process, tmp_path, 1, "00000*")
         wait_for(process, tmp_path, 1, "00001*")
@@ -143,7 +148,7 @@ def test_node_killed(tmp_path):
     assert [(row["state"], row["steps"]) for row in table(tmp_path)] == [("done", "40448")] * 2
     told = reports(tmp_path, f"*seed={seed}")
     assert told[-1]["pid"] not in dead
-    assert_undisturbed(tmp_path, seed, 40_000)
+    assert_undisturbed(tmp_path, seed, 40_000, algo)
 
 
 @contextmanager
