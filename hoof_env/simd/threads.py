@@ -4,8 +4,11 @@ bits."""
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from concurrent.futures import Future, ThreadPoolExecutor, wait
+import signal
+import threading
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
+from contextlib import contextmanager
 from functools import cache
 from itertools import pairwise, starmap
 from typing import Any
@@ -58,25 +61,29 @@ def run_together(kernel: Any, calls: Sequence[tuple[Any, ...]], num_threads: int
     """
     if num_threads == 1 or len(calls) == 1 or not kernel.overloads:  # it is compiled by this thread
         return [kernel(*call) for call in calls]
-    # No bytecode runs between taking a call and making it, so Ctrl-C does not lose one
+    # A thread takes a call and makes it without bytecode between, so that no other can take it, too
     waiting = starmap(kernel, iter(calls))
-    others: list[Future[list[Any]]] = []
-    try:
-        for _ in range(min(num_threads, len(calls)) - 1):
-            others.append(_workers().submit(list, waiting))  # noqa: PERF401  # those before an interrupt count
-        own = list(waiting)
-    finally:
-        _wait(others)
+    with _interrupts_wait():
+        others = [_workers().submit(list, waiting) for _ in range(min(num_threads, len(calls)) - 1)]
+        try:
+            own = list(waiting)
+        finally:
+            wait(others)
     return own + [result for other in others for result in other.result()]
 
 
-def _wait(futures: list[Future[Any]]) -> None:
-    interrupt: BaseException | None = None
-    while True:
-        try:
-            wait(futures)
-            break
-        except KeyboardInterrupt as error:
-            interrupt = error
-    if interrupt:
-        raise interrupt
+@contextmanager
+def _interrupts_wait() -> Iterator[None]:
+    """Ctrl-C is heard at the end: in the midst of it, calls and locks of the threads would be lost."""
+    handler = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(handler):
+        yield  # only the main thread hears it, and only a function of Python's can come in between
+        return
+    heard: list[tuple[int, Any]] = []
+    signal.signal(signal.SIGINT, lambda number, frame: heard.append((number, frame)))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+        if heard:
+            handler(*heard[0])

@@ -1,6 +1,7 @@
 """Columns are shared among threads without gap or overlap, and no call goes on behind its caller's back."""
 
 import signal
+import sys
 import threading
 import time
 
@@ -80,6 +81,37 @@ def test_an_interrupt_is_raised_when_all_calls_have_ended():
     with pytest.raises(KeyboardInterrupt):
         run_together(Together(), [(number,) for number in range(3)], 3)
     assert sorted(ended) == [0, 1, 2]
+
+
+def test_an_interrupt_at_any_line_loses_no_call():
+    """Wherever in the function it comes, as far as Python can be traced; then all is as before."""
+    handler = signal.getsignal(signal.SIGINT)
+    lines = 0
+    for where in range(1000):
+        slow, left = Slow(0.001), [where]
+
+        def trace(frame, event, argument, left=left):
+            if frame.f_code.co_filename == threading.__file__:
+                return None  # of the pool's start, which is the library's
+            left[0] -= 1
+            if left[0] == 0:
+                signal.raise_signal(signal.SIGINT)
+            return trace
+
+        sys.settrace(trace)
+        try:
+            run_together(slow, [(number,) for number in range(6)], 3)
+        except KeyboardInterrupt:
+            lines += 1
+        finally:
+            sys.settrace(None)
+        ended = sorted(slow.ended)
+        time.sleep(0.002)
+        assert sorted(slow.ended) == ended, "a call went on"
+        assert signal.getsignal(signal.SIGINT) is handler
+        if left[0] > 0:
+            break
+    assert lines > 30
 
 
 def test_an_error_is_raised_when_all_calls_have_ended():
