@@ -3,48 +3,55 @@
     python -m agents.train --algo ppo_flat
     python -m agents.train --algo ppo_flat --env-id hoof_env/HorseLegFixed-v0 --steps 100000
 
-Read `learn` first: it plays a rollout, estimates what its actions were worth, improves the networks. The
-algorithm is that of Stable-Baselines3's PPO with networks of tanh; policy, files and callbacks are that
-library's, so whatever works with one works with the other. What takes time is written out: the gradient of
-such networks is a dozen products of small matrices, and torch spends more time between them than in them.
+Read `FlatPPO` first: it plays a rollout, estimates what its actions were worth, improves the networks. It is
+Stable-Baselines3's PPO with networks of tanh and without what they do not need; training loop, buffer,
+policy and files are that library's. What takes time is written out: the gradient of such networks is a dozen
+products of small matrices, and torch spends more time between them than in them.
 
-The networks' weights are one vector, `weights`; those of the library's policy are views of it.
+Three things differ. Rewards are scaled by all returns up to the end of the rollout, not of the step. Among
+the `locals` of a step a callback finds `new_obs`, `rewards`, `dones`, `infos` and `clipped_actions`, but no
+values. Of the losses those of policy and value are logged.
 """
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 import torch
 from gymnasium import spaces
 from numpy.typing import NDArray
-from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 from stable_baselines3.common.policies import ActorCriticPolicy
+from stable_baselines3.common.vec_env import VecNormalize
 from torch import nn
+from torch.nn.utils import parameters_to_vector, vector_to_parameters
 
 from hoof_env.errors import ParameterError
 from hoof_env.simd.compile import inlined, kernel
-from hoof_env.simd.threads import check_threads, run_together
+from hoof_env.simd.threads import available, check_threads, run_together
 
 Floats = NDArray[np.float32]
 
 CHUNK = 1000
-"""Steps of a batch whose gradient is computed at once, by one thread: their numbers stay in the cache. The
-gradients are added up in order, so any number of threads gives the same bits."""
+"""Most steps of a batch whose gradient is computed at once, by one thread: their numbers stay in the cache.
+The gradients are added up in order, so any number of threads gives the same bits."""
 
 BETA1, BETA2, EPSILON = 0.9, 0.999, 1e-5  # of Adam
 
 LARGEST = np.float32(10.0)
 """Reward after `Scale`, as in Stable-Baselines3: one failure in a rollout is not to hide all else."""
 
+POLICY_KWARGS = {"net_arch", "activation_fn", "log_std_init", "ortho_init"}
+
 LOG_PROB, ADVANTAGE, TARGET, ACTIONS = 0, 1, 2, 3
 """Columns of what is learnt from, with the actions from the last one on."""
 
-ZERO, HALF, ONE = (np.float32(number) for number in (0.0, 0.5, 1.0))
+ZERO, HALF, ONE, FAR = (np.float32(number) for number in (0.0, 0.5, 1.0, 100.0))
 C0, A1, A2, A3 = (np.float32(number) for number in (34459425, 4729725, 135135, 990))
 B1, B2, B3, B4 = (np.float32(number) for number in (16216200, 945945, 13860, 45))
 
@@ -56,6 +63,7 @@ B1, B2, B3, B4 = (np.float32(number) for number in (16216200, 945945, 13860, 45)
 def tanh(x):  # type: ignore[no-untyped-def]
     """Lambert's continued fraction, the first nine terms, within 8e-6: without a call, so that the compiler
     does many at once."""
+    x = min(max(x, -FAR), FAR)
     s = x * x
     above = x * (C0 + s * (A1 + s * (A2 + s * (A3 + s))))
     y = above / (C0 + s * (B1 + s * (B2 + s * (B3 + s * B4))))
@@ -99,11 +107,12 @@ def backward(x, matrices, outputs, slopes, by_matrices, by_biases):  # type: ign
 
 @inlined
 def loss_of(  # type: ignore[no-untyped-def]
-    means, values, log_std, steps, clip_range, vf_coef, count, by_means, by_values, by_log_std, losses
+    means, values, log_std, steps, clip_range, vf_coef, ent_coef, count,
+    by_means, by_values, by_log_std, losses,
 ):  # fmt: skip
-    """The loss of Schulman et al. 2017 (Eq. 9 without the entropy) of some of `count` steps, and its
-    derivatives. The columns of `steps` are as `LOG_PROB` and so on say."""
-    by_log_std[:], losses[:] = ZERO, ZERO
+    """The loss of Schulman et al. 2017 (Eq. 9) of some of `count` steps, and its derivatives. The columns of
+    `steps` are as `LOG_PROB` and so on say. The entropy is the sum of `log_std`, but for a constant."""
+    by_log_std[:], losses[:] = -ent_coef * np.float32(len(steps)) / count, ZERO
     for i in range(len(steps)):
         log_prob = ZERO
         for k in range(ACTIONS, steps.shape[1]):
@@ -123,8 +132,9 @@ def loss_of(  # type: ignore[no-untyped-def]
 
 
 def gradient_of(  # type: ignore[no-untyped-def]
-    observations, steps, rows, scale, x, own, actor, critic, log_std, clip_range, vf_coef, count, losses
-):
+    observations, steps, rows, scale, x, own, actor, critic, log_std,
+    clip_range, vf_coef, ent_coef, count, losses,
+):  # fmt: skip
     """The loss of these rows, some of the `count` of a batch, and its derivatives, into the rooms of `actor`
     and `critic`: tuples of matrices, biases, outputs, slopes, and derivatives by matrices and biases.
     Advantages are normalised by `scale`, their mean and deviation."""
@@ -135,7 +145,7 @@ def gradient_of(  # type: ignore[no-untyped-def]
     forward(x, actor[0], actor[1], actor[2])
     forward(x, critic[0], critic[1], critic[2])
     loss_of(
-        actor[2][-1], critic[2][-1], log_std[0], own, clip_range, vf_coef, count,
+        actor[2][-1], critic[2][-1], log_std[0], own, clip_range, vf_coef, ent_coef, count,
         actor[3][-1], critic[3][-1], log_std[1], losses,
     )  # fmt: skip
     backward(x, actor[0], actor[2], actor[3], actor[4], actor[5])
@@ -175,7 +185,7 @@ class Network:
 
 @dataclass(frozen=True)
 class Weights:
-    """All weights, or what there is one of for each, as one vector, and by name as views of it."""
+    """All weights of a policy as one vector, and by name as views of it."""
 
     vector: Floats
     actor: Network
@@ -183,63 +193,43 @@ class Weights:
     log_std: Floats
 
     @classmethod
-    def like(cls, policy: Any) -> Weights:
-        """Zeros in the form of a policy's parameters."""
-        named = dict(policy.named_parameters())
-        ends = np.cumsum([one.numel() for one in named.values()])
-        vector = np.zeros(ends[-1], np.float32)
-        parts = {
-            name: part.reshape(tuple(one.shape))
-            for (name, one), part in zip(named.items(), np.split(vector, ends[:-1]), strict=True)
-        }
+    def of(cls, policy: Any) -> Weights:
+        """Those of a policy, whose parameters are views of the vector from now on."""
+        vector = parameters_to_vector(policy.parameters()).detach()
+        vector_to_parameters(vector, policy.parameters())
 
-        def network(hidden: str, last: str) -> Network:
-            layers = [name.removesuffix(".bias") for name in parts if name.startswith(hidden)]
-            layers = [layer for layer in layers if not layer.endswith("weight")] + [last]
+        def network(hidden: nn.Sequential, last: nn.Linear) -> Network:
+            layers = [*(layer for layer in hidden if isinstance(layer, nn.Linear)), last]
             return Network(
-                tuple(parts[f"{layer}.weight"] for layer in layers),
-                tuple(parts[f"{layer}.bias"] for layer in layers),
+                tuple(layer.weight.detach().numpy() for layer in layers),
+                tuple(layer.bias.detach().numpy() for layer in layers),
             )
 
-        actor = network("mlp_extractor.policy_net.", "action_net")
-        return cls(vector, actor, network("mlp_extractor.value_net.", "value_net"), parts["log_std"])
-
-    @classmethod
-    def shared(cls, policy: Any) -> Weights:
-        """Those of a policy, whose parameters are views of the vector from now on."""
-        weights, begin = cls.like(policy), 0
-        for parameter in policy.parameters():
-            part = weights.vector[begin : begin + parameter.numel()].reshape(tuple(parameter.shape))
-            part[:] = parameter.detach().numpy()
-            parameter.data = torch.from_numpy(part)
-            begin += parameter.numel()
-        return weights
+        hidden = policy.mlp_extractor
+        actor = network(hidden.policy_net, policy.action_net)
+        critic = network(hidden.value_net, policy.value_net)
+        return cls(vector.numpy(), actor, critic, policy.log_std.detach().numpy())
 
 
 # Experience
 
 
-def estimate_advantages(
-    rewards: Floats, values: Floats, ended: NDArray[np.bool_], gamma: float, gae_lambda: float
-) -> Floats:
-    """Generalised advantage estimation (Schulman et al. 2016), shape (T, n), of T steps of n environments.
-    `values`, shape (T + 1, n), are of the observations before each step and after the last. What comes after
-    a step that `ended` an episode is another one; what a time limit cut off is in that step's reward."""
-    goes_on = (~ended).astype(np.float32)
-    surprises = rewards + np.float32(gamma) * values[1:] * goes_on - values[:-1]
-    advantages, later = np.empty_like(rewards), np.zeros_like(rewards[0])
-    for t in reversed(range(len(rewards))):
-        later = surprises[t] + np.float32(gamma * gae_lambda) * goes_on[t] * later
-        advantages[t] = later
-    return advantages
+def flat(observations: Any, kept: int = 1) -> Floats:
+    """Observations with all axes but the first ones as one."""
+    return np.asarray(observations, np.float32).reshape(*observations.shape[:kept], -1)
 
 
 class Scale:
     """The standard deviation of discounted returns so far, from the first step of an episode to each."""
 
     def __init__(self, gamma: float) -> None:
-        self.gamma, self.returns = gamma, np.float32(0.0)
+        self.gamma = gamma
         self.count, self.mean, self.square = 1e-4, 0.0, 1.0
+        self.restart()
+
+    def restart(self) -> None:
+        """All episodes begin anew."""
+        self.returns = np.float32(0.0)
 
     def after(self, rewards: Floats, ended: NDArray[np.bool_]) -> np.float32:
         """The scale when these steps are counted, too, shape (T, n) both."""
@@ -255,37 +245,17 @@ class Scale:
         return np.float32(np.sqrt(self.square + 1e-8))
 
 
-@dataclass
-class Rollout:
-    """Steps of all environments, shape (T, n, ...); observations have one row more. `cut_off` are steps that
-    a time limit ended, as (t, environment), with the last observation of the episode."""
-
-    observations: Floats
-    actions: Floats
-    log_probs: Floats
-    rewards: Floats
-    ended: NDArray[np.bool_]
-    cut_off: list[tuple[int, int, Floats]] = field(default_factory=list)
-
-    @classmethod
-    def room(cls, steps: int, envs: int, entries: int, actions: int) -> Rollout:
-        """For so many steps."""
-        return cls(
-            np.zeros((steps + 1, envs, entries), np.float32), np.zeros((steps, envs, actions), np.float32),
-            np.zeros((steps, envs), np.float32), np.zeros((steps, envs), np.float32),
-            np.zeros((steps, envs), bool),
-        )  # fmt: skip
-
-
-class FlatPPO(BaseAlgorithm):
+class FlatPPO(OnPolicyAlgorithm):
     """PPO; arguments as those of Stable-Baselines3's, which its policies are loaded as.
 
     Args:
-        norm_reward: divide rewards by a `Scale`.
-        num_threads: threads that compute gradients; None is as many as torch may use.
+        norm_reward: divide rewards by a `Scale`, as `VecNormalize` would.
+        num_threads: threads that compute gradients; None is as many as torch may use. A batch has work for
+            one in each `CHUNK` steps.
 
     Raises:
-        ParameterError: another policy than perceptrons with tanh, or another device than the CPU.
+        ParameterError: another policy than perceptrons with tanh, another device than the CPU, batches of one
+            step, or rewards that would be normalised twice.
     """
 
     policy_aliases: ClassVar[dict[str, Any]] = {"MlpPolicy": ActorCriticPolicy}
@@ -301,7 +271,7 @@ class FlatPPO(BaseAlgorithm):
         n_epochs: int = 4,
         gamma: float = 0.99,
         gae_lambda: float = 0.95,
-        clip_range: float = 0.2,
+        clip_range: Any = 0.2,
         ent_coef: float = 0.0,
         vf_coef: float = 0.5,
         max_grad_norm: float = 0.5,
@@ -317,116 +287,96 @@ class FlatPPO(BaseAlgorithm):
             raise ParameterError(
                 f"ppo_flat: expected nn.Tanh on the CPU, got {kwargs['activation_fn']!r} on {device!r}"
             )
+        if unknown := set(kwargs) - POLICY_KWARGS:
+            known = ", ".join(sorted(POLICY_KWARGS))
+            raise ParameterError(f"policy_kwargs: expected some of {known}, got {', '.join(unknown)}")
         if batch_size < 2:
             raise ParameterError(f"batch_size: expected 2 or more, for its advantages, got {batch_size!r}")
-        super().__init__(
-            policy, env, learning_rate, kwargs, seed=seed, device="cpu", support_multi_env=True,
-            supported_action_spaces=(spaces.Box,),
-        )  # fmt: skip
-        self.n_steps, self.batch_size, self.n_epochs = n_steps, batch_size, n_epochs
-        self.gamma, self.gae_lambda, self.clip_range = gamma, gae_lambda, clip_range
-        self.ent_coef, self.vf_coef, self.max_grad_norm = ent_coef, vf_coef, max_grad_norm
+        if norm_reward and isinstance(env, VecNormalize) and env.norm_reward:
+            raise ParameterError("norm_reward: expected False where `normalize` does it, got both")
+        self.batch_size, self.n_epochs, self.clip_range = batch_size, n_epochs, clip_range
         self.norm_reward = norm_reward
         self.num_threads = None if num_threads is None else check_threads(num_threads)
         self.random, self.scale = np.random.default_rng(seed), Scale(gamma)
         self.moments: Floats | None = None  # of the gradient, for Adam
-        if _init_setup_model:
-            self._setup_model()
+        super().__init__(
+            policy, env, learning_rate, n_steps, gamma, gae_lambda, ent_coef, vf_coef, max_grad_norm,
+            use_sde=False, sde_sample_freq=-1, policy_kwargs=kwargs, seed=seed, device="cpu",
+            _init_setup_model=_init_setup_model, supported_action_spaces=(spaces.Box,),
+        )  # fmt: skip
 
     def _setup_model(self) -> None:
-        self._setup_lr_schedule()
-        self.set_random_seed(self.seed)
-        self.policy = self.policy_class(
-            self.observation_space, self.action_space, self.lr_schedule, **self.policy_kwargs
-        )
-        self.weights = Weights.shared(self.policy)
-        numbers = Weights.like(self.policy)
-        numbers.log_std[:] = 1.0
-        self.places = np.flatnonzero(numbers.vector)  # of log_std
+        super()._setup_model()
+        self.weights = Weights.of(self.policy)
         if self.moments is None:  # else it was loaded
             self.moments = np.zeros((2, self.weights.vector.size), np.float32)
 
     def _excluded_save_params(self) -> list[str]:
-        return [*super()._excluded_save_params(), "weights", "places"]
+        return [*super()._excluded_save_params(), "weights"]
 
-    def _get_torch_save_params(self) -> tuple[list[str], list[str]]:
-        return ["policy"], []
+    def _setup_learn(self, total_timesteps: int, callback: Any = None, *args: Any, **kwargs: Any) -> Any:
+        before = self._last_obs
+        found = super()._setup_learn(total_timesteps, callback, *args, **kwargs)
+        if self._last_obs is not before:  # the environments were reset
+            self.scale.restart()
+        return found
 
-    def learn(
-        self,
-        total_timesteps: int,
-        callback: Any = None,
-        log_interval: int = 1,
-        tb_log_name: str = "ppo_flat",
-        reset_num_timesteps: bool = True,
-        progress_bar: bool = False,
-    ) -> FlatPPO:
-        """Train for so many more steps. A callback is told of every step, and of every rollout."""
-        total, told = self._setup_learn(
-            total_timesteps, callback, reset_num_timesteps, tb_log_name, progress_bar
-        )
-        told.on_training_start(locals(), globals())
-        while self.num_timesteps < total:
-            told.on_rollout_start()
-            rollout = self.play(told)
-            if rollout is None:
-                break
-            told.on_rollout_end()
-            self._update_current_progress_remaining(self.num_timesteps, total)
-            self.log()
-            self.improve(*self.experience(rollout))
-        told.on_training_end()
-        return self
-
-    def play(self, callback: BaseCallback) -> Rollout | None:
-        """Go on from the last observation for `n_steps`; None where the callback ends the training."""
-        envs, box, weights = self.env, self.action_space, self.weights
-        assert envs is not None
+    def collect_rollouts(
+        self, env: Any, callback: BaseCallback, rollout_buffer: Any, n_rollout_steps: int
+    ) -> bool:
+        """Go on from the last observation for so many steps and fill the buffer; False where the callback
+        ends the training."""
+        box, weights, buffer = self.action_space, self.weights, rollout_buffer
         assert isinstance(box, spaces.Box)
-        entries, actions = (int(np.prod(space.shape or ())) for space in (self.observation_space, box))
-        rollout = Rollout.room(self.n_steps, envs.num_envs, entries, actions)
-        noise = self.random.standard_normal(rollout.actions.shape, np.float32)
-        rollout.log_probs[:] = -0.5 * np.square(noise).sum(-1) - weights.log_std.sum()
+        buffer.reset()
+        callback.on_rollout_start()
+        ended = np.zeros(buffer.rewards.shape, bool)
+        cut_off = []  # by a time limit: step, environment and its last observation
+        noise = self.random.standard_normal(buffer.actions.shape, np.float32)
+        buffer.log_probs[:] = -0.5 * np.square(noise).sum(-1) - weights.log_std.sum()
         noise *= np.exp(weights.log_std)
-        seen: Any = self._last_obs
-        for t in range(self.n_steps):
-            rollout.observations[t] = seen
-            np.add(weights.actor(rollout.observations[t]), noise[t], out=rollout.actions[t])
+        for t in range(n_rollout_steps):
+            buffer.observations[t] = self._last_obs
+            buffer.episode_starts[t] = self._last_episode_starts
+            np.add(weights.actor(flat(buffer.observations[t])), noise[t], out=buffer.actions[t])
             # A sample outside the box is played at its edge, but learnt from as it was drawn
-            played = np.clip(rollout.actions[t], box.low, box.high)
-            seen, rollout.rewards[t], dones, infos = envs.step(played)
-            rollout.ended[t] = dones
-            self.num_timesteps += envs.num_envs
+            clipped_actions = np.clip(buffer.actions[t].reshape(-1, *box.shape), box.low, box.high)
+            new_obs, rewards, dones, infos = env.step(clipped_actions)
+            self._last_obs, self._last_episode_starts = new_obs, dones
+            buffer.rewards[t], ended[t] = rewards, dones
+            self.num_timesteps += env.num_envs
             callback.update_locals(locals())
             if not callback.on_step():
-                return None
+                return False
             self._update_info_buffer(infos, dones)
-            for env in np.flatnonzero(dones).tolist():
-                if infos[env].get("TimeLimit.truncated", False):
-                    rollout.cut_off.append((t, env, infos[env]["terminal_observation"]))
-        rollout.observations[-1] = self._last_obs = seen
-        return rollout
-
-    def experience(self, rollout: Rollout) -> tuple[Floats, Floats]:
-        """What is learnt from, in one row for each step: observations, and log probabilities, advantages,
-        targets of the value and actions."""
-        critic = self.weights.critic
-        values, rewards = critic(rollout.observations)[..., 0], rollout.rewards
+            cut_off += [
+                (t, k, infos[k]["terminal_observation"])
+                for k in np.flatnonzero(dones).tolist()
+                if infos[k].get("TimeLimit.truncated", False)
+            ]
+        critic = weights.critic
         if self.norm_reward:
-            rewards = np.clip(rewards / self.scale.after(rewards, rollout.ended), -LARGEST, LARGEST)
-        if rollout.cut_off:
-            times, envs, last = zip(*rollout.cut_off, strict=True)
-            rewards[[*times], [*envs]] += np.float32(self.gamma) * critic(np.array(last))[:, 0]
-        advantages = estimate_advantages(rewards, values, rollout.ended, self.gamma, self.gae_lambda)
-        columns = rollout.log_probs, advantages, advantages + values[:-1]
-        steps = np.concatenate([*(one[..., None] for one in columns), rollout.actions], 2)
-        observations = rollout.observations[:-1]
-        return observations.reshape(-1, observations.shape[-1]), steps.reshape(-1, steps.shape[-1])
+            scale = self.scale.after(buffer.rewards, ended)
+            buffer.rewards[:] = np.clip(buffer.rewards / scale, -LARGEST, LARGEST)
+        if cut_off:
+            times, envs, last = zip(*cut_off, strict=True)
+            buffer.rewards[[*times], [*envs]] += np.float32(self.gamma) * critic(flat(np.array(last)))[:, 0]
+        buffer.values[:] = critic(flat(buffer.observations, 2))[..., 0]
+        buffer.compute_returns_and_advantage(torch.from_numpy(critic(flat(new_obs))), dones)
+        callback.update_locals(locals())
+        callback.on_rollout_end()
+        return True
 
-    def improve(self, observations: Floats, steps: Floats) -> None:
+    def train(self) -> None:
         """Steps of Adam on shuffled batches."""
-        rate = self.lr_schedule(self._current_progress_remaining)
-        gradient, losses = Gradient(self), []
+        buffer, progress = self.rollout_buffer, self._current_progress_remaining
+        columns = (buffer.log_probs, buffer.advantages, buffer.returns)
+        steps = np.concatenate([*(one[..., None] for one in columns), buffer.actions], 2)
+        steps = steps.reshape(-1, steps.shape[-1])
+        observations = buffer.observations.reshape(len(steps), -1)
+        rate = self.lr_schedule(progress)
+        clip_range = self.clip_range(progress) if callable(self.clip_range) else self.clip_range
+        gradient, losses = Gradient(self, clip_range), []
         for _ in range(self.n_epochs):
             for chosen in self.batches(len(steps)):
                 losses.append(gradient.compute(observations, steps, chosen))
@@ -456,20 +406,12 @@ class FlatPPO(BaseAlgorithm):
         spread = np.sqrt(square / (1 - BETA2**self._n_updates)) + EPSILON
         self.weights.vector[:] -= np.float32(size) * mean / spread
 
-    def log(self) -> None:
-        """Write what was recorded since the last rollout."""
-        if self.ep_info_buffer:
-            for name, key in (("rew", "r"), ("len", "l")):
-                mean = float(np.mean([episode[key] for episode in self.ep_info_buffer]))
-                self.logger.record(f"rollout/ep_{name}_mean", mean)
-        self.logger.dump(self.num_timesteps)
-
 
 class Gradient:
     """The gradient of the loss over a batch, `vector`."""
 
-    def __init__(self, model: FlatPPO) -> None:
-        self.model = model
+    def __init__(self, model: FlatPPO, clip_range: float) -> None:
+        self.model, self.clip_range = model, clip_range
         self.parts: dict[tuple[int, int], tuple[Any, ...]] = {}  # rooms, by chunk and its size
 
     def compute(self, observations: Floats, steps: Floats, chosen: NDArray[np.int64]) -> Floats:
@@ -477,27 +419,23 @@ class Gradient:
         model, log_std = self.model, self.model.weights.log_std
         advantages = steps[chosen, ADVANTAGE]
         scale = np.array([advantages.mean(), advantages.std(ddof=1) + 1e-8], np.float32)
-        constants = (np.float32(one) for one in (model.clip_range, model.vf_coef, len(chosen)))
-        clip_range, vf_coef, count = constants
-        chunks = [chosen[begin : begin + CHUNK] for begin in range(0, len(chosen), CHUNK)]
+        numbers = (self.clip_range, model.vf_coef, model.ent_coef, len(chosen))
+        constants = [np.float32(number) for number in numbers]
+        chunks = np.array_split(chosen, -(-len(chosen) // CHUNK))
         parts = [self.part(k, len(rows)) for k, rows in enumerate(chunks)]
-
         calls = [
-            (
-                observations, steps, rows, scale, *room, (log_std, own.log_std), clip_range, vf_coef, count,
-                losses,
-            )
+            (observations, steps, rows, scale, *room, (log_std, own.log_std), *constants, losses)
             for rows, (own, room, losses) in zip(chunks, parts, strict=True)
-        ]  # fmt: skip
-        run_together(compiled_gradient, calls, model.num_threads or torch.get_num_threads())
+        ]
+        threads = min(model.num_threads or torch.get_num_threads(), available())
+        run_together(compiled_gradient, calls, threads)
         self.vector = np.sum([own.vector for own, _, _ in parts], 0)
-        self.vector[model.places] -= np.float32(model.ent_coef)  # of the entropy, the sum of log_std and more
         return np.sum([losses for *_, losses in parts], 0)
 
     def part(self, number: int, rows: int) -> tuple[Any, ...]:
         """Room for a chunk of a batch: derivatives, what is between, losses."""
         if (number, rows) not in self.parts:
-            model, own = self.model, Weights.like(self.model.policy)
+            model, own = self.model, Weights.of(copy.deepcopy(self.model.policy))
             widths = model.weights.actor.matrices[0].shape[1], ACTIONS + model.weights.log_std.size
             room: list[Any] = [np.zeros((rows, width), np.float32) for width in widths]
             room += [

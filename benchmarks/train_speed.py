@@ -22,7 +22,6 @@ import torch
 from stable_baselines3.common.logger import Logger
 
 from agents import runs
-from agents.ppo_flat import FlatPPO
 from agents.settings import FOLDER, Algorithm, load_settings
 from agents.train import Args, make_model
 from benchmarks.history import RESULTS, write
@@ -95,8 +94,7 @@ def where_time_goes(model: Any, rounds: int) -> dict[str, float]:
     env = model.env
     while hasattr(env, "venv"):
         env = env.venv
-    improve = "improve" if isinstance(model, FlatPPO) else "train"
-    timed = [(env.envs.batch, "step"), (model.env, "step_async"), (model.env, "step_wait"), (model, improve)]
+    timed = [(env.envs.batch, "step"), (model.env, "step_async"), (model.env, "step_wait"), (model, "train")]
     clocks = [Clock() for _ in timed]
     for clock, (owner, name) in zip(clocks, timed, strict=True):
         setattr(owner, name, clock.around(getattr(owner, name)))

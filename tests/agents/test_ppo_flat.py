@@ -6,12 +6,11 @@ import gymnasium as gym
 import numpy as np
 import pytest
 import torch
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from stable_baselines3 import PPO
+from stable_baselines3.common.utils import LinearSchedule
 from stable_baselines3.common.vec_env import DummyVecEnv
 
-from agents.ppo_flat import CHUNK, FlatPPO, Gradient, Scale, estimate_advantages, tanh
+from agents.ppo_flat import CHUNK, FlatPPO, Gradient, Scale, tanh
 from agents.train import Args, train
 from agents.watch import DivergedError
 from hoof_env.errors import ParameterError
@@ -59,6 +58,8 @@ def test_tanh():
     y = np.empty_like(x)
     kernel(fill)(x, y)
     np.testing.assert_allclose(y, np.tanh(x.astype(float)), atol=8e-6)
+    kernel(fill)(np.float32([1e6, -np.inf, np.nan]), far := np.empty(3, np.float32))
+    np.testing.assert_array_equal(far, [1.0, -1.0, np.nan])
 
 
 @pytest.mark.parametrize("count", [2, 64, CHUNK, CHUNK + 1, 2 * CHUNK + 500])
@@ -76,7 +77,7 @@ def test_the_gradient_is_that_of_torch_and_stable_baselines(net_arch, count):
     chosen = generator.permutation(3 * count)[:count]
     half = 0.5 * np.log(2 * np.pi)  # each action's, which ours leaves out of both probabilities
     steps = np.column_stack([old + half, advantages, targets, actions]).astype(np.float32)
-    gradient = Gradient(one)
+    gradient = Gradient(one, one.clip_range)
     policy_loss, value_loss = gradient.compute(observations, steps, chosen)
 
     x, a, b, adv, v = (torch.tensor(row[chosen]) for row in (observations, actions, old, advantages, targets))
@@ -109,26 +110,6 @@ def test_steps_are_those_of_adam():
         np.testing.assert_allclose(one.weights.vector, expected, rtol=1e-4, atol=1e-6)
 
 
-@settings(max_examples=20, deadline=None)
-@given(st.integers(0, 10**6))
-def test_advantages_are_those_of_every_episode_alone(seed):
-    generator = np.random.default_rng(seed)
-    rewards = generator.normal(size=(40, 3)).astype(np.float32)
-    values = generator.normal(size=(41, 3)).astype(np.float32)
-    ended = generator.random((40, 3)) < 0.2
-    found = estimate_advantages(rewards, values, ended, GAMMA, LAMBDA)
-    for env in range(3):
-        for start in range(40):
-            expected, weight = 0.0, 1.0
-            for t in range(start, 40):
-                future = 0.0 if ended[t, env] else GAMMA * values[t + 1, env]
-                expected += weight * (rewards[t, env] + future - values[t, env])
-                weight *= GAMMA * LAMBDA
-                if ended[t, env]:
-                    break
-            assert found[start, env] == pytest.approx(float(expected), abs=1e-5)
-
-
 def test_the_scale_is_the_deviation_of_all_returns_so_far():
     generator, scale = np.random.default_rng(0), Scale(GAMMA)
     seen, running = [], np.zeros(4)
@@ -154,10 +135,18 @@ def test_a_time_limit_is_not_the_end_but_a_termination_is(ends, value):
     assert one.weights.critic(np.ones((1, 2), np.float32)) == pytest.approx(value, rel=0.1)
 
 
-def test_learns_the_action_that_pays():
-    one = model(envs=8, norm_reward=True).learn(8_000)
+@pytest.mark.parametrize("clip_range", [0.2, LinearSchedule(0.3, 0.1, 1.0)])
+def test_learns_the_action_that_pays(clip_range):
+    one = model(envs=8, norm_reward=True, clip_range=clip_range).learn(8_000)
     assert one.weights.actor(np.ones((1, 2), np.float32)) == pytest.approx(0.5, abs=0.1)
     assert one.num_timesteps >= 8_000
+
+
+def test_another_number_of_environments_goes_on(tmp_path):
+    """Their returns so far are another's."""
+    model(envs=8, norm_reward=True).learn(512).save(tmp_path / "model.zip")
+    loaded = FlatPPO.load(tmp_path / "model.zip", env=DummyVecEnv([Guess] * 3))
+    assert loaded.learn(96, reset_num_timesteps=False).num_timesteps == 608
 
 
 @pytest.mark.parametrize("num_threads", [1, 2, 5])
@@ -192,6 +181,8 @@ def test_what_it_leaves_is_played_as_stable_baselines_plays(tmp_path):
         ({"params": ('policy_kwargs={"activation_fn": "nn.ReLU"}',)}, "expected nn.Tanh"),
         ({"params": ("normalize=true", "use_sde=true")}, "use_sde"),
         ({"params": ("batch_size=1",)}, "batch_size: expected 2 or more"),
+        ({"params": ("normalize=true", "norm_reward=true")}, "norm_reward: expected False"),
+        ({"params": ('policy_kwargs={"squash_output": true}',)}, "policy_kwargs: expected some of"),
         ({"device": "cuda"}, "device"),
         ({"env_id": "CartPole-v1"}, "Discrete"),
     ],
