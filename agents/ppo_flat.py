@@ -33,7 +33,7 @@ from torch.nn.utils import parameters_to_vector, vector_to_parameters
 
 from hoof_env.errors import ParameterError
 from hoof_env.simd.compile import inlined, kernel
-from hoof_env.simd.threads import available, check_threads, run_together
+from hoof_env.simd.threads import check_threads, limit_threads, run_together
 
 Floats = NDArray[np.float32]
 
@@ -427,7 +427,7 @@ class Gradient:
             (observations, steps, rows, scale, *room, (log_std, own.log_std), *constants, losses)
             for rows, (own, room, losses) in zip(chunks, parts, strict=True)
         ]
-        threads = min(model.num_threads or torch.get_num_threads(), available())
+        threads = limit_threads(model.num_threads or torch.get_num_threads())
         run_together(compiled_gradient, calls, threads)
         self.vector = np.sum([own.vector for own, _, _ in parts], 0)
         return np.sum([losses for *_, losses in parts], 0)

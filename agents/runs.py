@@ -62,6 +62,8 @@ def alone(folder: Path) -> Iterator[None]:
         lock.acquire(timeout=0)
     except Timeout:
         raise OutputError(f"{folder}: another process is at work there; choose another folder") from None
+    except NotImplementedError:  # a file system without locks, as some of clusters
+        pass
     try:
         yield
     except BaseException:

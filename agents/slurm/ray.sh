@@ -10,13 +10,24 @@
 #SBATCH --ntasks-per-node=1
 #SBATCH --time=01:00:00
 #SBATCH --no-kill
+#SBATCH --exclusive
 
 source "${VENV:-.venv}/bin/activate"
-first=$(scontrol show hostnames "$SLURM_JOB_NODELIST" | head -n 1)
-address=$(scontrol show node "$first" --oneliner | sed 's/.*NodeAddr=\([^ ]*\).*/\1/')
-RAY_AUTH_TOKEN=$(python -c 'import secrets; print(secrets.token_hex())') # others work on the nodes, too
-export RAY_AUTH_TOKEN RAY_AUTH_MODE=token RAY_USAGE_STATS_ENABLED=0
+# This runs on the first node. ADDRESS says where the others reach it, if not at the first address that it has.
+address=${ADDRESS:-$(hostname -I | awk '{ print $1 }')}
+RAY_AUTH_TOKEN=$(python -c 'import secrets; print(secrets.token_hex())') # others may reach the nodes, too
+export RAY_AUTH_TOKEN RAY_AUTH_MODE=token RAY_USAGE_STATS_ENABLED=0 OMP_NUM_THREADS=1
+export RAY_SYMMETRIC_RUN_CLUSTER_WAIT_TIMEOUT=300
+began=$(mktemp)
+rm "$began"
 
-srun --no-kill ray symmetric-run --address "$address:$((20000 + SLURM_JOB_ID % 10000))" \
+srun --no-kill --cpus-per-task="${SLURM_CPUS_PER_TASK:-1}" \
+  ray symmetric-run --address "$address:$((20000 + SLURM_JOB_ID % 10000))" \
   --min-nodes "$SLURM_JOB_NUM_NODES" --num-cpus "${SLURM_CPUS_PER_TASK:-1}" -- \
-  python -m agents.distribute trials --address auto "$@"
+  bash -c 'touch "$0" && exec python -m agents.distribute trials --address auto "$@"' "$began" "$@"
+code=$?
+if ! rm "$began" 2>/dev/null; then
+  echo 'Ray did not start; its messages are above' >&2 # symmetric-run ends with 0 then
+  exit 1
+fi
+exit $code

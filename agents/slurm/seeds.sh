@@ -15,5 +15,6 @@ out=${1:?usage: sbatch --array=0-9 agents/slurm/seeds.sh FOLDER [arguments of ag
 : "${SLURM_ARRAY_TASK_ID:?expected an array: sbatch --array=0-9}"
 
 source "${VENV:-.venv}/bin/activate"
+export OMP_NUM_THREADS=1
 exec python -m agents.train --seed "$SLURM_ARRAY_TASK_ID" \
   --out "$out/seed-$SLURM_ARRAY_TASK_ID" --resume --torch-threads "${SLURM_CPUS_PER_TASK:-1}" "${@:2}"

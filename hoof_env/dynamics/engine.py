@@ -38,7 +38,7 @@ from hoof_env.gait import FilterSettings, GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.profile import by_name, cross, leg_profile
-from hoof_env.simd.threads import blocks, check_threads, run_together
+from hoof_env.simd.threads import blocks, check_threads, limit_threads, run_together
 from hoof_env.simd.user_functions import check_function, what_cannot_be_compiled
 
 FEW = 6
@@ -143,6 +143,7 @@ class TrunkEngine(Scene):
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state, _memory=memory.memory_of(*state["_memory"]))
+        self.num_threads = limit_threads(self.num_threads)
         self._choose_kernel()
 
     # What it is like

@@ -35,6 +35,11 @@ def check_threads(num_threads: Any) -> int:
     return threads
 
 
+def limit_threads(num_threads: int) -> int:
+    """So many, or the processors that there are: a copy may go on where there are fewer."""
+    return min(num_threads, available())
+
+
 def blocks(columns: int, lanes: int, num_threads: int) -> list[range]:
     """Columns in equal parts that begin with a group of lanes: one for a thread alone, else `PARTS` a thread
     where there are enough, since the processors of a busy machine are not equally fast."""

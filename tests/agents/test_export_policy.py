@@ -22,6 +22,7 @@ if not os.environ.get("CI"):  # which installs them, so that nothing may be left
 
 from agents import export
 from agents.export import main, write_policy
+from agents.ppo_flat import FlatPPO
 from agents.runs import SavedModel, TrainedPolicy, make_env
 from agents.score import play
 from hoof_env.errors import DataFileError, HoofEnvError, OutputError, ParameterError
@@ -44,7 +45,7 @@ def untrained(algorithm, normalized: bool) -> TrainedPolicy:
     envs = DummyVecEnv([lambda: gym.make("Pendulum-v1")])
     arguments = {"policy_kwargs": {"net_arch": [8]}, "seed": 0, "device": "cpu"}
     model = algorithm("MlpPolicy", envs, **arguments)
-    if algorithm is PPO:
+    if algorithm in (PPO, FlatPPO):
         model.policy.action_net.weight.data *= 300
     if not normalized:
         return TrainedPolicy(model, None)
@@ -54,7 +55,7 @@ def untrained(algorithm, normalized: bool) -> TrainedPolicy:
 
 
 @pytest.mark.parametrize("normalized", [True, False])
-@pytest.mark.parametrize("algorithm", [PPO, SAC, TD3, TQC])
+@pytest.mark.parametrize("algorithm", [PPO, FlatPPO, SAC, TD3, TQC])
 def test_what_is_exported_acts_as_the_model(algorithm, normalized):
     policy = untrained(algorithm, normalized)
     rows = np.random.default_rng(1).normal(0, 3, (50, 3)).astype(np.float32)

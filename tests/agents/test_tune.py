@@ -2,11 +2,12 @@
 
 import logging
 from pathlib import Path
+from typing import get_args
 
 import pytest
 import yaml
 
-from agents.settings import load_settings
+from agents.settings import Algorithm, load_settings
 from agents.train import Args as TrainArgs
 from agents.train import train
 from agents.tune import SPACES, Args, TrialScorer, draw, finished, load_space, tune
@@ -108,7 +109,7 @@ def test_a_bad_trial_is_pruned(tmp_path):
     assert scores == scorer.curve[:1]
 
 
-@pytest.mark.parametrize("algo", ["ppo", "sac", "td3", "tqc"])
+@pytest.mark.parametrize("algo", get_args(Algorithm))
 def test_every_algorithm_has_a_space(algo):
     space = load_space(SPACES, algo)
     base = {"policy_kwargs": {"net_arch": [8], "kept": 1}}

@@ -88,6 +88,15 @@ def test_copies_go_on_by_themselves(again):
     same(rolled(envs), expected)
 
 
+def test_a_copy_has_no_more_threads_than_there_are_processors(monkeypatch):
+    envs = make(40, 4).unwrapped
+    envs.reset(seed=4)
+    kept = pickle.dumps(envs)
+    monkeypatch.setattr(threads, "available", lambda: 3)
+    assert pickle.loads(kept).batch.engine.num_threads == 3
+    same(rolled(pickle.loads(kept)), rolled(envs))
+
+
 @pytest.mark.parametrize("given", [0, 9, 2.0])
 def test_bad_numbers_of_threads(given):
     with pytest.raises(ParameterError, match=r"num_threads: expected.*got"):
@@ -124,9 +133,7 @@ def test_a_forked_process_has_threads_of_its_own():
         warnings.simplefilter("ignore", DeprecationWarning)  # fork beside threads
         child = os.fork()
         same(envs.step(actions(1, 40)), expected)
-        if not child:
-            os._exit(0)
-        sys.exit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+        sys.exit(child and os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
         """,
     )
 
