@@ -7,7 +7,7 @@ pictures.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import cycle
 from pathlib import Path
@@ -103,34 +103,41 @@ def figures_table(rows: Sequence[Row], gaits: References) -> str:
 
 
 def pace_table(rows: Sequence[Row], known: Mapping[str, Scored]) -> str:
-    """Steps a second, and seconds until the open-loop gait's return: beside the first row, seed by seed."""
-    level = known[OPEN_LOOP].intervals["return"].mean
+    """Steps a second, return, and seconds until the open-loop gait's return; beside the first row, seed by
+    seed. Only seeds that reach that return in both are compared."""
+    level, first = known[OPEN_LOOP].intervals["return"].mean, rows[0]
     rates, times = [], []
     for row in rows:
-        rates.append(np.array([one.final["steps"] / one.final["wall_s"] for one in row.results]))
-        times.append(np.array([seconds_to(level, one) for one in row.results]))
+        ends = [one.final for one in row.results]
+        rates.append({end["seed"]: end["steps"] / end["wall_s"] for end in ends})
+        times.append({one.final["seed"]: seconds_to(level, one) for one in row.results})
     lines = []
     for row, rate, time in zip(rows, rates, times, strict=True):
-        n = min(len(rate), len(rates[0]))
-        with np.errstate(invalid="ignore"):  # where both never reach it
-            parts = time[:n] / times[0][:n]
+        both = [seed for seed in rate if seed in rates[0]]
+        faster = [rate[seed] / rates[0][seed] for seed in both]
+        parts = [time[seed] / times[0][seed] for seed in both if np.isfinite(time[seed] + times[0][seed])]
+        ours, theirs = row.scored.intervals["return"], first.scored.intervals["return"]
         lines.append(
-            [row.title, str(len(rate)), span(rate, 0), span(rate[:n] / rates[0][:n], 2),
-             row.scored.intervals["return"].text(), span(time, 0), f"{np.isfinite(time).sum()}/{len(time)}",
-             span(parts, 2), f"{np.sum(parts <= SOON)}/{n}"]
+            [row.title, str(len(rate)), span(rate.values(), 0), span(faster, 2), ours.text(),
+             "no" if ours.mean < theirs.low else "yes", span(time.values(), 0),
+             f"{np.isfinite([*time.values()]).sum()}/{len(time)}", span(parts, 2),
+             f"{np.sum(np.array(parts) <= SOON)}/{len(both)}"]
         )  # fmt: skip
     titles = (
-        "policy", "seeds", "steps/s", f"beside {rows[0].title}", "return: IQM [95 %]", f"s to {level:.1f}",
-        "reached", f"beside {rows[0].title}", f"at most {SOON}",
+        "policy", "seeds", "steps/s", f"beside {first.title}", "return: IQM [95 %]",
+        f"IQM not below {first.title}'s interval", f"s to {level:.1f}", "reached", f"beside {first.title}",
+        f"at most {SOON}",
     )  # fmt: skip
     return markdown_table(titles, lines)
 
 
-def span(values: Floats, digits: int) -> str:
-    """Median, least and greatest; nothing where one is not known."""
-    if np.isnan(values).any():
+def span(values: Iterable[float], digits: int) -> str:
+    """Median, least and greatest; nothing where there is none."""
+    numbers = np.array([*values])
+    if not numbers.size:
         return ""
-    texts = [f"{x:,.{digits}f}" for x in (np.median(values), values.min(), values.max())]
+    three = (np.median(numbers), numbers.min(), numbers.max())
+    texts = [f"{x:,.{digits}f}" if np.isfinite(x) else "never" for x in three]
     return "{} ({} to {})".format(*texts)
 
 

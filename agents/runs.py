@@ -84,15 +84,16 @@ def make_env(env_id: str, **kwargs: Any) -> gym.Env[Any, Any]:
         raise ParameterError(f"environment {env_id!r} with {kwargs or 'no arguments'}: {error}") from None
 
 
-def make_vec_env(env_id: str, n_envs: int, **kwargs: Any) -> Any:
-    """Environments side by side as Stable-Baselines3's `VecEnv`: in one call where the id has a vector
-    environment of this package, else one after the other. A pipe to another process would cost more."""
+def make_vec_env(env_id: str, n_envs: int, num_threads: int = 1, **kwargs: Any) -> Any:
+    """Environments side by side as Stable-Baselines3's `VecEnv`: in one call and on so many threads where the
+    id has a vector environment of this package, else one after the other. A pipe to another process would
+    cost more."""
     with make_env(env_id, **kwargs) as env:
         spec = env.spec
     if spec is not None and str(spec.vector_entry_point).startswith("hoof_env."):
         from hoof_env.envs.sb3 import Sb3VecEnv
 
-        many = Sb3VecEnv(spec.id, n_envs, **kwargs)
+        many = Sb3VecEnv(spec.id, n_envs, num_threads=num_threads, **kwargs)
         many.reset()  # the first step compiles; the training's own reset seeds all again
         many.step(np.zeros((n_envs, *(many.action_space.shape or ())), np.float32))
         return many

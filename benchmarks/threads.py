@@ -34,7 +34,6 @@ from hoof_env.simd.threads import available, run_together
 LEGS, STEPS = 1024, 60
 BESIDE_PROCESSES, BESIDE_ONE = 0.9, 1.5
 CORES, MODELLED = (2, 4, 8, 16, 32, 64), (1024, 8192)
-CALLS = 8
 
 INTRO = """\
 # What threads gain
@@ -46,12 +45,12 @@ legs and waits for nobody; threads are joined after each control step."""
 MODEL = """\
 ## More cores: computed, not measured
 
-A control step of n legs on p threads takes s + g ceil(n / 8 p) + c (p - 1): s is what one thread does for all
-legs (actions, observations, rewards, resets), g the time of a group of eight columns, c that of
-a call to a thread and its answer. Here s = {serial:.0f} us for 1024 legs and in proportion to them,
-g = {group:.1f} us and c = {call:.0f} us (medians; c from {calls} calls at once of an empty kernel). Memory
-and clock rate are taken to be those of one core, and no processor waits for a slower one: compare the row of
-two threads with what was measured."""
+A control step of n legs on p threads takes f (s + g ceil(n / 8 p)) + c (p - 1): s is what one thread does for
+all legs (actions, observations, rewards, resets), g the time of a group of eight columns, c that of a call to
+a thread and its answer, f how much slower a processor is while another works, as the processes above say.
+Here s = {serial:.0f} us for 1024 legs and in proportion to them, g = {group:.1f} us, f = {neighbours:.2f},
+c = {call:.0f} us (medians; c of an empty kernel). The row of two threads shows how far the model may be off.
+Left out are what a thread waits for one that is slower, and what more processors share than two do."""
 
 
 class Legs:
@@ -137,18 +136,18 @@ def call_cost(calls: int) -> float:
         run_together(nothing, [(1,)] * count, count)
         return time.perf_counter() - begin
 
-    timed(1), timed(calls)
+    timed(1), timed(calls)  # compiled, and threads started
     return float(np.median([timed(calls) - timed(1) for _ in range(500)])) / (calls - 1)
 
 
-def gain(legs: int, threads: int, serial: float, group: float, call: float) -> float:
+def gain(legs: int, threads: int, serial: float, group: float, call: float, neighbours: float) -> float:
     """How many times as fast so many threads are by the page's model; `serial` is for `LEGS`."""
     groups = -(-legs // LANES)
 
     def seconds(p: int) -> float:
-        return serial * legs / LEGS + group * -(-groups // p) + call * (p - 1)
+        return serial * legs / LEGS + group * -(-groups // p)
 
-    return seconds(1) / seconds(threads)
+    return seconds(1) / (neighbours * seconds(threads) + call * (threads - 1))
 
 
 def measure(rounds: int, threads: int) -> dict[str, Any]:
@@ -171,7 +170,8 @@ def measure(rounds: int, threads: int) -> dict[str, Any]:
         "machine": machine(), "bits": vector_bits(), "rounds": rounds, "legs": LEGS, "steps": STEPS,
         "rate": {name: spread(LEGS * STEPS / each) for name, each in seconds.items()},
         "ratios": [(case, beside, spread(ratio), bar) for case, beside, ratio, bar in ratios],
-        "calls": CALLS, "serial": serial, "group": kernel * LANES / LEGS, "call": call_cost(CALLS),
+        "serial": serial, "group": kernel * LANES / LEGS, "call": call_cost(threads),
+        "neighbours": threads / float(np.median(seconds["1 thread"] / seconds[apart])),
     }  # fmt: skip
 
 
@@ -182,7 +182,7 @@ def page(result: dict[str, Any]) -> str:
         [case, beside, describe(ratio), bar_text(bar, ratio) if bar else ""]
         for case, beside, ratio, bar in result["ratios"]
     ]
-    model = [result[key] for key in ("serial", "group", "call")]
+    model = [result[key] for key in ("serial", "group", "call", "neighbours")]
     more = [[str(p), *(f"{gain(legs, p, *model):.1f}" for legs in MODELLED)] for p in CORES]
     micro = {key: 1e6 * result[key] for key in ("serial", "group", "call")}
     about = markdown_table(["", ""], [[key, value] for key, value in result["machine"].items()])

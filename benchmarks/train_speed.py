@@ -48,10 +48,10 @@ Microseconds a step, the median over rounds. The kernel is one call for all legs
 of its step, with what Stable-Baselines3 asks of it; play is the policy and the bookkeeping."""
 
 
-def model_of(algo: Algorithm, **params: Any) -> Any:
+def model_of(algo: Algorithm, env_threads: int = 1, **params: Any) -> Any:
     """A model of an algorithm with `params` instead of the file's, on its environments."""
     settings = load_settings(FOLDER / f"{algo}.yml", ENV_ID) | params
-    many = runs.make_vec_env(ENV_ID, settings["n_envs"])
+    many = runs.make_vec_env(ENV_ID, settings["n_envs"], env_threads)
     model = make_model(Args(env_id=ENV_ID, algo=algo), settings, many)
     model.set_logger(Logger(None, []))
     return model
@@ -113,6 +113,10 @@ def measure(rounds: int) -> dict[str, Any]:
     sb3, flat = model_of("ppo"), {n: model_of("ppo_flat", num_threads=n) for n in {1, threads}}
     cases = {SB3: partial(train, sb3), f"PPO, {threads} threads": partial(train, model_of("ppo"), threads)}
     cases |= {f"PPO_FLAT, {n} thread{'s' * (n > 1)}": partial(train, model) for n, model in flat.items()}
+    cases |= {
+        f"{title}, {threads} threads, environments too": partial(train, model_of(algo, threads), threads)
+        for title, algo in (("PPO", "ppo"), ("PPO_FLAT", "ppo_flat"))
+    }
     seconds, units = interleave(cases, rounds), sb3.n_steps * sb3.n_envs
     parts = {SB3: where_time_goes(sb3, rounds)}
     parts |= {f"PPO_FLAT, {n} thread{'s' * (n > 1)}": where_time_goes(m, rounds) for n, m in flat.items()}
