@@ -25,9 +25,11 @@ from agents.baselines_results import (
     Row,
     compare,
     following,
+    following_commands,
     read_results,
     references,
     seconds_to,
+    settled_speeds,
     versions_of,
 )
 from agents.baselines_run import COLUMNS, CURVE, FOLDERS, LEG, Plan, load_plan, read_curve
@@ -163,13 +165,25 @@ def draw_frontier(rows: Sequence[Row], known: Mapping[str, Scored], path: Path) 
         figure.savefig(path, dpi=130)
 
 
-def following_table(rows: Sequence[Row]) -> str:
+def following_table(settled: Mapping[str, Mapping[int, Sequence[float]]]) -> str:
+    """Of settled speeds by row's title and seed."""
     lines = []
-    for row in rows:
-        one = following(row)
+    for title, speeds in settled.items():
+        one = following(title, speeds)
         each = ", ".join(f"{seed['follows']:.2f}" for seed in one.seeds)
-        lines.append([row.title, one.intervals["follows"].text(2), each])
-    return markdown_table(["", "change of speed / change of command", "each seed"], lines)
+        lines.append([title, one.intervals["follows"].text(2), each])
+    return markdown_table(["", "change of settled speed / change of command", "each seed"], lines)
+
+
+def write_settled(settled: Mapping[str, Mapping[int, Sequence[float]]], path: Path) -> None:
+    """A line for each agent and command."""
+    lines = [
+        {"policy": title, "seed": seed, "command_m_s": command, "settled_m_s": round(speed, 4)}
+        for title, speeds in settled.items()
+        for seed, each in speeds.items()
+        for command, speed in zip(following_commands(), each, strict=True)
+    ]
+    runs.write_csv(path, ("policy", "seed", "command_m_s", "settled_m_s"), lines)
 
 
 def made_text(rows: Sequence[Row]) -> str:
@@ -329,8 +343,10 @@ def report(args: Args) -> Path:
             parts += ["## How fast they train", pace_table(of_id(rows, LEG), gaits[LEG])]
             draw_frontier(of_id(rows, LEG), gaits[LEG], beside / "frontier.png")
             parts.append(f"![Return over steps a second]({beside.name}/frontier.png)")
-    if SPEED in gaits:
-        parts += ["## How a command is followed", following_table(of_id(rows, SPEED))]
+    settled = {row.title: settled_speeds(row) for row in of_id(rows, SPEED)}
+    if any(settled.values()):  # else there are results without policies
+        parts += ["## How a command is followed", following_table(settled)]
+        write_settled(settled, beside / "settled.csv")
     parts += ["## How it was made", made_text(rows)]
     runs.write_text(page, "\n\n".join(parts) + "\n")
     return page

@@ -26,6 +26,7 @@ from agents.statistics import TABLE, Scored, cells, mean_figures, over_episodes,
 from hoof_env._output import markdown_table
 from hoof_env.envs.tasks import TASKS
 from hoof_env.errors import DataFileError, HoofEnvError
+from hoof_env.saved_policy import ABOUT
 
 GAITS = ("run", "walk")
 OPEN_LOOP = "open-loop"  # name of the gait that CMA-ES found for an id, without learning
@@ -148,16 +149,29 @@ def reference(name: str, policy: Any, env_id: str) -> Scored:
     return Scored(name, over_episodes(score_vector(policy, env_id, FINAL_SEEDS)))
 
 
-def following(row: Row) -> Scored:
-    """Change of speed over change of command, of agents of `SPEED` that keep one command for an episode."""
-    low, high = TASKS["speed"].defaults["target_speed"]
-    commands, each = np.linspace(low, high, COMMANDS), []
+def settled_speeds(row: Row) -> dict[int, list[float]]:
+    """By seed, `settled_speed` under each of `following_commands`, of agents of `SPEED` whose policies are
+    there."""
+    found = {}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # they were trained with other commands, which is meant
         for one in row.results:
-            speeds = [settled_speed(str(one.folder), command) for command in commands]
-            each.append({"follows": float(np.polyfit(commands, speeds, 1)[0])})
-    return Scored(row.title, over_seeds(each), each)
+            if (one.folder / ABOUT).is_file():
+                speeds = [settled_speed(str(one.folder), command) for command in following_commands()]
+                found[one.final["seed"]] = speeds
+    return found
+
+
+def following_commands() -> list[float]:
+    """Commands [m/s] from the slowest to the quickest of `SPEED`."""
+    low, high = TASKS["speed"].defaults["target_speed"]
+    return [float(command) for command in np.linspace(low, high, COMMANDS)]
+
+
+def following(title: str, speeds: Mapping[int, Sequence[float]]) -> Scored:
+    """Change of the settled speed over change of command: the slope of a line through them."""
+    slopes = [{"follows": float(np.polyfit(following_commands(), one, 1)[0])} for one in speeds.values()]
+    return Scored(title, over_seeds(slopes), slopes)
 
 
 def settled_speed(policy: str, command: float) -> float:

@@ -37,7 +37,7 @@ from hoof_env import records
 from hoof_env._output import check_folder, markdown_table
 from hoof_env.envs.policies import open_loop_record
 from hoof_env.envs.vector import HorseLegVectorEnv
-from hoof_env.errors import DataFileError, ParameterError
+from hoof_env.errors import DataFileError, OutputError, ParameterError
 from hoof_env.saved_policy import find_saved
 
 ROWS = 1024  # episodes side by side at most; more are played one batch after the other
@@ -193,7 +193,8 @@ class Function:
         if actions.shape != (len(rows), self.actions) or not np.isfinite(actions).all():
             raise ParameterError(
                 f"policy {self.name}: expected finite actions of shape {(len(rows), self.actions)} for"
-                f" observations of shape {rows.shape}, got {actions.shape}"
+                f" observations of shape {rows.shape}, got shape {actions.shape} and"
+                f" {np.sum(~np.isfinite(actions))} that are not finite"
             )
         return actions.reshape(*np.shape(observation)[:-1], self.actions), state
 
@@ -210,7 +211,7 @@ def find_function(name: str, actions: int) -> Function:
         sys.path.insert(0, "")
     try:
         act = getattr(import_module(module), function)
-    except (ImportError, AttributeError) as error:
+    except (ImportError, AttributeError, SyntaxError) as error:
         raise ParameterError(f"policy: expected MODULE:NAME, got {name!r}: {error}") from error
     if not callable(act):
         raise ParameterError(f"policy {name}: expected a function of observations, got {act!r}")
@@ -231,12 +232,14 @@ def find_same(name: str, env: gym.Env[Any, Any], env_id: str) -> Any:
 
 
 def score(args: Args) -> list[tuple[str, list[dict[str, float]]]]:
-    """The episodes of each policy. `ParameterError`, `DataFileError`: an argument or a policy does not fit;
-    then nothing has been played. `OutputError`: the file cannot be written."""
+    """The episodes of each policy; says where they are played. `ParameterError`, `DataFileError`: an argument
+    or a policy does not fit; then nothing has been played. `OutputError`: the file cannot be written."""
     from tqdm import tqdm
 
     if args.csv:
         check_folder(args.csv.parent)
+        if args.csv.is_dir():
+            raise OutputError(f"--csv: expected the name of a file, {str(args.csv)!r} is a folder")
     read = [read_policy_record(name) for name in args.policy if not is_function(name)]
     record = next(filter(None, read), {})
     env_id = args.env_id or record.get("env_id", runs.DEFAULT_ENV)
@@ -244,6 +247,8 @@ def score(args: Args) -> list[tuple[str, list[dict[str, float]]]]:
     env_kwargs = parse_pairs("--env-kwargs", args.env_kwargs) or own
     with runs.make_env(env_id, **env_kwargs) as env:
         policies = {name: find_same(name, env, env_id) for name in args.policy}
+    with_what = f" with {env_kwargs}" if env_kwargs else ""
+    print(f"{env_id}{with_what}, episodes {FINAL_SEEDS[0]:,} to {FINAL_SEEDS[-1]:,}\n", flush=True)
     bar = tqdm(policies.items(), unit=" policies", leave=False, disable=None)
     return [(name, score_vector(policy, env_id, FINAL_SEEDS, **env_kwargs)) for name, policy in bar]
 

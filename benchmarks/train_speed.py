@@ -113,9 +113,10 @@ def measure(rounds: int) -> dict[str, Any]:
     sb3, flat = model_of("ppo"), {n: model_of("ppo_flat", num_threads=n) for n in {1, threads}}
     cases = {SB3: partial(train, sb3), f"PPO, {threads} threads": partial(train, model_of("ppo"), threads)}
     cases |= {f"PPO_FLAT, {n} thread{'s' * (n > 1)}": partial(train, model) for n, model in flat.items()}
+    too = f"{threads} threads, environments too"
     cases |= {
-        f"{title}, {threads} threads, environments too": partial(train, model_of(algo, threads), threads)
-        for title, algo in (("PPO", "ppo"), ("PPO_FLAT", "ppo_flat"))
+        f"PPO, {too}": partial(train, model_of("ppo", threads), threads),
+        f"PPO_FLAT, {too}": partial(train, model_of("ppo_flat", threads), threads),
     }
     seconds, units = interleave(cases, rounds), sb3.n_steps * sb3.n_envs
     parts = {SB3: where_time_goes(sb3, rounds)}

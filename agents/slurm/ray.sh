@@ -18,16 +18,13 @@ address=${ADDRESS:-$(hostname -I | awk '{ print $1 }')}
 RAY_AUTH_TOKEN=$(python -c 'import secrets; print(secrets.token_hex())') # others may reach the nodes, too
 export RAY_AUTH_TOKEN RAY_AUTH_MODE=token RAY_USAGE_STATS_ENABLED=0 OMP_NUM_THREADS=1
 export RAY_SYMMETRIC_RUN_CLUSTER_WAIT_TIMEOUT=300
-began=$(mktemp)
-rm "$began"
+result=$(mktemp) # of the trials; the step's own code is that of nodes which are ended with it
 
-srun --no-kill --cpus-per-task="${SLURM_CPUS_PER_TASK:-1}" \
+srun --no-kill --wait=60 --cpus-per-task="${SLURM_CPUS_PER_TASK:-1}" \
   ray symmetric-run --address "$address:$((20000 + SLURM_JOB_ID % 10000))" \
   --min-nodes "$SLURM_JOB_NUM_NODES" --num-cpus "${SLURM_CPUS_PER_TASK:-1}" -- \
-  bash -c 'touch "$0" && exec python -m agents.distribute trials --address auto "$@"' "$began" "$@"
-code=$?
-if ! rm "$began" 2>/dev/null; then
-  echo 'Ray did not start; its messages are above' >&2 # symmetric-run ends with 0 then
-  exit 1
-fi
-exit $code
+  bash -c 'python -m agents.distribute trials --address auto "$@"; echo $? >"$0"' "$result" "$@"
+code=$(<"$result")
+rm "$result"
+[ -n "$code" ] || echo 'Ray did not start; its messages are above' >&2
+exit "${code:-1}"

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hoof_env._version import __version__
 from hoof_env.envs.start import extreme_posture
 from hoof_env.errors import DataFileError, ParameterError, check_choice
 from hoof_env.gait import LIMITS, paper_gaits
@@ -192,7 +193,8 @@ GAITS = Path(__file__).parents[1] / "data" / "gaits"
 
 def load_open_loop(path_or_env_id: str | Path, env: Any = None) -> Scripted:
     """The policy of a gait file; or, for the id of an environment, of the best gait that is stored. Its clock
-    has the control step of `env`, or that of the file. Warns if it was found for another id.
+    has the control step of `env`, or that of the file. Warns if it was found for another id, with other
+    settings, or by another version.
 
     `DataFileError` if there is none, it cannot be read, or actions of `env` command other gaits.
     """
@@ -216,6 +218,15 @@ def load_open_loop(path_or_env_id: str | Path, env: Any = None) -> Scripted:
                 f"{record.get('env_id')} do, got {type(leg).__name__}, where this one is {meant.tolist()}"
             )
         here = leg.spec and leg.spec.id
+        unlike = []
         if here and (there := record.get("env_id") or here) not in (here, STANDS_FOR.get(here)):
-            warnings.warn(f"open-loop gait {path}: found for {there}, here {here}", stacklevel=2)
+            unlike.append(f"{there}, here {here}")
+        if (made_with := record.get("versions", {}).get("hoof-env", __version__)) != __version__:
+            unlike.append(f"hoof-env {made_with}, here {__version__}")
+        settings = getattr(leg, "settings", None)
+        for key, there in record.get("env_kwargs", {}).items():
+            if (now := json.loads(json.dumps(getattr(settings, key, None), default=str))) != there:
+                unlike.append(f"{key}={there!r}, here {now!r}")
+        if unlike:
+            warnings.warn(f"open-loop gait {path}: found for {'; '.join(unlike)}", stacklevel=2)
     return open_loop(given, dt)

@@ -25,6 +25,7 @@ from agents.baselines_results import (
     meets,
     read_results,
     seconds_to,
+    settled_speeds,
 )
 from agents.baselines_run import (
     CURVE,
@@ -312,10 +313,19 @@ def test_intervals_must_lie_apart():
     assert "| no |" in compare([scored(BETTER, 2.0)], scored(RUN))
 
 
-def test_who_follows_half_of_a_command(monkeypatch):
+def test_who_follows_half_of_a_command(monkeypatch, tmp_path):
+    """And results without a policy, as of an archive, are passed over."""
     monkeypatch.setattr(baselines_results, "settled_speed", lambda policy, command: 1.0 + 0.5 * command)
-    row = baselines_results.Row(SMALL[0], (baselines_results.Result(Path("one"), {}),) * 2)
-    assert following(row).intervals["follows"].mean == pytest.approx(0.5)
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "policy.json").touch()
+    results = [
+        baselines_results.Result(tmp_path / name, {"seed": seed})
+        for seed, name in enumerate(("one", "gone", "two"))
+    ]
+    speeds = settled_speeds(baselines_results.Row(SMALL[0], tuple(results)))
+    assert list(speeds) == [0, 2]
+    assert following("PPO", speeds).intervals["follows"].mean == pytest.approx(0.5)
 
 
 def test_the_settled_speed_is_that_behind_the_start():

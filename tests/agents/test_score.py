@@ -107,6 +107,8 @@ def test_each_policy_gets_the_line_of_the_table(capsys, tmp_path, monkeypatch, t
         ("trained", {"env_kwargs": ("episode_seconds=1",)}, "episode_seconds=0.4, here .* another task"),
         ("trained", {"env_kwargs": (*SHORT, "friction=0.1")}, "trained with friction"),
         (str(RUN_GAIT), {"env_id": ENV_ID}, " found for hoof_env/HorseLegRail-v0"),
+        ("another version", {"env_id": RAIL}, " found for hoof-env 9.9.9, here"),
+        ("another leg", {"env_id": RAIL}, " found for preset='first_fit', here 'identified'"),
         ("nobody:act", {}, "expected MODULE:NAME, got 'nobody:act'"),
         (f"{__name__}:walk", {}, "expected MODULE:NAME"),
         (f"{__name__}:RUN_GAIT", {}, "expected a function of observations"),
@@ -114,7 +116,13 @@ def test_each_policy_gets_the_line_of_the_table(capsys, tmp_path, monkeypatch, t
         ("gallop", {}, "policy: expected a name"),
     ],
 )  # fmt: skip
-def test_a_policy_for_something_else_is_refused(policy, kwargs, message, trained, monkeypatch):
+def test_a_policy_for_something_else_is_refused(policy, kwargs, message, trained, monkeypatch, tmp_path):
+    if policy.startswith("another"):
+        gait = json.loads(RUN_GAIT.read_text())
+        of_leg = {"env_kwargs": {"preset": "first_fit"}}
+        gait |= of_leg if "leg" in policy else {"versions": {"hoof-env": "9.9.9"}}
+        (tmp_path / "gait.json").write_text(json.dumps(gait))
+        policy = str(tmp_path / "gait.json")
     if "refuses" not in policy:
         monkeypatch.setattr(score, "score_vector", lambda *_, **__: pytest.fail("was played"))
     with pytest.raises(HoofEnvError, match=message):
