@@ -88,7 +88,8 @@ def test_each_policy_gets_the_line_of_the_table(capsys, tmp_path, monkeypatch, t
     given = ["run", f"{__name__}:act", str(trained.folder), str(other), "--csv", str(tmp_path / "all.csv")]
     given += ["--env-kwargs", *SHORT]
     score.main(given)
-    head, _, *table = capsys.readouterr().out.splitlines()
+    where, _, head, _, *table = capsys.readouterr().out.splitlines()
+    assert where == f"{ENV_ID} with {KWARGS}, episodes 1,000,000 to 1,000,004"
     assert [cell.strip() for cell in head.split("|")[1:4]] == ["policy", "return", "speed m/s"]
     assert [line.split("|")[1].strip() for line in table[:5]] == [*given[:4], "IQM of 2"]
     episodes = score_vector("run", ENV_ID, range(1_000_000, 1_000_005), **KWARGS)
@@ -108,7 +109,7 @@ def test_each_policy_gets_the_line_of_the_table(capsys, tmp_path, monkeypatch, t
         ("trained", {"env_kwargs": (*SHORT, "friction=0.1")}, "trained with friction"),
         (str(RUN_GAIT), {"env_id": ENV_ID}, " found for hoof_env/HorseLegRail-v0"),
         ("another version", {"env_id": RAIL}, " found for hoof-env 9.9.9, here"),
-        ("another leg", {"env_id": RAIL}, " found for preset='first_fit', here 'identified'"),
+        ("another leg", {"env_id": RAIL, "env_kwargs": ("preset=identified",)}, " found for preset='first_fit', here 'identified'"),
         ("nobody:act", {}, "expected MODULE:NAME, got 'nobody:act'"),
         (f"{__name__}:walk", {}, "expected MODULE:NAME"),
         (f"{__name__}:RUN_GAIT", {}, "expected a function of observations"),
