@@ -109,7 +109,7 @@ def test_each_policy_gets_the_line_of_the_table(capsys, tmp_path, monkeypatch, t
         ("trained", {"env_kwargs": (*SHORT, "friction=0.1")}, "trained with friction"),
         (str(RUN_GAIT), {"env_id": ENV_ID}, " found for hoof_env/HorseLegRail-v0"),
         ("another version", {"env_id": RAIL}, " found for hoof-env 9.9.9, here"),
-        ("another leg", {"env_id": RAIL, "env_kwargs": ("preset=identified",)}, "preset='first_fit', here 'identified'"),
+        ("another leg", {"env_id": RAIL, "env_kwargs": ("preset=identified",)}, "preset='first_fit', here"),
         ("nobody:act", {}, "expected MODULE:NAME, got 'nobody:act'"),
         (f"{__name__}:walk", {}, "expected MODULE:NAME"),
         (f"{__name__}:RUN_GAIT", {}, "expected a function of observations"),
