@@ -1,4 +1,7 @@
-"""On every id the reference gait beats the simplest policies, and no trick that was found beats it."""
+"""On every id the reference gait beats the simplest policies, and no trick that was found beats it.
+
+python tests/envs/test_rewards_of_tasks.py          prints the table of docs/environment.md
+"""
 
 import functools
 
@@ -7,6 +10,7 @@ import numpy as np
 import pytest
 from family import running_peak_charge, together
 
+from hoof_env._output import markdown_table
 from hoof_env.envs.policies import make_policy
 from hoof_env.envs.reward import check_weights
 from hoof_env.envs.tasks import TASKS
@@ -21,10 +25,14 @@ PACES = (3, 5, 6, 8, 10, 12, 18, 25, 50)
 """Control steps between two flips of a bang-bang policy."""
 
 
-def mean_return(task, act, options=None):
+def mean_return(task, act):
+    return returns(task, act).mean()
+
+
+def returns(task, act):
     """Of `SEEDS` episodes side by side; `act` maps observations and time to actions."""
     envs = gym.make_vec(TASKS[task].id, num_envs=SEEDS, autoreset_mode="DISABLED")
-    observations, _ = envs.reset(seed=0, options=options)
+    observations, _ = envs.reset(seed=0)
     total, ended = np.zeros(SEEDS), np.zeros(SEEDS, bool)
     for step in range(500):
         actions = np.asarray(act(observations, step * DT), np.float32)
@@ -33,7 +41,7 @@ def mean_return(task, act, options=None):
         if ended.any():
             break
     assert truncated.all()  # in good order, all at once
-    return total.mean()
+    return total
 
 
 def scripted(task, name, each):
@@ -63,16 +71,19 @@ def test_simple_policies_stay_below_the_reference(task, name):
     assert mean_return(task, scripted(task, name, each)) < reference(task) - MARGIN[task]
 
 
+def bang_bang(pace):
+    """From one end of all ranges to the other."""
+    return lambda _, time: np.full(4, 1.0 if round(time / DT) // pace % 2 else -1.0)
+
+
 @pytest.mark.parametrize("pace", PACES)
 @pytest.mark.parametrize("task", TASKS)
 def test_bang_bang_of_any_pace_stays_below_the_reference(task, pace):
-    flip = lambda _, time: np.full(4, 1.0 if round(time / DT) // pace % 2 else -1.0)  # noqa: E731
-    assert mean_return(task, flip) < reference(task) - MARGIN[task]
+    assert mean_return(task, bang_bang(pace)) < reference(task) - MARGIN[task]
 
 
-@pytest.mark.parametrize("task", TASKS)
-def test_hopping_on_the_swing_with_the_crank_stopped_stays_below_the_reference(task):
-    """Waves of the swing: many at once, no one of them pays."""
+def hop():
+    """Waves of the swing with the crank stopped: as many as episodes at once, no one of them pays."""
     generator = np.random.default_rng(0)
     middle, size, phase = generator.uniform(-1, 1, (3, SEEDS, 4))
     pulse = 2 * np.pi * generator.uniform(0.2, 8.0, (SEEDS, 1))
@@ -82,7 +93,12 @@ def test_hopping_on_the_swing_with_the_crank_stopped_stays_below_the_reference(t
         actions[:, 0] = -1.0
         return actions
 
-    assert mean_return(task, wave) < reference(task) - MARGIN[task]
+    return wave
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_hopping_on_the_swing_with_the_crank_stopped_stays_below_the_reference(task):
+    assert mean_return(task, hop()) < reference(task) - MARGIN[task]
 
 
 def paddle(_, time):
@@ -110,7 +126,11 @@ def test_paddling_under_one_held_peak_does_not_pay():
     assert summary["stances"] <= 3
     assert running_peak_charge(forces) > 10 * summary["stance_peak_sum_n"]
     assert total < reference("leg") - MARGIN["leg"]
-    assert mean_return("leg", paddle) < reference("leg") - MARGIN["leg"]
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_paddling_stays_below_the_reference(task):
+    assert mean_return(task, paddle) < reference(task) - MARGIN[task]
 
 
 STANDING = {
@@ -151,22 +171,30 @@ def test_trembling_in_place_of_steps_does_not_pay():
     assert total[never_lift].max() < reference("leg") - MARGIN["leg"]
 
 
-@pytest.mark.parametrize("task", [task for task in TASKS if task != "fixed"])
-def test_trembling_under_pressure_stays_below_the_reference(task):
+def tremble(task):
     """Found by a search: turn the crank to where the leg lifts the trunk against its spring, stop there, and
     tremble at 5.6 Hz. The leg bears twice the weight, so that the force hardly falls by half; were bearing
     paid to a stopped crank, the mean would be 74 where the run has 24."""
     names = gym.make(TASKS[task].id).unwrapped.observation_names
     sine, cosine = (names.index(f"{function}(crank angle)") for function in ("sin", "cos"))
 
-    def tremble(seen, time):
+    def act(seen, time):
         ahead = (1.746 - np.arctan2(seen[:, sine], seen[:, cosine])) % (2 * np.pi)
         speed = np.where((ahead > 0.05) & (ahead < 1.5 * np.pi), np.minimum(2 * ahead, 2 * np.pi), 0.0)
         size = np.where(speed[:, None] == 0, [0.366, -0.534, 1.26], 0.0)
         swing = np.array([0.294, 0.079, 0.243]) + size * np.sin(2 * np.pi * 5.562 * time)
         return np.clip(np.column_stack([speed / (2 * np.pi) - 1, swing]), -1, 1)
 
-    assert mean_return(task, tremble) < reference(task) - MARGIN[task]
+    return act
+
+
+TREMBLING = [task for task in TASKS if task != "fixed"]
+"""Where the trunk can be lifted."""
+
+
+@pytest.mark.parametrize("task", TREMBLING)
+def test_trembling_under_pressure_stays_below_the_reference(task):
+    assert mean_return(task, tremble(task)) < reference(task) - MARGIN[task]
 
 
 def test_failing_never_pays_more_than_going_on_badly():
@@ -184,3 +212,34 @@ def test_failing_never_pays_more_than_going_on_badly():
     assert min(returns) < -30  # the search did find policies that go badly wrong
     charge = check_weights(None)["failure"] * env.unwrapped.settings.episode_seconds
     assert charge > -1.5 * min(returns)
+
+
+def table():
+    """Returns of all these policies on all ids: mean and the normal 95 % interval over episodes."""
+
+    def cell(task, act):
+        each = returns(task, act)
+        return f"{each.mean():.1f} ± {1.96 * each.std(ddof=1) / SEEDS**0.5:.1f}"
+
+    named = {
+        **{
+            name: lambda task, name=name: scripted(task, name, each=False) for name in ("run", "walk", "idle")
+        },
+        **{
+            name: lambda task, name=name: scripted(task, name, each=True)
+            for name in ("zero", "airborne", "drag", "standing", "random")
+        },
+        **{f"bang-bang, {pace * DT:g} s": lambda _, pace=pace: bang_bang(pace) for pace in PACES},
+        "hopping on the swing": lambda _: hop(),
+        "paddling": lambda _: paddle,
+        "trembling under pressure": tremble,
+    }
+    lines = [
+        [name, *("" if name.startswith("tremb") and t not in TREMBLING else cell(t, of(t)) for t in TASKS)]
+        for name, of in named.items()
+    ]
+    return markdown_table(["policy", *(f"`{TASKS[task].id.partition('/')[2]}`" for task in TASKS)], lines)
+
+
+if __name__ == "__main__":
+    print(table())
