@@ -222,18 +222,12 @@ def table():
         return f"{each.mean():.1f} ± {1.96 * each.std(ddof=1) / SEEDS**0.5:.1f}"
 
     named = {
-        **{
-            name: lambda task, name=name: scripted(task, name, each=False) for name in ("run", "walk", "idle")
-        },
-        **{
-            name: lambda task, name=name: scripted(task, name, each=True)
-            for name in ("zero", "airborne", "drag", "standing", "random")
-        },
-        **{f"bang-bang, {pace * DT:g} s": lambda _, pace=pace: bang_bang(pace) for pace in PACES},
-        "hopping on the swing": lambda _: hop(),
-        "paddling": lambda _: paddle,
-        "trembling under pressure": tremble,
+        name: lambda task, name=name: scripted(task, name, each=name not in ("run", "walk", "idle"))
+        for name in ("run", "walk", "idle", "zero", "airborne", "drag", "standing", "random")
     }
+    named |= {f"bang-bang, {pace * DT:g} s": lambda _, pace=pace: bang_bang(pace) for pace in PACES}
+    named |= {"hopping on the swing": lambda _: hop(), "paddling": lambda _: paddle}
+    named |= {"trembling under pressure": tremble}
     lines = [
         [name, *("" if name.startswith("tremb") and t not in TREMBLING else cell(t, of(t)) for t in TASKS)]
         for name, of in named.items()
