@@ -37,7 +37,7 @@ from agents.command import run
 from agents.evaluate import Score
 from agents.score import FINAL_SEEDS
 from agents.settings import load_settings
-from agents.statistics import FIGURES, TABLE, Floats, Scored, cells, iqm
+from agents.statistics import PUBLISHED, TABLE, Floats, Scored, cells, iqm
 from hoof_env._output import markdown_table
 from hoof_env.paper.figures import BLUE, GREEN, GREY, ORANGE, PURPLE, STYLE
 
@@ -209,12 +209,12 @@ def write_data(rows: Sequence[Row], folder: Path) -> None:
     columns = ("policy", "env_id", "seed", *COLUMNS)
     runs.write_csv(folder / "curves.csv", columns, curves)
     runs.write_csv(folder / "runs.csv", (*columns, "config"), ends)
-    runs.write_csv(folder / "episodes.csv", ("policy", "env_id", "seed", "episode", *FIGURES), episodes)
+    runs.write_csv(folder / "episodes.csv", ("policy", "env_id", "seed", "episode", *PUBLISHED), episodes)
 
 
 def short(episode: Mapping[str, float]) -> dict[str, str]:
-    """The `FIGURES` of an episode with five digits."""
-    return {key: f"{episode[key]:.5g}" for key in FIGURES if key in episode}
+    """The `PUBLISHED` figures of an episode with five digits."""
+    return {key: f"{episode[key]:.5g}" for key in PUBLISHED if key in episode}
 
 
 def over_time(row: Row, key: str) -> tuple[Floats, Floats]:

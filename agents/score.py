@@ -32,7 +32,7 @@ from tyro.conf import Positional
 
 from agents import runs
 from agents.command import parse_pairs, run
-from agents.statistics import FIGURES, TABLE, Scored, cells, mean_figures, over_episodes, over_seeds
+from agents.statistics import PUBLISHED, TABLE, Scored, cells, mean_figures, over_episodes, over_seeds
 from hoof_env import records
 from hoof_env._output import check_folder, markdown_table
 from hoof_env.envs.policies import open_loop_record
@@ -272,11 +272,11 @@ def main(argv: list[str] | None = None) -> None:
     print(lines(scored))
     if args.csv:
         rows = [
-            {"policy": name, "episode": seed, **{key: one[key] for key in FIGURES if key in one}}
+            {"policy": name, "episode": seed, **{key: one[key] for key in PUBLISHED if key in one}}
             for name, episodes in scored
             for seed, one in zip(FINAL_SEEDS, episodes, strict=True)
         ]
-        runs.write_csv(args.csv, ("policy", "episode", *FIGURES), rows)
+        runs.write_csv(args.csv, ("policy", "episode", *PUBLISHED), rows)
         print(f"written: {args.csv}")
 
 

@@ -27,6 +27,9 @@ FIGURES = (
 TRANSPORT = ("distance_m", "drive_work_j", "mean_grf_n", "weight_share")
 """What a cost of transport over several episodes is made of; the force by the share is the weight."""
 
+PUBLISHED = tuple(dict.fromkeys((*FIGURES, *TRANSPORT)))
+"""Figures of an episode that all figures over several are made of."""
+
 TABLE: Mapping[str, tuple[str, int, float]] = {
     "speed_m_s": ("speed m/s", 2, 1.0),
     "peak_grf_n": ("highest GRF kN", 2, 1e-3),
