@@ -122,6 +122,9 @@ def test_a_slower_work_tree_is_named(capsys, monkeypatch):
 
 
 def test_threads_gain_what_the_model_says():
-    assert threads.gain(1024, 4, serial=0.0, group=1e-5, call=0.0) == pytest.approx(4.0)
-    assert threads.gain(1024, 256, serial=0.0, group=1e-5, call=0.0) == pytest.approx(128.0)  # groups of 8
-    assert threads.gain(2048, 2, serial=1e-3, group=1e-5, call=1e-4) == pytest.approx(4.56 / 3.38)
+    alone = {"serial": 0.0, "group": 1e-5, "call": 0.0, "neighbours": 1.0}
+    assert threads.gain(1024, 4, **alone) == pytest.approx(4.0)
+    assert threads.gain(1024, 256, **alone) == pytest.approx(128.0)  # groups of 8
+    assert threads.gain(1024, 4, **alone | {"neighbours": 1.25}) == pytest.approx(3.2)
+    slower = {"serial": 1e-3, "group": 1e-5, "call": 1e-4, "neighbours": 1.0}
+    assert threads.gain(2048, 2, **slower) == pytest.approx(4.56 / 3.38)
