@@ -130,6 +130,13 @@ def test_a_policy_for_something_else_is_refused(policy, kwargs, message, trained
         score.score(Args((str(trained.folder) if policy == "trained" else policy,), **kwargs))
 
 
+def test_a_model_without_a_record_is_told(trained, tmp_path, monkeypatch):
+    monkeypatch.setattr(score, "score_vector", lambda *_, **__: [])
+    bare = shutil.copy(trained.folder / "model.zip", tmp_path / "bare.zip")
+    with pytest.warns(UserWarning, match=r"bare.zip: nothing says what it was trained for"):
+        score.score(Args((str(bare),), env_kwargs=SHORT))
+
+
 def test_a_policy_of_another_leg_or_version_is_refused(trained, tmp_path):
     for change, said in (
         (
