@@ -19,6 +19,7 @@ import platform
 import shlex
 import subprocess
 import sys
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from importlib.metadata import PackageNotFoundError, version
@@ -62,8 +63,8 @@ def alone(folder: Path) -> Iterator[None]:
         lock.acquire(timeout=0)
     except Timeout:
         raise OutputError(f"{folder}: another process is at work there; choose another folder") from None
-    except NotImplementedError:  # a file system without locks, as some of clusters
-        pass
+    except NotImplementedError:  # of filelock, where a system has none
+        warnings.warn(f"{folder}: a file system that has no locks; keep other processes out", stacklevel=3)
     try:
         yield
     except BaseException:

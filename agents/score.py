@@ -240,11 +240,11 @@ def score(args: Args) -> list[tuple[str, list[dict[str, float]]]]:
         check_folder(args.csv.parent)
         if args.csv.is_dir():
             raise OutputError(f"--csv: expected the name of a file, {str(args.csv)!r} is a folder")
-    read = [read_policy_record(name) for name in args.policy if not is_function(name)]
-    for name in filter(is_model, args.policy):
-        if not read_policy_record(name).get("env_id"):
+    read = {name: read_policy_record(name) for name in args.policy if not is_function(name)}
+    for name in filter(is_model, read):
+        if not read[name].get("env_id"):
             warnings.warn(f"policy {name}: nothing says what it was trained for", stacklevel=2)
-    record = next(filter(None, read), {})
+    record = next(filter(None, read.values()), {})
     env_id = args.env_id or record.get("env_id", runs.DEFAULT_ENV)
     own = record.get("env_kwargs", {}) if env_id == record.get("env_id") else {}
     env_kwargs = parse_pairs("--env-kwargs", args.env_kwargs) or own

@@ -8,6 +8,7 @@ import signal
 import sys
 import threading
 import time
+from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -157,9 +158,9 @@ class Scorer(BaseCallback):
         self.env_id, self.env_kwargs, self.seeds, self.every = env_id, env_kwargs, seeds, every
         self.wall_s = self.cpu_s = 0.0
 
+    @abstractmethod
     def keep(self, episodes: list[dict[str, float]]) -> None:
         """Do something with a score: `episodes` as of `agents.score.play`."""
-        raise NotImplementedError
 
     def score(self) -> None:
         self.wall_s += time.monotonic() - self._since[0]

@@ -10,12 +10,13 @@ import time
 import zipfile
 from pathlib import Path
 
+import filelock
 import numpy as np
 import pytest
 from stable_baselines3.common.callbacks import BaseCallback
 
 from agents.checkpoints import REPLAY, STATE, checkpoints, whole
-from agents.runs import CHECKPOINTS, SavedModel
+from agents.runs import CHECKPOINTS, SavedModel, alone
 from agents.train import Args, main, train
 from agents.watch import DivergedError
 from hoof_env.errors import DataFileError, OutputError, ParameterError
@@ -83,6 +84,15 @@ def test_one_process_trains_in_a_folder(tmp_path):
             train(arguments("ppo", tmp_path / "run", resume=True))
 
     train(arguments("ppo", tmp_path / "run"), At(90, start_another))
+
+
+def test_a_file_system_without_locks_is_told(tmp_path, monkeypatch):
+    def acquire(self, **_):
+        raise NotImplementedError
+
+    monkeypatch.setattr(filelock.FileLock, "acquire", acquire)
+    with pytest.warns(UserWarning, match="has no locks"), alone(tmp_path / "run"):
+        assert (tmp_path / "run").is_dir()
 
 
 def test_killed_again_and_again(tmp_path):
