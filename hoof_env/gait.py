@@ -30,21 +30,34 @@ LIMITS = MappingProxyType(
 the middle of all four, at the paper's crank speed, 2 pi, creeps forward and is no good gait, so that a policy
 has to command one."""
 
+MOST_HARMONICS = 3
+"""Of a swing law."""
 
-@dataclass(frozen=True)
+WIDEST = MappingProxyType(
+    {
+        "crank_speed": (0.0, 6 * np.pi), "swing_offset": (-1.5, 2.0), "swing_sin": (-1.5, 1.5),
+        "swing_cos": (-1.5, 1.5), "higher": (-0.6, 0.6),
+    }
+)  # fmt: skip
+"""The same of a gait with higher harmonics, which a whole animal has and no environment of one leg takes."""
+
+
+@dataclass(frozen=True, repr=False)
 class GaitParameters:
     """One steady gait: the crank turns at `crank_speed` and the leg's frame swings about the crank centre by
 
         phi = swing_offset + swing_sin * sin(theta) + swing_cos * cos(theta),   theta the crank angle.
 
     The paper says that running 'controls the leg orientation by swinging motion with respect to the body' and
-    does not print the law; one harmonic is this project's assumption.
+    does not print the law; one harmonic is this project's assumption. A second and a third one, which let a
+    hoof follow a level stance, add A2 sin(2 theta) + B2 cos(2 theta) and so on.
 
     Attributes:
         crank_speed: theta's rate [rad/s], 0 to 4 pi.
         swing_offset: phi0 [rad], -0.1 to 1.2.
         swing_sin: A [rad], -0.7 to 0.6.
         swing_cos: B [rad], -0.7 to 0.6.
+        higher: A2, B2 and perhaps A3, B3 [rad], -0.6 to 0.6; where there are some, `WIDEST` holds for all.
 
     Raises:
         ParameterError: a value is not finite or outside `LIMITS`.
@@ -54,29 +67,76 @@ class GaitParameters:
     swing_offset: float
     swing_sin: float
     swing_cos: float
+    higher: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        for item in fields(self):
-            low, high = LIMITS[item.name]
-            object.__setattr__(
-                self, item.name, check_number(item.name, getattr(self, item.name), low=low, high=high)
+        given: Any = self.higher
+        try:
+            higher = tuple(given)
+        except TypeError:
+            higher = (None,)
+        if len(higher) not in range(0, 2 * MOST_HARMONICS - 1, 2):
+            raise ParameterError(
+                f"higher: expected the sine and cosine coefficients of none, one or two higher harmonics, "
+                f"0, 2 or 4 numbers, got {given!r}"
             )
+        limits = WIDEST if higher else LIMITS
+        numbers = [
+            check_number(f"higher[{k}]", value, low=WIDEST["higher"][0], high=WIDEST["higher"][1])
+            for k, value in enumerate(higher)
+        ]
+        object.__setattr__(self, "higher", tuple(numbers))
+        for name in PARAMETERS:
+            low, high = limits[name]
+            object.__setattr__(self, name, check_number(name, getattr(self, name), low=low, high=high))
 
-    def to_array(self) -> NDArray[np.float64]:
-        """The four values in the order of the fields, shape (4,)."""
-        return np.array([getattr(self, item.name) for item in fields(self)])
+    def __repr__(self) -> str:
+        names = (*PARAMETERS, *["higher"][: len(self.higher)])
+        return f"GaitParameters({', '.join(f'{name}={getattr(self, name)!r}' for name in names)})"
+
+    @property
+    def harmonics(self) -> int:
+        """Of the swing."""
+        return 1 + len(self.higher) // 2
+
+    def to_array(self, harmonics: int | None = None) -> NDArray[np.float64]:
+        """The values in the order of `parameter_names`, shape (2 + 2 harmonics,); of more harmonics than it
+        has, the others are 0.
+
+        Raises:
+            ParameterError: it has more.
+        """
+        values = [*(getattr(self, name) for name in PARAMETERS), *self.higher]
+        if harmonics is None:
+            return np.array(values)
+        if harmonics < self.harmonics:
+            raise ParameterError(
+                f"gait: expected a swing of at most {harmonics} harmonic{'s' * (harmonics > 1)}, got "
+                f"{self.harmonics}: higher = {self.higher}"
+            )
+        return np.array(values + [0.0] * (2 + 2 * harmonics - len(values)))
 
     @classmethod
     def from_array(cls, values: Any) -> GaitParameters:
         """Inverse of `to_array`."""
         array = np.asarray(values, dtype=np.float64)
-        if array.shape != (4,):
-            raise ParameterError(f"gait parameters: expected 4 values {PARAMETERS}, got shape {array.shape}")
-        return cls(*array.tolist())
+        if array.shape not in [(2 + 2 * n,) for n in range(1, MOST_HARMONICS + 1)]:
+            raise ParameterError(
+                f"gait parameters: expected 4 values {PARAMETERS}, or 6 or 8 with higher harmonics, "
+                f"got shape {array.shape}"
+            )
+        speed, offset, sine, cosine, *higher = array.tolist()
+        return cls(speed, offset, sine, cosine, tuple(higher))
 
 
-PARAMETERS = tuple(item.name for item in fields(GaitParameters))
+PARAMETERS = tuple(item.name for item in fields(GaitParameters) if item.name != "higher")
 """Names of the gait parameters, in the order used by actions and filters."""
+
+
+def parameter_names(harmonics: int = 1) -> tuple[str, ...]:
+    """Names of the gait parameters of a swing with so many harmonics, in their order."""
+    parts = ((f"swing_sin_{k}", f"swing_cos_{k}") for k in range(2, harmonics + 1))
+    return (*PARAMETERS, *(name for pair in parts for name in pair))
 
 
 def gait_names(preset: Preset = DEFAULT_PRESET) -> list[str]:
@@ -102,7 +162,7 @@ def load_gait(name: str, preset: Preset = DEFAULT_PRESET) -> GaitParameters:
         return GaitParameters(**gaits[name])
     except TypeError as error:
         raise wrong(preset)(
-            f"{named(preset)}, gait {name!r}: expected {', '.join(PARAMETERS)}: {error}"
+            f"{named(preset)}, gait {name!r}: expected {', '.join(PARAMETERS)}, perhaps higher: {error}"
         ) from None
 
 
@@ -150,6 +210,8 @@ class FilterSettings:
         crank_rate, crank_acc: bounds on the crank speed's rate [rad/s^2] and its acceleration [rad/s^3].
         swing_rate, swing_acc: the same for the three swing parameters [rad/s, rad/s^2].
 
+    A horse asks for more within a stride than the paper's leg: `QUICK`.
+
     The acceleration bound must allow the approach: gain * rate <= acc, else a parameter could overshoot its
     command.
     """
@@ -181,6 +243,10 @@ class FilterSettings:
         crank = (self.gain, self.crank_rate, self.crank_acc)
         swing = (self.gain, self.swing_rate, self.swing_acc)
         return np.array([crank, swing, swing, swing])
+
+
+QUICK = FilterSettings(gain=50.0, crank_rate=100.0, crank_acc=5000.0, swing_rate=15.0, swing_acc=750.0)
+"""Filters that let the crank follow a level stance: it slows down and speeds up within every stride."""
 
 
 @kernel

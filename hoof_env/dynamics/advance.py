@@ -6,7 +6,8 @@ four lanes that are the legs of one trunk, and for `LANES` environments side by 
 the stack, where the compiler keeps what it can in registers.
 
 An engine's memory is one matrix `data`, a column for each environment: the rows of the trunk, then those of
-each leg, fields as in `layout.TrunkMemory` and `LegMemory`.
+each leg, fields as in `layout.TrunkMemory` and `LegMemory`. Each kind of engine (`layout.Features`) has
+kernels of its own.
 """
 
 from __future__ import annotations
@@ -20,7 +21,20 @@ import numpy as np
 from numba import carray  # type: ignore[attr-defined]
 
 from hoof_env.dynamics.hoof import law_of, level_ground, remember_contacts
-from hoof_env.dynamics.layout import Account, LegMemory, LegRows, TrunkMemory, TrunkRows
+from hoof_env.dynamics.layout import (
+    PLAIN,
+    Account,
+    Features,
+    LegMemory,
+    LegRows,
+    LegState,
+    Strides,
+    StrideSums,
+    TrunkMemory,
+    TrunkRows,
+    TrunkState,
+)
+from hoof_env.dynamics.limits import clear_limits, heed_joints, heed_trunk
 from hoof_env.dynamics.mechanics import evaluate, keep_still, settle
 from hoof_env.dynamics.observables import count_stride, keep_account, report_leg, report_trunk
 from hoof_env.dynamics.parts import FIXED, Result
@@ -36,17 +50,56 @@ LANES = 8
 
 OK, NOT_FINITE = float(Result.OK), float(Result.NOT_FINITE)
 DEAD_POINT, FALLEN = float(Result.DEAD_POINT), float(Result.FALLEN)
+FIRST_LIMIT = float(Result.PITCH)
 
 STARTS = -1.0
 """Stands in the place of a result where an environment is to start."""
 
-TRUNK_ROWS, LEG_ROWS = TrunkMemory.size, LegMemory.size
-"""Rows of an engine's memory: of the trunk, and of each leg behind it."""
-
-TRUNK_SIZE, LEG_SIZE, ACCOUNT_SIZE = TrunkRows.size, LegRows.size, Account.size
-TRUNK_STATE_SIZE, LEG_STATE_SIZE = TrunkMemory.fields["state"].kind.size, LegMemory.fields["state"].kind.size
-STRIDES_SIZE, SUMS_SIZE = LegMemory.fields["strides"].kind.size, LegMemory.fields["sums"].kind.size
 CONSTANTS_SIZE, REACTIONS_SIZE = LegConstants.size, Reactions.size
+
+
+class Form(NamedTuple):
+    """The layouts of engines with the same `Features`, and what else the compiler must know of these.
+
+    Attributes:
+        trunk, leg, account: rows on the stack.
+        trunk_memory, leg_memory: rows in the engine's array, the trunk's first.
+        of the others: how many rows each has.
+        gait: how many gait parameters a leg has.
+        harmonics, springs, animal: as in `Features`; rows of a hoof point's spring, 0 or 2.
+    """
+
+    trunk: Any
+    leg: Any
+    account: Any
+    trunk_memory: Any
+    leg_memory: Any
+    trunk_size: int
+    leg_size: int
+    account_size: int
+    trunk_rows: int
+    leg_rows: int
+    trunk_state: int
+    leg_state: int
+    strides: int
+    sums: int
+    gait: int
+    harmonics: int
+    springs: int
+    animal: bool
+
+
+@cache
+def form_of(features: Features = PLAIN) -> Form:
+    """The `Form` of engines with these features."""
+    rows = [features.of(layout) for layout in (TrunkRows, LegRows, Account, TrunkMemory, LegMemory)]
+    inner = [features.of(layout).size for layout in (TrunkState, LegState, Strides, StrideSums)]
+    parts: list[Any] = [*rows, *(layout.size for layout in rows), *inner, features.gait_size]
+    return Form(*parts, features.harmonics, 2 * features.springs, features.animal)
+
+
+TRUNK_ROWS, LEG_ROWS = TrunkMemory.size, LegMemory.size
+"""Rows of the memory of an engine without `Features`: of the trunk, and of each leg behind it."""
 
 MODEL = np.dtype(
     [
@@ -74,6 +127,7 @@ class Model(NamedTuple):
     new_rates: bool
     strides: bool
     together: bool  # the lanes are the legs of one trunk
+    form: Form
     cells: int
     tables: Any  # pointer to the tables of all legs, one after the other
     settings: Any  # pointer to memory on the stack, as are fractions and weights
@@ -87,7 +141,7 @@ class Model(NamedTuple):
 
 
 @inlined
-def inner(model, tables, ground, small, together, law):  # type: ignore[no-untyped-def]
+def inner(model, tables, ground, small, together, law, form):  # type: ignore[no-untyped-def]
     """The model from its record and arrays; `small` points to room for 20 doubles."""
     given = model[0]
     for k in range(12):
@@ -96,7 +150,7 @@ def inner(model, tables, ground, small, together, law):  # type: ignore[no-untyp
         small[12 + k], small[16 + k] = given.fractions[k], given.weights[k]
     return Model(
         given.kind, given.eighths, given.friction_law, given.interpolated, given.is_terrain, given.new_rates,
-        given.strides, together, given.cells, address(tables),
+        given.strides, together, form, given.cells, address(tables),
         small, given.stages, offset(small, 12), offset(small, 16),
         carray(address(ground), ground.shape), given.ground_origin, given.ground_per_metre, law,
     )  # fmt: skip
@@ -111,13 +165,13 @@ def read_trunk(trunk, memory):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def read_leg(leg, memory):  # type: ignore[no-untyped-def]
+def read_leg(leg, memory, form):  # type: ignore[no-untyped-def]
     """State, command and settings from a `LegMemory`; sums begin anew."""
     fill(leg.state, memory.state)
     fill(leg.strides, memory.strides)
-    for k in range(SUMS_SIZE):
+    for k in range(form.sums):
         leg.sums[k] = 0.0
-    for k in range(4):
+    for k in range(form.gait):
         leg.command[k] = memory.command[k]
     fill(leg.settings, memory.settings)
     leg.hip = leg.settings.hip_on_trunk  # stays so unless the trunk pitches
@@ -125,20 +179,22 @@ def read_leg(leg, memory):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def find_result(trunk, legs, leg_count, together):  # type: ignore[no-untyped-def]
+def find_result(trunk, legs, leg_count, together, form):  # type: ignore[no-untyped-def]
     """How the environments ended, numbers of `parts.Result`."""
     total, stuck = level(trunk, 0.0), trunk.at_dead_point
-    for k in range(TRUNK_STATE_SIZE):
+    for k in range(form.trunk_state):
         total = total + trunk.state[k]
     for i in range(leg_count):
-        leg = nth(legs, i, LegRows)
+        leg = nth(legs, i)
         total = total + leg.theta_acceleration
-        for k in range(LEG_STATE_SIZE):
+        for k in range(form.leg_state):
             total = total + leg.state[k]
     if together:
         total, stuck = lane_sum(level(trunk, 0.0), total), lane_sum(level(trunk, 0.0), stuck)
     lost = choose(stuck > 0.0, DEAD_POINT, NOT_FINITE)
     fell = choose(trunk.fallen > 0.0, FALLEN, OK)
+    if form.animal:
+        fell = choose(trunk.fallen > 0.0, FALLEN, trunk.beyond[0])
     return choose((total - total != 0.0) | (stuck > 0.0), lost, fell)
 
 
@@ -160,12 +216,16 @@ def run_steps(  # type: ignore[no-untyped-def]
         evaluate(trunk, legs, leg_count, model, elapsed)
         if stage == 0:
             for i in range(leg_count):
-                leg = nth(legs, i, LegRows)
+                leg = nth(legs, i)
                 remember_contacts(leg)
                 if model.strides and turn > 0:
-                    count_stride(trunk, leg, h)
+                    count_stride(trunk, leg, model.form, h)
                 if reacts and (turn > 0 or steps == 0):
-                    react(trunk, leg, nth(constants, i, LegConstants), nth(reactions, i, Reactions))
+                    react(trunk, leg, nth(constants, i), nth(reactions, i))
+                if model.form.animal and turn > 0:
+                    heed_joints(trunk, leg, nth(constants, i), model)
+            if model.form.animal and turn > 0:
+                heed_trunk(trunk, model)
         if turn < steps * model.stages:
             weight = model.weights[stage]
             if keeps_account:
@@ -184,34 +244,36 @@ def run_steps(  # type: ignore[no-untyped-def]
 @pasted
 def run(  # type: ignore[no-untyped-def]
     data, model, tables, ground, constants, reactions, h, steps, keeps_account, begin, end,
-    leg_count, lanes, together, reacts, law,
+    leg_count, lanes, together, reacts, law, form,
 ):  # fmt: skip
     """Advance environments `begin` to `end`: `lanes` at a time, or one whose legs the lanes are. With `steps`
     below 0 those start whose result is `STARTS`. Unless `reacts`, a constant, there is no code for
     reactions."""
-    trunk = rows(doubles(TRUNK_SIZE * lanes), lanes, TrunkRows)
-    legs = rows(doubles(leg_count * LEG_SIZE * lanes), lanes, None)
-    account = rows(doubles(ACCOUNT_SIZE * lanes), lanes, Account)
-    shapes = rows(doubles(leg_count * CONSTANTS_SIZE * lanes), lanes, None)
-    forces = rows(doubles(leg_count * REACTIONS_SIZE * lanes), lanes, None)
-    inside = inner(model, tables, ground, doubles(20), together, law)
+    trunk = rows(doubles(form.trunk_size * lanes), lanes, form.trunk)
+    legs = rows(doubles(leg_count * form.leg_size * lanes), lanes, form.leg)
+    account = rows(doubles(form.account_size * lanes), lanes, form.account)
+    shapes = rows(doubles(leg_count * CONSTANTS_SIZE * lanes), lanes, LegConstants)
+    forces = rows(doubles(leg_count * REACTIONS_SIZE * lanes), lanes, Reactions)
+    inside = inner(model, tables, ground, doubles(20), together, law, form)
     at, row = address(data), data.shape[1]
     # lanes are neighbours, but where they are legs, as far apart as legs are
     envs, near, far = lanes, 1, 1
     if together:
-        envs, near, far = 1, 0, LEG_ROWS * row
-    if reacts:
+        envs, near, far = 1, 0, form.leg_rows * row
+    if reacts or form.animal:
         own = columns(address(constants), lanes, None, 0, 1, CONSTANTS_SIZE if together else 0)
         for k in range(leg_count * CONSTANTS_SIZE):
             shapes[k] = own[k]
     for n in range(begin, end, envs):
-        memory = columns(at, lanes, TrunkMemory, n, row, near)
+        memory = columns(at, lanes, form.trunk_memory, n, row, near)
         read_trunk(trunk, memory)
-        for k in range(ACCOUNT_SIZE):
+        if form.animal:
+            clear_limits(trunk)
+        for k in range(form.account_size):
             account[k] = 0.0
         for i in range(leg_count):
-            first = (TRUNK_ROWS + i * LEG_ROWS) * row + n
-            read_leg(nth(legs, i, LegRows), columns(at, lanes, LegMemory, first, row, far))
+            first = (form.trunk_rows + i * form.leg_rows) * row + n
+            read_leg(nth(legs, i), columns(at, lanes, form.leg_memory, first, row, far), form)
         before = memory.result
         starts = before == STARTS
         if steps < 0:
@@ -224,24 +286,27 @@ def run(  # type: ignore[no-untyped-def]
             trunk, legs, leg_count, inside, account, shapes, forces, h, max(steps, 0), keeps_account, reacts
         )
         report_trunk(trunk, memory.report)
-        result = find_result(trunk, legs, leg_count, together)
+        result = find_result(trunk, legs, leg_count, together, form)
         good = result == OK
+        if form.animal:
+            good = good | (result >= FIRST_LIMIT)  # a motion beyond a limit is a motion
         if steps < 0:  # the others are as they were; a start that cannot be is kept as it is
             result, good = choose(starts, result, before), starts
         memory.result = result
-        store(memory.state, trunk.state, TRUNK_STATE_SIZE, good)
-        for k in range(ACCOUNT_SIZE):
+        store(memory.state, trunk.state, form.trunk_state, good)
+        for k in range(form.account_size):
             account[k] = account[k] + memory.account[k]
-        store(memory.account, account, ACCOUNT_SIZE, good)
+        store(memory.account, account, form.account_size, good)
         for i in range(leg_count):
-            leg = nth(legs, i, LegRows)
-            own = columns(at, lanes, LegMemory, (TRUNK_ROWS + i * LEG_ROWS) * row + n, row, far)
+            leg = nth(legs, i)
+            first = (form.trunk_rows + i * form.leg_rows) * row + n
+            own = columns(at, lanes, form.leg_memory, first, row, far)
             report_leg(trunk, leg, own.report)
-            store(own.state, leg.state, LEG_STATE_SIZE, good)
-            store(own.strides, leg.strides, STRIDES_SIZE, good)
-            store(own.sums, leg.sums, SUMS_SIZE, good)
+            store(own.state, leg.state, form.leg_state, good)
+            store(own.strides, leg.strides, form.strides, good)
+            store(own.sums, leg.sums, form.sums, good)
             if reacts:
-                kept = nth(forces, i, Reactions)
+                kept = nth(forces, i)
                 first, stride = i * REACTIONS_SIZE * row + n, REACTIONS_SIZE * row if together else 1
                 out = columns(address(reactions), lanes, Reactions, first, row, stride)
                 for k in range(REACTIONS_SIZE):
@@ -254,12 +319,16 @@ number; lanes; whether these are the legs of one trunk."""
 
 
 @cache
-def advance_kernels(contact_law: Callable[..., Any] | None = None) -> SimpleNamespace:
+def advance_kernels(
+    contact_law: Callable[..., Any] | None = None, features: Features = PLAIN
+) -> SimpleNamespace:
     """`advance_leg`, `advance_four` and `advance_batch`; `react_leg` and so on compute joint reactions too.
 
     The law of contact is as in `hoof.law_of`; None is that of `ground.laws`.
     """
-    law, identity = law_of(contact_law), fingerprint(contact_law)
+    law, identity, form = law_of(contact_law), fingerprint(contact_law), form_of(features)
+    if features != PLAIN:
+        identity += f" {tuple(features)}"
 
     def made(name: str, legs: int, lanes: int, together: bool, reacts: bool) -> Any:
         def advance(  # type: ignore[no-untyped-def]
@@ -268,7 +337,7 @@ def advance_kernels(contact_law: Callable[..., Any] | None = None) -> SimpleName
             count = legs if legs else model[0].legs
             run(
                 data, model, tables, ground, constants, reactions, h, steps, keeps_account, begin, end,
-                count, lanes, together, reacts, law,
+                count, lanes, together, reacts, law, form,
             )  # fmt: skip
 
         advance.__name__ = name

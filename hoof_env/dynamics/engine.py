@@ -17,8 +17,20 @@ from numba.core.errors import NumbaError
 from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.dynamics import layout, memory
-from hoof_env.dynamics.advance import LANES, LEG_ROWS, STARTS, TRUNK_ROWS, advance_kernels
-from hoof_env.dynamics.parts import GRAVITY, Drive, Limb, Motor, Reactions, Result, Scene, Tally, Trunk
+from hoof_env.dynamics.advance import LANES, STARTS, advance_kernels, form_of
+from hoof_env.dynamics.layout import Features
+from hoof_env.dynamics.parts import (
+    GRAVITY,
+    Drive,
+    Limb,
+    Limits,
+    Motor,
+    Reactions,
+    Result,
+    Scene,
+    Tally,
+    Trunk,
+)
 from hoof_env.dynamics.reactions import Reactions as ReactionRows
 from hoof_env.dynamics.step_length import StepLength
 from hoof_env.dynamics.stepping import SCHEMES
@@ -34,7 +46,7 @@ from hoof_env.errors import (
     flag,
     one_of,
 )
-from hoof_env.gait import FilterSettings, GaitParameters
+from hoof_env.gait import MOST_HARMONICS, FilterSettings, GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.profile import by_name, cross, leg_profile
@@ -65,9 +77,13 @@ class TrunkEngine(Scene):
             as ground, motors and support ask, up to `step_length.MOST_SUBSTEPS`.
         num_envs: environments side by side, which share all of the above.
         num_threads: threads that share the environments; they change no bit.
-        filters: bounds of the command filters.
+        harmonics: of the swing law, 1 to `gait.MOST_HARMONICS`: gaits and commands have 2 + 2 harmonics
+            numbers.
+        filters: bounds of the command filters; `gait.QUICK` where the crank's speed changes within a stride.
         reactions: compute the joint reactions of every step; `reactions()` has those of the last.
         strides: count stances, peak forces and work; `strides` has them.
+        limits: where the motion should end, see `parts.Result`. An engine with limits, if only `Limits()`,
+            takes legs of other sizes in `vary`, and its `strides` have slip and horizontal impulses.
         contact_law: instead of the ground's normal law, see `hoof.law_of`.
 
     Attributes:
@@ -100,9 +116,11 @@ class TrunkEngine(Scene):
         substeps: int | None = None,
         num_envs: int = 1,
         num_threads: int = 1,
+        harmonics: int = 1,
         filters: FilterSettings | None = None,
         reactions: bool = False,
         strides: bool = False,
+        limits: Limits | None = None,
         contact_law: Callable[..., Any] | None = None,
     ) -> None:
         if contact_law is not None:
@@ -112,6 +130,15 @@ class TrunkEngine(Scene):
         if len(self.limbs) > MOST_LEGS:
             raise ParameterError(f"limbs: expected at most {MOST_LEGS}, got {len(self.limbs)}")
         self.trunk = one_of("trunk", trunk, Trunk)
+        self.motion_limits = None if limits is None else one_of("limits", limits, Limits)
+        springs, order = self.limbs[0].spring is not None, count("harmonics", harmonics, most=MOST_HARMONICS)
+        self.features = Features(order, springs, animal=limits is not None)
+        memory.check_limbs(self.trunk, self.limbs, self.features.springs)
+        if contact_law is not None and self.features.springs:
+            raise ParameterError(
+                "contact_law: expected none beside springs of the hoofs, whose speed follows from a law that "
+                f"is linear in it, got {contact_law!r}"
+            )
         self.ground = Ground() if ground is None else one_of("ground", ground, Ground)
         self.terrain = Terrain.flat() if terrain is None else one_of("terrain", terrain, Terrain)
         self.filters = FilterSettings() if filters is None else one_of("filters", filters, FilterSettings)
@@ -134,12 +161,15 @@ class TrunkEngine(Scene):
     def _choose_kernel(self) -> None:
         which = ("leg" if len(self.limbs) == 1 else "four") if self.is_few else "batch"
         does = "react" if self.reacts else "advance"
-        self._run = getattr(advance_kernels(self.contact_law), f"{does}_{which}")
+        self._run = getattr(advance_kernels(self.contact_law, self.features), f"{does}_{which}")
 
     def __getstate__(self) -> dict[str, Any]:
         """A copy has memory of its own, also a shallow one."""
         m, parts = self._memory, {name: part for name, part in vars(self).items() if name != "_run"}
-        return {**parts, "_memory": (m.data.copy(), self.num_envs, m.constants, m.reactions.copy())}
+        return {
+            **parts,
+            "_memory": (m.data.copy(), self.num_envs, m.constants, m.reactions.copy(), m.features),
+        }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state, _memory=memory.memory_of(*state["_memory"]))
@@ -197,15 +227,17 @@ class TrunkEngine(Scene):
         return count("env", env, low=0, most=self.num_envs - 1)
 
     def command_in(self, column: Floats) -> Floats:
-        """The command in such a column, shape (legs, 4)."""
-        legs = column[TRUNK_ROWS:].reshape(len(self.limbs), LEG_ROWS)
-        return legs[:, layout.LegMemory.rows("command")].copy()
+        """The command in such a column, shape (legs, 2 + 2 harmonics)."""
+        form = form_of(self.features)
+        legs = column[form.trunk_rows :].reshape(len(self.limbs), form.leg_rows)
+        return legs[:, form.leg_memory.rows("command")].copy()
 
     def alone(self) -> TrunkEngine:
         """An engine like this one, for one environment."""
         return TrunkEngine(
             self.limbs, self.trunk, self.ground, self.terrain, sim_dt=self.sim_dt, integrator=self.integrator,
-            substeps=self.substeps, filters=self.filters, reactions=self.reacts, strides=self.counts_strides,
+            substeps=self.substeps, harmonics=self.features.harmonics, filters=self.filters,
+            reactions=self.reacts, strides=self.counts_strides, limits=self.motion_limits,
             contact_law=self.contact_law,
         )  # fmt: skip
 
@@ -230,7 +262,8 @@ class TrunkEngine(Scene):
         A hoof point that starts inside the ground has entered it at its present rate.
 
         Args:
-            gaits: gait parameters, one for all legs or one each; or as numbers, shape (legs, 4, n).
+            gaits: gait parameters, one for all legs or one each; or as numbers, shape (legs, 2 + 2 harmonics,
+                n).
             theta: crank angles [rad], of shape (), (legs,) or (legs, n) with n the environments that start.
             x, y, pitch, vx, vy, pitch_rate: of the trunk's centre of mass [m, rad, s], shape () or (n,); a
                 `y` of None is the trunk's height.
@@ -243,7 +276,7 @@ class TrunkEngine(Scene):
         """
         where, m = memory.which(envs, self.num_envs), self._memory
         n = where.size
-        values = memory.gaits_of(gaits, len(self.limbs), n)
+        values = memory.gaits_of(gaits, len(self.limbs), n, self.features.harmonics)
         height = self.trunk.height if y is None else y
         trunk = {"x": x, "y": height, "pitch": pitch, "vx": vx, "vy": vy, "pitch_rate": pitch_rate}
         m.trunk[:, where], m.limbs[:, :, where] = memory.start(self, values, theta, theta_rate, trunk, n)
@@ -253,15 +286,23 @@ class TrunkEngine(Scene):
         self._go(-1)
 
     def vary(
-        self, env: int, trunk: Trunk | None = None, ground: Ground | None = None, drive: Drive | None = None
+        self,
+        env: int,
+        trunk: Trunk | None = None,
+        ground: Ground | None = None,
+        drive: Drive | None = None,
+        limbs: Sequence[Limb] | None = None,
     ) -> None:
-        """Give one environment its own masses, springs, ground or motors; it must be reset afterwards.
+        """Give one environment its own masses, springs, ground, motors or legs; it must be reset afterwards.
 
         Args:
             env: which.
             trunk, ground, drive: instead of the engine's, whose kinds, height, exponent and laws they share;
                 None is the engine's own. `total_mass`, `weight`, `tally` and `step_limits` stay those of the
                 engine.
+            limbs: legs in other places, with other springs of the hoofs or, in an engine with `limits`, of
+                other sizes, similar to its own (`Geometry.scaled`); None is the engine's own. Joint
+                reactions are not computed of legs of another size.
 
         Raises:
             ParameterError: what environments share differs, or there is no such environment.
@@ -269,10 +310,15 @@ class TrunkEngine(Scene):
         env = self._env(env)
         trunk = self.trunk if trunk is None else one_of("trunk", trunk, Trunk)
         ground = self.ground if ground is None else one_of("ground", ground, Ground)
-        limbs = [limb if drive is None else replace(limb, drive=drive) for limb in self.limbs]
-        memory.check_shared(self, trunk, ground, limbs)
+        own = self.limbs if limbs is None else all_of("limbs", limbs, Limb)
+        own = [limb if drive is None else replace(limb, drive=drive) for limb in own]
+        memory.check_shared(self, trunk, ground, own)
+        if self.reacts and any(
+            limb.geometry != mine.geometry for limb, mine in zip(own, self.limbs, strict=True)
+        ):
+            raise ParameterError("limbs: expected the engine's own geometries where it computes reactions")
         m = self._memory
-        m.trunk_settings[:, env], m.limb_settings[:, :, env] = memory.settings_of(self, trunk, ground, limbs)
+        m.trunk_settings[:, env], m.limb_settings[:, :, env] = memory.settings_of(self, trunk, ground, own)
 
     def get_state(self) -> dict[str, Any]:
         """Everything that changes, as arrays of their own: continuing from it is bit-identical."""
@@ -288,7 +334,7 @@ class TrunkEngine(Scene):
         arrays, reset = memory.read_state(self._layout, self._memory, state)
         self._put(arrays)
         self._memory.result[reset], self._memory.stride_sums[:] = 0.0, 0.0
-        self._look()
+        self.observe()
 
     @property
     def _layout(self) -> dict[str, Any]:
@@ -304,13 +350,13 @@ class TrunkEngine(Scene):
         """Advance by `steps` of `sim_dt` under a command.
 
         Args:
-            command: gait parameters, of shape (4,), (legs, 4) or (legs, 4, num_envs); None keeps the last.
+            command: gait parameters as `command` takes them, for all environments; None keeps the last.
             steps: how many; 0 evaluates forces and accelerations where the state is.
             account: whether to keep `account`.
 
         Returns:
-            How each environment ended, shape (num_envs,), values of `parts.Result`. One that did not end OK
-            is left in its last good state, from which this call began; the report is of there.
+            How each environment ended, shape (num_envs,), values of `parts.Result`. One that could not be
+            simulated is left in its last good state, from which this call began; the report is of there.
 
         Raises:
             ParameterError: the command has a wrong shape or is not finite.
@@ -318,13 +364,13 @@ class TrunkEngine(Scene):
         """
         steps = count("steps", steps, 0, MOST_STEPS // self.substeps)
         if command is not None:
-            self._command(command)
+            self.command(command)
         self._go(steps, account)
         if self._memory.result.any():
             if np.isnan(self._memory.trunk).all():
                 raise NotStartedError("the engine was asked to move before reset(): expected reset() first")
             if steps:
-                self._look()
+                self.observe()
         return self._memory.result.astype(np.int64)
 
     def run(
@@ -347,24 +393,35 @@ class TrunkEngine(Scene):
         for k in range(1, times):
             self._go(min(every, steps - (k - 1) * every), True)
             if m.result.any():
-                self._look()
+                self.observe()
                 times = k
                 break
             whole[..., k] = m.data
-        kept = memory.memory_of(whole[..., :times], self.num_envs, m.constants, m.reactions)
+        kept = memory.memory_of(whole[..., :times], self.num_envs, m.constants, m.reactions, m.features)
         named = {name: np.moveaxis(values, -1, 0) for name, values in memory.named_rows(kept).items()}
         return named | {"result": self.results}
 
-    def _command(self, command: ArrayLike) -> None:
-        given, whole = finite("command", command), self._memory.command
-        legs = len(self.limbs)
-        if given.shape == (4,) or given.shape == (legs, 4):
+    def command(self, command: ArrayLike, envs: ArrayLike | None = None) -> None:
+        """Command gaits from the next `advance` on, as after a `reset` of some environments.
+
+        Args:
+            command: gait parameters, P = 2 + 2 harmonics of them, of shape (P,), (legs, P) or (legs, P, n),
+                n the environments that are commanded.
+            envs: which, as indices or as a mask of shape (num_envs,); None is all.
+
+        Raises:
+            ParameterError: the command has a wrong shape or is not finite, or there are no such environments.
+        """
+        given, where = finite("command", command), memory.which(envs, self.num_envs)
+        legs, size = len(self.limbs), self.features.gait_size
+        if given.shape == (size,) or given.shape == (legs, size):
             given = given[..., None]
-        elif given.shape != whole.shape:
+        elif given.shape != (legs, size, where.size):
             raise ParameterError(
-                f"command: expected shape (4,), ({legs}, 4) or {whole.shape}, got {given.shape}"
+                f"command: expected shape ({size},), ({legs}, {size}) or {(legs, size, where.size)}, "
+                f"got {given.shape}"
             )
-        whole[:] = given
+        self._memory.command[:, :, where] = given
 
     def _go(self, steps: int, account: bool = False) -> None:
         try:
@@ -376,8 +433,9 @@ class TrunkEngine(Scene):
                 raise
             raise ParameterError(f"contact_law: {what_cannot_be_compiled(error)}") from error
 
-    def _look(self) -> None:
-        """Evaluate where the state is, and change nothing but the report."""
+    def observe(self) -> None:
+        """Evaluate forces and accelerations where the state is, and change nothing but `report` and
+        `reactions`."""
         kept = self._copy((*memory.STATE, "stride_sums", "result"))
         self._go(0)
         self._put(kept)
@@ -393,9 +451,9 @@ class TrunkEngine(Scene):
 
     @property
     def state(self) -> dict[str, Floats]:
-        """The state by name: rows of `layout.TRUNK_STATE`, shape (num_envs,), and of `LEG_STATE`, shape
+        """The state by name: rows of `layout.TRUNK_STATE`, shape (num_envs,), and of `leg_state`, shape
         (legs, num_envs)."""
-        return self._named(layout.TRUNK_STATE + layout.LEG_STATE)
+        return self._named(layout.TRUNK_STATE + layout.leg_state(self.features))
 
     @property
     def report(self) -> dict[str, Floats]:
@@ -408,16 +466,18 @@ class TrunkEngine(Scene):
 
     @property
     def account(self) -> dict[str, Floats]:
-        """Integrals since the reset by name, `layout.ACCOUNT`, shape (num_envs,)."""
-        return {name: self._memory.account[k].copy() for k, name in enumerate(layout.ACCOUNT)}
+        """Integrals since the reset by name, `layout.account`, shape (num_envs,)."""
+        return {name: self._memory.account[k].copy() for k, name in enumerate(layout.account(self.features))}
 
     @property
     def strides(self) -> dict[str, Floats]:
-        """The open stance and the sums of the last call by name, `layout.STRIDES` and `STRIDE_SUMS`, shape
+        """The open stance and the sums of the last call by name, `layout.STRIDES` and `stride_sums`, shape
         (legs, num_envs); see `observables`. Zeros unless the engine was made with `strides=True`."""
         m = self._memory
         whole = np.concatenate([m.strides, m.stride_sums], axis=1)
-        return {name: whole[:, k] for k, name in enumerate(layout.STRIDES + layout.STRIDE_SUMS)}
+        return {
+            name: whole[:, k] for k, name in enumerate(layout.STRIDES + layout.stride_sums(self.features))
+        }
 
     def reactions(self) -> Reactions:
         """Joint reactions at the present instant: of joints, shape (legs, 20, 2, num_envs), and the moments,

@@ -9,7 +9,7 @@ from hoof_env.ground.laws import friction_part, normal_force
 from hoof_env.ground.terrain import surface
 from hoof_env.simd import across, anywhere, choose, cross, dot, larger, level, plane, size
 from hoof_env.simd.compile import inlined
-from hoof_env.simd.math import root_power
+from hoof_env.simd.math import clip, root_power
 from hoof_env.simd.user_functions import named, number_of
 
 
@@ -58,6 +58,19 @@ def meet_point(trunk, leg, point, memory, arm, arm_by_theta, hip, hip_velocity, 
     point.place = place
     point.penetration, point.penetration_rate, point.sliding_speed = penetration, rate, sliding_speed
 
+    if model.form.springs:
+        press_through_spring(trunk, leg, point, memory, model)
+    else:
+        press_rigidly(trunk, point, memory, model)
+    normal = point.ground_normal
+    point.force = point.normal_force * normal - point.friction_force * across(normal)
+    return point.force, dot(point.force, by_theta), cross(arm, point.force)
+
+
+@inlined
+def press_rigidly(trunk, point, memory, model):  # type: ignore[no-untyped-def]
+    """Forces on a point that is the sole itself."""
+    penetration, rate, sliding_speed = point.penetration, point.penetration_rate, point.sliding_speed
     nothing = 0.0 * size(penetration)  # what is not a number stays so
     force, spring, friction = nothing, nothing, nothing
     inverse_speed, inside = memory.inverse_approach_speed, penetration > 0.0
@@ -73,11 +86,46 @@ def meet_point(trunk, leg, point, memory, arm, arm_by_theta, hip, hip_velocity, 
         grip = laws.friction * point.friction_scale * part * pushed  # Eq. 15
         friction = choose(inside, choose(sliding_speed > 0.0, -grip, grip), nothing)
         force, spring = choose(inside, pushed, nothing), choose(inside, stored, nothing)
-    normal = point.ground_normal
     point.spring_force, point.inverse_approach_speed = spring, inverse_speed
     point.normal_force, point.friction_force = force, friction
-    point.force = force * normal - friction * across(normal)
-    return point.force, dot(point.force, by_theta), cross(arm, point.force)
+
+
+@inlined
+def press_through_spring(trunk, leg, point, memory, model):  # type: ignore[no-untyped-def]
+    """Forces on a point whose sole has no mass: what spring and damper carry is what the ground gives.
+
+    The leg's point is `depth` in the ground, the sole s less. With b = chi S / v0 + c of the ground, S + b
+    (depth' - s') = k s + d s' gives s'. Where that asks the ground to pull, the spring goes back by itself.
+    Along the ground u is how far the leg is ahead of the sole: k u + d u' is friction, and u' is the leg's
+    speed while the sole stands.
+    """
+    laws, stiffness, damping = trunk.settings, leg.settings.hoof_stiffness, leg.settings.hoof_damping
+    give, along, speed = point.give[0], point.give[1], point.sliding_speed
+    depth_rate, elastic = point.penetration_rate, stiffness[0] * give
+    penetration, alone = point.penetration - give, -elastic / damping[0]
+    nothing = 0.0 * size(penetration)
+    spring, resistance = nothing, nothing
+    inverse_speed, inside = memory.inverse_approach_speed, penetration > 0.0
+    if anywhere(inside):
+        if anywhere(inside & (inverse_speed == 0.0)):
+            entering = inverse_entry_speed(trunk, memory, penetration, depth_rate - alone, model)
+            inverse_speed = choose(inverse_speed > 0.0, inverse_speed, entering)
+        pushed = ground_spring(laws, point.stiffness_scale, larger(penetration, 0.0), model.eighths)
+        spring = choose(inside, pushed, nothing)
+        resistance = choose(inside, laws.chi * spring * inverse_speed + laws.dashpot, nothing)
+    rate = (spring + resistance * depth_rate - elastic) / (damping[0] + resistance)
+    rate = larger(rate, alone)
+    force = elastic + damping[0] * rate
+    force = choose(inside, larger(force, 0.0), nothing)
+    sticking = stiffness[1] * along + damping[1] * speed
+    grip = laws.friction * point.friction_scale * force
+    held = clip(sticking, grip)
+    shear = choose(size(sticking) <= grip, speed, (held - stiffness[1] * along) / damping[1])
+    point.give_rate[0], point.give_rate[1] = rate, shear
+    point.penetration, point.penetration_rate = penetration, depth_rate - rate
+    point.sliding_speed = speed - shear
+    point.spring_force, point.inverse_approach_speed = spring, inverse_speed
+    point.normal_force, point.friction_force = force, -held
 
 
 @inlined
@@ -94,13 +142,19 @@ def inverse_entry_speed(trunk, memory, penetration, rate, model):  # type: ignor
 
 
 @inlined
-def contact_force(ground, stiffness_scale, penetration, rate, inverse_speed, eighths):  # type: ignore[no-untyped-def]
-    """Normal force on a point inside the ground (Eq. 14), and its spring's part [N]."""
+def ground_spring(ground, stiffness_scale, penetration, eighths):  # type: ignore[no-untyped-def]
+    """K d^n of Eq. 14 [N]."""
     if eighths == 12:  # the usual exponent, 3/2
         power = root_power(penetration, 12)
     else:
         power = root_power(penetration, eighths)
-    spring = ground.stiffness * stiffness_scale * power
+    return ground.stiffness * stiffness_scale * power
+
+
+@inlined
+def contact_force(ground, stiffness_scale, penetration, rate, inverse_speed, eighths):  # type: ignore[no-untyped-def]
+    """Normal force on a point inside the ground (Eq. 14), and its spring's part [N]."""
+    spring = ground_spring(ground, stiffness_scale, penetration, eighths)
     return normal_force(spring, ground.chi * rate * inverse_speed, ground.dashpot * rate), spring
 
 
@@ -147,3 +201,38 @@ def remember_point(point, memory):  # type: ignore[no-untyped-def]
     memory.penetration, memory.rate = point.penetration, point.penetration_rate
     kept = choose(point.penetration > 0.0, point.inverse_approach_speed, 0.0)
     memory.inverse_approach_speed = kept
+
+
+# The springs' states, step by step as `stepping` has it; `count` rows a point, 0 of rigid hoofs
+
+
+@inlined
+def begin_springs(leg, count):  # type: ignore[no-untyped-def]
+    """The first stage is at the state itself."""
+    for k in range(count):
+        leg.toe.give[k], leg.heel.give[k] = leg.state.toe.give[k], leg.state.heel.give[k]
+        leg.toe.mean_give_rate[k], leg.heel.mean_give_rate[k] = 0.0, 0.0
+
+
+@inlined
+def weigh_springs(leg, count, weight):  # type: ignore[no-untyped-def]
+    """Add the rates at the present stage to their means."""
+    for k in range(count):
+        leg.toe.mean_give_rate[k] = leg.toe.mean_give_rate[k] + weight * leg.toe.give_rate[k]
+        leg.heel.mean_give_rate[k] = leg.heel.mean_give_rate[k] + weight * leg.heel.give_rate[k]
+
+
+@inlined
+def move_springs(leg, count, elapsed):  # type: ignore[no-untyped-def]
+    """Go `elapsed` [s] from the step's start with the rates of the present stage."""
+    for k in range(count):
+        leg.toe.give[k] = leg.state.toe.give[k] + elapsed * leg.toe.give_rate[k]
+        leg.heel.give[k] = leg.state.heel.give[k] + elapsed * leg.heel.give_rate[k]
+
+
+@inlined
+def end_springs(leg, count, h):  # type: ignore[no-untyped-def]
+    """The state a step of `h` [s] later."""
+    for k in range(count):
+        leg.state.toe.give[k] = leg.state.toe.give[k] + h * leg.toe.mean_give_rate[k]
+        leg.state.heel.give[k] = leg.state.heel.give[k] + h * leg.heel.mean_give_rate[k]

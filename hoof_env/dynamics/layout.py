@@ -3,19 +3,55 @@ array.
 
 SI units and radians. beta = pitch + side phi is the world angle of a leg's frame. 'All' means trunk and legs
 together; 'fixed' frame means one that does not swing while the crank turns.
+
+What only some engines have (`Features`) are blocks whose size is 0 in the others, which keep their memory,
+their speed and their bits.
 """
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any, NamedTuple
 
-from hoof_env.gait import PARAMETERS
+from hoof_env.gait import parameter_names
 from hoof_env.leg.profile import Functions, Slopes
-from hoof_env.simd.layout import Block, Layout, Row, Vector
+from hoof_env.simd.layout import Block, Layout, Row, Size, Vector
 
 FARTHEST = 1e9
 """Largest angles [rad] and places [m] of a state, which are as good as numbers are fine there: to 6e-10 at
 1e6, to 6e-7 at 1e9; also the largest rates of a start, whose squares are then numbers still."""
+
+GAIT, SPRING, ANIMAL, LIMITS = Size("gait", 4), Size("spring", 0), Size("animal", 0), Size("limits", 0)
+
+
+class Features(NamedTuple):
+    """What an engine has beyond the paper's rigid leg. It is chosen when kernels are compiled: what is not
+    chosen is neither computed nor kept.
+
+    Attributes:
+        harmonics: of the swing law, 1 to `gait.MOST_HARMONICS`.
+        springs: in series with the ground at each hoof point, see `parts.HoofSpring`.
+        animal: legs of other sizes in some environments, limits of the motion, slip and horizontal impulses.
+    """
+
+    harmonics: int = 1
+    springs: bool = False
+    animal: bool = False
+
+    @property
+    def gait_size(self) -> int:
+        """How many gait parameters a leg has."""
+        return 2 + 2 * self.harmonics
+
+    def of(self, layout: Any) -> Any:
+        """A layout of this module as engines of this kind have it."""
+        return layout.sized(
+            gait=self.gait_size, spring=2 * self.springs, animal=int(self.animal), limits=5 * self.animal
+        )
+
+
+PLAIN = Features()
+"""The paper's leg."""
+
 
 # The trunk
 
@@ -65,6 +101,7 @@ class TrunkSettings(Layout):
     friction_slow: Row  # [m/s]
     friction_fast: Row  # [m/s]
     bottom: Row  # height below which the trunk has fallen through the ground [m]
+    limits: Annotated[Block, LIMITS]  # see `parts.Limits`: of pitch [rad] and height [m], clearance [m]
 
 
 class TrunkRows(Layout):
@@ -93,6 +130,7 @@ class TrunkRows(Layout):
     mass_pp: Row
     at_dead_point: Row  # 1 once a crank was where its linkage does not close
     fallen: Row  # 1 once the trunk was below `bottom`
+    beyond: Annotated[Block, ANIMAL]  # which of the limits was passed first, a number of `parts.Result`
     settings: TrunkSettings
 
 
@@ -107,6 +145,7 @@ class Account(Layout):
     drag_loss: Row
     damper_loss: Row
     impulse: Vector  # of the ground on all hoofs [N s]
+    hoof: Annotated[Block, SPRING]  # stored in the hoofs' springs, lost in their dampers [J]
 
 
 class TrunkReport(Layout):
@@ -138,6 +177,7 @@ class ContactMemory(Layout):
     penetration: Row  # [m]
     rate: Row  # [m/s]
     inverse_approach_speed: Row  # 1 / approach speed while it is in the ground, else 0 [s/m]
+    give: Annotated[Block, SPRING]  # of the hoof's spring, along normal and tangent of the ground [m]
 
 
 class LegState(Layout):
@@ -145,8 +185,8 @@ class LegState(Layout):
 
     theta: Row  # crank angle [rad]
     theta_rate: Row  # [rad/s]
-    gait: Annotated[Block, 4]  # outputs of the command filters, in the order of `PARAMETERS`
-    gait_rate: Annotated[Block, 4]
+    gait: Annotated[Block, GAIT]  # outputs of the command filters, in the order of `gait.parameter_names`
+    gait_rate: Annotated[Block, GAIT]
     toe: ContactMemory
     heel: ContactMemory
 
@@ -174,6 +214,9 @@ class StrideSums(Layout):
     loaded_time: Row  # [s]
     stances: Row  # that began
     travel: Row  # backward, of the hoof along the ground, weighted with the load [m]
+    slip: Annotated[Block, ANIMAL]  # the same without sign, so that to and fro adds up [m]
+    braking: Annotated[Block, ANIMAL]  # impulse of the ground backward [N s]
+    propulsion: Annotated[Block, ANIMAL]  # forward [N s]
 
 
 class LegSettings(Layout):
@@ -190,18 +233,25 @@ class LegSettings(Layout):
     rotor_coupling: Row
     rotor_frame: Row
     lift_off: Row  # normal force that tells stance from swing [N]
+    hoof_stiffness: Annotated[Block, SPRING]  # of the hoof's springs, normal and tangential [N/m]
+    hoof_damping: Annotated[Block, SPRING]  # [N s/m]
+    length_scale: Annotated[Block, ANIMAL]  # of this leg over that of the table [-]
+    mass_scale: Annotated[Block, ANIMAL]  # [-]
 
 
 class Contact(Layout):
     """A hoof point on the ground."""
 
     place: Vector  # [m]
-    penetration: Row  # [m]
+    penetration: Row  # of the ground; with a spring less than that of the leg's point [m]
     penetration_rate: Row  # [m/s]
+    give: Annotated[Block, SPRING]  # of the spring at the present stage [m]
+    give_rate: Annotated[Block, SPRING]  # [m/s]
+    mean_give_rate: Annotated[Block, SPRING]  # weighted mean over the stages so far
     ground_normal: Vector  # [-]
     stiffness_scale: Row  # factor of K there [-]
     friction_scale: Row  # factor of mu there [-]
-    sliding_speed: Row  # along the ground [m/s]
+    sliding_speed: Row  # along the ground, with a spring of the sole [m/s]
     spring_force: Row  # the part of the normal force that comes back [N]
     inverse_approach_speed: Row  # [s/m]
     normal_force: Row  # [N]
@@ -217,8 +267,8 @@ class LegRows(Layout):
     sums: StrideSums
     functions: Functions  # of the crank angle, at the present stage
     slopes: Slopes
-    command: Annotated[Block, 4]
-    gait_acceleration: Annotated[Block, 4]  # of the command filters
+    command: Annotated[Block, GAIT]
+    gait_acceleration: Annotated[Block, GAIT]  # of the command filters
     theta: Row  # crank angle, rate and acceleration at the present stage
     theta_rate: Row
     theta_acceleration: Row
@@ -286,7 +336,7 @@ class LegMemory(Layout):
     state: LegState
     strides: Strides
     sums: StrideSums
-    command: Annotated[Block, 4]
+    command: Annotated[Block, GAIT]
     settings: LegSettings
     report: LegReport
 
@@ -295,14 +345,30 @@ class LegMemory(Layout):
 
 TRUNK_STATE = ("time", "centre_x", "centre_y", "momentum_x", "momentum_y", "pitch", "spin")
 TRUNK_REPORT = ("x", "y", "vx", "vy", "ax", "ay", "pitch_rate", "pitch_acc")
-LEG_STATE = (
-    "theta", "theta_rate", *PARAMETERS, *(f"{name}_rate" for name in PARAMETERS),
-    "toe_penetration", "toe_rate", "toe_slowness", "heel_penetration", "heel_rate", "heel_slowness",
-)  # fmt: skip
 LEG_REPORT = LegReport.names
 STRIDES = Strides.names
-STRIDE_SUMS = (
-    "peak_increase", "running_peak_increase", "loading_rate_increase", "highest", "positive_work",
-    "load_impulse", "loaded_time", "stances", "travel",
-)  # fmt: skip
-ACCOUNT = Account.names
+
+
+def leg_state(features: Features = PLAIN) -> tuple[str, ...]:
+    """Names of the rows of a `LegState`."""
+    gait = parameter_names(features.harmonics)
+    contact = ("penetration", "rate", "slowness", *("give_normal", "give_tangential")[: 2 * features.springs])
+    points = (f"{point}_{name}" for point in ("toe", "heel") for name in contact)
+    return ("theta", "theta_rate", *gait, *(f"{name}_rate" for name in gait), *points)
+
+
+def stride_sums(features: Features = PLAIN) -> tuple[str, ...]:
+    """Names of the rows of `StrideSums`."""
+    return (
+        "peak_increase", "running_peak_increase", "loading_rate_increase", "highest", "positive_work",
+        "load_impulse", "loaded_time", "stances", "travel",
+        *("slip", "braking", "propulsion")[: 3 * features.animal],
+    )  # fmt: skip
+
+
+def account(features: Features = PLAIN) -> tuple[str, ...]:
+    """Names of the rows of an `Account`."""
+    return (*Account.names, *("hoof_stored", "hoof_loss")[: 2 * features.springs])
+
+
+LEG_STATE, STRIDE_SUMS, ACCOUNT = leg_state(), stride_sums(), account()

@@ -18,7 +18,7 @@ and angular, of all bodies together: in flight it is kept to round-off, whatever
 from __future__ import annotations
 
 from hoof_env.dynamics.hoof import meet_ground
-from hoof_env.dynamics.layout import FARTHEST, LegRows, Moving
+from hoof_env.dynamics.layout import FARTHEST, Moving
 from hoof_env.dynamics.parts import FIXED, FREE, RAIL, SUSPENDED
 from hoof_env.gait import COS, OFFSET, SIN, SPEED
 from hoof_env.leg.profile import look_up
@@ -44,15 +44,15 @@ def evaluate(trunk, legs, leg_count, model, elapsed):  # type: ignore[no-untyped
     if model.kind != FIXED:
         clear_trunk(trunk, model.kind)
     for i in range(leg_count):
-        leg = nth(legs, i, LegRows)
+        leg = nth(legs, i)
         look_up_functions(trunk, leg, model)
-        place_frame(trunk, leg, elapsed)
+        place_frame(trunk, leg, model.form.harmonics, elapsed)
         if model.kind != FIXED:
             gather_leg(trunk, leg, model.kind, model.together)
     if model.kind != FIXED:
         move_trunk(trunk, model.kind)
     for i in range(leg_count):
-        leg = nth(legs, i, LegRows)
+        leg = nth(legs, i)
         meet_ground(trunk, leg, model)
         set_up_crank(trunk, leg, elapsed)
         if model.kind != FIXED:
@@ -60,7 +60,7 @@ def evaluate(trunk, legs, leg_count, model, elapsed):  # type: ignore[no-untyped
     if model.kind != FIXED:
         accelerate_trunk(trunk, model.kind)
     for i in range(leg_count):
-        accelerate_crank(trunk, nth(legs, i, LegRows))
+        accelerate_crank(trunk, nth(legs, i))
 
 
 @inlined
@@ -68,23 +68,51 @@ def look_up_functions(trunk, leg, model):  # type: ignore[no-untyped-def]
     """The functions of the crank angle and their derivatives."""
     angle = leg.theta
     look_up(leg.functions, leg.slopes, model.tables, leg.settings.first_row, model.cells, angle)
+    if model.form.animal:
+        scale_functions(leg.functions, leg.slopes, leg.settings.length_scale[0], leg.settings.mass_scale[0])
     value = leg.functions[0]
     trunk.at_dead_point = choose((size(angle) <= FARTHEST) & (value != value), 1.0, trunk.at_dead_point)
 
 
 @inlined
-def place_frame(trunk, leg, elapsed):  # type: ignore[no-untyped-def]
+def scale_functions(value, slope, length, mass):  # type: ignore[no-untyped-def]
+    """Functions of a similar leg, `length` times as large with `mass` times the mass."""
+    moment, inertia = mass * length, mass * length * length
+    value.toe, value.heel = length * value.toe, length * value.heel
+    slope.toe, slope.heel = length * slope.toe, length * slope.heel
+    value.first_moment, value.moment_slope = moment * value.first_moment, moment * value.moment_slope
+    slope.moment_slope = moment * slope.moment_slope
+    value.crank_inertia, value.coupling = inertia * value.crank_inertia, inertia * value.coupling
+    slope.crank_inertia, slope.coupling = inertia * slope.crank_inertia, inertia * slope.coupling
+    value.frame_inertia = inertia * value.frame_inertia
+    value.frame_inertia_slope = inertia * value.frame_inertia_slope
+
+
+@inlined
+def place_frame(trunk, leg, harmonics, elapsed):  # type: ignore[no-untyped-def]
     """The leg's frame (E1), its first moment and inertia in the world. The swing is phi = offset +
-    A sin(theta) + B cos(theta), each parameter moving as its filter does."""
+    A sin(theta) + B cos(theta), perhaps with higher harmonics, each parameter moving as its filter does."""
     sine, cosine, w = leg.functions.sine, leg.functions.cosine, leg.theta_rate
     offset, rate, bend = filtered(leg, OFFSET, elapsed)
     part_a, rate_a, bend_a = filtered(leg, SIN, elapsed)
     part_b, rate_b, bend_b = filtered(leg, COS, elapsed)
     side, swing = leg.settings.side, part_a * sine + part_b * cosine
-    k = side * (part_a * cosine - part_b * sine)
+    slope = part_a * cosine - part_b * sine
     bent = bend + bend_a * sine + bend_b * cosine + (2.0 * (rate_a * cosine - rate_b * sine) - swing * w) * w
+    drift = rate + rate_a * sine + rate_b * cosine
+    sine_n, cosine_n = sine, cosine
+    for n in range(2, harmonics + 1):
+        sine_n, cosine_n = sine_n * cosine + cosine_n * sine, cosine_n * cosine - sine_n * sine
+        part_a, rate_a, bend_a = filtered(leg, 2 * n, elapsed)
+        part_b, rate_b, bend_b = filtered(leg, 2 * n + 1, elapsed)
+        part, turned = part_a * sine_n + part_b * cosine_n, n * w
+        swing, slope = swing + part, slope + n * (part_a * cosine_n - part_b * sine_n)
+        drift = drift + rate_a * sine_n + rate_b * cosine_n
+        twist = 2.0 * (rate_a * cosine_n - rate_b * sine_n) - part * turned
+        bent = bent + bend_a * sine_n + bend_b * cosine_n + twist * turned
+    k = side * slope
     leg.phi, leg.beta_by_theta = offset + swing, k
-    leg.swing_rate, leg.swing_acceleration = side * (rate + rate_a * sine + rate_b * cosine), side * bent
+    leg.swing_rate, leg.swing_acceleration = side * drift, side * bent
 
     cos_beta, sin_beta = cos_sin(trunk.stage.pitch + side * (offset + swing))
     turn = plane(cos_beta, sin_beta)
@@ -195,9 +223,9 @@ def settle(trunk, legs, leg_count, model, starts):  # type: ignore[no-untyped-de
     then: place and velocity of the trunk and rate of its pitch. The inverse of `move_trunk`."""
     clear_trunk(trunk, model.kind)
     for i in range(leg_count):
-        leg = nth(legs, i, LegRows)
+        leg = nth(legs, i)
         look_up_functions(trunk, leg, model)
-        place_frame(trunk, leg, 0.0)
+        place_frame(trunk, leg, model.form.harmonics, 0.0)
         gather_leg(trunk, leg, model.kind, model.together)
     place, velocity, rate = trunk.state.moving.centre, trunk.state.moving.momentum, trunk.state.moving.spin
     moment, drift, per_mass = trunk.first_moment, trunk.relative_momentum, trunk.settings.inverse_mass

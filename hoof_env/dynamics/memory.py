@@ -13,9 +13,28 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.dynamics import layout
-from hoof_env.dynamics.advance import LANES, LEG_ROWS, MODEL, TRUNK_ROWS
-from hoof_env.dynamics.layout import FARTHEST, LegMemory, LegState, Moving, TrunkMemory, TrunkState
-from hoof_env.dynamics.parts import FREE, GRAVITY, RAIL, SUSPENDED, TRUNKS, Limb, Motor, Scene, Trunk
+from hoof_env.dynamics.advance import LANES, MODEL, form_of
+from hoof_env.dynamics.layout import (
+    FARTHEST,
+    Features,
+    LegSettings,
+    LegState,
+    Moving,
+    TrunkSettings,
+    TrunkState,
+)
+from hoof_env.dynamics.parts import (
+    FREE,
+    GRAVITY,
+    RAIL,
+    SUSPENDED,
+    TRUNKS,
+    Limb,
+    Limits,
+    Motor,
+    Scene,
+    Trunk,
+)
 from hoof_env.dynamics.reactions import Reactions, leg_constants
 from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.errors import Floats, ParameterError, all_of, finite, spread
@@ -33,7 +52,8 @@ push under it."""
 
 
 class Memory(NamedTuple):
-    """An engine's memory as the kernels take it, and views of its parts; the last axis is the environment."""
+    """An engine's memory as the kernels take it, and views of its parts; the last axis is the environment.
+    Shapes are those without `Features`."""
 
     data: Floats  # all of it, (rows, columns): whole vectors of environments, so some columns may be idle
     trunk: Floats  # the state, (7, n)
@@ -49,18 +69,22 @@ class Memory(NamedTuple):
     result: Floats  # values of `parts.Result`, (n,); where it is not OK the state is left as it was
     constants: Floats  # `reactions.LegConstants`, (legs, size)
     reactions: Floats  # `reactions.Reactions`, (legs, size, columns)
+    features: Features
 
 
-def memory_of(data: Floats, num_envs: int, constants: Floats, reactions: Floats) -> Memory:
+def memory_of(
+    data: Floats, num_envs: int, constants: Floats, reactions: Floats, features: Features
+) -> Memory:
     """`Memory` with the parts of `data`, whose last columns may be idle; more axes may follow."""
-    trunk = data[:TRUNK_ROWS, :num_envs]
-    limbs = data[TRUNK_ROWS:].reshape(len(constants), LEG_ROWS, *data.shape[1:])[:, :, :num_envs]
-    t_parts = {name: trunk[TrunkMemory.rows(name)] for name in TrunkMemory.fields}
-    l_parts = {name: limbs[:, LegMemory.rows(name)] for name in LegMemory.fields}
+    form = form_of(features)
+    trunk = data[: form.trunk_rows, :num_envs]
+    limbs = data[form.trunk_rows :].reshape(len(constants), form.leg_rows, *data.shape[1:])[:, :, :num_envs]
+    t_parts = {name: trunk[form.trunk_memory.rows(name)] for name in form.trunk_memory.fields}
+    l_parts = {name: limbs[:, form.leg_memory.rows(name)] for name in form.leg_memory.fields}
     return Memory(
         data, t_parts["state"], l_parts["state"], t_parts["settings"], l_parts["settings"],
         l_parts["strides"], l_parts["sums"], l_parts["command"], t_parts["account"],
-        t_parts["report"], l_parts["report"], t_parts["result"][0], constants, reactions,
+        t_parts["report"], l_parts["report"], t_parts["result"][0], constants, reactions, features,
     )  # fmt: skip
 
 
@@ -68,7 +92,7 @@ def named_rows(memory: Memory) -> dict[str, Floats]:
     """State and report by name, as views."""
     parts = ((layout.TRUNK_STATE, memory.trunk), (layout.TRUNK_REPORT, memory.trunk_report))
     columns = {name: values[k] for names, values in parts for k, name in enumerate(names)}
-    limbs = ((layout.LEG_STATE, memory.limbs), (layout.LEG_REPORT, memory.limb_report))
+    limbs = ((layout.leg_state(memory.features), memory.limbs), (layout.LEG_REPORT, memory.limb_report))
     return columns | {name: values[:, k] for names, values in limbs for k, name in enumerate(names)}
 
 
@@ -83,11 +107,13 @@ def new_memory(scene: Scene, num_envs: int, columns: int, reacts: bool) -> Memor
     legs = len(scene.limbs)
     constants = np.array([leg_constants(limb.geometry) for limb in scene.limbs])
     reactions = np.zeros((legs, Reactions.size, columns if reacts else 0))
-    whole = memory_of(np.zeros((TRUNK_ROWS + legs * LEG_ROWS, columns)), columns, constants, reactions)
+    form = form_of(scene.features)
+    data = np.zeros((form.trunk_rows + legs * form.leg_rows, columns))
+    whole = memory_of(data, columns, constants, reactions, scene.features)
     whole.trunk[:], whole.limbs[:] = np.nan, np.nan
     trunk, limbs = settings_of(scene, scene.trunk, scene.ground, scene.limbs)
     whole.trunk_settings[:], whole.limb_settings[:] = trunk[:, None], limbs[:, :, None]
-    return memory_of(whole.data, num_envs, constants, reactions)
+    return memory_of(data, num_envs, constants, reactions, scene.features)
 
 
 def new_model(scene: Scene, filters: FilterSettings, strides: bool) -> tuple[NDArray[Any], Floats, Floats]:
@@ -114,7 +140,7 @@ def new_model(scene: Scene, filters: FilterSettings, strides: bool) -> tuple[NDA
 
 
 def check_shared(scene: Scene, trunk: Trunk, ground: Ground, limbs: Sequence[Limb]) -> None:
-    """Raise where one environment's trunk, ground or drives differ in what the kernels take once for all."""
+    """Raise where one environment's trunk, ground or legs differ in what the kernels take once for all."""
     for name, given, own in (
         ("trunk.kind", trunk.kind, scene.trunk.kind),
         ("trunk.height", trunk.height, scene.trunk.height),
@@ -123,16 +149,62 @@ def check_shared(scene: Scene, trunk: Trunk, ground: Ground, limbs: Sequence[Lim
     ):  # fmt: skip
         if given != own:
             raise ParameterError(f"{name}: expected {own!r}, which all environments share, got {given!r}")
-    for limb, own_limb in zip(limbs, scene.limbs, strict=True):
+    if len(limbs) != len(scene.limbs):
+        raise ParameterError(f"limbs: expected {len(scene.limbs)}, got {len(limbs)}")
+    check_limbs(trunk, limbs, scene.features.springs)
+    for k, (limb, own_limb) in enumerate(zip(limbs, scene.limbs, strict=True)):
         if type(limb.drive) is not type(own_limb.drive):
             raise ParameterError(f"drive: expected a {type(own_limb.drive).__name__}, got {limb.drive!r}")
+        if scales_of(f"limbs[{k}]", limb, own_limb) != (1.0, 1.0) and not scene.features.animal:
+            raise ParameterError(
+                f"limbs[{k}].geometry: expected that of the engine, which was made without limits; with "
+                f"limits, if only Limits(), legs may have sizes of their own"
+            )
+
+
+def check_limbs(trunk: Trunk, limbs: Sequence[Limb], springs: bool) -> None:
+    """Raise where a hip is beyond the trunk, or some hoofs have springs and others none."""
+    for k, limb in enumerate(limbs):
+        if trunk.length is not None and abs(limb.hip[0]) > trunk.length / 2:
+            raise ParameterError(
+                f"limbs[{k}].hip: expected within the trunk, {trunk.length / 2:g} m of its centre of mass "
+                f"forward or back, got {limb.hip[0]:g}"
+            )
+        if (limb.spring is not None) != springs:
+            expected, given = ("a HoofSpring", "none") if springs else ("none", repr(limb.spring))
+            raise ParameterError(
+                f"limbs[{k}].spring: expected {expected}, as the engine's first leg has, got {given}"
+            )
+
+
+def scales_of(name: str, limb: Limb, own: Limb) -> tuple[float, float]:
+    """Length and mass of a leg over those of the engine's, to which it must be similar."""
+    if limb.geometry == own.geometry:
+        return 1.0, 1.0
+    one, other = limb.geometry.to_dict(), own.geometry.to_dict()
+    length = one["hip_height"] / other["hip_height"]
+    mass = limb.geometry.mass / own.geometry.mass
+    pairs = [
+        (limb.geometry.body_lengths, length * own.geometry.body_lengths),
+        (one["pivot"], length * np.array(other["pivot"])),
+        (limb.geometry.body_masses, mass * own.geometry.body_masses),
+        (limb.geometry.body_inertias, mass * length**2 * own.geometry.body_inertias),
+    ]
+    same = all(one[key] == other[key] for key in ("assembly", "toe", "heel", "travel"))
+    if not same or not all(np.allclose(a, b, rtol=1e-9, atol=0) for a, b in pairs):
+        raise ParameterError(
+            f"{name}.geometry: expected one similar to the engine's {own.geometry.name!r}, as "
+            f"Geometry.scaled gives it, got {limb.geometry.name!r}"
+        )
+    return length, mass
 
 
 def settings_of(scene: Scene, trunk: Trunk, ground: Ground, limbs: Sequence[Limb]) -> tuple[Floats, Floats]:
-    """Rows of `TrunkSettings`, shape (17,), and of `LegSettings`, shape (legs, 12), of an environment under a
-    trunk of the same kind, on a ground with the same laws."""
+    """Rows of `TrunkSettings` and of `LegSettings`, (legs, rows), of an environment under a trunk of the same
+    kind, on a ground with the same laws."""
     mass = trunk.mass + sum(limb.geometry.mass for limb in limbs)
     record, hangs = ground.to_record(), trunk.kind == "suspended"
+    limits = scene.motion_limits or Limits()
     values = {
         "total_mass": mass, "inverse_mass": 1 / mass, "pitch_inertia": trunk.pitch_inertia,
         "support": (1 - trunk.share) * mass * GRAVITY if hangs else 0.0,
@@ -142,24 +214,40 @@ def settings_of(scene: Scene, trunk: Trunk, ground: Ground, limbs: Sequence[Limb
     } | {name: record[name] for name in (
         "stiffness", "chi", "dashpot", "approach_floor", "friction", "friction_slow", "friction_fast"
     )}  # fmt: skip
+    values |= _numbered("limits", (*limits.pitch, *limits.height, limits.clearance))
     lift_off = LIFT_OFF * mass * GRAVITY / len(limbs)
     unique, cells = list(dict.fromkeys(scene.profiles)), max(profile.cells for profile in scene.profiles)
     firsts = [unique.index(profile) * cells for profile in scene.profiles]  # where each leg's table begins
-    each = [_limb_settings(limb, first, lift_off) for limb, first in zip(limbs, firsts, strict=True)]
-    return np.array([values[name] for name in layout.TrunkSettings.names]), np.array(each)
+    names, each = scene.features.of(LegSettings).names, []
+    for k, (limb, own, first) in enumerate(zip(limbs, scene.limbs, firsts, strict=True)):
+        rows = _limb_settings(limb, first, lift_off, scales_of(f"limbs[{k}]", limb, own))
+        each.append([rows[name] for name in names])
+    return np.array([values[name] for name in scene.features.of(TrunkSettings).names]), np.array(each)
 
 
-def _limb_settings(limb: Limb, first_row: int, lift_off: float) -> Floats:
+def _limb_settings(
+    limb: Limb, first_row: int, lift_off: float, scales: tuple[float, float]
+) -> dict[str, float]:
     motor = limb.drive if isinstance(limb.drive, Motor) else Motor(0.0, 0.0, 0.0, 0.0)
-    side, rotor = float(limb.geometry.travel), motor.rotor_inertia
+    side, rotor, spring = float(limb.geometry.travel), motor.rotor_inertia, limb.spring
     values = {
         "hip_on_trunk_x": limb.hip[0], "hip_on_trunk_y": limb.hip[1], "mass": limb.geometry.mass,
         "side": side, "first_row": first_row, "is_motor": float(isinstance(limb.drive, Motor)),
         "speed_gain": motor.speed_gain, "torque_limit": motor.torque_limit,
         "rotor_crank": motor.reflected_inertia, "rotor_coupling": -side * motor.gear_ratio * rotor,
         "rotor_frame": rotor, "lift_off": lift_off,
+        "length_scale_0": scales[0], "mass_scale_0": scales[1],
     }  # fmt: skip
-    return np.array([values[name] for name in layout.LegSettings.names])
+    if spring is None:
+        return values
+    stiffness = _numbered("hoof_stiffness", (spring.stiffness, spring.tangential_stiffness))
+    damping = _numbered("hoof_damping", (spring.damping, spring.tangential_damping))
+    return values | stiffness | damping
+
+
+def _numbered(name: str, values: Sequence[float | None]) -> dict[str, Any]:
+    """The rows of a block by name."""
+    return {f"{name}_{k}": value for k, value in enumerate(values)}
 
 
 def which(envs: ArrayLike | None, num_envs: int) -> NDArray[np.int64]:
@@ -178,17 +266,17 @@ def which(envs: ArrayLike | None, num_envs: int) -> NDArray[np.int64]:
     )
 
 
-def gaits_of(gaits: Any, legs: int, n: int) -> Floats:
-    """`gaits` of `TrunkEngine.reset` as numbers of shape (legs, 4, n)."""
+def gaits_of(gaits: Any, legs: int, n: int, harmonics: int) -> Floats:
+    """`gaits` of `TrunkEngine.reset` as numbers of shape (legs, 2 + 2 harmonics, n)."""
     if isinstance(gaits, np.ndarray):
-        given = finite("gaits", gaits, FARTHEST)
-        if given.shape != (legs, 4, n):
-            raise ParameterError(f"gaits: expected shape {(legs, 4, n)}, got {given.shape}")
+        given, size = finite("gaits", gaits, FARTHEST), 2 + 2 * harmonics
+        if given.shape != (legs, size, n):
+            raise ParameterError(f"gaits: expected shape {(legs, size, n)}, got {given.shape}")
         return given
     each = all_of("gaits", [gaits] * legs if isinstance(gaits, GaitParameters) else gaits, GaitParameters)
     if len(each) != legs:
         raise ParameterError(f"gaits: expected one or {legs}, got {len(each)}")
-    return np.repeat(np.array([gait.to_array() for gait in each])[:, :, None], n, 2)
+    return np.repeat(np.array([gait.to_array(harmonics) for gait in each])[:, :, None], n, 2)
 
 
 def start(
@@ -199,7 +287,8 @@ def start(
     trunk: Mapping[str, ArrayLike],
     n: int,
 ) -> tuple[Floats, Floats]:
-    """State of `n` environments with filters at rest: of the trunk, shape (7, n), and legs, (legs, 16, n).
+    """State of `n` environments with filters at rest and springs that bear nothing: of the trunk, shape
+    (7, n), and legs, (legs, rows of a `LegState`, n).
 
     In the place of centre of mass, momentum and spin of all are the trunk's place, velocity and rate of
     pitch: the kernels make the one of the other (`mechanics.settle`). `TrunkEngine.reset` says what `trunk`
@@ -230,9 +319,10 @@ def start(
     moving = state[TrunkState.rows("moving")]  # the kernels make of these what they integrate
     moving[Moving.rows("centre")], moving[Moving.rows("momentum")] = (at["x"], at["y"]), (at["vx"], at["vy"])
     moving[Moving.rows("pitch")], moving[Moving.rows("spin")] = at["pitch"], at["pitch_rate"]
-    leg = np.zeros((legs, LegState.size, n))
-    leg[:, LegState.rows("theta")], leg[:, LegState.rows("theta_rate")] = angle[:, None], spin[:, None]
-    leg[:, LegState.rows("gait")] = gaits
+    rows = scene.features.of(LegState)
+    leg = np.zeros((legs, rows.size, n))
+    leg[:, rows.rows("theta")], leg[:, rows.rows("theta_rate")] = angle[:, None], spin[:, None]
+    leg[:, rows.rows("gait")] = gaits
     return state, leg
 
 
@@ -281,9 +371,17 @@ def identity_of(scene: Scene, filters: FilterSettings, **numbers: float) -> dict
     for name, part in (("trunk", scene.trunk), ("ground", scene.ground), ("filters", filters)):
         identity |= {f"{name}.{key}": value for key, value in asdict(part).items()}
     identity["terrain"] = _digest(scene.terrain.to_dict())
+    if scene.trunk.length is None:
+        del identity["trunk.length"]  # as in states from before there was one
+    if scene.features.harmonics > 1:
+        identity["harmonics"] = scene.features.harmonics
+    if scene.motion_limits:
+        identity["limits"] = repr(scene.motion_limits)
     for i, limb in enumerate(scene.limbs):
         shape = limb.geometry.to_dict()
         identity |= {f"limbs[{i}].hip": list(limb.hip), f"limbs[{i}].drive": repr(limb.drive)}
+        if limb.spring:
+            identity[f"limbs[{i}].spring"] = repr(limb.spring)
         identity[f"limbs[{i}].geometry"] = _digest(
             {key: value for key, value in shape.items() if key not in ("name", "provenance")}
         )

@@ -16,9 +16,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from hoof_env.dynamics.layout import LegRows
 from hoof_env.dynamics.mechanics import add
-from hoof_env.simd import across, choose, dot, larger, nth, root, smaller
+from hoof_env.simd import across, choose, dot, larger, nth, root, size, smaller
 from hoof_env.simd.compile import inlined
 
 REVOLUTION = 2 * math.pi
@@ -61,7 +60,7 @@ def keep_account(trunk, legs, leg_count, model, account, weight):  # type: ignor
     account.drag_loss = account.drag_loss + weight * drag
     account.damper_loss = account.damper_loss + weight * damper
     for i in range(leg_count):
-        leg = nth(legs, i, LegRows)
+        leg = nth(legs, i)
         find_drives(trunk, leg)
         toe, heel = leg.toe.penetration_rate, leg.heel.penetration_rate
         stored = leg.toe.spring_force * toe + leg.heel.spring_force * heel
@@ -75,6 +74,14 @@ def keep_account(trunk, legs, leg_count, model, account, weight):  # type: ignor
         account.ground_loss = add(account.ground_loss, weight * spent, together)
         account.friction_loss = add(account.friction_loss, -weight * rubbed, together)
         account.impulse = add(account.impulse, weight * leg.ground_force, together)
+        if model.form.springs:
+            for k in range(model.form.springs):
+                stiffness, damping = leg.settings.hoof_stiffness[k], leg.settings.hoof_damping[k]
+                toe, heel = leg.toe.give_rate[k], leg.heel.give_rate[k]
+                bent = stiffness * (leg.toe.give[k] * toe + leg.heel.give[k] * heel)
+                account.hoof[0] = add(account.hoof[0], weight * bent, together)
+                lost = damping * (toe * toe + heel * heel)
+                account.hoof[1] = add(account.hoof[1], weight * lost, together)
 
 
 @inlined
@@ -107,7 +114,7 @@ def report_point(point, report):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def count_stride(trunk, leg, h):  # type: ignore[no-untyped-def]
+def count_stride(trunk, leg, form, h):  # type: ignore[no-untyped-def]
     """Add a whole step of `h` [s] that ends here."""
     find_drives(trunk, leg)
     push, load = leg.ground_force, leg.toe.normal_force + leg.heel.normal_force
@@ -138,6 +145,12 @@ def count_stride(trunk, leg, h):  # type: ignore[no-untyped-def]
     leg.sums.loaded_time = leg.sums.loaded_time + choose(down, h, 0.0)
     slid = leg.toe.normal_force * leg.toe.sliding_speed + leg.heel.normal_force * leg.heel.sliding_speed
     leg.sums.travel = leg.sums.travel - choose(down, h * slid / choose(down, load, 1.0), 0.0)
+    if form.animal:
+        slid = leg.toe.normal_force * size(leg.toe.sliding_speed)
+        slid = slid + leg.heel.normal_force * size(leg.heel.sliding_speed)
+        leg.sums.slip[0] = leg.sums.slip[0] + choose(down, h * slid / choose(down, load, 1.0), 0.0)
+        leg.sums.braking[0] = leg.sums.braking[0] + h * larger(-push.real, 0.0)
+        leg.sums.propulsion[0] = leg.sums.propulsion[0] + h * larger(push.real, 0.0)
 
 
 @dataclass

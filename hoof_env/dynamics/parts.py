@@ -7,6 +7,7 @@ crank. In both the swing is a function of the crank angle and of the gait parame
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
@@ -47,6 +48,7 @@ class Trunk:
         drag: resistance to forward motion [N s/m].
         height: height of O above the ground [m] where the spring is at rest, of the rail, or at a start.
         pitch_inertia: of the trunk about its centre of mass [kg m^2]; "free" only.
+        length: of the trunk [m], whose ends hips must not be beyond; None knows no ends.
 
     Raises:
         ParameterError: an unknown kind or a value out of range.
@@ -60,6 +62,7 @@ class Trunk:
     drag: float = 20.0
     height: float = 1.7
     pitch_inertia: float = 20.0
+    length: float | None = None
 
     def __post_init__(self) -> None:
         check_choice("trunk", self.kind, TRUNKS)
@@ -70,6 +73,8 @@ class Trunk:
         check_number("trunk_drag", self.drag, low=0)
         check_number("trunk_height", self.height, low=0, exclusive_low=True)
         check_number("trunk_pitch_inertia", self.pitch_inertia, low=0, exclusive_low=True)
+        if self.length is not None:
+            check_number("trunk_length", self.length, low=0, exclusive_low=True)
 
 
 @dataclass(frozen=True)
@@ -116,6 +121,77 @@ class Motor:
 Drive = Prescribed | Motor
 
 
+@dataclass(frozen=True)
+class HoofSpring:
+    """A massless spring and damper at each hoof point, in series between the leg and the ground.
+
+    Its axes are the normal and the tangent of the ground under the point. The sole, which touches the ground,
+    has no mass: along the normal, spring and damper carry what Eq. 14 gives at the sole's penetration, along
+    the tangent no more than Coulomb's friction coefficient times that; up to there the sole stands still, for
+    no sliding speed is needed to have friction. Thresholds of the ground's friction law have no part in it.
+
+    Attributes:
+        stiffness, damping: along the normal [N/m, N s/m].
+        tangential_stiffness, tangential_damping: along the tangent; None is the same as along the normal.
+
+    Raises:
+        ParameterError: a value is not positive and finite: without damping a massless sole has no speed.
+    """
+
+    stiffness: float
+    damping: float
+    tangential_stiffness: float | None = None
+    tangential_damping: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("stiffness", "damping"):
+            value = check_number(
+                f"hoof_spring.{name}", getattr(self, name), low=0, high=1e12, exclusive_low=True
+            )
+            other = getattr(self, f"tangential_{name}")
+            other = value if other is None else other
+            check_number(f"hoof_spring.tangential_{name}", other, low=0, high=1e12, exclusive_low=True)
+            object.__setattr__(self, f"tangential_{name}", other)
+
+    @classmethod
+    def with_ratio(cls, stiffness: float, mass: float, ratio: float = 0.1) -> HoofSpring:
+        """The spring whose damping has this ratio to the critical one of a mass on it [kg]."""
+        for name, value in (("stiffness", stiffness), ("mass", mass), ("ratio", ratio)):
+            check_number(f"hoof_spring.{name}", value, low=0, high=1e12, exclusive_low=True)
+        return cls(stiffness, 2 * ratio * math.sqrt(stiffness * mass))
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Where a motion should end, see `Result`; infinite bounds hold nothing back.
+
+    Attributes:
+        pitch: lowest and highest [rad].
+        height: of the trunk's centre of mass above the ground, lowest and highest [m].
+        clearance: of all joints but the hoof's corners above the ground, at least [m].
+
+    Raises:
+        ParameterError: a bound is not a number, or the lower one is not the lower one.
+    """
+
+    pitch: tuple[float, float] = (-math.inf, math.inf)
+    height: tuple[float, float] = (-math.inf, math.inf)
+    clearance: float = -math.inf
+
+    def __post_init__(self) -> None:
+        for name in ("pitch", "height"):
+            given = getattr(self, name)
+            try:
+                low, high = (float(value) for value in given)
+            except (TypeError, ValueError):
+                low = high = math.nan
+            if not low < high:
+                raise ParameterError(f"limits.{name}: expected a lower and a higher bound, got {given!r}")
+            object.__setattr__(self, name, (low, high))
+        if not isinstance(self.clearance, (int, float)) or math.isnan(self.clearance):
+            raise ParameterError(f"limits.clearance: expected a number, got {self.clearance!r}")
+
+
 FARTHEST = 1e3
 """Of O from the trunk's centre of mass [m]."""
 
@@ -128,6 +204,7 @@ class Limb:
         geometry: the leg.
         hip: where the crank centre O sits on the trunk, from the trunk's centre of mass [m], forward and up.
         drive: what turns its crank.
+        spring: of the hoof; None is a rigid one.
 
     Raises:
         ParameterError: a part is of the wrong type, not finite, or the hip beyond `FARTHEST`.
@@ -136,8 +213,11 @@ class Limb:
     geometry: Geometry
     hip: tuple[float, float] = (0.0, 0.0)
     drive: Drive = field(default_factory=Motor)
+    spring: HoofSpring | None = None
 
     def __post_init__(self) -> None:
+        if self.spring is not None and not isinstance(self.spring, HoofSpring):
+            raise ParameterError(f"limb.spring: expected a HoofSpring or None, got {self.spring!r}")
         if not isinstance(self.geometry, Geometry):
             raise ParameterError(f"limb.geometry: expected a Geometry, got {self.geometry!r}")
         if not isinstance(self.drive, (Prescribed, Motor)):
@@ -163,6 +243,8 @@ class Scene:
     ground: Ground
     terrain: Terrain
     integrator: str
+    features: Any = None  # `layout.Features`, of an engine
+    motion_limits: Limits | None = None
 
 
 class Reactions(NamedTuple):
@@ -194,13 +276,16 @@ class Tally(NamedTuple):
 
 
 class Result(IntEnum):
-    """Outcome of an advance."""
+    """Outcome of an advance. Those from PITCH on are of `Limits`: the motion goes on, its state is kept."""
 
     OK = 0
     NOT_FINITE = 1
     SINGULAR = 2
     DEAD_POINT = 3
     FALLEN = 4
+    PITCH = 5
+    HEIGHT = 6
+    LOW_JOINT = 7
 
     @property
     def message(self) -> str:
@@ -215,4 +300,7 @@ _MESSAGES = {
     Result.SINGULAR: f"the equations of motion are singular; {_PUT_BACK}",
     Result.DEAD_POINT: f"a crank was driven to an angle at which its linkage does not close; {_PUT_BACK}",
     Result.FALLEN: f"the trunk fell through the ground; {_PUT_BACK}",
+    Result.PITCH: "the trunk pitched beyond its limits",
+    Result.HEIGHT: "the trunk left its range of heights",
+    Result.LOW_JOINT: "a joint came too near the ground",
 }

@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from hoof_env.dynamics.layout import LegRows
+from hoof_env.dynamics.hoof import begin_springs, end_springs, move_springs, weigh_springs
 from hoof_env.dynamics.mechanics import MOVING
 from hoof_env.dynamics.parts import FIXED, FREE
 from hoof_env.gait import INNER, SPEED
@@ -23,10 +23,11 @@ from hoof_env.simd.math import clip
 
 
 @inlined
-def filter_accelerations(leg, settings):  # type: ignore[no-untyped-def]
+def filter_accelerations(leg, count, settings):  # type: ignore[no-untyped-def]
     """Accelerations of the command filters: bounded, towards a bounded rate, towards the command."""
-    for k in range(4):
-        gain, rate_bound, acc_bound = settings[3 * k], settings[3 * k + 1], settings[3 * k + 2]
+    for k in range(count):
+        row = 3 * min(k, 3)  # higher harmonics swing like the first
+        gain, rate_bound, acc_bound = settings[row], settings[row + 1], settings[row + 2]
         wanted = clip(gain * (leg.command[k] - leg.state.gait[k]), rate_bound)
         leg.gait_acceleration[k] = clip(INNER * gain * (wanted - leg.state.gait_rate[k]), acc_bound)
 
@@ -49,10 +50,11 @@ def begin_step(trunk, legs, leg_count, model):  # type: ignore[no-untyped-def]
             trunk.stage[k] = trunk.state.moving[k]
             trunk.mean_rates[k] = 0.0
     for i in range(leg_count):
-        leg = nth(legs, i, LegRows)
-        filter_accelerations(leg, model.settings)
+        leg = nth(legs, i)
+        filter_accelerations(leg, model.form.gait, model.settings)
         leg.theta, leg.theta_rate = leg.state.theta, leg.state.theta_rate
         leg.mean_theta_rate, leg.mean_theta_acceleration = 0.0, 0.0
+        begin_springs(leg, model.form.springs)
 
 
 @inlined
@@ -63,9 +65,10 @@ def weigh_stage(trunk, legs, leg_count, model, weight):  # type: ignore[no-untyp
     if model.kind != FIXED:
         go_on(model.kind, trunk.mean_rates, trunk.mean_rates, weight, trunk.rates)
     for i in range(leg_count):
-        leg = nth(legs, i, LegRows)
+        leg = nth(legs, i)
         leg.mean_theta_rate = leg.mean_theta_rate + weight * leg.theta_rate
         leg.mean_theta_acceleration = leg.mean_theta_acceleration + weight * leg.theta_acceleration
+        weigh_springs(leg, model.form.springs, weight)
 
 
 @inlined
@@ -82,11 +85,12 @@ def next_stage(trunk, legs, leg_count, model, elapsed):  # type: ignore[no-untyp
     if model.kind != FIXED:
         go_on(model.kind, trunk.stage, trunk.state.moving, elapsed, trunk.rates)
     for i in range(leg_count):
-        leg = nth(legs, i, LegRows)
+        leg = nth(legs, i)
         is_motor = leg.settings.is_motor > 0.0
         angle, spin = prescribed(leg, elapsed)
         leg.theta = choose(is_motor, leg.state.theta + elapsed * leg.theta_rate, angle)
         leg.theta_rate = choose(is_motor, leg.state.theta_rate + elapsed * leg.theta_acceleration, spin)
+        move_springs(leg, model.form.springs, elapsed)
 
 
 @inlined
@@ -106,7 +110,7 @@ def end_step(trunk, legs, leg_count, model, h):  # type: ignore[no-untyped-def]
         go_on(model.kind, trunk.state.moving, trunk.state.moving, h, trunk.mean_rates)
     trunk.state.time = trunk.state.time + h
     for i in range(leg_count):
-        leg = nth(legs, i, LegRows)
+        leg = nth(legs, i)
         is_motor = leg.settings.is_motor > 0.0
         angle, spin = prescribed(leg, h)
         omega, mean = leg.state.theta_rate + h * leg.mean_theta_acceleration, leg.mean_theta_rate
@@ -114,7 +118,8 @@ def end_step(trunk, legs, leg_count, model, h):  # type: ignore[no-untyped-def]
             mean = omega
         leg.state.theta = choose(is_motor, leg.state.theta + h * mean, angle)
         leg.state.theta_rate = choose(is_motor, omega, spin)
-        for k in range(4):
+        end_springs(leg, model.form.springs, h)
+        for k in range(model.form.gait):
             rate, bend = leg.state.gait_rate[k], leg.gait_acceleration[k]
             leg.state.gait[k] = leg.state.gait[k] + h * (rate + 0.5 * h * bend)
             leg.state.gait_rate[k] = rate + h * bend

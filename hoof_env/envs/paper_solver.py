@@ -146,7 +146,7 @@ class PaperSolver:
 
     def _memory(self) -> Memory:
         data, _, _, _, constants, reactions = self.engine.arrays
-        return memory_of(data, self.engine.num_envs, constants, reactions)
+        return memory_of(data, self.engine.num_envs, constants, reactions, self.engine.features)
 
     def _put(self, env: int, memory: Memory) -> None:
         now = self.traces[env][-1]

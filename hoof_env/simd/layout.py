@@ -7,6 +7,7 @@ attributes, of `Rows` on the stack and of `Columns` in an array; Python reaches 
 
 from __future__ import annotations
 
+from functools import cache
 from types import SimpleNamespace
 from typing import Annotated, Any, ClassVar, NamedTuple, get_origin, get_type_hints
 
@@ -34,7 +35,15 @@ class Vector:
 
 
 class Block:
-    """`Annotated[Block, n]`: n rows, reached by their number."""
+    """`Annotated[Block, n]`: n rows, reached by their number; n is a number or a `Size`."""
+
+
+class Size(NamedTuple):
+    """How many rows a block has unless `Layout.sized` says otherwise; with 0 it is no memory, but a name that
+    kernels may mention where they do not go."""
+
+    name: str
+    rows: int
 
 
 class Field(NamedTuple):
@@ -57,6 +66,7 @@ class _Named(type):
         cls.fields, cls.size, names = {}, 0, []
         for key, hint in get_type_hints(cls, include_extras=True).items():
             kind, size = (Block, hint.__metadata__[0]) if get_origin(hint) is Annotated else (hint, hint.size)
+            size = size.rows if isinstance(size, Size) else size
             cls.fields[key] = Field(cls.size, size, kind)
             cls.size += size
             names += _names(key, cls.fields[key])
@@ -67,15 +77,36 @@ class _Named(type):
         start, size, _ = cls.fields[name]
         return slice(start, start + size)
 
+    def sized(cls, **sizes: int) -> Any:
+        """The layout, and all inside it, with other numbers of rows for the `Size`s that are named."""
+        return _sized(cls, tuple(sorted(sizes.items())))
+
 
 class Layout(metaclass=_Named):
     """Base of all layouts; the annotations of a subclass are its fields, in order.
 
     Attributes:
-        fields: `Field`s by name.
+        fields: `Field`s by name; `sized` gives the layout with other sizes of blocks.
         size: how many rows they take.
         names: of the rows, those of inner fields behind their field's name.
     """
+
+
+@cache
+def _sized(layout: Any, sizes: tuple[tuple[str, int], ...]) -> Any:
+    wanted, hints, kept = dict(sizes), get_type_hints(layout, include_extras=True), {}
+    for key, hint in hints.items():
+        if get_origin(hint) is not Annotated:
+            kept[key] = hint.sized(**wanted) if isinstance(hint, _Named) else hint
+            continue
+        size = hint.__metadata__[0]
+        if isinstance(size, Size):
+            size = size._replace(rows=wanted.get(size.name, size.rows))
+        kept[key] = Annotated[Block, size]
+    if kept == hints:
+        return layout  # one layout, one type
+    name = layout.__qualname__ + "".join(f" {key}={rows}" for key, rows in sizes)
+    return _Named(name, (Layout,), {"__annotations__": kept, "__module__": layout.__module__})
 
 
 def views(layout: Any, data: NDArray[Any]) -> Any:

@@ -154,10 +154,11 @@ def columns(code: Code, pointer: Any, count: Any, layout: Any, start: Any, row: 
     return record._getvalue()
 
 
-@instruction(lambda rows, number, layout: type(rows)(rows.count, layout.layout)(rows, types.intp, layout))
-def nth(code: Code, rows: Any, number: Any, layout: Any) -> Any:
-    """The rows of the `number`-th layout of several one after the other."""
-    return part_of(code, code.args[0], rows, code.builder.mul(number, INDEX(code.args[2].layout.size)))
+@instruction(lambda rows, number: rows(rows, types.intp))
+def nth(code: Code, rows: Any, number: Any) -> Any:
+    """The rows of the `number`-th of several layouts one after the other; rows with the names of a layout are
+    those of the first."""
+    return part_of(code, code.args[0], rows, code.builder.mul(number, INDEX(code.args[0].layout.size)))
 
 
 def part_of(code: Code, memory: Any, value: Any, first: Any) -> Any:

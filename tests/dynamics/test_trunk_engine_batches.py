@@ -43,7 +43,7 @@ def start(engine, which):
     moves = {name: row[which] for name, row in moves.items() if k >= {"vx": 1, "vy": 2}.get(name, 3)}
     engine.reset([RUN, WALK, WALK, RUN][:legs], theta[:, which], x=draw[4][which], **moves)
     scale = 1 + 0.1 * draw[4][which]
-    engine._command(COMMAND[:legs, :, None] * scale)
+    engine.command(COMMAND[:legs, :, None] * scale)
 
 
 def bits(engine, account=True):

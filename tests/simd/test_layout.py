@@ -70,10 +70,10 @@ def test_a_field_is_where_numpy_finds_it(lanes):
 @njit(error_model="numpy")
 def swap(data):
     """Toe and heel of all columns, by way of rows on the stack, where the second thing has a copy."""
-    both = rows(doubles(2 * SIZE * 8), 8, None)
+    both = rows(doubles(2 * SIZE * 8), 8, Thing)
     for n in range(0, data.shape[1], 8):
         given = columns(address(data), 8, Thing, n, data.shape[1], 1)
-        first, second = nth(both, 0, Thing), nth(both, 1, Thing)
+        first, second = nth(both, 0), nth(both, 1)
         fill(first, given)
         fill(second, given)
         first.toe.place = second.heel.place

@@ -1,0 +1,81 @@
+"""Whether a motion goes on where it should end: pitch and height of the trunk, joints near the ground.
+
+What is checked after every whole step is kept until the call of the engine ends, so that a joint that dips
+between two looks is not missed. Beyond a limit the motion goes on, and its state is as good as any other.
+"""
+
+from __future__ import annotations
+
+from hoof_env.dynamics.parts import Result
+from hoof_env.ground.terrain import surface
+from hoof_env.simd import choose, lane_sum, level, plane, root, smaller
+from hoof_env.simd.compile import inlined
+
+PITCH, HEIGHT, LOW_JOINT = float(Result.PITCH), float(Result.HEIGHT), float(Result.LOW_JOINT)
+
+
+@inlined
+def clear_limits(trunk):  # type: ignore[no-untyped-def]
+    """Before a call: nothing was passed."""
+    trunk.beyond[0] = 0.0
+
+
+@inlined
+def note(trunk, is_beyond, result):  # type: ignore[no-untyped-def]
+    """Keep the first of the limits that were passed."""
+    before = trunk.beyond[0]
+    trunk.beyond[0] = choose((before == 0.0) & is_beyond, result, before)
+
+
+@inlined
+def ground_height(place, model):  # type: ignore[no-untyped-def]
+    """Of the ground below a point [m]."""
+    height = 0.0 * place.real
+    if model.is_terrain:
+        height, _, _, _, _ = surface(
+            place.real, model.ground_cells, model.ground_origin, model.ground_per_metre
+        )
+    return height
+
+
+@inlined
+def heed_trunk(trunk, model):  # type: ignore[no-untyped-def]
+    """Pitch, and height above the ground."""
+    limits, pitch = trunk.settings.limits, trunk.stage.pitch
+    height = trunk.place.imag - ground_height(trunk.place, model)
+    note(trunk, (pitch < limits[0]) | (pitch > limits[1]), PITCH)
+    note(trunk, (height < limits[2]) | (height > limits[3]), HEIGHT)
+
+
+@inlined
+def heed_joints(trunk, leg, shape, model):  # type: ignore[no-untyped-def]
+    """Whether a joint other than the hoof's corners is too near the ground; `shape` are `LegConstants`."""
+    crank = shape.crank * plane(shape.travel * leg.functions.cosine, -leg.functions.sine)
+    b = meeting(shape.B, shape.pivot, crank)
+    d = shape.pivot + (b - shape.pivot) * shape.D.place
+    f = meeting(shape.F, shape.pivot, crank)
+    e = meeting(shape.E, d, f)
+    a, g = shape.pivot + shape.rocker * (f - shape.pivot), f + shape.shank * (f - e)
+    lowest = clearance(trunk, leg, b, model)
+    for joint in (d, f, e, a, g):
+        lowest = smaller(lowest, clearance(trunk, leg, joint, model))
+    is_low = choose(lowest < trunk.settings.limits[4], 1.0, 0.0)
+    if model.together:
+        is_low = lane_sum(level(trunk, 0.0), is_low)
+    note(trunk, is_low > 0.0, LOW_JOINT)
+
+
+@inlined
+def meeting(dyad, first, second):  # type: ignore[no-untyped-def]
+    """Where two links meet whose far ends are `first` and `second`; see `reactions.hinge_point`."""
+    span = second - first
+    d2 = span.real * span.real + span.imag * span.imag
+    k = 0.5 * d2 + dyad.half
+    return first + span * (1.0 / d2) * plane(k, dyad.side * root(dyad.one2 * d2 - k * k))
+
+
+@inlined
+def clearance(trunk, leg, joint, model):  # type: ignore[no-untyped-def]
+    """Of a joint of the leg's frame above the ground [m]."""
+    place = trunk.place + leg.hip + leg.settings.length_scale[0] * (leg.turn * joint)
+    return place.imag - ground_height(place, model)
