@@ -200,6 +200,38 @@ class Geometry:
         with staged(path.parent) as stage:
             (stage / path.name).write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
 
+    def scaled(self, factor: float, mass_per_metre: float | None = None) -> Geometry:
+        """A similar leg: lengths, pivot and hip height times `factor`, angles and gaits as before.
+
+        Mass per length stays, so masses scale with `factor`, first moments with its square and the inertias
+        of uniform rods with its cube; those of `inertia="paper"` know no mass and scale with `factor`. Bodies
+        of one density have masses that scale with `factor` cubed: give `mass_per_metre` for these.
+
+        Args:
+            factor: of every length [-].
+            mass_per_metre: of every link [kg/m]; in the place of `linear_density` and of own `masses`.
+
+        Returns:
+            The leg, by the same name; `provenance` says by how much it is scaled.
+
+        Raises:
+            ParameterError: a number is not finite or not above 0, or a length leaves the limits of the class.
+        """
+        factor = check_number("factor", factor, low=0, exclusive_low=True)
+        masses, density = self.masses, self.linear_density
+        if mass_per_metre is not None:
+            masses = None
+            density = check_number("mass_per_metre", mass_per_metre, low=0, exclusive_low=True)
+        return replace(
+            self,
+            lengths={name: factor * length for name, length in self.lengths.items()},
+            pivot=(factor * self.pivot[0], factor * self.pivot[1]),
+            hip_height=factor * self.hip_height,
+            linear_density=density,
+            masses=None if masses is None else tuple(factor * mass for mass in masses),
+            provenance=f"{self.provenance} Scaled by {factor:g}.".lstrip(),
+        )
+
     def replace(self, **changes: Any) -> Geometry:
         """A copy with some attributes changed; `lengths` and `assembly` may be partial mappings."""
         for name in ("lengths", "assembly"):

@@ -1,4 +1,4 @@
-"""A leg of one's own as `docs/own_leg.md` says: the example runs, the tables are whole, errors exact."""
+"""A leg of one's own as `docs/own_leg.md` says: the examples run, the tables are whole, errors exact."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from dataclasses import MISSING, fields
 from pathlib import Path
 
 import gymnasium as gym
+import numpy as np
 import pytest
 from family import roll, same
 from gymnasium.envs.registration import EnvSpec
@@ -19,17 +20,27 @@ from hoof_env.gait import LIMITS
 from hoof_env.ground import contact as ground
 from hoof_env.leg.geometry import PARTS
 from hoof_env.leg.linkage import DYADS, LENGTHS
+from hoof_env.leg.profile import by_name, functions
 
 PAGE = (Path(__file__).parents[2] / "docs" / "own_leg.md").read_text(encoding="utf-8")
 LEG = "hoof_env/HorseLeg-v0"
 CONTENT = read_preset("identified")
 
 
-def test_the_example_runs(tmp_path, monkeypatch):
+def test_the_examples_run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (block,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
-    exec(compile(block, "own_leg.md", "exec"), {})
+    known: dict = {}
+    for block in re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL):
+        exec(compile(block, "own_leg.md", "exec"), known)
     assert json.loads((tmp_path / "pony.json").read_text())["provenance"] == "identified at half its size"
+
+    leg, fore, hind, trunk = (known[name] for name in ("leg", "fore", "hind", "trunk"))
+    assert f"# {fore.mass:.1f} and {hind.mass:.1f} kg" in PAGE
+    assert f"# {trunk:.1f} kg: " in PAGE
+    theta = np.linspace(0, 2 * np.pi, 360, endpoint=False)
+    about = [by_name(functions(one, theta)[0])["frame_inertia"].mean() for one in (leg, fore, hind)]
+    said = f"{leg.mass:.1f} kg and, on average over a turn, {about[0]:.1f} kg m^2 about O; the fore limb has"
+    assert f"{said} {about[1]:.1f} kg m^2 and the hind limb {about[2]:.1f}," in PAGE
 
 
 def entries(heading: str) -> dict[str, list[str]]:

@@ -1,0 +1,92 @@
+"""Segment masses of a horse's fore and hind limb on the links of a leg.
+
+The masses are published and stand, with where they were read, in `hoof_env/data/limbs`. Which link carries
+which segment is assumed here: the linkage has no bones. Links are taken from the hip down to the ground, as
+high as their centres are on average in the walk of `identified`; `docs/own_leg.md` has the heights.
+
+All that counts as scapula, brachium or thigh hangs on the links. What a horse has above, such as muscles of
+the croup as far as they were weighed with the trunk, stays with the trunk: `trunk_mass`.
+"""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from importlib import resources
+from typing import Any
+
+from hoof_env.errors import check_choice, check_number
+from hoof_env.leg.geometry import Geometry
+from hoof_env.leg.linkage import BODY_LENGTHS
+
+LIMBS = ("fore", "hind")
+
+CARRIERS = (
+    ("OP", "PB", "CB", "BD", "CD", "DE"),  # scapula and brachium, thigh: crank, coupler, upper triangle, rod
+    ("EF", "CF", "PF"),  # antebrachium, crus: upper part of the shank, rocker, strut
+    ("FG", "AJ"),  # metacarpus, metatarsus: lower part of the shank, tie rod
+    ("GJ", "GI"),  # pastern: the hoof triangle's sides
+    ("IJ",),  # hoof: its sole
+)
+"""Links, by the names of their lengths, that carry each segment from proximal to distal (assumed)."""
+
+BODY_MASS = 475.0
+"""Default mass of the animal [kg]. Shares of it are the same up to 600 kg (Nauwelaerts and others 2011)."""
+
+
+@cache
+def _measured() -> dict[str, Any]:
+    file = resources.files("hoof_env").joinpath("data", "limbs", "warmblood.json")
+    return dict(json.loads(file.read_text(encoding="utf-8")))
+
+
+def segment_masses(limb: str, body_mass: float = BODY_MASS) -> dict[str, float]:
+    """Masses of one limb's segments [kg], by name, from proximal to distal.
+
+    Args:
+        limb: "fore" or "hind".
+        body_mass: of the animal [kg]; the published masses are those of one of 538 kg, in proportion.
+
+    Raises:
+        ParameterError: another limb, or a mass that is not finite or not above 0.
+    """
+    check_choice("limb", limb, LIMBS)
+    body_mass = check_number("body_mass", body_mass, low=0, exclusive_low=True)
+    measured = _measured()
+    return {name: mass * body_mass / measured["body_mass"] for name, mass in measured[limb].items()}
+
+
+def trunk_mass(body_mass: float = BODY_MASS) -> float:
+    """What a trunk on two fore and two hind limbs weighs, with head and neck [kg]: all but the limbs.
+
+    Raises:
+        ParameterError: a mass that is not finite or not above 0.
+    """
+    body_mass = check_number("body_mass", body_mass, low=0, exclusive_low=True)
+    return body_mass - 2 * sum(sum(segment_masses(limb, body_mass).values()) for limb in LIMBS)
+
+
+def with_limb_masses(geometry: Geometry, limb: str, body_mass: float = BODY_MASS) -> Geometry:
+    """The leg with the masses of a horse's limb in the place of its own; each segment's lies evenly along
+    the links that carry it (`CARRIERS`).
+
+    Args:
+        geometry: of any size; lengths stay.
+        limb: "fore" or "hind".
+        body_mass: of the animal [kg], as of `segment_masses`.
+
+    Returns:
+        The leg, by the same name; `provenance` says whose masses it has.
+
+    Raises:
+        ParameterError: another limb, or a mass that is not finite or not above 0.
+    """
+    by_link: dict[str, float] = {}
+    for links, mass in zip(CARRIERS, segment_masses(limb, body_mass).values(), strict=True):
+        whole = sum(geometry.lengths[name] for name in links)
+        by_link |= {name: mass * geometry.lengths[name] / whole for name in links}
+    said = f"Masses of the {limb} limb of a horse of {float(body_mass):g} kg (Buchner and others 1997)."
+    return geometry.replace(
+        masses=tuple(by_link[name] for name in BODY_LENGTHS),
+        provenance=f"{geometry.provenance} {said}".lstrip(),
+    )
