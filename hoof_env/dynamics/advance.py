@@ -94,8 +94,8 @@ def form_of(features: Features = PLAIN) -> Form:
     """The `Form` of engines with these features."""
     rows = [features.of(layout) for layout in (TrunkRows, LegRows, Account, TrunkMemory, LegMemory)]
     inner = [features.of(layout).size for layout in (TrunkState, LegState, Strides, StrideSums)]
-    parts: list[Any] = [*rows, *(layout.size for layout in rows), *inner, features.gait_size]
-    return Form(*parts, features.harmonics, 2 * features.springs, features.animal)
+    sizes = [*(layout.size for layout in rows), *inner, features.gait_size]
+    return Form._make([*rows, *sizes, features.harmonics, 2 * features.springs, features.animal])
 
 
 TRUNK_ROWS, LEG_ROWS = TrunkMemory.size, LegMemory.size
