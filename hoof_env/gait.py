@@ -252,8 +252,9 @@ QUICK = FilterSettings(gain=50.0, crank_rate=100.0, crank_acc=5000.0, swing_rate
 @kernel
 def command_filters(filters, command, settings):  # type: ignore[no-untyped-def]
     """Set each filter's acceleration: bounded, towards a bounded rate, towards the command."""
-    for k in range(4):
-        gain, rate_bound, acc_bound = settings[k, 0], settings[k, 1], settings[k, 2]
+    for k in range(filters.shape[0]):
+        row = min(k, 3)  # higher harmonics swing like the first
+        gain, rate_bound, acc_bound = settings[row, 0], settings[row, 1], settings[row, 2]
         wanted_rate = clip(gain * (command[k] - filters[k].value), rate_bound)
         filters[k].acc = clip(INNER * gain * (wanted_rate - filters[k].rate), acc_bound)
 

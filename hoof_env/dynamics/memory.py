@@ -51,6 +51,10 @@ ground between two pushes has lifted off: were any contact stance, a policy coul
 push under it."""
 
 
+NOWHERE = 1e30
+"""A bound that nothing reaches, in the place of an infinite one."""
+
+
 class Memory(NamedTuple):
     """An engine's memory as the kernels take it, and views of its parts; the last axis is the environment.
     Shapes are those without `Features`."""
@@ -214,7 +218,8 @@ def settings_of(scene: Scene, trunk: Trunk, ground: Ground, limbs: Sequence[Limb
     } | {name: record[name] for name in (
         "stiffness", "chi", "dashpot", "approach_floor", "friction", "friction_slow", "friction_fast"
     )}  # fmt: skip
-    values |= _numbered("limits", (*limits.pitch, *limits.height, limits.clearance))
+    bounds = np.clip((*limits.pitch, *limits.height, limits.clearance), -NOWHERE, NOWHERE)
+    values |= _numbered("limits", bounds.tolist())
     lift_off = LIFT_OFF * mass * GRAVITY / len(limbs)
     unique, cells = list(dict.fromkeys(scene.profiles)), max(profile.cells for profile in scene.profiles)
     firsts = [unique.index(profile) * cells for profile in scene.profiles]  # where each leg's table begins

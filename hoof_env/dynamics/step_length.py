@@ -20,10 +20,10 @@ from functools import cached_property
 
 import numpy as np
 
-from hoof_env.dynamics.parts import GRAVITY, Limb, Motor, Scene
+from hoof_env.dynamics.parts import GRAVITY, HoofSpring, Limb, Motor, Scene
 from hoof_env.errors import Floats
 from hoof_env.ground.contact import Ground
-from hoof_env.ground.stiffness import LARGEST_ANGLE, SCHEMES, contact_rates
+from hoof_env.ground.stiffness import LARGEST_ANGLE, SCHEMES, ContactRates, contact_rates, spring_rates
 from hoof_env.leg.profile import LegProfile, by_name
 
 ANGLES = 48
@@ -32,11 +32,15 @@ ANGLES = 48
 FAST = 0.1
 """Speed of a fast touch-down [m/s], which goes deep."""
 
+HARD = 2.0
+"""Of a hard one, as of a trotting horse's fore hoof [m/s]: the less the ground damps a sole without mass."""
+
 Functions = dict[str, Floats]
 
 CAUSES = {
     "elastic": "the stiffness of this ground under these masses",
     "damping": "the damping of this ground under these masses",
+    "hoof": "the damping of the hoofs' springs against the stiffness of this ground",
     "servo": "the speed gain of a motor and the inertia of its crank",
     "support": "spring, damper or drag of the trunk",
 }
@@ -60,8 +64,8 @@ class StepLength(Scene):
     @cached_property
     def limits(self) -> dict[str, float]:
         """Longest step [s] for each cause, infinite where there is none: "elastic", "damping" and "friction"
-        of the ground (`ground.stiffness`), "servo" of the motors, "support" of what holds or drags the
-        trunk."""
+        of the ground (`ground.stiffness`), "hoof" of its springs, "servo" of the motors, "support" of
+        what holds or drags the trunk."""
         trunk, decay = self.trunk, SCHEMES[self.integrator].decay
         mass, is_held = trunk.mass + sum(limb.geometry.mass for limb in self.limbs), trunk.kind == "suspended"
         damper, spring = (trunk.damping, trunk.stiffness) if is_held else (0.0, 0.0)
@@ -101,10 +105,15 @@ class StepLength(Scene):
         return None
 
     def _ground_limits(self, ground: Ground) -> dict[str, float]:
-        limits = {"elastic": np.inf, "damping": np.inf, "friction": np.inf}
+        limits = {"elastic": np.inf, "damping": np.inf, "friction": np.inf, "hoof": np.inf}
         whole = self.trunk.mass + sum(limb.geometry.mass for limb in self.limbs)
         load = whole * GRAVITY / len(self.limbs)
-        for slides, sinks in self._masses:
+        for limb, (slides, sinks) in zip(self.limbs, self._masses, strict=True):
+            if limb.spring:
+                masses = min(slides, whole), min(sinks, whole)
+                for name, longest in self._spring_limits(ground, limb.spring, masses, load).items():
+                    limits[name] = min(limits[name], longest)
+                continue
             for speed in {FAST, ground.approach_floor}:
                 mass, sliding_mass = min(sinks, whole), min(slides, whole)
                 rates = contact_rates(ground, mass, load, speed, sliding_mass, self.terrain)
@@ -112,6 +121,24 @@ class StepLength(Scene):
                     if np.isfinite(slides if name == "friction" else sinks):
                         limits[name] = min(limits[name], longest)
         return limits
+
+    def _spring_limits(
+        self, ground: Ground, spring: HoofSpring, masses: tuple[float, float], load: float
+    ) -> dict[str, float]:
+        """The same of a hoof with a spring, on masses [kg] that it sets against forces along the ground and
+        into it."""
+        slides, sinks = masses
+        k, c = spring.tangential_stiffness or 0.0, spring.tangential_damping or 0.0
+        along = ContactRates(math.sqrt(k / slides), c / slides, 0.0, 1.0)
+        found, soles = [along], [k / c]
+        for speed in {FAST, ground.approach_floor, HARD}:
+            vertical = (spring.stiffness, spring.damping)
+            rates, sole = spring_rates(ground, vertical, sinks, load, speed, self.terrain)
+            found.append(rates)
+            soles.append(sole)
+        steps = [rates.longest_steps(self.integrator) for rates in found]
+        limits = {name: min(step[name] for step in steps) for name in ("elastic", "damping")}
+        return limits | {"hoof": SCHEMES[self.integrator].decay / max(soles)}
 
     @cached_property
     def _masses(self) -> list[tuple[float, float]]:

@@ -17,6 +17,11 @@ for d^n has a kink at touch-down that limits the order. `SCHEMES` holds the larg
 rounded up; at n = 1.5 less than 0.7 of it is enough for semi-implicit Euler and the midpoint rule, less than
 0.4 for the others.
 
+A hoof with a spring k and a damper c of its own has a sole without mass, whose penetration d follows the
+leg's with the rate (k + n K d^(n - 1)) / (c + chi K d^n / v0): the stiff ground against all damping. It is
+largest somewhere on the way in. The mass then has the frequency of both springs in series, the damping of c
+at most, and friction needs no sliding speed.
+
 Damping and friction decay: explicit schemes are stable up to h rate = 2 (Euler, midpoint), 2.51 (third order)
 and 2.79 (RK4), and half of that is the limit here. Past its limit friction does not blow up, for its force is
 bounded, but leaves the point sliding to and fro with a speed of up to some 1.5 mu F h / m.
@@ -55,6 +60,9 @@ SCHEMES: Mapping[str, SchemeLimits] = MappingProxyType(
 )
 """Schemes by name; "rk3" is Heun's of third order, "rk4" the classical one."""
 
+DEPTHS = 65
+"""Penetrations at which the rate of a sole is looked at."""
+
 LARGEST_ANGLE = 0.4
 """Largest h w [-]: up to here the errors were measured."""
 
@@ -78,6 +86,34 @@ class ContactRates:
         allowed = {"elastic": angle, "damping": limits.decay, "friction": limits.decay}
         rates = {name: getattr(self, name) for name in allowed}
         return {name: allowed[name] / rate if rate > 0 else math.inf for name, rate in rates.items()}
+
+
+def spring_rates(
+    ground: Ground,
+    spring: tuple[float, float],
+    mass: float,
+    load: float,
+    speed: float,
+    terrain: Terrain | None = None,
+) -> tuple[ContactRates, float]:
+    """Rates of a mass on a hoof's spring on the ground, and that of the sole [1/s].
+
+    Args:
+        ground: its laws.
+        spring: stiffness [N/m] and damping [N s/m] along the normal.
+        mass, load, speed, terrain: as `contact_rates` takes them; no contact is pressed harder than by twice
+            the load, with what spring and damper take of the touch-down.
+    """
+    k, c = spring
+    speed = max(speed, ground.approach_floor)
+    n, stiffness = ground.exponent, ground.stiffness * float(np.max((terrain or Terrain()).stiffness))
+    chi, dashpot = ground.damping
+    force = 2 * load + speed * (math.sqrt(k * mass) + c)
+    depth = (force / stiffness) ** (1 / n) * np.linspace(0.0, 1.0, DEPTHS)
+    slope = n * stiffness * depth ** (n - 1)
+    sole = (k + slope) / (c + chi * stiffness * depth**n / speed + dashpot)
+    series = k * slope[-1] / (k + slope[-1])
+    return ContactRates(math.sqrt(series / mass), c / mass, 0.0, n), float(sole.max())
 
 
 def contact_rates(

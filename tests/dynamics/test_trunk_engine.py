@@ -1,12 +1,14 @@
 """The engine of several legs against d'Alembert with a dense mass matrix (`PlainHorse`), at instants."""
 
+from dataclasses import replace
+
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.dynamics.parts import TRUNKS, Limb, Motor, Prescribed, Result, Trunk
-from hoof_env.gait import FILTER, LIMITS, PARAMETERS, FilterSettings, GaitParameters, command_filters
+from hoof_env.dynamics.parts import TRUNKS, HoofSpring, Limb, Limits, Motor, Prescribed, Result, Trunk
+from hoof_env.gait import FILTER, LIMITS, FilterSettings, GaitParameters, command_filters, parameter_names
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.laws import FRICTION_LAWS
 from hoof_env.ground.terrain import Terrain
@@ -69,9 +71,10 @@ def reach(limbs, gaits, theta):
 def put_somewhere(engine, rng, depth):
     """Every environment in a state of its own, hoofs in the ground or above it, filters on the move."""
     kind, legs, n = engine.trunk.kind, len(engine.limbs), engine.num_envs
-    still = GaitParameters(*(LOW + HIGH) / 2)
+    still, size = GaitParameters(*(LOW + HIGH) / 2), engine.features.gait_size
     theta = rng.uniform(-10, 10, (legs, n))
-    command, value = (rng.uniform(LOW[:, None], HIGH[:, None], (legs, 4, n)) for _ in range(2))
+    low, high = (np.append(bound, np.full(size - 4, edge)) for bound, edge in ((LOW, -0.3), (HIGH, 0.3)))
+    command, value = (rng.uniform(low[:, None], high[:, None], (legs, size, n)) for _ in range(2))
     start = {"x": rng.uniform(-1, 1, n)}
     if kind != "fixed":
         start["vx"] = rng.normal(size=n)
@@ -84,7 +87,7 @@ def put_somewhere(engine, rng, depth):
     state = engine.get_state()
     names = list(engine.state)[7:]
     rows = {name: state["limbs"][:, names.index(name)] for name in names}
-    for k, name in enumerate(PARAMETERS):
+    for k, name in enumerate(parameter_names(engine.features.harmonics)):
         rows[name][:] = value[:, k]
         rows[f"{name}_rate"][:] = rng.normal(0, 3, (legs, n))
     motors = np.array([isinstance(limb.drive, Motor) for limb in engine.limbs])[:, None]
@@ -92,6 +95,9 @@ def put_somewhere(engine, rng, depth):
     for point in ("toe", "heel"):
         rows[f"{point}_penetration"][:] = 1.0
         rows[f"{point}_slowness"][:] = 1 / rng.uniform(0.1, 1.5, (legs, n))
+        if engine.features.springs:
+            rows[f"{point}_give_normal"][:] = rng.uniform(-0.02, 0.04, (legs, n))
+            rows[f"{point}_give_tangential"][:] = rng.uniform(-0.03, 0.03, (legs, n))
     engine.set_state(state)
     fallen = Result.FALLEN  # a state put together at random may have the trunk in the ground: it is reported
     assert np.isin(engine.advance(command, 0), (Result.OK, fallen)).all()
@@ -100,9 +106,9 @@ def put_somewhere(engine, rng, depth):
 def oracle(engine, horse, e):
     """`PlainHorse.at` where environment `e` is."""
     s, r = engine.state, engine.report
-    filters = np.zeros((len(engine.limbs), 4), FILTER)
+    filters = np.zeros((len(engine.limbs), engine.features.gait_size), FILTER)
     command, bounds = engine.get_state()["command"], engine.filters.to_array()
-    for k, name in enumerate(PARAMETERS):
+    for k, name in enumerate(parameter_names(engine.features.harmonics)):
         filters[:, k]["value"], filters[:, k]["rate"] = s[name][:, e], s[f"{name}_rate"][:, e]
     for i, row in enumerate(filters):
         command_filters(row, command[i, :, e], bounds)
@@ -111,7 +117,17 @@ def oracle(engine, horse, e):
     approach = np.where(slowness > 0, 1 / np.where(slowness > 0, slowness, 1), np.nan)
     place = r["x"][e], r["y"][e], s["pitch"][e]
     velocity = r["vx"][e], r["vy"][e], r["pitch_rate"][e]
-    return horse.at(place, velocity, s["theta"][:, e], s["theta_rate"][:, e], steady, approach)
+    give = None
+    if engine.features.springs:
+        axes = ("normal", "tangential")
+        give = np.array([[s[f"{point}_give_{axis}"][:, e] for axis in axes] for point in ("toe", "heel")])
+        give = give.transpose(2, 0, 1)
+        for leg, point in np.ndindex(approach.shape):  # the ground is where the sole is
+            name = ("toe", "heel")[point]
+            at = complex(r[f"{name}_x"][leg, e], r[f"{name}_y"][leg, e])
+            if horse.ground.depth(at, 0j)[0] <= give[leg, point, 0]:
+                approach[leg, point] = np.nan
+    return horse.at(place, velocity, s["theta"][:, e], s["theta_rate"][:, e], steady, approach, give)
 
 
 def assert_close(found, expected, scale, name, rtol=1e-9):
@@ -136,13 +152,65 @@ def test_every_instant_is_d_alembert_s(legs, trunk, ground, terrain, depth, seed
         legs, trunk, ground, terrain, substeps=1000, num_envs=STATES, filters=FilterSettings()
     )
     put_somewhere(engine, rng, depth)
-    horse, r, s, tally = PlainHorse(trunk, legs, ground, terrain), engine.report, engine.state, engine.tally()
+    check_instants(engine, [PlainHorse(trunk, legs, ground, terrain)] * STATES)
+
+
+springs = st.builds(
+    HoofSpring, st.floats(1e4, 1e5), st.floats(200, 2000), st.floats(1e4, 1e5), st.floats(200, 2000)
+)
+
+
+@settings(max_examples=24, deadline=None, phases=(Phase.explicit, Phase.generate))
+@given(
+    legs=st.lists(limbs, min_size=1, max_size=4),
+    spring=springs,
+    trunk=trunks,
+    ground=grounds,
+    terrain=st.sampled_from(TERRAINS),
+    depth=st.sampled_from((0.05, -1.0)),
+    seed=st.integers(0, 2**32 - 1),
+)
+def test_every_instant_of_an_animal_is_d_alembert_s(legs, spring, trunk, ground, terrain, depth, seed):
+    """The same with springs, three harmonics, and legs of other places, sizes and springs in each
+    environment."""
+    rng = np.random.default_rng(seed)
+    legs = [replace(limb, spring=spring) for limb in legs if limb.geometry.inertia != "paper"]
+    legs = legs or [Limb(FIRST, spring=spring)]
+    theta, gait = rng.uniform(0, 6, len(legs)), np.tile((LOW + HIGH) / 2, (len(legs), 1))
+    trunk = Trunk(**{**vars(trunk), "height": reach(legs, gait, theta) - depth})
+    engine = TrunkEngine(
+        legs, trunk, ground, terrain, substeps=1000, num_envs=STATES, harmonics=3, limits=Limits()
+    )
+    horses = []
     for e in range(STATES):
+        own, size = [], rng.uniform(0.8, 1.2, len(legs))
+        for k, limb in enumerate(legs):
+            geometry = limb.geometry.scaled(size[k])
+            if geometry.masses is None:
+                geometry = geometry.replace(linear_density=rng.uniform(1, 4))
+            hip, other = tuple(rng.uniform(-0.5, 0.5, 2)), replace(spring, damping=rng.uniform(300, 900))
+            own.append(replace(limb, geometry=geometry, hip=hip, spring=other))
+        engine.vary(e, limbs=own)
+        horses.append(PlainHorse(trunk, own, ground, terrain))
+    put_somewhere(engine, rng, depth)
+    check_instants(engine, horses)
+
+
+def normals(horse, now):
+    """Of the ground at each hoof point."""
+    return np.vectorize(lambda x: horse.ground.surface(x)[1])(now.hoof.real)
+
+
+def check_instants(engine, horses):
+    """Compare every environment with an oracle of its own."""
+    r, s, varied = engine.report, engine.state, len(set(map(id, horses))) > 1
+    tally = None if varied else engine.tally()
+    for e, horse in enumerate(horses):
         now = oracle(engine, horse, e)
         force = np.stack(
             [r["toe_normal"] - 1j * r["toe_friction"], r["heel_normal"] - 1j * r["heel_friction"]], 1
         )
-        force = force[..., e] * np.vectorize(lambda x: horse.ground.surface(x)[1])(now.hoof.real)
+        force = force[..., e] * normals(horse, now)
         hoof = np.stack([r["toe_x"] + 1j * r["toe_y"], r["heel_x"] + 1j * r["heel_y"]], 1)[..., e]
         push = max(engine.weight, np.abs(now.hoof_force).max())
         turn = max(push, np.abs(now.crank_torque).max(), np.abs(now.hip_torque).max())
@@ -160,10 +228,23 @@ def test_every_instant_is_d_alembert_s(legs, trunk, ground, terrain, depth, seed
             ("hip_torque", r["hip_torque"][:, e], now.hip_torque, turn),
             ("crank_power", r["crank_power"][:, e].sum(), now.power["crank"], turn * fast),
             ("hip_power", r["hip_power"][:, e].sum(), now.power["hip"], turn * fast),
-            ("centre", tally.centre[e], now.centre, 1.0),
-            ("momentum", tally.momentum[e], now.momentum, np.abs(now.momentum) + 1.0),
-            ("angular momentum", tally.spin[e], now.angular_momentum, np.abs(now.momentum) + 1.0),
-            ("kinetic", tally.kinetic[e], now.kinetic, now.kinetic),
-            ("potential", tally.potential[e], now.potential, abs(now.potential) + now.kinetic),
+            *(_tallied(tally, now, e) if tally else _soles(engine, horse, now, e)),
         ):
             assert_close(found, expected, scale, f"{name}, environment {e}")
+
+
+def _tallied(tally, now, e):
+    return (
+        ("centre", tally.centre[e], now.centre, 1.0),
+        ("momentum", tally.momentum[e], now.momentum, np.abs(now.momentum) + 1.0),
+        ("angular momentum", tally.spin[e], now.angular_momentum, np.abs(now.momentum) + 1.0),
+        ("kinetic", tally.kinetic[e], now.kinetic, now.kinetic),
+        ("potential", tally.potential[e], now.potential, abs(now.potential) + now.kinetic),
+    )
+
+
+def _soles(engine, horse, now, e):
+    """Sliding speeds are those of the soles."""
+    ahead = (now.hoof_velocity * (normals(horse, now) / 1j).conj()).real
+    found = np.stack([engine.report["toe_slide"], engine.report["heel_slide"]], 1)[..., e]
+    return (("slide", found, ahead - now.give_rate[..., 1], max(1.0, np.abs(now.give_rate).max())),)

@@ -7,7 +7,7 @@ leg, and `Jet` carries their two derivatives by time along.
 import numpy as np
 
 from hoof_env.dynamics.parts import Motor
-from hoof_env.gait import COS, OFFSET, SIN
+from hoof_env.gait import OFFSET
 from hoof_env.leg.linkage import BODIES, CONSTRUCTION, Dyad
 from tests.oracle.jet import Jet, concatenate, direction, inverse, root, stack, turn
 
@@ -82,10 +82,14 @@ class PlainBodies:
         )
 
     def swing(self, theta, filters):
-        """phi = offset + A sin theta + B cos theta, `filters` of shape (N, 4, 3)."""
-        offset, a, b = (Jet(*filters[:, k].T) for k in (OFFSET, SIN, COS))
-        e = turn(theta)
-        return offset + a * e.part(np.imag) + b * e.part(np.real)
+        """phi = offset + A sin theta + B cos theta + A2 sin 2 theta ..., `filters` of shape (N, 4, 3) or with
+        more harmonics."""
+        phi = Jet(*filters[:, OFFSET].T)
+        for k in range(1, filters.shape[1] // 2):
+            a, b = (Jet(*filters[:, row].T) for row in (2 * k, 2 * k + 1))
+            e = turn(theta * float(k))
+            phi = phi + a * e.part(np.imag) + b * e.part(np.real)
+        return phi
 
     def hooves(self, trunk, trunk_rate, theta, theta_rate, gaits):
         """Place and velocity [m, m/s] of hoof points under steady gaits (N, 4); complex, shapes (N, 2)."""

@@ -1,6 +1,7 @@
 """The ground under the plain horse: one point at a time, on any terrain."""
 
 import numpy as np
+from scipy.optimize import brentq
 
 from hoof_env.ground.laws import FRICTION_LAWS, damping
 from tests.oracle.laws import friction_force, normal_force
@@ -34,8 +35,9 @@ class PlainGround:
         height, normal = self.surface(position.real)
         return (height - position.imag) * normal.imag, -(velocity * normal.conjugate()).real
 
-    def forces(self, position, velocity, approach):
-        """Normal force and friction [N] on a point that touched down at `approach` [m/s]."""
+    def forces(self, position, velocity, approach, less=(0.0, 0.0)):
+        """Normal force and friction [N] on a point that touched down at `approach` [m/s]; `less` is how much
+        less deep the sole is than the point [m], and its rate."""
         ground, (_, normal) = self.ground, self.surface(position.real)
         harder, rougher = 1.0, 1.0
         if self.terrain is not None:
@@ -43,7 +45,7 @@ class PlainGround:
                 float(np.interp(position.real, self.terrain.x, factors))
                 for factors in (self.terrain.stiffness, self.terrain.friction)
             )
-        d, rate = self.depth(position, velocity)
+        d, rate = np.subtract(self.depth(position, velocity), less)
         push = normal_force(
             d, rate, approach, ground.stiffness * harder, ground.exponent, self.chi, self.dashpot
         )
@@ -53,3 +55,33 @@ class PlainGround:
             self.law, ground.friction * rougher, ground.friction_slow, ground.friction_fast,
         )  # fmt: skip
         return push * normal, grip * along
+
+    def through_spring(self, position, velocity, approach, spring, give):
+        """Normal force and friction [N] on a point with a sole on a spring, and the rates of what that gives
+        along normal and tangent [m/s]: the balance of a sole without mass, solved as it is written."""
+        _, normal = self.surface(position.real)
+        along = normal / 1j
+        ahead = (velocity * along.conjugate()).real
+        k, c = spring.stiffness, spring.damping
+
+        def ground_less_spring(slide_in):
+            push = 0.0
+            if not np.isnan(approach):
+                push = abs(self.forces(position, velocity, approach, (give[0], slide_in))[0])
+            return push - k * give[0] - c * slide_in
+
+        wide = 1.0
+        while ground_less_spring(-wide) < 0 or ground_less_spring(wide) > 0:
+            wide *= 2
+        sinking = brentq(ground_less_spring, -wide, wide, xtol=1e-15, rtol=1e-15)
+        push = k * give[0] + c * sinking if not np.isnan(approach) else 0.0
+        harder = 1.0
+        if self.terrain is not None:
+            harder = float(np.interp(position.real, self.terrain.x, self.terrain.friction))
+        grip = self.ground.friction * harder * push
+        k, c = spring.tangential_stiffness, spring.tangential_damping
+        stretching, held = ahead, k * give[1] + c * ahead
+        if abs(held) > grip:  # the sole slides: friction is known, the spring follows
+            held = np.copysign(grip, held)
+            stretching = (held - k * give[1]) / c
+        return push * normal, -held * along, (sinking, stretching)

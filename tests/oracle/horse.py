@@ -51,6 +51,7 @@ class Moment:
     hoof: Array  # of the hoof points in the world, (N, 2), complex [m, m/s, N]
     hoof_velocity: Array
     hoof_force: Array
+    give_rate: Array  # of springs at the hoof points along normal and tangent, (N, 2, 2) [m/s]
     power: dict[str, float]  # [W] of each of `WORKS`; a motor's hip gives what the gearing does not take
 
 
@@ -64,16 +65,18 @@ class PlainHorse(PlainBodies):
         self.motors = np.array([isinstance(limb.drive, Motor) for limb in limbs])
         self.trunk_freedom = ((), (0,), (0, 1), (0, 1, 2))[TRUNKS.index(trunk.kind)]
 
-    def at(self, trunk, trunk_rate, theta, theta_rate, filters, approach=None):
+    def at(self, trunk, trunk_rate, theta, theta_rate, filters, approach=None, give=None):
         """Everything about one instant.
 
         Args:
             trunk, trunk_rate: x, y, pitch and their rates, shape (3,) [m, rad, s].
             theta, theta_rate: of each crank, shape (N,) [rad, rad/s]; a prescribed rate is the filter's.
             filters: value, rate and acceleration of each leg's gait parameters, shape (N, 4, 3) in the order
-                of `gait.PARAMETERS`; shape (N, 4) where they are steady.
+                of `gait.PARAMETERS`; shape (N, 4) where they are steady; or with higher harmonics.
             approach: v0 of each hoof point in the ground, NaN of one that is not, shape (N, 2) [m/s]; None
                 where all are in the air.
+            give: of the springs at the hoof points along normal and tangent, shape (N, 2, 2) [m]; None of
+                rigid hoofs.
         """
         n = self.size
         filters = np.asarray(filters, float)
@@ -99,7 +102,7 @@ class PlainHorse(PlainBodies):
         bias += spin @ (inertia * turns.acc[:, 0])
 
         hoof, hoof_velocity = hooves.value[..., 0], hooves.rate[..., 0]
-        normal, friction = self.ground_forces(hoof, hoof_velocity, approach)
+        normal, friction, give_rate = self.ground_forces(hoof, hoof_velocity, approach, give)
         force = normal + friction
         support, springs = self.support(u[1])
         damper = -self.trunk.damping * ud[1] if self.trunk.kind == "suspended" else 0.0
@@ -135,7 +138,7 @@ class PlainHorse(PlainBodies):
             kinetic=float(m @ np.abs(v) ** 2 + inertia @ w**2) / 2,
             potential=float(GRAVITY * m @ centres.value[:, 0].imag) + springs,
             crank_torque=crank, hip_torque=hip,
-            hoof=hoof, hoof_velocity=hoof_velocity, hoof_force=force,
+            hoof=hoof, hoof_velocity=hoof_velocity, hoof_force=force, give_rate=give_rate,
             power=dict(zip(WORKS, map(float, (
                 crank @ rate, hip @ by_time, np.sum(normal.conj() * hoof_velocity).real,
                 np.sum(friction.conj() * hoof_velocity).real, drag * ud[0], damper * ud[1],
@@ -151,14 +154,21 @@ class PlainHorse(PlainBodies):
         weight, stretch = (1 - trunk.share) * self.masses.sum() * GRAVITY, y - trunk.height
         return weight - trunk.stiffness * stretch, trunk.stiffness * stretch**2 / 2 - weight * y
 
-    def ground_forces(self, hoof, velocity, approach):
-        """Normal force and friction on each hoof point that is in the ground, complex [N]."""
-        forces = np.zeros((2, *hoof.shape), complex)
-        if self.ground is not None:
+    def ground_forces(self, hoof, velocity, approach, give=None):
+        """Normal force and friction on each hoof point that is in the ground, complex [N], and the rates of
+        their springs [m/s]."""
+        forces, rates = np.zeros((2, *hoof.shape), complex), np.zeros((*hoof.shape, 2))
+        if give is not None:
+            for k in np.ndindex(hoof.shape):
+                where = complex(hoof[k]), complex(velocity[k]), float(approach[k])
+                spring = self.limbs[k[0]].spring
+                found = self.ground.through_spring(*where, spring, give[k])
+                forces[(slice(None), *k)], rates[k] = found[:2], found[2]
+        elif self.ground is not None:
             for k in zip(*np.nonzero(~np.isnan(approach)), strict=True):
                 where = complex(hoof[k]), complex(velocity[k]), float(approach[k])
                 forces[(slice(None), *k)] = self.ground.forces(*where)
-        return forces[0], forces[1]
+        return forces[0], forces[1], rates
 
 
 def servo(drive, lag):
