@@ -15,15 +15,14 @@ import numpy as np
 from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.advance import LANES, TRUNK_ROWS
+from hoof_env.dynamics.advance import LANES, form_of
 from hoof_env.dynamics.constrained import INTEGRATORS
 from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.dynamics.layout import LegMemory, TrunkMemory
-from hoof_env.dynamics.parts import GRAVITY, LARGEST, ONE_LEG, Limb, Result
+from hoof_env.dynamics.parts import GRAVITY, LARGEST, ONE_LEG, Result
 from hoof_env.dynamics.step_length import StepLength
 from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.envs import step as kernels
-from hoof_env.envs.infos import AT_MEASURED, BEGUN, GAIT, LAST_STEP, MEASUREMENTS, START, named
+from hoof_env.envs.infos import BEGUN, GAIT, LAST_STEP, START, at_measured, measurements, named
 from hoof_env.envs.observation import HALF_RANGE, HIGH, LOW, MIDDLE, check_groups, groups_of, observed
 from hoof_env.envs.paper_solver import PaperSolver, check_paper
 from hoof_env.envs.parameters import (
@@ -118,12 +117,12 @@ class EpisodeBatch:
                 raise ParameterError(
                     f"observation: {group!r} is constant without {needed}, got {needed}={given!r}"
                 )
-        trunk, ground, drive = physics(s, self.height, {})
+        trunk, ground, limb = physics(s, self.geometry, self.height, {})
         substeps = None
         if self.randomize:
             substeps = max(self._parts(corner, None) for corner in ({}, *extremes(self.randomize)))
         self.engine = TrunkEngine(
-            Limb(self.geometry, drive=drive), trunk, ground, self._terrain, substeps=substeps,
+            limb, trunk, ground, self._terrain, substeps=substeps,
             sim_dt=s.sim_dt, integrator="midpoint" if is_paper else s.integrator,
             num_envs=num_envs, num_threads=num_threads, strides=True, contact_law=task.contact_law,
         )  # fmt: skip
@@ -170,7 +169,9 @@ class EpisodeBatch:
         """Find the arrays where they are now, and the kernels."""
         self.entries = observed(self.groups, self.settings.trunk, self.task.entries)
         self.now = views(episode_layout(len(self.task.terms)), self.episode)
-        self._kernels = k = kernels.step_kernels(self.task.terms, self.task.entries, self.task.contact_law)
+        self._kernels = k = kernels.step_kernels(
+            self.task.terms, self.task.entries, self.task.contact_law, self.engine.features
+        )
         is_few = self.engine.is_few or self.paper
         self.kernel, self._observe = (
             (k.step_one, k.observe_one) if is_few else (k.step_batch, k.observe_batch)
@@ -252,8 +253,8 @@ class EpisodeBatch:
 
     def _parts(self, changes: Mapping[str, float], asked: int | None) -> int:
         """Into how many parts `sim_dt` is cut with some settings changed, see `StepLength.choose`."""
-        trunk, ground, drive = physics(self.settings, self.height, changes)
-        limb, s = Limb(self.geometry, drive=drive), self.settings
+        trunk, ground, limb = physics(self.settings, self.geometry, self.height, changes)
+        s = self.settings
         profiles = [leg_profile(self.geometry)]
         length = StepLength((limb,), profiles, trunk, ground, self._terrain, s.integrator)
         return length.choose(s.sim_dt, asked, stacklevel=5)
@@ -278,8 +279,8 @@ class EpisodeBatch:
                 values = draw_parameters(parameters, generator)
                 for name, value in values.items():
                     drawn[name][k] = value
-                trunk, ground, drive = physics(self.settings, self.height, values)
-                self.engine.vary(int(env), trunk, ground, drive)
+                trunk, ground, limb = physics(self.settings, self.geometry, self.height, values)
+                self.engine.vary(int(env), trunk, ground, limbs=[limb])
                 now.weight[env] = (trunk.mass + self.geometry.mass) * GRAVITY
             self._varied[which] = bool(parameters)
         start = draw_starts(
@@ -341,9 +342,11 @@ class EpisodeBatch:
     def _observe_broken(self) -> None:
         """Observe the last good state of what could not be simulated, whose report is of where it broke."""
         data, broken = self.engine.arrays[0], np.flatnonzero(self.engine.results)
-        kept, leg = data.copy(), LegMemory.rows("report")
+        kept, form = data.copy(), form_of(self.engine.features)
+        leg = form.leg_memory.rows("report")
         self.engine.advance(None, 0)
-        for rows in (TrunkMemory.rows("report"), slice(TRUNK_ROWS + leg.start, TRUNK_ROWS + leg.stop)):
+        of_leg = slice(form.trunk_rows + leg.start, form.trunk_rows + leg.stop)
+        for rows in (form.trunk_memory.rows("report"), of_leg):
             kept[rows, broken] = data[rows, broken]
         data[:] = kept
         self._observe(self.addresses)
@@ -353,7 +356,7 @@ class EpisodeBatch:
         (num_envs,), but for "gait", "measured" and "parameters", which are `Named`. `ended` says whether
         there may be environments that could not be simulated."""
         n, begun, memory = self.num_envs, self.begun.copy(), self.engine.arrays[0]
-        measured = memory[AT_MEASURED, :n].copy()
+        measured = memory[at_measured(self.engine.features), :n].copy()
         if ended:
             broken = self.engine.results != 0
             measured[LAST_STEP, broken] = 0.0  # nothing happened there
@@ -361,7 +364,7 @@ class EpisodeBatch:
         infos["gait"] = begun[len(START) : BEGUN].T.view(GAIT)
         if self.randomize:
             infos["parameters"] = named(begun[BEGUN:].T, tuple(self.randomize))
-        infos["measured"] = measured.T.view(MEASUREMENTS)
+        infos["measured"] = measured.T.view(measurements(self.engine.features))
         infos.update(zip(self.terms, self.now.terms[:, :n].copy(), strict=True))
         return infos
 

@@ -14,7 +14,7 @@ from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
 from hoof_env.envs.base import LegBase, array_of, generator_of
-from hoof_env.envs.infos import AT_MEASURED, BEGUN, LAST_STEP, MEASURED, START, named
+from hoof_env.envs.infos import BEGUN, LAST_STEP, START, at_measured, measured_names, named
 from hoof_env.envs.recording import Recording
 from hoof_env.envs.reward import failure
 from hoof_env.envs.step import ACTIONS, FAILED
@@ -54,13 +54,13 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def _attach(self) -> None:
         """What every step reads, writes or calls, found once."""
-        batch, terms = self.batch, self.task.terms
+        batch, terms, features = self.batch, self.task.terms, self.batch.engine.features
         weighed = [(k, term) for k, term in enumerate(terms) if batch.weights[term.name]]
         paid = [(term.key, k) for k, term in weighed if term.compute is not failure]  # 0 before the end
         self._views: tuple[Any, ...] = (
             batch.actions[0].data, batch.direct_kernel(), batch.addresses, bool(batch.randomize), paid,
             batch.now.terms[:, 0], batch.rewards.data, batch.observations[0].copy,
-            named(batch.engine.arrays[0][AT_MEASURED, 0], MEASURED).copy,
+            named(batch.engine.arrays[0][at_measured(features), 0], measured_names(features)).copy,
         )  # fmt: skip
 
     # What pictures, records and policies read

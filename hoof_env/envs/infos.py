@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hoof_env.dynamics.layout import LEG_STATE, STRIDE_SUMS, STRIDES, TRUNK_REPORT, LegMemory, TrunkMemory
+from hoof_env.dynamics.advance import form_of
+from hoof_env.dynamics.layout import PLAIN, STRIDE_SUMS, STRIDES, TRUNK_REPORT, Features, leg_state
 from hoof_env.gait import PARAMETERS
 
 START = ("crank_angle", "speed", "height", "x")
@@ -21,12 +22,22 @@ START = ("crank_angle", "speed", "height", "x")
 
 BEGUN = len(START) + len(PARAMETERS)  # how many numbers these are; those drawn follow
 
-MEASURED = (*TRUNK_REPORT, "result", *LEG_STATE, *STRIDES, *STRIDE_SUMS)
-"""What an info measures, neighbours in the engine's memory: read with one copy."""
-
-AT_MEASURED = slice(TrunkMemory.rows("report").start, TrunkMemory.size + LegMemory.rows("sums").stop)
 LAST_STEP = slice(-len(STRIDE_SUMS), None)
-"""The rows of the engine's memory, and which of them are of the last control step, not of its end."""
+"""Which rows of what is measured are of the last control step, not of its end."""
+
+
+def measured_names(features: Features = PLAIN) -> tuple[str, ...]:
+    """What an info measures, neighbours in the engine's memory: read with one copy."""
+    return (*TRUNK_REPORT, "result", *leg_state(features), *STRIDES, *STRIDE_SUMS)
+
+
+def at_measured(features: Features) -> slice:
+    """Where that is."""
+    form = form_of(features)
+    return slice(form.trunk_memory.rows("report").start, form.trunk_rows + form.leg_memory.rows("sums").stop)
+
+
+MEASURED = measured_names()
 
 
 class Named(np.ndarray[Any, np.dtype[np.float64]]):
@@ -98,8 +109,13 @@ def named(values: ArrayLike, names: Sequence[str]) -> Named:
     return np.asarray(values, np.float64).view(_kind(tuple(names)))
 
 
-GAIT, MEASUREMENTS = _kind(PARAMETERS), _kind(MEASURED)
-"""Kinds of `Named`, to view arrays as."""
+GAIT = _kind(PARAMETERS)
+"""A kind of `Named`, to view arrays as."""
+
+
+def measurements(features: Features) -> type[Named]:
+    """That of what is measured."""
+    return _kind(measured_names(features))
 
 
 def row_of(infos: Mapping[str, Any], env: int) -> dict[str, Any]:

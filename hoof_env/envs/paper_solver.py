@@ -43,7 +43,13 @@ finite, up to 1e300."""
 
 def check_paper(settings: Settings) -> None:
     """`ParameterError` where settings ask of the paper's solver what it cannot do."""
-    only = {"trunk": "fixed", "drive": "prescribed", "terrain": None, "randomize": None}
+    only = {
+        "trunk": "fixed",
+        "drive": "prescribed",
+        "terrain": None,
+        "randomize": None,
+        "hoof_stiffness": None,
+    }
     for name, expected in only.items():
         given = getattr(settings, name)
         if given != expected and not (expected is None and not given):

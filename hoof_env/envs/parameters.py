@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from hoof_env.dynamics.parts import Drive, Motor, Prescribed, Trunk
+from hoof_env.dynamics.parts import Drive, HoofSpring, Limb, Motor, Prescribed, Trunk
 from hoof_env.envs.tasks import PER_EPISODE, SOLVERS, Settings, check_effect
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.ground.contact import Ground, load_ground
 from hoof_env.ground.terrain import Terrain
-from hoof_env.leg.geometry import named, read_preset, wrong
+from hoof_env.leg.geometry import Geometry, named, read_preset, wrong
 
 MOST_SUBSTEPS = 100_000  # of a control step
 
@@ -65,8 +65,10 @@ def substeps_of(dt: float, sim_dt: float) -> int:
     return round(ratio)
 
 
-def physics(settings: Settings, height: float, changes: Mapping[str, float]) -> tuple[Trunk, Ground, Drive]:
-    """Trunk at a height [m], ground and drive of some `resolved` settings with others changed."""
+def physics(
+    settings: Settings, geometry: Geometry, height: float, changes: Mapping[str, float]
+) -> tuple[Trunk, Ground, Limb]:
+    """Trunk at a height [m], ground and leg of some `resolved` settings with others changed."""
     s: Any = replace(settings, **dict(changes))  # type: ignore[arg-type]
     trunk = Trunk(
         s.trunk, s.trunk_mass, s.trunk_share, s.trunk_stiffness, s.trunk_damping, s.trunk_drag, height
@@ -76,9 +78,24 @@ def physics(settings: Settings, height: float, changes: Mapping[str, float]) -> 
         "sampled" if s.solver == "paper" else "interpolated",
         s.friction_law, s.friction, s.friction_slow, s.friction_fast, s.trunk_mass,
     )  # fmt: skip
-    if s.drive == "prescribed":
-        return trunk, ground, Prescribed()
-    return trunk, ground, Motor(s.motor_gain, s.motor_torque, s.motor_inertia, 1.0)
+    drive: Drive = Prescribed()
+    if s.drive != "prescribed":
+        drive = Motor(s.motor_gain, s.motor_torque, s.motor_inertia, 1.0)
+    return trunk, ground, Limb(geometry, drive=drive, spring=hoof_spring(s))
+
+
+def hoof_spring(settings: Settings) -> HoofSpring | None:
+    """The spring at the hoof; without a damping, with a tenth of the critical one under the trunk."""
+    stiffness, damping = settings.hoof_stiffness, settings.hoof_damping
+    if stiffness is None:
+        if damping is not None:
+            raise ParameterError(f"hoof_damping: expected a hoof_stiffness beside it, got {damping!r}")
+        return None
+    check_number("hoof_stiffness", stiffness, low=0, exclusive_low=True)
+    if damping is None:
+        return HoofSpring.with_ratio(stiffness, settings.trunk_mass)
+    check_number("hoof_damping", damping, low=0, exclusive_low=True)
+    return HoofSpring(stiffness, damping)
 
 
 def check_parameters(name: str, given: Any, settings: Settings) -> dict[str, float | tuple[float, float]]:

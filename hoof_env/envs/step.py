@@ -14,8 +14,8 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from hoof_env.dynamics.advance import LANES, MODEL, TRUNK_ROWS, advance_kernels
-from hoof_env.dynamics.layout import LegMemory, TrunkMemory
+from hoof_env.dynamics.advance import LANES, MODEL, advance_kernels, form_of
+from hoof_env.dynamics.layout import PLAIN, Features
 from hoof_env.envs.observation import Entry, Scene
 from hoof_env.envs.reward import TERMS, Outcome, Term
 from hoof_env.gait import PARAMETERS
@@ -106,6 +106,22 @@ def episode_layout(terms: int) -> Any:
     fields = {**Episode.__annotations__, "terms": Annotated[Block, terms]}
     make: Any = type(Layout)
     return make(f"Episode{terms}", (Layout,), {"__annotations__": fields, "__module__": __name__})
+
+
+class Memories(NamedTuple):
+    """Layouts of what a step works on, and how many rows the trunk's has."""
+
+    episode: Any
+    trunk: Any
+    leg: Any
+    trunk_rows: int
+
+
+@cache
+def memories_of(terms: int, features: Features) -> Memories:
+    """The layouts with so many terms, of an engine of this kind."""
+    form = form_of(features)
+    return Memories(episode_layout(terms), form.trunk_memory, form.leg_memory, form.trunk_rows)
 
 
 def task_type(terms: int, entries: int) -> np.dtype[Any]:
@@ -203,14 +219,14 @@ def decide(task, outcome, episode):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def memories(addresses, lanes, layout, n):  # type: ignore[no-untyped-def]
+def memories(addresses, lanes, layouts, n):  # type: ignore[no-untyped-def]
     """Trunk, leg and episode of environments n, n + 1, ..., as `lanes` columns, see `simd.columns`."""
     row = addresses[AT.data + COLUMNS]
     data, episode = doubles_at(addresses[AT.data]), doubles_at(addresses[AT.episode])
     return (
-        columns(data, lanes, TrunkMemory, n, row, 1),
-        columns(data, lanes, LegMemory, TRUNK_ROWS * row + n, row, 1),
-        columns(episode, lanes, layout, n, row, 1),
+        columns(data, lanes, layouts.trunk, n, row, 1),
+        columns(data, lanes, layouts.leg, layouts.trunk_rows * row + n, row, 1),
+        columns(episode, lanes, layouts.episode, n, row, 1),
     )
 
 
@@ -228,14 +244,14 @@ def outcome_of_one(outcome, lane, trunk, leg, episode):  # type: ignore[no-untyp
     )  # fmt: skip
 
 
-def _with_terms(terms: tuple[Term, ...], k: int = 0) -> Callable[..., Any]:
+def _with_terms(terms: tuple[Term, ...], features: Features, k: int = 0) -> Callable[..., Any]:
     """A function that computes the terms from the k-th on, keeps them in `episode.terms` and returns the sum
     of all. numba has no loop over functions, so each calls the next."""
     if k == len(terms):
         return inlined(lambda addresses, lanes, task, outcome, episode, n, total: total)
-    compute, rest, is_first = inlined(terms[k].compute), _with_terms(terms, k + 1), k == 0
-    layout, is_own, number = (
-        episode_layout(len(terms)),
+    compute, rest, is_first = inlined(terms[k].compute), _with_terms(terms, features, k + 1), k == 0
+    layouts, is_own, number = (
+        memories_of(len(terms), features),
         terms[k].name not in SHIPPED,
         number_of(terms[k].title),
     )
@@ -256,7 +272,7 @@ def _with_terms(terms: tuple[Term, ...], k: int = 0) -> Callable[..., Any]:
     @inlined
     def compute_one_by_one(addresses, lanes, task, outcome, episode, n, total):  # type: ignore[no-untyped-def]
         for lane in range(lanes):
-            trunk, leg, own = memories(addresses, 0, layout, n + lane)
+            trunk, leg, own = memories(addresses, 0, layouts, n + lane)
             one = outcome_of_one(outcome, lane, trunk, leg, own)
             own.terms[k] = number(compute(one, task.weights[k])) + 0.0
         return add_term(addresses, lanes, task, outcome, episode, n, total)
@@ -275,13 +291,15 @@ def slots_of(entries: tuple[Entry, ...]) -> tuple[list[int], int, int]:
     return [slots[k] for k in range(len(entries))], vectors, vectors * LANES + len(others)
 
 
-def _with_entries(entries: tuple[Entry, ...], terms: int, scaled: bool, k: int = 0) -> Callable[..., Any]:
+def _with_entries(
+    entries: tuple[Entry, ...], terms: int, features: Features, scaled: bool, k: int = 0
+) -> Callable[..., Any]:
     """A function that puts the entries that are observed, from the k-th on, into their slots: scaled but for
     tanh, or as they are measured."""
     if k == len(entries):
         return inlined(lambda addresses, lanes, scene, numbers, n: None)
     measure, apply, slot = inlined(entries[k].measure), entries[k].scale.apply, slots_of(entries)[0][k]
-    rest, layout = _with_entries(entries, terms, scaled, k + 1), episode_layout(terms)
+    rest, layouts = _with_entries(entries, terms, features, scaled, k + 1), memories_of(terms, features)
     scale = inlined(apply) if scaled and apply is not None else inlined(lambda x, scene: x)
     number, scaled_number = number_of(entries[k].title), number_of(f"the scale of {entries[k].title}")
 
@@ -295,7 +313,7 @@ def _with_entries(entries: tuple[Entry, ...], terms: int, scaled: bool, k: int =
     def put_one_by_one(addresses, lanes, scene, numbers, n):  # type: ignore[no-untyped-def]
         if scene.task.places[slot] >= 0:
             for lane in range(lanes):
-                trunk, leg, episode = memories(addresses, 0, layout, n + lane)
+                trunk, leg, episode = memories(addresses, 0, layouts, n + lane)
                 own = Scene(
                     trunk, leg, episode, scene.task, scene.ground, scene.ground_origin, scene.ground_per_metre
                 )
@@ -328,9 +346,12 @@ class StepKernels(NamedTuple):
 
 @cache
 def step_kernels(
-    terms: tuple[Term, ...], entries: tuple[Entry, ...], contact_law: Callable[..., Any] | None
+    terms: tuple[Term, ...],
+    entries: tuple[Entry, ...],
+    contact_law: Callable[..., Any] | None,
+    features: Features = PLAIN,
 ) -> StepKernels:
-    """The kernels of tasks with these terms, entries and law of contact."""
+    """The kernels of tasks with these terms, entries and law of contact, on an engine of this kind."""
     parts: list[Any] = [term.compute for term in terms]
     parts += [part for entry in entries for part in (entry.measure, entry.scale.apply) if part]
     flags = (
@@ -339,16 +360,20 @@ def step_kernels(
     )
     Episode = episode_layout(len(terms))
     identity = fingerprint(*parts, contact_law, flags, Episode.names, (FAILED, TRUNCATED))
-    compute_reward = _with_terms(terms)
-    put_scaled, put_measured = (_with_entries(entries, len(terms), scaled) for scaled in (True, False))
+    if features != PLAIN:
+        identity += f" {tuple(features)}"
+    layouts, compute_reward = memories_of(len(terms), features), _with_terms(terms, features)
+    put_scaled, put_measured = (
+        _with_entries(entries, len(terms), features, scaled) for scaled in (True, False)
+    )
     _, vectors, slots = slots_of(entries)
-    advance = advance_kernels(contact_law)
+    advance = advance_kernels(contact_law, features)
     advance_leg, advance_batch = advance.advance_leg, advance.advance_batch
     task_at, model_at = record_at(task_type(len(terms), slots)), record_at(MODEL)
 
     @pasted
     def scene_of(addresses, lanes, task, n):  # type: ignore[no-untyped-def]
-        trunk, leg, episode = memories(addresses, lanes, Episode, n)
+        trunk, leg, episode = memories(addresses, lanes, layouts, n)
         model, ground = model_at(addresses[AT.model])[0], matrix_at(addresses, AT.ground)
         return Scene(trunk, leg, episode, task, ground, model.ground_origin, model.ground_per_metre)
 
@@ -361,7 +386,7 @@ def step_kernels(
             good &= size(float(actions[k])) < np.inf
         if good:
             for n in range(addresses[BEGIN], addresses[END], lanes):
-                apply_action(task, actions, memories(addresses, lanes, Episode, n)[1], n)
+                apply_action(task, actions, memories(addresses, lanes, layouts, n)[1], n)
         return good
 
     @pasted
@@ -389,7 +414,7 @@ def step_kernels(
         task, actions = task_at(addresses[AT.task])[0], singles_at(addresses[AT.actions])
         rewards, memory, happened = doubles_at(addresses[AT.rewards]), doubles(slots * lanes), 0
         for n in range(addresses[BEGIN], addresses[END], lanes):
-            trunk, leg, episode = memories(addresses, lanes, Episode, n)
+            trunk, leg, episode = memories(addresses, lanes, layouts, n)
             outcome = find_outcome(task, trunk, leg, episode, remember_action(actions, episode, n))
             add_up(outcome, episode)
             ended, switched = decide(task, outcome, episode)

@@ -56,6 +56,8 @@ class Settings:
     friction: float = 0.4
     friction_slow: float = 1e-3
     friction_fast: float = 5e-2
+    hoof_stiffness: float | None = None
+    hoof_damping: float | None = None
     terrain: Mapping[str, Any] | None = None
     drive: str = "prescribed"
     motor_gain: float = 100.0
@@ -100,6 +102,8 @@ class Keywords(TypedDict, total=False):
     friction: float
     friction_slow: float
     friction_fast: float
+    hoof_stiffness: float | None
+    hoof_damping: float | None
     terrain: Mapping[str, Any] | None
     drive: str
     motor_gain: float
@@ -152,6 +156,12 @@ NEEDED: Mapping[str, tuple[str, tuple[str, ...]]] = MappingProxyType(
 def check_effect(name: str, settings: Settings, within: str = "") -> None:
     """Raise `ParameterError` where a setting that somebody names, perhaps `within` another argument or
     option, has no effect beside the others."""
+    if name in ("friction_law", "friction_slow", "friction_fast") and settings.hoof_stiffness is not None:
+        named = f"{within}: {name!r}" if within else name
+        raise ParameterError(
+            f"{named}: expected none with a hoof_stiffness, whose friction needs no sliding speed, got "
+            f"hoof_stiffness={settings.hoof_stiffness!r}"
+        )
     needed, values = NEEDED.get(name, ("", ()))
     given: Any = getattr(settings, needed, None)
     if needed and (given not in values if values else _is_one(given)):
