@@ -30,34 +30,21 @@ LIMITS = MappingProxyType(
 the middle of all four, at the paper's crank speed, 2 pi, creeps forward and is no good gait, so that a policy
 has to command one."""
 
-MOST_HARMONICS = 3
-"""Of a swing law."""
 
-WIDEST = MappingProxyType(
-    {
-        "crank_speed": (0.0, 6 * np.pi), "swing_offset": (-1.5, 2.0), "swing_sin": (-1.5, 1.5),
-        "swing_cos": (-1.5, 1.5), "higher": (-0.6, 0.6),
-    }
-)  # fmt: skip
-"""The same of a gait with higher harmonics, which a whole animal has and no environment of one leg takes."""
-
-
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True)
 class GaitParameters:
     """One steady gait: the crank turns at `crank_speed` and the leg's frame swings about the crank centre by
 
         phi = swing_offset + swing_sin * sin(theta) + swing_cos * cos(theta),   theta the crank angle.
 
     The paper says that running 'controls the leg orientation by swinging motion with respect to the body' and
-    does not print the law; one harmonic is this project's assumption. A second and a third one, which let a
-    hoof follow a level stance, add A2 sin(2 theta) + B2 cos(2 theta) and so on.
+    does not print the law; one harmonic is this project's assumption.
 
     Attributes:
         crank_speed: theta's rate [rad/s], 0 to 4 pi.
         swing_offset: phi0 [rad], -0.1 to 1.2.
         swing_sin: A [rad], -0.7 to 0.6.
         swing_cos: B [rad], -0.7 to 0.6.
-        higher: A2, B2 and perhaps A3, B3 [rad], -0.6 to 0.6; where there are some, `WIDEST` holds for all.
 
     Raises:
         ParameterError: a value is not finite or outside `LIMITS`.
@@ -67,70 +54,102 @@ class GaitParameters:
     swing_offset: float
     swing_sin: float
     swing_cos: float
-    higher: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        given: Any = self.higher
-        try:
-            higher = tuple(given)
-        except TypeError:
-            higher = (None,)
-        if len(higher) not in range(0, 2 * MOST_HARMONICS - 1, 2):
-            raise ParameterError(
-                f"higher: expected the sine and cosine coefficients of none, one or two higher harmonics, "
-                f"0, 2 or 4 numbers, got {given!r}"
-            )
-        limits = WIDEST if higher else LIMITS
-        numbers = [
-            check_number(f"higher[{k}]", value, low=WIDEST["higher"][0], high=WIDEST["higher"][1])
-            for k, value in enumerate(higher)
-        ]
-        object.__setattr__(self, "higher", tuple(numbers))
+        self._check(LIMITS)
+
+    def _check(self, limits: Mapping[str, tuple[float, float]]) -> None:
         for name in PARAMETERS:
             low, high = limits[name]
             object.__setattr__(self, name, check_number(name, getattr(self, name), low=low, high=high))
 
-    def __repr__(self) -> str:
-        names = (*PARAMETERS, *["higher"][: len(self.higher)])
-        return f"GaitParameters({', '.join(f'{name}={getattr(self, name)!r}' for name in names)})"
-
-    @property
-    def harmonics(self) -> int:
-        """Of the swing."""
-        return 1 + len(self.higher) // 2
-
-    def to_array(self, harmonics: int | None = None) -> NDArray[np.float64]:
-        """The values in the order of `parameter_names`, shape (2 + 2 harmonics,); of more harmonics than it
-        has, the others are 0.
-
-        Raises:
-            ParameterError: it has more.
-        """
-        values = [*(getattr(self, name) for name in PARAMETERS), *self.higher]
-        if harmonics is None:
-            return np.array(values)
-        if harmonics < self.harmonics:
-            raise ParameterError(
-                f"gait: expected a swing of at most {harmonics} harmonic{'s' * (harmonics > 1)}, got "
-                f"{self.harmonics}: higher = {self.higher}"
-            )
-        return np.array(values + [0.0] * (2 + 2 * harmonics - len(values)))
+    def to_array(self) -> NDArray[np.float64]:
+        """The four values in the order of the fields, shape (4,)."""
+        return np.array([getattr(self, name) for name in PARAMETERS])
 
     @classmethod
     def from_array(cls, values: Any) -> GaitParameters:
         """Inverse of `to_array`."""
         array = np.asarray(values, dtype=np.float64)
-        if array.shape not in [(2 + 2 * n,) for n in range(1, MOST_HARMONICS + 1)]:
+        if array.shape != (4,):
+            raise ParameterError(f"gait parameters: expected 4 values {PARAMETERS}, got shape {array.shape}")
+        return cls(*array.tolist())
+
+
+PARAMETERS = tuple(item.name for item in fields(GaitParameters))
+"""Names of the gait parameters, in the order used by actions and filters."""
+
+MOST_HARMONICS = 3
+"""Of a swing law."""
+
+WIDEST = MappingProxyType(
+    {
+        "crank_speed": (0.0, 6 * np.pi), "swing_offset": (-1.5, 2.0),
+        "swing_sin": (-1.5, 1.5), "swing_cos": (-1.5, 1.5), "higher": (-0.6, 0.6),
+    }
+)  # fmt: skip
+"""The `LIMITS` of a `HarmonicGait`."""
+
+
+@dataclass(frozen=True)
+class HarmonicGait(GaitParameters):
+    """A gait whose swing has higher harmonics, so that a hoof can follow a level stance; an engine made with
+    `harmonics` takes it, and no environment of one leg does:
+
+        phi = swing_offset + sum over k of A_k sin(k theta) + B_k cos(k theta).
+
+    Attributes:
+        higher: A2, B2 and perhaps A3, B3 [rad], -0.6 to 0.6; the others are those of `GaitParameters`.
+
+    Raises:
+        ParameterError: a value is not finite or outside `WIDEST`, or there are not 2 or 4 of `higher`.
+    """
+
+    higher: tuple[float, ...] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        self._check(WIDEST)
+        given: Any = self.higher
+        try:
+            higher = tuple(given)
+        except TypeError:
+            higher = ()
+        if len(higher) not in (2, 4):
             raise ParameterError(
-                f"gait parameters: expected 4 values {PARAMETERS}, or 6 or 8 with higher harmonics, "
-                f"got shape {array.shape}"
+                "higher: expected the sine and cosine coefficients of the second harmonic, or of the second "
+                f"and the third, got {given!r}"
             )
+        low, high = WIDEST["higher"]
+        numbers = (check_number(f"higher[{k}]", x, low=low, high=high) for k, x in enumerate(higher))
+        object.__setattr__(self, "higher", tuple(numbers))
+
+    def to_array(self) -> NDArray[np.float64]:
+        """The values in the order of `parameter_names`, shape (6,) or (8,)."""
+        return np.append(super().to_array(), self.higher)
+
+    @classmethod
+    def from_array(cls, values: Any) -> HarmonicGait:
+        """Inverse of `to_array`."""
+        array = np.asarray(values, dtype=np.float64)
+        if array.shape not in ((6,), (8,)):
+            raise ParameterError(f"gait parameters: expected 6 or 8 values, got shape {array.shape}")
         speed, offset, sine, cosine, *higher = array.tolist()
         return cls(speed, offset, sine, cosine, tuple(higher))
 
 
-PARAMETERS = tuple(item.name for item in fields(GaitParameters) if item.name != "higher")
-"""Names of the gait parameters, in the order used by actions and filters."""
+def gait_array(gait: GaitParameters, harmonics: int) -> NDArray[np.float64]:
+    """The values of a gait for an engine with so many harmonics, shape (2 + 2 harmonics,); those that the
+    gait has not are 0.
+
+    Raises:
+        ParameterError: it has more.
+    """
+    values = gait.to_array()
+    if len(values) > 2 + 2 * harmonics:
+        raise ParameterError(
+            f"gait: expected a swing of at most {harmonics} harmonic{'s' * (harmonics > 1)}, got {gait!r}"
+        )
+    return np.append(values, np.zeros(2 + 2 * harmonics - len(values)))
 
 
 def parameter_names(harmonics: int = 1) -> tuple[str, ...]:
@@ -159,7 +178,7 @@ def load_gait(name: str, preset: Preset = DEFAULT_PRESET) -> GaitParameters:
     gaits = _read_gaits(preset)
     check_choice("gait", name, gaits)
     try:
-        return GaitParameters(**gaits[name])
+        return (HarmonicGait if "higher" in gaits[name] else GaitParameters)(**gaits[name])
     except TypeError as error:
         raise wrong(preset)(
             f"{named(preset)}, gait {name!r}: expected {', '.join(PARAMETERS)}, perhaps higher: {error}"
@@ -245,7 +264,7 @@ class FilterSettings:
         return np.array([crank, swing, swing, swing])
 
 
-QUICK = FilterSettings(gain=50.0, crank_rate=100.0, crank_acc=5000.0, swing_rate=15.0, swing_acc=750.0)
+QUICK = FilterSettings(gain=100.0, crank_rate=100.0, crank_acc=1e4, swing_rate=15.0, swing_acc=1500.0)
 """Filters that let the crank follow a level stance: it slows down and speeds up within every stride."""
 
 

@@ -95,7 +95,7 @@ def find_policy(name: str, env: gym.Env[Any, Any], env_id: str, seed: int = 0) -
     except ValueError:
         numbers = []
     if len(numbers) == len(PARAMETERS):
-        action = env.unwrapped.action_for(GaitParameters.from_array(numbers))  # type: ignore[attr-defined]
+        action = env.unwrapped.action_for(GaitParameters(*numbers))  # type: ignore[attr-defined]
         return Scripted(lambda observation, time: action, setting(env).dt)
     raise ParameterError(
         f"policy: expected a name ({', '.join(names)}, open-loop), four gait parameters as "

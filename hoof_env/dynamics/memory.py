@@ -38,7 +38,7 @@ from hoof_env.dynamics.parts import (
 from hoof_env.dynamics.reactions import Reactions, leg_constants
 from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.errors import Floats, ParameterError, all_of, finite, spread
-from hoof_env.gait import FilterSettings, GaitParameters
+from hoof_env.gait import FilterSettings, GaitParameters, gait_array
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.laws import FRICTION_LAWS
 from hoof_env.ground.terrain import Terrain
@@ -281,7 +281,7 @@ def gaits_of(gaits: Any, legs: int, n: int, harmonics: int) -> Floats:
     each = all_of("gaits", [gaits] * legs if isinstance(gaits, GaitParameters) else gaits, GaitParameters)
     if len(each) != legs:
         raise ParameterError(f"gaits: expected one or {legs}, got {len(each)}")
-    return np.repeat(np.array([gait.to_array(harmonics) for gait in each])[:, :, None], n, 2)
+    return np.repeat(np.array([gait_array(gait, harmonics) for gait in each])[:, :, None], n, 2)
 
 
 def start(

@@ -14,9 +14,14 @@ charged just that."""
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from hoof_env.dynamics.mechanics import add
+from hoof_env.errors import Floats
 from hoof_env.simd import across, choose, dot, larger, nth, root, size, smaller
 from hoof_env.simd.compile import inlined
 
@@ -181,3 +186,31 @@ class StanceCounter:
         running = min(self.running, 2 * force)
         self.running = max(running, force)
         return self.peak - before, max(force - running, 0.0), self.steepest - steepest
+
+
+def stance_figures(sums: Mapping[str, Floats], seconds: ArrayLike, turns: ArrayLike) -> dict[str, Floats]:
+    """Figures of limbs from sums of `TrunkEngine.strides` over some time, each shape (legs, num_envs).
+
+    Args:
+        sums: by name, added up over the calls of `advance`.
+        seconds: that they are about [s].
+        turns: of the cranks meanwhile [-], shape as of the sums.
+
+    Returns:
+        "peak", mean of the stances' highest resultant forces, and "mean", of the normal force while the hoof
+        bears load [N]; "duty", part of the time that it does [-]; "stances_per_turn" [-]; and of an engine
+        with limits "slip" of a stance [m], "braking" and "propulsion", mean horizontal forces backward and
+        forward while the hoof bears load [N]. Not a number where there was no stance.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        stances, loaded = sums["stances"] / (sums["stances"] > 0), sums["loaded_time"]
+        found = {
+            "peak": sums["peak_increase"] / stances,
+            "mean": sums["load_impulse"] / loaded,
+            "duty": loaded / np.asarray(seconds),
+            "stances_per_turn": sums["stances"] / np.asarray(turns),
+        }
+        if "slip" in sums:
+            found["slip"] = sums["slip"] / stances
+            found |= {name: sums[name] / loaded for name in ("braking", "propulsion")}
+    return found

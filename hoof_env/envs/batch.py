@@ -40,7 +40,7 @@ from hoof_env.envs.start import HIGHEST, LOWEST, check_options, draw_starts
 from hoof_env.envs.step import ACTIONS, FAILED, SUMS, episode_layout
 from hoof_env.envs.tasks import TASKS, Settings, Task
 from hoof_env.errors import ParameterError, check_choice, check_number
-from hoof_env.gait import GaitParameters, gait_names, load_gait
+from hoof_env.gait import GaitParameters, gait_array, gait_names, load_gait
 from hoof_env.ground.contact import load_ground
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.profile import leg_profile
@@ -93,6 +93,8 @@ class EpisodeBatch:
         self.geometry = load_geometry(s.preset)
         load_ground(s.preset)  # what is wrong with it is said, also where the settings replace it
         self.gaits = {name: load_gait(name, s.preset) for name in gait_names(s.preset)}
+        for gait in self.gaits.values():
+            gait_array(gait, 1)  # refuses harmonics that no environment of one leg takes
         self.gait = None if s.gait is None else self.gaits[check_choice("gait", s.gait, self.gaits)]
         self._base = MIDDLE if self.gait is None else self.gait.to_array()
         self.terms = tuple(term.key for term in task.terms)
