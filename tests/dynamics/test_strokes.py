@@ -15,10 +15,8 @@ from tests.legs import FIRST_FIT
 
 HIP_HEIGHT, HIGH, TURN = 1.4, 10.0, 2 * np.pi  # of the horse; of O in the test, away from the ground [m]
 GAITS = json.loads(Path("docs/evidence/strokes/gaits.json").read_text(encoding="utf-8"))
-LEAD, PULL = (
-    1 / (5 * QUICK.gain) + 5e-4,
-    60.0,
-)  # how long the filter's rate takes [s]; on what is missing [1/s]
+LEAD = 1 / (5 * QUICK.gain) + 5e-4  # how long the filter's rate takes [s]
+PULL = 60.0  # of what is missing on the command [1/s]
 
 
 def chosen(case):
@@ -70,7 +68,7 @@ def drive(case):
 
 
 @pytest.mark.parametrize(
-    "case", filter(chosen, GAITS), ids=lambda c: f"{c['leg']}-{c['stroke']}-{c['froude']}-{c['harmonics']}"
+    "case", [*filter(chosen, GAITS)], ids=lambda c: f"{c['leg']}-{c['stroke']}-{c['froude']}-{c['harmonics']}"
 )
 def test_a_stroke_is_level_and_even_and_the_swing_is_clear(case):
     """The bars of the study: 3 cm peak to peak, 5 %, 3 cm; with 100 rad/s^2 and 15 rad/s."""
