@@ -38,7 +38,8 @@ MODEL = """
 
 
 def ours(ground, speed):
-    """How far the mass is under its start [m] and the ground's force [N], every `EVERY`. Only the toe lands."""
+    """How far the mass is under its start [m] and the ground's force [N], every `EVERY`. Only the
+    toe lands."""
     leg = load_geometry(FIRST_FIT)
     trunk = Trunk(mass=MASS - leg.mass, share=1.0, stiffness=0.0, damping=0.0, drag=0.0, height=3.0)
     limb = Limb(leg, drive=Prescribed(), spring=SPRING)
