@@ -80,13 +80,14 @@ def keep_account(trunk, legs, leg_count, model, account, weight):  # type: ignor
         account.friction_loss = add(account.friction_loss, -weight * rubbed, together)
         account.impulse = add(account.impulse, weight * leg.ground_force, together)
         if model.form.springs:
+            bent, lost = 0.0 * stored, 0.0 * stored
             for k in range(model.form.springs):
                 stiffness, damping = leg.settings.hoof_stiffness[k], leg.settings.hoof_damping[k]
                 toe, heel = leg.toe.give_rate[k], leg.heel.give_rate[k]
-                bent = stiffness * (leg.toe.give[k] * toe + leg.heel.give[k] * heel)
-                account.hoof[0] = add(account.hoof[0], weight * bent, together)
-                lost = damping * (toe * toe + heel * heel)
-                account.hoof[1] = add(account.hoof[1], weight * lost, together)
+                bent = bent + stiffness * (leg.toe.give[k] * toe + leg.heel.give[k] * heel)
+                lost = lost + damping * (toe * toe + heel * heel)
+            account.hoof[0] = add(account.hoof[0], weight * bent, together)  # once a leg: one order of legs
+            account.hoof[1] = add(account.hoof[1], weight * lost, together)
 
 
 @inlined

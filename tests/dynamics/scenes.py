@@ -19,12 +19,11 @@ THETA, LOWEST = np.array([4.02, 4.18, 4.1, 4.14]), 1.389  # soles level, and how
 HIPS = ((-0.75, 0.0), (-0.65, 0.0), (0.65, 0.0), (0.75, 0.0))
 
 
-def horse(ground=FAR, drive=None, hips=HIPS, settings=(), **trunk):
+def horse(ground=FAR, drive=None, hips=HIPS, settings=(), spring=None, terrain=None, **trunk):
     """Four legs on one trunk, free unless told otherwise."""
     trunk = {"kind": "free", "mass": 320.0, "height": LOWEST, "drag": 0.0, "pitch_inertia": 80.0} | trunk
-    return TrunkEngine(
-        [Limb(LEG, hip, drive or Motor()) for hip in hips], Trunk(**trunk), ground, **dict(settings)
-    )
+    limbs = [Limb(LEG, hip, drive or Motor(), spring) for hip in hips]
+    return TrunkEngine(limbs, Trunk(**trunk), ground, terrain, **dict(settings))
 
 
 def energy(engine):
@@ -36,7 +35,7 @@ def energy(engine):
 def drives_less_losses(engine):
     """What the account says of the change of `energy` [J]."""
     total = engine.account
-    gains = total["crank_work"] + total["swing_work"] - total["ground_stored"]
+    gains = total["crank_work"] + total["swing_work"] - total["ground_stored"] - total.get("hoof_stored", 0.0)
     return gains - sum(total[name] for name in total if name.endswith("_loss"))
 
 
