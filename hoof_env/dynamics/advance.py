@@ -42,6 +42,7 @@ from hoof_env.dynamics.reactions import LegConstants, Reactions, react
 from hoof_env.dynamics.stepping import begin_step, end_step, next_stage, weigh_stage
 from hoof_env.simd import anywhere, choose, columns, fill, lane_sum, level, nth, rows
 from hoof_env.simd.compile import inlined, kernel, pasted
+from hoof_env.simd.layout import Constants
 from hoof_env.simd.memory import address, doubles, offset
 from hoof_env.simd.user_functions import fingerprint
 
@@ -58,17 +59,7 @@ STARTS = -1.0
 CONSTANTS_SIZE, REACTIONS_SIZE = LegConstants.size, Reactions.size
 
 
-class Form(NamedTuple):
-    """The layouts of engines with the same `Features`, and what else the compiler must know of these.
-
-    Attributes:
-        trunk, leg, account: rows on the stack.
-        trunk_memory, leg_memory: rows in the engine's array, the trunk's first.
-        of the others: how many rows each has.
-        gait: how many gait parameters a leg has.
-        harmonics, springs, animal: as in `Features`; rows of a hoof point's spring, 0 or 2.
-    """
-
+class _Form(NamedTuple):
     trunk: Any
     leg: Any
     account: Any
@@ -87,6 +78,18 @@ class Form(NamedTuple):
     harmonics: int
     springs: int
     animal: bool
+
+
+class Form(Constants, _Form):
+    """The layouts of engines with the same `Features`, and what else the compiler must know of these.
+
+    Attributes:
+        trunk, leg, account: rows on the stack.
+        trunk_memory, leg_memory: rows in the engine's array, the trunk's first.
+        of the others: how many rows each has.
+        gait: how many gait parameters a leg has.
+        harmonics, springs, animal: as in `Features`; rows of a hoof point's spring, 0 or 2.
+    """
 
 
 @cache
@@ -142,16 +145,19 @@ class Model(NamedTuple):
 
 @inlined
 def inner(model, tables, ground, small, together, law, form):  # type: ignore[no-untyped-def]
-    """The model from its record and arrays; `small` points to room for 20 doubles."""
+    """The model from its record and arrays; `small` points to room for 8 + 3 form.gait doubles."""
     given = model[0]
-    for k in range(12):
-        small[k] = given.settings[k]
     for k in range(4):
-        small[12 + k], small[16 + k] = given.fractions[k], given.weights[k]
+        small[k], small[4 + k] = given.fractions[k], given.weights[k]
+    settings = offset(small, 8)
+    for k in range(12):
+        settings[k] = given.settings[k]
+    for k in range(12, 3 * form.gait):  # higher harmonics swing like the first
+        settings[k] = given.settings[k % 3 + 9]
     return Model(
         given.kind, given.eighths, given.friction_law, given.interpolated, given.is_terrain, given.new_rates,
         given.strides, together, form, given.cells, address(tables),
-        small, given.stages, offset(small, 12), offset(small, 16),
+        settings, given.stages, small, offset(small, 4),
         carray(address(ground), ground.shape), given.ground_origin, given.ground_per_metre, law,
     )  # fmt: skip
 
@@ -254,7 +260,7 @@ def run(  # type: ignore[no-untyped-def]
     account = rows(doubles(form.account_size * lanes), lanes, form.account)
     shapes = rows(doubles(leg_count * CONSTANTS_SIZE * lanes), lanes, LegConstants)
     forces = rows(doubles(leg_count * REACTIONS_SIZE * lanes), lanes, Reactions)
-    inside = inner(model, tables, ground, doubles(20), together, law, form)
+    inside = inner(model, tables, ground, doubles(8 + 3 * form.gait), together, law, form)
     at, row = address(data), data.shape[1]
     # lanes are neighbours, but where they are legs, as far apart as legs are
     envs, near, far = lanes, 1, 1

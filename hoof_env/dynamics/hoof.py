@@ -61,16 +61,15 @@ def meet_point(trunk, leg, point, memory, arm, arm_by_theta, hip, hip_velocity, 
     if model.form.springs:
         press_through_spring(trunk, leg, point, memory, model)
     else:
-        press_rigidly(trunk, point, memory, model)
+        press_rigidly(trunk, point, memory, penetration, rate, sliding_speed, model)
     normal = point.ground_normal
     point.force = point.normal_force * normal - point.friction_force * across(normal)
     return point.force, dot(point.force, by_theta), cross(arm, point.force)
 
 
 @inlined
-def press_rigidly(trunk, point, memory, model):  # type: ignore[no-untyped-def]
+def press_rigidly(trunk, point, memory, penetration, rate, sliding_speed, model):  # type: ignore[no-untyped-def]
     """Forces on a point that is the sole itself."""
-    penetration, rate, sliding_speed = point.penetration, point.penetration_rate, point.sliding_speed
     nothing = 0.0 * size(penetration)  # what is not a number stays so
     force, spring, friction = nothing, nothing, nothing
     inverse_speed, inside = memory.inverse_approach_speed, penetration > 0.0

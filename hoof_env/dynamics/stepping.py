@@ -26,8 +26,7 @@ from hoof_env.simd.math import clip
 def filter_accelerations(leg, count, settings):  # type: ignore[no-untyped-def]
     """Accelerations of the command filters: bounded, towards a bounded rate, towards the command."""
     for k in range(count):
-        row = 3 * min(k, 3)  # higher harmonics swing like the first
-        gain, rate_bound, acc_bound = settings[row], settings[row + 1], settings[row + 2]
+        gain, rate_bound, acc_bound = settings[3 * k], settings[3 * k + 1], settings[3 * k + 2]
         wanted = clip(gain * (leg.command[k] - leg.state.gait[k]), rate_bound)
         leg.gait_acceleration[k] = clip(INNER * gain * (wanted - leg.state.gait_rate[k]), acc_bound)
 

@@ -34,7 +34,7 @@ from hoof_env.simd import (
     write,
 )
 from hoof_env.simd.compile import inlined, kernel, pasted
-from hoof_env.simd.layout import Block, Layout, Row
+from hoof_env.simd.layout import Block, Constants, Layout, Row
 from hoof_env.simd.math import clip, tanh
 from hoof_env.simd.memory import (
     COLUMNS,
@@ -108,13 +108,15 @@ def episode_layout(terms: int) -> Any:
     return make(f"Episode{terms}", (Layout,), {"__annotations__": fields, "__module__": __name__})
 
 
-class Memories(NamedTuple):
-    """Layouts of what a step works on, and how many rows the trunk's has."""
-
+class _Memories(NamedTuple):
     episode: Any
     trunk: Any
     leg: Any
     trunk_rows: int
+
+
+class Memories(Constants, _Memories):
+    """Layouts of what a step works on, and how many rows the trunk's has."""
 
 
 @cache

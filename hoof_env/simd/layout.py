@@ -145,6 +145,48 @@ def _no_value(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     return context.get_dummy_value()
 
 
+class Constants:
+    """Base of named tuples that kernels take as a whole: layouts, and numbers that the compiler knows."""
+
+
+class ConstantsType(types.Opaque):
+    """numba's type of one such tuple: what it holds is part of the type."""
+
+    def __init__(self, given: Any) -> None:
+        self.given = given
+        super().__init__(f"{type(given).__name__}({', '.join(map(_shown, given))})")
+
+
+def _shown(part: Any) -> str:
+    return LayoutConstant(part).name if isinstance(part, _Named) else repr(part)
+
+
+register_model(ConstantsType)(models.OpaqueModel)
+lower_constant(ConstantsType)(_no_value)
+
+
+@typeof_impl.register(Constants)
+def _type_of_constants(given: Any, context: Any) -> ConstantsType:
+    return ConstantsType(given)
+
+
+@infer_getattr
+class _PartsOfConstants(AttributeTemplate):
+    key = ConstantsType
+
+    def generic_resolve(self, constants: Any, name: str) -> Any:  # type: ignore[override]
+        part = getattr(constants.given, name)
+        return LayoutConstant(part) if isinstance(part, _Named) else types.literal(part)
+
+
+@lower_getattr_generic(ConstantsType)
+def _get_part(context: Any, builder: Any, kind: Any, value: Any, name: str) -> Any:
+    part = getattr(kind.given, name)
+    if isinstance(part, _Named):
+        return context.get_dummy_value()
+    return context.get_constant(types.boolean if isinstance(part, bool) else types.intp, part)
+
+
 def _vector_type(memory: Any) -> Any:
     return Plane(memory.count) if memory.count else types.complex128
 
