@@ -22,6 +22,9 @@ from hoof_env.gait import GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import load_geometry
+from hoof_env.paper.measure import measure_stance
+from hoof_env.paper.reproduce import run_cycle
+from hoof_env.paper.rows import CONDITIONS
 from research.identify.leg import FIRST_FIT
 
 Vector = NDArray[np.float64]
@@ -146,6 +149,25 @@ def damped() -> list[Row]:
     return rows
 
 
+def conditions() -> list[Row]:
+    """The paper's four conditions with springs under its hoof: peaks [N], their share of the rigid one's,
+    stance [s] and the elastic peak over the inelastic one."""
+    rows = []
+    for gait in ("walk", "run"):
+        for stiffness in (None, 1e6, 1e5, 4e4, 2e4):
+            spring = {} if stiffness is None else {"hoof_stiffness": stiffness}
+            found = {
+                name: measure_stance(run_cycle(gait, "exact", restitution=cr, **spring))
+                for name, cr in CONDITIONS.items()
+            }
+            row: Row = {"gait": gait, "hoof_n_m": stiffness or "rigid"}
+            for name, stance_of in found.items():
+                row |= {f"{name}_peak_n": stance_of.peak, f"{name}_mean_n": stance_of.mean}
+                row[f"{name}_stance_s"] = stance_of.end - stance_of.start
+            rows.append(row | {"inelastic_over_elastic": found["inelastic"].peak / found["elastic"].peak})
+    return rows
+
+
 def engine_peak(record: dict[str, NDArray[Any]]) -> float:
     """Largest normal force of a record, of the weight."""
     return float((record["toe_normal"] + record["heel_normal"]).max()) / (MASS * GRAVITY)
@@ -168,9 +190,10 @@ def draw(path: Path) -> None:
 
 
 def compliance(out: Path = Path("docs/evidence/compliance")) -> None:
-    """Write drops.csv, creep.csv, order.csv, damping.csv and drops.png to the folder `out`."""
+    """Write a csv of each table and drops.png to the folder `out`."""
     out.mkdir(parents=True, exist_ok=True)
     tables = {"drops": drops(), "creep": standing(), "order": orders(), "damping": damped()}
+    tables["conditions"] = conditions()
     for name, rows in tables.items():
         lines = [[f"{v:.4g}" if isinstance(v, float) else v for v in row.values()] for row in rows]
         with (out / f"{name}.csv").open("w", newline="", encoding="utf-8") as file:

@@ -3,6 +3,7 @@ does not depend on how the compiler arranged a loop."""
 
 from __future__ import annotations
 
+import hashlib
 import os
 import sys
 import time
@@ -30,6 +31,8 @@ def kernel(function: F, identity: str = "", threads: bool = False) -> F:
     first call raises OutputError if the kernel has to be compiled and the folder is not writable. `threads`:
     several may run it at once, for Python goes on meanwhile; a call takes a little longer.
     """
+    if identity:  # names in machine code are made of it: of two functions of one name the first is called
+        function.__qualname__ += f".{hashlib.sha256(identity.encode()).hexdigest()[:12]}"
     compiled: Any = numba.njit(error_model="numpy", nogil=threads)(function)
     if not hasattr(compiled, "_cache"):  # records have no attributes outside compiled code
         raise HoofEnvError("NUMBA_DISABLE_JIT is set, but kernels run compiled only: unset it")

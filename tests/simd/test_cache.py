@@ -341,3 +341,42 @@ def test_an_environment_has_all_its_kernels_once_it_is_made(start):
     # the folder of all tests: these kernels are large
     shared = os.environ.get("NUMBA_CACHE_DIR", "")
     assert ended(start(code, NUMBA_CACHE_DIR=shared), limit=550)[0] == "True [] True [] True [] []"
+
+
+TWINS = """
+import math, sys
+from hoof_env.simd.compile import kernel
+
+def twin(n):
+    def part(y):
+        if y > 1e9:
+            return 0.0
+{body}
+        return n + 0.0 * y
+
+    inner = kernel(part, f"part {n}")
+
+    def whole(count):
+        total = 0.0
+        for k in range(count):
+            total += inner(total + k)
+        return total
+
+    return kernel(whole, f"whole {n}")
+
+print(*(twin(float(n))(2) for n in sys.argv[1:]))
+"""
+
+
+def test_kernels_of_one_source_are_told_apart_when_both_are_loaded(tmp_path):
+    """Each was compiled by a process of its own; too large to be put in line, they are called by name."""
+    body = [f"        y = y * {1 + k / 1000} + math.sin(y + {k}.0) / (1.0 + y * y)" for k in range(120)]
+    (tmp_path / "twins.py").write_text(TWINS.replace("{body}", "\n".join(body)))
+    settings = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(ROOT)}
+
+    def said(*numbers):
+        command = [sys.executable, str(tmp_path / "twins.py"), *numbers]
+        return subprocess.run(command, env=settings, check=True, capture_output=True, text=True).stdout
+
+    assert [said("1"), said("2")] == ["2.0\n", "4.0\n"]
+    assert [said("1", "2"), said("2", "1")] == ["2.0 4.0\n", "4.0 2.0\n"]
