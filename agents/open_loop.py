@@ -2,12 +2,14 @@
 
     python -m agents.open_loop                                             mean return on hoof_env/HorseLeg-v0
     python -m agents.open_loop --env-id hoof_env/HorseLegRail-v0 --family clocked
+    python -m agents.open_loop --family four-legs --speed 1.85             a horse, a minute a search
     python -m agents.evaluate --policy run runs/open_loop/HorseLeg-v0-constant.json
 
 Families: "constant", the paper's gaits, four numbers that are held; "clocked", each of the four actions with
-a first harmonic of one clock beside it, which starts with the episode, thirteen numbers. The best of several
-searches is chosen by starts that none has met and scored with yet others, the episodes of agents.evaluate.
-The file is written after every search; searches that are in it are not made again.
+a first harmonic of one clock beside it, which starts with the episode, thirteen numbers; "four-legs", gaits
+of a horse of four legs, which is `agents.four_legs`. The best of several searches is chosen by starts that
+none has met and scored with yet others, the episodes of agents.evaluate. The file is written after every
+search; searches that are in it are not made again. Those of four legs are written at the end.
 """
 
 from __future__ import annotations
@@ -70,8 +72,16 @@ class Args:
     """registered environment of this package with many at once"""
     env_kwargs: tuple[str, ...] = ()
     """its arguments: key=value ..., or one JSON object; with reward_weights returns weigh otherwise"""
-    family: Literal["constant", "clocked"] = "constant"
+    family: Literal["constant", "clocked", "four-legs"] = "constant"
     """of gaits"""
+    speed: float = 1.85
+    """that four legs are asked for [m/s]"""
+    harmonics: int = 2
+    """of the swing of four legs"""
+    spring: float = 4e4
+    """stiffness of the springs at the hoofs of four legs [N/m]"""
+    stiffness: float = 2e6
+    """of the ground under four legs, K [N/m^1.5]"""
     restarts: int = 5
     """searches, of seeds 0, 1, ..."""
     episodes: int | None = None
@@ -284,6 +294,27 @@ def earlier(path: Path, about: dict[str, Any]) -> list[dict[str, Any]]:
     raise DataFileError(f"{path}: expected searches with {about} to go on with; name another --out")
 
 
+def search_four_legs(args: Args) -> None:
+    """Find and write gaits of four legs. `HoofEnvError`: no CMA-ES is installed. `ParameterError`: a value is
+    out of range, or of an option that is one leg's."""
+    from agents.four_legs import optimise as optimise_four_legs
+
+    if args.start is not None or args.env_kwargs:
+        raise ParameterError("start, env_kwargs: expected none of them with the family four-legs")
+    path = args.out or Path("runs/open_loop", f"four-legs-{args.speed:g}.json")
+    check_folder(path.parent)
+    content = optimise_four_legs(
+        args.speed, args.harmonics, args.spring, args.stiffness, args.restarts, args.episodes
+    )
+    content |= {"command": runs.command(), "versions": {**runs.versions(), "cma": version("cma")}}
+    runs.write_text(path, json.dumps(content, indent=1) + "\n")
+    for one in content["searches"]:
+        print(f"search {one['seed']}: cost {one['cost']:.3f}, {one['wall_s']:.0f} s")
+    for name, value in content["figures"].items():
+        print(f"{name:18} {value}")
+    print(f"written: {path}")
+
+
 def place(args: Args) -> Path:
     name = f"{args.env_id.rpartition('/')[2]}-{args.family}.json"
     return args.out or Path("runs/open_loop", name)
@@ -293,6 +324,8 @@ def main(argv: list[str] | None = None) -> None:
     import tyro
 
     args = tyro.cli(Args, args=argv, prog="python -m agents.open_loop", description=__doc__)
+    if args.family == "four-legs":
+        return search_four_legs(args)
     content = optimise(args)
     for one in content["restarts"]:
         print(
