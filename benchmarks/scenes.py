@@ -10,14 +10,14 @@ jammed against the floor and stalls.
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from benchmarks.common import Start
 from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.dynamics.parts import Limb, Motor, Trunk
+from hoof_env.dynamics.parts import HoofSpring, Limb, Motor, Trunk
 from hoof_env.dynamics.step_length import StepWarning
 from hoof_env.gait import GaitParameters, load_gait
 from hoof_env.ground.contact import load_ground
@@ -68,6 +68,12 @@ def scenes(preset: str) -> dict[str, Scene]:
             Scene("horse", four, big, trot, swing, 0.1),
         )
     }
+
+
+def with_springs(scene: Scene) -> Scene:
+    """The scene with springs at the hoofs."""
+    spring = HoofSpring.with_ratio(4e4, 475.0 / 4)
+    return replace(scene, limbs=tuple(replace(limb, spring=spring) for limb in scene.limbs))
 
 
 def engine(scene: Scene, preset: str, num_envs: int = 1, **options: Any) -> TrunkEngine:

@@ -27,8 +27,9 @@ from benchmarks.common import ALL, RIGID, GroundForces
 from benchmarks.history import RESULTS, write
 from benchmarks.machine import machine, vector_bits
 from benchmarks.rounds import bar_text, describe, interleave, spread, timed
-from benchmarks.scenes import DT, Scene, engine, scenes
+from benchmarks.scenes import DT, Scene, engine, scenes, with_springs
 from hoof_env._output import markdown_table
+from hoof_env.dynamics.parts import Limits
 from hoof_env.ground.contact import load_ground
 
 ROUNDS = 40
@@ -60,6 +61,16 @@ VARIANTS: tuple[tuple[str, dict[str, Any], float], ...] = (
 )
 """Name, options of the engine, and share of the bars that is asked of it; the last is MuJoCo's own scheme."""
 
+ANIMAL: tuple[tuple[str, dict[str, Any], float | None], ...] = (
+    (", springs and three harmonics", {"harmonics": 3}, 1.4),
+    (
+        ", the same with limits and figures of stances",
+        {"harmonics": 3, "limits": Limits(), "strides": True},
+        None,
+    ),
+)
+"""What a whole animal has beyond rigid legs, and how much longer a step may take than theirs."""
+
 INTRO = """\
 # How fast it is
 
@@ -76,6 +87,13 @@ Steps of 1 ms with contact and motors. MuJoCo: `mj_step` of many steps with its 
 linkage body for body and joint for joint (14 hinges a leg); RIGID has the rigid triangles and the locked
 shank welded (9 hinges), which is kinder to MuJoCo. The bars are judged on ALL. Rates are steps of the whole
 animal. Bars with all joint reactions are half of those without."""
+
+
+COSTS = """\
+## A whole animal
+
+The time of a step of four compliant legs whose swing has three harmonics, over that of four rigid legs with
+one, in the same round."""
 
 
 @dataclass(frozen=True)
@@ -120,6 +138,12 @@ def own_cases(quick: bool, clock: Clock) -> list[Case]:
             bars = (None, None) if quick or not share else BARS[name, count]
             required, aimed = (bar and share * bar for bar in bars)
             cases.append(Case(title + what, name, run, n * steps, "", required, aimed, vector_bits()))
+        for what, options, _ in ANIMAL if name == "horse" else ():
+            made = engine(with_springs(scenes(PRESET)[name]), PRESET, n, **options)
+            made.advance(steps=1, account=False)
+            before = partial(made.set_state, made.get_state())
+            run = partial(timed, clock, before, partial(made.advance, steps=steps, account=False))
+            cases.append(Case(title + what, name, run, n * steps, bits=vector_bits()))
     return cases
 
 
@@ -171,6 +195,10 @@ def exudyn_cases(quick: bool, clock: Clock) -> list[Case]:
 def compare(cases: list[Case], rounds: int) -> list[dict[str, Any]]:
     """Time all cases interleaved: rates [steps/s] and ratios to MuJoCo of the same group, as spreads."""
     seconds = interleave({case.name: case.run for case in cases}, rounds)
+    costs = {
+        case.name + what: seconds[case.name + what] / seconds[case.name]
+        for case in cases for what, _, _ in ANIMAL if case.name + what in seconds
+    }  # fmt: skip
     rate = {case.name: case.units / seconds[case.name] for case in cases}
     rows = []
     for case in cases:
@@ -180,6 +208,7 @@ def compare(cases: list[Case], rounds: int) -> list[dict[str, Any]]:
         rows.append(
             {"name": case.name, "group": case.group, "note": case.note, "bits": case.bits,
              "rate": spread(rate[case.name]), "ratios": ratios,
+             "cost": spread(costs[case.name]) if case.name in costs else None,
              "required": case.required, "aimed": case.aimed}
         )  # fmt: skip
     return rows
@@ -242,10 +271,22 @@ def speed_table(rows: list[dict[str, Any]]) -> str:
     return markdown_table(head, lines)
 
 
+def cost_table(rows: list[dict[str, Any]]) -> str:
+    """What springs and harmonics cost beside rigid legs."""
+    bars, lines = {what: bar for what, _, bar in ANIMAL}, []
+    for row in rows:
+        if cost := row["cost"]:
+            bar = next(bar for what, bar in bars.items() if row["name"].endswith(what))
+            met = f"{bar:g}: {'met' if cost['median'] <= bar else 'not met'}" if bar else ""
+            lines.append([row["name"], describe(cost), met])
+    return markdown_table(["case", "time over that of rigid legs", "at most"], lines)
+
+
 def page(result: dict[str, Any]) -> str:
     """The whole result as Markdown."""
     about = [["leg and ground", result["preset"]], *([k, v] for k, v in result["machine"].items())]
     parts = [INTRO.format(**result), markdown_table(["", ""], about), RATIOS, speed_table(result["cases"])]
+    parts += [COSTS, cost_table(result["cases"])]
     parts += [f"- {note}" for note in result["notes"]]
     if seconds := result["start"]:
         rows = [
