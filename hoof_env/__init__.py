@@ -15,7 +15,9 @@ from hoof_env._version import __version__
 if TYPE_CHECKING:
     from hoof_env.dynamics.constrained import ConstrainedLeg as ConstrainedLeg
     from hoof_env.dynamics.engine import TrunkEngine as TrunkEngine
+    from hoof_env.dynamics.parts import HoofSpring as HoofSpring
     from hoof_env.dynamics.parts import Limb as Limb
+    from hoof_env.dynamics.parts import Limits as Limits
     from hoof_env.dynamics.parts import Motor as Motor
     from hoof_env.dynamics.parts import Prescribed as Prescribed
     from hoof_env.dynamics.parts import Result as Result
@@ -38,6 +40,7 @@ if TYPE_CHECKING:
     from hoof_env.errors import OutputError as OutputError
     from hoof_env.errors import ParameterError as ParameterError
     from hoof_env.gait import GaitParameters as GaitParameters
+    from hoof_env.gait import HarmonicGait as HarmonicGait
     from hoof_env.gait import load_gait as load_gait
     from hoof_env.ground.contact import Ground as Ground
     from hoof_env.ground.terrain import Terrain as Terrain
@@ -48,7 +51,7 @@ if TYPE_CHECKING:
 _MODULES = {
     "dynamics.constrained": "ConstrainedLeg",
     "dynamics.engine": "TrunkEngine",
-    "dynamics.parts": "Limb Motor Prescribed Result Trunk",
+    "dynamics.parts": "HoofSpring Limb Limits Motor Prescribed Result Trunk",
     "dynamics.step_length": "StepWarning",
     "envs.horse_leg": "HorseLegEnv HorseLegMOEnv RandomizeParameters",
     "envs.observation": "Entry Scale",
@@ -58,7 +61,7 @@ _MODULES = {
     "envs.tasks": "register",
     "envs.vector": "HorseLegVectorEnv",
     "errors": "DataFileError GeometryError HoofEnvError MissingExtraError OutputError ParameterError",
-    "gait": "GaitParameters load_gait",
+    "gait": "GaitParameters HarmonicGait load_gait",
     "ground.contact": "Ground",
     "ground.terrain": "Terrain",
     "leg.geometry": "Geometry load_geometry read_preset",
