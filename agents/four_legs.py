@@ -45,6 +45,12 @@ SPANS = (0.5, 0.4, 0.4)  # of them [rad]
 HIGHER = 0.3  # of the higher harmonics [rad]
 
 
+def froude_speed(froude: float) -> float:
+    """Speed [m/s] of a Froude number, v^2 / (g hip height). `ParameterError`: it is out of range."""
+    check_number("froude", froude, low=0.003, high=7.0)
+    return round(float(np.sqrt(froude * GRAVITY * HIP_HEIGHT)), 3)
+
+
 class Horse:
     """Many horses at once, which play gaits.
 
@@ -165,15 +171,16 @@ class Horse:
 
 def search(
     horse: Horse, seed: int, generations: int, tick: Callable[[float], Any]
-) -> tuple[Floats, float, bool]:
+) -> tuple[Floats, float, int]:
     """One CMA-ES; returns the mean of its last distribution, its cost over starts that it had not met, and
-    whether Ctrl-C ended it. `horse` has POPULATION * STARTS environments; `tick` takes the lowest cost."""
+    how many generations it had: fewer than asked for if Ctrl-C ended it. `KeyboardInterrupt`: before the
+    first was over. `horse` has POPULATION * STARTS environments; `tick` takes the lowest cost."""
     try:
         import cma
     except ModuleNotFoundError:
         raise HoofEnvError('agents.open_loop needs cma: pip install "hoof-env[train,identify]"') from None
     options = {"bounds": [-1, 1], "popsize": POPULATION, "seed": seed + 1, "verbose": -9, "verb_log": 0}
-    strategy, fresh, interrupted = cma.CMAEvolutionStrategy(np.zeros(horse.size), 0.4, options), 0, False
+    strategy, fresh, done = cma.CMAEvolutionStrategy(np.zeros(horse.size), 0.4, options), 0, 0
 
     def costs(points: Sequence[Floats]) -> list[float]:
         nonlocal fresh
@@ -188,11 +195,13 @@ def search(
             values = costs(points)
             strategy.tell(points, values)
             best = np.clip(strategy.result.xfavorite, -1, 1)
+            done += 1
             tick(min(values))
     except KeyboardInterrupt:
-        interrupted = True
+        if not done:
+            raise
     rounded = np.round(best, 5)
-    return rounded, float(np.mean(costs([rounded] * POPULATION))), interrupted
+    return rounded, float(np.mean(costs([rounded] * POPULATION))), done
 
 
 def optimise(
@@ -205,6 +214,7 @@ def optimise(
     Raises:
         ParameterError: a value is out of range.
         HoofEnvError: no CMA-ES or no tqdm is installed.
+        KeyboardInterrupt: Ctrl-C before anything was found; later it ends the search, "interrupted" is true.
     """
     try:
         from tqdm import tqdm
@@ -214,7 +224,7 @@ def optimise(
     check_number("restarts", restarts, low=1, high=1000)
     each = POPULATION * STARTS
     generations = int(check_number("episodes", episodes or GENERATIONS * each, low=each, high=1e8)) // each
-    horse, found = Horse(POPULATION * STARTS, speed, harmonics, spring, stiffness), []
+    horse, found = Horse(POPULATION * STARTS, speed, harmonics, spring, stiffness), list[dict[str, Any]]()
     for seed in range(restarts):
         began = time.monotonic()
         with tqdm(total=generations, unit=" generations", leave=False, disable=None) as bar:
@@ -223,11 +233,17 @@ def optimise(
                 bar.update()
                 bar.set_postfix(cost=f"{lowest:.2f}")
 
-            x, cost, interrupted = search(horse, seed, generations, tick)
+            try:
+                x, cost, done = search(horse, seed, generations, tick)
+            except KeyboardInterrupt:
+                if not found:
+                    raise
+                break
         found.append(
-            {"seed": seed, "cost": cost, "x": x.tolist(), "wall_s": round(time.monotonic() - began, 1)}
-        )
-        if interrupted:
+            {"seed": seed, "cost": cost, "x": x.tolist(), "generations": done,
+             "wall_s": round(time.monotonic() - began, 1)}
+        )  # fmt: skip
+        if done < generations:
             break
     best = min(found, key=lambda one: one["cost"])
     test = horse.play(np.tile(best["x"], (POPULATION * STARTS, 1)), 10**6)
@@ -245,4 +261,5 @@ def optimise(
         "family": "four-legs", "speed": speed, "harmonics": harmonics, "spring": spring,
         "stiffness": stiffness, "generations": generations, "gait": gait, "figures": figures,
         "searches": found,
+        "interrupted": len(found) < restarts or found[-1]["generations"] < generations,
     }  # fmt: skip

@@ -76,6 +76,8 @@ class Args:
     """of gaits"""
     speed: float = 1.85
     """that four legs are asked for [m/s]"""
+    froude: float | None = None
+    """asks four legs for a speed by its Froude number, v^2 / (g hip height), in place of --speed"""
     harmonics: int = 2
     """of the swing of four legs"""
     spring: float = 4e4
@@ -296,15 +298,23 @@ def earlier(path: Path, about: dict[str, Any]) -> list[dict[str, Any]]:
 
 def search_four_legs(args: Args) -> None:
     """Find and write gaits of four legs. `HoofEnvError`: no CMA-ES is installed. `ParameterError`: a value is
-    out of range, or of an option that is one leg's."""
+    out of range, or of an option that is one leg's. `KeyboardInterrupt`: what was found is in the file."""
+    from agents.four_legs import froude_speed
     from agents.four_legs import optimise as optimise_four_legs
 
-    if args.start is not None or args.env_kwargs:
-        raise ParameterError("start, env_kwargs: expected none of them with the family four-legs")
-    path = args.out or Path("runs/open_loop", f"four-legs-{args.speed:g}.json")
+    others = ("env_id", "env_kwargs", "test_episodes", "start")
+    given = [name for name in others if getattr(args, name) != getattr(Args, name)]
+    if given:
+        raise ParameterError(f"{', '.join(given)}: expected none of them with the family four-legs")
+    speed = args.speed
+    if args.froude is not None:
+        if speed != Args.speed:
+            raise ParameterError("speed, froude: expected one of them")
+        speed = froude_speed(args.froude)
+    path = args.out or Path("runs/open_loop", f"four-legs-{speed:g}.json")
     check_folder(path.parent)
     content = optimise_four_legs(
-        args.speed, args.harmonics, args.spring, args.stiffness, args.restarts, args.episodes
+        speed, args.harmonics, args.spring, args.stiffness, args.restarts, args.episodes
     )
     content |= {"command": runs.command(), "versions": {**runs.versions(), "cma": version("cma")}}
     runs.write_text(path, json.dumps(content, indent=1) + "\n")
@@ -313,6 +323,8 @@ def search_four_legs(args: Args) -> None:
     for name, value in content["figures"].items():
         print(f"{name:18} {value}")
     print(f"written: {path}")
+    if content["interrupted"]:
+        raise KeyboardInterrupt
 
 
 def place(args: Args) -> Path:

@@ -65,5 +65,41 @@ def test_what_does_not_fit_is_named(tmp_path):
         four_legs.optimise(1.0, 4, 4e4, 2e6, 1)
     with pytest.raises(ParameterError, match=r"hoof_spring.stiffness: expected .* got 0.0"):
         four_legs.optimise(1.0, 2, 0.0, 2e6, 1)
-    with pytest.raises(ParameterError, match="expected none of them with the family four-legs"):
-        open_loop.search_four_legs(open_loop.Args(family="four-legs", env_kwargs=("trunk=rail",)))
+    with pytest.raises(ParameterError, match=r"froude: expected .* got 0.0"):
+        four_legs.froude_speed(0.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("env_id", "other"), ("env_kwargs", ("trunk=rail",)), ("test_episodes", 7)]
+)
+def test_an_option_of_one_leg_is_refused(name, value):
+    with pytest.raises(ParameterError, match=f"{name}: expected none of them with the family four-legs"):
+        open_loop.search_four_legs(open_loop.Args(family="four-legs", **{name: value}))
+
+
+def test_a_froude_number_asks_for_its_speed():
+    assert four_legs.froude_speed(0.25) == pytest.approx(1.85, abs=0.01)
+    assert four_legs.froude_speed(0.5) == pytest.approx(2.62, abs=0.01)
+    with pytest.raises(ParameterError, match="speed, froude: expected one of them"):
+        open_loop.search_four_legs(open_loop.Args(family="four-legs", speed=1.0, froude=0.25))
+
+
+@pytest.mark.parametrize(("stop", "kept"), [(1, 0), (3, 2)])
+def test_ctrl_c_keeps_what_was_found_and_says_so(monkeypatch, tmp_path, stop, kept):
+    """Nothing before a generation is over; then the generations that there were."""
+    play, calls, path = Horse.play, [], tmp_path / "gait.json"
+
+    def interrupt(self, x, seed):
+        calls.append(seed)
+        if len(calls) == stop:
+            raise KeyboardInterrupt
+        return play(self, x, seed)
+
+    monkeypatch.setattr(Horse, "play", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        open_loop.main(["--family", "four-legs", "--episodes", str(5 * MANY), "--out", str(path)])
+    assert path.exists() == (kept > 0)
+    if kept:
+        found = json.loads(path.read_text())
+        assert found["interrupted"]
+        assert [one["generations"] for one in found["searches"]] == [kept]
