@@ -3,7 +3,7 @@
 The horse is planar: two fore and two hind legs on a free trunk, with cited masses, springs at the hoofs and
 prescribed cranks. A gait has one crank rate, the lag of the fore pair behind the hind pair, and for each pair
 the swing's coefficients and a first harmonic of the crank's speed over its angle; left and right are half a
-turn apart. A candidate meets several perturbed starts. It pays for missing the speed, for stance peaks,
+stride apart. A candidate meets several perturbed starts. It pays for missing the speed, for stance peaks,
 slip, work and pitch, and most for falling, the more the sooner.
 """
 
@@ -33,7 +33,7 @@ HIPS = (1.0, -0.2)  # crank centres of the pairs, from the trunk's centre [m]
 
 PITCH, HEIGHT, CLEARANCE = 0.5, (0.75, 1.8), 0.02  # where it has fallen: +-[rad], [m], of a joint [m]
 DT, STEP, SECONDS, SETTLED = 0.02, 1e-3, 5.0, 1.0  # control and engine step, an episode, of that no part [s]
-POPULATION, STARTS, TESTS = 32, 4, 32  # candidates of a generation, starts of each, of the final test
+POPULATION, STARTS = 32, 4  # candidates of a generation, starts that all of them meet
 GENERATIONS = 150
 PEAK, SLIP, WORK, TILT, FALL, MISS = 0.35, 1.0, 0.5, 4.0, 10.0, 4.0
 """What costs: stance peaks [10 N/kg s], slip [m/s], work over weight and distance, pitch^2 [rad^2], a fall,
@@ -49,6 +49,11 @@ def froude_speed(froude: float) -> float:
     """Speed [m/s] of a Froude number, v^2 / (g hip height). `ParameterError`: it is out of range."""
     check_number("froude", froude, low=0.003, high=7.0)
     return round(float(np.sqrt(froude * GRAVITY * HIP_HEIGHT)), 3)
+
+
+def modulated(harmonic: Floats, theta: Floats) -> Floats:
+    """Crank speed over its mean [-] with this first harmonic, cosine and sine on axis 1."""
+    return np.asarray(1 + harmonic[:, 0] * np.cos(theta) + harmonic[:, 1] * np.sin(theta))
 
 
 class Horse:
@@ -105,22 +110,35 @@ class Horse:
         """Of all legs at these crank angles, shape (4, n); shape (4, 2 + 2 harmonics, n)."""
         found = np.empty((4, 2 + 2 * self.harmonics, theta.shape[1]))
         part = np.repeat(gaits["modulation"].transpose(1, 2, 0), 2, axis=0)
-        turned = 1 + part[:, 0] * np.cos(theta) + part[:, 1] * np.sin(theta)
         even = 1 / np.sqrt(1 - np.minimum((part**2).sum(1), 0.9))  # so that a turn takes as long as without
-        found[:, 0] = np.clip(gaits["rate"] * even * turned, 0.5, 4 * np.pi)
+        found[:, 0] = np.clip(gaits["rate"] * even * modulated(part, theta), 0.5, 4 * np.pi)
         found[:, 1:] = np.repeat(gaits["swing"].transpose(1, 2, 0), 2, axis=0)
         return found
 
-    def play(self, x: Floats, seed: int) -> dict[str, Floats]:
-        """Episodes of the gaits x, shape (n, size), one an environment, from starts that `seed` perturbs: the
-        "cost" and figures by name, shape (n,); of the pairs shape (n, 2)."""
-        rng, gaits, n = np.random.default_rng(seed), self.decode(x), len(x)
-        phase = (
-            2 * np.pi * np.array([gaits["lag"], gaits["lag"] + 0.5, 0 * gaits["lag"], 0 * gaits["lag"] + 0.5])
+    def angles(self, gaits: dict[str, Floats], phase: Floats) -> Floats:
+        """Crank angles [rad] of legs so far through their turns in time, both of shape (4, n)."""
+        part, grid = (
+            np.repeat(gaits["modulation"].transpose(1, 2, 0), 2, axis=0),
+            np.linspace(0, 2 * np.pi, 257),
         )
-        theta = phase + rng.uniform(0, 2 * np.pi, n) + rng.uniform(-0.1, 0.1, (4, n))
+        slowness = 1 / modulated(part[..., None], grid)
+        passed = np.cumsum(slowness[..., 1:] + slowness[..., :-1], axis=-1)
+        found, at = np.empty_like(phase), np.concatenate([0 * passed[..., :1], passed], axis=-1)
+        for leg, env in np.ndindex(*phase.shape):
+            whole = at[leg, env]
+            found[leg, env] = np.interp(phase[leg, env] % 1.0, whole / whole[-1], grid)
+        return found
+
+    def play(self, x: Floats, seed: int, starts: int = STARTS) -> dict[str, Floats]:
+        """Episodes of the gaits x, shape (n, size), one an environment: the "cost" and figures by name, shape
+        (n,); of the pairs shape (n, 2). `seed` perturbs so many starts, which come again and again."""
+        rng, gaits, n = np.random.default_rng(seed), self.decode(x), len(x)
+        noise = np.tile(rng.uniform(-1, 1, (7, starts)), -(-n // starts))[:, :n]
+        whole, half = 0 * gaits["lag"], 0 * gaits["lag"] + 0.5
+        phase = np.array([gaits["lag"], gaits["lag"] + half, whole, half]) + noise[0] / 2 + noise[1:5] / 60
+        theta = self.angles(gaits, phase)
         command, engine = self.command(gaits, theta), self.engine
-        start = {"vx": self.speed * rng.uniform(0.9, 1.1, n), "pitch": rng.uniform(-0.03, 0.03, n)}
+        start = {"vx": self.speed * (1 + 0.1 * noise[5]), "pitch": 0.03 * noise[6]}
         engine.reset(command, theta, y=5.0, **start)
         low = np.minimum(engine.report["toe_y"], engine.report["heel_y"]).min(0)
         engine.reset(command, theta, y=5.0 - low + 0.01, **start)
@@ -200,8 +218,9 @@ def search(
     except KeyboardInterrupt:
         if not done:
             raise
-    rounded = np.round(best, 5)
-    return rounded, float(np.mean(costs([rounded] * POPULATION))), done
+    rounded, each = np.round(best, 5), POPULATION * STARTS
+    final = horse.play(np.tile(rounded, (each, 1)), 1000 * seed, each)["cost"]
+    return rounded, float(np.mean(final)), done
 
 
 def optimise(
@@ -246,8 +265,7 @@ def optimise(
         if done < generations:
             break
     best = min(found, key=lambda one: one["cost"])
-    test = horse.play(np.tile(best["x"], (POPULATION * STARTS, 1)), 10**6)
-    test = {name: values[:TESTS] for name, values in test.items()}
+    test = horse.play(np.tile(best["x"], (each, 1)), 10**6, each)
     stood = test["fell"] == 0
     figures = {
         name: np.mean(values[stood], 0).round(4).tolist() for name, values in test.items() if stood.any()
