@@ -226,7 +226,7 @@ def search(
 def optimise(
     speed: float, harmonics: int, spring: float, stiffness: float, restarts: int, episodes: int | None = None
 ) -> dict[str, Any]:
-    """The best gait of several searches, and what it does from `TESTS` starts that none has met, pairs fore
+    """The best gait of several searches, and what it does from starts that none has met, pairs fore
     first: of those that did not fall, peak and mean force in stance [N/kg], duty, stances a turn, slip of a
     stance [m], braking and propulsion [N], speed [m/s] and cost of transport. `episodes` are of a search.
 

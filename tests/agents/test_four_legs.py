@@ -31,6 +31,18 @@ def test_every_gait_of_the_box_is_one(horse):
     assert slowness.mean(1) == pytest.approx(np.full(4, 1 / one["rate"][0]))
 
 
+def test_legs_are_apart_in_time_as_the_gait_says(horse):
+    """However the cranks speed up and slow down: from one leg's angle half a stride leads to the other's."""
+    x = np.random.default_rng(2).uniform(-0.8, 0.8, (8, horse.size))
+    gaits, steps = horse.decode(x), 20_000
+    phase = np.array([gaits["lag"], gaits["lag"] + 0.5, 0 * gaits["lag"], 0 * gaits["lag"] + 0.5])
+    theta = horse.angles(gaits, phase)
+    now, seconds = theta[[0, 2]], np.pi / gaits["rate"]
+    for _ in range(steps):
+        now = now + seconds / steps * horse.command(gaits, np.repeat(now, 2, axis=0))[[0, 2], 0]
+    assert np.exp(1j * now) == pytest.approx(np.exp(1j * theta[[1, 3]]), abs=5e-3)
+
+
 def test_who_falls_pays_more_the_sooner(horse):
     x = np.random.default_rng(1).uniform(-1, 1, (MANY, horse.size))
     played = horse.play(x, 0)
@@ -89,11 +101,11 @@ def test_ctrl_c_keeps_what_was_found_and_says_so(monkeypatch, tmp_path, stop, ke
     """Nothing before a generation is over; then the generations that there were."""
     play, calls, path = Horse.play, [], tmp_path / "gait.json"
 
-    def interrupt(self, x, seed):
+    def interrupt(self, x, seed, *starts):
         calls.append(seed)
         if len(calls) == stop:
             raise KeyboardInterrupt
-        return play(self, x, seed)
+        return play(self, x, seed, *starts)
 
     monkeypatch.setattr(Horse, "play", interrupt)
     with pytest.raises(KeyboardInterrupt):
