@@ -142,8 +142,8 @@ def manual(id: str = "hoof_env/HorseLeg-v0", out: Path | None = None) -> None:
 def compile() -> None:
     """Compile the kernels of all environments now, for an image of a container or before workers begin.
 
-    They are kept in the folder NUMBA_CACHE_DIR. An engine with four legs and `reproduce` have more
-    of their own.
+    They are kept in the folder NUMBA_CACHE_DIR. Environments with a hoof_stiffness, an engine with four
+    legs and `reproduce` have more of their own, which the first use compiles.
     """
     from hoof_env.envs.batch import compile_kernels
 

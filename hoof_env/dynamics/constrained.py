@@ -39,6 +39,7 @@ from hoof_env.gait import (
     advance_motion,
     command_filters,
     evaluate_motion,
+    gait_array,
     steady_filters,
 )
 from hoof_env.ground.contact import HEEL, TOE, Ground, new_contacts, touch
@@ -252,7 +253,7 @@ class ConstrainedLeg:
             raise ParameterError(
                 f"height, speed: a fixed trunk rests at {self.trunk.height:g} m, got {height!r} and {speed!r}"
             )
-        state, command = self.state, gait.to_array()
+        state, command = self.state, gait_array(gait, 1)
         state.body["time"], state.body["x"], state.motion["theta"] = 0.0, x, theta
         state.filters[:] = steady_filters(command)
         state.contacts[:] = new_contacts()

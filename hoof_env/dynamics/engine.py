@@ -53,6 +53,9 @@ from hoof_env.leg.profile import by_name, cross, leg_profile
 from hoof_env.simd.threads import blocks, check_threads, limit_threads, run_together
 from hoof_env.simd.user_functions import check_function, what_cannot_be_compiled
 
+HEIGHT = layout.TrunkSettings.fields["height"].start
+"""Row of a trunk's height at rest among its settings."""
+
 FEW = 6
 """Up to so many environments of one leg or four are run one by one: eight lanes would be mostly empty."""
 
@@ -277,9 +280,12 @@ class TrunkEngine(Scene):
         where, m = memory.which(envs, self.num_envs), self._memory
         n = where.size
         values = memory.gaits_of(gaits, len(self.limbs), n, self.features.harmonics)
-        height = self.trunk.height if y is None else y
+        heights = m.trunk_settings[HEIGHT, where]
+        height = heights if y is None else y
         trunk = {"x": x, "y": height, "pitch": pitch, "vx": vx, "vy": vy, "pitch_rate": pitch_rate}
-        m.trunk[:, where], m.limbs[:, :, where] = memory.start(self, values, theta, theta_rate, trunk, n)
+        m.trunk[:, where], m.limbs[:, :, where] = memory.start(
+            self, values, theta, theta_rate, trunk, heights
+        )
         m.command[:, :, where] = values
         m.account[:, where], m.strides[:, :, where] = 0.0, 0.0
         m.result[where] = STARTS
@@ -297,12 +303,13 @@ class TrunkEngine(Scene):
 
         Args:
             env: which.
-            trunk, ground, drive: instead of the engine's, whose kinds, height, exponent and laws they share;
-                None is the engine's own. `total_mass`, `weight`, `tally` and `step_limits` stay those of the
+            trunk, ground, drive: instead of the engine's, whose kinds, exponent and laws they share; None is
+                the engine's own. `total_mass`, `weight`, `tally` and `step_limits` stay those of the
                 engine.
             limbs: legs in other places, with other springs of the hoofs or, in an engine with `limits`, of
-                other sizes, similar to its own (`Geometry.scaled`); None is the engine's own. Joint
-                reactions are not computed of legs of another size.
+                other sizes, similar to its own (`Geometry.scaled`), whose trunk needs another height, too;
+                None is the engine's own. Joint reactions are not computed of legs of another size. Steps
+                are those that the engine's own legs and springs ask for.
 
         Raises:
             ParameterError: what environments share differs, or there is no such environment.
@@ -380,7 +387,8 @@ class TrunkEngine(Scene):
 
         Returns:
             Arrays by name, time on the first axis, and "result", how each environment ended, shape
-            (num_envs,). Once one does not end OK all stop, and the record is that up to there.
+            (num_envs,). Once one does not end OK all stop, and the record is that up to there: with the
+            instant where a limit was passed, without one that could not be simulated.
 
         Raises:
             ParameterError, NotStartedError: as `advance`.
@@ -392,11 +400,12 @@ class TrunkEngine(Scene):
         whole[..., 0] = m.data
         for k in range(1, times):
             self._go(min(every, steps - (k - 1) * every), True)
-            if m.result.any():
+            if (lost := (m.result > Result.OK) & (m.result < Result.PITCH)).any():
                 self.observe()
-                times = k
-                break
             whole[..., k] = m.data
+            if m.result.any():
+                times = k if lost.any() else k + 1
+                break
         kept = memory.memory_of(whole[..., :times], self.num_envs, m.constants, m.reactions, m.features)
         named = {name: np.moveaxis(values, -1, 0) for name, values in memory.named_rows(kept).items()}
         return named | {"result": self.results}

@@ -56,8 +56,8 @@ def heed_joints(trunk, leg, shape, model):  # type: ignore[no-untyped-def]
     f = meeting(shape.F, shape.pivot, crank)
     e = meeting(shape.E, d, f)
     a, g = shape.pivot + shape.rocker * (f - shape.pivot), f + shape.shank * (f - e)
-    lowest = clearance(trunk, leg, b, model)
-    for joint in (d, f, e, a, g):
+    lowest = clearance(trunk, leg, 0.0 * crank, model)  # O
+    for joint in (crank, shape.pivot, b, d, f, e, a, g):
         lowest = smaller(lowest, clearance(trunk, leg, joint, model))
     is_low = choose(lowest < trunk.settings.limits[4], 1.0, 0.0)
     if model.together:

@@ -147,7 +147,6 @@ def check_shared(scene: Scene, trunk: Trunk, ground: Ground, limbs: Sequence[Lim
     """Raise where one environment's trunk, ground or legs differ in what the kernels take once for all."""
     for name, given, own in (
         ("trunk.kind", trunk.kind, scene.trunk.kind),
-        ("trunk.height", trunk.height, scene.trunk.height),
         *((name, getattr(ground, name), getattr(scene.ground, name))
           for name in ("exponent", "friction_law", "approach")),
     ):  # fmt: skip
@@ -194,11 +193,15 @@ def scales_of(name: str, limb: Limb, own: Limb) -> tuple[float, float]:
         (limb.geometry.body_masses, mass * own.geometry.body_masses),
         (limb.geometry.body_inertias, mass * length**2 * own.geometry.body_inertias),
     ]
-    same = all(one[key] == other[key] for key in ("assembly", "toe", "heel", "travel"))
-    if not same or not all(np.allclose(a, b, rtol=1e-9, atol=0) for a, b in pairs):
+    unlike = [key for key in ("assembly", "toe", "heel", "travel") if one[key] != other[key]]
+    parts = ("lengths", "pivot", "masses", "inertias")
+    unlike += [
+        part for part, (a, b) in zip(parts, pairs, strict=True) if not np.allclose(a, b, rtol=1e-9, atol=0)
+    ]
+    if unlike:
         raise ParameterError(
-            f"{name}.geometry: expected one similar to the engine's {own.geometry.name!r}, as "
-            f"Geometry.scaled gives it, got {limb.geometry.name!r}"
+            f"{name}.geometry: expected one similar to the engine's {own.geometry.name!r}, of uniform rods "
+            f"with masses in the same proportions, got {limb.geometry.name!r} with other {', '.join(unlike)}"
         )
     return length, mass
 
@@ -290,16 +293,16 @@ def start(
     theta: ArrayLike,
     theta_rate: ArrayLike | None,
     trunk: Mapping[str, ArrayLike],
-    n: int,
+    heights: Floats,
 ) -> tuple[Floats, Floats]:
-    """State of `n` environments with filters at rest and springs that bear nothing: of the trunk, shape
-    (7, n), and legs, (legs, rows of a `LegState`, n).
+    """State of n environments whose trunks have these heights at rest, with filters at rest and springs that
+    bear nothing: of the trunk, shape (7, n), and legs, (legs, rows of a `LegState`, n).
 
     In the place of centre of mass, momentum and spin of all are the trunk's place, velocity and rate of
     pitch: the kernels make the one of the other (`mechanics.settle`). `TrunkEngine.reset` says what `trunk`
     holds and what is refused.
     """
-    legs = len(scene.limbs)
+    legs, n = len(scene.limbs), len(heights)
     angle = spread("theta", theta, (legs, n), FARTHEST)
     spin = spread("theta_rate", gaits[:, 0] if theta_rate is None else theta_rate, (legs, n), FARTHEST)
     for i, limb in enumerate(scene.limbs):
@@ -318,8 +321,8 @@ def start(
     ):  # fmt: skip
         if kind not in kinds and at[name].any():
             raise ParameterError(f"{name}: expected 0 of a {scene.trunk.kind} trunk, got {at[name]}")
-    if kind <= RAIL and (at["y"] != scene.trunk.height).any():
-        raise ParameterError(f"y: a {scene.trunk.kind} trunk is at {scene.trunk.height:g} m, got {at['y']}")
+    if kind <= RAIL and (off := at["y"] != heights).any():
+        raise ParameterError(f"y: a {scene.trunk.kind} trunk is at {heights[off][0]:g} m, got {at['y']}")
     state = np.zeros((TrunkState.size, n))
     moving = state[TrunkState.rows("moving")]  # the kernels make of these what they integrate
     moving[Moving.rows("centre")], moving[Moving.rows("momentum")] = (at["x"], at["y"]), (at["vx"], at["vy"])

@@ -13,6 +13,8 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from hoof_env.errors import Floats, ParameterError, check_choice, check_number
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
@@ -188,8 +190,9 @@ class Limits:
             if not low < high:
                 raise ParameterError(f"limits.{name}: expected a lower and a higher bound, got {given!r}")
             object.__setattr__(self, name, (low, high))
-        if not isinstance(self.clearance, (int, float)) or math.isnan(self.clearance):
-            raise ParameterError(f"limits.clearance: expected a number, got {self.clearance!r}")
+        least: Any = self.clearance
+        if isinstance(least, bool) or not isinstance(least, (int, float, np.number)) or math.isnan(least):
+            raise ParameterError(f"limits.clearance: expected a number, got {least!r}")
 
 
 FARTHEST = 1e3

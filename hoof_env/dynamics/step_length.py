@@ -112,7 +112,8 @@ class StepLength(Scene):
             if limb.spring:
                 masses = min(slides, whole), min(sinks, whole)
                 for name, longest in self._spring_limits(ground, limb.spring, masses, load).items():
-                    limits[name] = min(limits[name], longest)
+                    if name == "hoof" or np.isfinite(sinks):
+                        limits[name] = min(limits[name], longest)
                 continue
             for speed in {FAST, ground.approach_floor}:
                 mass, sliding_mass = min(sinks, whole), min(slides, whole)

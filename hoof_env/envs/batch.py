@@ -40,9 +40,10 @@ from hoof_env.envs.start import HIGHEST, LOWEST, check_options, draw_starts
 from hoof_env.envs.step import ACTIONS, FAILED, SUMS, episode_layout
 from hoof_env.envs.tasks import TASKS, Settings, Task
 from hoof_env.errors import ParameterError, check_choice, check_number
-from hoof_env.gait import GaitParameters, gait_array, gait_names, load_gait
+from hoof_env.gait import GaitParameters, HarmonicGait, gait_names, load_gait
 from hoof_env.ground.contact import load_ground
-from hoof_env.leg.geometry import load_geometry
+from hoof_env.leg.geometry import load_geometry, wrong
+from hoof_env.leg.geometry import named as named_preset
 from hoof_env.leg.profile import leg_profile
 from hoof_env.simd.cache import COMPILED, given_folder
 from hoof_env.simd.layout import views
@@ -93,8 +94,12 @@ class EpisodeBatch:
         self.geometry = load_geometry(s.preset)
         load_ground(s.preset)  # what is wrong with it is said, also where the settings replace it
         self.gaits = {name: load_gait(name, s.preset) for name in gait_names(s.preset)}
-        for gait in self.gaits.values():
-            gait_array(gait, 1)  # refuses harmonics that no environment of one leg takes
+        for name, gait in self.gaits.items():
+            if isinstance(gait, HarmonicGait):
+                raise wrong(s.preset)(
+                    f"{named_preset(s.preset)}, gait {name!r}: expected the four parameters of one harmonic, "
+                    f"which environments of one leg take, got {gait!r}"
+                )
         self.gait = None if s.gait is None else self.gaits[check_choice("gait", s.gait, self.gaits)]
         self._base = MIDDLE if self.gait is None else self.gait.to_array()
         self.terms = tuple(term.key for term in task.terms)
@@ -481,7 +486,7 @@ KERNELS: dict[str, Callable[[], object]] = {
         TASKS["fixed"], TASKS["fixed"].settings({"solver": "paper"}), 1
     ),
 }
-"""What uses kernels of its own; all ids and all settings share these."""
+"""What uses kernels of its own; all ids share these, and all settings but `hoof_stiffness`."""
 
 
 def compile_kernels(say: Callable[[str], None]) -> list[str]:

@@ -81,11 +81,12 @@ def physics(
     drive: Drive = Prescribed()
     if s.drive != "prescribed":
         drive = Motor(s.motor_gain, s.motor_torque, s.motor_inertia, 1.0)
-    return trunk, ground, Limb(geometry, drive=drive, spring=hoof_spring(s))
+    return trunk, ground, Limb(geometry, drive=drive, spring=hoof_spring(settings))
 
 
 def hoof_spring(settings: Settings) -> HoofSpring | None:
-    """The spring at the hoof; without a damping, with a tenth of the critical one under the trunk."""
+    """The spring at toe and heel each; without a damping, with a tenth of the critical one under the trunk of
+    the settings, whatever a reset draws."""
     stiffness, damping = settings.hoof_stiffness, settings.hoof_damping
     if stiffness is None:
         if damping is not None:

@@ -14,7 +14,7 @@ from hoof_env.dynamics.parts import Trunk
 from hoof_env.envs.parameters import check_parameters
 from hoof_env.envs.tasks import Settings
 from hoof_env.errors import ParameterError, check_choice, check_number
-from hoof_env.gait import GaitParameters, paper_gaits
+from hoof_env.gait import GaitParameters, gait_array, paper_gaits
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.profile import LegProfile, by_name
 
@@ -158,6 +158,7 @@ def _check_trunk(options: Mapping[str, float], trunk: Trunk) -> None:
 
 def _gait(value: Any, gaits: Mapping[str, GaitParameters]) -> GaitParameters:
     if isinstance(value, GaitParameters):
+        gait_array(value, 1)  # refuses harmonics that no environment of one leg takes
         return value
     if isinstance(value, str):
         return gaits[check_choice("options['gait']", value, gaits)]

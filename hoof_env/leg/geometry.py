@@ -240,12 +240,17 @@ class Geometry:
         return replace(self, **changes)
 
 
-def _numbers(what: str, given: Any) -> dict[str, float]:
-    """The numbers of a dataclass or mapping by name, as JSON can hold them."""
+def _numbers(what: str, given: Any) -> dict[str, Any]:
+    """The numbers, or lists of them, of a dataclass or mapping by name, as JSON can hold them."""
     found = asdict(given) if is_dataclass(given) and not isinstance(given, type) else given
     if not isinstance(found, Mapping):
         raise ParameterError(f"{what}: expected numbers by name, got {given!r}")
-    return {name: check_number(f"{what}[{name!r}]", value) for name, value in found.items()}
+    return {
+        name: [check_number(f"{what}[{name!r}][{k}]", part) for k, part in enumerate(value)]
+        if isinstance(value, (list, tuple))
+        else check_number(f"{what}[{name!r}]", value)
+        for name, value in found.items()
+    }
 
 
 def _check_keys(what: str, given: Any, expected: Sequence[str], optional: Sequence[str] = ()) -> None:

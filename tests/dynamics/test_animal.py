@@ -74,6 +74,26 @@ def test_beyond_a_limit_the_motion_goes_on(num_envs):
     assert (engine.advance() == Result.OK).all()
 
 
+@pytest.mark.parametrize("num_envs", [1, 9])
+def test_a_record_has_the_instant_at_which_a_limit_was_passed(num_envs):
+    engine = animal(Limits(pitch=(-0.2, 0.2)), num_envs)
+    engine.reset(WALK, THETA, pitch=0.15, pitch_rate=3.0)
+    record = engine.run(steps=200, every=10)
+    assert (record["result"] == Result.PITCH).all()
+    assert (record["pitch"][-1] > 0.2).all()
+    assert (record["pitch"][:-1] <= 0.2).all()
+    assert (record["pitch"][-1] == engine.state["pitch"]).all()
+
+
+def test_a_trunk_over_longer_legs_begins_higher():
+    engine = animal(Limits(), 3)
+    engine.vary(1, replace(FREE, height=1.2 * LOWEST), limbs=[
+        Limb(LEG.scaled(1.2), hip, Motor(), SPRING) for hip in HIPS
+    ])  # fmt: skip
+    engine.reset(WALK, THETA)
+    assert engine.report["y"] == pytest.approx([LOWEST, 1.2 * LOWEST, LOWEST])
+
+
 def test_height_is_above_the_ground_below():
     engine = animal(Limits(height=(1.0, 2.0)), terrain=Terrain(height=(5.0,)))
     engine.reset(WALK, THETA, y=LOWEST + 5)
@@ -185,7 +205,7 @@ def test_commands_after_a_partial_reset():
             lambda: animal(Limits()).vary(
                 0, limbs=[Limb(LEG.replace(lengths={"FG": 0.6}), hip, spring=SPRING) for hip in HIPS]
             ),
-            r"limbs\[0\].geometry: expected one similar to the engine's",
+            r"limbs\[0\].geometry: expected one similar to the engine's .* other lengths, masses, inertias",
         ),
         (lambda: animal(Limits()).set_state(horse().get_state()), r"state: of another engine; .*spring"),
         (lambda: animal(Limits()).command(np.zeros(6)), r"command: expected shape \(4,\), .* got \(6,\)"),

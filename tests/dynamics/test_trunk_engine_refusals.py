@@ -162,7 +162,6 @@ def test_before_a_reset_it_is_nowhere():
         ({"trunk": "x"}, "trunk: expected Trunk"),
         ({"ground": 3}, "ground: expected Ground"),
         ({"trunk": replace(FREE, kind="rail")}, "trunk.kind: expected 'free'"),
-        ({"trunk": replace(FREE, height=3.0)}, "trunk.height: expected"),
         ({"drive": Motor()}, "drive: expected a Prescribed"),
     ],
 )

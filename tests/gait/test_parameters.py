@@ -2,14 +2,26 @@
 
 import json
 
+import gymnasium as gym
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import hoof_env  # noqa: F401
+from hoof_env.dynamics.constrained import ConstrainedLeg
 from hoof_env.errors import DataFileError, ParameterError
-from hoof_env.gait import LIMITS, PARAMETERS, GaitParameters, gait_names, load_gait, paper_gaits
-from hoof_env.leg.geometry import read_preset
+from hoof_env.gait import (
+    LIMITS,
+    PARAMETERS,
+    GaitParameters,
+    HarmonicGait,
+    gait_names,
+    load_gait,
+    paper_gaits,
+)
+from hoof_env.ground.contact import Ground
+from hoof_env.leg.geometry import load_geometry, read_preset
 from tests.legs import FIRST_FIT
 
 inside = st.tuples(*(st.floats(low, high) for low, high in LIMITS.values()))
@@ -105,3 +117,21 @@ def test_a_preset_holds_more_gaits_than_the_papers(tmp_path):
 def test_the_papers_gaits_stand_apart_from_those_found_later(gaits, names):
     chosen = paper_gaits({name: name.upper() for name in gaits.split()})
     assert list(chosen.items()) == [(name, name.upper()) for name in names]
+
+
+def test_a_gait_with_harmonics_is_kept_in_a_file_and_no_leg_alone_takes_it(tmp_path):
+    leg, gait = load_geometry(), HarmonicGait(5.0, 0.4, 0.1, -0.2, (0.1, 0.05))
+    leg.save(
+        tmp_path / "leg.json", gaits={"trot": gait, "walk": load_gait("walk")}, ground={"stiffness": 2e4}
+    )
+    assert load_gait("trot", tmp_path / "leg.json") == gait
+    assert HarmonicGait.from_array(gait.to_array()) == gait
+    with pytest.raises(DataFileError, match=r"leg.json, gait 'trot': expected the four parameters"):
+        gym.make("hoof_env/HorseLeg-v0", preset=tmp_path / "leg.json")
+    env = gym.make("hoof_env/HorseLeg-v0")
+    with pytest.raises(ParameterError, match="gait: expected a swing of at most 1 harmonic, got"):
+        env.reset(seed=0, options={"gait": gait})
+    with pytest.raises(ParameterError, match="gait: expected one of"):
+        env.unwrapped.action_for(gait)
+    with pytest.raises(ParameterError, match="gait: expected a swing of at most 1 harmonic"):
+        ConstrainedLeg(leg, Ground()).reset(gait)
