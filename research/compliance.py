@@ -14,6 +14,7 @@ import numpy as np
 import tyro
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import GRAVITY, HoofSpring, Limb, Prescribed, Result, Trunk
@@ -56,22 +57,33 @@ def leg_over(ground: Ground, spring: HoofSpring | None, **settings: Any) -> Trun
     return TrunkEngine(Limb(LEG, drive=Prescribed(), spring=spring), trunk, ground, strides=True, **settings)
 
 
-def lift(engine: TrunkEngine, speed: float, above: float = 1e-3) -> None:
+def level_crank() -> float:
+    """Crank angle [rad] at which a leg in `POSE` sets its sole down level."""
+
+    def slant(crank: float) -> float:
+        engine = leg_over(ground_of(GROUNDS[0]), None)
+        engine.reset(POSE, crank, y=30.0)
+        return float((engine.report["toe_y"] - engine.report["heel_y"])[0, 0])
+
+    return float(brentq(slant, 2.5, 3.25))
+
+
+def lift(engine: TrunkEngine, speed: float, above: float = 1e-3, crank: float = CRANK) -> None:
     """Start with the hoof so far over the ground [m], downwards [m/s]."""
-    engine.reset(POSE, CRANK, vy=-speed)
+    engine.reset(POSE, crank, vy=-speed)
     low = min(engine.report[f"{point}_y"][0, 0] for point in ("toe", "heel"))
-    engine.reset(POSE, CRANK, y=3.0 - low + above, vy=-speed)
+    engine.reset(POSE, crank, y=3.0 - low + above, vy=-speed)
 
 
-def drops() -> list[Row]:
-    """Largest force of drops, of the weight."""
+def drops(crank: float = CRANK) -> list[Row]:
+    """Largest force of drops, of the weight, toe first or at another crank angle [rad]."""
     rows = []
     for stiffness in SPRINGS:
         for speed in SPEEDS:
             peaks = []
             for ground in GROUNDS:
                 engine = leg_over(ground_of(ground), spring_of(stiffness, MASS))
-                lift(engine, speed)
+                lift(engine, speed, crank=crank)
                 engine.advance(steps=400)
                 peaks.append(float(engine.strides["highest"][0, 0]) / (MASS * GRAVITY))
             row: Row = {"spring_N_m": stiffness or "rigid", "speed_m_s": speed}
@@ -193,7 +205,7 @@ def compliance(out: Path = Path("docs/evidence/compliance")) -> None:
     """Write a csv of each table and drops.png to the folder `out`."""
     out.mkdir(parents=True, exist_ok=True)
     tables = {"drops": drops(), "creep": standing(), "order": orders(), "damping": damped()}
-    tables["conditions"] = conditions()
+    tables |= {"level_drops": drops(level_crank()), "conditions": conditions()}
     for name, rows in tables.items():
         lines = [[f"{v:.4g}" if isinstance(v, float) else v for v in row.values()] for row in rows]
         with (out / f"{name}.csv").open("w", newline="", encoding="utf-8") as file:
