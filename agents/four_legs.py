@@ -1,10 +1,10 @@
 """Open-loop gaits of a horse of four legs, found by CMA-ES: `python -m agents.open_loop --family four-legs`.
 
 The horse is planar: two fore and two hind legs on a free trunk, with cited masses, springs at the hoofs and
-prescribed cranks. A gait has one crank rate, the lag of the fore pair behind the hind pair, and for each pair
-the swing's coefficients and a first harmonic of the crank's speed over its angle; left and right are half a
-stride apart. A candidate meets several perturbed starts. It pays for missing the speed, for stance peaks,
-slip, work and pitch, and most for falling, the more the sooner.
+prescribed cranks. A gait has one crank rate, how far the fore pair is ahead of the hind pair, and for each
+pair the swing's coefficients and a first harmonic of the crank's speed over its angle; left and right are
+half a stride apart. A candidate meets several perturbed starts. It pays for missing the speed, for stance
+peaks, slip, work and pitch, and most for falling, the more the sooner.
 """
 
 from __future__ import annotations
@@ -90,18 +90,19 @@ class Horse:
 
     @property
     def size(self) -> int:
-        """Numbers of a gait: rate, lag, and of each pair a harmonic of the speed and the swing."""
+        """Numbers of a gait: rate, lead, and of each pair a harmonic of the speed and the swing."""
         return 2 + 2 * (3 + 2 * self.harmonics)
 
     def decode(self, x: Floats) -> dict[str, Floats]:
-        """Gaits from points of the box [-1, 1], shape (n, size): crank rate [rad/s] and lag [turns], shape
-        (n,), the speed's harmonic (n, 2, 2) [-], the swing's coefficients (n, 2, 1 + 2 harmonics) [rad]."""
+        """Gaits from points of the box [-1, 1], shape (n, size): crank rate [rad/s] and lead of the fore pair
+        [strides], shape (n,), the speed's harmonic (n, 2, 2) [-] and the swing's coefficients (n, 2, 1 + 2
+        harmonics) [rad]."""
         pairs = x[:, 2:].reshape(len(x), 2, -1)
         spans = [*SPANS, *[HIGHER] * (2 * self.harmonics - 2)]
         centre = [*CENTRE, *[0.0] * (2 * self.harmonics - 2)]
         return {
             "rate": SLOWEST + (FASTEST - SLOWEST) * (x[:, 0] + 1) / 2,
-            "lag": x[:, 1] / 2,
+            "lead": x[:, 1] / 2,
             "modulation": MODULATION * pairs[:, :, :2],
             "swing": centre + np.array(spans) * pairs[:, :, 2:],
         }
@@ -117,10 +118,8 @@ class Horse:
 
     def angles(self, gaits: dict[str, Floats], phase: Floats) -> Floats:
         """Crank angles [rad] of legs so far through their turns in time, both of shape (4, n)."""
-        part, grid = (
-            np.repeat(gaits["modulation"].transpose(1, 2, 0), 2, axis=0),
-            np.linspace(0, 2 * np.pi, 257),
-        )
+        part = np.repeat(gaits["modulation"].transpose(1, 2, 0), 2, axis=0)
+        grid = np.linspace(0, 2 * np.pi, 257)
         slowness = 1 / modulated(part[..., None], grid)
         passed = np.cumsum(slowness[..., 1:] + slowness[..., :-1], axis=-1)
         found, at = np.empty_like(phase), np.concatenate([0 * passed[..., :1], passed], axis=-1)
@@ -134,8 +133,8 @@ class Horse:
         (n,); of the pairs shape (n, 2). `seed` perturbs so many starts, which come again and again."""
         rng, gaits, n = np.random.default_rng(seed), self.decode(x), len(x)
         noise = np.tile(rng.uniform(-1, 1, (7, starts)), -(-n // starts))[:, :n]
-        whole, half = 0 * gaits["lag"], 0 * gaits["lag"] + 0.5
-        phase = np.array([gaits["lag"], gaits["lag"] + half, whole, half]) + noise[0] / 2 + noise[1:5] / 60
+        whole, half = 0 * gaits["lead"], 0 * gaits["lead"] + 0.5
+        phase = np.array([gaits["lead"], gaits["lead"] + half, whole, half]) + noise[0] / 2 + noise[1:5] / 60
         theta = self.angles(gaits, phase)
         command, engine = self.command(gaits, theta), self.engine
         start = {"vx": self.speed * (1 + 0.1 * noise[5]), "pitch": 0.03 * noise[6]}

@@ -29,6 +29,7 @@ from benchmarks.machine import machine, vector_bits
 from benchmarks.rounds import bar_text, describe, interleave, spread, timed
 from benchmarks.scenes import DT, Scene, engine, scenes, with_springs
 from hoof_env._output import markdown_table
+from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limits
 from hoof_env.ground.contact import load_ground
 
@@ -131,20 +132,21 @@ def own_cases(quick: bool, clock: Clock) -> list[Case]:
         n, steps = (min(count, 64), max(steps // 20, 4)) if quick else (count, steps)
         title = f"{name}, " + ("one" if n == 1 else f"batch of {n}")
         for what, options, share in VARIANTS:
-            made = engine(scenes(PRESET)[name], PRESET, n, **options)
-            made.advance(steps=1, account=False)  # compiled from here on
-            before = partial(made.set_state, made.get_state())
-            run = partial(timed, clock, before, partial(made.advance, steps=steps, account=False))
+            run = run_of(engine(scenes(PRESET)[name], PRESET, n, **options), steps, clock)
             bars = (None, None) if quick or not share else BARS[name, count]
             required, aimed = (bar and share * bar for bar in bars)
             cases.append(Case(title + what, name, run, n * steps, "", required, aimed, vector_bits()))
         for what, options, _ in ANIMAL if name == "horse" else ():
-            made = engine(with_springs(scenes(PRESET)[name]), PRESET, n, **options)
-            made.advance(steps=1, account=False)
-            before = partial(made.set_state, made.get_state())
-            run = partial(timed, clock, before, partial(made.advance, steps=steps, account=False))
+            run = run_of(engine(with_springs(scenes(PRESET)[name]), PRESET, n, **options), steps, clock)
             cases.append(Case(title + what, name, run, n * steps, bits=vector_bits()))
     return cases
+
+
+def run_of(made: TrunkEngine, steps: int, clock: Clock) -> Callable[[], float]:
+    """Times so many steps of an engine from where it is now, its kernels compiled."""
+    made.advance(steps=1, account=False)
+    before = partial(made.set_state, made.get_state())
+    return partial(timed, clock, before, partial(made.advance, steps=steps, account=False))
 
 
 def mujoco_cases(quick: bool, clock: Clock) -> list[Case]:

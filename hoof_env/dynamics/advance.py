@@ -20,20 +20,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import carray  # type: ignore[attr-defined]
 
+from hoof_env.dynamics.form import Form, form_of
 from hoof_env.dynamics.hoof import law_of, level_ground, remember_contacts
-from hoof_env.dynamics.layout import (
-    PLAIN,
-    Account,
-    Features,
-    LegMemory,
-    LegRows,
-    LegState,
-    Strides,
-    StrideSums,
-    TrunkMemory,
-    TrunkRows,
-    TrunkState,
-)
+from hoof_env.dynamics.layout import PLAIN, Features
 from hoof_env.dynamics.limits import clear_limits, heed_joints, heed_trunk
 from hoof_env.dynamics.mechanics import evaluate, keep_still, settle
 from hoof_env.dynamics.observables import count_stride, keep_account, report_leg, report_trunk
@@ -42,7 +31,6 @@ from hoof_env.dynamics.reactions import LegConstants, Reactions, react
 from hoof_env.dynamics.stepping import begin_step, end_step, next_stage, weigh_stage
 from hoof_env.simd import anywhere, choose, columns, fill, lane_sum, level, nth, rows
 from hoof_env.simd.compile import inlined, kernel, pasted
-from hoof_env.simd.layout import Constants
 from hoof_env.simd.memory import address, doubles, offset
 from hoof_env.simd.user_functions import fingerprint
 
@@ -57,52 +45,6 @@ STARTS = -1.0
 """Stands in the place of a result where an environment is to start."""
 
 CONSTANTS_SIZE, REACTIONS_SIZE = LegConstants.size, Reactions.size
-
-
-class _Form(NamedTuple):
-    trunk: Any
-    leg: Any
-    account: Any
-    trunk_memory: Any
-    leg_memory: Any
-    trunk_size: int
-    leg_size: int
-    account_size: int
-    trunk_rows: int
-    leg_rows: int
-    trunk_state: int
-    leg_state: int
-    strides: int
-    sums: int
-    gait: int
-    harmonics: int
-    springs: int
-    animal: bool
-
-
-class Form(Constants, _Form):
-    """The layouts of engines with the same `Features`, and what else the compiler must know of these.
-
-    Attributes:
-        trunk, leg, account: rows on the stack.
-        trunk_memory, leg_memory: rows in the engine's array, the trunk's first.
-        of the others: how many rows each has.
-        gait: how many gait parameters a leg has.
-        harmonics, springs, animal: as in `Features`; rows of a hoof point's spring, 0 or 2.
-    """
-
-
-@cache
-def form_of(features: Features = PLAIN) -> Form:
-    """The `Form` of engines with these features."""
-    rows = [features.of(layout) for layout in (TrunkRows, LegRows, Account, TrunkMemory, LegMemory)]
-    inner = [features.of(layout).size for layout in (TrunkState, LegState, Strides, StrideSums)]
-    sizes = [*(layout.size for layout in rows), *inner, features.gait_size]
-    return Form._make([*rows, *sizes, features.harmonics, 2 * features.springs, features.animal])
-
-
-TRUNK_ROWS, LEG_ROWS = TrunkMemory.size, LegMemory.size
-"""Rows of the memory of an engine without `Features`: of the trunk, and of each leg behind it."""
 
 MODEL = np.dtype(
     [

@@ -17,14 +17,14 @@ from numba.core.errors import NumbaError
 from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.dynamics import layout, memory
-from hoof_env.dynamics.advance import LANES, STARTS, advance_kernels, form_of
+from hoof_env.dynamics.advance import LANES, STARTS, advance_kernels
+from hoof_env.dynamics.form import form_of
 from hoof_env.dynamics.layout import Features
 from hoof_env.dynamics.parts import (
     GRAVITY,
     Drive,
     Limb,
     Limits,
-    Motor,
     Reactions,
     Result,
     Scene,
@@ -34,6 +34,7 @@ from hoof_env.dynamics.parts import (
 from hoof_env.dynamics.reactions import Reactions as ReactionRows
 from hoof_env.dynamics.step_length import StepLength
 from hoof_env.dynamics.stepping import SCHEMES
+from hoof_env.dynamics.tally import tally_of
 from hoof_env.errors import (
     Floats,
     NotStartedError,
@@ -49,7 +50,7 @@ from hoof_env.errors import (
 from hoof_env.gait import MOST_HARMONICS, FilterSettings, GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
-from hoof_env.leg.profile import by_name, cross, leg_profile
+from hoof_env.leg.profile import leg_profile
 from hoof_env.simd.threads import blocks, check_threads, limit_threads, run_together
 from hoof_env.simd.user_functions import check_function, what_cannot_be_compiled
 
@@ -505,41 +506,7 @@ class TrunkEngine(Scene):
 
     def tally(self) -> Tally:
         """Momentum, spin and energy of all bodies at the present instant, added up anew from their motion."""
-        r, s, own = self.report, self.state, self.trunk
-        place, velocity = r["x"] + 1j * r["y"], r["vx"] + 1j * r["vy"]
-        pitch_rate, turn = r["pitch_rate"], np.exp(1j * s["pitch"])
-        moment, momentum = own.mass * place, own.mass * velocity  # first moment about the origin
-        spin = own.pitch_inertia * pitch_rate + own.mass * cross(place, velocity)  # about the origin
-        kinetic = 0.5 * own.mass * np.abs(velocity) ** 2 + 0.5 * own.pitch_inertia * pitch_rate**2
-        for i, limb in enumerate(self.limbs):
-            theta_rate = s["theta_rate"][i]
-            f = by_name(self.profiles[i](s["theta"][i])[0])
-            a, b, c = f["crank_inertia"], f["coupling"], f["frame_inertia"]
-            side = limb.geometry.travel
-            if isinstance(limb.drive, Motor):
-                rotor, gear = limb.drive.rotor_inertia, limb.drive.gear_ratio
-                a, b, c = a + gear**2 * rotor, b - side * gear * rotor, c + rotor
-            frame = turn * np.exp(1j * side * r["phi"][i])
-            frame_rate = pitch_rate + side * r["phi_rate"][i]
-            first_moment = frame * (f["first_moment_x"] + 1j * f["first_moment_y"])
-            slope = f["moment_slope_x"] + 1j * f["moment_slope_y"]
-            own_rate = frame * slope * theta_rate + 1j * first_moment * frame_rate
-            arm = turn * complex(*limb.hip)
-            hip, hip_rate, mass = place + arm, velocity + 1j * arm * pitch_rate, limb.geometry.mass
-            moment = moment + mass * hip + first_moment
-            momentum = momentum + mass * hip_rate + own_rate
-            spin = spin + cross(hip, mass * hip_rate + own_rate) + cross(first_moment, hip_rate)
-            spin = spin + b * theta_rate + c * frame_rate
-            kinetic = kinetic + 0.5 * mass * np.abs(hip_rate) ** 2 + (hip_rate.conj() * own_rate).real
-            rates = a * theta_rate**2 + 2 * b * theta_rate * frame_rate + c * frame_rate**2
-            kinetic = kinetic + 0.5 * rates
-        total = self.total_mass
-        centre = moment / total
-        potential = GRAVITY * moment.imag
-        if own.kind == "suspended":
-            potential = potential + 0.5 * own.stiffness * (r["y"] - own.height) ** 2
-            potential = potential - (1 - own.share) * total * GRAVITY * r["y"]
-        return Tally(centre, momentum, spin - cross(centre, momentum), kinetic, potential)
+        return tally_of(self)
 
     def messages(self) -> list[str]:
         """How each environment ended, for people."""

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.dynamics import layout
-from hoof_env.dynamics.advance import LANES, MODEL, form_of
+from hoof_env.dynamics.advance import LANES, MODEL
+from hoof_env.dynamics.form import form_of
 from hoof_env.dynamics.layout import (
     FARTHEST,
     Features,

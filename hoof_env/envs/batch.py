@@ -15,9 +15,10 @@ import numpy as np
 from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.advance import LANES, form_of
+from hoof_env.dynamics.advance import LANES
 from hoof_env.dynamics.constrained import INTEGRATORS
 from hoof_env.dynamics.engine import TrunkEngine
+from hoof_env.dynamics.form import form_of
 from hoof_env.dynamics.parts import GRAVITY, LARGEST, ONE_LEG, Result
 from hoof_env.dynamics.step_length import StepLength
 from hoof_env.dynamics.stepping import SCHEMES

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hoof_env.dynamics.advance import form_of
+from hoof_env.dynamics.form import form_of
 from hoof_env.dynamics.layout import PLAIN, STRIDE_SUMS, STRIDES, TRUNK_REPORT, Features, leg_state
 from hoof_env.gait import PARAMETERS
 
@@ -38,6 +38,7 @@ def at_measured(features: Features) -> slice:
 
 
 MEASURED = measured_names()
+"""Of a leg with a rigid hoof."""
 
 
 class Named(np.ndarray[Any, np.dtype[np.float64]]):

@@ -14,7 +14,8 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from hoof_env.dynamics.advance import LANES, MODEL, advance_kernels, form_of
+from hoof_env.dynamics.advance import LANES, MODEL, advance_kernels
+from hoof_env.dynamics.form import form_of
 from hoof_env.dynamics.layout import PLAIN, Features
 from hoof_env.envs.observation import Entry, Scene
 from hoof_env.envs.reward import TERMS, Outcome, Term

@@ -35,7 +35,7 @@ def test_legs_are_apart_in_time_as_the_gait_says(horse):
     """However the cranks speed up and slow down: from one leg's angle half a stride leads to the other's."""
     x = np.random.default_rng(2).uniform(-0.8, 0.8, (8, horse.size))
     gaits, steps = horse.decode(x), 20_000
-    phase = np.array([gaits["lag"], gaits["lag"] + 0.5, 0 * gaits["lag"], 0 * gaits["lag"] + 0.5])
+    phase = np.array([gaits["lead"], gaits["lead"] + 0.5, 0 * gaits["lead"], 0 * gaits["lead"] + 0.5])
     theta = horse.angles(gaits, phase)
     now, seconds = theta[[0, 2]], np.pi / gaits["rate"]
     for _ in range(steps):

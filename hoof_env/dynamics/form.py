@@ -1,0 +1,63 @@
+"""What the compiler must know of an engine: which layouts its memory has, and how long its loops are."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any, NamedTuple
+
+from hoof_env.dynamics.layout import (
+    PLAIN,
+    Account,
+    Features,
+    LegMemory,
+    LegRows,
+    LegState,
+    Strides,
+    StrideSums,
+    TrunkMemory,
+    TrunkRows,
+    TrunkState,
+)
+from hoof_env.simd.layout import Constants
+
+
+class _Form(NamedTuple):
+    trunk: Any
+    leg: Any
+    account: Any
+    trunk_memory: Any
+    leg_memory: Any
+    trunk_size: int
+    leg_size: int
+    account_size: int
+    trunk_rows: int
+    leg_rows: int
+    trunk_state: int
+    leg_state: int
+    strides: int
+    sums: int
+    gait: int
+    harmonics: int
+    springs: int
+    animal: bool
+
+
+class Form(Constants, _Form):
+    """The layouts of engines with the same `Features`, and what else the compiler must know of these.
+
+    Attributes:
+        trunk, leg, account: rows on the stack.
+        trunk_memory, leg_memory: rows in the engine's array, the trunk's first.
+        of the others: how many rows each has.
+        gait: how many gait parameters a leg has.
+        harmonics, springs, animal: as in `Features`; rows of a hoof point's spring, 0 or 2.
+    """
+
+
+@cache
+def form_of(features: Features = PLAIN) -> Form:
+    """The `Form` of engines with these features."""
+    rows = [features.of(layout) for layout in (TrunkRows, LegRows, Account, TrunkMemory, LegMemory)]
+    inner = [features.of(layout).size for layout in (TrunkState, LegState, Strides, StrideSums)]
+    sizes = [*(layout.size for layout in rows), *inner, features.gait_size]
+    return Form._make([*rows, *sizes, features.harmonics, 2 * features.springs, features.animal])

@@ -1,0 +1,52 @@
+"""What all bodies of an engine add up to, from their motion and not from what is integrated: an audit."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hoof_env.dynamics.parts import GRAVITY, Motor, Tally
+from hoof_env.leg.profile import by_name, cross
+
+if TYPE_CHECKING:
+    from hoof_env.dynamics.engine import TrunkEngine
+
+
+def tally_of(engine: TrunkEngine) -> Tally:
+    """See `TrunkEngine.tally`."""
+    r, s, own = engine.report, engine.state, engine.trunk
+    place, velocity = r["x"] + 1j * r["y"], r["vx"] + 1j * r["vy"]
+    pitch_rate, turn = r["pitch_rate"], np.exp(1j * s["pitch"])
+    moment, momentum = own.mass * place, own.mass * velocity  # first moment about the origin
+    spin = own.pitch_inertia * pitch_rate + own.mass * cross(place, velocity)  # about the origin
+    kinetic = 0.5 * own.mass * np.abs(velocity) ** 2 + 0.5 * own.pitch_inertia * pitch_rate**2
+    for i, limb in enumerate(engine.limbs):
+        theta_rate = s["theta_rate"][i]
+        f = by_name(engine.profiles[i](s["theta"][i])[0])
+        a, b, c = f["crank_inertia"], f["coupling"], f["frame_inertia"]
+        side = limb.geometry.travel
+        if isinstance(limb.drive, Motor):
+            rotor, gear = limb.drive.rotor_inertia, limb.drive.gear_ratio
+            a, b, c = a + gear**2 * rotor, b - side * gear * rotor, c + rotor
+        frame = turn * np.exp(1j * side * r["phi"][i])
+        frame_rate = pitch_rate + side * r["phi_rate"][i]
+        first_moment = frame * (f["first_moment_x"] + 1j * f["first_moment_y"])
+        slope = f["moment_slope_x"] + 1j * f["moment_slope_y"]
+        own_rate = frame * slope * theta_rate + 1j * first_moment * frame_rate
+        arm = turn * complex(*limb.hip)
+        hip, hip_rate, mass = place + arm, velocity + 1j * arm * pitch_rate, limb.geometry.mass
+        moment = moment + mass * hip + first_moment
+        momentum = momentum + mass * hip_rate + own_rate
+        spin = spin + cross(hip, mass * hip_rate + own_rate) + cross(first_moment, hip_rate)
+        spin = spin + b * theta_rate + c * frame_rate
+        kinetic = kinetic + 0.5 * mass * np.abs(hip_rate) ** 2 + (hip_rate.conj() * own_rate).real
+        rates = a * theta_rate**2 + 2 * b * theta_rate * frame_rate + c * frame_rate**2
+        kinetic = kinetic + 0.5 * rates
+    total = engine.total_mass
+    centre = moment / total
+    potential = GRAVITY * moment.imag
+    if own.kind == "suspended":
+        potential = potential + 0.5 * own.stiffness * (r["y"] - own.height) ** 2
+        potential = potential - (1 - own.share) * total * GRAVITY * r["y"]
+    return Tally(centre, momentum, spin - cross(centre, momentum), kinetic, potential)
