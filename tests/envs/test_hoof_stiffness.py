@@ -1,0 +1,108 @@
+"""A spring at the hoof as an option of every id."""
+
+import pickle
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import hoof_env
+from hoof_env.errors import ParameterError
+
+LEG, FIXED = "hoof_env/HorseLeg-v0", "hoof_env/HorseLegFixed-v0"
+SOFT = {"hoof_stiffness": 4e4}
+
+
+def play(env, steps=150):
+    """Observations and rewards of the paper's run from one start, and the info of the last step."""
+    observation, info = env.reset(seed=3)
+    seen = [observation]
+    for _ in range(steps):
+        observation, reward, _, truncated, info = env.step(env.unwrapped.action_for("run"))
+        seen += [observation, np.float64(reward)]
+        if truncated:
+            break
+    return seen, info
+
+
+@pytest.fixture(scope="module")
+def soft():
+    return gym.make(LEG, **SOFT)
+
+
+@pytest.mark.filterwarnings("ignore:.*is not in the environment spec:UserWarning")
+def test_gymnasium_finds_nothing_wrong(soft):
+    check_env(soft.unwrapped, skip_render_check=True)
+
+
+def test_a_row_of_many_has_the_bits_of_one_alone(soft):
+    envs = gym.make_vec(LEG, num_envs=9, **SOFT)
+    observations, _ = envs.reset(seed=3)
+    seen, rewards = [observations[0]], []
+    action = np.tile(soft.unwrapped.action_for("run"), (9, 1))
+    for _ in range(50):
+        observations, reward, *_ = envs.step(action)
+        seen.append(observations[0])
+        rewards.append(reward[0])
+    alone, _ = play(soft, 50)
+    assert np.array_equal(seen, [alone[0], *alone[1::2]])
+    assert np.array_equal(rewards, alone[2::2])
+
+
+def test_a_softer_hoof_has_lower_peaks():
+    peaks = [play(gym.make(FIXED, gait="run", hoof_stiffness=k))[1]["episode_summary"]["peak_grf_n"]
+             for k in (None, 1e5, 2e4)]  # fmt: skip
+    assert peaks[0] > 1.1 * peaks[1] > 1.3 * peaks[2]
+
+
+def test_states_pickles_and_infos_know_the_spring(soft):
+    play(soft, 30)
+    state, kept = soft.unwrapped.get_state(), pickle.loads(pickle.dumps(soft.unwrapped))
+    measured = play(soft, 30)[1]["measured"]
+    assert {"toe_give_normal", "heel_give_tangential"} <= set(measured.names)
+    soft.unwrapped.set_state(state)
+    action = soft.unwrapped.action_for("walk")
+    assert np.array_equal(soft.step(action)[0], kept.step(action)[0])
+    with pytest.raises(ParameterError, match="state: of other settings; hoof_stiffness: None here"):
+        gym.make(LEG).unwrapped.set_state(state)
+    soft.unwrapped.record()  # from here on steps are recorded
+    soft.step(action)
+    assert len(soft.unwrapped.record()["toe_give_normal"]) == 20
+
+
+def test_the_default_damping_is_that_of_the_settings_whatever_is_drawn():
+    env = gym.make(LEG, randomize={"trunk_mass": (30.0, 70.0)}, **SOFT)
+    limb = env.unwrapped.engine.limbs[0]
+    assert limb.spring.damping == pytest.approx(0.2 * np.sqrt(4e4 * env.unwrapped.batch.settings.trunk_mass))
+    settings = env.unwrapped.engine._memory.limb_settings
+    before = settings.copy()
+    env.reset(seed=1)
+    assert np.array_equal(settings[0, -4:], before[0, -4:])
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"hoof_stiffness": 0.0}, "hoof_stiffness: expected .* got 0.0"),
+        ({"hoof_stiffness": "soft"}, "hoof_stiffness: expected .* got 'soft'"),
+        ({**SOFT, "hoof_damping": 0.0}, "hoof_damping: expected .* got 0.0"),
+        ({"hoof_damping": 300.0}, "hoof_damping: expected a hoof_stiffness beside it, got 300.0"),
+        ({**SOFT, "friction_fast": 0.1}, "friction_fast: expected none with a hoof_stiffness"),
+        ({**SOFT, "randomize": {"friction_slow": 0.01}}, "randomize: 'friction_slow': expected none with"),
+    ],
+)
+def test_what_does_not_fit_is_named(changes, words):
+    with pytest.raises(ParameterError, match=words):
+        gym.make(LEG, **changes)
+
+
+def test_the_papers_solver_has_none():
+    with pytest.raises(ParameterError, match=r'hoof_stiffness: expected None with solver="paper", got 4000'):
+        gym.make(FIXED, solver="paper", **SOFT)
+
+
+def test_a_law_of_ones_own_has_none():
+    hoof_env.register("test/OwnLaw-v0", contact_law=lambda d, rate, slowness, ground: 1e4 * d)
+    with pytest.raises(ParameterError, match="contact_law: expected none beside springs"):
+        gym.make("test/OwnLaw-v0", **SOFT)
