@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.dynamics.parts import TRUNKS, Limb, Motor, Prescribed, Trunk
+from hoof_env.dynamics.parts import GRAVITY, TRUNKS, HoofSpring, Limb, Motor, Prescribed, Trunk
 from hoof_env.dynamics.step_length import MOST_SUBSTEPS, StepWarning
 from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.gait import GaitParameters
@@ -173,3 +173,48 @@ def test_stiff_ground_gets_the_substeps_that_it_needs(scheme):
     error, too_long = np.abs(way - fine), np.abs(coarse - fine)
     assert error.max() < 1e-3
     assert too_long.max() > 4 * error.max()
+
+
+def dropped(ratio, stiffness, restitution, step=None):
+    """Peak force over the weight of 135 kg dropped at 1 m/s on a sprung hoof, and the engine; `step` is part
+    of the limit of the sole, None what the engine chooses."""
+    spring, mass = HoofSpring.with_ratio(4e4, 135.0 / 2, ratio), 135.0
+    trunk = Trunk(mass=mass - LEG.mass, share=1.0, stiffness=0.0, damping=0.0, drag=0.0, height=3.0)
+    ground = Ground(stiffness=stiffness, restitution=restitution, approach_floor=0.1)
+    limb, settings = Limb(LEG, drive=Prescribed(), spring=spring), {}
+    if step:
+        limit = TrunkEngine(limb, trunk, ground).step_limits["hoof"]
+        settings = {"sim_dt": step * limit, "substeps": 1}
+    engine, pose = TrunkEngine(limb, trunk, ground, strides=True, **settings), GaitParameters(0, 0.4, 0, 0)
+    engine.reset(pose, 4.1, vy=-1.0)
+    low = min(engine.report["toe_y"][0, 0], engine.report["heel_y"][0, 0])
+    engine.reset(pose, 4.1, y=3.0 - low + 1e-3, vy=-1.0)
+    engine.advance(steps=round(0.25 / engine.sim_dt))
+    peak = engine.strides["highest"][0, 0] / (mass * GRAVITY) if not engine.results.any() else np.inf
+    return peak, engine
+
+
+@pytest.mark.filterwarnings("ignore::hoof_env.dynamics.step_length.StepWarning")
+@pytest.mark.parametrize(
+    ("ratio", "stiffness", "restitution"), [(0.02, 1e7, 0.5), (0.02, 2e6, 1.0), (0.05, 1e7, 1.0)]
+)
+def test_a_sole_without_mass_gets_the_step_that_its_damping_allows(ratio, stiffness, restitution):
+    """What is chosen is as good as a tenth of it; a step of five times the limit is not."""
+    case = (ratio, stiffness, restitution)
+    fine, chosen, coarse = (dropped(*case, step)[0] for step in (0.1, None, 5.0))
+    assert chosen == pytest.approx(fine, rel=2e-3)
+    assert abs(coarse / fine - 1) > 0.05
+
+
+def test_a_sole_with_too_few_substeps_is_named():
+    _, engine = dropped(0.02, 1e7, 0.5, 0.1)
+    assert engine.step_limits["hoof"] == min(engine.step_limits.values())
+    with pytest.warns(StepWarning, match="are too long for the damping of the hoofs' springs against"):
+        TrunkEngine(engine.limbs, engine.trunk, engine.ground, substeps=1)
+
+
+def test_springs_ask_for_less_the_more_they_are_damped():
+    limits = [dropped(ratio, 1e7, 0.5, 0.1)[1].step_limits["hoof"] for ratio in (0.02, 0.1, 0.5)]
+    assert limits == sorted(limits)
+    rigid = TrunkEngine(Limb(LEG), Trunk("fixed"))
+    assert rigid.step_limits["hoof"] == np.inf
