@@ -222,28 +222,43 @@ def search(
     return rounded, float(np.mean(final)), done
 
 
-def optimise(
-    speed: float, harmonics: int, spring: float, stiffness: float, restarts: int, episodes: int | None = None
+def asked(
+    speed: float, harmonics: int, spring: float, stiffness: float, episodes: int | None = None
 ) -> dict[str, Any]:
-    """The best gait of several searches, and what it does from starts that none has met, pairs fore
-    first: of those that did not fall, peak and mean force in stance [N/kg], duty, stances a turn, slip of a
-    stance [m], braking and propulsion [N], speed [m/s] and cost of transport. `episodes` are of a search.
+    """What searches are about, checked; `episodes` are of one search. `ParameterError`: out of range."""
+    each = POPULATION * STARTS
+    generations = int(check_number("episodes", episodes or GENERATIONS * each, low=each, high=1e8)) // each
+    check_number("speed", speed, low=0.2, high=10.0)
+    Horse(1, speed, harmonics, spring, stiffness)  # refuses what is no horse
+    return {
+        "family": "four-legs", "speed": speed, "harmonics": harmonics, "spring": spring,
+        "stiffness": stiffness, "generations": generations,
+    }  # fmt: skip
+
+
+def optimise(
+    about: dict[str, Any], restarts: int, found: list[dict[str, Any]], keep: Callable[[dict[str, Any]], Any]
+) -> dict[str, Any]:
+    """Search, with seeds that are not among those `found` already, and `keep` what there is after each.
+
+    Returns:
+        What was kept last: `about`, the searches, the best gait, and its figures over starts that none has
+        met, pairs fore first: of those that did not fall, peak and mean force in stance [N/kg], duty, stances
+        a turn, slip of a stance [m], braking and propulsion [N], speed [m/s] and cost of transport.
 
     Raises:
-        ParameterError: a value is out of range.
+        ParameterError: `restarts` is out of range.
         HoofEnvError: no CMA-ES or no tqdm is installed.
-        KeyboardInterrupt: Ctrl-C before anything was found; later it ends the search, "interrupted" is true.
+        KeyboardInterrupt: Ctrl-C; a search that had begun is kept as "interrupted".
     """
     try:
         from tqdm import tqdm
     except ModuleNotFoundError:
         raise HoofEnvError('agents.open_loop needs tqdm: pip install "hoof-env[train,identify]"') from None
-    check_number("speed", speed, low=0.2, high=10.0)
     check_number("restarts", restarts, low=1, high=1000)
-    each = POPULATION * STARTS
-    generations = int(check_number("episodes", episodes or GENERATIONS * each, low=each, high=1e8)) // each
-    horse, found = Horse(POPULATION * STARTS, speed, harmonics, spring, stiffness), list[dict[str, Any]]()
-    for seed in range(restarts):
+    settings = (about[name] for name in ("speed", "harmonics", "spring", "stiffness"))
+    horse, generations = Horse(POPULATION * STARTS, *settings), about["generations"]
+    for seed in [seed for seed in range(restarts) if seed not in [one["seed"] for one in found]]:
         began = time.monotonic()
         with tqdm(total=generations, unit=" generations", leave=False, disable=None) as bar:
 
@@ -251,19 +266,21 @@ def optimise(
                 bar.update()
                 bar.set_postfix(cost=f"{lowest:.2f}")
 
-            try:
-                x, cost, done = search(horse, seed, generations, tick)
-            except KeyboardInterrupt:
-                if not found:
-                    raise
-                break
+            x, cost, done = search(horse, seed, generations, tick)
+        interrupted = {"interrupted": True} if done < generations else {}
         found.append(
             {"seed": seed, "cost": cost, "x": x.tolist(), "generations": done,
-             "wall_s": round(time.monotonic() - began, 1)}
+             "wall_s": round(time.monotonic() - began, 1), **interrupted}
         )  # fmt: skip
-        if done < generations:
-            break
-    best = min(found, key=lambda one: one["cost"])
+        keep(summary(horse, about, found))
+        if interrupted:
+            raise KeyboardInterrupt
+    return summary(horse, about, found)
+
+
+def summary(horse: Horse, about: dict[str, Any], found: list[dict[str, Any]]) -> dict[str, Any]:
+    """See `optimise`."""
+    each, best = POPULATION * STARTS, min(found, key=lambda one: one["cost"])
     test = horse.play(np.tile(best["x"], (each, 1)), 10**6, each)
     stood = test["fell"] == 0
     figures = {
@@ -274,9 +291,4 @@ def optimise(
         name: np.asarray(value[0]).round(5).tolist()
         for name, value in horse.decode(np.array([best["x"]])).items()
     }
-    return {
-        "family": "four-legs", "speed": speed, "harmonics": harmonics, "spring": spring,
-        "stiffness": stiffness, "generations": generations, "gait": gait, "figures": figures,
-        "searches": found,
-        "interrupted": len(found) < restarts or found[-1]["generations"] < generations,
-    }  # fmt: skip
+    return {**about, "gait": gait, "figures": figures, "restarts": found}

@@ -9,7 +9,7 @@ Families: "constant", the paper's gaits, four numbers that are held; "clocked", 
 a first harmonic of one clock beside it, which starts with the episode, thirteen numbers; "four-legs", gaits
 of a horse of four legs, which is `agents.four_legs`. The best of several searches is chosen by starts that
 none has met and scored with yet others, the episodes of agents.evaluate. The file is written after every
-search; searches that are in it are not made again. Those of four legs are written at the end.
+search; searches that are in it are not made again.
 """
 
 from __future__ import annotations
@@ -297,10 +297,10 @@ def earlier(path: Path, about: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def search_four_legs(args: Args) -> None:
-    """Find and write gaits of four legs. `HoofEnvError`: no CMA-ES is installed. `ParameterError`: a value is
-    out of range, or of an option that is one leg's. `KeyboardInterrupt`: what was found is in the file."""
-    from agents.four_legs import froude_speed
-    from agents.four_legs import optimise as optimise_four_legs
+    """Find gaits of four legs, and write the file after every search. `HoofEnvError`: no CMA-ES is installed.
+    `ParameterError`: a value is out of range, or of an option that is one leg's. `DataFileError`: the file is
+    of something else. `KeyboardInterrupt`: what was found is in the file."""
+    from agents import four_legs
 
     others = ("env_id", "env_kwargs", "test_episodes", "start")
     given = [name for name in others if getattr(args, name) != getattr(Args, name)]
@@ -310,21 +310,22 @@ def search_four_legs(args: Args) -> None:
     if args.froude is not None:
         if speed != Args.speed:
             raise ParameterError("speed, froude: expected one of them")
-        speed = froude_speed(args.froude)
+        speed = four_legs.froude_speed(args.froude)
+    about = four_legs.asked(speed, args.harmonics, args.spring, args.stiffness, args.episodes)
     path = args.out or Path("runs/open_loop", f"four-legs-{speed:g}.json")
+    found = earlier(path, about)
     check_folder(path.parent)
-    content = optimise_four_legs(
-        speed, args.harmonics, args.spring, args.stiffness, args.restarts, args.episodes
-    )
-    content |= {"command": runs.command(), "versions": {**runs.versions(), "cma": version("cma")}}
-    runs.write_text(path, json.dumps(content, indent=1) + "\n")
-    for one in content["searches"]:
+
+    def keep(content: dict[str, Any]) -> None:
+        made = {"command": runs.command(), "versions": {**runs.versions(), "cma": version("cma")}}
+        runs.write_text(path, json.dumps(content | made, indent=1) + "\n")
+
+    content = four_legs.optimise(about, args.restarts, found, keep)
+    for one in content["restarts"]:
         print(f"search {one['seed']}: cost {one['cost']:.3f}, {one['wall_s']:.0f} s")
     for name, value in content["figures"].items():
         print(f"{name:18} {value}")
     print(f"written: {path}")
-    if content["interrupted"]:
-        raise KeyboardInterrupt
 
 
 def place(args: Args) -> Path:

@@ -7,7 +7,7 @@ import pytest
 
 from agents import four_legs, open_loop
 from agents.four_legs import FALL, POPULATION, STARTS, Horse
-from hoof_env.errors import ParameterError
+from hoof_env.errors import DataFileError, ParameterError
 
 MANY = POPULATION * STARTS
 
@@ -64,19 +64,28 @@ def test_a_short_search_finds_better_than_it_began_with_and_writes_it(tmp_path, 
     horse = Horse(MANY, found["speed"], found["harmonics"], found["spring"], found["stiffness"])
     start, best = (
         horse.play(np.tile(x, (MANY, 1)), 99)["cost"].mean()
-        for x in (np.zeros(horse.size), found["searches"][0]["x"])
+        for x in (np.zeros(horse.size), found["restarts"][0]["x"])
     )
     assert best < start
     assert len(found["gait"]["swing"]) == 2
+    before = path.read_text()
+    open_loop.main(arguments)  # nothing is left to search
+    assert path.read_text() == before
+    with pytest.raises(DataFileError, match=r"gait.json: expected searches with .*'spring': 20000.0"):
+        open_loop.search_four_legs(
+            open_loop.Args(family="four-legs", spring=2e4, episodes=6 * MANY, out=path, restarts=1)
+        )
 
 
-def test_what_does_not_fit_is_named(tmp_path):
+def test_what_does_not_fit_is_named():
     with pytest.raises(ParameterError, match=r"speed: expected .* got 0.0"):
-        four_legs.optimise(0.0, 2, 4e4, 2e6, 1)
+        four_legs.asked(0.0, 2, 4e4, 2e6)
     with pytest.raises(ParameterError, match=r"harmonics: expected .* got 4"):
-        four_legs.optimise(1.0, 4, 4e4, 2e6, 1)
+        four_legs.asked(1.0, 4, 4e4, 2e6)
     with pytest.raises(ParameterError, match=r"hoof_spring.stiffness: expected .* got 0.0"):
-        four_legs.optimise(1.0, 2, 0.0, 2e6, 1)
+        four_legs.asked(1.0, 2, 0.0, 2e6)
+    with pytest.raises(ParameterError, match=r"episodes: expected .* got 5"):
+        four_legs.asked(1.0, 2, 4e4, 2e6, 5)
     with pytest.raises(ParameterError, match=r"froude: expected .* got 0.0"):
         four_legs.froude_speed(0.0)
 
@@ -113,5 +122,4 @@ def test_ctrl_c_keeps_what_was_found_and_says_so(monkeypatch, tmp_path, stop, ke
     assert path.exists() == (kept > 0)
     if kept:
         found = json.loads(path.read_text())
-        assert found["interrupted"]
-        assert [one["generations"] for one in found["searches"]] == [kept]
+        assert [(one["generations"], one["interrupted"]) for one in found["restarts"]] == [(kept, True)]
