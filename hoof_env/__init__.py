@@ -76,6 +76,7 @@ _TASKS = {
     "HorseLegSpeed": "speed",
     "HorseLegTerrain": "terrain",
     "HorseLegFixed": "fixed",
+    "Horse": "horse",
 }
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.envs.batch import EpisodeBatch
-from hoof_env.envs.step import ACTIONS
+from hoof_env.envs.reference import HorseGait
 from hoof_env.envs.tasks import PER_EPISODE, SETTINGS, Settings, Task, task_of, to_json
 from hoof_env.errors import FixedSettingError, ParameterError, check_choice
 from hoof_env.gait import GaitParameters
@@ -78,7 +78,8 @@ class LegBase:
         self.settings = self.task.settings(given)
         self.batch = EpisodeBatch(self.task, self.settings, n, num_threads)
         self.metadata = {**self.metadata, "render_fps": max(1, round(1 / self.batch.dt))}
-        return [spaces.Box(-1.0, 1.0, (size,), np.float32) for size in (len(self.batch.names), ACTIONS)]
+        sizes = len(self.batch.names), self.batch.body.actions
+        return [spaces.Box(-1.0, 1.0, (size,), np.float32) for size in sizes]
 
     def __setattr__(self, name: str, value: Any) -> None:
         """As of any object; `FixedSettingError` for settings and what follows from them."""
@@ -116,12 +117,12 @@ class LegBase:
     @property
     def geometry(self) -> Geometry:
         """The leg."""
-        return self.batch.geometry
+        return self.batch.body.geometry
 
     @property
-    def gaits(self) -> dict[str, GaitParameters]:
-        """Gaits of the preset by name."""
-        return self.batch.gaits
+    def gaits(self) -> Mapping[str, GaitParameters | HorseGait]:
+        """Gaits of the preset by name, or of the horse."""
+        return self.batch.body.gaits
 
     @property
     def engine(self) -> TrunkEngine:
@@ -181,7 +182,7 @@ class LegBase:
 
     def command_of(self, action: Any) -> NDArray[np.float64]:
         """Gait parameters that an action commands, shape (4,); the action is clipped to [-1, 1]."""
-        return self.batch.command_of(action)
+        return self.batch.body.command_of(action)
 
     def action_for(self, gait: str | GaitParameters | NDArray[np.float64]) -> NDArray[np.float32]:
         """The action that commands a gait, to float32 precision; the nearest one if it is out of reach.
@@ -192,7 +193,7 @@ class LegBase:
         Raises:
             ParameterError: an unknown name, or not four parameters.
         """
-        return self.batch.action_for(gait)
+        return self.batch.body.action_for(gait)
 
     def _check_open(self, call: str) -> None:
         if self._phase == "closed":

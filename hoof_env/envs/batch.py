@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,12 +20,14 @@ from hoof_env.dynamics.advance import LANES
 from hoof_env.dynamics.constrained import INTEGRATORS
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.form import form_of
-from hoof_env.dynamics.parts import GRAVITY, LARGEST, ONE_LEG, Result
+from hoof_env.dynamics.parts import GRAVITY, LARGEST, Result
 from hoof_env.dynamics.step_length import StepLength
 from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.envs import step as kernels
-from hoof_env.envs.infos import BEGUN, GAIT, LAST_STEP, START, at_measured, measurements, named
-from hoof_env.envs.observation import HALF_RANGE, HIGH, LOW, MIDDLE, check_groups, groups_of, observed
+from hoof_env.envs.horse import Horse
+from hoof_env.envs.infos import Measurements, named
+from hoof_env.envs.observation import MIDDLE, check_groups, groups_of, observed
+from hoof_env.envs.one_leg import OneLeg
 from hoof_env.envs.paper_solver import PaperSolver, check_paper
 from hoof_env.envs.parameters import (
     check_parameters,
@@ -32,19 +35,15 @@ from hoof_env.envs.parameters import (
     extremes,
     make_terrain,
     pair,
-    physics,
     resolved,
     substeps_of,
 )
+from hoof_env.envs.reference import rows_of
 from hoof_env.envs.reward import check_weights
-from hoof_env.envs.start import HIGHEST, LOWEST, check_options, draw_starts
 from hoof_env.envs.step import ACTIONS, FAILED, SUMS, episode_layout
 from hoof_env.envs.tasks import TASKS, Settings, Task
 from hoof_env.errors import ParameterError, check_choice, check_number
-from hoof_env.gait import GaitParameters, HarmonicGait, gait_names, load_gait
-from hoof_env.ground.contact import load_ground
-from hoof_env.leg.geometry import load_geometry, wrong
-from hoof_env.leg.geometry import named as named_preset
+from hoof_env.gait import GaitParameters
 from hoof_env.leg.profile import leg_profile
 from hoof_env.simd.cache import COMPILED, given_folder
 from hoof_env.simd.layout import views
@@ -68,10 +67,13 @@ class EpisodeBatch:
         kernel, addresses: one control step of all is `kernel(addresses)`; then comes `follow`.
         episode: memory of the episodes, rows as in `step.Episode`, shape (rows, columns).
         now: the same by name, shape (columns,) or (rows, columns) each.
-        actions, observations, rewards: what a step takes and gives, shapes (columns, 4), (columns, entries),
+        actions, observations, rewards: what a step takes and gives, shapes (columns, actions), (columns,
+            entries),
             (columns,).
-        begun: what they started with: rows `infos.START`, the gait and what `randomize` drew, a column an
-            environment; not a number where a state does not say.
+        body: the leg, or the horse, that they are about.
+        measurements: what infos measure.
+        begun: what they started with: the body's `start_names`, the gait and what `randomize` drew, a column
+            an environment; not a number where a state does not say.
 
     Raises:
         ParameterError: a setting is out of range or of the wrong type.
@@ -81,7 +83,6 @@ class EpisodeBatch:
         self.task, self.num_envs = task, num_envs
         self.settings = s = resolved(settings)
         is_paper = s.solver == "paper"
-        check_choice("trunk", s.trunk, ONE_LEG)
         check_choice("integrator", s.integrator, INTEGRATORS if is_paper else SCHEMES)
         check_choice("drive", s.drive, ("prescribed", "motor"))
         for name in ("baumgarte_alpha", "baumgarte_beta"):
@@ -92,17 +93,7 @@ class EpisodeBatch:
         self._terrain, self._found_good = make_terrain(s.terrain), ""
         if is_paper:
             check_paper(s)
-        self.geometry = load_geometry(s.preset)
-        load_ground(s.preset)  # what is wrong with it is said, also where the settings replace it
-        self.gaits = {name: load_gait(name, s.preset) for name in gait_names(s.preset)}
-        for name, gait in self.gaits.items():
-            if isinstance(gait, HarmonicGait):
-                raise wrong(s.preset)(
-                    f"{named_preset(s.preset)}, gait {name!r}: expected the four parameters of one harmonic, "
-                    f"which environments of one leg take, got {gait!r}"
-                )
-        self.gait = None if s.gait is None else self.gaits[check_choice("gait", s.gait, self.gaits)]
-        self._base = MIDDLE if self.gait is None else self.gait.to_array()
+        self.body = Horse(s) if task.is_horse else OneLeg(s)
         self.terms = tuple(term.key for term in task.terms)
         self.weights = check_weights(s.reward_weights, task.terms)
         self.substeps = substeps_of(s.dt, s.sim_dt)
@@ -112,9 +103,6 @@ class EpisodeBatch:
             "episode_seconds", s.episode_seconds, low=low, high=LONGEST_EPISODE
         )
         self.steps_per_episode = round(s.episode_seconds / self.dt)
-        nominal = self.geometry.hip_height
-        height = nominal if s.hip_height is None else s.hip_height
-        self.height = check_number("hip_height", height, low=LOWEST * nominal, high=HIGHEST * nominal)
         self.groups = check_groups(s.observation, groups_of(task.entries))
         self.target_speed = None if s.target_speed is None else pair("target_speed", s.target_speed, -20.0)
         self.speed_changes = self.target_speed is not None and self.target_speed[0] < self.target_speed[1]
@@ -125,26 +113,28 @@ class EpisodeBatch:
                 raise ParameterError(
                     f"observation: {group!r} is constant without {needed}, got {needed}={given!r}"
                 )
-        trunk, ground, limb = physics(s, self.geometry, self.height, {})
+        trunk, ground, limbs = self.body.parts(s)
         substeps = None
         if self.randomize:
             substeps = max(self._parts(corner, None) for corner in ({}, *extremes(self.randomize)))
         self.engine = TrunkEngine(
-            limb, trunk, ground, self._terrain, substeps=substeps,
+            limbs, trunk, ground, self._terrain, substeps=substeps,
             sim_dt=s.sim_dt, integrator="midpoint" if is_paper else s.integrator,
             num_envs=num_envs, num_threads=num_threads, strides=True, contact_law=task.contact_law,
+            harmonics=self.body.harmonics, filters=self.body.filters, limits=self.body.limits,
         )  # fmt: skip
         self.paper = PaperSolver(s, self.engine, self.substeps) if is_paper else None
         self._varied = np.zeros(num_envs, bool)
-        self.begun = np.full((BEGUN + len(self.randomize), num_envs), np.nan)
+        self.begun = np.full((self.begun_rows + len(self.randomize), num_envs), np.nan)
         self.names = [entry.name for entry in observed(self.groups, s.trunk, task.entries)]
         if not self.names:
             raise ParameterError(f"observation: nothing of {s.observation!r} is observed on a fixed trunk")
         columns = self.engine.columns
-        self.episode = np.zeros((episode_layout(len(task.terms)).size, columns))
-        self.actions = np.zeros((columns, ACTIONS), np.float32)
+        self.episode = np.zeros((self._episode_layout.size, columns))
+        self.actions = np.zeros((columns, self.body.actions), np.float32)
         self.observations = np.zeros((columns, len(self.names)), np.float32)
         self.rewards = np.zeros(columns)
+        self.measurements = Measurements(self.engine.features, self.body.legs)
         self._task = self._task_record()
         self._open()
         self.now.weight[:] = self.engine.weight
@@ -155,17 +145,17 @@ class EpisodeBatch:
 
     def _task_record(self) -> NDArray[Any]:
         slots, _, count = kernels.slots_of(self.task.entries)
-        constants = np.zeros(1, kernels.task_type(len(self.task.terms), count))
+        constants = np.zeros(
+            1, kernels.task_type(len(self.task.terms), count, self.engine.features.gait_size)
+        )
         task = constants[0]
-        task["base"], task["middle"] = self._base, MIDDLE
-        task["half"], task["low"], task["high"] = HALF_RANGE, LOW, HIGH
-        task["rate_bound"] = self.engine.filters.to_array()[:, 1]
+        for name, value in self.body.constants().items():
+            task[name] = value
+        task["rate_bound"][:ACTIONS] = self.engine.filters.to_array()[:, 1]
         task["weights"] = [self.weights[term.name] for term in self.task.terms]
         task["episode_seconds"] = self.episode_seconds
         task["h"], task["substeps"] = self.engine.substep, self.substeps * self.engine.substeps
         task["dt"], task["episode_steps"] = self.dt, self.steps_per_episode
-        task["height"] = self.height
-        task["lowest"], task["highest"] = LOWEST * self.height, HIGHEST * self.height
         task["stays"] = self.settings.trunk == "fixed"
         task["count"], task["places"] = len(self.names), -1
         for entry, slot in zip(self.task.entries, slots, strict=True):
@@ -173,12 +163,21 @@ class EpisodeBatch:
                 task["places"][slot] = self.names.index(entry.name)
         return constants
 
+    @property
+    def _episode_layout(self) -> Any:
+        return episode_layout(len(self.task.terms), self.body.legs)
+
+    @property
+    def begun_rows(self) -> int:
+        """How many numbers an episode starts with, besides those drawn."""
+        return len(self.body.start_names) + len(self.body.gait_names)
+
     def _open(self) -> None:
         """Find the arrays where they are now, and the kernels."""
         self.entries = observed(self.groups, self.settings.trunk, self.task.entries)
-        self.now = views(episode_layout(len(self.task.terms)), self.episode)
+        self.now = views(self._episode_layout, self.episode)
         self._kernels = k = kernels.step_kernels(
-            self.task.terms, self.task.entries, self.task.contact_law, self.engine.features
+            self.task.terms, self.task.entries, self.task.contact_law, self.engine.features, self.body.legs
         )
         is_few = self.engine.is_few or self.paper
         self.kernel, self._observe = (
@@ -195,14 +194,13 @@ class EpisodeBatch:
 
     def _compile(self) -> None:
         """Have every kernel of a step compiled, or loaded, by running it on no environment."""
-        gait = GaitParameters.from_array(MIDDLE)
         if self.paper:
             self._run_idle(self._kernels.apply_one, self._kernels.finish_one)
-            self.paper.compile(gait)
+            self.paper.compile(GaitParameters.from_array(MIDDLE))
         else:
             self._run_idle(self.kernel)
         self._run_idle(self._observe)
-        self.engine.reset(gait, envs=[])
+        self.engine.reset(np.empty((self.body.legs, self.engine.features.gait_size, 0)), envs=[])
 
     def _run_idle(self, *step_kernels: Any) -> None:
         idle = self.addresses.copy()
@@ -243,8 +241,7 @@ class EpisodeBatch:
     def check_options(self, options: Any) -> dict[str, Any]:
         """Reset options as `reset` takes them; `ParameterError` of whatever can be wrong with them, so that a
         refused reset changes nothing."""
-        s = self.settings
-        checked = check_options(options, self.gaits, self.engine.trunk, s)
+        checked = self.body.check_options(options, self.engine.trunk, self.settings)
         if self.paper and checked.get("parameters"):
             raise ParameterError(
                 f"options['parameters']: expected none with solver=\"paper\", got {checked['parameters']!r}"
@@ -261,10 +258,10 @@ class EpisodeBatch:
 
     def _parts(self, changes: Mapping[str, float], asked: int | None) -> int:
         """Into how many parts `sim_dt` is cut with some settings changed, see `StepLength.choose`."""
-        trunk, ground, limb = physics(self.settings, self.geometry, self.height, changes)
-        s = self.settings
-        profiles = [leg_profile(self.geometry)]
-        length = StepLength((limb,), profiles, trunk, ground, self._terrain, s.integrator)
+        s: Any = replace(self.settings, **dict(changes))  # type: ignore[arg-type]
+        trunk, ground, limbs = self.body.parts(s)
+        profiles = [leg_profile(limb.geometry) for limb in limbs]
+        length = StepLength(limbs, profiles, trunk, ground, self._terrain, s.integrator)
         return length.choose(s.sim_dt, asked, stacklevel=5)
 
     def reset(
@@ -272,11 +269,10 @@ class EpisodeBatch:
         envs: Sequence[int] | NDArray[np.int64],
         generators: Sequence[np.random.Generator],
         options: Mapping[str, Any],
-    ) -> dict[str, Any]:
+    ) -> dict[str, Floats]:
         """Start episodes in `envs`, with a generator each and options as `check_options` gives them.
 
-        Returns what was drawn, by name, one row an environment: gaits, crank_angle, speed, height, x; and
-        "parameters", those of this episode by name.
+        Returns the "parameters" that were drawn or set, by name, shape (len(envs),).
         """
         which, now = np.asarray(envs, np.int64), self.now
         options = {**self.task.start, **options}
@@ -287,22 +283,10 @@ class EpisodeBatch:
                 values = draw_parameters(parameters, generator)
                 for name, value in values.items():
                     drawn[name][k] = value
-                trunk, ground, limb = physics(self.settings, self.geometry, self.height, values)
-                self.engine.vary(int(env), trunk, ground, limbs=[limb])
-                now.weight[env] = (trunk.mass + self.geometry.mass) * GRAVITY
+                self._vary(int(env), values)
             self._varied[which] = bool(parameters)
-        start = draw_starts(
-            options, generators, self.engine.profiles[0], self.engine.trunk, self.gaits, self.engine.terrain,
-            self.gait,
-        )  # fmt: skip
-        self.engine.reset(
-            start.gaits.T[None], start.crank_angle[None],
-            x=start.x, y=start.height, vx=start.speed, envs=which,
-        )  # fmt: skip
-        begun = [*(getattr(start, name) for name in START), *start.gaits.T]
-        self.begun[:, which] = [*begun, *(drawn[name] for name in self.randomize)]
-        now.action[:, which] = self.action_for(start.gaits).T
-        now.steps[which], now.x_before[which], now.ended[which] = 0.0, start.x, 0.0
+        start = self.body.draw(options, generators, self.engine)
+        now.steps[which] = 0.0
         for name in SUMS:
             getattr(now, name)[which] = 0.0
         self.rewards[which] = 0.0
@@ -313,10 +297,29 @@ class EpisodeBatch:
             for env, generator in zip(which, generators, strict=True):
                 now.target[env] = generator.uniform(*self.target_speed)
                 self._draw_target(int(env), generator)
+        self.body.settle(start, now.target[which], options, self.engine)
+        self.engine.reset(start.commands, start.theta, envs=which, **start.trunk)
+        begun = [*(start.begun[name] for name in self.body.start_names), *start.gaits.T]
+        self.begun[:, which] = [*begun, *(drawn[name] for name in self.randomize)]
+        now.action[:, which] = start.action.T
+        now.x_before[which], now.ended[which] = start.trunk["x"], 0.0
+        self._refer(which, start.gaits)
         if self.paper:
-            self.paper.start(which.tolist(), start.gaits, start.crank_angle, start.x)
+            self.paper.start(which.tolist(), start.gaits, start.begun["crank_angle"], start.begun["x"])
         self._observe(self.addresses)
-        return {**vars(start), "parameters": drawn}
+        return drawn
+
+    def _vary(self, env: int, values: Mapping[str, float]) -> None:
+        """Give one environment settings of its own."""
+        trunk, ground, limbs = self.body.parts(replace(self.settings, **dict(values)))  # type: ignore[arg-type]
+        self.engine.vary(env, trunk, ground, limbs=limbs)
+        self.now.weight[env] = (trunk.mass + sum(limb.geometry.mass for limb in limbs)) * GRAVITY
+
+    def _refer(self, envs: NDArray[np.int64], gaits: Floats) -> None:
+        """Let the actions of a horse lie around these gaits from now on."""
+        if self.body.legs > 1:
+            rows = self._episode_layout.rows("fore").start
+            self.episode[rows:, envs] = rows_of(gaits)
 
     def _draw_target(self, env: int, generator: np.random.Generator) -> None:
         assert self.target_speed
@@ -343,8 +346,11 @@ class EpisodeBatch:
             self._observe_broken()
         if happened & kernels.SOME_SWITCHED:
             due = (self.now.steps >= self.now.switch)[: self.num_envs]
-            for env in np.flatnonzero(due if idle is None else due & ~idle):
+            due = np.flatnonzero(due if idle is None else due & ~idle)
+            for env in due:
                 self._draw_target(int(env), generators[int(env)])
+            if isinstance(self.body, Horse):
+                self._refer(due, self.body.reference(self.now.target[due]))
         return bool(happened & kernels.SOME_ENDED)
 
     def _observe_broken(self) -> None:
@@ -353,8 +359,11 @@ class EpisodeBatch:
         kept, form = data.copy(), form_of(self.engine.features)
         leg = form.leg_memory.rows("report")
         self.engine.advance(None, 0)
-        of_leg = slice(form.trunk_rows + leg.start, form.trunk_rows + leg.stop)
-        for rows in (form.trunk_memory.rows("report"), of_leg):
+        reports = [form.trunk_memory.rows("report")]
+        for k in range(self.body.legs):
+            first = form.trunk_rows + k * form.leg_rows
+            reports.append(slice(first + leg.start, first + leg.stop))
+        for rows in reports:
             kept[rows, broken] = data[rows, broken]
         data[:] = kept
         self._observe(self.addresses)
@@ -364,15 +373,16 @@ class EpisodeBatch:
         (num_envs,), but for "gait", "measured" and "parameters", which are `Named`. `ended` says whether
         there may be environments that could not be simulated."""
         n, begun, memory = self.num_envs, self.begun.copy(), self.engine.arrays[0]
-        measured = memory[at_measured(self.engine.features), :n].copy()
+        measured = self.measurements.read(memory[:, :n])
         if ended:
             broken = self.engine.results != 0
-            measured[LAST_STEP, broken] = 0.0  # nothing happened there
-        infos: dict[str, NDArray[Any]] = dict(zip(START, begun, strict=False))
-        infos["gait"] = begun[len(START) : BEGUN].T.view(GAIT)
+            measured[np.ix_(self.measurements.last_step, broken)] = 0.0  # nothing happened there
+        first, names = self.begun_rows, self.body.start_names
+        infos: dict[str, NDArray[Any]] = dict(zip(names, begun, strict=False))
+        infos["gait"] = named(begun[len(names) : first].T, self.body.gait_names)
         if self.randomize:
-            infos["parameters"] = named(begun[BEGUN:].T, tuple(self.randomize))
-        infos["measured"] = measured.T.view(measurements(self.engine.features))
+            infos["parameters"] = named(begun[first:].T, tuple(self.randomize))
+        infos["measured"] = measured.T.view(self.measurements.kind)
         infos.update(zip(self.terms, self.now.terms[:, :n].copy(), strict=True))
         return infos
 
@@ -383,13 +393,15 @@ class EpisodeBatch:
         whole time), stance_peak_sum_n, stances, loading_rate_n_s (mean over stances), duty_factor,
         drive_work_j (braking is not recovered), cost_of_transport (work per weight and distance; infinite
         without forward progress), weight_share (mean normal force over weight: what the leg bore),
-        support_share (the rest: what the rail or the suspension bore), failed (0 or 1).
+        support_share (the rest: what the rail or the suspension bore), failed (0 or 1); of a horse slip_m
+        (mean over stances), and mean, sum and duty factor are of all its legs.
         """
-        seconds, distance, work, impulse, loaded, stances, peaks, rates, highest = (
+        seconds, distance, work, impulse, loaded, stances, peaks, rates, highest, slip = (
             float(getattr(self.now, name)[env]) for name in SUMS
         )
         weight, time = float(self.now.weight[env]), max(seconds, 1e-12)
         mean = impulse / time
+        slid = {"slip_m": slip / max(stances, 1.0)} if self.engine.features.animal else {}
         return {
             "seconds": round(round(seconds / self.dt) * self.dt, 12),  # the sum of rounded steps is 9.99...
             "distance_m": distance,
@@ -399,7 +411,8 @@ class EpisodeBatch:
             "stance_peak_sum_n": peaks,
             "stances": stances,
             "loading_rate_n_s": rates / max(stances, 1.0),
-            "duty_factor": loaded / time,
+            "duty_factor": loaded / time / self.body.legs,
+            **slid,
             "drive_work_j": work,
             "cost_of_transport": work / (weight * distance) if distance > 0 else float("inf"),
             "weight_share": mean / weight,
@@ -413,28 +426,6 @@ class EpisodeBatch:
             return "the linkage came apart; the state was put back to the last good one"
         result = Result(int(self.engine.results[env]))
         return result.message if result is not Result.OK else "the trunk left its range of heights"
-
-    # Actions
-
-    def command_of(self, action: Any) -> Floats:
-        """See `LegBase.command_of`; they are clipped to their limits."""
-        wanted = self._base + HALF_RANGE * np.clip(np.asarray(action, np.float64), -1.0, 1.0)
-        return np.clip(wanted, LOW, HIGH)
-
-    def action_for(self, gaits: str | GaitParameters | Floats) -> NDArray[np.float32]:
-        """See `LegBase.action_for`."""
-        if isinstance(gaits, str):
-            gaits = self.gaits[check_choice("gait", gaits, self.gaits)]
-        try:
-            values = gaits.to_array() if isinstance(gaits, GaitParameters) else np.asarray(gaits, np.float64)
-        except (TypeError, ValueError):
-            values = np.empty(0)
-        if values.shape[-1:] != (ACTIONS,) or not np.isfinite(values).all():
-            raise ParameterError(
-                f"gait: expected one of {', '.join(self.gaits)}, GaitParameters or an array of shape (4,) or "
-                f"(n, 4), got {gaits!r}"
-            )
-        return np.clip((values - self._base) / HALF_RANGE, -1, 1).astype(np.float32)
 
     # State
 

@@ -14,13 +14,12 @@ from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
 from hoof_env.envs.base import LegBase, array_of, generator_of
-from hoof_env.envs.infos import BEGUN, LAST_STEP, START, at_measured, measured_names, named
+from hoof_env.envs.infos import named
 from hoof_env.envs.recording import Recording
 from hoof_env.envs.reward import failure
-from hoof_env.envs.step import ACTIONS, FAILED
+from hoof_env.envs.step import FAILED
 from hoof_env.envs.tasks import Keywords
 from hoof_env.errors import ParameterError, count, flag
-from hoof_env.gait import PARAMETERS
 
 
 class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
@@ -54,13 +53,13 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def _attach(self) -> None:
         """What every step reads, writes or calls, found once."""
-        batch, terms, features = self.batch, self.task.terms, self.batch.engine.features
+        batch, terms = self.batch, self.task.terms
         weighed = [(k, term) for k, term in enumerate(terms) if batch.weights[term.name]]
         paid = [(term.key, k) for k, term in weighed if term.compute is not failure]  # 0 before the end
         self._views: tuple[Any, ...] = (
             batch.actions[0].data, batch.direct_kernel(), batch.addresses, bool(batch.randomize), paid,
             batch.now.terms[:, 0], batch.rewards.data, batch.observations[0].copy,
-            named(batch.engine.arrays[0][at_measured(features), 0], measured_names(features)).copy,
+            batch.measurements.reader(batch.engine.arrays[0][:, 0]),
         )  # fmt: skip
 
     # What pictures, records and policies read
@@ -108,14 +107,14 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         super().reset(seed=None if seed is None else count("seed", seed, low=0))
         if self._recording is not None:
             self._recording.start()
-        start = self.batch.reset([0], [self.np_random], checked)
+        parameters = self.batch.reset([0], [self.np_random], checked)
         self._phase = "running"
         if self._recording is not None:
             self._show(restart=True)
         self._begin()
         info = copy.deepcopy(self._begun[0]()) | {"measured": self._views[-1]()}
-        if start["parameters"]:
-            info["parameters"] = named([v[0] for v in start["parameters"].values()], [*start["parameters"]])
+        if parameters:
+            info["parameters"] = named([values[0] for values in parameters.values()], [*parameters])
         return self.batch.observations[0].copy(), info
 
     def step(
@@ -162,7 +161,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             if failed:
                 info["failure"] = self.batch.failure(0)
             if self.batch.engine.results[0]:  # nothing happened
-                info["measured"][LAST_STEP] = 0.0
+                info["measured"][self.batch.measurements.last_step] = 0.0
         if self._recording is not None:
             self._show()
         return observe(), rewards[0], failed, truncated, info
@@ -178,18 +177,19 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def _begin(self) -> None:
         """What each info of this episode says of its start, and the keys of what a step fills in."""
-        row, n = self.batch.begun[:, 0].copy(), len(START)
-        gait, info = named(row[n:BEGUN], PARAMETERS), dict[str, Any](zip(START, row, strict=False))
-        info["gait"] = gait
+        row, body, first = self.batch.begun[:, 0].copy(), self.batch.body, self.batch.begun_rows
+        info = dict[str, Any](zip(body.start_names, row, strict=False))
+        info["gait"] = gait = named(row[len(body.start_names) : first], body.gait_names)
         if self.batch.randomize:
-            info["parameters"] = named(row[BEGUN:], [*self.batch.randomize])
+            info["parameters"] = named(row[first:], [*self.batch.randomize])
         info |= {"measured": None, **dict.fromkeys(self.batch.terms, np.float64(0.0))}
         self._begun = info.copy, gait.copy
 
     def _read_action(self, action: Any) -> None:
         given = array_of(action)
-        if given.shape != (ACTIONS,) or given.dtype.kind not in "fiu":
-            raise ParameterError(f"action: expected 4 finite numbers in [-1, 1], got {action!r}")
+        count = self.batch.body.actions
+        if given.shape != (count,) or given.dtype.kind not in "fiu":
+            raise ParameterError(f"action: expected {count} finite numbers in [-1, 1], got {action!r}")
         with np.errstate(over="ignore"):  # to infinity, which is refused
             self.batch.actions[0] = given
 

@@ -6,39 +6,82 @@ same keys at a reset and at a step: libraries that stack infos ask for that.
 
 from __future__ import annotations
 
-from collections.abc import ItemsView, KeysView, Mapping, Sequence, ValuesView
+from collections.abc import Callable, ItemsView, KeysView, Mapping, Sequence, ValuesView
 from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.dynamics.form import form_of
-from hoof_env.dynamics.layout import PLAIN, STRIDE_SUMS, STRIDES, TRUNK_REPORT, Features, leg_state
-from hoof_env.gait import PARAMETERS
-
-START = ("crank_angle", "speed", "height", "x")
-"""What an episode starts with, besides its gait and the parameters that are drawn."""
-
-BEGUN = len(START) + len(PARAMETERS)  # how many numbers these are; those drawn follow
-
-LAST_STEP = slice(-len(STRIDE_SUMS), None)
-"""Which rows of what is measured are of the last control step, not of its end."""
-
-
-def measured_names(features: Features = PLAIN) -> tuple[str, ...]:
-    """What an info measures, neighbours in the engine's memory: read with one copy."""
-    return (*TRUNK_REPORT, "result", *leg_state(features), *STRIDES, *STRIDE_SUMS)
+from hoof_env.dynamics.layout import (
+    LEG_REPORT,
+    PLAIN,
+    STRIDES,
+    TRUNK_REPORT,
+    Features,
+    leg_state,
+    stride_sums,
+)
+from hoof_env.envs.reference import LEGS
+from hoof_env.gait import parameter_names
 
 
-def at_measured(features: Features) -> slice:
-    """Where that is."""
-    form = form_of(features)
-    return slice(form.trunk_memory.rows("report").start, form.trunk_rows + form.leg_memory.rows("sums").stop)
+def measured_names(features: Features = PLAIN, legs: int = 1) -> tuple[str, ...]:
+    """What an info measures: of one leg neighbours in the engine's memory, read with one copy; of a horse
+    the trunk's pitch, too, and each leg's command and report, under its name in `reference.LEGS`."""
+    leg = (*leg_state(features), *STRIDES, *stride_sums(features))
+    if legs == 1:
+        return (*TRUNK_REPORT, "result", *leg)
+    command = tuple(f"command_{name}" for name in parameter_names(features.harmonics))
+    each = (f"{one}_{name}" for one in LEGS for name in (*leg, *command, *LEG_REPORT))
+    return ("pitch", *TRUNK_REPORT, "result", *each)
 
 
 MEASURED = measured_names()
 """Of a leg with a rigid hoof."""
+
+
+class Measurements:
+    """Where what is measured lies in the memory of engines of a kind.
+
+    Attributes:
+        names: of it.
+        kind: of `Named`, to view arrays as.
+        last_step: which of it is of the last control step, not of its end.
+    """
+
+    def __init__(self, features: Features, legs: int) -> None:
+        self.names = measured_names(features, legs)
+        self.kind = _kind(self.names)
+        form = form_of(features)
+        trunk, leg, first = form.trunk_memory.rows, form.leg_memory.rows, form.trunk_rows
+        self._rows: Any = slice(trunk("report").start, first + leg("sums").stop)
+        if legs > 1:
+            pitch = trunk("state").stop - 2
+            rows = [pitch, *range(trunk("report").start, first)]
+            for k in range(legs):
+                parts = (range(0, leg("sums").stop), *(range(leg(name).start, leg(name).stop)
+                         for name in ("command", "report")))  # fmt: skip
+                rows += [first + k * form.leg_rows + row for part in parts for row in part]
+            self._rows = np.array(rows)
+        sums = [
+            f"{leg}{name}" for leg in ("", *(f"{one}_" for one in LEGS)) for name in stride_sums(features)
+        ]
+        self.last_step = np.array([k for k, name in enumerate(self.names) if name in sums])
+
+    def read(self, memory: NDArray[np.float64]) -> NDArray[np.float64]:
+        """A copy of what is measured, from columns of memory, shape (rows, ...)."""
+        found: NDArray[np.float64] = memory[self._rows]
+        return found.copy() if isinstance(self._rows, slice) else found
+
+    def reader(self, column: NDArray[np.float64]) -> Callable[[], Any]:
+        """A function that reads a column that stays where it is, with names."""
+        if isinstance(self._rows, slice):
+            copied: Callable[[], Any] = named(column[self._rows], self.names).copy
+            return copied
+        rows, kind = self._rows, self.kind
+        return lambda: column[rows].view(kind)
 
 
 class Named(np.ndarray[Any, np.dtype[np.float64]]):
@@ -108,15 +151,6 @@ def _kind(names: tuple[str, ...]) -> type[Named]:
 def named(values: ArrayLike, names: Sequence[str]) -> Named:
     """A view of some numbers, shape (..., len(names)), that has names."""
     return np.asarray(values, np.float64).view(_kind(tuple(names)))
-
-
-GAIT = _kind(PARAMETERS)
-"""A kind of `Named`, to view arrays as."""
-
-
-def measurements(features: Features) -> type[Named]:
-    """That of what is measured."""
-    return _kind(measured_names(features))
 
 
 def row_of(infos: Mapping[str, Any], env: int) -> dict[str, Any]:

@@ -17,19 +17,24 @@ from typing import Any
 
 from hoof_env._output import markdown_table
 from hoof_env.dynamics.constrained import INTEGRATORS
+from hoof_env.dynamics.layout import Features
 from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.dynamics.parts import ONE_LEG
 from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.envs import observation, start
+from hoof_env.envs.horse import OPTIONS as HORSE_OPTIONS
+from hoof_env.envs.horse import SPANS, Horse
 from hoof_env.envs.horse_leg import HorseLegMOEnv
-from hoof_env.envs.infos import MEASURED
+from hoof_env.envs.infos import measured_names
+from hoof_env.envs.one_leg import OneLeg
 from hoof_env.envs.parameters import HILLS, SPACING
+from hoof_env.envs.reference import ACTED, COUNT
 from hoof_env.envs.reward import check_weights
 from hoof_env.envs.tasks import PER_EPISODE, TASKS, Settings, Task, task_of, to_json
 from hoof_env.errors import OutputError, check_choice
-from hoof_env.gait import LIMITS, FilterSettings
+from hoof_env.gait import LIMITS, QUICK, FilterSettings
 from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS
-from hoof_env.leg.geometry import load_geometry, preset_names
+from hoof_env.leg.geometry import preset_names
 
 HERE = Path(__file__).parent
 PAGE, MO_PAGE = (
@@ -69,7 +74,8 @@ def page(task: str) -> str:
     what = task_of("leg" if task == "mo" else task)
     if task == "mo":
         return Template(MO_PAGE).substitute(observations=_observations(what))
-    s = what.settings({})
+    s, kind = what.settings({}), "horse" if what.is_horse else "leg"
+    body = Horse(s) if what.is_horse else OneLeg(s)
     trunk, groups = TABLES[s.trunk], observation.groups_of(what.entries)
     weights = check_weights(s.reward_weights, what.terms)
     rewards = [(f"`{t.key}`", f"`{t.name}`", f"{weights[t.name]:g}", t.unit, t.meaning) for t in what.terms]
@@ -77,16 +83,23 @@ def page(task: str) -> str:
     settings = _rows("settings", defaults | {name: f"**{defaults[name]}**" for name in what.defaults})
     hills = {name: literal(value) for name, value in HILLS.items()}
     head = ("Name", "Default", "Unit", "Meaning")
-    height = s.hip_height or load_geometry(s.preset).hip_height
     limits = [f"{low:.5g} to {high:.5g} {GAIT[k].unit}" for k, (low, high) in enumerate(LIMITS.values())]
     text = Template(PAGE).substitute(
         name=what.name,
         id=what.id,
         summary=what.summary,
         about=what.about,
-        trunk=trunk["moves"],
-        action_space=f"Box(-1, 1, ({len(LIMITS)},), float32)",
-        actions=_actions(s.gait),
+        body=Template(WORDS[f"{kind}_body"].strip()).safe_substitute(trunk=trunk["moves"]),
+        action_space=f"Box(-1, 1, ({body.actions},), float32)",
+        actions=_horse_actions() if what.is_horse else _actions(s.gait),
+        commands=WORDS[f"{kind}_commands"].strip(),
+        observed=WORDS[f"{kind}_observed"].strip(),
+        still="" if what.is_horse else WORDS["leg_still"].rstrip(),
+        share="a fourth of " if what.is_horse else "",
+        legs=str(body.legs),
+        of_legs="legs'" if what.is_horse else "leg's",
+        prefixes=WORDS["prefixes"] if what.is_horse else "",
+        example='"phase": 0.0' if what.is_horse else '"gait": "run", "crank_angle": 0.0',
         offsets=Template(WORDS["offsets"]).substitute(gait=s.gait, limits=", ".join(limits))
         if s.gait
         else "",
@@ -97,14 +110,14 @@ def page(task: str) -> str:
         target_reward=WORDS["target_reward"] if s.target_speed else "",
         lift_off=f"{100 * LIFT_OFF:g}",
         start=_start(s, what.start),
-        options=markdown_table(("Option", "Unit", "Range", "Meaning"), _options()),
+        options=markdown_table(("Option", "Unit", "Range", "Meaning"), _options(what.is_horse)),
         parameters=", ".join(f"`{name}`" for name in PER_EPISODE),
-        infos=markdown_table(("Key", "Unit", "Meaning"), _rows("info")),
-        measured=str(len(MEASURED)),
-        quantities=markdown_table(("Name", "In", "Unit", "Meaning"), _rows("quantities")),
-        leaves=Template(trunk["leaves"]).substitute(height=f"{height:.4g}"),
+        infos=markdown_table(("Key", "Unit", "Meaning"), _rows("horse_info" if what.is_horse else "info")),
+        measured=str(len(measured_names(_features(s, body), body.legs))),
+        quantities=markdown_table(("Name", "In", "Unit", "Meaning"), _quantities(what.is_horse)),
+        leaves=Template(trunk["leaves"]).substitute(height=f"{body.height:.4g}"),
         seconds=literal(s.episode_seconds),
-        figures=markdown_table(("Figure", "Unit", "Meaning"), _rows("summary")),
+        figures=markdown_table(("Figure", "Unit", "Meaning"), _figures(what.is_horse)),
         vector_arguments=markdown_table(("Argument", "Default", "Meaning"), _vector_arguments()),
         bold=WORDS["bold"] if what.defaults else "",
         settings=markdown_table(head, [*settings, RENDER_MODE]),
@@ -128,8 +141,9 @@ def index() -> str:
         what, native = TASKS.get(task, TASKS["leg"]), "yes" if task in TASKS else "no"
         summary = what.summary if task in TASKS else str(HorseLegMOEnv.__doc__).splitlines()[0]
         link = f"[`hoof_env/{name}-v0`]({name}.md)"
-        rows.append((link, summary, str(len(_observed(what))), what.reference, native))
-    head = ("id", "what it is", "observation", "reference gait", "native vector environment")
+        actions = str(ACTED * (COUNT if what.is_horse else 1))
+        rows.append((link, summary, actions, str(len(_observed(what))), what.reference, native))
+    head = ("id", "what it is", "action", "observation", "reference gait", "native vector environment")
     return Template(WORDS["index"]).substitute(table=markdown_table(head, rows))
 
 
@@ -163,6 +177,32 @@ def _observed(what: Task) -> list[observation.Entry]:
     return observation.observed(settings.observation, settings.trunk, what.entries)
 
 
+def _features(s: Settings, body: Horse | OneLeg) -> Features:
+    return Features(body.harmonics, s.hoof_stiffness is not None, body.limits is not None)
+
+
+def _quantities(of_horse: bool) -> list[tuple[str, ...]]:
+    """What is measured and recorded; of a horse what its engine has beyond that of one leg, too."""
+    own = {**TABLES["quantities"], **(TABLES["horse_quantities"] if of_horse else {})}
+    return [(", ".join(f"`{one}`" for one in names.split(", ")), *cells) for names, cells in own.items()]
+
+
+def _figures(of_horse: bool) -> list[tuple[str, ...]]:
+    return [row for row in _rows("summary") if of_horse or row[0] != "`slip_m`"]
+
+
+def _horse_actions() -> str:
+    bounds = QUICK.to_array()[:, 1]
+    rows = []
+    for k, span in enumerate(SPANS):
+        what = ("times 1 + action", "-") if k == 0 else ("plus", "rad")
+        fastest = f"{bounds[k]:g} {GAIT[len(LIMITS) + k].unit}"
+        numbers = ", ".join(str(ACTED * leg + k) for leg in range(COUNT))
+        rows.append((numbers, GAIT[k].name, what[0], f"{-span:g}", f"{span:g}", what[1], fastest))
+    head = ("Num", "Of the reference", "Is", "At -1", "At +1", "Unit", "Fastest change")
+    return markdown_table(head, rows)
+
+
 def _actions(gait: str | None) -> str:
     bounds = FilterSettings().to_array()[:, 1]
     rows = []
@@ -182,6 +222,8 @@ def _observations(what: Task) -> str:
 
 def _start(settings: Settings, options: Mapping[str, float]) -> str:
     trunk = TABLES[settings.trunk]
+    if settings.trunk == "free":
+        return "; ".join((WORDS["start_horse"], trunk["speed"], trunk["height"], WORDS["start_target"]))
     return "; ".join(
         (
             f"Crank angle {options['crank_angle']:g}" if "crank_angle" in options else "Crank angle uniform",
@@ -194,9 +236,10 @@ def _start(settings: Settings, options: Mapping[str, float]) -> str:
     )
 
 
-def _options() -> Iterable[tuple[str, ...]]:
-    for name, (unit, meaning) in TABLES["options"].items():
-        low, high = start.OPTIONS.get(name, (0.0, 0.0))
+def _options(of_horse: bool) -> Iterable[tuple[str, ...]]:
+    ranges = HORSE_OPTIONS if of_horse else start.OPTIONS
+    for name, (unit, meaning) in TABLES["horse_options" if of_horse else "options"].items():
+        low, high = ranges.get(name, (0.0, 0.0))
         within = "" if low == high else f"{low:.7g} to {high:.7g}" if math.isfinite(high) else f"from {low:g}"
         yield f"`{name}`", unit, within, meaning
 

@@ -151,7 +151,7 @@ def _cosine(scene):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _contact(memory):  # type: ignore[no-untyped-def]
+def in_contact(memory):  # type: ignore[no-untyped-def]
     return choose(memory.penetration > 0.0, 1.0, 0.0)
 
 
@@ -187,8 +187,8 @@ ENTRIES = (
         "height", "trunk", "m", lambda s: s.trunk.report.place.imag,
         Scale("tanh((x - hip height) / 0.3)", _height, True),
     ),
-    Entry("toe contact", "hoof", "-", lambda s: _contact(s.leg.state.toe), TRUTH),
-    Entry("heel contact", "hoof", "-", lambda s: _contact(s.leg.state.heel), TRUTH),
+    Entry("toe contact", "hoof", "-", lambda s: in_contact(s.leg.state.toe), TRUTH),
+    Entry("heel contact", "hoof", "-", lambda s: in_contact(s.leg.state.heel), TRUTH),
     Entry("toe load", "hoof", "N", lambda s: s.leg.report.toe.normal, IN_WEIGHTS),
     Entry("heel load", "hoof", "N", lambda s: s.leg.report.heel.normal, IN_WEIGHTS),
     Entry("toe approach speed", "hoof", "m/s", lambda s: _approach_speed(s.leg.state.toe), tanh_of(2.0)),

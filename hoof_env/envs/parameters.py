@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from hoof_env.dynamics.parts import Drive, HoofSpring, Limb, Motor, Prescribed, Trunk
+from hoof_env.dynamics.parts import Drive, HoofSpring, Motor, Prescribed
 from hoof_env.envs.tasks import PER_EPISODE, SOLVERS, Settings, check_effect
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.ground.contact import Ground, load_ground
 from hoof_env.ground.terrain import Terrain
-from hoof_env.leg.geometry import Geometry, named, read_preset, wrong
+from hoof_env.leg.geometry import named, read_preset, wrong
 
 MOST_SUBSTEPS = 100_000  # of a control step
 
@@ -65,23 +65,20 @@ def substeps_of(dt: float, sim_dt: float) -> int:
     return round(ratio)
 
 
-def physics(
-    settings: Settings, geometry: Geometry, height: float, changes: Mapping[str, float]
-) -> tuple[Trunk, Ground, Limb]:
-    """Trunk at a height [m], ground and leg of some `resolved` settings with others changed."""
-    s: Any = replace(settings, **dict(changes))  # type: ignore[arg-type]
-    trunk = Trunk(
-        s.trunk, s.trunk_mass, s.trunk_share, s.trunk_stiffness, s.trunk_damping, s.trunk_drag, height
-    )  # fmt: skip
-    ground = Ground(
+def ground_of(s: Any, mass: float) -> Ground:
+    """The ground of some `resolved` settings, under a trunk of so much mass [kg]."""
+    return Ground(
         s.stiffness, s.exponent, s.normal_law, s.restitution, s.approach_floor,
         "sampled" if s.solver == "paper" else "interpolated",
-        s.friction_law, s.friction, s.friction_slow, s.friction_fast, s.trunk_mass,
+        s.friction_law, s.friction, s.friction_slow, s.friction_fast, mass,
     )  # fmt: skip
-    drive: Drive = Prescribed()
-    if s.drive != "prescribed":
-        drive = Motor(s.motor_gain, s.motor_torque, s.motor_inertia, 1.0)
-    return trunk, ground, Limb(geometry, drive=drive, spring=hoof_spring(settings))
+
+
+def drive_of(s: Settings) -> Drive:
+    """What turns the cranks."""
+    if s.drive == "prescribed":
+        return Prescribed()
+    return Motor(s.motor_gain, s.motor_torque, s.motor_inertia, 1.0)
 
 
 def hoof_spring(settings: Settings) -> HoofSpring | None:

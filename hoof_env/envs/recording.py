@@ -77,7 +77,7 @@ class Recording:
             from hoof_env.render.renderer import Renderer
 
             self.renderer = Renderer(
-                self.batch.geometry, mode, fps, trunk=self.batch.settings.trunk, weight_n=weight,
+                self.batch.body.geometry, mode, fps, trunk=self.batch.settings.trunk, weight_n=weight,
                 lift_off_n=LIFT_OFF * weight, terrain=engine.terrain,
             )  # fmt: skip
         if self._restarted:

@@ -17,7 +17,8 @@ from hoof_env.simd.user_functions import check_function
 
 
 class Outcome(NamedTuple):
-    """What a control step brought, for the terms; where the engine failed nothing but `failed`.
+    """What a control step brought, for the terms; where the engine failed nothing but `failed`. Of a horse,
+    forces, work, times and slip are those of all legs together.
 
     Attributes:
         seconds: simulated [s].
@@ -31,12 +32,13 @@ class Outcome(NamedTuple):
         normal_impulse: of the ground on the hoof [N s].
         loaded_time: [s].
         stances: that began.
+        slip: of hoofs that bear load, without sign [m]; 0 where the engine does not say.
         action_change: mean square of the action's change [-].
         failed: 1 where the episode ends by failure, else 0.
         episode_seconds: of a whole episode [s].
-        weight: of trunk and leg [N].
+        weight: of trunk and legs [N].
         trunk, leg, episode: all that the engine and the episode have in memory after the step, fields as in
-            `dynamics.layout.TrunkMemory` and `LegMemory` and `step.Episode`.
+            `dynamics.layout.TrunkMemory` and `LegMemory` and `step.Episode`; `nth(leg, i)` is a horse's i-th.
     """
 
     seconds: Any
@@ -50,6 +52,7 @@ class Outcome(NamedTuple):
     normal_impulse: Any
     loaded_time: Any
     stances: Any
+    slip: Any
     action_change: Any
     failed: Any
     episode_seconds: Any

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.dynamics.parts import Trunk
 from hoof_env.envs.parameters import check_parameters
@@ -42,20 +42,32 @@ MOST_TRIES = 100  # draws of a crank angle at which the hoof is above the ground
 
 
 @dataclass
-class Starts:
-    """Starts of n episodes."""
+class Start:
+    """Starts of n episodes.
 
-    gaits: Floats  # shape (n, 4)
-    crank_angle: Floats  # shape (n,) [rad]
-    speed: Floats  # [m/s]
-    height: Floats  # [m]
-    x: Floats  # [m]
+    Attributes:
+        begun: what infos say of them, by name, shape (n,).
+        gaits: what they say of the gait, shape (n, numbers).
+        commands: of the engine, shape (legs, gait parameters, n).
+        theta: crank angles [rad], shape (legs, n).
+        trunk: arguments of `TrunkEngine.reset` by name, shape (n,).
+        action: that commands the gait, shape (n, actions).
+    """
+
+    begun: dict[str, Floats]
+    gaits: Floats
+    commands: Floats
+    theta: Floats
+    trunk: dict[str, Floats]
+    action: NDArray[np.float32]
 
 
-def hoof_height(profile: LegProfile, gaits: Floats, theta: Floats) -> Floats:
+def hoof_height(profile: LegProfile, gaits: Floats, theta: Floats, turn: ArrayLike = 0.0) -> Floats:
     """Height of the lower hoof point relative to O [m], at crank angles `theta`, shape (n,), of steady gaits,
-    shape (n, 4)."""
-    phi = gaits[:, 1] + gaits[:, 2] * np.sin(theta) + gaits[:, 3] * np.cos(theta)
+    shape (n, 2 + 2 harmonics), of a frame turned by so much more [rad]."""
+    phi: Floats = gaits[:, 1] + gaits[:, 2] * np.sin(theta) + gaits[:, 3] * np.cos(theta) + np.asarray(turn)
+    for k in range(2, gaits.shape[1] // 2):
+        phi = phi + gaits[:, 2 * k] * np.sin(k * theta) + gaits[:, 2 * k + 1] * np.cos(k * theta)
     sine, cosine = profile.geometry.travel * np.sin(phi), np.cos(phi)
     f = by_name(profile(theta)[0])
     toe = sine * f["toe_x"] + cosine * f["toe_y"]
@@ -70,7 +82,7 @@ def draw_starts(
     gaits: Mapping[str, GaitParameters],
     terrain: Terrain,
     own_gait: GaitParameters | None = None,
-) -> Starts:
+) -> Start:
     """Random starts, one for each generator, but for what the options fix (see `check_options`).
 
     No contact begins with a hoof inside the ground: a suspended trunk hangs higher where it would, on any
@@ -80,6 +92,8 @@ def draw_starts(
         terrain: an episode begins anywhere on it but near its ends; at 0 if it is level, short, or one slope,
             which leaves the height at which a trunk can hang.
         own_gait: instead of one between walk and run.
+
+    The action is left to the caller.
     """
     n = len(generators)
     drawn = np.array([generator.random(3) for generator in generators])
@@ -93,10 +107,8 @@ def draw_starts(
     height, x = np.full(n, options.get("height", trunk.height)), np.full(n, options.get("x", 0.0))
     ground = np.zeros(n)
     if terrain != FLAT:
-        low, high = terrain.x[0] + MARGIN, terrain.x[-1] - MARGIN
-        if "x" not in options and low < high and len(terrain.height) > 2:
-            x = np.array([generator.uniform(low, high) for generator in generators])
-        ground = _highest(terrain, x)
+        x = anywhere(terrain, x, options, generators)
+        ground = highest(terrain, x, REACH)
     if trunk.kind == "suspended":
         if "height" not in options:
             height = np.maximum(height, ground - hoof_height(profile, chosen, theta))
@@ -106,14 +118,35 @@ def draw_starts(
             if not below.size:
                 break
             theta[below] = [2 * np.pi * generators[int(k)].random() for k in below]
-    return Starts(chosen, theta, speed, height, x)
+    begun = {"crank_angle": theta, "speed": speed, "height": height, "x": x}
+    trunk_at = {"x": x, "y": height, "vx": speed}
+    return Start(begun, chosen, chosen.T[None], theta[None], trunk_at, np.empty(0, np.float32))
+
+
+def anywhere(
+    terrain: Terrain, x: Floats, options: Mapping[str, Any], generators: Sequence[np.random.Generator]
+) -> Floats:
+    """Where episodes on a terrain begin: at `x` if it is short or one slope, or if the options say so."""
+    low, high = terrain.x[0] + MARGIN, terrain.x[-1] - MARGIN
+    if "x" not in options and low < high and len(terrain.height) > 2:
+        return np.array([generator.uniform(low, high) for generator in generators])
+    return x
 
 
 def check_options(
     options: Any, gaits: Mapping[str, GaitParameters], trunk: Trunk, settings: Settings
 ) -> dict[str, Any]:
     """Reset options with their values checked and the gait as `GaitParameters`; ParameterError of others."""
-    known = ("gait", "parameters", *OPTIONS)
+    checked = checked_options(options, OPTIONS)
+    _check_trunk(checked, trunk)
+    if checked.get("gait") is not None:
+        checked["gait"] = _gait(checked["gait"], gaits)
+    return with_parameters(checked, settings)
+
+
+def checked_options(options: Any, numbers: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
+    """Reset options with their `numbers`, of these ranges, checked; ParameterError of unknown ones."""
+    known = ("gait", "parameters", *numbers)
     if options is None:
         return {}
     if isinstance(options, Mapping):
@@ -121,22 +154,24 @@ def check_options(
     if not isinstance(options, Mapping) or not set(options) <= set(known):
         raise ParameterError(f"options: expected a mapping with some of {', '.join(known)}, got {options!r}")
     checked = dict(options)
-    for name, (low, high) in OPTIONS.items():
+    for name, (low, high) in numbers.items():
         if name in checked:
             checked[name] = check_number(f"options[{name!r}]", checked[name], low=low, high=high)
-    _check_trunk(checked, trunk)
-    if checked.get("gait") is not None:
-        checked["gait"] = _gait(checked["gait"], gaits)
-    if "parameters" in checked:
-        checked["parameters"] = check_parameters("options['parameters']", checked["parameters"], settings)
     return checked
 
 
-def _highest(terrain: Terrain, x: Floats) -> Floats:
-    """Highest ground within `REACH` of `x`, shape (n,): it is at an end or at a knot."""
-    low, high = x[:, None] - REACH, x[:, None] + REACH
+def with_parameters(options: dict[str, Any], settings: Settings) -> dict[str, Any]:
+    """Options with the parameters of the episode checked."""
+    if "parameters" in options:
+        options["parameters"] = check_parameters("options['parameters']", options["parameters"], settings)
+    return options
+
+
+def highest(terrain: Terrain, x: Floats, reach: float) -> Floats:
+    """Highest ground within a reach of `x`, shape (n,): it is at an end or at a knot."""
+    low, high = x[:, None] - reach, x[:, None] + reach
     first = np.ceil((low - terrain.start) / terrain.spacing)
-    knots = terrain.start + terrain.spacing * (first + np.arange(int(2 * REACH / terrain.spacing) + 1))
+    knots = terrain.start + terrain.spacing * (first + np.arange(int(2 * reach / terrain.spacing) + 1))
     return terrain.height_at(np.hstack([low, np.clip(knots, low, high), high])).max(1)
 
 

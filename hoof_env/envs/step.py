@@ -17,7 +17,9 @@ import numpy as np
 from hoof_env.dynamics.advance import LANES, MODEL, advance_kernels
 from hoof_env.dynamics.form import form_of
 from hoof_env.dynamics.layout import PLAIN, Features
+from hoof_env.envs.horse_rows import HORSE_TERMS
 from hoof_env.envs.observation import Entry, Scene
+from hoof_env.envs.reference import ROOM, PairReference, command_gait
 from hoof_env.envs.reward import TERMS, Outcome, Term
 from hoof_env.gait import PARAMETERS
 from hoof_env.simd import (
@@ -27,6 +29,7 @@ from hoof_env.simd import (
     lane_of,
     larger,
     level,
+    nth,
     read,
     rows,
     set_lane,
@@ -35,7 +38,7 @@ from hoof_env.simd import (
     write,
 )
 from hoof_env.simd.compile import inlined, kernel, pasted
-from hoof_env.simd.layout import Block, Constants, Layout, Row
+from hoof_env.simd.layout import Block, Constants, Layout, Row, Size
 from hoof_env.simd.math import clip, tanh
 from hoof_env.simd.memory import (
     COLUMNS,
@@ -62,24 +65,29 @@ ADDRESSES = Addresses(
 
 AT, BEGIN, END = ADDRESSES.slots, ADDRESSES.begin, ADDRESSES.end
 
-SHIPPED = tuple(term.name for term in TERMS)
+SHIPPED = tuple(term.name for term in (*TERMS, *HORSE_TERMS))
 
 
 ACTIONS = len(PARAMETERS)
+"""Of a leg."""
+
 FAILED, TRUNCATED = 1, 2
 """How an episode ended, in the place of 0."""
 
 SUMS = (
     "time", "distance", "work", "impulse", "loaded_time", "stances", "peak_sum", "loading_rate_sum",
-    "highest",
+    "highest", "slip",
 )  # fmt: skip
 """Fields of `Episode` that begin at 0 and are added to."""
+
+
+ACTION, REWARD = Size("action", ACTIONS), Size("reward", len(TERMS))
 
 
 class Episode(Layout):
     """Memory of an episode."""
 
-    action: Annotated[Block, ACTIONS]  # the last one, clipped to its limits
+    action: Annotated[Block, ACTION]  # the last one, clipped to its limits
     steps: Row  # control steps so far
     x_before: Row  # x of the trunk before this step [m]
     target: Row  # commanded speed [m/s]; infinite if there is none
@@ -93,20 +101,25 @@ class Episode(Layout):
     peak_sum: Row  # of the stances' peaks [N]
     loading_rate_sum: Row  # of the stances' loading rates [N/s]
     highest: Row  # force of the episode [N]
-    terms: Annotated[Block, len(TERMS)]  # of the last reward
+    slip: Row  # of hoofs that bear load, without sign; 0 where the engine does not say [m]
+    terms: Annotated[Block, REWARD]  # of the last reward
     ended: Row  # 0, `FAILED` or `TRUNCATED`
     switch: Row  # the control step after which another speed is commanded
     next_target: Row  # and which [m/s]
 
 
+class HorseEpisode(Episode):
+    """That of a horse."""
+
+    fore: PairReference  # of the reference gait
+    hind: PairReference
+
+
 @cache
-def episode_layout(terms: int) -> Any:
-    """`Episode` with room for so many terms."""
-    if terms == len(TERMS):
-        return Episode
-    fields = {**Episode.__annotations__, "terms": Annotated[Block, terms]}
-    make: Any = type(Layout)
-    return make(f"Episode{terms}", (Layout,), {"__annotations__": fields, "__module__": __name__})
+def episode_layout(terms: int, legs: int = 1) -> Any:
+    """`Episode` of so many legs with room for so many terms."""
+    layout: Any = Episode if legs == 1 else HorseEpisode
+    return layout.sized(action=legs * ACTIONS, reward=terms)
 
 
 class _Memories(NamedTuple):
@@ -114,26 +127,33 @@ class _Memories(NamedTuple):
     trunk: Any
     leg: Any
     trunk_rows: int
+    legs: int
+    gait: int
+    animal: bool
 
 
 class Memories(Constants, _Memories):
-    """Layouts of what a step works on, and how many rows the trunk's has."""
+    """Layouts of what a step works on, how many rows the trunk's has, how many legs there are and how many
+    gait parameters each has, and whether their slip is known."""
 
 
 @cache
-def memories_of(terms: int, features: Features) -> Memories:
+def memories_of(terms: int, features: Features, legs: int = 1) -> Memories:
     """The layouts with so many terms, of an engine of this kind."""
     form = form_of(features)
-    return Memories(episode_layout(terms), form.trunk_memory, form.leg_memory, form.trunk_rows)
+    return Memories(
+        episode_layout(terms, legs), form.trunk_memory, form.leg_memory, form.trunk_rows, legs, form.gait,
+        form.animal,
+    )  # fmt: skip
 
 
-def task_type(terms: int, entries: int) -> np.dtype[Any]:
+def task_type(terms: int, entries: int, gait: int = ACTIONS) -> np.dtype[Any]:
     """The record of a task's constants."""
     return np.dtype(
         [
-            ("base", "f8", (4,)), ("half", "f8", (4,)),  # command = base + half action
-            ("low", "f8", (4,)), ("high", "f8", (4,)),  # within these
-            ("middle", "f8", (4,)), ("rate_bound", "f8", (4,)),  # (value - middle) / half is observed
+            ("base", "f8", (gait,)), ("half", "f8", (gait,)),  # command = base + half action
+            ("low", "f8", (gait,)), ("high", "f8", (gait,)),  # within these
+            ("middle", "f8", (gait,)), ("rate_bound", "f8", (gait,)),  # (value - middle) / half is observed
             ("weights", "f8", (terms,)), ("episode_seconds", "f8"),  # of the reward
             ("h", "f8"), ("substeps", "i8"), ("dt", "f8"), ("episode_steps", "i8"),
             ("height", "f8"), ("lowest", "f8"), ("highest", "f8"),  # of the trunk: nominal and extreme [m]
@@ -153,38 +173,68 @@ def apply_action(task, actions, leg, n):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def remember_action(actions, episode, n):  # type: ignore[no-untyped-def]
+def remember_action(actions, episode, legs, n):  # type: ignore[no-untyped-def]
     """Keep the clipped action; returns the mean square of its change."""
-    change = level(episode, 0.0)
-    for k in range(ACTIONS):
-        action = clip(read(episode, actions, n * ACTIONS + k, ACTIONS), 1.0)
+    change, count = level(episode, 0.0), legs * ACTIONS
+    for k in range(count):
+        action = clip(read(episode, actions, n * count + k, count), 1.0)
         difference = action - episode.action[k]
         change = change + difference * difference
         episode.action[k] = action
-    return 0.25 * change
+    return change * (1.0 / count)
 
 
 @inlined
-def find_outcome(task, trunk, leg, episode, action_change):  # type: ignore[no-untyped-def]
+def sum_up(first_leg, layouts):  # type: ignore[no-untyped-def]
+    """What all legs did in the step, and the highest of their forces."""
+    sums, slip = first_leg.sums, 0.0 * first_leg.sums.travel
+    running_peak_increase, peak_grf_increase = sums.running_peak_increase, sums.peak_grf_increase
+    loading_rate_increase, highest_grf = sums.loading_rate_increase, sums.highest_grf
+    positive_work, normal_impulse = sums.positive_work, sums.normal_impulse
+    loaded_time, stances = sums.loaded_time, sums.stances
+    if layouts.animal:
+        slip = sums.slip[0]
+    for i in range(1, layouts.legs):
+        sums = nth(first_leg, i).sums
+        running_peak_increase = running_peak_increase + sums.running_peak_increase
+        peak_grf_increase = peak_grf_increase + sums.peak_grf_increase
+        loading_rate_increase = loading_rate_increase + sums.loading_rate_increase
+        highest_grf = larger(highest_grf, sums.highest_grf)
+        positive_work = positive_work + sums.positive_work
+        normal_impulse = normal_impulse + sums.normal_impulse
+        loaded_time = loaded_time + sums.loaded_time
+        stances = stances + sums.stances
+        if layouts.animal:
+            slip = slip + sums.slip[0]
+    return (
+        running_peak_increase, peak_grf_increase, loading_rate_increase, highest_grf, positive_work,
+        normal_impulse, loaded_time, stances, slip,
+    )  # fmt: skip
+
+
+@inlined
+def find_outcome(task, trunk, leg, episode, layouts, action_change):  # type: ignore[no-untyped-def]
     """What the step brought."""
     works = trunk.result == 0.0  # else the state is of before: nothing is paid
-    x, y, sums = trunk.report.place.real, trunk.report.place.imag, leg.sums
+    x, y = trunk.report.place.real, trunk.report.place.imag
+    running, peak, loading, highest, work, impulse, loaded, stances, slip = sum_up(leg, layouts)
     progress = x - episode.x_before
     if task.stays:
-        progress = sums.travel
+        progress = leg.sums.travel
     episode.x_before = x
     return Outcome(
         seconds=choose(works, task.dt, 0.0),
         progress=choose(works, progress, 0.0),
         commanded_progress=task.dt * episode.target,
-        running_peak_increase=choose(works, sums.running_peak_increase, 0.0),
-        peak_grf_increase=choose(works, sums.peak_grf_increase, 0.0),
-        loading_rate_increase=choose(works, sums.loading_rate_increase, 0.0),
-        highest_grf=choose(works, sums.highest_grf, 0.0),
-        positive_work=choose(works, sums.positive_work, 0.0),
-        normal_impulse=choose(works, sums.normal_impulse, 0.0),
-        loaded_time=choose(works, sums.loaded_time, 0.0),
-        stances=choose(works, sums.stances, 0.0),
+        running_peak_increase=choose(works, running, 0.0),
+        peak_grf_increase=choose(works, peak, 0.0),
+        loading_rate_increase=choose(works, loading, 0.0),
+        highest_grf=choose(works, highest, 0.0),
+        positive_work=choose(works, work, 0.0),
+        normal_impulse=choose(works, impulse, 0.0),
+        loaded_time=choose(works, loaded, 0.0),
+        stances=choose(works, stances, 0.0),
+        slip=choose(works, slip, 0.0),
         action_change=action_change,
         failed=choose(works & (y > task.lowest) & (y < task.highest), 0.0, 1.0),
         episode_seconds=task.episode_seconds,
@@ -207,6 +257,7 @@ def add_up(outcome, episode):  # type: ignore[no-untyped-def]
     episode.peak_sum = episode.peak_sum + outcome.peak_grf_increase
     episode.loading_rate_sum = episode.loading_rate_sum + outcome.loading_rate_increase
     episode.highest = larger(episode.highest, outcome.highest_grf)
+    episode.slip = episode.slip + outcome.slip
 
 
 @inlined
@@ -242,22 +293,19 @@ def outcome_of_one(outcome, lane, trunk, leg, episode):  # type: ignore[no-untyp
         lane_of(outcome.peak_grf_increase, lane), lane_of(outcome.loading_rate_increase, lane),
         lane_of(outcome.highest_grf, lane), lane_of(outcome.positive_work, lane),
         lane_of(outcome.normal_impulse, lane), lane_of(outcome.loaded_time, lane),
-        lane_of(outcome.stances, lane), lane_of(outcome.action_change, lane), lane_of(outcome.failed, lane),
+        lane_of(outcome.stances, lane), lane_of(outcome.slip, lane), lane_of(outcome.action_change, lane),
+        lane_of(outcome.failed, lane),
         outcome.episode_seconds, lane_of(outcome.weight, lane), trunk, leg, episode,
     )  # fmt: skip
 
 
-def _with_terms(terms: tuple[Term, ...], features: Features, k: int = 0) -> Callable[..., Any]:
+def _with_terms(terms: tuple[Term, ...], layouts: Memories, k: int = 0) -> Callable[..., Any]:
     """A function that computes the terms from the k-th on, keeps them in `episode.terms` and returns the sum
     of all. numba has no loop over functions, so each calls the next."""
     if k == len(terms):
         return inlined(lambda addresses, lanes, task, outcome, episode, n, total: total)
-    compute, rest, is_first = inlined(terms[k].compute), _with_terms(terms, features, k + 1), k == 0
-    layouts, is_own, number = (
-        memories_of(len(terms), features),
-        terms[k].name not in SHIPPED,
-        number_of(terms[k].title),
-    )
+    compute, rest, is_first = inlined(terms[k].compute), _with_terms(terms, layouts, k + 1), k == 0
+    is_own, number = terms[k].name not in SHIPPED, number_of(terms[k].title)
 
     @inlined
     def add_term(addresses, lanes, task, outcome, episode, n, total):  # type: ignore[no-untyped-def]
@@ -294,23 +342,36 @@ def slots_of(entries: tuple[Entry, ...]) -> tuple[list[int], int, int]:
     return [slots[k] for k in range(len(entries))], vectors, vectors * LANES + len(others)
 
 
-def _with_entries(
-    entries: tuple[Entry, ...], terms: int, features: Features, scaled: bool, k: int = 0
-) -> Callable[..., Any]:
-    """A function that puts the entries that are observed, from the k-th on, into their slots: scaled but for
-    tanh, or as they are measured."""
-    if k == len(entries):
-        return inlined(lambda addresses, lanes, scene, numbers, n: None)
-    measure, apply, slot = inlined(entries[k].measure), entries[k].scale.apply, slots_of(entries)[0][k]
-    rest, layouts = _with_entries(entries, terms, features, scaled, k + 1), memories_of(terms, features)
+def _with_entries(entries: tuple[Entry, ...], layouts: Memories, scaled: bool) -> Callable[..., Any]:
+    """A function that puts the entries that are observed into their slots: scaled but for tanh, or as they
+    are measured. numba has no loop over functions, so each half is a function of its own."""
+    slots = slots_of(entries)[0]
+
+    def put_from(first: int, last: int) -> Callable[..., Any]:
+        if last - first == 1:
+            return _with_entry(entries[first], slots[first], layouts, scaled)
+        middle = (first + last) // 2
+        one, other = put_from(first, middle), put_from(middle, last)
+
+        @inlined
+        def put_both(addresses, lanes, scene, numbers, n):  # type: ignore[no-untyped-def]
+            one(addresses, lanes, scene, numbers, n)
+            other(addresses, lanes, scene, numbers, n)
+
+        return put_both
+
+    return put_from(0, len(entries))
+
+
+def _with_entry(entry: Entry, slot: int, layouts: Memories, scaled: bool) -> Callable[..., Any]:
+    measure, apply = inlined(entry.measure), entry.scale.apply
     scale = inlined(apply) if scaled and apply is not None else inlined(lambda x, scene: x)
-    number, scaled_number = number_of(entries[k].title), number_of(f"the scale of {entries[k].title}")
+    number, scaled_number = number_of(entry.title), number_of(f"the scale of {entry.title}")
 
     @inlined
     def put_entry(addresses, lanes, scene, numbers, n):  # type: ignore[no-untyped-def]
         if scene.task.places[slot] >= 0:
             numbers[slot] = scaled_number(scale(number(measure(scene)), scene))
-        rest(addresses, lanes, scene, numbers, n)
 
     @inlined
     def put_one_by_one(addresses, lanes, scene, numbers, n):  # type: ignore[no-untyped-def]
@@ -321,9 +382,8 @@ def _with_entries(
                     trunk, leg, episode, scene.task, scene.ground, scene.ground_origin, scene.ground_per_metre
                 )
                 set_lane(numbers, slot, lane, scaled_number(scale(number(measure(own)), own)))
-        rest(addresses, lanes, scene, numbers, n)
 
-    return put_one_by_one if entries[k].scalar else put_entry
+    return put_one_by_one if entry.scalar else put_entry
 
 
 class StepKernels(NamedTuple):
@@ -353,26 +413,29 @@ def step_kernels(
     entries: tuple[Entry, ...],
     contact_law: Callable[..., Any] | None,
     features: Features = PLAIN,
+    legs: int = 1,
 ) -> StepKernels:
-    """The kernels of tasks with these terms, entries and law of contact, on an engine of this kind."""
+    """The kernels of tasks with these terms, entries and law of contact, on an engine of this kind with one
+    leg, or with a horse's four."""
     parts: list[Any] = [term.compute for term in terms]
     parts += [part for entry in entries for part in (entry.measure, entry.scale.apply) if part]
     flags = (
         [(term.scalar, term.name in SHIPPED) for term in terms],
         [(entry.scalar, entry.scale.saturates) for entry in entries],
     )
-    Episode = episode_layout(len(terms))
-    identity = fingerprint(*parts, contact_law, flags, Episode.names, (FAILED, TRUNCATED))
+    layouts = memories_of(len(terms), features, legs)
+    identity = fingerprint(*parts, contact_law, flags, layouts.episode.names, (FAILED, TRUNCATED))
     if features != PLAIN:
         identity += f" {tuple(features)}"
-    layouts, compute_reward = memories_of(len(terms), features), _with_terms(terms, features)
-    put_scaled, put_measured = (
-        _with_entries(entries, len(terms), features, scaled) for scaled in (True, False)
-    )
+    if legs > 1:
+        identity += f" {legs} legs"
+    compute_reward = _with_terms(terms, layouts)
+    put_scaled, put_measured = (_with_entries(entries, layouts, scaled) for scaled in (True, False))
     _, vectors, slots = slots_of(entries)
     advance = advance_kernels(contact_law, features)
-    advance_leg, advance_batch = advance.advance_leg, advance.advance_batch
-    task_at, model_at = record_at(task_type(len(terms), slots)), record_at(MODEL)
+    advance_one = advance.advance_leg if legs == 1 else advance.advance_four
+    advance_batch = advance.advance_batch
+    task_at, model_at = record_at(task_type(len(terms), slots, layouts.gait)), record_at(MODEL)
 
     @pasted
     def scene_of(addresses, lanes, task, n):  # type: ignore[no-untyped-def]
@@ -385,11 +448,16 @@ def step_kernels(
         """All, or none: returns whether they are numbers, those of other blocks, too."""
         actions, count = singles_at(addresses[AT.actions]), addresses[AT.data + COLUMNS]
         task, good = task_at(addresses[AT.task])[0], True
-        for k in range(count * ACTIONS):
+        for k in range(count * (legs * ACTIONS)):
             good &= size(float(actions[k])) < np.inf
         if good:
+            room = rows(doubles(ROOM * lanes), lanes, None)
             for n in range(addresses[BEGIN], addresses[END], lanes):
-                apply_action(task, actions, memories(addresses, lanes, layouts, n)[1], n)
+                _, leg, episode = memories(addresses, lanes, layouts, n)
+                if legs == 1:
+                    apply_action(task, actions, leg, n)
+                else:
+                    command_gait(task, actions, episode, leg, layouts.gait, n, room)
         return good
 
     @pasted
@@ -418,7 +486,8 @@ def step_kernels(
         rewards, memory, happened = doubles_at(addresses[AT.rewards]), doubles(slots * lanes), 0
         for n in range(addresses[BEGIN], addresses[END], lanes):
             trunk, leg, episode = memories(addresses, lanes, layouts, n)
-            outcome = find_outcome(task, trunk, leg, episode, remember_action(actions, episode, n))
+            change = remember_action(actions, episode, legs, n)
+            outcome = find_outcome(task, trunk, leg, episode, layouts, change)
             add_up(outcome, episode)
             ended, switched = decide(task, outcome, episode)
             nothing = level(episode, 0.0)
@@ -450,7 +519,7 @@ def step_kernels(
             observe(addresses, lanes, task, n, memory)
 
     def step_one(addresses):  # type: ignore[no-untyped-def]
-        return step(addresses, 1, advance_leg)
+        return step(addresses, 1, advance_one)
 
     def step_batch(addresses):  # type: ignore[no-untyped-def]
         return step(addresses, LANES, advance_batch)

@@ -21,6 +21,7 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
+from hoof_env.envs.horse_rows import HORSE_ENTRIES, HORSE_TERMS
 from hoof_env.envs.observation import ENTRIES, Entry, check_groups, groups_of
 from hoof_env.envs.reward import TERMS, Term, check_weights
 from hoof_env.errors import ParameterError, UnknownArgumentError, check_choice
@@ -72,6 +73,9 @@ class Settings:
     episode_seconds: float = 10.0
     target_speed: tuple[float, float] | None = (2.5, 2.5)
     target_seconds: tuple[float, float] = (2.0, 4.0)
+    size: float | None = None
+    harmonics: int | None = None
+    filters: str | None = None
     observation: tuple[str, ...] = ("crank", "gait", "trunk", "hoof", "action")
     reward_weights: Mapping[str, float] | None = None
     randomize: Mapping[str, Any] | None = None
@@ -118,6 +122,9 @@ class Keywords(TypedDict, total=False):
     episode_seconds: float
     target_speed: Range | None
     target_seconds: Range
+    size: float | None
+    harmonics: int | None
+    filters: str | None
     observation: Sequence[str]
     reward_weights: Mapping[str, float] | None
     randomize: Mapping[str, Range] | None
@@ -148,6 +155,7 @@ NEEDED: Mapping[str, tuple[str, tuple[str, ...]]] = MappingProxyType(
     | {"trunk_drag": ("trunk", ("suspended", "rail")), "friction_slow": ("friction_law", ("ambrosio",))}
     | dict.fromkeys(("motor_gain", "motor_torque", "motor_inertia"), ("drive", ("motor",)))
     | dict.fromkeys(("baumgarte_alpha", "baumgarte_beta"), ("solver", ("paper",)))
+    | dict.fromkeys(("size", "harmonics", "filters"), ("trunk", ("free",)))
     | {"target_seconds": ("target_speed", ())}
 )
 """Settings that have an effect only beside certain values of another one; () stands for any range."""
@@ -191,6 +199,7 @@ class Task:
         reference: the scripted gait that simple policies must stay below.
         terms: of the reward.
         entries: all that can be observed.
+        is_horse: it is about a trunk on four legs, see `horse.Horse`, not about one leg.
         contact_law: instead of `normal_law`, see `dynamics.hoof.law_of`.
         module: that registers it, which other processes import.
     """
@@ -203,6 +212,7 @@ class Task:
     reference: str = "run"
     terms: tuple[Term, ...] = TERMS
     entries: tuple[Entry, ...] = ENTRIES
+    is_horse: bool = False
     contact_law: Callable[..., Any] | None = None
     module: str = ""
 
@@ -330,6 +340,29 @@ TASKS: Mapping[str, Task] = MappingProxyType(
             },
             start={"crank_angle": 0.0},
             reference="walk",
+        ),
+        "horse": Task(
+            "Horse",
+            "A horse on four legs that keeps a commanded speed.",
+            "Four legs carry a trunk that moves along x and y and pitches, in the plane. Every 3 to 5 s a new"
+            " speed is commanded, between the Froude numbers 0.1 and 1 (v^2 over g times the height of the"
+            " hips), and with it the gait around which actions lie: zeros are the reference gait of it.",
+            {
+                "trunk": "free",
+                "trunk_mass": 365.84,
+                "trunk_drag": 0.0,
+                "stiffness": 2e6,
+                "exponent": 1.5,
+                "friction": 0.6,
+                "hoof_stiffness": 24000.0,
+                "target_speed": (1.172, 3.706),
+                "target_seconds": (3.0, 5.0),
+                "observation": ("trunk", "target", "crank", "gait", "hoof", "action"),
+            },
+            reference="reference",
+            terms=HORSE_TERMS,
+            entries=HORSE_ENTRIES,
+            is_horse=True,
         ),
     }
 )

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from hoof_env.envs.base import LegBase, array_of, fixed_setting, generator_of
 from hoof_env.envs.infos import named
 from hoof_env.envs.recording import Recording
-from hoof_env.envs.step import ACTIONS, FAILED, TRUNCATED
+from hoof_env.envs.step import FAILED, TRUNCATED
 from hoof_env.envs.tasks import Keywords
 from hoof_env.errors import ParameterError, count
 
@@ -318,7 +318,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         return mask
 
     def _check_actions(self, actions: Any) -> NDArray[np.float32]:
-        given, shape = array_of(actions), (self.num_envs, ACTIONS)
+        given, shape = array_of(actions), (self.num_envs, self.batch.body.actions)
         if given.dtype.kind not in "fiu" or given.shape != shape:
             raise ParameterError(
                 f"actions: expected finite numbers in [-1, 1], shape {shape}, "
@@ -338,15 +338,14 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         watched = [self._watched[env] for env in envs.tolist() if env in self._watched]
         for recording in watched:
             recording.start()
-        start = self.batch.reset(envs, [self._generators[env] for env in envs], options)
+        parameters = self.batch.reset(envs, [self._generators[env] for env in envs], options)
         self._started[envs] = True
         if self._phase == "new" and self._started.all():
             self._phase = "running"
         for recording in watched:
             if recording.env < self.drawn:
                 recording.keep(True)
-        found: dict[str, Any] = start["parameters"]
-        return found
+        return parameters
 
     def _show(self) -> None:
         for env in range(self.drawn):

@@ -13,9 +13,16 @@ from hoof_env.envs.tasks import TASKS, Settings, check_effect
 from hoof_env.errors import ParameterError
 from hoof_env.gait import LIMITS
 
-IDS = sorted(
-    name for name, spec in gym.registry.items() if str(spec.entry_point).endswith("horse_leg:HorseLegEnv")
+HORSE = "hoof_env/Horse-v0"
+
+LEGS = sorted(
+    name
+    for name, spec in gym.registry.items()
+    if str(spec.entry_point).endswith("horse_leg:HorseLegEnv") and name != HORSE
 )
+"""The ids of one leg."""
+
+IDS = [*LEGS, HORSE]
 """All ids of one environment class."""
 
 OTHER = {
@@ -45,9 +52,10 @@ def effective(given, env_id: str = "hoof_env/HorseLeg-v0", **settings):
     return {name: value for name, value in given.items() if has_effect(name)}
 
 
-def actions(seed: int, *shape: int) -> np.ndarray:
+def actions(seed: int, *shape: int, env_id: str = LEGS[0]) -> np.ndarray:
     """Random actions."""
-    return np.random.default_rng(seed).uniform(-1, 1, (*shape, 4)).astype(np.float32)
+    width = 16 if env_id == HORSE else 4
+    return np.random.default_rng(seed).uniform(-1, 1, (*shape, width)).astype(np.float32)
 
 
 def same(one, two) -> None:
@@ -74,7 +82,8 @@ def make(env_id, n=0, **settings):
 
 def steps(env, count: int, seed: int = 5):
     """What `count` random actions lead to, of one environment or many."""
-    return [env.step(action) for action in actions(seed, count, *env.action_space.shape[:-1])]
+    shape = count, *env.action_space.shape[:-1]
+    return [env.step(action) for action in actions(seed, *shape, env_id=env.task.id)]
 
 
 def roll(env, count: int, seed: int = 5):

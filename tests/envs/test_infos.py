@@ -11,12 +11,14 @@ import pytest
 from family import FALLS, IDS, actions, same, together
 from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 
-from hoof_env.envs.infos import MEASURED, START, Named, named, row_of
+from hoof_env.envs.infos import MEASURED, Named, named, row_of
+from hoof_env.envs.one_leg import OneLeg
 from hoof_env.envs.reward import TERMS as TABLE
 from hoof_env.errors import ParameterError
 from hoof_env.gait import PARAMETERS
 
 LEG = "hoof_env/HorseLeg-v0"
+START = OneLeg.start_names
 TERMS = tuple(term.key for term in TABLE)
 DRAWN = {"randomize": {"friction": (0.2, 0.8), "trunk_mass": 70.0}}
 

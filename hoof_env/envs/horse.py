@@ -1,0 +1,224 @@
+"""The body of `Horse-v0`: a trunk on four legs, in the plane. `one_leg` is the other body there is.
+
+A horse of 475 kg, its hips 1.4 m high. The legs are the linkage of the preset, scaled, with the segment
+masses of Buchner and others (1997, see `leg.limb_masses`); springs of 24 kN/m at toe and heel give a limb
+the stiffness of a horse's distal spring: 127 mm under 12.8 N/kg (McGuigan & Wilson 2003). Radius of gyration
+and hips are assumed: the leg stands half a metre behind its crank centre, so that the fore feet are half a
+metre before the trunk's centre and the hind feet 0.7 m behind. A `size` other than 1 is a similar animal:
+lengths go with it, masses with its cube, stiffnesses with its square, speeds with its root.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from functools import cache
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoof_env.dynamics.engine import TrunkEngine
+from hoof_env.dynamics.parts import FREE, TRUNKS, HoofSpring, Limb, Limits, Trunk
+from hoof_env.envs.parameters import drive_of, ground_of
+from hoof_env.envs.reference import (
+    ACTED,
+    COUNT,
+    FASTEST,
+    NAMES,
+    commands_of,
+    crank_angles,
+    gait_numbers,
+    horse_gaits,
+    reference_gaits,
+)
+from hoof_env.envs.start import (
+    FLAT,
+    Start,
+    anywhere,
+    checked_options,
+    highest,
+    hoof_height,
+    with_parameters,
+)
+from hoof_env.envs.tasks import Settings
+from hoof_env.errors import ParameterError, check_choice, check_number
+from hoof_env.gait import QUICK, WIDEST, FilterSettings
+from hoof_env.ground.contact import Ground
+from hoof_env.leg.geometry import Geometry, load_geometry
+from hoof_env.leg.limb_masses import trunk_mass, with_limb_masses
+
+Floats = NDArray[np.float64]
+
+HIP_HEIGHT, MASS, GYRATION = 1.4, 475.0, 0.5  # [m], [kg], of the trunk about its centre [m]
+HIPS = {"fore": 1.0, "hind": -0.2}  # crank centres, forward from the trunk's centre [m]
+PITCH, HEIGHT, CLEARANCE = 0.5, (0.75, 1.8), 0.02
+"""Where it has fallen: +-pitch [rad], heights of the trunk [m], of a joint over the ground [m]."""
+GAP = 0.005  # between the lowest hoof and the ground at a start [m]
+
+SPANS = (1.0, 0.3, 0.3, 0.3)
+"""What an action of 1 changes: of the crank's speed [-], of the swing's offset, sine and cosine [rad]."""
+
+FILTERS = {"quick": QUICK, "slow": FilterSettings()}  # of commands, by the setting `filters`
+
+OPTIONS = {"phase": (-1e6, 1e6), "speed": (-20.0, 20.0), "pitch": (-0.4, 0.4), "x": (-1e5, 1e5)}
+"""Numeric reset options and their ranges [strides, m/s, rad, m]; "gait" and "parameters" are the others."""
+
+SPEED_SPREAD, PITCH_SPREAD, PHASE_SPREAD = 0.2, 0.03, 0.05
+"""How far starts are from the gait: of the commanded speed [-], pitch [rad], each crank [strides]."""
+
+
+class Horse:
+    """Four legs on a free trunk.
+
+    Attributes:
+        gaits: that were found, by name.
+        gait: around which actions lie whatever speed is commanded; None for those of `reference_gaits`.
+        harmonics, filters, limits: of the engine.
+        start_names, gait_names: of what an episode starts with.
+    """
+
+    legs, actions = COUNT, COUNT * ACTED
+    start_names, gait_names = ("phase", "speed", "pitch", "x"), NAMES
+
+    def __init__(self, settings: Settings) -> None:
+        s = settings
+        self.size = check_number("size", 1.0 if s.size is None else s.size, low=0.2, high=2.0)
+        if s.trunk != TRUNKS[FREE]:
+            raise ParameterError(f'trunk: expected "free" of a horse, got {s.trunk!r}')
+        self.geometry = load_geometry(s.preset)
+        self.geometry = self.geometry.scaled(HIP_HEIGHT * self.size / self.geometry.hip_height)
+        self.height = HIP_HEIGHT * self.size
+        self.gaits = horse_gaits()
+        self.gait = None if s.gait is None else self.gaits[check_choice("gait", s.gait, self.gaits)]
+        self.harmonics = int(check_number("harmonics", s.harmonics or 2, low=1, high=2))
+        self.filters = FILTERS[check_choice("filters", s.filters or "quick", FILTERS)]
+        self.lowest, self.highest = (self.size * height for height in HEIGHT)
+        self.limits = Limits((-PITCH, PITCH), (self.lowest, self.highest), CLEARANCE * self.size)
+
+    def parts(self, s: Settings) -> tuple[Trunk, Ground, tuple[Limb, ...]]:
+        """Trunk, ground and legs of some settings."""
+        size = self.size
+        mass = check_number("trunk_mass", s.trunk_mass, low=0, exclusive_low=True) * size**3
+        trunk = Trunk(
+            "free", mass, drag=s.trunk_drag, height=self.height, pitch_inertia=mass * (GYRATION * size) ** 2
+        )
+        drive, spring = drive_of(s), self._spring(s)
+        fore, hind = (
+            Limb(_limb(self.geometry, pair, MASS * size**3), (HIPS[pair] * size, 0.0), drive, spring)
+            for pair in HIPS
+        )
+        return trunk, ground_of(s, mass), (fore, fore, hind, hind)
+
+    def _spring(self, s: Settings) -> HoofSpring | None:
+        if s.hoof_stiffness is None:
+            if s.hoof_damping is not None:
+                raise ParameterError(
+                    f"hoof_damping: expected a hoof_stiffness beside it, got {s.hoof_damping!r}"
+                )
+            return None
+        stiffness = check_number("hoof_stiffness", s.hoof_stiffness, low=0, exclusive_low=True)
+        if s.hoof_damping is None:
+            damping = HoofSpring.with_ratio(stiffness, MASS / COUNT).damping
+        else:
+            damping = check_number("hoof_damping", s.hoof_damping, low=0, exclusive_low=True)
+        return HoofSpring(stiffness * self.size**2, damping * self.size**2.5)
+
+    def constants(self) -> dict[str, Any]:
+        """Of the task's record: spans of actions and bounds of commands."""
+        count = 2 + 2 * self.harmonics
+        low, high = np.transpose([*list(WIDEST.values())[:4], *[WIDEST["higher"]] * (count - 4)])
+        high[0] = FASTEST
+        half = np.zeros(count)
+        half[:ACTED] = SPANS
+        return {
+            "half": half, "low": low, "high": high, "height": self.height,
+            "lowest": -np.inf, "highest": np.inf,  # the engine's own limits end episodes
+        }  # fmt: skip
+
+    # Starts
+
+    def check_options(self, options: Any, trunk: Trunk, settings: Settings) -> dict[str, Any]:
+        """Reset options with their values checked; `ParameterError` of others."""
+        checked = checked_options(options, OPTIONS)
+        if checked.get("gait") is not None and not isinstance(checked["gait"], np.ndarray):
+            checked["gait"] = gait_numbers("options['gait']", checked["gait"], self.gaits)
+        return with_parameters(checked, settings)
+
+    def draw(
+        self, options: Mapping[str, Any], generators: Sequence[np.random.Generator], engine: TrunkEngine
+    ) -> Start:
+        """Starts of episodes, one for each generator, but for what the options fix: in the stride of the gait
+        that `settle` takes, each crank, speed and pitch a little off, the hoofs just above the ground."""
+        n = len(generators)
+        drawn = np.array([generator.random(3 + COUNT) for generator in generators])
+        off = 2 * drawn - 1
+        begun = {
+            "phase": drawn[:, 0], "speed": 1 + SPEED_SPREAD * off[:, 1], "pitch": PITCH_SPREAD * off[:, 2],
+            "x": np.zeros(n),
+        }  # fmt: skip
+        if engine.terrain != FLAT:
+            begun["x"] = anywhere(engine.terrain, begun["x"], options, generators)
+        begun |= {name: np.full(n, options[name]) for name in OPTIONS if name in options}
+        commands = np.zeros((self.legs, 2 + 2 * self.harmonics, n))
+        theta, action = PHASE_SPREAD * off[:, 3:].T, np.zeros((n, self.actions), np.float32)
+        return Start(begun, np.empty(0), commands, theta, {}, action)
+
+    def settle(self, start: Start, targets: Floats, options: Mapping[str, Any], engine: TrunkEngine) -> None:
+        """Complete starts with the gaits of the commanded speeds [m/s]."""
+        begun, own = start.begun, options.get("gait")
+        if "speed" not in options:
+            begun["speed"] = begun["speed"] * targets
+        start.gaits = self.reference(targets, own)
+        start.theta[:] = crank_angles(start.gaits, begun["phase"], start.theta)
+        start.commands[:] = commands_of(start.gaits, start.theta, start.commands.shape[1])
+        hoof = np.min([
+            np.sin(begun["pitch"]) * limb.hip[0]
+            + hoof_height(profile, command.T, angle, begun["pitch"] * self.geometry.travel)
+            for limb, profile, command, angle in zip(
+                engine.limbs, engine.profiles, start.commands, start.theta, strict=True
+            )
+        ], axis=0)  # fmt: skip
+        ground = highest(engine.terrain, begun["x"], 2 * self.height)
+        start.trunk = {
+            "x": begun["x"], "y": ground - hoof + GAP * self.size, "vx": begun["speed"],
+            "pitch": begun["pitch"],
+        }  # fmt: skip
+
+    # Gaits
+
+    def reference(self, targets: Floats, given: Any = None) -> Floats:
+        """Numbers of the gaits around which actions lie at commanded speeds [m/s], shape (n, 16)."""
+        own, pace = self.gait if given is None else given, math.sqrt(self.size)
+        if own is None:
+            found = reference_gaits(np.asarray(targets) / pace)
+        else:
+            found = np.array(
+                np.broadcast_to(gait_numbers("gait", own, self.gaits), (len(targets), len(NAMES)))
+            )
+        found[:, 0] /= pace
+        return found
+
+    def command_of(self, action: Any) -> NoReturn:
+        """There is none: `ParameterError`."""
+        raise ParameterError(
+            "command_of: expected an environment of one leg; what an action of a horse commands depends on"
+            " the angles of its cranks, and is in info['measured']"
+        )
+
+    def action_for(self, gait: Any) -> NoReturn:
+        """There is none: `ParameterError`."""
+        raise ParameterError(
+            "action_for: expected an environment of one leg; actions of a horse lie around a gait, zeros are"
+            f" that gait, and the argument gait= makes it one of {', '.join(self.gaits)}"
+        )
+
+
+@cache
+def _limb(geometry: Geometry, pair: str, mass: float) -> Geometry:
+    return with_limb_masses(geometry, pair, mass)
+
+
+def default_trunk_mass() -> float:
+    """Of a horse of 475 kg [kg]."""
+    return trunk_mass(MASS)

@@ -1,0 +1,168 @@
+"""What a horse's policy sees, and what it is paid: the tables of `Horse-v0`, as `observation` and `reward`
+have them for one leg."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from hoof_env.envs.observation import PLAIN, TRUTH, Entry, Scale, in_contact, tanh_of
+from hoof_env.envs.reference import LEGS
+from hoof_env.envs.reward import TERMS, Term
+from hoof_env.gait import PARAMETERS
+from hoof_env.simd import choose, larger, nth, size
+from hoof_env.simd.compile import inlined
+from hoof_env.simd.math import cos_sin
+
+# The observation
+
+IN_WEIGHTS = Scale("tanh(x / weight)", lambda x, scene: x / scene.episode.weight, True)
+"""Of the whole horse."""
+
+
+def _height(x, scene):  # type: ignore[no-untyped-def]
+    return (x - scene.task.height) / (0.2 * scene.task.height)
+
+
+def _of_leg(i: int, measure: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    compiled = inlined(measure)
+    return lambda scene: compiled(nth(scene.leg, i))
+
+
+def _sine(leg):  # type: ignore[no-untyped-def]
+    return cos_sin(leg.state.theta)[1]
+
+
+def _cosine(leg):  # type: ignore[no-untyped-def]
+    return cos_sin(leg.state.theta)[0]
+
+
+def _toe_contact(leg):  # type: ignore[no-untyped-def]
+    return in_contact(leg.state.toe)
+
+
+def _heel_contact(leg):  # type: ignore[no-untyped-def]
+    return in_contact(leg.state.heel)
+
+
+def _filter(k: int) -> Callable[[Any], Any]:
+    return lambda leg: leg.state.gait[k]
+
+
+def _filter_rate(k: int) -> Callable[[Any], Any]:
+    return lambda leg: leg.state.gait_rate[k]
+
+
+def _action(k: int) -> Callable[[Any], Any]:
+    return lambda scene: scene.episode.action[k]
+
+
+_PER_LEG: tuple[tuple[str, str, str, Callable[[Any], Any], Scale], ...] = (
+    ("sin(crank angle)", "crank", "-", _sine, PLAIN),
+    ("cos(crank angle)", "crank", "-", _cosine, PLAIN),
+    ("crank speed", "gait", "rad/s", _filter(0), tanh_of(10.0)),
+    ("swing offset", "gait", "rad", _filter(1), PLAIN),
+    ("swing sine coefficient", "gait", "rad", _filter(2), PLAIN),
+    ("swing cosine coefficient", "gait", "rad", _filter(3), PLAIN),
+    ("rate of crank speed", "rates", "rad/s^2", _filter_rate(0), tanh_of(50.0)),
+    ("rate of swing offset", "rates", "rad/s", _filter_rate(1), tanh_of(10.0)),
+    ("rate of swing sine coefficient", "rates", "rad/s", _filter_rate(2), tanh_of(10.0)),
+    ("rate of swing cosine coefficient", "rates", "rad/s", _filter_rate(3), tanh_of(10.0)),
+    ("toe contact", "hoof", "-", _toe_contact, TRUTH),
+    ("heel contact", "hoof", "-", _heel_contact, TRUTH),
+    ("toe load", "hoof", "N", lambda leg: leg.report.toe.normal, IN_WEIGHTS),
+    ("heel load", "hoof", "N", lambda leg: leg.report.heel.normal, IN_WEIGHTS),
+    ("running peak force", "hoof", "N", lambda leg: leg.strides.running_peak, IN_WEIGHTS),
+)  # fmt: skip
+
+HORSE_ENTRIES = (
+    Entry("forward speed", "trunk", "m/s", lambda s: s.trunk.report.velocity.real, tanh_of(5.0)),
+    Entry("vertical speed", "trunk", "m/s", lambda s: s.trunk.report.velocity.imag, tanh_of(1.0)),
+    Entry(
+        "height", "trunk", "m", lambda s: s.trunk.report.place.imag,
+        Scale("tanh((x - hip height) / (0.2 hip height))", _height, True),
+    ),
+    Entry("pitch", "trunk", "rad", lambda s: s.trunk.state.moving.pitch, tanh_of(0.3)),
+    Entry("pitch rate", "trunk", "rad/s", lambda s: s.trunk.report.pitch_rate, tanh_of(2.0)),
+    Entry("commanded speed", "target", "m/s", lambda s: s.episode.target, tanh_of(5.0)),
+    *(
+        Entry(f"{leg.replace('_', ' ')}: {name}", group, unit, _of_leg(i, measure), scale)
+        for name, group, unit, measure, scale in _PER_LEG
+        for i, leg in enumerate(LEGS)
+    ),
+    *(
+        Entry(
+            f"previous action: {leg.replace('_', ' ')}, {name.replace('_', ' ')}", "action", "-",
+            _action(len(PARAMETERS) * i + k), PLAIN,
+        )
+        for i, leg in enumerate(LEGS)
+        for k, name in enumerate(PARAMETERS)
+    ),
+)  # fmt: skip
+"""All that can be observed of a horse, by group; legs in the order of `LEGS`."""
+
+# The reward
+
+
+def alive(step, weight):  # type: ignore[no-untyped-def]
+    """For every second."""
+    return weight * step.seconds
+
+
+def tracking(step, weight):  # type: ignore[no-untyped-def]
+    """1 at the commanded speed, less the relative error."""
+    asked = larger(step.commanded_progress, 1e-9)
+    error = size(step.progress - asked) / asked
+    return choose(step.seconds > 0.0, weight * step.seconds * larger(1.0 - error, -1.0), 0.0)
+
+
+def peak(step, weight):  # type: ignore[no-untyped-def]
+    """In units of the weight."""
+    return -weight * step.running_peak_increase / step.weight
+
+
+def slip(step, weight):  # type: ignore[no-untyped-def]
+    """In metres."""
+    return -weight * step.slip
+
+
+def work(step, weight):  # type: ignore[no-untyped-def]
+    """Over the weight and the commanded distance, for every second."""
+    asked = larger(step.commanded_progress, 1e-9)
+    return -weight * step.seconds * step.positive_work / (step.weight * asked)
+
+
+def pitch(step, weight):  # type: ignore[no-untyped-def]
+    """Square of the angle."""
+    angle = step.trunk.state.moving.pitch
+    return -weight * step.seconds * (angle * angle)
+
+
+def fall(step, weight):  # type: ignore[no-untyped-def]
+    """Charged once."""
+    return choose(step.failed > 0.0, -weight, 0.0)
+
+
+_ACTION = next(term for term in TERMS if term.name == "action")
+
+HORSE_TERMS = (
+    Term("alive", 2.0, "1/s", "for every second", alive),
+    Term(
+        "tracking", 10.0, "1/s", "for every second, 1 less the relative error of the speed, at least -1",
+        tracking,
+    ),
+    Term(
+        "peak", 0.35, "-",
+        "minus the increase of the legs' running peak GRF over the weight; each is the highest force of all"
+        " substeps but at most twice the present one, so that it adds up to every stance's peak", peak,
+    ),
+    Term("slip", 3.0, "1/m", "minus the way that hoofs slide under load, to and fro", slip),
+    Term(
+        "work", 0.5, "1/s",
+        "minus the positive work of all drives over the weight times the commanded distance", work,
+    ),
+    Term("pitch", 4.0, "1/(s rad^2)", "minus the square of the trunk's pitch", pitch),
+    _ACTION,
+    Term("fall", 20.0, "-", "once, minus this, when the episode fails", fall),
+)  # fmt: skip
+"""The terms of `Horse-v0`."""

@@ -1,0 +1,100 @@
+"""The body of all ids but `Horse-v0`: a trunk that one leg carries, or pulls along. `horse` is the other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoof_env.dynamics.engine import TrunkEngine
+from hoof_env.dynamics.parts import ONE_LEG, Limb, Trunk
+from hoof_env.envs.observation import HALF_RANGE, HIGH, LOW, MIDDLE
+from hoof_env.envs.parameters import drive_of, ground_of, hoof_spring
+from hoof_env.envs.start import HIGHEST, LOWEST, Start, check_options, draw_starts
+from hoof_env.envs.tasks import Settings
+from hoof_env.errors import ParameterError, check_choice, check_number
+from hoof_env.gait import PARAMETERS, GaitParameters, HarmonicGait, gait_names, load_gait
+from hoof_env.ground.contact import Ground, load_ground
+from hoof_env.leg.geometry import load_geometry, named, wrong
+
+Floats = NDArray[np.float64]
+
+
+class OneLeg:
+    """A leg under a trunk; attributes and methods are as of `horse.Horse`."""
+
+    legs, actions, harmonics, filters, limits = 1, len(PARAMETERS), 1, None, None
+    start_names, gait_names = ("crank_angle", "speed", "height", "x"), PARAMETERS
+
+    def __init__(self, settings: Settings) -> None:
+        s = settings
+        check_choice("trunk", s.trunk, ONE_LEG)
+        self.geometry = load_geometry(s.preset)
+        load_ground(s.preset)  # what is wrong with it is said, also where the settings replace it
+        self.gaits = {name: load_gait(name, s.preset) for name in gait_names(s.preset)}
+        for name, gait in self.gaits.items():
+            if isinstance(gait, HarmonicGait):
+                raise wrong(s.preset)(
+                    f"{named(s.preset)}, gait {name!r}: expected the four parameters of one harmonic, "
+                    f"which environments of one leg take, got {gait!r}"
+                )
+        self.gait = None if s.gait is None else self.gaits[check_choice("gait", s.gait, self.gaits)]
+        self._base = MIDDLE if self.gait is None else self.gait.to_array()
+        nominal = self.geometry.hip_height
+        height = nominal if s.hip_height is None else s.hip_height
+        self.height = check_number("hip_height", height, low=LOWEST * nominal, high=HIGHEST * nominal)
+
+    def parts(self, s: Settings) -> tuple[Trunk, Ground, tuple[Limb, ...]]:
+        """Trunk, ground and legs of some settings."""
+        trunk = Trunk(
+            s.trunk, s.trunk_mass, s.trunk_share, s.trunk_stiffness, s.trunk_damping, s.trunk_drag,
+            self.height,
+        )  # fmt: skip
+        limb = Limb(self.geometry, drive=drive_of(s), spring=hoof_spring(s))
+        return trunk, ground_of(s, s.trunk_mass), (limb,)
+
+    def constants(self) -> dict[str, Any]:
+        """Of the task's record."""
+        return {
+            "base": self._base, "middle": MIDDLE, "half": HALF_RANGE, "low": LOW, "high": HIGH,
+            "height": self.height, "lowest": LOWEST * self.height, "highest": HIGHEST * self.height,
+        }  # fmt: skip
+
+    def check_options(self, options: Any, trunk: Trunk, settings: Settings) -> dict[str, Any]:
+        """See `start.check_options`."""
+        return check_options(options, self.gaits, trunk, settings)
+
+    def draw(
+        self, options: Mapping[str, Any], generators: Sequence[np.random.Generator], engine: TrunkEngine
+    ) -> Start:
+        """Starts of episodes; see `start.draw_starts`."""
+        start = draw_starts(
+            options, generators, engine.profiles[0], engine.trunk, self.gaits, engine.terrain, self.gait
+        )
+        start.action = self.action_for(start.gaits)
+        return start
+
+    def settle(self, start: Start, targets: Floats, options: Any, engine: TrunkEngine) -> None:
+        """Nothing depends on the commanded speeds."""
+
+    def command_of(self, action: Any) -> Floats:
+        """See `LegBase.command_of`; they are clipped to their limits."""
+        wanted = self._base + HALF_RANGE * np.clip(np.asarray(action, np.float64), -1.0, 1.0)
+        return np.clip(wanted, LOW, HIGH)
+
+    def action_for(self, gaits: str | GaitParameters | Floats) -> NDArray[np.float32]:
+        """See `LegBase.action_for`."""
+        if isinstance(gaits, str):
+            gaits = self.gaits[check_choice("gait", gaits, self.gaits)]
+        try:
+            values = gaits.to_array() if isinstance(gaits, GaitParameters) else np.asarray(gaits, np.float64)
+        except (TypeError, ValueError):
+            values = np.empty(0)
+        if values.shape[-1:] != (self.actions,) or not np.isfinite(values).all():
+            raise ParameterError(
+                f"gait: expected one of {', '.join(self.gaits)}, GaitParameters or an array of shape (4,) or "
+                f"(n, 4), got {gaits!r}"
+            )
+        return np.clip((values - self._base) / HALF_RANGE, -1, 1).astype(np.float32)

@@ -1,0 +1,234 @@
+"""Gaits of a horse, and the commands that keep one up: the zero action of `Horse-v0`.
+
+A gait has one rate of the crank for all legs, how far the fore pair is ahead of the hind pair, and for each
+pair the crank's speed and the leg's swing as harmonics of the crank's angle; left and right are half a stride
+apart. The speed within a stride is a function of the angle, not of time, and cranks that have fallen out of
+step are pulled back into it (Kuramoto 1984): each is sped up or slowed down with the sine of how far it is
+from the others, `COUPLING` of its speed at most.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoof_env.errors import ParameterError, check_choice, check_number
+from hoof_env.gait import WIDEST
+from hoof_env.simd import larger, level, nth, read, smaller
+from hoof_env.simd.compile import inlined
+from hoof_env.simd.layout import Block, Layout, Row, Vector, views
+from hoof_env.simd.math import clip, cos_sin
+
+Floats = NDArray[np.float64]
+
+PAIRS = ("fore", "hind")
+LEGS = ("left_fore", "right_fore", "left_hind", "right_hind")
+"""In the order of an engine's limbs."""
+
+LIMITS = {
+    "speed_cos": (-0.6, 0.6), "speed_sin": (-0.6, 0.6), "swing_offset": WIDEST["swing_offset"],
+    "swing_sin": WIDEST["swing_sin"], "swing_cos": WIDEST["swing_cos"],
+    "swing_sin_2": WIDEST["higher"], "swing_cos_2": WIDEST["higher"],
+}  # fmt: skip
+"""Lowest and highest of each number of a pair: a harmonic of the crank's speed over its mean [-], and offset
+and two harmonics of the swing [rad]."""
+
+PAIR = tuple(LIMITS)
+SWING = 5  # of these are the swing's
+COUNT, ACTED = len(LEGS), 4  # legs, and actions of each
+HALF_TURN = np.pi
+ROOM = 3 * COUNT  # numbers that `command_gait` needs room for
+NAMES = ("rate", "lead", *(f"{pair}_{name}" for pair in PAIRS for name in PAIR))
+"""Of the numbers of a gait, in their order."""
+
+FASTEST = 6 * np.pi  # a crank [rad/s]
+SLOWEST = 0.15  # a crank within a stride, over its mean [-]
+COUPLING = 0.2  # most that falling out of step changes the speed of a crank [-]
+ANGLES = np.linspace(0.0, 2 * np.pi, 257)
+
+
+@dataclass(frozen=True)
+class HorseGait:
+    """A gait of a horse.
+
+    Attributes:
+        rate: of the cranks, averaged over a stride [rad/s].
+        lead: how far the fore pair is ahead of the hind pair [strides]; whole strides do not count, and half
+            ones change left and right.
+        fore, hind: the numbers of a pair, in the order of `LIMITS`.
+
+    Raises:
+        ParameterError: a number is not finite or outside its limits, or a pair has not seven.
+    """
+
+    rate: float
+    lead: float
+    fore: tuple[float, ...]
+    hind: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        check_number("rate", self.rate, low=0.1, high=FASTEST)
+        check_number("lead", self.lead, low=-10.0, high=10.0)
+        for pair in PAIRS:
+            given: Any = getattr(self, pair)
+            try:
+                numbers = tuple(given)
+            except TypeError:
+                numbers = ()
+            if len(numbers) != len(PAIR):
+                raise ParameterError(f"{pair}: expected {len(PAIR)} numbers {PAIR}, got {given!r}")
+            checked = (
+                check_number(f"{pair}[{name!r}]", value, low=low, high=high)
+                for value, (name, (low, high)) in zip(numbers, LIMITS.items(), strict=True)
+            )
+            object.__setattr__(self, pair, tuple(checked))
+
+    def to_array(self) -> Floats:
+        """The numbers in the order of `NAMES`, shape (16,)."""
+        return np.array([self.rate, self.lead, *self.fore, *self.hind])
+
+    @classmethod
+    def from_array(cls, values: Any) -> HorseGait:
+        """Inverse of `to_array`."""
+        array = np.asarray(values, float)
+        if array.shape != (len(NAMES),):
+            raise ParameterError(f"gait of a horse: expected {len(NAMES)} numbers, got shape {array.shape}")
+        rate, lead, *pairs = array.tolist()
+        return cls(rate, lead, tuple(pairs[: len(PAIR)]), tuple(pairs[len(PAIR) :]))
+
+
+@cache
+def _data() -> dict[str, Any]:
+    file = resources.files("hoof_env").joinpath("data", "horse", "gaits.json")
+    return dict(json.loads(file.read_text(encoding="utf-8")))
+
+
+def horse_gaits() -> dict[str, HorseGait]:
+    """The gaits that were found for a horse of 475 kg, by name."""
+    return {name: HorseGait.from_array(values) for name, values in _data()["gaits"].items()}
+
+
+def gait_numbers(name: str, given: Any, gaits: Mapping[str, HorseGait]) -> Floats:
+    """The numbers of a gait, from the name of one of `gaits`, a `HorseGait` or its numbers; of many, shape
+    (n, 16), from theirs. `ParameterError` from anything else."""
+    if isinstance(given, str):
+        given = gaits[check_choice(name, given, gaits)]
+    if isinstance(given, HorseGait):
+        return given.to_array()
+    try:
+        numbers = np.asarray(given, float)
+    except (TypeError, ValueError):
+        numbers = np.empty(0)
+    if numbers.ndim not in (1, 2) or numbers.shape[-1] != len(NAMES) or not np.isfinite(numbers).all():
+        raise ParameterError(
+            f"{name}: expected one of {', '.join(gaits)}, a HorseGait, or finite numbers of shape "
+            f"({len(NAMES)},) or (n, {len(NAMES)}), got {given!r:.80}"
+        )
+    return numbers
+
+
+def reference_gaits(speeds: Floats) -> Floats:
+    """The gaits that go with speeds [m/s] of a horse of 475 kg, shape (n, 16): between those that are stored
+    they are mixed, beyond them the rate alone changes."""
+    stored = _data()["reference"]
+    found = [np.interp(speeds, stored["speeds"], column) for column in np.transpose(stored["gaits"])]
+    found[0] = found[0] * speeds / np.clip(speeds, stored["speeds"][0], stored["speeds"][-1])
+    return np.transpose(found)
+
+
+# What the kernels read
+
+
+class PairReference(Layout):
+    """A pair's part of a gait."""
+
+    speed: Row  # of the crank without harmonics [rad/s]
+    wave: Vector  # cosine and sine coefficient of its harmonic [rad/s]
+    phase: Vector  # the same of the phase, which grows evenly in time, less the angle [rad]
+    anchor: Row  # what the phase of the pair's first leg is ahead of the horse's [rad]
+    swing: Annotated[Block, SWING]  # coefficients [rad]
+
+
+def rows_of(gaits: Floats) -> Floats:
+    """Gaits of shape (n, 16) as rows of a `PairReference` for each pair, shape (2 PairReference.size, n)."""
+    rate, lead = gaits[:, 0], gaits[:, 1]
+    pairs = gaits[:, 2:].reshape(len(gaits), len(PAIRS), len(PAIR))
+    found = []
+    for numbers, ahead in zip(pairs.transpose(1, 2, 0), (lead, 0 * lead), strict=True):
+        slowness = 1 / shape_of(numbers[:2, :, None], ANGLES[:-1])  # over one turn, at equal distances
+        mean = slowness.mean(1)
+        wave = slowness @ np.exp(-1j * ANGLES[:-1]) * 2 / (mean * slowness.shape[1])
+        speed, phase = rate * mean, (wave.imag, wave.real)  # integrated over the angle
+        anchor = 2 * np.pi * ahead + phase[0]  # the phase of angle 0
+        found += [speed, *(speed * numbers[:2]), *phase, anchor, *numbers[2:]]
+    return np.array(found)
+
+
+def shape_of(numbers: Floats, angles: Floats) -> Floats:
+    """Crank's speed at angles over its mean over the angle [-], of a pair's first two numbers (axis 0)."""
+    return np.maximum(1 + numbers[0] * np.cos(angles) + numbers[1] * np.sin(angles), SLOWEST)
+
+
+def crank_angles(gaits: Floats, phase: Floats, off: Floats) -> Floats:
+    """Angles [rad] of the cranks of gaits, shape (n, 16), at a phase of the stride, shape (n,), from which
+    each is off, shape (4, n), both [strides]; shape (4, n)."""
+    pairs = gaits[:, 2:].reshape(len(gaits), len(PAIRS), len(PAIR))
+    found = np.empty((COUNT, len(gaits)))
+    for i in range(COUNT):
+        slowness = 1 / shape_of(pairs[:, i // 2, :2].T[:, :, None], ANGLES)
+        passed = np.cumsum(slowness[:, 1:] + slowness[:, :-1], axis=1)
+        passed = np.hstack([0 * passed[:, :1], passed / passed[:, -1:]])
+        wanted = (phase + off[i] + (gaits[:, 1] if i < 2 else 0.0) + 0.5 * (i % 2)) % 1.0
+        found[i] = [np.interp(x, row, ANGLES) for x, row in zip(wanted, passed, strict=True)]
+    return found
+
+
+def commands_of(gaits: Floats, theta: Floats, count: int) -> Floats:
+    """What legs that are in step are commanded at crank angles, shape (4, n), by gaits, shape (n, 16):
+    `count` gait parameters of an engine, shape (4, count, n)."""
+    found = np.empty((COUNT, count, len(gaits)))
+    pairs = rows_of(gaits).reshape(len(PAIRS), PairReference.size, -1)
+    for i in range(COUNT):
+        pair = views(PairReference, pairs[i // 2])
+        wave = pair.wave[0] * np.cos(theta[i]) + pair.wave[1] * np.sin(theta[i])
+        found[i, 0] = np.maximum(pair.speed + wave, SLOWEST * pair.speed)
+        found[i, 1:] = pair.swing[: count - 1]
+    return found
+
+
+@inlined
+def command_gait(task, actions, episode, first_leg, gait, n, room):  # type: ignore[no-untyped-def]
+    """Command the reference gait, and what actions change of it; `room` is for `ROOM` numbers.
+
+    The first action of a leg scales its crank's speed, the others are added to the swing's first three
+    coefficients."""
+    together_cos, together_sin = level(episode, 0.0), level(episode, 0.0)
+    for i in range(COUNT):
+        pair, theta = nth(episode.fore, i // 2), nth(first_leg, i).state.theta
+        c, s = cos_sin(theta)
+        phase = theta + (pair.phase.real * c + pair.phase.imag * s) - pair.anchor
+        phase_cos, phase_sin = cos_sin(phase - HALF_TURN * (i % 2))
+        speed = pair.speed + (pair.wave.real * c + pair.wave.imag * s)
+        room[3 * i] = larger(speed, SLOWEST * pair.speed)
+        room[3 * i + 1], room[3 * i + 2] = phase_cos, phase_sin
+        together_cos, together_sin = together_cos + phase_cos, together_sin + phase_sin
+    for i in range(COUNT):
+        leg, pair = nth(first_leg, i), nth(episode.fore, i // 2)
+        behind = together_sin * room[3 * i + 1] - together_cos * room[3 * i + 2]
+        speed = room[3 * i] * (1.0 + (COUPLING / COUNT) * behind)
+        for k in range(gait):
+            action = 0.0 * speed
+            if k < ACTED:
+                at = (n * COUNT + i) * ACTED + k
+                action = task.half[k] * clip(read(leg, actions, at, COUNT * ACTED), 1.0)
+            wanted = speed * (1.0 + action)
+            if k > 0:
+                wanted = pair.swing[k - 1] + action
+            leg.command[k] = smaller(larger(wanted, task.low[k]), task.high[k])
