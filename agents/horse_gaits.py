@@ -1,10 +1,9 @@
 """Reference gaits of the horse, found by CMA-ES: `python -m agents.horse_gaits`.
 
-The search plays zero actions on `hoof_env/Horse-v0` around gaits of its own and knows nothing but the
-return. It begins at Froude number 0.25 and goes on from each speed to the next one, so that neighbours are
-alike; actions lie around what is between them. Two more gaits are searched for on their own: one whose fore
-and hind legs keep time, as in a trot or a pace, and the fastest, which is asked for a speed that none has.
-What was found already is not searched for again.
+The search plays zero actions on `hoof_env/Horse-v0` around gaits of its own and knows nothing but the return.
+It begins from nothing at Froude number 0.25, and then asks for a little more speed every few generations, or
+for less, so that neighbours are alike: actions lie around what is between them. A second family keeps fore
+and hind legs in time, as in a trot or a pace. What was found already is not searched for again.
 """
 
 from __future__ import annotations
@@ -29,14 +28,16 @@ from hoof_env.errors import HoofEnvError
 Floats = NDArray[np.float64]
 
 GRAVITY = 9.81
-POPULATION, STARTS, GENERATIONS, SECONDS = 32, 4, 250, 5.0
-"""Candidates of a generation, episodes of each, generations, and the length of an episode [s]."""
+POPULATION, STARTS, SECONDS = 32, 8, 5.0
+"""Candidates of a generation, episodes of each, and their length [s]."""
 
-FROUDE = (0.25, 0.35, 0.5, 0.7, 1.0, 0.175, 0.1)
-"""Of the reference gaits, in the order in which they are found: each begins with the nearest one so far."""
-
-FIRST, NEXT = 0.4, 0.12  # spread of a search from nothing, and of one that begins with a gait
-FASTEST = 12.0  # speed that the fastest gait is asked for [m/s]
+FIRST, LEAST = 0.4, 0.05  # spread of a search from nothing, and the least while the speed changes
+STEP = 1.03  # ratio of one speed to the next
+FROUDE = 0.25  # where the search begins
+LOWEST = 0.1  # Froude number at which the slower gaits end
+KNOTS = (1.2, 1.5, 1.85, 2.2, 2.6, 2.9)  # speeds that the reference gaits have, about [m/s]
+MOST = 40  # steps of speed at most
+FALLEN = 0.3  # share of falls at which the speed is raised no more
 
 CENTRE = (1.05, 0.45, -0.7, 0.0, 0.0)  # swing about which a search from nothing begins [rad]
 SPANS = (0.5, 0.4, 0.4, 0.3, 0.3)
@@ -61,19 +62,20 @@ class Course:
     """Many horses that are asked for one speed [m/s], on ground of a stiffness [N/m^1.5] perhaps."""
 
     def __init__(self, speed: float, num_envs: int, **settings: Any) -> None:
-        self.envs = gym.make_vec(
+        envs: Any = gym.make_vec(
             "hoof_env/Horse-v0", num_envs, num_threads=2, target_speed=speed,
             autoreset_mode=AutoresetMode.SAME_STEP, **{"episode_seconds": SECONDS, **settings},
         )  # fmt: skip
-        self.steps: int = self.envs.unwrapped.batch.steps_per_episode  # type: ignore[attr-defined]
+        self.envs, self.steps = envs, int(envs.unwrapped.batch.steps_per_episode)
 
-    def play(self, gaits: Floats, seed: int) -> tuple[Floats, list[dict[str, float]]]:
-        """Returns of the first episodes of some gaits, shape (n, 16), and their figures. Every `STARTS` of
-        them meet the same starts."""
+    def play(self, gaits: Floats, seed: int, starts: int = STARTS) -> tuple[Floats, list[dict[str, float]]]:
+        """Returns of the first episodes of some gaits, shape (n, 16), and their figures. So many after each
+        other meet different starts, the same as the next ones."""
         envs, n = self.envs, len(gaits)
-        envs.reset(seed=[seed + k % STARTS for k in range(n)], options={"gait": gaits})
-        returns, ended, summaries = np.zeros(n), np.zeros(n, bool), [{} for _ in range(n)]
-        idle = np.zeros(envs.action_space.shape, np.float32)  # type: ignore[arg-type]
+        envs.reset(seed=[seed + k % starts for k in range(n)], options={"gait": gaits})
+        returns, ended = np.zeros(n), np.zeros(n, bool)
+        summaries: list[dict[str, float]] = [{} for _ in range(n)]
+        idle = np.zeros((n, 16), np.float32)
         for _ in range(self.steps):
             _, rewards, terminated, truncated, infos = envs.step(idle)
             returns += np.where(ended, 0.0, rewards)
@@ -88,37 +90,49 @@ class Course:
         return returns, summaries
 
 
-def search(
-    course: Course, first: Floats | None, seed: int, generations: int, lead: float | None
-) -> tuple[Floats, float]:
-    """One CMA-ES, which begins with a gait, shape (16,), or from nothing; the mean of its last distribution
-    and its mean return. `lead` is fixed if it is given."""
-    try:
-        import cma
-        from tqdm import tqdm
-    except ModuleNotFoundError:
-        raise HoofEnvError('agents.horse_gaits needs cma: pip install "hoof-env[train,identify]"') from None
+class Search:
+    """A CMA-ES whose commanded speed may change on the way.
 
-    def gaits_of(points: Any) -> Floats:
-        gaits = decode(np.asarray(points))
-        if lead is not None:
-            gaits[:, 1] = lead
-        return gaits
+    Args:
+        first: a gait to begin with, shape (16,); None is from nothing.
+        lead: of the fore pair [strides], fixed if it is given.
+    """
 
-    start = np.zeros(2 + len(PAIRS) * len(LIMITS)) if first is None else encode(first[None])[0]
-    options = {"bounds": [-1, 1], "popsize": POPULATION, "seed": seed + 1, "verbose": -9, "verb_log": 0}
-    strategy = cma.CMAEvolutionStrategy(start, FIRST if first is None else NEXT, options)
-    with tqdm(total=generations, unit=" generations", leave=False, disable=None) as bar:
-        for k in range(generations):
-            points = strategy.ask()
-            gaits = np.repeat(gaits_of(points), STARTS, axis=0)
-            returns = course.play(gaits, 10_000 * seed + STARTS * k)[0].reshape(-1, STARTS).mean(1)
-            strategy.tell(points, (-returns).tolist())
-            bar.update()
-            bar.set_postfix(best=f"{returns.max():.2f}")
-    best = gaits_of(np.clip(strategy.result.xfavorite, -1, 1)[None])[0].round(5)
-    returns, _ = course.play(np.tile(best, (POPULATION * STARTS, 1)), 10**6)
-    return best, float(returns.mean())
+    def __init__(self, seed: int, first: Floats | None = None, lead: float | None = None) -> None:
+        try:
+            import cma
+        except ModuleNotFoundError:
+            raise HoofEnvError(
+                'agents.horse_gaits needs cma: pip install "hoof-env[train,identify]"'
+            ) from None
+        self.lead, self.seed, self.count = lead, seed, 0
+        start = np.zeros(2 + len(PAIRS) * len(LIMITS)) if first is None else encode(first[None])[0]
+        options = {"bounds": [-1, 1], "popsize": POPULATION, "seed": seed + 1, "verbose": -9, "verb_log": 0}
+        self.strategy = cma.CMAEvolutionStrategy(start, FIRST if first is None else FIRST / 2, options)
+
+    def gaits(self, points: Any) -> Floats:
+        """Of points of the box, shape (n, 16)."""
+        found = decode(np.clip(np.asarray(points), -1, 1))
+        if self.lead is not None:
+            found[:, 1] = self.lead
+        return found
+
+    def run(self, speed: float, generations: int, tick: Any) -> dict[str, Any]:
+        """Search on at a commanded speed [m/s]; what the mean of the distribution is worth there."""
+        course = Course(speed, POPULATION * STARTS)
+        for _ in range(generations):
+            points = self.strategy.ask()
+            gaits = np.repeat(self.gaits(points), STARTS, axis=0)
+            self.count += 1
+            returns, _ = course.play(gaits, 10_000 * self.seed + STARTS * self.count)
+            self.strategy.tell(points, (-returns.reshape(-1, STARTS).mean(1)).tolist())
+            self.strategy.sigma = max(self.strategy.sigma, LEAST)
+            tick(speed, returns.max())
+        gait = self.gaits(self.strategy.result.xfavorite[None])[0].round(5)
+        returns, summaries = course.play(np.tile(gait, (POPULATION * STARTS, 1)), 10**6, POPULATION * STARTS)
+        shown = ("speed_m_s", "slip_m", "cost_of_transport", "duty_factor", "failed")
+        figures = {key: round(float(np.mean([one[key] for one in summaries])), 4) for key in shown}
+        return {"speed": round(speed, 4), "gait": gait.tolist(), "return": float(returns.mean()), **figures}
 
 
 @dataclass
@@ -127,61 +141,120 @@ class Args:
 
     out: Path = Path("runs/horse.json")
     """what was found; one that exists is gone on with"""
-    generations: int = GENERATIONS
-    """of a search"""
-    restarts: int = 3
+    generations: int = 200
+    """of a search from nothing"""
+    each: int = 10
+    """generations for each step of speed"""
+    restarts: int = 2
     """searches from nothing, of which the best is taken"""
-    only: str = ""
-    """one of walk, trot, fast; otherwise all of them and the reference gaits"""
 
 
 def speed_of(froude: float) -> float:
     """[m/s], of a Froude number."""
-    return float(round(np.sqrt(froude * GRAVITY * HIP_HEIGHT), 3))
+    return float(np.sqrt(froude * GRAVITY * HIP_HEIGHT))
+
+
+class Finder:
+    """Finds what the file lacks, and writes it after every search."""
+
+    def __init__(self, args: Args) -> None:
+        self.args = args
+        self.content: dict[str, Any] = {"searches": {}}
+        if args.out.is_file():
+            self.content = json.loads(args.out.read_text(encoding="utf-8"))
+
+    def keep(self, name: str, look: Any) -> list[dict[str, Any]]:
+        """What a search found under this name, or finds now."""
+        from tqdm import tqdm
+
+        if name not in self.content["searches"]:
+            began = time.monotonic()
+            with tqdm(desc=name, unit=" generations", leave=False, disable=None) as bar:
+
+                def tick(speed: float, best: float) -> None:
+                    bar.update()
+                    bar.set_postfix(speed=f"{speed:.2f}", best=f"{best:.1f}")
+
+                steps = look(tick)
+            wall = round(time.monotonic() - began, 1)
+            self.content["searches"][name] = {"steps": steps, "wall_s": wall}
+            self.content |= {"command": runs.command(), "versions": runs.versions()}
+            self.args.out.parent.mkdir(parents=True, exist_ok=True)
+            runs.write_text(self.args.out, json.dumps(self.content, indent=1) + "\n")
+            for step in steps:
+                print(name, {key: value for key, value in step.items() if key != "gait"}, flush=True)
+        found: list[dict[str, Any]] = self.content["searches"][name]["steps"]
+        return found
+
+    def ramp(
+        self, search: Search, first: float, ratio: float, last: float, tick: Any
+    ) -> list[dict[str, Any]]:
+        """Change the speed by a ratio until it is `last`, or the horse falls."""
+        steps, speed = [], first
+        for _ in range(MOST):
+            speed = speed * ratio
+            if (speed - last) * (ratio - 1) > 0:
+                break
+            steps.append(search.run(speed, self.args.each, tick))
+            if steps[-1]["failed"] > FALLEN:
+                break
+        return steps
+
+    def family(self, name: str, lead: float | None, first: Floats | None) -> None:
+        """A walk from nothing, or from a gait, and where more and less speed lead from there."""
+        args, speed = self.args, speed_of(FROUDE)
+        begins = [
+            self.keep(
+                f"{name} {seed}",
+                lambda tick, seed=seed: [Search(seed, first, lead).run(speed, args.generations, tick)],
+            )[0]
+            for seed in range(args.restarts)
+        ]
+        best = np.array(max(begins, key=lambda one: float(one["return"]))["gait"])
+        for way, ratio, last in (("faster", STEP, 8.0), ("slower", 1 / STEP, speed_of(LOWEST) / STEP)):
+            self.keep(
+                f"{name}, {way}",
+                lambda tick, ratio=ratio, last=last: self.ramp(
+                    Search(7, best, lead), speed, ratio, last, tick
+                ),
+            )
+
+
+def shipped(searches: dict[str, Any]) -> dict[str, Any]:
+    """What comes with the package: gaits by the speed that they have, not by the one that was asked for, and
+    by name those of the first search, of the fastest one that never fell, and of the family in time."""
+    families = {
+        family: sorted(
+            (
+                step
+                for name, found in searches.items() if name.startswith(family)
+                for step in found["steps"] if step["failed"] < 0.01
+            ),
+            key=lambda step: float(step["speed_m_s"]),
+        )
+        for family in ("free", "in time")
+    }  # fmt: skip
+    free = families["free"]
+    knots = [min(free, key=lambda step: abs(float(step["speed_m_s"]) - speed)) for speed in KNOTS]
+    named = {"walk": knots[2], "fast": free[-1]}
+    if families["in time"]:
+        named["in time"] = families["in time"][-1]
+    return {
+        "reference": {"speeds": [one["speed_m_s"] for one in knots], "gaits": [one["gait"] for one in knots]},
+        "gaits": {name: one["gait"] for name, one in named.items()},
+    }
 
 
 def main(argv: list[str] | None = None) -> None:
-    """Find what the file lacks, and write it after every search."""
+    """Find gaits."""
     import tyro
 
     args = tyro.cli(Args, args=argv, prog="python -m agents.horse_gaits", description=__doc__)
-    content: dict[str, Any] = {"searches": {}}
-    if args.out.is_file():
-        content = json.loads(args.out.read_text(encoding="utf-8"))
-    found: dict[str, Any] = content["searches"]
-
-    def look(name: str, speed: float, first: Floats | None, seed: int, lead: float | None = None) -> Any:
-        if name in found:
-            return found[name]
-        began, course = time.monotonic(), Course(speed, POPULATION * STARTS)
-        gait, score = search(course, first, seed, args.generations, lead)
-        summaries = course.play(np.tile(gait, (POPULATION * STARTS, 1)), 2 * 10**6)[1]
-        shown = ("speed_m_s", "slip_m", "cost_of_transport", "duty_factor", "failed", "stances")
-        figures = {key: round(float(np.mean([one[key] for one in summaries])), 4) for key in shown}
-        found[name] = {
-            "speed": speed, "gait": gait.tolist(), "return": round(score, 3), **figures,
-            "wall_s": round(time.monotonic() - began, 1),
-        }  # fmt: skip
-        content["command"], content["versions"] = runs.command(), runs.versions()
-        args.out.parent.mkdir(parents=True, exist_ok=True)
-        runs.write_text(args.out, json.dumps(content, indent=1) + "\n")
-        print(name, {key: value for key, value in found[name].items() if key != "gait"}, flush=True)
-        return found[name]
-
-    def best_of(name: str, speed: float, lead: float | None = None) -> Floats:
-        each = [look(f"{name}, search {seed}", speed, None, seed, lead) for seed in range(args.restarts)]
-        return np.array(max(each, key=lambda one: float(one["return"]))["gait"])
-
-    if args.only in ("", "walk"):
-        gaits = {FROUDE[0]: best_of("walk", speed_of(FROUDE[0]))}
-        for froude in FROUDE[1:]:
-            near = min(gaits, key=lambda other: abs(np.log(other / froude)))
-            one = look(f"Froude {froude:g}", speed_of(froude), gaits[near], 0)
-            gaits[froude] = np.array(one["gait"])
-    if args.only in ("", "trot"):
-        best_of("trot", speed_of(1.0), 0.0)
-    if args.only in ("", "fast"):
-        best_of("fast", FASTEST)
+    finder = Finder(args)
+    finder.family("free", None, None)
+    begins = [finder.content["searches"][f"free {seed}"]["steps"][0] for seed in range(args.restarts)]
+    best = max(begins, key=lambda one: float(one["return"]))
+    finder.family("in time", 0.0, np.array(best["gait"]))
 
 
 if __name__ == "__main__":

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from hoof_env import records
 from hoof_env._output import staged
 from hoof_env.errors import HoofEnvError, ParameterError, check_number, parse_pairs
-from hoof_env.render.instant import Columns, Instant, instants
+from hoof_env.render.instant import Columns, instants
 
 if TYPE_CHECKING:
     from hoof_env.render.renderer import Renderer
@@ -59,16 +60,21 @@ def check_film(path: Path, fps: float) -> None:
 
 
 def frames(
-    renderer: Renderer, episode: Iterable[Columns], fps: float, slow: float = 1.0
+    renderer: Renderer,
+    episode: Iterable[Columns],
+    fps: float,
+    slow: float = 1.0,
+    read: Callable[[Columns], list[Any]] = instants,
 ) -> Iterator[NDArray[np.uint8]]:
     """Pictures of an episode, 1 / (fps slow) of its seconds apart, each at the last substep before its time;
-    `renderer` is in mode "rgb_array" and is reset, `episode` as `records.episode` yields it."""
+    `renderer` is in mode "rgb_array" and is reset, `episode` as `records.episode` yields it; `read` makes
+    instants of its columns."""
     renderer.reset()
     step = 1 / (fps * slow)
     shown = 0
-    news: list[Instant] = []
+    news: list[Any] = []
     for columns in episode:
-        for now in instants(columns):
+        for now in read(columns):
             news.append(now)
             if now.time >= shown * step - 1e-9:
                 renderer.add(news)
@@ -147,7 +153,8 @@ def render_episode(
     with records.make_env(env_id, parse_pairs("--args", arguments)) as env:
         player = records.find_policy(policy, env, env_id, seed)
         renderer = new_renderer(records.setting(env), fps, size)
-        pictures = frames(renderer, records.episode(env, player, seed, seconds), fps, slow)
+        played = records.episode(env, player, seed, seconds)
+        pictures = frames(renderer, played, fps, slow, partial(records.instants_of, env))
         count = write_film(_with_progress(pictures, round(seconds * slow * fps) + 1), path, fps)
     return count
 

@@ -21,10 +21,20 @@ import hoof_env
 from hoof_env._output import check_folder, staged
 from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.envs.policies import Scripted, load_open_loop, make_policy, policy_names
+from hoof_env.envs.reference import LEGS
 from hoof_env.errors import HoofEnvError, OutputError, ParameterError, check_number, parse_pairs
 from hoof_env.gait import PARAMETERS, GaitParameters
 from hoof_env.ground.terrain import Terrain
-from hoof_env.render.instant import UNITS, Columns, Setting, columns_of_engine
+from hoof_env.render.instant import (
+    OF_TRUNK,
+    UNITS,
+    Columns,
+    Setting,
+    columns_of_engine,
+    columns_of_horse,
+    horse_instants,
+    instants,
+)
 from hoof_env.saved_policy import find_saved
 
 RECORD = {name: unit for name, unit in UNITS.items() if name not in PARAMETERS[1:]} | {"free_moment": "N m"}
@@ -36,14 +46,16 @@ def setting(env: Any) -> Setting:
     """The setting of an environment of this package, wrapped or not; `ParameterError` of another."""
     leg = env.unwrapped
     try:
+        hips = leg.batch.body.hips
         return Setting(
             leg.geometry,
             getattr(leg, "terrain", None) or Terrain.flat(),
             leg.weight,
             leg.engine.trunk.kind,
-            LIFT_OFF * leg.weight,
+            LIFT_OFF * leg.weight / max(len(hips), 1),
             leg.dt,
             leg.sim_dt,
+            hips,
         )
     except AttributeError:
         raise ParameterError(
@@ -53,9 +65,18 @@ def setting(env: Any) -> Setting:
 
 def substeps(env: Any, command: NDArray[np.float64] | None = None) -> Columns:
     """What happened in the last control step of an environment of this package, one row a substep, or the
-    start after a reset; `command`, shape (4,), is what was commanded, if known."""
+    start after a reset; `command`, shape (4,), is what was commanded of one leg, if known."""
     leg = env.unwrapped
+    if hips := leg.batch.body.hips:
+        engine = leg.engine
+        return columns_of_horse(leg.record(), hips, leg.terrain, command=engine.command_in(engine.column(0)))
     return columns_of_engine(leg.record(), leg.terrain, command=command)
+
+
+def instants_of(env: Any, columns: Columns) -> list[Any]:
+    """Records of the rows of `columns` of an environment, `Instant`s or `HorseInstant`s."""
+    hips = env.unwrapped.batch.body.hips
+    return horse_instants(columns, hips) if hips else instants(columns)
 
 
 def make_env(env_id: str, arguments: Mapping[str, Any] | None = None) -> gym.Env[Any, Any]:
@@ -119,8 +140,8 @@ def episode(
         check_number("seconds", seconds, low=0, exclusive_low=True)
     leg: Any = env.unwrapped
     observation, info = env.reset(seed=seed, options=dict(options or {}))
-    gait = info.get("gait")
-    here = substeps(env, np.array([gait[name] for name in PARAMETERS]) if gait else None)
+    gait, of_horse = info.get("gait"), bool(setting(env).hips)
+    here = substeps(env, np.array([gait[name] for name in PARAMETERS]) if gait and not of_horse else None)
     yield here
     start, ended = np.ones(1, bool), False
     while not ended and (seconds is None or here["time"][-1] < seconds - 1e-9):
@@ -128,7 +149,7 @@ def episode(
         observation, _, failed, truncated, _ = env.step(action)
         start, ended = np.zeros(1, bool), failed or truncated
         before = here["time"][-1]
-        here = substeps(env, leg.command_of(np.asarray(action, np.float32)))
+        here = substeps(env, None if of_horse else leg.command_of(np.asarray(action, np.float32)))
         if here["time"][-1] > before:  # else the simulation failed and nothing happened
             yield here
 
@@ -140,11 +161,24 @@ def record_episode(
     seconds: float | None = None,
     options: Mapping[str, Any] | None = None,
 ) -> Columns:
-    """The record of an episode at every substep: arrays of shape (n,), names and units as in `RECORD`.
+    """The record of an episode at every substep: arrays of shape (n,), names and units as `units_of` says.
     Arguments and errors are those of `episode`."""
-    parts = list(episode(env, policy, seed, seconds, options))
-    record = {name: np.concatenate([part[name] for part in parts]) for name in RECORD if name in parts[0]}
-    return record | {"free_moment": np.zeros(len(record["time"]))}
+    parts, units = list(episode(env, policy, seed, seconds, options)), units_of(env)
+    moments = [name for name in units if name.endswith("free_moment")]
+    record = {name: np.concatenate([part[name] for part in parts]) for name in units if name in parts[0]}
+    return record | {name: np.zeros(len(record["time"])) for name in moments}
+
+
+def units_of(env: gym.Env[Any, Any]) -> dict[str, str]:
+    """Columns of a record and their units: `RECORD`; of a horse those of the trunk, and each leg's under its
+    name, `left_fore_force_y`."""
+    hips = setting(env).hips
+    if not hips:
+        return RECORD
+    found = {name: UNITS[name if name in UNITS else f"trunk_{name}"] for name in OF_TRUNK}
+    own = {name: unit for name, unit in RECORD.items() if name not in ("time", "pitch")}
+    own = {name: unit for name, unit in own.items() if not name.startswith("trunk_")}
+    return found | {f"{leg}_{name}": unit for leg in hips for name, unit in own.items()}
 
 
 def describe(env: gym.Env[Any, Any], **about: Any) -> dict[str, Any]:
@@ -157,7 +191,7 @@ def describe(env: gym.Env[Any, Any], **about: Any) -> dict[str, Any]:
         "sim_dt_s": here.sim_dt,
         "weight_n": here.weight_n,
         "axes": "x forward, y up, z to the right; angles counter-clockwise",
-        "units": RECORD,
+        "units": units_of(env),
         "geometry": here.geometry.to_dict(),
         "ground": {name: value.item() if isinstance(value, np.generic) else value for name, value in ground},
         "terrain": here.terrain.to_dict(),
@@ -204,14 +238,19 @@ def write_parquet(record: Columns, about: Mapping[str, Any], path: Path) -> None
 
 
 def write_mot(record: Columns, about: Mapping[str, Any], path: Path) -> None:
-    """OpenSim's motion file for external loads, the leg in the plane z = 0: `MOT_COLUMNS` under its
-    header."""
-    nothing = np.zeros(len(record["time"]))
-    table = [record[name] + 0.0 if name else nothing for name in MOT_COLUMNS.values()]  # no -0
+    """OpenSim's motion file for external loads, legs in the plane z = 0: `MOT_COLUMNS` under its header, of a
+    horse for each leg with its name before theirs."""
+    nothing, legs = np.zeros(len(record["time"])), [leg for leg in LEGS if f"{leg}_force_x" in record]
+    names = {"time": "time"} | {
+        f"{before}{name}": f"{before}{column}" if column else ""
+        for before in ([f"{leg}_" for leg in legs] or [""])
+        for name, column in MOT_COLUMNS.items() if name != "time"
+    }  # fmt: skip
+    table = [record[name] + 0.0 if name else nothing for name in names.values()]  # no -0
     header = (
         f"{path.name}\nversion=1\nnRows={len(nothing)}\nnColumns={len(table)}\ninDegrees=yes\nendheader\n"
     )
-    _write_table(path, table, "%.10g", "\t", header + "\t".join(MOT_COLUMNS))
+    _write_table(path, table, "%.10g", "\t", header + "\t".join(names))
 
 
 def _write_table(path: Path, columns: list[Any], number: str, between: str, header: str) -> None:

@@ -134,7 +134,6 @@ class EpisodeBatch:
         self.actions = np.zeros((columns, self.body.actions), np.float32)
         self.observations = np.zeros((columns, len(self.names)), np.float32)
         self.rewards = np.zeros(columns)
-        self.measurements = Measurements(self.engine.features, self.body.legs)
         self._task = self._task_record()
         self._open()
         self.now.weight[:] = self.engine.weight
@@ -176,6 +175,7 @@ class EpisodeBatch:
         """Find the arrays where they are now, and the kernels."""
         self.entries = observed(self.groups, self.settings.trunk, self.task.entries)
         self.now = views(self._episode_layout, self.episode)
+        self.measurements = Measurements(self.engine.features, self.body.legs)
         self._kernels = k = kernels.step_kernels(
             self.task.terms, self.task.entries, self.task.contact_law, self.engine.features, self.body.legs
         )
@@ -463,7 +463,9 @@ class EpisodeBatch:
         self._observe(self.addresses)
 
     def __getstate__(self) -> dict[str, Any]:
-        found_again = ("addresses", "_blocks", "entries", "kernel", "now", "_kernels", "_observe")
+        found_again = (
+            "addresses", "_blocks", "entries", "kernel", "measurements", "now", "_kernels", "_observe"
+        )  # fmt: skip
         return {key: value for key, value in vars(self).items() if key not in found_again}
 
     def __setstate__(self, state: dict[str, Any]) -> None:

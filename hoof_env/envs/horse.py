@@ -19,12 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.dynamics.parts import FREE, TRUNKS, HoofSpring, Limb, Limits, Trunk
+from hoof_env.dynamics.parts import FREE, GRAVITY, TRUNKS, HoofSpring, Limb, Limits, Trunk
 from hoof_env.envs.parameters import drive_of, ground_of
 from hoof_env.envs.reference import (
     ACTED,
     COUNT,
     FASTEST,
+    LEGS,
     NAMES,
     commands_of,
     crank_angles,
@@ -54,7 +55,7 @@ HIP_HEIGHT, MASS, GYRATION = 1.4, 475.0, 0.5  # [m], [kg], of the trunk about it
 HIPS = {"fore": 1.0, "hind": -0.2}  # crank centres, forward from the trunk's centre [m]
 PITCH, HEIGHT, CLEARANCE = 0.5, (0.75, 1.8), 0.02
 """Where it has fallen: +-pitch [rad], heights of the trunk [m], of a joint over the ground [m]."""
-GAP = 0.005  # between the lowest hoof and the ground at a start [m]
+GAP = 0.005  # between the lowest rigid hoof and the ground at a start [m]
 
 SPANS = (1.0, 0.3, 0.3, 0.3)
 """What an action of 1 changes: of the crank's speed [-], of the swing's offset, sine and cosine [rad]."""
@@ -74,6 +75,7 @@ class Horse:
     Attributes:
         gaits: that were found, by name.
         gait: around which actions lie whatever speed is commanded; None for those of `reference_gaits`.
+        hips: places of the crank centres on the trunk [m], by leg.
         harmonics, filters, limits: of the engine.
         start_names, gait_names: of what an episode starts with.
     """
@@ -89,11 +91,15 @@ class Horse:
         self.geometry = load_geometry(s.preset)
         self.geometry = self.geometry.scaled(HIP_HEIGHT * self.size / self.geometry.hip_height)
         self.height = HIP_HEIGHT * self.size
+        self.hips = {leg: (HIPS[leg.partition("_")[2]] * self.size, 0.0) for leg in LEGS}
         self.gaits = horse_gaits()
         self.gait = None if s.gait is None else self.gaits[check_choice("gait", s.gait, self.gaits)]
         self.harmonics = int(check_number("harmonics", s.harmonics or 2, low=1, high=2))
         self.filters = FILTERS[check_choice("filters", s.filters or "quick", FILTERS)]
         self.lowest, self.highest = (self.size * height for height in HEIGHT)
+        self._gap = GAP * self.size
+        if s.hoof_stiffness is not None:  # the springs of two legs bear the weight
+            self._gap = -MASS * GRAVITY / (4 * s.hoof_stiffness) * self.size
         self.limits = Limits((-PITCH, PITCH), (self.lowest, self.highest), CLEARANCE * self.size)
 
     def parts(self, s: Settings) -> tuple[Trunk, Ground, tuple[Limb, ...]]:
@@ -105,7 +111,7 @@ class Horse:
         )
         drive, spring = drive_of(s), self._spring(s)
         fore, hind = (
-            Limb(_limb(self.geometry, pair, MASS * size**3), (HIPS[pair] * size, 0.0), drive, spring)
+            Limb(_limb(self.geometry, pair, MASS * size**3), self.hips[f"left_{pair}"], drive, spring)
             for pair in HIPS
         )
         return trunk, ground_of(s, mass), (fore, fore, hind, hind)
@@ -181,7 +187,7 @@ class Horse:
         ], axis=0)  # fmt: skip
         ground = highest(engine.terrain, begun["x"], 2 * self.height)
         start.trunk = {
-            "x": begun["x"], "y": ground - hoof + GAP * self.size, "vx": begun["speed"],
+            "x": begun["x"], "y": ground - hoof + self._gap, "vx": begun["speed"],
             "pitch": begun["pitch"],
         }  # fmt: skip
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,7 @@ class OneLeg:
     """A leg under a trunk; attributes and methods are as of `horse.Horse`."""
 
     legs, actions, harmonics, filters, limits = 1, len(PARAMETERS), 1, None, None
+    hips: Mapping[str, tuple[float, float]] = MappingProxyType({})
     start_names, gait_names = ("crank_angle", "speed", "height", "x"), PARAMETERS
 
     def __init__(self, settings: Settings) -> None:
@@ -41,6 +43,7 @@ class OneLeg:
                     f"which environments of one leg take, got {gait!r}"
                 )
         self.gait = None if s.gait is None else self.gaits[check_choice("gait", s.gait, self.gaits)]
+        self._spring = hoof_spring(s)
         self._base = MIDDLE if self.gait is None else self.gait.to_array()
         nominal = self.geometry.hip_height
         height = nominal if s.hip_height is None else s.hip_height
@@ -52,7 +55,7 @@ class OneLeg:
             s.trunk, s.trunk_mass, s.trunk_share, s.trunk_stiffness, s.trunk_damping, s.trunk_drag,
             self.height,
         )  # fmt: skip
-        limb = Limb(self.geometry, drive=drive_of(s), spring=hoof_spring(s))
+        limb = Limb(self.geometry, drive=drive_of(s), spring=self._spring)
         return trunk, ground_of(s, s.trunk_mass), (limb,)
 
     def constants(self) -> dict[str, Any]:

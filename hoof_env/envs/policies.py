@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env._version import __version__
+from hoof_env.envs.reference import ACTED
 from hoof_env.envs.start import extreme_posture
 from hoof_env.errors import DataFileError, ParameterError, check_choice
 from hoof_env.gait import LIMITS, paper_gaits
@@ -63,8 +64,15 @@ POLICIES = ("idle", "random", "bang-bang", "drag", "airborne")
 """Names of the policies that are not a gait of the preset."""
 
 
+HORSE_POLICIES = ("reference", "idle", "random", "bang-bang")
+"""Those of a horse."""
+
+
 def policy_names(env: Any) -> list[str]:
-    """Names accepted by `make_policy` for an environment: the gaits of its preset and `POLICIES`."""
+    """Names accepted by `make_policy` for an environment: the gaits of its preset and `POLICIES`, or
+    `HORSE_POLICIES`."""
+    if env.unwrapped.batch.body.legs > 1:
+        return list(HORSE_POLICIES)
     return sorted(env.unwrapped.gaits) + list(POLICIES)
 
 
@@ -76,7 +84,8 @@ def make_policy(name: str, env: Any, seed: int = 0) -> Scripted:
     turns the hoof to the ground, stops there and rubs it to and fro with the swing; "airborne" turns it to
     its highest place and stops there. Where actions are offsets to a gait (`gait=`) and do not reach
     everything, a gait is the nearest one, the highest place the highest in reach, and a swing stops at its
-    limits.
+    limits. Of a horse "reference" is the zero action, the gait around which actions lie, and "idle" stops all
+    cranks.
 
     Raises:
         ParameterError: unknown name, a policy that stops the crank where no action stops it, or one that must
@@ -88,15 +97,22 @@ def make_policy(name: str, env: Any, seed: int = 0) -> Scripted:
             f"env: expected an environment of this package, make_policy(name, env), got {env!r}"
         )
     check_choice("policy", name, policy_names(env))
+    count = leg.batch.body.actions
+    if leg.batch.body.legs > 1 and name in ("reference", "idle"):
+        still = np.zeros(count, np.float32)
+        still[::ACTED] = -1.0 if name == "idle" else 0.0
+        return Scripted(lambda observation, time: still, leg.dt)
     if name in leg.gaits:
         action = leg.action_for(leg.gaits[name])
         return Scripted(lambda observation, time: action, leg.dt)
     if name == "random":
         generator = np.random.default_rng(seed)
-        return Scripted(lambda observation, time: generator.uniform(-1, 1, (*np.shape(time), 4)), leg.dt)
+        return Scripted(lambda observation, time: generator.uniform(-1, 1, (*np.shape(time), count)), leg.dt)
     if name == "bang-bang":
         high = lambda time: np.asarray(time / 0.25).astype(int)[..., None] % 2  # noqa: E731
-        return Scripted(lambda observation, time: np.where(high(time), np.ones(4), -np.ones(4)), leg.dt)
+        return Scripted(
+            lambda observation, time: np.where(high(time), np.ones(count), -np.ones(count)), leg.dt
+        )
     offsets = [gait.swing_offset for gait in paper_gaits(leg.gaits).values()]
     middle = sum(offsets) / len(offsets)
     offsets = np.linspace(*LIMITS["swing_offset"], 14).tolist() if name == "airborne" else [middle]

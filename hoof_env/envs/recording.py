@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.dynamics.parts import Result
 from hoof_env.envs.batch import EpisodeBatch
-from hoof_env.render.instant import columns_of_engine, instants
+from hoof_env.render.instant import columns_of_engine, columns_of_horse, horse_instants, instants
 
 SHOWN = 4.0  # seconds before a picture that it can show
 
@@ -78,7 +78,8 @@ class Recording:
 
             self.renderer = Renderer(
                 self.batch.body.geometry, mode, fps, trunk=self.batch.settings.trunk, weight_n=weight,
-                lift_off_n=LIFT_OFF * weight, terrain=engine.terrain,
+                lift_off_n=LIFT_OFF * weight / self.batch.body.legs, terrain=engine.terrain,
+                hips=self.batch.body.hips,
             )  # fmt: skip
         if self._restarted:
             self.renderer.reset()
@@ -86,9 +87,14 @@ class Recording:
         if self.renderer.is_empty and not self._waiting:
             self._waiting.append(self.last())
         while self._waiting:
-            command = engine.command_in(engine.column(self.env))[0]
-            columns = columns_of_engine(self._waiting.popleft(), engine.terrain, command=command)
-            self.renderer.add(instants(columns))
+            command, hips = engine.command_in(engine.column(self.env)), self.batch.body.hips
+            record = self._waiting.popleft()
+            if hips:
+                columns = columns_of_horse(record, hips, engine.terrain, command=command)
+                self.renderer.add(horse_instants(columns, hips))
+            else:
+                columns = columns_of_engine(record, engine.terrain, command=command[0])
+                self.renderer.add(instants(columns))
         return self.renderer.frame()
 
     def close(self) -> None:

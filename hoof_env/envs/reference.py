@@ -43,15 +43,12 @@ and two harmonics of the swing [rad]."""
 PAIR = tuple(LIMITS)
 SWING = 5  # of these are the swing's
 COUNT, ACTED = len(LEGS), 4  # legs, and actions of each
-HALF_TURN = np.pi
 ROOM = 3 * COUNT  # numbers that `command_gait` needs room for
 NAMES = ("rate", "lead", *(f"{pair}_{name}" for pair in PAIRS for name in PAIR))
 """Of the numbers of a gait, in their order."""
 
 FASTEST = 6 * np.pi  # a crank [rad/s]
-SLOWEST = 0.15  # a crank within a stride, over its mean [-]
 COUPLING = 0.2  # most that falling out of step changes the speed of a crank [-]
-ANGLES = np.linspace(0.0, 2 * np.pi, 257)
 
 
 @dataclass(frozen=True)
@@ -147,46 +144,82 @@ def reference_gaits(speeds: Floats) -> Floats:
 
 
 class PairReference(Layout):
-    """A pair's part of a gait."""
+    """A pair's part of a gait; see `Stride`."""
 
-    speed: Row  # of the crank without harmonics [rad/s]
-    wave: Vector  # cosine and sine coefficient of its harmonic [rad/s]
-    phase: Vector  # the same of the phase, which grows evenly in time, less the angle [rad]
-    anchor: Row  # what the phase of the pair's first leg is ahead of the horse's [rad]
+    speed: Row  # of the crank without its harmonic [rad/s]
+    wave: Vector  # its cosine and sine coefficient over that [-]
+    fold: Vector
+    half: Row
+    turn: Vector  # of what leads e^(i phase) of the pair's first leg to that of the horse
     swing: Annotated[Block, SWING]  # coefficients [rad]
+
+
+class Stride:
+    """How the crank's angle goes through a stride, in closed form.
+
+    Its speed is a constant times 1 + Re(conj(w) z) with z = e^(i theta) and w = cosine + i sine coefficient,
+    so that theta is to the phase, which grows evenly in time, what the true anomaly of a Kepler orbit with
+    eccentricity |w| is to the eccentric one, but for constant angles:
+
+        e^(i phase) = (half z + fold conj(z) + w) / (1 + Re(conj(w) z)),
+        half = (1 + r) / 2,   fold = w^2 / (2 + 2 r),   r = sqrt(1 - |w|^2),
+
+    and the other way round with -w. Complex numbers are pairs of arrays: NumPy rounds products of complex
+    ones as many as there are.
+    """
+
+    def __init__(self, cosine: Floats, sine: Floats) -> None:
+        self.wave = cosine, sine
+        self.r = np.sqrt(1 - (cosine * cosine + sine * sine))
+        self.half, by = (1 + self.r) / 2, 2 + 2 * self.r
+        self.fold = (cosine * cosine - sine * sine) / by, 2 * cosine * sine / by
+
+    def phase(self, x: Floats, y: Floats) -> tuple[Floats, Floats]:
+        """e^(i phase) where e^(i theta) is x + i y."""
+        return self._map(x, y, 1.0)
+
+    def angle(self, x: Floats, y: Floats) -> tuple[Floats, Floats]:
+        """Inverse of `phase`."""
+        return self._map(x, y, -1.0)
+
+    def _map(self, x: Floats, y: Floats, sign: float) -> tuple[Floats, Floats]:
+        (u, v), (f, g) = self.wave, self.fold
+        speed = 1 + sign * (u * x + v * y)
+        return (
+            (self.half * x + (f * x + g * y) + sign * u) / speed,
+            (self.half * y + (g * x - f * y) + sign * v) / speed,
+        )
 
 
 def rows_of(gaits: Floats) -> Floats:
     """Gaits of shape (n, 16) as rows of a `PairReference` for each pair, shape (2 PairReference.size, n)."""
     rate, lead = gaits[:, 0], gaits[:, 1]
-    pairs = gaits[:, 2:].reshape(len(gaits), len(PAIRS), len(PAIR))
     found = []
-    for numbers, ahead in zip(pairs.transpose(1, 2, 0), (lead, 0 * lead), strict=True):
-        slowness = 1 / shape_of(numbers[:2, :, None], ANGLES[:-1])  # over one turn, at equal distances
-        mean = slowness.mean(1)
-        wave = slowness @ np.exp(-1j * ANGLES[:-1]) * 2 / (mean * slowness.shape[1])
-        speed, phase = rate * mean, (wave.imag, wave.real)  # integrated over the angle
-        anchor = 2 * np.pi * ahead + phase[0]  # the phase of angle 0
-        found += [speed, *(speed * numbers[:2]), *phase, anchor, *numbers[2:]]
+    for numbers, ahead in zip(_pairs(gaits), (lead, 0 * lead), strict=True):
+        stride = Stride(numbers[0], numbers[1])
+        x, y = stride.phase(1 + 0 * rate, 0 * rate)  # the phase of a gait begins at angle 0
+        c, s = np.cos(2 * np.pi * ahead), np.sin(2 * np.pi * ahead)
+        turn = x * c - y * s, -(x * s + y * c)
+        found += [rate / stride.r, *stride.wave, *stride.fold, stride.half, *turn, *numbers[2:]]
     return np.array(found)
 
 
-def shape_of(numbers: Floats, angles: Floats) -> Floats:
-    """Crank's speed at angles over its mean over the angle [-], of a pair's first two numbers (axis 0)."""
-    return np.maximum(1 + numbers[0] * np.cos(angles) + numbers[1] * np.sin(angles), SLOWEST)
+def _pairs(gaits: Floats) -> Floats:
+    """The numbers of the pairs, shape (2, 7, n)."""
+    pairs = gaits[:, 2:].reshape(len(gaits), len(PAIRS), len(PAIR))
+    return np.ascontiguousarray(pairs.transpose(1, 2, 0))
 
 
 def crank_angles(gaits: Floats, phase: Floats, off: Floats) -> Floats:
     """Angles [rad] of the cranks of gaits, shape (n, 16), at a phase of the stride, shape (n,), from which
     each is off, shape (4, n), both [strides]; shape (4, n)."""
-    pairs = gaits[:, 2:].reshape(len(gaits), len(PAIRS), len(PAIR))
-    found = np.empty((COUNT, len(gaits)))
+    found, pairs = np.empty((COUNT, len(gaits))), _pairs(gaits)
     for i in range(COUNT):
-        slowness = 1 / shape_of(pairs[:, i // 2, :2].T[:, :, None], ANGLES)
-        passed = np.cumsum(slowness[:, 1:] + slowness[:, :-1], axis=1)
-        passed = np.hstack([0 * passed[:, :1], passed / passed[:, -1:]])
-        wanted = (phase + off[i] + (gaits[:, 1] if i < 2 else 0.0) + 0.5 * (i % 2)) % 1.0
-        found[i] = [np.interp(x, row, ANGLES) for x, row in zip(wanted, passed, strict=True)]
+        stride = Stride(pairs[i // 2, 0], pairs[i // 2, 1])
+        turned = 2 * np.pi * (phase + off[i] + (gaits[:, 1] if i < 2 else 0.0) + 0.5 * (i % 2))
+        (x, y), c, s = stride.phase(1 + 0 * phase, 0 * phase), np.cos(turned), np.sin(turned)
+        x, y = stride.angle(x * c - y * s, x * s + y * c)
+        found[i] = np.arctan2(y, x) % (2 * np.pi)
     return found
 
 
@@ -198,7 +231,7 @@ def commands_of(gaits: Floats, theta: Floats, count: int) -> Floats:
     for i in range(COUNT):
         pair = views(PairReference, pairs[i // 2])
         wave = pair.wave[0] * np.cos(theta[i]) + pair.wave[1] * np.sin(theta[i])
-        found[i, 0] = np.maximum(pair.speed + wave, SLOWEST * pair.speed)
+        found[i, 0] = pair.speed * (1 + wave)
         found[i, 1:] = pair.swing[: count - 1]
     return found
 
@@ -213,10 +246,14 @@ def command_gait(task, actions, episode, first_leg, gait, n, room):  # type: ign
     for i in range(COUNT):
         pair, theta = nth(episode.fore, i // 2), nth(first_leg, i).state.theta
         c, s = cos_sin(theta)
-        phase = theta + (pair.phase.real * c + pair.phase.imag * s) - pair.anchor
-        phase_cos, phase_sin = cos_sin(phase - HALF_TURN * (i % 2))
-        speed = pair.speed + (pair.wave.real * c + pair.wave.imag * s)
-        room[3 * i] = larger(speed, SLOWEST * pair.speed)
+        wave, fold = pair.wave, pair.fold
+        pace = 1.0 + (wave.real * c + wave.imag * s)
+        x = (pair.half * c + (fold.real * c + fold.imag * s) + wave.real) / pace
+        y = (pair.half * s + (fold.imag * c - fold.real * s) + wave.imag) / pace
+        sign = 1.0 - 2.0 * (i % 2)
+        phase_cos = sign * (x * pair.turn.real - y * pair.turn.imag)
+        phase_sin = sign * (x * pair.turn.imag + y * pair.turn.real)
+        room[3 * i] = pair.speed * pace
         room[3 * i + 1], room[3 * i + 2] = phase_cos, phase_sin
         together_cos, together_sin = together_cos + phase_cos, together_sin + phase_sin
     for i in range(COUNT):

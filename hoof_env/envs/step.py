@@ -65,7 +65,12 @@ ADDRESSES = Addresses(
 
 AT, BEGIN, END = ADDRESSES.slots, ADDRESSES.begin, ADDRESSES.end
 
-SHIPPED = tuple(term.name for term in (*TERMS, *HORSE_TERMS))
+SHIPPED = tuple(term.name for term in TERMS)
+
+
+def is_own(term: Term) -> bool:
+    """Whether a term is from outside the package, so that nobody knows what it does with broken reports."""
+    return term.name not in SHIPPED and term not in HORSE_TERMS
 
 
 ACTIONS = len(PARAMETERS)
@@ -305,11 +310,11 @@ def _with_terms(terms: tuple[Term, ...], layouts: Memories, k: int = 0) -> Calla
     if k == len(terms):
         return inlined(lambda addresses, lanes, task, outcome, episode, n, total: total)
     compute, rest, is_first = inlined(terms[k].compute), _with_terms(terms, layouts, k + 1), k == 0
-    is_own, number = terms[k].name not in SHIPPED, number_of(terms[k].title)
+    from_outside, number = is_own(terms[k]), number_of(terms[k].title)
 
     @inlined
     def add_term(addresses, lanes, task, outcome, episode, n, total):  # type: ignore[no-untyped-def]
-        if is_own:
+        if from_outside:
             works = outcome.trunk.result == 0.0  # else the reports that it may read are of where it broke
             episode.terms[k] = choose(works, episode.terms[k], 0.0)
         total = episode.terms[k] if is_first else total + episode.terms[k]
@@ -420,7 +425,7 @@ def step_kernels(
     parts: list[Any] = [term.compute for term in terms]
     parts += [part for entry in entries for part in (entry.measure, entry.scale.apply) if part]
     flags = (
-        [(term.scalar, term.name in SHIPPED) for term in terms],
+        [(term.scalar, not is_own(term)) for term in terms],
         [(entry.scalar, entry.scale.saturates) for entry in entries],
     )
     layouts = memories_of(len(terms), features, legs)

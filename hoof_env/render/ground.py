@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -65,14 +65,16 @@ class GroundPainter:
         )
         return [(name, colour) for name, colour, there in all_kinds if there]
 
-    def draw(self, canvas: Any, now: Instant, corner: complex) -> None:
-        """Draw the ground; `corner` is the place in the world of the picture's upper left corner [m]."""
-        x = self._places(now, corner.real)
+    def draw(self, canvas: Any, feet: Sequence[Instant], corner: complex) -> None:
+        """Draw the ground under some legs; `corner` is the place in the world of the picture's upper left
+        corner [m]."""
+        pressing = [now for now in feet if max(now.toe_depth, now.heel_depth) > 0]
+        x = self._places(pressing, corner.real)
         surface = (corner.imag - self.height(x)) * self._scale
         if self._level:
             surface = np.round(surface)  # a sharp line
-        if max(now.toe_depth, now.heel_depth) > 0:
-            surface += footprint(now, x) * self._scale
+        if pressing:
+            surface += np.max([footprint(now, x) for now in pressing], axis=0) * self._scale
         line = list(zip(((x - corner.real) * self._scale).tolist(), surface.tolist(), strict=True))
         middle = (x[1:] + x[:-1]) / 2
         for part, colour in self._runs(line, middle, self._stiffness, BODY):
@@ -86,12 +88,12 @@ class GroundPainter:
         self._draw_ticks(canvas, corner)
         self._draw_labels(canvas, corner)
 
-    def _places(self, now: Instant, left: float) -> NDArray[np.float64]:
+    def _places(self, feet: Sequence[Instant], left: float) -> NDArray[np.float64]:
         """Where the surface is drawn [m]: at places fixed to the ground, so that it does not shimmer."""
         right = left + self._size[0] / self._scale
         grid = self._grid
         x = [np.arange(np.floor(left / grid), np.ceil(right / grid) + 1) * grid]
-        if max(now.toe_depth, now.heel_depth) > 0:
+        for now in feet:
             near, far = sorted((now.toe_x, now.heel_x))
             x.append(np.arange(near - 3 * FLANK_M, min(far, near + 1) + 3 * FLANK_M, 2 / self._scale))
         return np.unique(np.concatenate(x))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 from typing import Annotated, Any, NamedTuple, get_type_hints
 
 import numpy as np
@@ -29,10 +30,11 @@ class Setting(NamedTuple):
 
     Attributes:
         geometry, terrain: the leg and what it stands on.
-        weight_n: weight of trunk and leg [N].
-        trunk: its kind, one of `dynamics.parts.ONE_LEG`.
-        lift_off_n: normal force that tells stance from swing [N].
+        weight_n: weight of trunk and legs [N].
+        trunk: its kind, one of `dynamics.parts.TRUNKS`.
+        lift_off_n: normal force on a hoof that tells stance from swing [N].
         dt, sim_dt: control step and substep [s].
+        hips: of a horse, the crank centres from the trunk's centre of mass [m], by the names of its legs.
     """
 
     geometry: Geometry
@@ -42,6 +44,7 @@ class Setting(NamedTuple):
     lift_off_n: float
     dt: float
     sim_dt: float
+    hips: Mapping[str, tuple[float, float]] = MappingProxyType({})
 
 
 class Instant(NamedTuple):
@@ -101,6 +104,21 @@ class Instant(NamedTuple):
         return float((self.force_x**2 + self.force_y**2) ** 0.5)
 
 
+class HorseInstant(NamedTuple):
+    """One instant of a horse: what `Instant` says of a leg is said of each, by its place in `legs`."""
+
+    time: Second
+    x: Metre
+    y: Metre
+    vx: MetrePerSecond
+    vy: MetrePerSecond
+    pitch: Radian
+    legs: tuple[Instant, ...] = ()
+
+
+OF_TRUNK = ("time", "x", "y", "vx", "vy", "pitch")
+"""Columns of a horse besides those of its legs."""
+
 POINTS = ("toe", "heel")
 
 UNITS = {name: kind.__metadata__[0] for name, kind in get_type_hints(Instant, include_extras=True).items()}
@@ -108,25 +126,62 @@ UNITS = {name: kind.__metadata__[0] for name, kind in get_type_hints(Instant, in
 
 
 def instants(columns: Mapping[str, NDArray[np.float64]]) -> list[Instant]:
-    """Records of the rows of `columns`."""
+    """Records of the rows of `columns`, of one leg."""
     return list(map(Instant._make, zip(*(columns[name].tolist() for name in Instant._fields), strict=True)))
 
 
-def columns_of_engine(
-    record: Mapping[str, NDArray[Any]], terrain: Terrain | None = None, *, command: ArrayLike | None = None
+def horse_instants(columns: Mapping[str, NDArray[np.float64]], legs: Iterable[str]) -> list[HorseInstant]:
+    """Records of the rows of `columns`, of a horse with these legs."""
+    each = [instants({name: columns[f"{leg}_{name}"] for name in Instant._fields}) for leg in legs]
+    of_trunk = zip(*(columns[name].tolist() for name in OF_TRUNK), strict=True)
+    rows = zip(of_trunk, *each, strict=True)
+    return [HorseInstant._make((*row, tuple(now))) for row, *now in rows]
+
+
+def columns_of_horse(
+    record: Mapping[str, NDArray[Any]],
+    hips: Mapping[str, tuple[float, float]],
+    terrain: Terrain | None = None,
+    *,
+    command: NDArray[np.float64] | None = None,
 ) -> Columns:
-    """Columns from what `TrunkEngine` says of an environment with one leg, whose O is the trunk's own place.
+    """Columns of a horse from what `TrunkEngine` says of one: `OF_TRUNK`, and those of each leg under its
+    name; `command` has a row for each leg."""
+    columns: Columns = {name: np.atleast_1d(record[name][..., 0]).astype(float) for name in OF_TRUNK}
+    for i, (leg, hip) in enumerate(hips.items()):
+        wanted = None if command is None else command[i, :4]
+        own = columns_of_engine(record, terrain, command=wanted, leg=i, hip=hip)
+        columns |= {f"{leg}_{name}": values for name, values in own.items()}
+    return columns
+
+
+def columns_of_engine(
+    record: Mapping[str, NDArray[Any]],
+    terrain: Terrain | None = None,
+    *,
+    command: ArrayLike | None = None,
+    leg: int = 0,
+    hip: tuple[float, float] = (0.0, 0.0),
+) -> Columns:
+    """Columns of a leg from what `TrunkEngine` says of an environment.
 
     Args:
         record: `engine.state | engine.report`, for one instant, or what `engine.run` returns.
         terrain: what the engine stands on; level if None.
         command: gait parameters commanded, shape (4,); None if not known.
+        leg: which.
+        hip: where its O is, from the trunk's own place [m].
     """
     ground = Terrain.flat() if terrain is None else terrain
     of_trunk = {name: np.atleast_1d(record[name][..., 0]).astype(float) for name in _TRUNK}
-    of_leg = {name: np.atleast_1d(record[name][..., 0, 0]).astype(float) for name in _LEG}
+    of_leg = {name: np.atleast_1d(record[name][..., leg, 0]).astype(float) for name in _LEG}
     n = len(of_trunk["time"])
     wanted = np.full(4, np.nan) if command is None else np.asarray(command, float)
+    if any(hip):
+        arm = complex(*hip) * np.exp(1j * of_trunk["pitch"])
+        turning = 1j * arm * np.atleast_1d(record["pitch_rate"][..., 0])
+        of_trunk["x"], of_trunk["y"] = of_trunk["x"] + arm.real, of_trunk["y"] + arm.imag
+        of_trunk["vx"], of_trunk["vy"] = of_trunk["vx"] + turning.real, of_trunk["vy"] + turning.imag
     columns = {
         "time": of_trunk["time"],
         **{f"trunk_{name}": of_trunk[name] for name in ("x", "y", "vx", "vy")}, "pitch": of_trunk["pitch"],

@@ -101,17 +101,17 @@ class Panel:
     def reset(self) -> None:
         self.stances = Stances(self._lift_off)
         self._curve: deque[tuple[float, float]] = deque()  # time [s], force [N]
-        self.full_scale = _nice(max(4 * (self._weight or 0.0), SMALLEST_SCALE))
+        self.full_scale = nice(max(4 * (self._weight or 0.0), SMALLEST_SCALE))
 
     def add(self, instants: Sequence[Instant]) -> None:
         curve = self._curve
         for now in instants:
             self.stances.add(now)
-            if not curve or _interval(curve[-1][0]) != _interval(now.time):
+            if not curve or interval_of(curve[-1][0]) != interval_of(now.time):
                 curve.append((now.time, now.grf))
             elif now.grf > curve[-1][1]:
                 curve[-1] = now.time, now.grf
-        self.full_scale = max(self.full_scale, _nice(max(self.stances.highest, SMALLEST_SCALE)))
+        self.full_scale = max(self.full_scale, nice(max(self.stances.highest, SMALLEST_SCALE)))
         while curve[0][0] < instants[-1].time - SECONDS:
             curve.popleft()
 
@@ -236,11 +236,12 @@ class Panel:
         self._brush.write(canvas, f"{seen[-1].force / 1000:.2f}", above, 20, FORCE, "midbottom")
 
 
-def _interval(time: float) -> int:
+def interval_of(time: float) -> int:
+    """Which interval of `RESOLUTION` a time [s] is in."""
     return math.floor(time / RESOLUTION + 1e-6)
 
 
-def _nice(force: float) -> float:
+def nice(force: float) -> float:
     """The smallest 1, 2 or 5 times a power of ten that is at least `force`."""
     power = 10.0 ** np.floor(np.log10(force))
     return float(next(power * m for m in (1, 2, 5, 10) if power * m >= force * (1 - 1e-12)))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,11 +16,11 @@ from gymnasium import logger
 from gymnasium.error import DependencyNotInstalled, ResetNeeded
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.parts import ONE_LEG
+from hoof_env.dynamics.parts import ONE_LEG, TRUNKS
 from hoof_env.errors import HoofEnvError, ParameterError, check_choice, check_number
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
-from hoof_env.render.instant import Instant, Setting
+from hoof_env.render.instant import HorseInstant, Instant, Setting
 
 if TYPE_CHECKING:
     from hoof_env.render.panel import Stances
@@ -42,6 +42,7 @@ class Renderer:
         weight_n: weight of trunk and leg [N], a line beside the force if the trunk is suspended; or None.
         lift_off_n: normal force that tells stance from swing [N].
         terrain: what it stands on; level if None.
+        hips: of a horse, see `instant.Setting`; its instants are `HorseInstant`s.
 
     Raises:
         ParameterError: an unknown mode, or a value out of range.
@@ -58,11 +59,12 @@ class Renderer:
         weight_n: float | None = None,
         lift_off_n: float = 0.0,
         terrain: Terrain | None = None,
+        hips: Mapping[str, tuple[float, float]] | None = None,
     ) -> None:
         self.mode = check_choice("render_mode", mode, MODES)
         self.fps = check_number("fps", fps, low=0, exclusive_low=True)
         self.size = _check_size(size)
-        check_choice("trunk", trunk, ONE_LEG)
+        check_choice("trunk", trunk, TRUNKS if hips else ONE_LEG)
         if weight_n is not None:
             check_number("weight_n", weight_n, low=0)
         try:
@@ -81,21 +83,29 @@ class Renderer:
         self.brush = brush = Brush(self.size)
         edge, column = round(16 * brush.unit), round(304 * brush.unit)
         ground = Terrain.flat() if terrain is None else terrain
-        self._scene = Scene(brush, geometry, ground, self.size, column + 2 * edge, trunk)
         box = (self.size[0] - edge - column, edge, column, round(508 * brush.unit))
-        self._panel = Panel(brush, box, weight_n if trunk == "suspended" else None, lift_off_n)
+        if hips:
+            from hoof_env.render.horse_panel import HorsePanel
+            from hoof_env.render.horse_scene import HorseScene
+
+            self._scene: Any = HorseScene(brush, geometry, ground, self.size, column + 2 * edge)
+            self._panel: Any = HorsePanel(brush, box, tuple(hips), weight_n or 0.0, lift_off_n)
+        else:
+            self._scene = Scene(brush, geometry, ground, self.size, column + 2 * edge, trunk)
+            self._panel = Panel(brush, box, weight_n if trunk == "suspended" else None, lift_off_n)
         self._window_open = False
         self._clock = pygame.time.Clock()
         self._closed = False
-        self._now: Instant | None = None
+        self._now: Any = None
 
     @property
     def stances(self) -> Stances:
         """Stances of the episode and their peaks."""
-        return self._panel.stances
+        found: Stances = self._panel.stances
+        return found
 
     @property
-    def latest(self) -> Instant:
+    def latest(self) -> Any:
         """The instant that is drawn next; `ResetNeeded` if there is none."""
         if self._now is None:
             raise ResetNeeded("nothing to draw yet: reset the environment first")
@@ -111,9 +121,9 @@ class Renderer:
         self._scene.reset()
         self._panel.reset()
 
-    def add(self, news: Sequence[Instant]) -> None:
+    def add(self, news: Sequence[Instant] | Sequence[HorseInstant]) -> None:
         """Take what happened since the last call, in the order of time; what is not finite is left out."""
-        seen = [now for now in news if math.isfinite(sum(now[:9]) + now.force_x + now.force_y)]
+        seen = [now for now in news if _is_finite(now)]
         if seen:
             self._now = seen[-1]
             self._scene.add(seen)
@@ -189,10 +199,18 @@ def open_window(size: tuple[int, int], title: str, *, may_be_unseen: bool = Fals
     return window
 
 
+def _is_finite(now: Instant | HorseInstant) -> bool:
+    if isinstance(now, HorseInstant):
+        return math.isfinite(sum(now[:6])) and all(map(_is_finite, now.legs))
+    return math.isfinite(sum(now[:9]) + now.force_x + now.force_y)
+
+
 def new_renderer(here: Setting, fps: float, size: tuple[int, int] = (960, 540)) -> Renderer:
     """An off-screen renderer for an environment with this setting; errors are those of `Renderer`."""
     force = {"weight_n": here.weight_n, "lift_off_n": here.lift_off_n}
-    return Renderer(here.geometry, "rgb_array", fps, size, here.trunk, **force, terrain=here.terrain)
+    return Renderer(
+        here.geometry, "rgb_array", fps, size, here.trunk, **force, terrain=here.terrain, hips=here.hips
+    )
 
 
 def _check_size(size: Any) -> tuple[int, int]:

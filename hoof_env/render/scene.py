@@ -70,7 +70,7 @@ class Scene:
         self._paths: deque[tuple[float, complex, complex]] = deque()  # time [s], heel, toe [m]
         self._ground = GroundPainter(brush, terrain, size, self._scale, 2 * self._centre)
         self._leg = tables(geometry)
-        self._kind = trunk
+        self._kind, self._girth = trunk, 1.0
         self._trunk = self._paint_trunk()
         self._sky = self._paint_sky()
         self._key = lru_cache(maxsize=8)(self._paint_key)
@@ -92,7 +92,7 @@ class Scene:
         pixels = self.look_at(now)
         canvas.blit(self._sky, (0, 0))
         self._draw_support(canvas, pixels["O"])
-        self._ground.draw(canvas, now, self.corner)
+        self._ground.draw(canvas, [now], self.corner)
         self._draw_trunk(canvas, pixels["O"], now.pitch)
         self._draw_paths(canvas, pixels)
         self._draw_leg(canvas, pixels)
@@ -112,6 +112,11 @@ class Scene:
         high = hip.imag - level
         rise = high - min(max(high, usual - HEIGHT_SLACK_M), usual + HEIGHT_SLACK_M)
         self._camera = complex(hip.real, level + rise)
+        return self.points_of(now)
+
+    def points_of(self, now: Instant) -> dict[str, complex]:
+        """Where each named point of a leg lies [pixels]."""
+        hip = complex(now.trunk_x, now.trunk_y)
         z, dz, ddz = np.empty((3, len(POINTS)), np.complex128)
         crank, pivot = self._geometry.lengths["OP"], complex(*self._geometry.pivot)
         solve_points(now.crank_angle, crank, pivot, *self._leg, z, dz, ddz)
@@ -181,8 +186,9 @@ class Scene:
         at = round(corner.real), round(corner.imag)
         canvas.blit(image, at, special_flags=pygame.BLEND_PREMULTIPLIED)
 
-    def _draw_leg(self, canvas: Any, pixels: dict[str, complex]) -> None:
-        metre, crank = self._scale * FINE, self._geometry.lengths["OP"]  # metre: on the fine surface
+    def _draw_leg(self, canvas: Any, pixels: dict[str, complex], lettered: bool = True) -> None:
+        metre = self._girth * self._scale * FINE  # on the fine surface
+        crank = self._geometry.lengths["OP"] / self._girth
         edge = 1.5 * FINE
 
         def paint(fine: Any, place: Any) -> None:
@@ -206,10 +212,10 @@ class Scene:
             for pivot in "OC":
                 pygame.draw.circle(fine, INK, at[pivot], 0.013 * metre)
 
-        turn = crank * self._scale * (1 + 1j)
+        turn = self._geometry.lengths["OP"] * self._scale * (1 + 1j)
         box = [*pixels.values(), pixels["O"] - turn, pixels["O"] + turn]
-        self._brush.smooth(canvas, box, 0.16 * self._scale + 2, paint)
-        for pivot, side, shift in (("O", "midbottom", -0.05j), ("C", "midleft", 0.06)):
+        self._brush.smooth(canvas, box, 0.16 * self._girth * self._scale + 2, paint)
+        for pivot, side, shift in (("O", "midbottom", -0.05j), ("C", "midleft", 0.06)) if lettered else ():
             letter = pixels[pivot] + shift * self._scale
             self._brush.write(canvas, pivot, (letter.real, letter.imag), 18, INK, side)
 
@@ -227,7 +233,9 @@ class Scene:
                 for shift in (0.0, 0.8 * self._brush.unit):  # an anti-aliased line is one pixel wide
                     pygame.draw.aalines(canvas, faded, False, [(x, y + shift) for x, y in part])
 
-    def _draw_forces(self, canvas: Any, now: Instant, full_scale: float) -> None:
+    def _draw_forces(
+        self, canvas: Any, now: Instant, full_scale: float, share: float = 1.0, is_told: bool = True
+    ) -> None:
         """Arrows of the forces on the hoof; where both points bear load, that of their sum behind them."""
         if now.grf < full_scale * LEAST_FORCE:
             return
@@ -238,7 +246,7 @@ class Scene:
         ]
         ends = [
             (colour, width * self._brush.unit * FINE, self._pixels(foot),
-             self._pixels(foot + force * ARROW_M / full_scale))
+             self._pixels(foot + force * share * ARROW_M / full_scale))
             for colour, width, foot, force in reversed(forces) if force
         ]  # fmt: skip
 
@@ -250,6 +258,8 @@ class Scene:
 
         box = [z for end in ends for z in end[2:]]
         self._brush.smooth(canvas, box, 14 * self._brush.unit, paint)
+        if not is_told:
+            return
         tip = ends[0][3]
         text = f"{now.grf / 1000:.2f} kN"
         self._brush.write(canvas, text, (tip.real + 12 * self._brush.unit, tip.imag), 21, FORCE)

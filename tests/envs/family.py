@@ -29,7 +29,8 @@ OTHER = {
     "trunk_mass": 120.0, "trunk_share": 0.5, "trunk_stiffness": 6000.0, "trunk_damping": 900.0,
     "trunk_drag": 60.0, "stiffness": 4e4, "restitution": 0.9, "approach_floor": 2.0, "friction": 0.1,
     "friction_slow": 0.04, "friction_fast": 0.2, "motor_gain": 30.0, "motor_torque": 100.0,
-    "motor_inertia": 2.0, "target_seconds": (0.02, 0.1), "exponent": 1.25,
+    "motor_inertia": 2.0, "target_seconds": (0.02, 0.1), "exponent": 1.25, "size": 1.2, "harmonics": 1,
+    "filters": "slow",
 }  # fmt: skip
 """Values of settings that are not the defaults."""
 
@@ -83,7 +84,7 @@ def make(env_id, n=0, **settings):
 def steps(env, count: int, seed: int = 5):
     """What `count` random actions lead to, of one environment or many."""
     shape = count, *env.action_space.shape[:-1]
-    return [env.step(action) for action in actions(seed, *shape, env_id=env.task.id)]
+    return [env.step(action) for action in actions(seed, *shape, env_id=env.unwrapped.task.id)]
 
 
 def roll(env, count: int, seed: int = 5):
@@ -138,5 +139,5 @@ def scaled(scaling, x, leg):
         return (2 * x - low - high) / (high - low)
     if part := re.fullmatch(r"/ ([\d.]+)", scaling):
         return np.clip(x / float(part[1]), -1, 1)
-    formula = scaling.replace("3 weights", "(3 * weight)").replace("hip height", f"{leg.batch.height}")
+    formula = scaling.replace("3 weights", "(3 * weight)").replace("hip height", f"{leg.batch.body.height}")
     return eval(formula, {"tanh": np.tanh, "x": x, "weight": leg.weight})

@@ -20,7 +20,7 @@ OTHER_LEG = {**read_preset("identified"), "provenance": "another"}
 ARGUMENTS = [
     ({"trunk_mas": 80.0}, "HorseLeg-v0: unexpected keyword argument 'trunk_mas'; did you mean trunk_mass?"),
     ({"wings": 2}, r"unexpected keyword argument 'wings' \(known: preset, gait, trunk, "),
-    ({"task": "fly"}, "task: expected one of fixed, leg, .*got 'fly'"),
+    ({"task": "fly"}, "task: expected one of fixed, horse, leg, .*got 'fly'"),
     ({"preset": "no_such_leg"}, "preset: expected one of identified, got 'no_such_leg'"),
     ({"trunk": "floating"}, "trunk: expected one of fixed, rail, suspended, got 'floating'"),
     ({"trunk": "free"}, "trunk: expected one of fixed, rail, suspended, got 'free'"),

@@ -8,7 +8,7 @@ from dataclasses import replace
 import gymnasium as gym
 import numpy as np
 import pytest
-from family import IDS, actions, running_peak_charge, same, together
+from family import LEGS, actions, running_peak_charge, same, together
 
 import hoof_env  # noqa: F401
 from hoof_env.envs.tasks import Settings
@@ -41,7 +41,7 @@ def test_the_ground_is_the_presets_unless_it_is_given(soft, solver):
 
 def test_by_default_it_is_what_the_default_preset_says():
     assert ground(FIXED) == load_ground(reference_mass=Settings.trunk_mass)
-    for env_id in IDS:
+    for env_id in LEGS:
         found = ground(env_id)
         assert (found.stiffness, found.exponent) == (load_ground().stiffness, load_ground().exponent)
 

@@ -28,15 +28,16 @@ DRAWN = {"randomize": {"friction": (0.2, 0.8), "trunk_mass": 70.0}}
 def test_reset_and_step_have_the_same_keys_of_numpys_numbers(env_id, settings):
     env = gym.make(env_id, episode_seconds=0.06, **settings)
     _, first = env.reset(seed=0)
-    infos = [first, *(env.step(taken)[4] for taken in actions(0, 2))]
+    infos = [first, *(env.step(taken)[4] for taken in actions(0, 2, env_id=env_id))]
+    start, terms = env.unwrapped.batch.body.start_names, env.unwrapped.batch.terms
     for info in infos:
-        assert set(info) == {*START, "gait", "measured", *TERMS} | ({"parameters"} if settings else set())
+        assert set(info) == {*start, "gait", "measured", *terms} | ({"parameters"} if settings else set())
         for key, value in info.items():
             assert isinstance(value, np.float64 | np.ndarray), key
             assert value.dtype == np.float64
-        for key in (*START, "gait", *(["parameters"] if settings else [])):
+        for key in (*start, "gait", *(["parameters"] if settings else [])):
             same(info[key], first[key])
-    assert {*env.step(actions(0))[4]} - {*first} == {"episode_summary"}
+    assert {*env.step(actions(0, env_id=env_id))[4]} - {*first} == {"episode_summary"}
 
 
 @pytest.mark.parametrize("kind", [SyncVectorEnv, AsyncVectorEnv])

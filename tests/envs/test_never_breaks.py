@@ -24,13 +24,13 @@ STEPS = int(float(os.environ.get("HOOF_ENV_STEPS", "1e5")))
 ENVS = 100
 
 
-def mixed(steps: int, envs: int, seed: int = 0):
-    """Actions of shape (envs, 4): new ones at each step in one half, in the other held for a while, and at
-    their limits half of the time."""
+def mixed(steps: int, envs: int, seed: int = 0, width: int = 4):
+    """Actions of shape (envs, width): new ones at each step in one half, in the other held for a while, and
+    at their limits half of the time."""
     generator = np.random.default_rng(seed)
-    half, held = envs // 2, generator.uniform(-1, 1, (envs, 4))
+    half, held = envs // 2, generator.uniform(-1, 1, (envs, width))
     for _ in range(steps):
-        fresh = generator.uniform(-1, 1, (envs, 4))
+        fresh = generator.uniform(-1, 1, (envs, width))
         fresh[envs // 4 : half] = np.sign(fresh[envs // 4 : half])
         new = generator.random(envs) < 0.03
         new[:half] = True
@@ -44,7 +44,7 @@ def test_random_actions(env_id):
     env = gym.make_vec(env_id, num_envs=ENVS)
     seen, _ = env.reset(seed=0)
     low, high, ends = seen.min(0), seen.max(0), 0
-    for taken in mixed(STEPS // ENVS, ENVS):
+    for taken in mixed(STEPS // ENVS, ENVS, width=env.action_space.shape[1]):
         seen, rewards, terminated, truncated, _ = env.step(taken)
         assert np.isfinite(rewards).all()
         assert np.abs(seen).max() <= 1.0  # false for what is not a number

@@ -7,7 +7,7 @@ import copy
 import gymnasium as gym
 import numpy as np
 import pytest
-from family import IDS, MODES, actions, both, same, scaled
+from family import HORSE, IDS, MODES, actions, both, same, scaled
 
 from hoof_env.errors import FixedSettingError, ParameterError
 
@@ -29,13 +29,14 @@ def test_each_answers_as_the_single_environment(env_id, mode):
     ours.reset(seed=0), theirs.reset(seed=0)
     for name in ("dt", "sim_dt", *(f"observation_{what}" for what in ("names", "units", "space"))):
         assert ours.get_attr(name) == theirs.get_attr(name), name
-    for k, taken in enumerate(actions(1, 40, 4)):
+    for k, taken in enumerate(actions(1, 40, 4, env_id=env_id)):
         ours.step(taken), theirs.step(taken)
         if k in (3, 14, 15, 39):
             for name in ("weight", "episode_summary", "raw_observation"):
                 same(ours.call(name), theirs.call(name))
     assert ours.get_attr("action_space") == theirs.get_attr("action_space")
-    same(ours.call("command_of", np.ones(4)), theirs.call("command_of", np.ones(4)))
+    if env_id != HORSE:
+        same(ours.call("command_of", np.ones(4)), theirs.call("command_of", np.ones(4)))
     assert [ours.weight[env] for env in range(4)] == list(theirs.get_attr("weight"))
     assert ours.episode_summary()["distance_m"].shape == (4,)
 

@@ -32,9 +32,13 @@ def make(n, num_threads, env_id=LEG, **settings):
     return gym.make_vec(env_id, num_envs=n, num_threads=num_threads, episode_seconds=0.3, **settings)
 
 
+def _actions(envs, seed, steps):
+    return actions(seed, steps, envs.num_envs, env_id=envs.unwrapped.task.id)
+
+
 def rolled(envs, steps=40, seed=1):
     """All that a rollout gives; episodes end and begin in it."""
-    return [envs.step(taken) for taken in actions(seed, steps, envs.num_envs)]
+    return [envs.step(taken) for taken in _actions(envs, seed, steps)]
 
 
 @pytest.mark.parametrize("mode", MODES[:2], ids=lambda mode: mode.name)

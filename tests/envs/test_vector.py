@@ -7,7 +7,7 @@ import copy
 import gymnasium as gym
 import numpy as np
 import pytest
-from family import FALLS, IDS, MODES, actions, both, same, steps
+from family import FALLS, IDS, LEGS, MODES, actions, both, same, steps
 from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers.vector import NormalizeReward, RecordEpisodeStatistics, RecordVideo
 
@@ -49,15 +49,14 @@ def check_step(ours, theirs, taken):
 def drive(ours, theirs, steps, mode):
     """Step both, resetting by hand what nobody else resets; returns how many episodes ended."""
     ends = 0
-    for k, taken in enumerate(actions(1, steps, ours.num_envs)):
+    for k, taken in enumerate(actions(1, steps, ours.num_envs, env_id=ours.task.id)):
         *_, terminated, truncated, _ = check_step(ours, theirs, taken)
         done = terminated | truncated
         ends += done.sum()
         if mode == AutoresetMode.DISABLED and done.any():
             seeds = None if k % 2 else [7 * k + i for i in range(ours.num_envs)]
             one, two = (
-                env.reset(seed=seeds, options={"reset_mask": done, "crank_angle": 0.25})
-                for env in (ours, theirs)
+                env.reset(seed=seeds, options={"reset_mask": done, "x": 0.25}) for env in (ours, theirs)
             )
             same(one[0], two[0])
             check_infos(one[1], two[1])
@@ -90,7 +89,7 @@ def test_any_number_of_them(n):
 
 
 def test_seeds_one_each_and_going_on_without():
-    ours, theirs = both(IDS[-1], 4, **SHORT)
+    ours, theirs = both(LEGS[-1], 4, **SHORT)
     for seed in ([5, 6, 5, 0], [None, 1, None, 2], None, 8, [None] * 4):
         one, two = ours.reset(seed=seed), theirs.reset(seed=seed)
         same(one[0], two[0])

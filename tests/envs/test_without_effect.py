@@ -129,14 +129,15 @@ OWN_WEIGHTS = {RAIL: RACING, FIXED: RACING, SPEED: {"progress": 12.0, "overspeed
 
 @pytest.mark.parametrize("env_id", IDS)
 def test_reward_weights_that_are_not_named_keep_the_values_of_the_task(env_id):
-    plain = check_weights(OWN_WEIGHTS.get(env_id))
+    terms = TASKS[gym.spec(env_id).kwargs["task"]].terms
+    plain = check_weights(OWN_WEIGHTS.get(env_id), terms)
     assert gym.make(env_id).unwrapped.batch.weights == plain
-    for given in ({"peak": 1.0}, {}, None, {"progress": 3.0, "support": 1.0}):
+    for given in ({"peak": 1.0}, {}, None, {terms[0].name: 3.0, terms[1].name: 1.0}):
         for env in (gym.make(env_id, reward_weights=given), gym.make_vec(env_id, reward_weights=given)):
             leg = env.unwrapped
             assert leg.batch.weights == {**plain, **(given or {})}
             shown = leg.settings.reward_weights or {}
-            assert check_weights(shown) == leg.batch.weights
+            assert check_weights(shown, terms) == leg.batch.weights
             leg.reset(seed=0)
             assert (leg.get_state()["settings"]["reward_weights"] or {}) == shown
 

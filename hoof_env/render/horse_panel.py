@@ -1,0 +1,159 @@
+"""The panel of a horse: numbers of the instant, the force on each hoof, the footfall of the last seconds."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any
+
+import pygame
+
+from hoof_env.render.brush import FAINT, FINE, FORCE, GREY, HEEL, INK, PAPER, TOE, Brush, Colour
+from hoof_env.render.instant import HorseInstant
+from hoof_env.render.panel import SECONDS, Stances, interval_of, nice
+
+NUMBERS = (
+    ("time", "s", INK),
+    ("forward speed", "m/s", INK),
+    ("pitch", "deg", INK),
+    ("highest force", "kN", FORCE),
+)
+COLOURS: tuple[Colour, ...] = (TOE, (86, 180, 233), HEEL, (230, 159, 0))
+"""Of the legs: blue and sky blue for fore, reddish purple and orange for hind."""
+ROW = 13  # height of a row of the footfall diagram [pixels of the usual picture]
+
+
+class HorsePanel:
+    """Numbers, a force curve for each leg and the footfall diagram in one box (left, top, width, height) of
+    the picture, with the weight of the animal [N] as a scale and stances from `lift_off_n` [N] on."""
+
+    def __init__(
+        self,
+        brush: Brush,
+        box: tuple[int, int, int, int],
+        legs: Sequence[str],
+        weight_n: float,
+        lift_off_n: float,
+    ) -> None:
+        unit = brush.unit
+        self._brush, self._box, self._legs = brush, pygame.Rect(box), tuple(legs)
+        self._weight, self._lift_off = weight_n, lift_off_n
+        self._inside = self._box.inflate(-36 * unit, -28 * unit)
+        left, width = self._inside.left + round(34 * unit), self._inside.width - round(40 * unit)
+        top, high = self._inside.top + 124 * unit, 52 * unit
+        self._plots = [
+            pygame.Rect(left, round(top + k * (high + 15 * unit)), width, round(high))
+            for k in range(len(legs))
+        ]
+        first = self._plots[-1].bottom + 34 * unit
+        self._rows = [
+            pygame.Rect(left, round(first + k * ROW * unit), width, round((ROW - 4) * unit))
+            for k in range(len(legs))
+        ]
+        self._card = lru_cache(maxsize=8)(self._paint_card)
+        self.reset()
+
+    def reset(self) -> None:
+        self.each = [Stances(self._lift_off) for _ in self._legs]
+        self._curves: list[deque[tuple[float, float]]] = [deque() for _ in self._legs]
+        self._stances: list[list[list[float]]] = [[] for _ in self._legs]  # from and to [s]
+        self.full_scale = nice(self._weight)
+
+    @property
+    def stances(self) -> Stances:
+        """Of the leg with the highest force of an open stance."""
+        return max(self.each, key=lambda one: one.running_peak)
+
+    def add(self, instants: Sequence[HorseInstant]) -> None:
+        for now in instants:
+            for k, leg in enumerate(now.legs):
+                stances, curve, bars = self.each[k], self._curves[k], self._stances[k]
+                stances.add(leg)
+                if not curve or interval_of(curve[-1][0]) != interval_of(now.time):
+                    curve.append((now.time, leg.grf))
+                elif leg.grf > curve[-1][1]:
+                    curve[-1] = now.time, leg.grf
+                if stances.opened is not None:
+                    if not bars or bars[-1][0] != stances.opened:
+                        bars.append([stances.opened, now.time])
+                    bars[-1][1] = now.time
+        since = instants[-1].time - SECONDS
+        for curve, bars in zip(self._curves, self._stances, strict=True):
+            while curve[0][0] < since:
+                curve.popleft()
+            while bars and bars[0][1] < since:
+                bars.pop(0)
+        self.full_scale = max(
+            self.full_scale, nice(max(self._weight / 4, *(one.highest for one in self.each)))
+        )
+
+    def draw(self, canvas: Any, now: HorseInstant) -> None:
+        canvas.blit(self._card(self.full_scale), self._box, special_flags=pygame.BLEND_PREMULTIPLIED)
+        highest = max(one.highest for one in self.each) / 1000
+        values = now.time, now.vx, now.pitch * 57.29578, highest
+        for k, (value, (_, _, colour)) in enumerate(zip(values, NUMBERS, strict=True)):
+            self._brush.write(
+                canvas, f"{round(value, 2) + 0.0:.2f}", self._line(k, 210), 24, colour, "midright"
+            )
+        for k, colour in enumerate(COLOURS[: len(self._legs)]):
+            self._draw_curve(canvas, k, now.time, colour)
+            row = self._rows[k]
+            for start, end in self._stances[k]:
+                left = max(self._across(row, now.time, start), row.left)
+                right = self._across(row, now.time, end)
+                canvas.fill(colour, (round(left), row.top, max(round(right - left), 1), row.height))
+
+    def _across(self, plot: Any, now: float, time: float) -> float:
+        return float(plot.right - (now - time) * plot.width / SECONDS)
+
+    def _draw_curve(self, canvas: Any, k: int, now: float, colour: Colour) -> None:
+        plot, unit = self._plots[k], self._brush.unit
+        line = [
+            (self._across(plot, now, time), plot.bottom - force * plot.height / self.full_scale)
+            for time, force in self._curves[k]
+        ]
+        if len(line) > 1:
+            for shift in (0.0, 0.7 * unit):  # an anti-aliased line is one pixel wide
+                pygame.draw.aalines(canvas, colour, False, [(x, y - shift) for x, y in line])
+
+    def _line(self, k: float, x: float) -> tuple[float, float]:
+        """Middle of line `k` of the numbers, `x` from the left."""
+        return self._inside.left + x * self._brush.unit, self._inside.top + (8 + 23 * k) * self._brush.unit
+
+    def _paint_card(self, full_scale: float) -> Any:
+        unit = self._brush.unit
+        whole = pygame.Surface(self._box.bottomright, pygame.SRCALPHA, 32)
+
+        def paint(fine: Any, place: Any) -> None:
+            edge, radius = fine.get_rect(), round(12 * unit * FINE)
+            pygame.draw.rect(fine, FAINT, edge, border_radius=radius)
+            pygame.draw.rect(fine, PAPER, edge.inflate(-2 * FINE, -2 * FINE), border_radius=radius - FINE)
+
+        def write(
+            text: str, x: float, y: float, size: int, side: str = "midleft", colour: Any = GREY
+        ) -> None:
+            self._brush.write(whole, text, (x, y), size, colour, side)
+
+        self._brush.smooth(whole, [complex(*self._box.topleft), complex(*self._box.bottomright)], 0, paint)
+        for k, (name, unit_name, _) in enumerate(NUMBERS):
+            write(name, *self._line(k, 0), 20)
+            write(unit_name, *self._line(k, 217), 20)
+        write("force on each hoof, kN", *self._line(len(NUMBERS) + 0.2, 0), 20)
+        for plot, leg, colour in zip(self._plots, self._legs, COLOURS, strict=False):
+            for part in (0.0, 1.0):
+                y = plot.bottom - part * plot.height
+                whole.fill(FAINT, (plot.left, round(y), plot.width, 1))
+                write(f"{part * full_scale / 1000:g}", plot.left - 7 * unit, y, 16, "midright")
+            write(leg.replace("_", " "), plot.right, plot.top + 7 * unit, 17, "midright", colour)
+        first, last = self._rows[0], self._rows[-1]
+        write("footfall", self._inside.left, first.top - 14 * unit, 20)
+        for row, leg in zip(self._rows, self._legs, strict=True):
+            whole.fill(FAINT, row)
+            letters = "".join(word[0].upper() for word in leg.split("_"))
+            write(letters, row.left - 7 * unit, row.centery, 16, "midright")
+        for second in range(SECONDS + 1):
+            x = last.right - second / SECONDS * last.width
+            write(f"{-second}", x, last.bottom + 5 * unit, 16, "midtop")
+        write("time before now, s", last.centerx, last.bottom + 31 * unit, 17, "midbottom")
+        return whole.subsurface(self._box)

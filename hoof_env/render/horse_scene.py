@@ -1,0 +1,116 @@
+"""The scene of a horse: the whole animal, far legs behind the trunk and near ones before it, and the forces.
+
+The camera follows the trunk along x and keeps its height over the ground.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import pygame
+
+from hoof_env.ground.terrain import Terrain
+from hoof_env.leg.geometry import Geometry, tables
+from hoof_env.render.brush import CRANK, FINE, FORCE, GREY, HEEL, TOE, Brush, arrow, bar
+from hoof_env.render.ground import GroundPainter
+from hoof_env.render.instant import HorseInstant
+from hoof_env.render.scene import AROUND_M, ARROW_M, COAT, COAT_EDGE, Scene
+
+NEAR = (0, 2)  # the left legs
+FAR_COAT = 0.45  # how far the colour of far legs is from the sky's [-]
+WIDE_M, SOIL_M = (1.75, 2.25), 0.45  # seen behind and before the trunk's centre, and below the ground [m]
+ARROW_SHARE = 0.75  # length of a full-scale arrow over that of one leg's scene [-]
+
+BODY = (
+    ((-0.62, 0.10), (-0.05, 0.02), 0.34, 0.33), ((-0.05, 0.02), (0.72, 0.02), 0.33, 0.36),
+    ((0.80, 0.16), (1.38, 0.74), 0.28, 0.15), ((1.40, 0.78), (1.78, 0.46), 0.15, 0.085),
+)  # fmt: skip
+"""Barrel, neck and head about the trunk's centre of mass, of a horse with hips 1.4 m high: from, to, radius
+at both ends [m]."""
+EAR, TAIL = ((1.36, 0.86), (1.38, 1.06), 0.05, 0.015), ((-0.93, 0.22), (-1.15, -0.42), 0.05, 0.025)
+USUAL_HIP_M = 1.4
+
+
+class HorseScene(Scene):
+    """Draws one instant into a picture of `size`, whose `right` pixels the animal leaves free."""
+
+    def __init__(
+        self, brush: Brush, geometry: Geometry, terrain: Terrain, size: tuple[int, int], right: int
+    ) -> None:
+        self._brush, self._geometry, self._size = brush, geometry, size
+        self._animal = geometry.hip_height / USUAL_HIP_M
+        self._centre = (size[0] - right) * WIDE_M[0] / sum(WIDE_M)
+        self._scale = (size[0] - right) / sum(WIDE_M) / self._animal
+        self._girth = self._animal
+        self._level = size[1] - SOIL_M * self._animal * self._scale
+        self._camera = 0j
+        self._ground = GroundPainter(brush, terrain, size, self._scale, size[0] - right)
+        self._leg = tables(geometry)
+        self._sky = self._paint_sky()
+        self._key = lru_cache(maxsize=8)(self._paint_key)
+
+    def reset(self) -> None:
+        """Nothing is kept."""
+
+    def add(self, instants: Sequence[Any]) -> None:
+        """Nothing is kept."""
+
+    def draw(self, canvas: Any, now: Any, full_scale: float) -> None:
+        """Draw an instant; the arrow of a force `full_scale` [N] is as long as `_arrow` says."""
+        level = float(self._ground.height(now.x + AROUND_M).mean())
+        self._camera = complex(now.x, level)
+        canvas.blit(self._sky, (0, 0))
+        self._ground.draw(canvas, now.legs, self.corner)
+        for i in range(len(now.legs)):
+            if i not in NEAR:
+                self._draw_far_leg(canvas, self.points_of(now.legs[i]))
+        self._draw_body(canvas, now)
+        for i in NEAR:
+            self._draw_leg(canvas, self.points_of(now.legs[i]), lettered=False)
+        for leg in now.legs:
+            self._draw_forces(canvas, leg, full_scale, ARROW_SHARE, is_told=False)
+        canvas.blit(self._key(full_scale), (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
+
+    def _draw_far_leg(self, canvas: Any, pixels: dict[str, complex]) -> None:
+        far = pygame.Surface(self._size, pygame.SRCALPHA, 32)
+        self._draw_leg(far, pixels, lettered=False)
+        far.fill((255, 255, 255, round(255 * FAR_COAT)), special_flags=pygame.BLEND_RGBA_MULT)
+        far.fill((round(255 * FAR_COAT),) * 3 + (255,), special_flags=pygame.BLEND_RGBA_MULT)
+        canvas.blit(far, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
+
+    def _draw_body(self, canvas: Any, now: HorseInstant) -> None:
+        centre, turn = complex(now.x, now.y), np.exp(1j * now.pitch)
+        metre = self._scale * self._animal
+
+        def at(point: tuple[float, float]) -> complex:
+            return complex(self._pixels(centre + self._animal * turn * complex(*point)))
+
+        parts = [(at(a), at(b), one * metre, other * metre) for a, b, one, other in (TAIL, EAR, *BODY)]
+
+        def paint(fine: Any, place: Any) -> None:
+            for colour, grow in ((COAT_EDGE, 1.5 * FINE), (COAT, 0.0)):
+                for a, b, one, other in parts:
+                    bar(fine, colour, place(a), place(b), one * FINE + grow, other * FINE + grow)
+
+        self._brush.smooth(canvas, [z for part in parts for z in part[:2]], 0.4 * metre, paint)
+
+    def _paint_key(self, full_scale: float) -> Any:
+        unit, force = self._brush.unit, full_scale / 5
+        length = ARROW_SHARE * ARROW_M * self._scale / 5
+        image = pygame.Surface(self._size, pygame.SRCALPHA, 32)
+        rows = [(20 + (20 + 20 * k) * 1j) * unit for k in range(4)]
+
+        def paint(fine: Any, place: Any) -> None:
+            arrow(fine, FORCE, place(rows[0]), place(rows[0] + length), 7 * unit * FINE)
+            for at, (colour, radius) in zip(rows[1:], ((TOE, 1.2), (HEEL, 1.2), (CRANK, 3.3)), strict=True):
+                bar(fine, colour, place(at), place(at + length), radius * unit * FINE, radius * unit * FINE)
+
+        self._brush.smooth(image, [*rows, rows[-1] + length], 10 * unit, paint)
+        words = f"{force / 1000:g} kN on a hoof", "force on the toe", "force on the heel", "crank"
+        for at, text in zip(rows, words, strict=True):
+            where = at + length + 12 * unit
+            self._brush.write(image, text, (where.real, where.imag), 19, GREY)
+        return image

@@ -1,0 +1,295 @@
+"""`Horse-v0`: what it commands, where it starts and ends, and that tricks stay below the reference gait."""
+
+from __future__ import annotations
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from family import HORSE, actions, make, same
+
+from hoof_env import Sb3VecEnv
+from hoof_env.dynamics.parts import GRAVITY
+from hoof_env.envs.policies import make_policy
+from hoof_env.envs.reference import (
+    COUPLING,
+    LEGS,
+    NAMES,
+    HorseGait,
+    crank_angles,
+    horse_gaits,
+    reference_gaits,
+    rows_of,
+)
+from hoof_env.errors import ParameterError
+
+SPEEDS = (1.853, 2.62)  # Froude numbers 0.25 and 0.5
+SEEDS = 40
+MARGIN = 20.0
+"""Return over ten seconds by which the reference gait is ahead of what is no gait."""
+
+
+def random_gaits(n, seed=0):
+    """Some that a search might try."""
+    rng = np.random.default_rng(seed)
+    gaits = np.tile(reference_gaits(np.array([1.85]))[0], (n, 1))
+    return gaits + rng.uniform(-0.05, 0.05, gaits.shape)
+
+
+def commands(gait, theta, action):
+    """What the legs are commanded, written out: shape (4, 6)."""
+    found, phases = np.zeros((4, 6)), np.zeros(4)
+    grid = np.linspace(0, 2 * np.pi, 20001)
+    for i in range(4):
+        cosine, sine, *swing = gait[2 + 7 * (i // 2) : 9 + 7 * (i // 2)]
+        slowness = 1 / (1 + cosine * np.cos(grid) + sine * np.sin(grid))
+        mean = np.trapezoid(slowness, grid) / (2 * np.pi)
+        here = 1 + cosine * np.cos(theta[i]) + sine * np.sin(theta[i])
+        found[i, 0] = gait[0] * mean * here
+        found[i, 1:] = swing
+        passed = np.concatenate([[0], np.cumsum((slowness[1:] + slowness[:-1]) / 2) * grid[1]]) / mean
+        phases[i] = np.interp(theta[i] % (2 * np.pi), grid, passed) - np.pi * (i % 2)
+        phases[i] -= 2 * np.pi * gait[1] * (i < 2)
+    found[:, 0] *= 1 + COUPLING / 4 * np.sin(phases - phases[:, None]).sum(1)
+    each = action.reshape(4, 4)
+    found[:, 0] *= 1 + each[:, 0]
+    found[:, 1:4] += 0.3 * each[:, 1:]
+    return found
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_command_is_the_reference_with_the_action_and_the_pull(seed):
+    """Against the sums written out, with the phase by quadrature."""
+    env, rng = make(HORSE, target_speed=1.85), np.random.default_rng(seed)
+    gait, action = random_gaits(1, seed)[0], rng.uniform(-1, 1, 16).astype(np.float32)
+    env.reset(seed=seed, options={"gait": gait})
+    theta = env.engine.state["theta"][:, 0]
+    measured = env.step(action)[4]["measured"]
+    expected = commands(gait, theta, action.astype(float))
+    names = ("crank_speed", "swing_offset", "swing_sin", "swing_cos", "swing_sin_2", "swing_cos_2")
+    found = np.array([[measured[f"{leg}_command_{name}"] for name in names] for leg in LEGS])
+    np.testing.assert_allclose(found[:, 1:], expected[:, 1:], atol=1e-6)
+    np.testing.assert_allclose(found[:, 0], expected[:, 0], rtol=1e-6)
+
+
+def test_the_phase_grows_evenly_in_time():
+    gaits, phase = random_gaits(3), np.array([0.1, 0.4, 0.9])
+    theta = crank_angles(gaits, phase, np.zeros((4, 3)))
+    rows = rows_of(gaits).reshape(2, -1, 3)
+    speed = rows[:, 0] * (1 + rows[:, 1] * np.cos(theta[::2]) + rows[:, 2] * np.sin(theta[::2]))
+    later = crank_angles(gaits, phase + 1e-6, np.zeros((4, 3)))
+    passed = (later - theta)[::2] / (1e-6 * 2 * np.pi / gaits[:, 0])
+    np.testing.assert_allclose(passed, speed, rtol=1e-5)
+
+
+def test_cranks_that_are_out_of_step_come_back():
+    """A leg 0.1 strides ahead: the difference falls with the rate times the coupling, as sines do."""
+    env = make(HORSE, target_speed=1.5)
+    env.reset(seed=0, options={"phase": 0.0})
+    rate = reference_gaits(np.array([1.5]))[0, 0]
+
+    def ahead():
+        """Of the other legs' mean phase [rad], by the kernels' own rows."""
+        theta, rows = env.engine.state["theta"][:, 0], env.batch.episode[-22:, 0]
+        found = []
+        for i in range(4):
+            _, u, v, f, g, half, turn_x, turn_y, *_ = rows[11 * (i // 2) :]
+            z, w = np.exp(1j * theta[i]), u + 1j * v
+            phase = (half * z + (f + 1j * g) * z.conj() + w) / (1 + (w.conjugate() * z).real)
+            found.append(phase * (turn_x + 1j * turn_y) * (-1) ** i)
+        return np.angle(found[0] / np.sum(found[1:]))
+
+    state = env.get_state()
+    state["engine"]["limbs"][0, 0] += 0.4
+    env.set_state(state)
+    before, steps = ahead(), 150
+    for _ in range(steps):
+        *_, failed, _, _ = env.step(np.zeros(16, np.float32))
+        assert not failed
+    expected = before * np.exp(-rate * COUPLING * 0.02 * steps)
+    assert abs(before) > 0.2
+    assert abs(ahead()) < 0.5 * abs(before)
+    assert ahead() == pytest.approx(expected, abs=0.1 * abs(before) + 0.05)
+
+
+@pytest.mark.parametrize("speed", SPEEDS)
+def test_zeros_travel_and_stay_upright(speed):
+    _totals, summaries = played(lambda seen, time: np.zeros(16), target_speed=speed)
+    assert not any(one["failed"] for one in summaries)
+    assert np.mean([one["slip_m"] for one in summaries]) < 0.10
+    assert np.mean([one["speed_m_s"] for one in summaries]) > 0.85 * speed
+
+
+def played(act, **settings):
+    """Returns and summaries of `SEEDS` episodes of ten seconds side by side."""
+    envs = gym.make_vec(HORSE, num_envs=SEEDS, autoreset_mode="SAME_STEP", **settings)
+    seen, _ = envs.reset(seed=0)
+    total, ended, found = np.zeros(SEEDS), np.zeros(SEEDS, bool), [None] * SEEDS
+    for step in range(500):
+        taken = np.broadcast_to(np.asarray(act(seen, 0.02 * step), np.float32), (SEEDS, 16))
+        seen, rewards, failed, truncated, infos = envs.step(taken)
+        total += np.where(ended, 0.0, rewards)
+        for env in np.flatnonzero((failed | truncated) & ~ended):
+            figures = infos["final_info"]["episode_summary"]
+            found[env] = {name: figures[name][env] for name in figures if not name.startswith("_")}
+        ended |= failed | truncated
+    return total, found
+
+
+def bang_bang(pace):
+    return lambda seen, time: np.full(16, 1.0 if round(time / 0.02) // pace % 2 else -1.0)
+
+
+def hop(seen, time):
+    """All cranks stopped, all legs swung together."""
+    action = np.zeros((4, 4))
+    action[:, 0], action[:, 1] = -1.0, np.sin(2 * np.pi * 3 * time)
+    return action.ravel()
+
+
+def brake(seen, time):
+    """The fore legs against the hind legs."""
+    action = np.zeros((4, 4))
+    action[:2, 1], action[2:, 1] = 1.0, -1.0
+    return action.ravel()
+
+
+def skate(seen, time):
+    """Cranks slowed down, hoofs dragged by the swing."""
+    action = np.zeros((4, 4))
+    action[:, 0] = -0.5
+    action[::2, 1] = np.sin(2 * np.pi * time)
+    action[1::2, 1] = -np.sin(2 * np.pi * time)
+    return action.ravel()
+
+
+def die(seen, time):
+    """The fore legs folded: the sooner it falls, the less else it pays."""
+    action = np.zeros((4, 4))
+    action[:2] = (1.0, -1.0, -1.0, 1.0)
+    return action.ravel()
+
+
+TRICKS = {"hop": hop, "brake": brake, "skate": skate, "die": die} | {
+    f"bang-bang {pace}": bang_bang(pace) for pace in (3, 6, 12, 25)
+}
+
+
+@pytest.fixture(scope="module")
+def reference():
+    return played(lambda seen, time: np.zeros(16))[0].mean()
+
+
+@pytest.mark.parametrize("name", TRICKS)
+def test_tricks_stay_below_the_reference(reference, name):
+    assert played(TRICKS[name])[0].mean() < reference - MARGIN
+
+
+@pytest.mark.parametrize("name", ["idle", "random"])
+def test_simple_policies_stay_below_the_reference(reference, name):
+    policy = make_policy(name, gym.make(HORSE))
+    assert played(lambda seen, time: policy.predict(seen)[0])[0].mean() < reference - MARGIN
+
+
+def test_a_pony_is_a_similar_horse():
+    """A quarter of the length: masses go with the cube; the legs' own laws hold, whatever the size."""
+    one, half = make(HORSE), make(HORSE, size=0.5)
+    assert half.weight == pytest.approx(one.weight / 8)
+    assert half.geometry.hip_height == pytest.approx(one.geometry.hip_height / 2)
+    assert half.engine.limbs[0].spring.stiffness == pytest.approx(one.engine.limbs[0].spring.stiffness / 4)
+    assert one.weight == pytest.approx(475 * GRAVITY, rel=1e-4)
+
+
+@pytest.mark.parametrize("size", [0.7, 1.2])
+def test_ponies_travel(size):
+    speed = 1.853 * size**0.5
+    _, summaries = played(lambda seen, time: np.zeros(16), target_speed=speed, size=size)
+    assert np.mean([one["failed"] for one in summaries]) < 0.1
+    assert np.mean([one["speed_m_s"] for one in summaries]) == pytest.approx(speed, rel=0.2)
+
+
+def test_the_reference_follows_the_command():
+    env = make(HORSE, target_speed=(1.3, 2.6), target_seconds=(0.5, 1.0))
+    env.reset(seed=1)
+    seen = set()
+    for _ in range(150):
+        env.step(np.zeros(16, np.float32))
+        rows = env.batch.episode[env.batch._episode_layout.rows("fore").start :, 0]
+        same(rows, rows_of(reference_gaits(env.batch.now.target[:1]))[:, 0])
+        seen.add(float(env.batch.now.target[0]))
+    assert len(seen) >= 3
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"trunk": "rail"}, 'trunk: expected "free" of a horse, got'),
+        ({"size": 3.0}, "size: expected"),
+        ({"harmonics": 3}, "harmonics: expected"),
+        ({"filters": "fast"}, "filters: expected one of quick, slow, got 'fast'"),
+        ({"gait": "canter"}, "gait: expected one of"),
+        ({"hoof_stiffness": None, "hoof_damping": 100.0}, "hoof_damping: expected a hoof_stiffness"),
+        ({"trunk_share": 0.5}, "trunk_share: expected trunk='suspended'"),
+        ({"solver": "paper"}, "solver|trunk"),
+    ],
+    ids=str,
+)
+def test_bad_settings(settings, message):
+    with pytest.raises(ParameterError, match=message):
+        gym.make(HORSE, **settings)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"crank_angle": 0.0}, "options: expected a mapping with some of gait, parameters, phase"),
+        ({"phase": "early"}, r"options\['phase'\]"),
+        ({"gait": "canter"}, r"options\['gait'\]: expected one of"),
+        ({"gait": [1.0, 2.0]}, "a HorseGait, or finite numbers of shape"),
+        ({"pitch": 1.0}, r"options\['pitch'\]"),
+    ],
+    ids=str,
+)
+def test_bad_options_change_nothing(options, message):
+    env = make(HORSE)
+    env.reset(seed=0)
+    before = env.get_state()
+    with pytest.raises(ParameterError, match=message):
+        env.reset(options=options)
+    same(env.get_state(), before)
+
+
+def test_gaits_by_name_class_and_numbers_are_the_same():
+    name, gait = next(iter(horse_gaits().items()))
+    seen = [make(HORSE).reset(seed=0, options={"gait": given})[0] for given in (name, gait, gait.to_array())]
+    same(seen[0], seen[1]), same(seen[0], seen[2])
+    assert HorseGait.from_array(gait.to_array()) == gait
+    assert len(gait.to_array()) == len(NAMES)
+    with pytest.raises(ParameterError, match="fore: expected 7 numbers"):
+        HorseGait(6.0, 0.0, (0.0,), (0.0,))
+    with pytest.raises(ParameterError, match=r"fore\['speed_cos'\]"):
+        HorseGait(6.0, 0.0, (2.0, *[0.0] * 6), (0.0,) * 7)
+
+
+def test_sums_of_the_legs_are_the_summary():
+    env = make(HORSE, episode_seconds=1.0, target_speed=1.85)
+    env.reset(seed=2)
+    stances = slip = work = 0.0
+    done = False
+    while not done:
+        *_, failed, truncated, info = env.step(np.zeros(16, np.float32))
+        measured, done = info["measured"], failed or truncated
+        stances += sum(measured[f"{leg}_stances"] for leg in LEGS)
+        slip += sum(measured[f"{leg}_slip"] for leg in LEGS)
+        work += sum(measured[f"{leg}_positive_work"] for leg in LEGS)
+    figures = info["episode_summary"]
+    assert figures["stances"] == stances > 3
+    assert figures["slip_m"] == pytest.approx(slip / stances)
+    assert figures["drive_work_j"] == pytest.approx(work)
+
+
+def test_stable_baselines_takes_it():
+    envs = Sb3VecEnv(HORSE, 8, episode_seconds=0.5)
+    assert envs.reset().shape == (8, 66)
+    for taken in actions(0, 60, 8, env_id=HORSE):
+        _observations, rewards, _dones, _infos = envs.step(taken)
+    assert np.isfinite(rewards).all()
