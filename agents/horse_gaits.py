@@ -31,13 +31,14 @@ GRAVITY = 9.81
 POPULATION, STARTS, SECONDS = 32, 8, 5.0
 """Candidates of a generation, episodes of each, and their length [s]."""
 
-FIRST, LEAST = 0.4, 0.05  # spread of a search from nothing, and the least while the speed changes
+FIRST, NEXT = 0.4, 0.05  # spread of a search from nothing, and at least where the speed changes
 STEP = 1.03  # ratio of one speed to the next
 FROUDE = 0.25  # where the search begins
 LOWEST = 0.1  # Froude number at which the slower gaits end
-KNOTS = (1.2, 1.5, 1.85, 2.2, 2.6, 2.9)  # speeds that the reference gaits have, about [m/s]
+KNOTS = (1.2, 1.5, 1.85, 2.2, 2.6, 3.0, 3.4)  # speeds that the reference gaits have, about [m/s]
 MOST = 40  # steps of speed at most
-FALLEN = 0.3  # share of falls at which the speed is raised no more
+STABLE, NEAR = 0.07, 0.05  # most falls, and distance of speeds, of what is shipped [-]
+FALLEN = 0.1  # share of falls at which the speed is raised no more
 
 CENTRE = (1.05, 0.45, -0.7, 0.0, 0.0)  # swing about which a search from nothing begins [rad]
 SPANS = (0.5, 0.4, 0.4, 0.3, 0.3)
@@ -108,7 +109,7 @@ class Search:
         self.lead, self.seed, self.count = lead, seed, 0
         start = np.zeros(2 + len(PAIRS) * len(LIMITS)) if first is None else encode(first[None])[0]
         options = {"bounds": [-1, 1], "popsize": POPULATION, "seed": seed + 1, "verbose": -9, "verb_log": 0}
-        self.strategy = cma.CMAEvolutionStrategy(start, FIRST if first is None else FIRST / 2, options)
+        self.strategy = cma.CMAEvolutionStrategy(start, FIRST if first is None else NEXT, options)
 
     def gaits(self, points: Any) -> Floats:
         """Of points of the box, shape (n, 16)."""
@@ -126,7 +127,7 @@ class Search:
             self.count += 1
             returns, _ = course.play(gaits, 10_000 * self.seed + STARTS * self.count)
             self.strategy.tell(points, (-returns.reshape(-1, STARTS).mean(1)).tolist())
-            self.strategy.sigma = max(self.strategy.sigma, LEAST)
+            self.strategy.sigma = max(self.strategy.sigma, NEXT)
             tick(speed, returns.max())
         gait = self.gaits(self.strategy.result.xfavorite[None])[0].round(5)
         returns, summaries = course.play(np.tile(gait, (POPULATION * STARTS, 1)), 10**6, POPULATION * STARTS)
@@ -208,7 +209,7 @@ class Finder:
                 f"{name} {seed}",
                 lambda tick, seed=seed: [Search(seed, first, lead).run(speed, args.generations, tick)],
             )[0]
-            for seed in range(args.restarts)
+            for seed in range(args.restarts if first is None else 1)
         ]
         best = np.array(max(begins, key=lambda one: float(one["return"]))["gait"])
         for way, ratio, last in (("faster", STEP, 8.0), ("slower", 1 / STEP, speed_of(LOWEST) / STEP)):
@@ -221,27 +222,31 @@ class Finder:
 
 
 def shipped(searches: dict[str, Any]) -> dict[str, Any]:
-    """What comes with the package: gaits by the speed that they have, not by the one that was asked for, and
-    by name those of the first search, of the fastest one that never fell, and of the family in time."""
-    families = {
-        family: sorted(
-            (
-                step
-                for name, found in searches.items() if name.startswith(family)
-                for step in found["steps"] if step["failed"] < 0.01
-            ),
-            key=lambda step: float(step["speed_m_s"]),
-        )
-        for family in ("free", "in time")
-    }  # fmt: skip
-    free = families["free"]
-    knots = [min(free, key=lambda step: abs(float(step["speed_m_s"]) - speed)) for speed in KNOTS]
-    named = {"walk": knots[2], "fast": free[-1]}
-    if families["in time"]:
-        named["in time"] = families["in time"][-1]
+    """What comes with the package. Gaits go by the speed that they have, not by the one that was asked for;
+    of those within `NEAR` of a knot it is the one that slips least. By name there are the reference at Froude
+    number 0.25, the fastest one, and the fastest of the family in time."""
+
+    def steps_of(family: str) -> list[dict[str, Any]]:
+        return [
+            step
+            for name, found in searches.items() if name.startswith(family)
+            for step in found["steps"] if step["failed"] < STABLE
+        ]  # fmt: skip
+
+    def near(steps: list[dict[str, Any]], speed: float) -> dict[str, Any] | None:
+        close = [step for step in steps if abs(step["speed_m_s"] / speed - 1) < NEAR]
+        return min(close, key=lambda step: float(step["slip_m"])) if close else None
+
+    free, in_time = steps_of("free"), steps_of("in time")
+    knots = {step["speed_m_s"]: step["gait"] for speed in KNOTS if (step := near(free, speed))}
+    named = {
+        "walk": near(free, KNOTS[2]),
+        "fast": max(free, key=lambda step: float(step["speed_m_s"])),
+        "in time": max(in_time, key=lambda step: float(step["speed_m_s"]), default=None),
+    }
     return {
-        "reference": {"speeds": [one["speed_m_s"] for one in knots], "gaits": [one["gait"] for one in knots]},
-        "gaits": {name: one["gait"] for name, one in named.items()},
+        "reference": {"speeds": list(knots), "gaits": list(knots.values())},
+        "gaits": {name: step["gait"] for name, step in named.items() if step},
     }
 
 

@@ -2,14 +2,13 @@
 
     python -m agents.open_loop                                             mean return on hoof_env/HorseLeg-v0
     python -m agents.open_loop --env-id hoof_env/HorseLegRail-v0 --family clocked
-    python -m agents.open_loop --family four-legs --speed 1.85             a horse, a minute a search
     python -m agents.evaluate --policy run runs/open_loop/HorseLeg-v0-constant.json
 
 Families: "constant", the paper's gaits, four numbers that are held; "clocked", each of the four actions with
-a first harmonic of one clock beside it, which starts with the episode, thirteen numbers; "four-legs", gaits
-of a horse of four legs, which is `agents.four_legs`. The best of several searches is chosen by starts that
-none has met and scored with yet others, the episodes of agents.evaluate. The file is written after every
-search; searches that are in it are not made again.
+a first harmonic of one clock beside it, which starts with the episode, thirteen numbers. The best of several
+searches is chosen by starts that none has met and scored with yet others, the episodes of agents.evaluate.
+The file is written after every search; searches that are in it are not made again. `agents.horse_gaits` finds
+the gaits of the horse.
 """
 
 from __future__ import annotations
@@ -72,18 +71,8 @@ class Args:
     """registered environment of this package with many at once"""
     env_kwargs: tuple[str, ...] = ()
     """its arguments: key=value ..., or one JSON object; with reward_weights returns weigh otherwise"""
-    family: Literal["constant", "clocked", "four-legs"] = "constant"
+    family: Literal["constant", "clocked"] = "constant"
     """of gaits"""
-    speed: float = 1.85
-    """that four legs are asked for [m/s]"""
-    froude: float | None = None
-    """asks four legs for a speed by its Froude number, v^2 / (g hip height), in place of --speed"""
-    harmonics: int = 2
-    """of the swing of four legs"""
-    spring: float = 4e4
-    """stiffness of the springs at the hoofs of four legs [N/m]"""
-    stiffness: float = 2e6
-    """of the ground under four legs, K [N/m^1.5]"""
     restarts: int = 5
     """searches, of seeds 0, 1, ..."""
     episodes: int | None = None
@@ -296,38 +285,6 @@ def earlier(path: Path, about: dict[str, Any]) -> list[dict[str, Any]]:
     raise DataFileError(f"{path}: expected searches with {about} to go on with; name another --out")
 
 
-def search_four_legs(args: Args) -> None:
-    """Find gaits of four legs, and write the file after every search. `HoofEnvError`: no CMA-ES is installed.
-    `ParameterError`: a value is out of range, or of an option that is one leg's. `DataFileError`: the file is
-    of something else. `KeyboardInterrupt`: what was found is in the file."""
-    from agents import four_legs
-
-    others = ("env_id", "env_kwargs", "test_episodes", "start")
-    given = [name for name in others if getattr(args, name) != getattr(Args, name)]
-    if given:
-        raise ParameterError(f"{', '.join(given)}: expected none of them with the family four-legs")
-    speed = args.speed
-    if args.froude is not None:
-        if speed != Args.speed:
-            raise ParameterError("speed, froude: expected one of them")
-        speed = four_legs.froude_speed(args.froude)
-    about = four_legs.asked(speed, args.harmonics, args.spring, args.stiffness, args.episodes)
-    path = args.out or Path("runs/open_loop", f"four-legs-{speed:g}.json")
-    found = earlier(path, about)
-    check_folder(path.parent)
-
-    def keep(content: dict[str, Any]) -> None:
-        made = {"command": runs.command(), "versions": {**runs.versions(), "cma": version("cma")}}
-        runs.write_text(path, json.dumps(content | made, indent=1) + "\n")
-
-    content = four_legs.optimise(about, args.restarts, found, keep)
-    for one in content["restarts"]:
-        print(f"search {one['seed']}: cost {one['cost']:.3f}, {one['wall_s']:.0f} s")
-    for name, value in content["figures"].items():
-        print(f"{name:18} {value}")
-    print(f"written: {path}")
-
-
 def place(args: Args) -> Path:
     name = f"{args.env_id.rpartition('/')[2]}-{args.family}.json"
     return args.out or Path("runs/open_loop", name)
@@ -337,8 +294,6 @@ def main(argv: list[str] | None = None) -> None:
     import tyro
 
     args = tyro.cli(Args, args=argv, prog="python -m agents.open_loop", description=__doc__)
-    if args.family == "four-legs":
-        return search_four_legs(args)
     content = optimise(args)
     for one in content["restarts"]:
         print(

@@ -55,7 +55,7 @@ class Args(TrainingArgs):
     device: str = "cpu"
     """torch device; small networks are fastest on the CPU"""
     torch_threads: int = 1
-    """threads of torch; on a busy machine more than one are slower"""
+    """threads of torch and of the environments; on a busy machine more than one are slower"""
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,8 @@ def _train(
         raise ParameterError(f"device: expected one that torch finds here, got {args.device!r}")
     torch.set_num_threads(args.torch_threads)
     config = yaml.safe_dump({args.env_id: settings}, sort_keys=False)  # the library adds to policy_kwargs
-    envs = many = runs.make_vec_env(args.env_id, settings["n_envs"], **env_kwargs)
+    threads = args.torch_threads  # of the environments, too: they change no bit there
+    envs = many = runs.make_vec_env(args.env_id, settings["n_envs"], threads, **env_kwargs)
     try:
         resumed = None
         if start:

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from hoof_env.envs.observation import Entry as Entry
     from hoof_env.envs.observation import Scale as Scale
     from hoof_env.envs.policies import make_policy as make_policy
+    from hoof_env.envs.reference import HorseGait as HorseGait
     from hoof_env.envs.reward import Term as Term
     from hoof_env.envs.sb3 import Sb3VecEnv as Sb3VecEnv
     from hoof_env.envs.tasks import register as register
@@ -56,6 +57,7 @@ _MODULES = {
     "envs.horse_leg": "HorseLegEnv HorseLegMOEnv RandomizeParameters",
     "envs.observation": "Entry Scale",
     "envs.policies": "make_policy",
+    "envs.reference": "HorseGait",
     "envs.reward": "Term",
     "envs.sb3": "Sb3VecEnv",
     "envs.tasks": "register",

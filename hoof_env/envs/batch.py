@@ -297,6 +297,8 @@ class EpisodeBatch:
             for env, generator in zip(which, generators, strict=True):
                 now.target[env] = generator.uniform(*self.target_speed)
                 self._draw_target(int(env), generator)
+        if "target_speed" in options:  # of a horse, and for the whole episode
+            now.target[which], now.switch[which] = options["target_speed"], np.inf
         self.body.settle(start, now.target[which], options, self.engine)
         self.engine.reset(start.commands, start.theta, envs=which, **start.trunk)
         begun = [*(start.begun[name] for name in self.body.start_names), *start.gaits.T]

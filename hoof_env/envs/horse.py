@@ -57,13 +57,17 @@ PITCH, HEIGHT, CLEARANCE = 0.5, (0.75, 1.8), 0.02
 """Where it has fallen: +-pitch [rad], heights of the trunk [m], of a joint over the ground [m]."""
 GAP = 0.005  # between the lowest rigid hoof and the ground at a start [m]
 
-SPANS = (1.0, 0.3, 0.3, 0.3)
+SPANS = (1.0, 0.2, 0.2, 0.2)
 """What an action of 1 changes: of the crank's speed [-], of the swing's offset, sine and cosine [rad]."""
 
 FILTERS = {"quick": QUICK, "slow": FilterSettings()}  # of commands, by the setting `filters`
 
-OPTIONS = {"phase": (-1e6, 1e6), "speed": (-20.0, 20.0), "pitch": (-0.4, 0.4), "x": (-1e5, 1e5)}
-"""Numeric reset options and their ranges [strides, m/s, rad, m]; "gait" and "parameters" are the others."""
+OPTIONS = {
+    "phase": (-1e6, 1e6), "speed": (-20.0, 20.0), "pitch": (-0.4, 0.4), "x": (-1e5, 1e5),
+    "target_speed": (0.1, 20.0),
+}  # fmt: skip
+"""Numeric reset options and their ranges [strides, m/s, rad, m, m/s]; "gait" and "parameters" are the
+others."""
 
 SPEED_SPREAD, PITCH_SPREAD, PHASE_SPREAD = 0.2, 0.03, 0.05
 """How far starts are from the gait: of the commanded speed [-], pitch [rad], each crank [strides]."""
@@ -165,7 +169,7 @@ class Horse:
         }  # fmt: skip
         if engine.terrain != FLAT:
             begun["x"] = anywhere(engine.terrain, begun["x"], options, generators)
-        begun |= {name: np.full(n, options[name]) for name in OPTIONS if name in options}
+        begun |= {name: np.full(n, options[name]) for name in begun if name in options}
         commands = np.zeros((self.legs, 2 + 2 * self.harmonics, n))
         theta, action = PHASE_SPREAD * off[:, 3:].T, np.zeros((n, self.actions), np.float32)
         return Start(begun, np.empty(0), commands, theta, {}, action)

@@ -126,6 +126,11 @@ def slip(step, weight):  # type: ignore[no-untyped-def]
     return -weight * step.slip
 
 
+def landing(step, weight):  # type: ignore[no-untyped-def]
+    """For each stance that begins."""
+    return -weight * step.stances
+
+
 def work(step, weight):  # type: ignore[no-untyped-def]
     """Over the weight and the commanded distance, for every second."""
     asked = larger(step.commanded_progress, 1e-9)
@@ -146,7 +151,7 @@ def fall(step, weight):  # type: ignore[no-untyped-def]
 _ACTION = next(term for term in TERMS if term.name == "action")
 
 HORSE_TERMS = (
-    Term("alive", 2.0, "1/s", "for every second", alive),
+    Term("alive", 6.0, "1/s", "for every second", alive),
     Term(
         "tracking", 10.0, "1/s", "for every second, 1 less the relative error of the speed, at least -1",
         tracking,
@@ -157,6 +162,7 @@ HORSE_TERMS = (
         " substeps but at most twice the present one, so that it adds up to every stance's peak", peak,
     ),
     Term("slip", 3.0, "1/m", "minus the way that hoofs slide under load, to and fro", slip),
+    Term("landing", 0.3, "-", "minus the stances that begin: who taps the ground pays twice", landing),
     Term(
         "work", 0.5, "1/s",
         "minus the positive work of all drives over the weight times the commanded distance", work,

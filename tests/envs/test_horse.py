@@ -52,7 +52,7 @@ def commands(gait, theta, action):
     found[:, 0] *= 1 + COUPLING / 4 * np.sin(phases - phases[:, None]).sum(1)
     each = action.reshape(4, 4)
     found[:, 0] *= 1 + each[:, 0]
-    found[:, 1:4] += 0.3 * each[:, 1:]
+    found[:, 1:4] += 0.2 * each[:, 1:]
     return found
 
 

@@ -1,0 +1,88 @@
+"""The search for reference gaits: its box, what it keeps, and that what comes with the package is from it."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from agents import horse_gaits
+from agents.horse_gaits import Course, Search, decode, encode, shipped, speed_of
+from hoof_env.envs.reference import HorseGait, reference_gaits
+from hoof_env.envs.reference import horse_gaits as gaits_of_the_package
+
+
+def test_every_point_of_the_box_is_a_gait_and_the_way_back_is_the_same():
+    points = np.random.default_rng(0).uniform(-1, 1, (50, 16))
+    gaits = decode(points)
+    for gait in gaits:
+        assert (HorseGait.from_array(gait).to_array() == gait).all()
+    np.testing.assert_allclose(encode(gaits), points, atol=1e-12)
+
+
+def test_speeds_are_those_of_their_froude_numbers():
+    assert speed_of(0.25) == pytest.approx(1.853, abs=1e-3)
+
+
+def test_the_same_gait_has_the_same_return_in_every_row():
+    gait = reference_gaits(np.array([1.85]))
+    returns, figures = Course(1.85, 8, episode_seconds=0.5).play(np.tile(gait, (8, 1)), 3, starts=4)
+    assert (returns[:4] == returns[4:]).all()
+    assert len(set(returns[:4])) == 4
+    assert all(one["seconds"] <= 0.5 for one in figures)
+
+
+def test_a_search_goes_on_and_keeps_a_fixed_lead():
+    search = Search(1, reference_gaits(np.array([1.85]))[0], lead=0.0)
+    found = search.run(1.85, 2, lambda speed, best: None)
+    assert found["gait"][1] == 0.0
+    assert search.count == 2
+    assert {"speed_m_s", "slip_m", "failed", "return"} <= set(found)
+
+
+def test_what_is_shipped_goes_by_the_speed_that_a_gait_has():
+    def step(speed, reached, slip=0.1, failed=0.0):
+        return {
+            "speed": speed,
+            "speed_m_s": reached,
+            "failed": failed,
+            "gait": [reached] * 16,
+            "slip_m": slip,
+        }
+
+    searches = {
+        "free 0": {"steps": [step(1.85, 1.8)]},
+        "free, faster": {"steps": [step(2.5, 2.2), step(2.6, 2.19, 0.05), step(4.5, 4.0, failed=0.5)]},
+        "free, slower": {"steps": [step(1.2, 1.2)]},
+        "in time, faster": {"steps": [step(2.5, 2.4)]},
+    }
+    found = shipped(searches)
+    assert found["reference"]["speeds"] == [1.2, 1.8, 2.19]  # of two alike, the one that slips less
+    assert found["gaits"]["fast"][0] == 2.2  # the faster one fell
+    assert found["gaits"]["walk"][0] == 1.8
+    assert found["gaits"]["in time"][0] == 2.4
+
+
+def test_the_package_has_gaits_in_the_order_of_their_speeds():
+    from hoof_env.envs.reference import _data
+
+    speeds = _data()["reference"]["speeds"]
+    assert speeds == sorted(set(speeds))
+    np.testing.assert_array_equal(reference_gaits(np.array(speeds)), _data()["reference"]["gaits"])
+    assert {"walk", "fast", "in time"} <= set(gaits_of_the_package())
+    assert gaits_of_the_package()["in time"].lead == 0.0
+
+
+def test_the_file_is_gone_on_with(tmp_path, monkeypatch, capsys):
+    out = tmp_path / "horse.json"
+    monkeypatch.setattr(horse_gaits, "MOST", 1)
+    arguments = ["--out", str(out), "--generations", "1", "--each", "1", "--restarts", "1"]
+    horse_gaits.main(arguments)
+    first = json.loads(out.read_text())
+    assert {"free 0", "free, faster", "free, slower", "in time 0"} <= set(first["searches"])
+    written = capsys.readouterr().out
+    horse_gaits.main(arguments)
+    assert capsys.readouterr().out == ""
+    assert json.loads(out.read_text()) == first
+    assert written.count("\n") >= 4
