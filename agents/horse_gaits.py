@@ -227,11 +227,11 @@ def shipped(searches: dict[str, Any]) -> dict[str, Any]:
     number 0.25, the fastest one, and the fastest of the family in time."""
 
     def steps_of(family: str) -> list[dict[str, Any]]:
-        return [
-            step
-            for name, found in searches.items() if name.startswith(family)
-            for step in found["steps"] if step["failed"] < STABLE
-        ]  # fmt: skip
+        begins = [found["steps"][0] for name, found in searches.items() if name[:-1] == f"{family} "]
+        steps = sorted(begins, key=lambda step: float(step["return"]))[-1:]  # the others are another gait
+        for way in ("faster", "slower"):
+            steps += searches.get(f"{family}, {way}", {"steps": []})["steps"]
+        return [step for step in steps if step["failed"] < STABLE]
 
     def near(steps: list[dict[str, Any]], speed: float) -> dict[str, Any] | None:
         close = [step for step in steps if abs(step["speed_m_s"] / speed - 1) < NEAR]

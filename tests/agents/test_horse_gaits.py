@@ -53,6 +53,7 @@ def test_what_is_shipped_goes_by_the_speed_that_a_gait_has():
 
     searches = {
         "free 0": {"steps": [step(1.85, 1.8)]},
+        "free 1": {"steps": [step(1.9, 1.85, slip=0.01)]},
         "free, faster": {"steps": [step(2.5, 2.2), step(2.6, 2.19, 0.05), step(4.5, 4.0, failed=0.5)]},
         "free, slower": {"steps": [step(1.2, 1.2)]},
         "in time, faster": {"steps": [step(2.5, 2.4)]},
