@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.envs.batch import EpisodeBatch
-from hoof_env.envs.reference import HorseGait
 from hoof_env.envs.tasks import PER_EPISODE, SETTINGS, Settings, Task, task_of, to_json
 from hoof_env.errors import FixedSettingError, ParameterError, check_choice
 from hoof_env.gait import GaitParameters
@@ -120,9 +119,11 @@ class LegBase:
         return self.batch.body.geometry
 
     @property
-    def gaits(self) -> Mapping[str, GaitParameters | HorseGait]:
-        """Gaits of the preset by name, or of the horse."""
-        return self.batch.body.gaits
+    def gaits(self) -> dict[str, GaitParameters]:
+        """Gaits of the preset by name; of a horse they are `HorseGait`s."""
+        gaits: Any = self.batch.body.gaits
+        found: dict[str, GaitParameters] = gaits
+        return found
 
     @property
     def engine(self) -> TrunkEngine:

@@ -15,6 +15,7 @@ from hoof_env.envs.reference import (
     LEGS,
     NAMES,
     HorseGait,
+    PairReference,
     crank_angles,
     horse_gaits,
     reference_gaits,
@@ -89,10 +90,10 @@ def test_cranks_that_are_out_of_step_come_back():
 
     def ahead():
         """Of the other legs' mean phase [rad], by the kernels' own rows."""
-        theta, rows = env.engine.state["theta"][:, 0], env.batch.episode[-22:, 0]
+        theta, rows = env.engine.state["theta"][:, 0], env.batch.episode[-2 * PairReference.size :, 0]
         found = []
         for i in range(4):
-            _, u, v, f, g, half, turn_x, turn_y, *_ = rows[11 * (i // 2) :]
+            _, u, v, f, g, half, turn_x, turn_y, *_ = rows[PairReference.size * (i // 2) :]
             z, w = np.exp(1j * theta[i]), u + 1j * v
             phase = (half * z + (f + 1j * g) * z.conj() + w) / (1 + (w.conjugate() * z).real)
             found.append(phase * (turn_x + 1j * turn_y) * (-1) ** i)

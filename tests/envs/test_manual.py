@@ -203,13 +203,13 @@ def test_every_key_of_infos_and_every_quantity_is_there(page):
     assert [key for key in told if key != "parameters"] == [key for key in info if "reward" not in key]
     found = {"both": [], "record": [], "measured": []}
     legs = LEGS if page == "horse" else []
-    shown = {re.sub(f"^({'|'.join(LEGS)})_", "", name) for name in info["measured"]}
+    shown = {re.sub(f"^({'|'.join(LEGS)})_", "", name) for name in info["measured"].names}
     for names, within, unit, _ in rows(measured):
         found[within] += re.findall(r"`(\w+)`", names)
         assert unit
     record = env.unwrapped.record()
     assert sorted(found["both"] + found["record"]) == sorted(record)
     assert sorted(found["both"] + found["measured"]) == sorted(shown)
-    assert len(info["measured"].keys()) == len(set(info["measured"].keys()))
+    assert len(info["measured"].names) == len(set(info["measured"].names))
     assert f"shape\n({len(info['measured'])},)" in measured
     assert {array.shape for array in record.values()} == {(1, 1), (1, max(len(legs), 1), 1)}
