@@ -42,10 +42,10 @@ def advance(hips: tuple[float, ...], trunk: str, count: int, steps: int, calls: 
     return run
 
 
-def step(env: gym.Env, steps: int) -> Callable[[], object]:
-    """So many steps of one environment with random actions, going on from the last."""
+def step(env: gym.Env, steps: int, size: float = 1.0) -> Callable[[], object]:
+    """So many steps of one environment with random actions up to a size, going on from the last."""
     shape: tuple[int, ...] = env.action_space.shape or ()
-    actions = np.random.default_rng(0).uniform(-1, 1, (steps, *shape)).astype(env.action_space.dtype)
+    actions = np.random.default_rng(0).uniform(-size, size, (steps, *shape)).astype(env.action_space.dtype)
     env.reset(seed=0)
 
     def run() -> None:
@@ -57,10 +57,11 @@ def step(env: gym.Env, steps: int) -> Callable[[], object]:
     return run
 
 
-def step_many(envs: Any, count: int, steps: int) -> Callable[[], object]:
-    """So many steps of `count` environments that have been reset, of Gymnasium or EnvPool."""
+def step_many(envs: Any, count: int, steps: int, size: float = 1.0) -> Callable[[], object]:
+    """So many steps of `count` environments that have been reset, of Gymnasium or EnvPool, with random
+    actions up to a size."""
     shape = (min(steps, 8), count, envs.action_space.shape[-1])
-    actions = np.random.default_rng(0).uniform(-1, 1, shape).astype(envs.action_space.dtype)
+    actions = np.random.default_rng(0).uniform(-size, size, shape).astype(envs.action_space.dtype)
 
     def run() -> None:
         for k in range(steps):
