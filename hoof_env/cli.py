@@ -40,7 +40,7 @@ def reproduce(out: Path, figures: bool = True, preset: str | None = None) -> Non
 
 def render(
     out: Path,
-    policy: str = "run",
+    policy: str | None = None,
     id: str = "hoof_env/HorseLeg-v0",
     args: tuple[str, ...] = (),
     seed: int = 0,
@@ -56,7 +56,8 @@ def render(
         out: the film; ends in .mp4 or .gif. Its folder is made if need be.
         policy: a gait of the preset, idle, random, bang-bang, drag or airborne; four gait parameters as
             6.28,0.7,-0.2,-0.3; the .json of an open-loop gait, or open-loop for the best that the package
-            holds; or a trained model (a trusted one only: a model is code).
+            holds; or a trained model (a trusted one only: a model is code). Otherwise run, and of a horse
+            its reference gait.
         id: the environment.
         args: its arguments: key=value ..., or one JSON object.
         seed: of the episode and of "random".
@@ -97,7 +98,7 @@ def play(
 
 def export(
     out: Path,
-    policy: str = "run",
+    policy: str | None = None,
     id: str = "hoof_env/HorseLeg-v0",
     args: tuple[str, ...] = (),
     seed: int = 0,

@@ -132,7 +132,7 @@ def _writer(path: Path, shape: tuple[int, ...], fps: float) -> Any:
 
 def render_episode(
     path: Path,
-    policy: str,
+    policy: str | None,
     env_id: str,
     arguments: Sequence[str] = (),
     seed: int = 0,

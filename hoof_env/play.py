@@ -1,4 +1,4 @@
-"""Drive a leg by keyboard: `hoof-env play`.
+"""Drive a leg, or a horse, by keyboard: `hoof-env play`.
 
 `Game` is the whole of it without a window: it takes names of keys and advances an environment. `play` feeds
 it from pygame's event loop and shows what the renderer draws, with the keys and the score below.
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from hoof_env import records
 from hoof_env.errors import HoofEnvError, check_number, parse_pairs
 from hoof_env.gait import GaitParameters
-from hoof_env.render.instant import Instant, instants
+from hoof_env.render.instant import HorseInstant
 
 HELD = {
     "up": (0, 1), "down": (0, -1), "right": (1, 1), "left": (1, -1),
@@ -41,7 +41,7 @@ class Game:
         seed: of the first episode; each further one takes the next.
 
     Attributes:
-        action: what is commanded, shape (4,), in [-1, 1].
+        action: what is commanded, in [-1, 1]: four numbers, or those of each of a horse's legs.
         news: what happened since the last tick or restart.
         score: sum of the rewards of the episode, of all objectives alike.
         paused, ended, quit: whether it waits, the episode is over, or the player has left.
@@ -53,20 +53,22 @@ class Game:
         self._leg: Any = env.unwrapped
         self.dt = records.setting(env).dt
         self.gaits: list[str] = sorted(self._leg.gaits)
+        self._of_horse, self._gait = bool(records.setting(env).hips), ""
         self.paused = self.quit = False
         self.restart()
 
     def restart(self) -> None:
         """Begin a new episode with the gait that it starts in."""
-        _, info = self._env.reset(seed=self._seed)
+        options = {"gait": self._gait} if self._gait else {}
+        _, info = self._env.reset(seed=self._seed, options=options)
         self._seed += 1
         gait = info.get("gait")
-        self.action: NDArray[np.float32] = np.zeros(4, np.float32)
-        if gait:
+        self.action: NDArray[np.float32] = np.zeros(self._env.action_space.shape, np.float32)
+        if gait and not self._of_horse:  # whose actions lie around it
             self.action = self._leg.action_for(GaitParameters(**gait))
         self.news = self._happened()
         self.score = 0.0
-        self.distance_from = self.news[0].trunk_x
+        self.distance_from = way_of(self.news[0])
         self.ended, self.why = False, ""
         self.begun = True
 
@@ -79,7 +81,10 @@ class Game:
         elif key == "space":
             self.paused = not self.paused
         elif key == "0":
-            self.action[0] = -1.0
+            self.action[::4] = -1.0
+        elif key.isdecimal() and 0 < int(key) <= len(self.gaits) and self._of_horse:
+            self._gait = self.gaits[int(key) - 1]
+            self.restart()
         elif key.isdecimal() and 0 < int(key) <= len(self.gaits):
             self.action = self._leg.action_for(self._leg.gaits[self.gaits[int(key) - 1]])
 
@@ -91,7 +96,8 @@ class Game:
         for key in held:
             if key in HELD:
                 entry, way = HELD[key]
-                self.action[entry] = np.clip(self.action[entry] + way * RATE * self.dt, -1.0, 1.0)
+                moved = self.action[entry::4] + way * RATE * self.dt  # of a horse in all legs alike
+                self.action[entry::4] = np.clip(moved, -1.0, 1.0)
         _, reward, failed, truncated, info = self._env.step(self.action.copy())
         self.score += float(np.sum(reward))
         self.news = self._happened()
@@ -106,8 +112,14 @@ class Game:
             return f"over: {self.why}; r starts again"
         return "paused; space goes on" if self.paused else ""
 
-    def _happened(self) -> list[Instant]:
-        return instants(records.substeps(self._env, self._leg.command_of(self.action)))
+    def _happened(self) -> list[Any]:
+        command = None if self._of_horse else self._leg.command_of(self.action)
+        return records.instants_of(self._env, records.substeps(self._env, command))
+
+
+def way_of(now: Any) -> float:
+    """Where the trunk is [m]."""
+    return float(now.x if isinstance(now, HorseInstant) else now.trunk_x)
 
 
 def play(
@@ -172,7 +184,7 @@ def _draw_strip(window: Any, renderer: Any, game: Game, size: tuple[int, int]) -
     unit, top = brush.unit, size[1]
     window.fill(PAPER, (0, top, size[0], _strip(size)))
     rows = [top + y * unit for y in (20, 48, 76)]
-    ahead = renderer.latest.trunk_x - game.distance_from
+    ahead = way_of(renderer.latest) - game.distance_from
     for y, (text, colour) in zip(
         rows,
         (

@@ -94,15 +94,17 @@ def make_env(env_id: str, arguments: Mapping[str, Any] | None = None) -> gym.Env
     return env
 
 
-def find_policy(name: str, env: gym.Env[Any, Any], env_id: str, seed: int = 0) -> Any:
+def find_policy(name: str | None, env: gym.Env[Any, Any], env_id: str, seed: int = 0) -> Any:
     """A policy for an environment by its name: a gait or another scripted one, "6.28,0.7,-0.2,-0.3" (crank
     speed [rad/s], swing offset, sine and cosine coefficient [rad]), "open-loop", the best gait that comes
-    with this package for the id, or a path.
+    with this package for the id, or a path; None is "run", or a horse's "reference".
 
     The .zip or run folder of a model is a pickle: it can run code. A policy's .onnx file, the folder of one
     that is shipped, or a gait's .json are data. `seed` is that of "random".
     """
     names = policy_names(env)
+    if name is None:
+        name = "reference" if "reference" in names else "run"
     if name in names:
         return make_policy(name, env, seed)
     if name.endswith(".json"):
@@ -283,7 +285,7 @@ def write(record: Columns, about: Mapping[str, Any], path: Path) -> Path:
 
 def export_episode(
     path: Path,
-    policy: str,
+    policy: str | None,
     env_id: str,
     arguments: Sequence[str] = (),
     seed: int = 0,

@@ -1,0 +1,124 @@
+"""Pictures and records of the horse: four legs, their forces and the footfall are what the engine says."""
+
+from __future__ import annotations
+
+import itertools
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from hoof_env import records
+from hoof_env.dynamics.parts import GRAVITY
+from hoof_env.envs.policies import make_policy
+from hoof_env.envs.reference import LEGS
+from hoof_env.film import frames
+from hoof_env.play import Game
+from hoof_env.render.renderer import new_renderer
+
+HORSE = "hoof_env/Horse-v0"
+
+
+@pytest.fixture(scope="module")
+def played():
+    """An environment, and the columns of two seconds of its reference gait."""
+    env = gym.make(HORSE, target_speed=1.853)
+    return env, list(records.episode(env, make_policy("reference", env), 1, 2.0))
+
+
+def whole(parts):
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def test_the_forces_of_the_record_bear_the_animal(played):
+    """Newton: the mean vertical force is the weight, but for the change of momentum."""
+    env, parts = played
+    record = whole(parts)
+    upward = sum(record[f"{leg}_force_y"] for leg in LEGS)
+    time = record["time"]
+    mean = np.trapezoid(upward, time) / time[-1]
+    weight = env.unwrapped.weight
+    change = weight / GRAVITY * (record["vy"][-1] - record["vy"][0]) / time[-1]
+    assert mean == pytest.approx(weight + change, rel=0.05)
+
+
+def test_hips_stand_where_they_are_on_the_trunk(played):
+    env, parts = played
+    record = whole(parts)
+    for leg, (x, _) in env.unwrapped.batch.body.hips.items():
+        arm = (record[f"{leg}_trunk_x"] - record["x"]) + 1j * (record[f"{leg}_trunk_y"] - record["y"])
+        np.testing.assert_allclose(arm, x * np.exp(1j * record["pitch"]), atol=1e-12)
+
+
+def test_the_panel_counts_the_stances_that_the_forces_show(played):
+    env, parts = played
+    here = records.setting(env)
+    renderer = new_renderer(here, 50.0)
+    for part in parts:
+        renderer.add(records.instants_of(env, part))
+    record = whole(parts)
+    for k, leg in enumerate(LEGS):
+        normal = record[f"{leg}_toe_normal"] + record[f"{leg}_heel_normal"]
+        loaded = normal > here.lift_off_n
+        begun = int(loaded[0]) + int((np.diff(loaded.astype(int)) == 1).sum())
+        assert len(renderer._panel.each[k].peaks) == begun
+        bars = renderer._panel._stances[k]
+        assert sum(end - start for start, end in bars) == pytest.approx(loaded.sum() * 1e-3, abs=0.01)
+        grf = np.hypot(record[f"{leg}_force_x"], record[f"{leg}_force_y"])
+        assert renderer._panel.each[k].highest == pytest.approx(grf.max())
+
+
+def test_films_show_a_horse_that_goes(played):
+    env, parts = played
+    pictures = list(
+        frames(
+            new_renderer(records.setting(env), 25.0), parts, 25.0, read=lambda c: records.instants_of(env, c)
+        )
+    )
+    assert len(pictures) == 51
+    assert all(picture.shape == (540, 960, 3) and picture.dtype == np.uint8 for picture in pictures)
+    assert all((one != other).any() for one, other in itertools.pairwise(pictures))
+
+
+@pytest.mark.parametrize("n", [0, 3])
+def test_frames_of_one_and_of_many(n):
+    if n:
+        env = gym.make_vec(HORSE, num_envs=n, render_mode="rgb_array")
+        env.reset(seed=0), env.step(np.zeros((n, 16), np.float32))
+        pictures = env.render()
+        assert len(pictures) == n
+        assert (pictures[0] != pictures[1]).any()
+    else:
+        env = gym.make(HORSE, render_mode="rgb_array", size=0.7)
+        env.reset(seed=0), env.step(np.zeros(16, np.float32))
+        assert env.render().shape == (540, 960, 3)
+    env.close()
+
+
+def test_exports_name_every_limb(tmp_path, played):
+    env, _ = played
+    record = records.record_episode(env, make_policy("reference", env), 1, 0.1)
+    about = records.describe(env)
+    for suffix in (".csv", ".mot"):
+        text = records.write(record, about, tmp_path / f"horse{suffix}").read_text()
+        for leg in LEGS:
+            assert f"{leg}_{'force_y [N]' if suffix == '.csv' else 'ground_force_vy'}" in text
+    header, *rows = (tmp_path / "horse.csv").read_text().splitlines()
+    assert len(header.split(",")) == len(rows[0].split(","))
+    assert set(record) == set(about["units"]) | {"free_moment"} & set(record)
+    lines = (tmp_path / "horse.mot").read_text().splitlines()
+    assert f"nColumns={1 + 9 * 4}" in lines
+
+
+def test_a_player_moves_all_legs_alike_and_takes_a_gait():
+    game = Game(gym.make(HORSE))
+    for _ in range(5):
+        game.tick(["up", "left"])
+    assert (game.action[0::4] > 0).all()
+    assert (game.action[1::4] < 0).all()
+    assert len(set(game.action[0::4])) == 1
+    game.press("0")
+    assert (game.action[0::4] == -1).all()
+    game.press("1")
+    assert not game.action.any()
+    assert game.news[0].time == 0.0
