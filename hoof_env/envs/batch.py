@@ -481,8 +481,11 @@ KERNELS: dict[str, Callable[[], object]] = {
     "the paper's solver": lambda: EpisodeBatch(
         TASKS["fixed"], TASKS["fixed"].settings({"solver": "paper"}), 1
     ),
+    "one horse": lambda: EpisodeBatch(TASKS["horse"], TASKS["horse"].settings({}), 1),
+    "many horses": lambda: EpisodeBatch(TASKS["horse"], TASKS["horse"].settings({}), LANES),
 }
-"""What uses kernels of its own; all ids share these, and all settings but `hoof_stiffness`."""
+"""What uses kernels of its own; all ids share these, and all settings but `hoof_stiffness` of one leg, and
+`harmonics` and a rigid hoof of a horse."""
 
 
 def compile_kernels(say: Callable[[str], None]) -> list[str]:
