@@ -214,7 +214,7 @@ class StrideSums(Layout):
     loaded_time: Row  # [s]
     stances: Row  # that began
     travel: Row  # backward, of the hoof along the ground, weighted with the load [m]
-    slip: Annotated[Block, ANIMAL]  # the same without sign, so that to and fro adds up [m]
+    slip: Annotated[Block, ANIMAL]  # in stance, the same without sign, so that to and fro adds up [m]
     braking: Annotated[Block, ANIMAL]  # impulse of the ground backward [N s]
     propulsion: Annotated[Block, ANIMAL]  # forward [N s]
 

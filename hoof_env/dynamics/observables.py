@@ -154,7 +154,8 @@ def count_stride(trunk, leg, form, h):  # type: ignore[no-untyped-def]
     if form.animal:
         slid = leg.toe.normal_force * size(leg.toe.sliding_speed)
         slid = slid + leg.heel.normal_force * size(leg.heel.sliding_speed)
-        leg.sums.slip[0] = leg.sums.slip[0] + choose(down, h * slid / choose(down, load, 1.0), 0.0)
+        # in stance alone: a sole without mass flies back as it is unloaded, which is no slip of the hoof
+        leg.sums.slip[0] = leg.sums.slip[0] + choose(loaded, h * slid / choose(loaded, load, 1.0), 0.0)
         leg.sums.braking[0] = leg.sums.braking[0] + h * larger(-push.real, 0.0)
         leg.sums.propulsion[0] = leg.sums.propulsion[0] + h * larger(push.real, 0.0)
 

@@ -161,7 +161,7 @@ HORSE_TERMS = (
         "minus the increase of the legs' running peak GRF over the weight; each is the highest force of all"
         " substeps but at most twice the present one, so that it adds up to every stance's peak", peak,
     ),
-    Term("slip", 3.0, "1/m", "minus the way that hoofs slide under load, to and fro", slip),
+    Term("slip", 3.0, "1/m", "minus the way that hoofs slide in stance, to and fro", slip),
     Term("landing", 0.3, "-", "minus the stances that begin: who taps the ground pays twice", landing),
     Term(
         "work", 0.5, "1/s",

@@ -32,7 +32,7 @@ class Outcome(NamedTuple):
         normal_impulse: of the ground on the hoof [N s].
         loaded_time: [s].
         stances: that began.
-        slip: of hoofs that bear load, without sign [m]; 0 where the engine does not say.
+        slip: of hoofs in stance, without sign [m]; 0 where the engine does not say.
         action_change: mean square of the action's change [-].
         failed: 1 where the episode ends by failure, else 0.
         episode_seconds: of a whole episode [s].

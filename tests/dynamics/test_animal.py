@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hoof_env.dynamics.engine import TrunkEngine
+from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.dynamics.observables import stance_figures
 from hoof_env.dynamics.parts import HoofSpring, Limb, Limits, Motor, Prescribed, Result, Trunk
 from hoof_env.errors import ParameterError
@@ -105,8 +106,8 @@ def test_height_is_above_the_ground_below():
 # -- sums ------------------------------------------------------------------------------------------------
 
 
-def test_slip_is_what_the_soles_slide_under_load():
-    """Toward and back adds up; impulses are those of the horizontal force."""
+def test_slip_is_what_the_soles_slide_in_stance():
+    """To and fro adds up; impulses are those of the horizontal force."""
     h = 2e-4
     engine = animal(Limits(), ground=replace(NATURAL, friction=0.1), sim_dt=h, substeps=1)
     engine.reset(WALK, THETA, vx=0.5)
@@ -120,14 +121,14 @@ def test_slip_is_what_the_soles_slide_under_load():
         slide = np.array([r["toe_slide"], r["heel_slide"]])[..., 0]
         load = normal.sum(0)
         down = load > 0
-        slip[down] += h * (normal * np.abs(slide)).sum(0)[down] / load[down]
+        stands = load > LIFT_OFF * engine.weight / 4
+        slip[stands] += h * (normal * np.abs(slide)).sum(0)[stands] / load[stands]
         travel[down] -= h * (normal * slide).sum(0)[down] / load[down]
         push = (r["toe_friction"] + r["heel_friction"])[:, 0]
         pushes += h * np.array([np.maximum(-push, 0), np.maximum(push, 0)])
     assert slip.min() > 0.01
     assert total["slip"][:, 0] == pytest.approx(slip)
     assert total["travel"][:, 0] == pytest.approx(travel)
-    assert (total["slip"] >= np.abs(total["travel"]) - 1e-12).all()
     assert [total["braking"][:, 0], total["propulsion"][:, 0]] == [pytest.approx(p) for p in pushes]
     figures = stance_figures(total, 0.3, np.full((4, 1), 0.25))
     assert set(figures) >= {"peak", "mean", "duty", "stances_per_turn", "slip", "braking", "propulsion"}

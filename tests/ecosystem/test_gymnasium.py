@@ -60,9 +60,11 @@ def test_make(env_id):
         ):
             observation, _ = made.reset(seed=0)
             for _ in range(20):
-                observation, reward, *_ = made.step(made.action_space.sample())
+                observation, reward, terminated, *_ = made.step(made.action_space.sample())
                 assert observation in made.observation_space
                 assert np.isfinite(reward)
+                if terminated:
+                    break
 
 
 def test_make_vec(envs):
