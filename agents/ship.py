@@ -51,12 +51,6 @@ CHECKED = 20
 """Episodes, from the first of the score on, that are played again to check a shipped policy."""
 
 GAITS = ("run", "walk", "carrying_walk", "reference", "open-loop")  # scored beside it, where an id has them
-    "run",
-    "walk",
-    "carrying_walk",
-    "reference",
-    "open-loop",
-)  # scored beside the policy, where an id has them
 
 LIMIT, FILM_LIMIT = 1_000_000, 750_000
 """Bytes of a folder and of the film in it, which is made shorter where it is larger."""
