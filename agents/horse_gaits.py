@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from agents import runs
 from agents.command import run
 from hoof_env.envs.horse import HIP_HEIGHT
-from hoof_env.envs.reference import LIMITS, PAIRS
+from hoof_env.envs.reference import LIMITS, PAIRS, Stride
 from hoof_env.errors import HoofEnvError
 
 Floats = NDArray[np.float64]
@@ -38,6 +38,7 @@ LOWEST = 0.1  # Froude number at which the slower gaits end
 KNOTS = (1.2, 1.5, 1.85, 2.2, 2.6, 3.0, 3.4)  # speeds that the reference gaits have, about [m/s]
 MOST = 40  # steps of speed at most
 STABLE, NEAR = 0.07, 0.05  # most falls, and distance of speeds, of what is shipped [-]
+HARMONICS = 3  # of the trunk's motion
 FALLEN = 0.1  # share of falls at which the speed is raised no more
 
 CENTRE = (1.05, 0.45, -0.7, 0.0, 0.0)  # swing about which a search from nothing begins [rad]
@@ -142,6 +143,8 @@ class Args:
 
     out: Path = Path("runs/horse.json")
     """what was found; one that exists is gone on with"""
+    shipped: Path = Path("runs/gaits.json")
+    """what of it comes with the package, as hoof_env/data/horse/gaits.json"""
     generations: int = 200
     """of a search from nothing"""
     each: int = 10
@@ -221,10 +224,37 @@ class Finder:
             )
 
 
+def trunk_series(gait: list[float], speed: float) -> list[list[float]]:
+    """How the trunk moves in a gait that keeps a speed [m/s]: height over that of the hips [-], speed over
+    its mean [-] and pitch [rad], of each the mean, and cosine and sine coefficients of `HARMONICS` harmonics
+    of half a stride; what `reference.trunk_motion` reads."""
+    course = Course(speed, 64, episode_seconds=2 * SECONDS)
+    envs, numbers = course.envs, np.array(gait)
+    body, stride = envs.unwrapped.batch.body, Stride(*numbers[-len(LIMITS) :][:2])
+    envs.reset(seed=1, options={"gait": numbers})
+    rows, upright = [], np.ones(envs.num_envs, bool)
+    for k in range(course.steps - 1):
+        _, _, terminated, _, infos = envs.step(np.zeros((envs.num_envs, 16), np.float32))
+        upright &= ~terminated
+        if k >= course.steps // 2:
+            m = infos["measured"]
+            rows.append([m[name].copy() for name in ("left_hind_theta", "y", "vx", "pitch")])
+    theta, y, vx, pitch = np.moveaxis(rows, 1, 0)[..., upright].reshape(4, -1)
+    one, zero = np.ones(1), np.zeros(1)
+    begin, now = stride.phase(one, zero), stride.phase(np.cos(theta), np.sin(theta))
+    phase = np.arctan2(now[1], now[0]) - np.arctan2(begin[1], begin[0])
+    order = 2 * np.arange(1, HARMONICS + 1)
+    waves = [wave(n * phase) for n in order for wave in (np.cos, np.sin)]
+    terms = np.stack([np.ones_like(phase), *waves], 1)
+    moves = np.stack([y / body.height, vx / vx.mean(), pitch], 1)
+    found: list[list[float]] = np.linalg.lstsq(terms, moves, rcond=None)[0].T.round(6).tolist()
+    return found
+
+
 def shipped(searches: dict[str, Any]) -> dict[str, Any]:
-    """What comes with the package. Gaits go by the speed that they have, not by the one that was asked for;
-    of those within `NEAR` of a knot it is the one that slips least. By name there are the reference at Froude
-    number 0.25, the fastest one, and the fastest of the family in time."""
+    """What comes with the package, but for how the trunk moves. Gaits go by the speed that they have, not by
+    the one that was asked for; of those within `NEAR` of a knot it is the one that slips least. By name there
+    are the reference at Froude number 0.25, the fastest one, and the fastest of the family in time."""
 
     def steps_of(family: str) -> list[dict[str, Any]]:
         begins = [found["steps"][0] for name, found in searches.items() if name[:-1] == f"{family} "]
@@ -241,7 +271,7 @@ def shipped(searches: dict[str, Any]) -> dict[str, Any]:
     knots = {step["speed_m_s"]: step["gait"] for speed in KNOTS if (step := near(free, speed))}
     named = {
         "walk": near(free, KNOTS[2]),
-        "fast": max(free, key=lambda step: float(step["speed_m_s"])),
+        "fast": max(free, key=lambda step: float(step["speed_m_s"]), default=None),
         "in time": max(in_time, key=lambda step: float(step["speed_m_s"]), default=None),
     }
     return {
@@ -260,6 +290,12 @@ def main(argv: list[str] | None = None) -> None:
     begins = [finder.content["searches"][f"free {seed}"]["steps"][0] for seed in range(args.restarts)]
     best = max(begins, key=lambda one: float(one["return"]))
     finder.family("in time", 0.0, np.array(best["gait"]))
+    found = shipped(finder.content["searches"])
+    reference = found["reference"]
+    each = zip(reference["gaits"], reference["speeds"], strict=True)
+    reference["trunk"] = [trunk_series(gait, speed) for gait, speed in each]
+    runs.write_text(args.shipped, json.dumps(found, indent=1) + "\n")
+    print(f"written: {args.shipped}")
 
 
 if __name__ == "__main__":

@@ -23,7 +23,7 @@ from numba import carray  # type: ignore[attr-defined]
 from hoof_env.dynamics.form import Form, form_of
 from hoof_env.dynamics.hoof import law_of, level_ground, remember_contacts
 from hoof_env.dynamics.layout import PLAIN, Features
-from hoof_env.dynamics.limits import clear_limits, heed_joints, heed_trunk
+from hoof_env.dynamics.limits import LOOK, clear_limits, heed_joints, heed_trunk
 from hoof_env.dynamics.mechanics import evaluate, keep_still, settle
 from hoof_env.dynamics.observables import count_stride, keep_account, report_leg, report_trunk
 from hoof_env.dynamics.parts import FIXED, Result
@@ -163,6 +163,8 @@ def run_steps(  # type: ignore[no-untyped-def]
     for turn in range(steps * model.stages + 1):
         evaluate(trunk, legs, leg_count, model, elapsed)
         if stage == 0:
+            left = steps * model.stages - turn
+            looks = turn > 0 and left % (LOOK * model.stages) == 0
             for i in range(leg_count):
                 leg = nth(legs, i)
                 remember_contacts(leg)
@@ -170,9 +172,9 @@ def run_steps(  # type: ignore[no-untyped-def]
                     count_stride(trunk, leg, model.form, h)
                 if reacts and (turn > 0 or steps == 0):
                     react(trunk, leg, nth(constants, i), nth(reactions, i))
-                if model.form.animal and turn > 0:
+                if model.form.animal and looks:
                     heed_joints(trunk, leg, nth(constants, i), model)
-            if model.form.animal and turn > 0:
+            if model.form.animal and looks:
                 heed_trunk(trunk, model)
         if turn < steps * model.stages:
             weight = model.weights[stage]

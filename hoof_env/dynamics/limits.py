@@ -1,7 +1,7 @@
 """Whether a motion goes on where it should end: pitch and height of the trunk, joints near the ground.
 
-What is checked after every whole step is kept until the call of the engine ends, so that a joint that dips
-between two looks is not missed. Beyond a limit the motion goes on, and its state is as good as any other.
+What is checked after every `LOOK` whole steps, and after the last, is kept until the call of the engine ends,
+so that a joint that dips between two calls is not missed. Beyond a limit the motion goes on, and its state is as good as any other.
 """
 
 from __future__ import annotations
@@ -10,6 +10,9 @@ from hoof_env.dynamics.parts import Result
 from hoof_env.ground.terrain import surface
 from hoof_env.simd import choose, lane_sum, level, plane, root, smaller
 from hoof_env.simd.compile import inlined
+
+LOOK = 5
+"""Whole steps from one look to the next: where the joints are costs a sixth of a step."""
 
 PITCH, HEIGHT, LOW_JOINT = float(Result.PITCH), float(Result.HEIGHT), float(Result.LOW_JOINT)
 

@@ -32,6 +32,7 @@ from hoof_env.envs.reference import (
     gait_numbers,
     horse_gaits,
     reference_gaits,
+    trunk_motion,
 )
 from hoof_env.envs.start import (
     FLAT,
@@ -42,7 +43,7 @@ from hoof_env.envs.start import (
     hoof_height,
     with_parameters,
 )
-from hoof_env.envs.tasks import Settings
+from hoof_env.envs.tasks import TASKS, Settings
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait import QUICK, WIDEST, FilterSettings
 from hoof_env.ground.contact import Ground
@@ -56,6 +57,9 @@ HIPS = {"fore": 1.0, "hind": -0.2}  # crank centres, forward from the trunk's ce
 PITCH, HEIGHT, CLEARANCE = 0.5, (0.75, 1.8), 0.02
 """Where it has fallen: +-pitch [rad], heights of the trunk [m], of a joint over the ground [m]."""
 GAP = 0.005  # between the lowest rigid hoof and the ground at a start [m]
+SAG = MASS * GRAVITY / (4 * TASKS["horse"].defaults["hoof_stiffness"])  # of two legs that bear the weight [m]
+UNKNOWN: dict[str, Any] = {"vx": 1.0, "vy": 0.0, "pitch": 0.0, "pitch_rate": 0.0}
+"""How a trunk starts in a gait that is not a reference gait."""
 
 SPANS = (1.0, 0.2, 0.2, 0.2)
 """What an action of 1 changes: of the crank's speed [-], of the swing's offset, sine and cosine [rad]."""
@@ -69,7 +73,7 @@ OPTIONS = {
 """Numeric reset options and their ranges [strides, m/s, rad, m, m/s]; "gait" and "parameters" are the
 others."""
 
-SPEED_SPREAD, PITCH_SPREAD, PHASE_SPREAD = 0.2, 0.03, 0.05
+SPEED_SPREAD, PITCH_SPREAD, PHASE_SPREAD = 0.1, 0.03, 0.03
 """How far starts are from the gait: of the commanded speed [-], pitch [rad], each crank [strides]."""
 
 
@@ -101,9 +105,8 @@ class Horse:
         self.harmonics = int(check_number("harmonics", s.harmonics or 2, low=1, high=2))
         self.filters = FILTERS[check_choice("filters", s.filters or "quick", FILTERS)]
         self.lowest, self.highest = (self.size * height for height in HEIGHT)
-        self._gap = GAP * self.size
-        if s.hoof_stiffness is not None:  # the springs of two legs bear the weight
-            self._gap = -MASS * GRAVITY / (4 * s.hoof_stiffness) * self.size
+        own, stored = s.hoof_stiffness, TASKS["horse"].defaults["hoof_stiffness"]
+        self._softness = 0.0 if own is None else stored / own
         self.limits = Limits((-PITCH, PITCH), (self.lowest, self.highest), CLEARANCE * self.size)
 
     def parts(self, s: Settings) -> tuple[Trunk, Ground, tuple[Limb, ...]]:
@@ -159,7 +162,7 @@ class Horse:
         self, options: Mapping[str, Any], generators: Sequence[np.random.Generator], engine: TrunkEngine
     ) -> Start:
         """Starts of episodes, one for each generator, but for what the options fix: in the stride of the gait
-        that `settle` takes, each crank, speed and pitch a little off, the hoofs just above the ground."""
+        that `settle` takes, each crank, speed and pitch a little off."""
         n = len(generators)
         drawn = np.array([generator.random(3 + COUNT) for generator in generators])
         off = 2 * drawn - 1
@@ -175,13 +178,18 @@ class Horse:
         return Start(begun, np.empty(0), commands, theta, {}, action)
 
     def settle(self, start: Start, targets: Floats, options: Mapping[str, Any], engine: TrunkEngine) -> None:
-        """Complete starts with the gaits of the commanded speeds [m/s]."""
+        """Complete starts with the gaits of the commanded speeds [m/s]. In a reference gait the trunk moves
+        as it does in that; in others it is as low as the springs of two legs give under the weight."""
         begun, own = start.begun, options.get("gait")
-        if "speed" not in options:
-            begun["speed"] = begun["speed"] * targets
         start.gaits = self.reference(targets, own)
         start.theta[:] = crank_angles(start.gaits, begun["phase"], start.theta)
         start.commands[:] = commands_of(start.gaits, start.theta, start.commands.shape[1])
+        is_known = own is None and self.gait is None
+        motion = trunk_motion(targets / math.sqrt(self.size), begun["phase"]) if is_known else UNKNOWN
+        if "speed" not in options:
+            begun["speed"] = begun["speed"] * targets * motion["vx"]
+        if "pitch" not in options:
+            begun["pitch"] = begun["pitch"] + motion["pitch"]
         hoof = np.min([
             np.sin(begun["pitch"]) * limb.hip[0]
             + hoof_height(profile, command.T, angle, begun["pitch"] * self.geometry.travel)
@@ -189,10 +197,14 @@ class Horse:
                 engine.limbs, engine.profiles, start.commands, start.theta, strict=True
             )
         ], axis=0)  # fmt: skip
-        ground = highest(engine.terrain, begun["x"], 2 * self.height)
+        # of the lowest hoof over the ground; below it is what the springs have given
+        lift = hoof + self.height * motion["y"] if is_known else np.full(len(hoof), -SAG * self.size)
+        lift = np.where(lift < 0, self._softness * lift, lift) + (0 if self._softness else GAP * self.size)
+        ground, rate = highest(engine.terrain, begun["x"], 2 * self.height), start.gaits[:, 0]
         start.trunk = {
-            "x": begun["x"], "y": ground - hoof + self._gap, "vx": begun["speed"],
-            "pitch": begun["pitch"],
+            "x": begun["x"], "y": ground - hoof + lift, "vx": begun["speed"],
+            "vy": self.height * rate * motion["vy"], "pitch": begun["pitch"],
+            "pitch_rate": rate * motion["pitch_rate"],
         }  # fmt: skip
 
     # Gaits

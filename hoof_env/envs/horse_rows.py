@@ -153,22 +153,22 @@ _ACTION = next(term for term in TERMS if term.name == "action")
 HORSE_TERMS = (
     Term("alive", 6.0, "1/s", "for every second", alive),
     Term(
-        "tracking", 10.0, "1/s", "for every second, 1 less the relative error of the speed, at least -1",
+        "tracking", 30.0, "1/s", "for every second, 1 less the relative error of the speed, at least -1",
         tracking,
     ),
     Term(
-        "peak", 0.35, "-",
+        "peak", 1.0, "-",
         "minus the increase of the legs' running peak GRF over the weight; each is the highest force of all"
         " substeps but at most twice the present one, so that it adds up to every stance's peak", peak,
     ),
-    Term("slip", 3.0, "1/m", "minus the way that hoofs slide in stance, to and fro", slip),
-    Term("landing", 0.3, "-", "minus the stances that begin: who taps the ground pays twice", landing),
+    Term("slip", 15.0, "1/m", "minus the way that hoofs slide in stance, to and fro", slip),
+    Term("landing", 1.0, "-", "minus the stances that begin: who taps the ground pays twice", landing),
     Term(
-        "work", 0.5, "1/s",
+        "work", 1.5, "1/s",
         "minus the positive work of all drives over the weight times the commanded distance", work,
     ),
-    Term("pitch", 4.0, "1/(s rad^2)", "minus the square of the trunk's pitch", pitch),
+    Term("pitch", 12.0, "1/(s rad^2)", "minus the square of the trunk's pitch", pitch),
     _ACTION,
-    Term("fall", 20.0, "-", "once, minus this, when the episode fails", fall),
+    Term("fall", 60.0, "-", "once, minus this, when the episode fails", fall),
 )  # fmt: skip
 """The terms of `Horse-v0`."""

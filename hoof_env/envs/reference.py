@@ -140,6 +140,21 @@ def reference_gaits(speeds: Floats) -> Floats:
     return np.transpose(found)
 
 
+def trunk_motion(speeds: Floats, phase: Floats) -> dict[str, Floats]:
+    """How the trunk of a horse of 475 kg moves at a phase of its stride [strides] where it keeps up the
+    reference gaits of some speeds [m/s], all of shape (n,): "y" over the height of the hips [-] and its rate
+    "vy" over the rate of the crank [1/rad], "vx" over the speed [-], "pitch" [rad] and "pitch_rate" over the
+    rate of the crank [-]. From simulation, in harmonics of half a stride, after which left is right."""
+    stored = _data()["reference"]
+    series = np.moveaxis(np.array(stored["trunk"]), 0, -1)  # of y, vx and pitch: mean, cosine and sine, ...
+    mixed = np.array([[np.interp(speeds, stored["speeds"], c) for c in one] for one in series])
+    order = 2 * np.arange(1, series.shape[1] // 2 + 1)[:, None]
+    cosine, sine = np.cos(2 * np.pi * order * phase), np.sin(2 * np.pi * order * phase)
+    value = mixed[:, 0] + (mixed[:, 1::2] * cosine + mixed[:, 2::2] * sine).sum(1)
+    slope = (order * (mixed[:, 2::2] * cosine - mixed[:, 1::2] * sine)).sum(1)
+    return {"y": value[0], "vy": slope[0], "vx": value[1], "pitch": value[2], "pitch_rate": slope[2]}
+
+
 # What the kernels read
 
 

@@ -355,6 +355,7 @@ TASKS: Mapping[str, Task] = MappingProxyType(
                 "exponent": 1.5,
                 "friction": 0.6,
                 "hoof_stiffness": 24000.0,
+                "integrator": "semi_implicit_euler",
                 "target_speed": (1.172, 3.706),
                 "target_seconds": (3.0, 5.0),
                 "observation": ("trunk", "target", "crank", "gait", "hoof", "action"),

@@ -75,12 +75,16 @@ def test_the_package_has_gaits_in_the_order_of_their_speeds():
 def test_the_file_is_gone_on_with(tmp_path, monkeypatch, capsys):
     out = tmp_path / "horse.json"
     monkeypatch.setattr(horse_gaits, "MOST", 1)
+    shipped = tmp_path / "gaits.json"
     arguments = ["--out", str(out), "--generations", "1", "--each", "1", "--restarts", "1"]
+    arguments += ["--shipped", str(shipped)]
     horse_gaits.main(arguments)
     first = json.loads(out.read_text())
     assert {"free 0", "free, faster", "free, slower", "in time 0"} <= set(first["searches"])
     written = capsys.readouterr().out
     horse_gaits.main(arguments)
-    assert capsys.readouterr().out == ""
+    assert capsys.readouterr().out == f"written: {shipped}\n"
     assert json.loads(out.read_text()) == first
+    reference = json.loads(shipped.read_text())["reference"]
+    assert len(reference["speeds"]) == len(reference["gaits"]) == len(reference["trunk"])
     assert written.count("\n") >= 4
