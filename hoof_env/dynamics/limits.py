@@ -1,7 +1,8 @@
 """Whether a motion goes on where it should end: pitch and height of the trunk, joints near the ground.
 
 What is checked after every `LOOK` whole steps, and after the last, is kept until the call of the engine ends,
-so that a joint that dips between two calls is not missed. Beyond a limit the motion goes on, and its state is as good as any other.
+so that a joint that dips between two calls is not missed. Beyond a limit the motion goes on, and its state is
+as good as any other.
 """
 
 from __future__ import annotations
