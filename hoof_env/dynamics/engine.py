@@ -79,6 +79,7 @@ class TrunkEngine(Scene):
         integrator: one of `stepping.SCHEMES`.
         substeps: parts of `sim_dt` that are integrated, contacts remembered after each; None chooses as many
             as ground, motors and support ask, up to `step_length.MOST_SUBSTEPS`.
+        step_error: of the state after a contact [-], for which that choice is made.
         num_envs: environments side by side, which share all of the above.
         num_threads: threads that share the environments; they change no bit.
         harmonics: of the swing law, 1 to `gait.MOST_HARMONICS`: gaits and commands have 2 + 2 harmonics
@@ -118,6 +119,7 @@ class TrunkEngine(Scene):
         sim_dt: float = 1e-3,
         integrator: str = "midpoint",
         substeps: int | None = None,
+        step_error: float = 0.01,
         num_envs: int = 1,
         num_threads: int = 1,
         harmonics: int = 1,
@@ -150,7 +152,11 @@ class TrunkEngine(Scene):
         self.sim_dt = check_number("sim_dt", sim_dt, low=1e-7, high=self.filters.longest_step)
         self.num_envs, self.num_threads = count("num_envs", num_envs), check_threads(num_threads)
         self.profiles = [leg_profile(limb.geometry) for limb in self.limbs]
-        length = StepLength(self.limbs, self.profiles, self.trunk, self.ground, self.terrain, self.integrator)
+        self.step_error = check_number("step_error", step_error, low=0, high=1, exclusive_low=True)
+        length = StepLength(
+            self.limbs, self.profiles, self.trunk, self.ground, self.terrain, self.integrator,
+            step_error=self.step_error,
+        )  # fmt: skip
         self.step_limits = length.limits
         asked = None if substeps is None else count("substeps", substeps, most=MOST_STEPS)
         self.substeps = length.choose(self.sim_dt, asked)
@@ -240,9 +246,9 @@ class TrunkEngine(Scene):
         """An engine like this one, for one environment."""
         return TrunkEngine(
             self.limbs, self.trunk, self.ground, self.terrain, sim_dt=self.sim_dt, integrator=self.integrator,
-            substeps=self.substeps, harmonics=self.features.harmonics, filters=self.filters,
-            reactions=self.reacts, strides=self.counts_strides, limits=self.motion_limits,
-            contact_law=self.contact_law,
+            substeps=self.substeps, step_error=self.step_error, harmonics=self.features.harmonics,
+            filters=self.filters, reactions=self.reacts, strides=self.counts_strides,
+            limits=self.motion_limits, contact_law=self.contact_law,
         )  # fmt: skip
 
     # State

@@ -248,6 +248,7 @@ class Scene:
     integrator: str
     features: Any = None  # `layout.Features`, of an engine
     motion_limits: Limits | None = None
+    step_error: float = 0.01  # of the state after a contact, with which steps are chosen [-]
 
 
 class Reactions(NamedTuple):

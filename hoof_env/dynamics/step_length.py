@@ -118,7 +118,7 @@ class StepLength(Scene):
             for speed in {FAST, ground.approach_floor}:
                 mass, sliding_mass = min(sinks, whole), min(slides, whole)
                 rates = contact_rates(ground, mass, load, speed, sliding_mass, self.terrain)
-                for name, longest in rates.longest_steps(self.integrator).items():
+                for name, longest in rates.longest_steps(self.integrator, self.step_error).items():
                     if np.isfinite(slides if name == "friction" else sinks):
                         limits[name] = min(limits[name], longest)
         return limits
@@ -137,7 +137,7 @@ class StepLength(Scene):
             rates, sole = spring_rates(ground, vertical, sinks, load, speed, self.terrain)
             found.append(rates)
             soles.append(sole)
-        steps = [rates.longest_steps(self.integrator) for rates in found]
+        steps = [rates.longest_steps(self.integrator, self.step_error) for rates in found]
         limits = {name: min(step[name] for step in steps) for name in ("elastic", "damping")}
         return limits | {"hoof": SCHEMES[self.integrator].decay / max(soles)}
 

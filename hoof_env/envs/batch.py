@@ -121,7 +121,8 @@ class EpisodeBatch:
             limbs, trunk, ground, self._terrain, substeps=substeps,
             sim_dt=s.sim_dt, integrator="midpoint" if is_paper else s.integrator,
             num_envs=num_envs, num_threads=num_threads, strides=True, contact_law=task.contact_law,
-            harmonics=self.body.harmonics, filters=self.body.filters, limits=self.body.limits,
+            step_error=self.body.step_error, harmonics=self.body.harmonics, filters=self.body.filters,
+            limits=self.body.limits,
         )  # fmt: skip
         self.paper = PaperSolver(s, self.engine, self.substeps) if is_paper else None
         self._varied = np.zeros(num_envs, bool)
@@ -261,7 +262,9 @@ class EpisodeBatch:
         s: Any = replace(self.settings, **dict(changes))  # type: ignore[arg-type]
         trunk, ground, limbs = self.body.parts(s)
         profiles = [leg_profile(limb.geometry) for limb in limbs]
-        length = StepLength(limbs, profiles, trunk, ground, self._terrain, s.integrator)
+        length = StepLength(
+            limbs, profiles, trunk, ground, self._terrain, s.integrator, step_error=self.body.step_error
+        )
         return length.choose(s.sim_dt, asked, stacklevel=5)
 
     def reset(

@@ -28,6 +28,7 @@ class OneLeg:
 
     legs, actions, harmonics, filters, limits = 1, len(PARAMETERS), 1, None, None
     hips: Mapping[str, tuple[float, float]] = MappingProxyType({})
+    step_error = 0.01
     start_names, gait_names = ("crank_angle", "speed", "height", "x"), PARAMETERS
 
     def __init__(self, settings: Settings) -> None:
