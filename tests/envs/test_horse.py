@@ -157,6 +157,28 @@ def test_no_start_is_a_fall(speed):
 
 
 @pytest.mark.parametrize("speed", SPEEDS)
+def test_peaks_hang_on_the_hoof_and_not_on_how_hard_the_ground_is(speed):
+    """The same commands on ground five times as stiff: stance peaks within 15 %."""
+    peaks = []
+    for stiffness in (2e6, 1e7):
+        _, summaries = played(lambda seen, time: np.zeros(16), target_speed=speed, stiffness=stiffness)
+        total, stances = (sum(one[name] for one in summaries) for name in ("stance_peak_sum_n", "stances"))
+        peaks.append(total / stances)
+    assert peaks[1] == pytest.approx(peaks[0], rel=0.15)
+
+
+@pytest.mark.parametrize("speed", SPEEDS)
+def test_semi_implicit_euler_is_exact_enough(speed):
+    """The reference gait in a fifth of the step by a scheme of second order: speed, peak and duty factor."""
+    found = []
+    for settings in ({}, {"integrator": "midpoint", "sim_dt": 2e-4}):
+        _, summaries = played(lambda seen, time: np.zeros(16), target_speed=speed, **settings)
+        peak = np.mean([one["stance_peak_sum_n"] / one["stances"] for one in summaries])
+        found.append([peak, *(np.mean([one[k] for one in summaries]) for k in ("speed_m_s", "duty_factor"))])
+    np.testing.assert_allclose(found[0], found[1], rtol=0.02)
+
+
+@pytest.mark.parametrize("speed", SPEEDS)
 def test_zeros_travel_and_stay_upright(speed):
     _totals, summaries = played(lambda seen, time: np.zeros(16), target_speed=speed)
     assert not any(one["failed"] for one in summaries)
