@@ -153,7 +153,7 @@ _ACTION = next(term for term in TERMS if term.name == "action")
 HORSE_TERMS = (
     Term("alive", 6.0, "1/s", "for every second", alive),
     Term(
-        "tracking", 30.0, "1/s", "for every second, 1 less the relative error of the speed, at least -1",
+        "tracking", 50.0, "1/s", "for every second, 1 less the relative error of the speed, at least -1",
         tracking,
     ),
     Term(
@@ -161,7 +161,7 @@ HORSE_TERMS = (
         "minus the increase of the legs' running peak GRF over the weight; each is the highest force of all"
         " substeps but at most twice the present one, so that it adds up to every stance's peak", peak,
     ),
-    Term("slip", 15.0, "1/m", "minus the way that hoofs slide in stance, to and fro", slip),
+    Term("slip", 40.0, "1/m", "minus the way that hoofs slide in stance, to and fro", slip),
     Term("landing", 1.0, "-", "minus the stances that begin: who taps the ground pays twice", landing),
     Term(
         "work", 1.5, "1/s",
