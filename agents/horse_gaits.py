@@ -240,14 +240,15 @@ def trunk_series(gait: list[float], speed: float) -> list[list[float]]:
     envs, numbers = course.envs, np.array(gait)
     body, stride = envs.unwrapped.batch.body, Stride(*numbers[-len(LIMITS) :][:2])
     envs.reset(seed=1, options={"gait": numbers})
-    rows, upright = [], np.ones(envs.num_envs, bool)
+    rows: list[list[Floats]] = []
+    upright = np.ones(envs.num_envs, bool)
     for k in range(course.steps - 1):
         _, _, terminated, _, infos = envs.step(np.zeros((envs.num_envs, 16), np.float32))
         upright &= ~terminated
         if k >= course.steps // 2:
             m = infos["measured"]
             rows.append([m[name].copy() for name in ("left_hind_theta", "y", "vx", "pitch")])
-    theta, y, vx, pitch = np.moveaxis(rows, 1, 0)[..., upright].reshape(4, -1)
+    theta, y, vx, pitch = np.moveaxis(np.array(rows), 1, 0)[..., upright].reshape(4, -1)
     one, zero = np.ones(1), np.zeros(1)
     begin, now = stride.phase(one, zero), stride.phase(np.cos(theta), np.sin(theta))
     phase = np.arctan2(now[1], now[0]) - np.arctan2(begin[1], begin[0])

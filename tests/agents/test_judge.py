@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from agents import judge
-from agents.judge import Stance, lag_of, stances_of
+from agents.gait_figures import Stance, lag_of, stances_of
 from hoof_env.errors import HoofEnvError, ParameterError
 
 TIME = np.arange(0.0, 6.0, 1e-3)
@@ -78,6 +78,18 @@ def test_a_horse_meets_the_judges_and_what_slips_does_not_count():
     assert verdict["walk: peak_fore"] == "met"
     assert judge.verdicts([figures(peak_fore=9.0)])[4][5] == "missed"
     assert judge.verdicts([{"speed": 1.0, "froude": 0.1, "fell": 1.0}]) == []
+
+
+def test_of_all_policies_there_are_means_and_intervals():
+    base = dict.fromkeys(judge.SHOWN, 0.5)
+    base |= {"slip_fore": 0.01, "slip_hind": 0.01, "stances_per_turn_fore": 1.0, "stances_per_turn_hind": 1.0}
+    each = [[figures(**{**base, "lag": lag, "duty_fore": duty})] for lag, duty in ((0.01, 0.6), (0.49, 0.64))]
+    (one,) = judge.of_all([*each, [{"speed": 1.85, "froude": 0.25, "fell": 1.0}]])
+    assert min(one["lag"], 0.5 - one["lag"]) < 1e-9  # between just before and just after, not a quarter
+    assert one["duty_fore"] == pytest.approx(0.62)
+    assert one["fell"] == pytest.approx((0.5 + 0.5 + 1.0) / 3)
+    assert one["counts"] == {"fore": True, "hind": True}
+    assert "0.620 [" in judge.table_of("all", [one])
 
 
 def test_the_command_writes_figures_a_table_and_pictures(tmp_path, capsys):
