@@ -19,7 +19,7 @@ help:
 	@echo 'make test-peers  the engine against MuJoCo and Exudyn, which it installs'
 	@echo 'make test-ecosystem  every RL library on every id, in environments under .ecosystem/: 6 GB, some minutes'
 	@echo 'make bench       how fast engine and environments are beside MuJoCo, Exudyn and EnvPool'
-	@echo 'make baselines   the agents of docs/baselines.md, hours; ARGS="--subset nightly": a small part, minutes'
+	@echo 'make baselines   the agents of docs/evidence/baselines.md, hours; ARGS="--subset nightly": a small part, minutes'
 	@echo 'make lint        lint and types alone'
 	@echo 'make setup       make .venv with all that the commands of the README need, and nothing more'
 	@echo 'make clean       remove .venv and the caches; runs/ stays'
