@@ -5,7 +5,7 @@
 #   TORCH_INDEX=URL     where Linux takes PyTorch from; empty for pip's own index, which has the CUDA build
 
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-demo demo test kernels test-slow test-peers test-ecosystem bench baselines lint clean
+.PHONY: help setup setup-demo demo test kernels test-slow test-peers test-oldest test-ecosystem bench baselines lint clean
 
 PY := .venv/bin/python
 PYTHONS := $(or $(PYTHON),$(PY) python3 python3.13 python3.12 python3.11)
@@ -17,6 +17,7 @@ help:
 	@echo 'make test        lint, types and tests'
 	@echo 'make test-slow   in full what make test samples'
 	@echo 'make test-peers  the engine against MuJoCo and Exudyn, which it installs'
+	@echo 'make test-oldest the wheel on the oldest dependencies that pyproject.toml names, some minutes'
 	@echo 'make test-ecosystem  every RL library on every id, in environments under .ecosystem/: 6 GB, some minutes'
 	@echo 'make bench       how fast engine and environments are beside MuJoCo, Exudyn and EnvPool'
 	@echo 'make baselines   the agents of docs/evidence/baselines.md, hours; ARGS="--subset nightly": a small part, minutes'
@@ -52,6 +53,12 @@ test-peers: setup
 	@echo 'pip install mujoco exudyn' && $(PY) -m pip install -q -c constraints.txt -e '.[peers]'
 	@echo 'pytest tests/peers' && $(PY) -m pytest -q $(LONG) -m '' tests/peers
 
+test-oldest: setup
+	@rm -rf .oldest && $(PY) -m hatchling build -t wheel -d .oldest/dist
+	@$(PY) -m uv venv -q -p $(PY) .oldest/venv
+	@VIRTUAL_ENV=.oldest/venv $(PY) -m uv pip install -q --resolution lowest-direct "$$(ls .oldest/dist/*.whl)[render,plot,export]"
+	@NUMBA_CACHE_DIR=.oldest/cache .oldest/venv/bin/python examples/smoke.py
+
 test-ecosystem: setup
 	@$(PY) -m tests.ecosystem.run $(ARGS)
 
@@ -71,5 +78,5 @@ lint: setup
 	@echo 'mypy' && $(PY) -m mypy
 
 clean:
-	@rm -rf .venv .ecosystem dist build .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	@rm -rf .venv .ecosystem .oldest dist build .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	@find . -name __pycache__ -type d -prune -exec rm -rf {} +
