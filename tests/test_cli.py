@@ -96,7 +96,7 @@ def test_a_reader_that_leaves_is_no_error():
 
 BAD_REQUESTS = {
     "export": [
-        (["--out", "{}/x.txt"], "expected a file that ends in .csv, .mot, .parquet"),
+        (["--out", "{}/x.txt"], "expected a file that ends in .c3d, .csv, .mot, .parquet, .sto"),
         (["--out", "{}/x.csv", "--policy", "gallop"], "policy: expected a name"),
         (["--out", "{}/x.csv", "--policy", "1,0.2,0.3,nan"], "swing_cos: expected"),
         (["--out", "{}/x.csv", "--policy", "99,0,0,0"], "crank_speed: expected"),
