@@ -110,6 +110,10 @@ BAD_REQUESTS = {
         (["--out", "{}/x.csv", "--seed", "-1"], "seed: expected"),
         (["--out", "{}"], "expected a file that ends in"),
         (["--out", "{}/taken/x.csv"], "cannot write to"),
+        (["--out", "{}/x.csv", "--threshold", "-1"], "threshold: expected"),
+        (["--out", "{}/x.csv", "--units", "lb"], "units: expected one of BW, N"),
+        (["--out", "{}/x.mot", "--units", "BW"], "units: expected N in .mot"),
+        (["--out", "{}/x.mot", "--bodies", "tail=x"], "bodies: expected leg=BODY"),
     ],
     "render": [
         (["--out", "{}/x.avi"], "expected a file that ends in .gif, .mp4"),

@@ -6,8 +6,8 @@ are shorter are closed, and stances that a record cuts off are left out.
 
 Three ways to align B with A. "none": the times of the files. "shift": one shift for all limbs. It is a
 difference of the touchdowns of one stance of A and one of B, the one under which the vertical forces of all
-limbs differ least (root mean square over at least half of the shorter record; of shifts within 1 % of the
-least, the shortest), then moved within two sampling intervals to the least difference. "stances": that shift
+limbs differ least (root mean square over at least half of the shorter record; of shifts within 10 % of the
+least, the shortest, as strides repeat), then moved within two sampling intervals to the least difference. "stances": that shift
 tells which stances belong together, and then each pair is laid touchdown on touchdown. The pairs of a limb
 begin with the two whose touchdowns are nearest under the shift, and go on from there in order, so that
 records of different stride times can be compared.
@@ -33,7 +33,7 @@ Floats = NDArray[np.float64]
 SHORTEST = 0.02  # stances and gaps that count [s]
 ALIGNMENTS = ("stances", "shift", "none")
 ONE_PERCENT = 0.01  # threshold in body weights of an animal whose weight is not known
-NEAR = 1.01  # of the least difference, within which the shortest shift is taken
+NEAR = 1.1  # of the least difference, within which the shortest shift is taken
 MOST_SHIFTS = 400  # of touchdowns that are tried
 
 
@@ -163,7 +163,8 @@ def _common_unit(a: ForceRecord, b: ForceRecord, units: str) -> tuple[str, tuple
         by_a, by_b = a.per(unit), b.per(unit)
         if by_a and by_b:
             return unit, (by_a, by_b)
-    lacking = next(name for name, record in (("a", a), ("b", b)) if not record.weight)
+    wanted = "N" if units == "auto" else units
+    lacking = next(name for name, record in (("a", a), ("b", b)) if not record.per(wanted))
     raise ParameterError(
         f"mass-{lacking}: expected the mass [kg] of the animal of {a.name if lacking == 'a' else b.name}, to "
         f"compare {a.unit} with {b.unit}{'' if units == 'auto' else f' in {units}'}"
@@ -231,7 +232,8 @@ def _shift(
 
     found = {lag: difference(lag) for lag in lags}
     best = next(lag for lag in lags if found[lag] <= NEAR * min(found.values()))
-    return min(range(best - near, best + near + 1), key=difference) / rate
+    around = sorted(range(best - near, best + near + 1), key=lambda lag: abs(lag - best))
+    return min(around, key=difference) / rate  # the first of equals
 
 
 class _Side(NamedTuple):

@@ -20,7 +20,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.parts import GRAVITY
-from hoof_env.errors import DataFileError, HoofEnvError, MissingExtraError, ParameterError, check_choice
+from hoof_env.errors import (
+    DataFileError,
+    HoofEnvError,
+    MissingExtraError,
+    ParameterError,
+    check_choice,
+    check_number,
+)
 from hoof_env.lab.c3d import read_c3d
 from hoof_env.lab.forces import limb_name
 
@@ -111,6 +118,9 @@ def read_record(
     """
     check_choice("reverse", reverse, REVERSED)
     check_choice("units", unit, ("auto", *FORCE_UNITS))
+    for name, number in (("rate", rate), ("mass", mass)):
+        if number is not None:
+            check_number(name, number, low=0.0, exclusive_low=True)
     table, given = _load(path), dict(mapping or {})
     limbs, time = _named(path, table, given)
     forces = {limb: [_column(path, table, name) for name in pair] for limb, pair in limbs.items()}
