@@ -7,10 +7,10 @@ are shorter are closed, and stances that a record cuts off are left out.
 Three ways to align B with A. "none": the times of the files. "shift": one shift for all limbs. It is a
 difference of the touchdowns of one stance of A and one of B, the one under which the vertical forces of all
 limbs differ least (root mean square over at least half of the shorter record; of shifts within 10 % of the
-least, the shortest, as strides repeat), then moved within two sampling intervals to the least difference. "stances": that shift
-tells which stances belong together, and then each pair is laid touchdown on touchdown. The pairs of a limb
-begin with the two whose touchdowns are nearest under the shift, and go on from there in order, so that
-records of different stride times can be compared.
+least, the shortest, as strides repeat), then moved within two sampling intervals to the least difference.
+"stances": that shift tells which stances belong together, and then each pair is laid touchdown on touchdown.
+The pairs of a limb begin with the two whose touchdowns are nearest under the shift, and go on from there in
+order, so that records of different stride times can be compared.
 """
 
 from __future__ import annotations
