@@ -7,7 +7,7 @@ from xml.etree import ElementTree as xml
 import numpy as np
 import pytest
 
-from hoof_env import records
+from hoof_env import cli, records
 from hoof_env.envs.reference import LEGS
 from hoof_env.errors import ParameterError
 from hoof_env.lab.opensim import MOT_COLUMNS, check_bodies, loads_path
@@ -109,3 +109,16 @@ def test_a_leg_has_plain_names(of_leg, tmp_path):
 def test_bodies_are_of_limbs(bodies):
     with pytest.raises(ParameterError, match="bodies: expected leg=BODY"):
         check_bodies(bodies, [""])
+
+
+def test_loads_that_are_there_are_not_replaced_unasked(tmp_path, capsys):
+    mine = tmp_path / "run_loads.xml"
+    mine.write_text("mine", encoding="utf-8")
+    command = ["export", "--out", str(tmp_path / "run.mot"), "--seconds", "0.1"]
+    assert cli.main(command) == 2
+    assert "run_loads.xml' exists already" in capsys.readouterr().err
+    assert [file.name for file in tmp_path.iterdir()] == ["run_loads.xml"]
+    assert cli.main([*command, "--overwrite", "--bodies", "leg=LF", "--threshold", "50", "--reactions"]) == 0
+    assert "<applied_to_body>LF<" in mine.read_text(encoding="utf-8")
+    assert "joint_G_11_10_x" in (tmp_path / "run.mot").read_text(encoding="utf-8")
+    assert "1 BW = 565.0 N" in capsys.readouterr().out
