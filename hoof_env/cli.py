@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from hoof_env._version import __version__
-from hoof_env.errors import HoofEnvError
+from hoof_env.errors import HoofEnvError, parse_pairs
 
 
 def reproduce(out: Path, figures: bool = True, preset: str | None = None) -> None:
@@ -103,26 +103,93 @@ def export(
     args: tuple[str, ...] = (),
     seed: int = 0,
     seconds: float | None = None,
+    threshold: float = 20.0,
+    units: str = "N",
+    reactions: bool = False,
+    bodies: tuple[str, ...] = (),
     overwrite: bool = False,
 ) -> None:
-    """Write the ground reaction force of an episode at every substep, with its point of application.
+    """Write the ground reaction force of each limb at every substep, with its centre of pressure.
 
     Args:
-        out: the file; ends in .csv, .parquet (needs 'export') or .mot, OpenSim's. Its folder is made if need
-            be.
+        out: the file; ends in .csv, .parquet (needs 'export'), .c3d (needs 'lab'), or OpenSim's .mot or .sto,
+            which has its ExternalLoads beside it, as run_loads.xml. Its folder is made if need be.
         policy: as in `hoof-env render`.
         id: the environment.
         args: its arguments: key=value ..., or one JSON object.
         seed: of the episode and of "random".
         seconds: of the episode at most; its own end otherwise.
-        overwrite: replace the file if there is one.
+        threshold: vertical force below which a limb counts as unloaded, as on a force plate [N].
+        units: of forces: N, or BW for body weights (.csv and .parquet).
+        reactions: add the forces in the joints of each leg (not in .c3d).
+        bodies: bodies of your OpenSim model that carry the forces: leg=BODY, or left_fore=BODY ...
+        overwrite: replace the files if there are some.
     """
     from hoof_env._output import check_new
-    from hoof_env.records import export_episode
+    from hoof_env.records import export_episode, files_of
+
+    made, *_ = [check_new(file, overwrite) for file in files_of(out)]
+    rows, weight = export_episode(out, policy, id, args, seed, seconds, threshold, units, reactions, bodies)
+    beside = "".join(f", with {file.name}" for file in files_of(out)[1:])
+    _say(f"{out}: {rows} rows, 1 BW = {weight:.1f} N, {_size(out)}{beside}{made}")
+
+
+def compare(
+    a: Path,
+    b: Path,
+    /,
+    out: Path = Path("compare.png"),
+    map_a: tuple[str, ...] = (),
+    map_b: tuple[str, ...] = (),
+    units_a: str = "auto",
+    units_b: str = "auto",
+    reverse_a: str = "auto",
+    reverse_b: str = "auto",
+    rate_a: float | None = None,
+    rate_b: float | None = None,
+    mass_a: float | None = None,
+    mass_b: float | None = None,
+    align: str = "stances",
+    threshold: float = 20.0,
+    units: str = "auto",
+    overwrite: bool = False,
+) -> None:
+    """Compare the ground reaction forces of two records, simulated or measured, limb by limb (needs 'lab').
+
+    Args:
+        a: a record that counts as right: .csv, .txt, .tsv, .parquet (needs 'export'), .mot, .sto or .c3d.
+        b: the one whose errors are told.
+        out: the picture; ends in .png, .pdf or .svg.
+        map_a: columns of A where they have other names than ours: time=Seconds force_x=-Fx force_y=Fz, or
+            left_fore_force_y=LF_Fz ...; a - turns a column round. left_fore=plate_1 renames a limb.
+        map_b: columns of B.
+        units_a: unit of A's forces: N, kN, N/kg, BW or %BW; auto takes what the file says.
+        units_b: unit of B's forces.
+        reverse_a: components of A that point the other way: none, x, y or xy; auto turns both if the vertical
+            force points into the ground.
+        reverse_b: components of B that do.
+        rate_a: samples a second of A, if it has no time.
+        rate_b: samples a second of B.
+        mass_a: of A's animal [kg], for body weights, if the file does not say it.
+        mass_b: of B's animal [kg].
+        align: stances lays each pair touchdown on touchdown, shift shifts B as a whole, none takes the times
+            of the files.
+        threshold: vertical force that makes a stance [N].
+        units: of the errors: N or BW; auto is N where both records can be in N.
+        overwrite: replace the picture if there is one.
+    """
+    from hoof_env._output import check_new
+    from hoof_env.lab.compare import compare
+    from hoof_env.lab.picture import check_picture, draw, report
+    from hoof_env.lab.read import read_record
 
     made = check_new(out, overwrite)
-    rows = export_episode(out, policy, id, args, seed, seconds)
-    _say(f"{out}: {rows} rows, {_size(out)}{made}")
+    check_picture(out)
+    first = read_record(a, parse_pairs("--map-a", map_a), units_a, reverse_a, rate_a, mass_a)
+    second = read_record(b, parse_pairs("--map-b", map_b), units_b, reverse_b, rate_b, mass_b)
+    found = compare(first, second, align, threshold, units)
+    draw(found, out)
+    _say(f"{report(found)}\n\n{out}: {_size(out)}{made}")
 
 
 def manual(id: str = "hoof_env/HorseLeg-v0", out: Path | None = None) -> None:
@@ -152,7 +219,7 @@ def compile() -> None:
 
 
 COMMANDS: dict[str, Callable[..., None]] = {
-    command.__name__: command for command in (reproduce, render, play, export, manual, compile)
+    command.__name__: command for command in (reproduce, render, play, export, compare, manual, compile)
 }
 
 

@@ -1,8 +1,8 @@
 """Episodes of any policy on any environment of the package, substep by substep: for pictures, and for files.
 
 `setting` and `substeps` are all that is read from behind an environment; the rest is written against them.
-The files are CSV, Parquet and OpenSim's .mot; `write` chooses by the suffix. In swing, force and centre of
-pressure are 0 in all of them, as force plates and gait-lab tools have it.
+The files are CSV, Parquet, OpenSim's .mot and .sto, and .c3d; `write` chooses by the suffix. Frame, signs and
+centre of pressure are those of `hoof_env.lab`.
 """
 
 from __future__ import annotations
@@ -21,10 +21,14 @@ import hoof_env
 from hoof_env._output import check_folder, staged
 from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.envs.policies import Scripted, load_open_loop, make_policy, policy_names
-from hoof_env.envs.reference import LEGS
-from hoof_env.errors import HoofEnvError, OutputError, ParameterError, check_number, parse_pairs
+from hoof_env.errors import HoofEnvError, OutputError, ParameterError, check_choice, check_number, parse_pairs
 from hoof_env.gait import PARAMETERS, GaitParameters
 from hoof_env.ground.terrain import Terrain
+from hoof_env.lab.c3d import ezc3d, write_c3d
+from hoof_env.lab.forces import THRESHOLD, above_threshold, in_units, limbs_of, onto_surface
+from hoof_env.lab.forces import UNITS as FORCE_UNITS
+from hoof_env.lab.opensim import check_bodies, loads_path, write_mot
+from hoof_env.lab.reactions import REACTION_UNITS, JointReactions
 from hoof_env.render.instant import (
     OF_TRUNK,
     UNITS,
@@ -132,11 +136,12 @@ def episode(
     seed: int = 0,
     seconds: float | None = None,
     options: Mapping[str, Any] | None = None,
+    joints: JointReactions | None = None,
 ) -> Iterator[Columns]:
     """Play an episode; yields the columns of its start (one row) and of every control step.
 
     `policy` is anything with Stable-Baselines3's `predict`; `seed` and `options` are those of `reset`. It
-    stops after some `seconds`, or at its own end.
+    stops after some `seconds`, or at its own end. With `joints` the columns have their reactions, too.
     """
     if seconds is not None:
         check_number("seconds", seconds, low=0, exclusive_low=True)
@@ -144,16 +149,29 @@ def episode(
     observation, info = env.reset(seed=seed, options=dict(options or {}))
     gait, of_horse = info.get("gait"), bool(setting(env).hips)
     here = substeps(env, np.array([gait[name] for name in PARAMETERS]) if gait and not of_horse else None)
-    yield here
+    yield here | (_named(env, joints.now()) if joints else {})
     start, ended = np.ones(1, bool), False
     while not ended and (seconds is None or here["time"][-1] < seconds - 1e-9):
         action, _ = policy.predict(observation, episode_start=start, deterministic=True)
+        began = joints.before() if joints else None
         observation, _, failed, truncated, _ = env.step(action)
         start, ended = np.zeros(1, bool), failed or truncated
         before = here["time"][-1]
         here = substeps(env, None if of_horse else leg.command_of(np.asarray(action, np.float32)))
         if here["time"][-1] > before:  # else the simulation failed and nothing happened
+            if joints and began is not None:
+                here |= _named(env, joints.after(began, len(here["time"])))
             yield here
+
+
+def _named(env: gym.Env[Any, Any], reactions: NDArray[np.float64]) -> Columns:
+    """Reactions of shape (n, legs, columns) by name."""
+    limbs = [f"{leg}_" for leg in setting(env).hips] or [""]
+    return {
+        f"{limb}{name}": reactions[:, i, k]
+        for i, limb in enumerate(limbs)
+        for k, name in enumerate(REACTION_UNITS)
+    }
 
 
 def record_episode(
@@ -162,23 +180,27 @@ def record_episode(
     seed: int = 0,
     seconds: float | None = None,
     options: Mapping[str, Any] | None = None,
+    reactions: bool = False,
 ) -> Columns:
     """The record of an episode at every substep: arrays of shape (n,), names and units as `units_of` says.
-    Arguments and errors are those of `episode`."""
-    parts, units = list(episode(env, policy, seed, seconds, options)), units_of(env)
+    Arguments and errors are those of `episode`; `reactions` adds the forces in the joints, see
+    `lab.reactions`."""
+    joints = JointReactions(env) if reactions else None
+    parts, units = list(episode(env, policy, seed, seconds, options, joints)), units_of(env, reactions)
     moments = [name for name in units if name.endswith("free_moment")]
     record = {name: np.concatenate([part[name] for part in parts]) for name in units if name in parts[0]}
-    return record | {name: np.zeros(len(record["time"])) for name in moments}
+    record |= {name: np.zeros(len(record["time"])) for name in moments}
+    return onto_surface(record, setting(env).terrain)
 
 
-def units_of(env: gym.Env[Any, Any]) -> dict[str, str]:
-    """Columns of a record and their units: `RECORD`; of a horse those of the trunk, and each leg's under its
-    name, `left_fore_force_y`."""
-    hips = setting(env).hips
+def units_of(env: gym.Env[Any, Any], reactions: bool = False) -> dict[str, str]:
+    """Columns of a record and their units: `RECORD`, with `reactions` also `REACTION_UNITS`; of a horse those
+    of the trunk, and each leg's under its name, `left_fore_force_y`."""
+    hips, of_leg = setting(env).hips, RECORD | (REACTION_UNITS if reactions else {})
     if not hips:
-        return RECORD
+        return of_leg
     found = {name: UNITS[name if name in UNITS else f"trunk_{name}"] for name in OF_TRUNK}
-    own = {name: unit for name, unit in RECORD.items() if name not in ("time", "pitch")}
+    own = {name: unit for name, unit in of_leg.items() if name not in ("time", "pitch")}
     own = {name: unit for name, unit in own.items() if not name.startswith("trunk_")}
     return found | {f"{leg}_{name}": unit for leg in hips for name, unit in own.items()}
 
@@ -210,21 +232,11 @@ def check_place(path: Path, suffixes: Iterable[str]) -> None:
     check_folder(path.parent)
 
 
-MOT_COLUMNS = {
-    "time": "time",
-    "ground_force_vx": "force_x", "ground_force_vy": "force_y", "ground_force_vz": "",
-    "ground_force_px": "cop_x", "ground_force_py": "cop_y", "ground_force_pz": "",
-    "ground_torque_x": "", "ground_torque_y": "", "ground_torque_z": "free_moment",
-}  # fmt: skip
-"""OpenSim's names, x forward, y up, z right: force [N], point of application [m], free moment [N m]; and the
-column of the record, none for zeros."""
-
-
 def write_csv(record: Columns, about: Mapping[str, Any], path: Path) -> None:
     """One row a substep under one header line with name and unit; numbers keep their bits."""
-    units = about["units"]
-    header = ",".join(f"{name} [{units[name]}]" for name in record)
-    _write_table(path, [*record.values()], "%.17g", ",", header)
+    header = ",".join(f"{name} [{about['units'][name]}]" for name in record)
+    table = np.column_stack([*record.values()])
+    np.savetxt(path, table, "%.17g", delimiter=",", header=header, comments="", encoding="utf-8")
 
 
 def write_parquet(record: Columns, about: Mapping[str, Any], path: Path) -> None:
@@ -239,34 +251,19 @@ def write_parquet(record: Columns, about: Mapping[str, Any], path: Path) -> None
     parquet.write_table(pa.table(dict(record), schema=schema), path)
 
 
-def write_mot(record: Columns, about: Mapping[str, Any], path: Path) -> None:
-    """OpenSim's motion file for external loads, legs in the plane z = 0: `MOT_COLUMNS` under its header, of a
-    horse for each leg with its name before theirs."""
-    nothing, legs = np.zeros(len(record["time"])), [leg for leg in LEGS if f"{leg}_force_x" in record]
-    names = {"time": "time"} | {
-        f"{before}{name}": f"{before}{column}" if column else ""
-        for before in ([f"{leg}_" for leg in legs] or [""])
-        for name, column in MOT_COLUMNS.items() if name != "time"
-    }  # fmt: skip
-    table = [record[name] + 0.0 if name else nothing for name in names.values()]  # no -0
-    header = (
-        f"{path.name}\nversion=1\nnRows={len(nothing)}\nnColumns={len(table)}\ninDegrees=yes\nendheader\n"
-    )
-    _write_table(path, table, "%.10g", "\t", header + "\t".join(names))
-
-
-def _write_table(path: Path, columns: list[Any], number: str, between: str, header: str) -> None:
-    table = np.column_stack(columns)
-    np.savetxt(path, table, number, delimiter=between, header=header, comments="", encoding="utf-8")
-
-
 WRITERS: dict[str, Callable[[Columns, Mapping[str, Any], Path], None]]
-WRITERS = {".csv": write_csv, ".parquet": write_parquet, ".mot": write_mot}
+WRITERS = {
+    ".csv": write_csv, ".parquet": write_parquet, ".mot": write_mot, ".sto": write_mot, ".c3d": write_c3d
+}  # fmt: skip
+NEWTONS = (".mot", ".sto", ".c3d")
+"""Formats whose readers take forces for newtons."""
 
 
 def check_export(path: Path) -> None:
     """Raise unless `write` can write to `path`; before an episode is played."""
     check_place(path, WRITERS)
+    if path.suffix.lower() == ".c3d":
+        ezc3d()
     if path.suffix.lower() == ".parquet":
         try:
             import pyarrow.parquet  # noqa: F401
@@ -274,9 +271,15 @@ def check_export(path: Path) -> None:
             raise HoofEnvError('Parquet needs pyarrow: pip install "hoof-env[export]"') from None
 
 
+def files_of(path: Path) -> list[Path]:
+    """What `write` writes: the record and, of OpenSim's formats, the ExternalLoads XML."""
+    return [path, loads_path(path)] if path.suffix.lower() in (".mot", ".sto") else [path]
+
+
 def write(record: Columns, about: Mapping[str, Any], path: Path) -> Path:
     """Write what `record_episode` and `describe` return, in the format of the path's suffix;
-    an older file is replaced when this is complete. Errors are those of `check_export`."""
+    older files are replaced when these are complete. Errors are those of `check_export`, and `ParameterError`
+    of a record that does not fit into the format."""
     check_export(path)
     with staged(path.parent) as stage:
         WRITERS[path.suffix.lower()](record, about, stage / path.name)
@@ -290,13 +293,32 @@ def export_episode(
     arguments: Sequence[str] = (),
     seed: int = 0,
     seconds: float | None = None,
-) -> int:
-    """Play an episode and write its record; returns the number of rows. What `hoof-env export` does; errors
-    are those of `make_env`, `find_policy` and, before the episode is played, `write`."""
+    threshold: float = THRESHOLD,
+    units: str = "N",
+    reactions: bool = False,
+    bodies: Sequence[str] = (),
+) -> tuple[int, float]:
+    """Play an episode and write its record; returns the number of rows and the weight [N]. What
+    `hoof-env export` does; errors are those of `make_env`, `find_policy` and, before the episode is played,
+    `write`."""
     check_export(path)
+    suffix = path.suffix.lower()
     check_number("seed", seed, low=0)
+    check_number("threshold", threshold, low=0.0, high=1e6)
+    check_choice("units", units, FORCE_UNITS)
+    if units != "N" and suffix in NEWTONS:
+        raise ParameterError(f"units: expected N in {suffix}, which is read as newtons, got {units}")
+    if reactions and suffix == ".c3d":
+        raise ParameterError("reactions: expected a .csv, .parquet, .mot or .sto, got .c3d")
     with make_env(env_id, given := parse_pairs("--args", arguments)) as env:
-        record = record_episode(env, find_policy(policy, env, env_id, seed), seed, seconds)
-        about = describe(env, environment=env_id, arguments=given, policy=policy, seed=seed)
-    write(record, about, path)
-    return len(record["time"])
+        names = units_of(env, reactions)
+        on = check_bodies(parse_pairs("--bodies", bodies), limbs_of(names))
+        player = find_policy(policy, env, env_id, seed)
+        record = record_episode(env, player, seed, seconds, reactions=reactions)
+        about = describe(env, environment=env_id, arguments=given, policy=policy, seed=seed) | {
+            "threshold_n": threshold, "bodies": on, "units": names,
+            "reactions": [name for name in names if reactions and name.endswith(tuple(REACTION_UNITS))],
+        }  # fmt: skip
+    written, said = in_units(above_threshold(record, threshold), about, units)
+    write(written, said, path)
+    return len(record["time"]), about["weight_n"]

@@ -96,7 +96,7 @@ def test_a_reader_that_leaves_is_no_error():
 
 BAD_REQUESTS = {
     "export": [
-        (["--out", "{}/x.txt"], "expected a file that ends in .csv, .mot, .parquet"),
+        (["--out", "{}/x.txt"], "expected a file that ends in .c3d, .csv, .mot, .parquet, .sto"),
         (["--out", "{}/x.csv", "--policy", "gallop"], "policy: expected a name"),
         (["--out", "{}/x.csv", "--policy", "1,0.2,0.3,nan"], "swing_cos: expected"),
         (["--out", "{}/x.csv", "--policy", "99,0,0,0"], "crank_speed: expected"),
@@ -110,6 +110,10 @@ BAD_REQUESTS = {
         (["--out", "{}/x.csv", "--seed", "-1"], "seed: expected"),
         (["--out", "{}"], "expected a file that ends in"),
         (["--out", "{}/taken/x.csv"], "cannot write to"),
+        (["--out", "{}/x.csv", "--threshold", "-1"], "threshold: expected"),
+        (["--out", "{}/x.csv", "--units", "lb"], "units: expected one of BW, N"),
+        (["--out", "{}/x.mot", "--units", "BW"], "units: expected N in .mot"),
+        (["--out", "{}/x.mot", "--bodies", "tail=x"], "bodies: expected leg=BODY"),
     ],
     "render": [
         (["--out", "{}/x.avi"], "expected a file that ends in .gif, .mp4"),

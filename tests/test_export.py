@@ -16,9 +16,9 @@ from hoof_env.dynamics.layout import TRUNK_STATE
 from hoof_env.dynamics.parts import GRAVITY
 from hoof_env.envs.policies import make_policy
 from hoof_env.errors import HoofEnvError, OutputError, ParameterError, parse_pairs
+from hoof_env.lab.opensim import MOT_COLUMNS
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.records import (
-    MOT_COLUMNS,
     RECORD,
     describe,
     export_episode,
@@ -87,7 +87,7 @@ def test_mot_is_what_opensim_reads(episode, tmp_path):
     record, about = episode
     header, columns = read_mot(write(record, about, tmp_path / "run.mot"))
     assert header == {"version": "1", "nRows": "2001", "nColumns": "10", "inDegrees": "yes"}
-    assert [*columns] == [*MOT_COLUMNS]
+    assert [*columns] == ["time", *MOT_COLUMNS]
     for name, source in (("vx", "force_x"), ("vy", "force_y"), ("px", "cop_x"), ("py", "cop_y")):
         np.testing.assert_allclose(columns[f"ground_force_{name}"], record[source], rtol=1e-9)
     np.testing.assert_allclose(columns["time"], record["time"], rtol=1e-9)
@@ -135,7 +135,7 @@ def test_the_fixed_leg_is_recorded_too(solver, tmp_path):
 
 def test_an_episode_that_ends_early_ends_its_record(tmp_path):
     for name in ("one.csv", "two.csv"):
-        assert export_episode(tmp_path / name, "run", LEG, ["episode_seconds=0.1"]) == 101
+        assert export_episode(tmp_path / name, "run", LEG, ["episode_seconds=0.1"])[0] == 101
     assert (tmp_path / "one.csv").read_bytes() == (tmp_path / "two.csv").read_bytes()
 
 

@@ -20,6 +20,7 @@ FLOORS = (
     ("hoof_env/render",),
     ("hoof_env/envs", "hoof_env/__init__.py"),
     ("hoof_env/paper", "hoof_env/saved_policy.py"),
+    ("hoof_env/lab",),
     ("hoof_env/records.py",),
     ("hoof_env/film.py", "hoof_env/play.py"),
     ("hoof_env/cli.py",),

@@ -1,0 +1,124 @@
+"""What `hoof-env compare` prints and draws: a table of errors, and both records over the stance."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hoof_env._output import check_folder, markdown_table, staged
+from hoof_env.errors import MissingExtraError, ParameterError
+from hoof_env.lab.compare import Comparison, Force
+from hoof_env.lab.read import ForceRecord
+from hoof_env.paper.figures import BLUE, GREY, ORANGE, STYLE
+
+SUFFIXES = (".pdf", ".png", ".svg")
+NO_DATE = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
+POINTS = 201  # of a mean curve
+
+
+def report(found: Comparison) -> str:
+    """What was compared, a table of errors, and a hint where fore-aft forces point opposite ways."""
+    lines = [
+        _about("A", found.a),
+        _about("B", found.b),
+        f"Errors are B less A, means over the stances, at {found.rate:g} Hz; "
+        f"times of B {found.shift:+.3f} s. A's own value is in brackets.",
+        "",
+        _table(found),
+    ]
+    for limb, errors in found.limbs.items():
+        if errors.forces["fore-aft"].r < -0.5:
+            lines.append(f"{limb}: fore-aft forces point opposite ways; --reverse-b x turns those of B")
+    return "\n".join(lines)
+
+
+def _about(which: str, record: ForceRecord) -> str:
+    turned = "; forces pointed into the ground and are turned round" if record.turned else ""
+    return f"{which}  {record.name}: {record.rate:g} Hz, {record.unit}, {', '.join(record.limbs)}{turned}"
+
+
+def _table(found: Comparison) -> str:
+    unit, places = found.unit, 1 if found.unit == "N" else 4
+    head = (
+        "limb", "force", "stances", f"RMSE [{unit}]", "r", f"peak [{unit}]", f"impulse [{unit} s]",
+        "contact [ms]", "touchdown [ms]", "time of peak [ms]",
+    )  # fmt: skip
+    rows = []
+    for limb, errors in found.limbs.items():
+        for name, force in errors.forces.items():
+            row = [limb if name == "vertical" else "", name]
+            if name in ("vertical", "fore-aft"):
+                row += [str(errors.pairs), f"{force.rmse:.{places}f}", _r(force)]
+            else:
+                row += ["", "", ""]
+            row.append("" if name == "fore-aft" else _pair(force.peak_error, force.peak, places))
+            row.append(_pair(force.impulse_error, force.impulse, places + 1))
+            if name == "vertical":
+                row += [
+                    _pair(1e3 * errors.contact_error, 1e3 * errors.contact, 0),
+                    f"{round(1e3 * errors.touchdown_error):+d} ± {1e3 * errors.touchdown_spread:.0f}",
+                    f"{round(1e3 * errors.peak_time_error):+d}",
+                ]
+            rows.append(row)
+    return markdown_table(head, rows)
+
+
+def _r(force: Force) -> str:
+    return "-" if math.isnan(force.r) else f"{force.r:.3f}"
+
+
+def _pair(error: float, of: float, places: int) -> str:
+    return f"{round(error, places) + 0.0:+.{places}f} ({round(of, places) + 0.0:.{places}f})"  # no -0
+
+
+def draw(found: Comparison, path: Path) -> Path:
+    """Write a picture, a row of panels for each limb: the vertical and the fore-aft force from touchdown on,
+    each stance thin and their mean heavy, A and B."""
+    check_picture(path)
+    from matplotlib import style
+    from matplotlib.figure import Figure
+
+    limbs = list(found.curves)
+    with style.context(["default", STYLE]), staged(path.parent) as stage:
+        figure = Figure(figsize=(7.5, 1.1 + 1.9 * len(limbs)), layout="constrained")
+        axes = figure.subplots(len(limbs), 2, sharex=True, sharey="col", squeeze=False)
+        for row, limb in zip(axes, limbs, strict=True):
+            pairs = found.curves[limb]
+            for panel, component, title in zip(row, (1, 0), ("vertical", "fore-aft"), strict=True):
+                for side, colour, width in ((1, BLUE, 2.4), (2, ORANGE, 1.2)):
+                    for pair in pairs:
+                        panel.plot(pair[0], pair[side][:, component], color=colour, lw=0.5, alpha=0.35)
+                    panel.plot(*_mean(pairs, side, component), color=colour, lw=width)
+                panel.axhline(0, color=GREY, lw=0.6, zorder=1)
+                panel.set_title(f"{limb.replace('_', ' ')}, {title}", loc="left")
+            row[0].set_ylabel(f"force [{found.unit}]")
+        for panel in axes[-1]:
+            panel.set_xlabel("time from touchdown [s]")
+        for name, record, colour, width in (("A", found.a, BLUE, 2.4), ("B", found.b, ORANGE, 1.2)):
+            axes[0, 0].plot([], [], color=colour, lw=width, label=f"{name}: {record.name}, mean")
+        axes[0, 0].plot([], [], color=GREY, lw=0.5, label="single stances")
+        figure.legend(loc="outside lower center", ncols=3)
+        figure.savefig(stage / path.name, metadata=NO_DATE.get(path.suffix.lower()))
+    return path
+
+
+def _mean(pairs: list[Any], side: int, component: int) -> tuple[Any, Any]:
+    """Mean curve over the longest pair; a limb bears nothing outside its stance."""
+    time = np.linspace(min(pair[0][0] for pair in pairs), max(pair[0][-1] for pair in pairs), POINTS)
+    curves = [np.interp(time, pair[0], pair[side][:, component], 0.0, 0.0) for pair in pairs]
+    return time, np.mean(curves, axis=0)
+
+
+def check_picture(path: Path) -> None:
+    """Raise unless a picture can be drawn at `path`: `ParameterError` of another suffix, `OutputError` of a
+    folder that cannot be written, `MissingExtraError` without matplotlib."""
+    if path.suffix.lower() not in SUFFIXES:
+        raise ParameterError(f"out: expected a file that ends in {', '.join(SUFFIXES)}, got {str(path)!r}")
+    check_folder(path.parent)
+    try:
+        import matplotlib  # noqa: F401
+    except ImportError:
+        raise MissingExtraError('pictures need matplotlib: pip install "hoof-env[lab]"') from None
