@@ -19,7 +19,7 @@ help:
 	@echo 'make test-peers  the engine against MuJoCo and Exudyn, which it installs'
 	@echo 'make test-ecosystem  every RL library on every id, in environments under .ecosystem/: 6 GB, some minutes'
 	@echo 'make bench       how fast engine and environments are beside MuJoCo, Exudyn and EnvPool'
-	@echo 'make baselines   the agents of docs/baselines.md, hours; ARGS="--subset nightly": a small part, minutes'
+	@echo 'make baselines   the agents of docs/evidence/baselines.md, hours; ARGS="--subset nightly": a small part, minutes'
 	@echo 'make docs        these pages and the API as a site in build/site'
 	@echo 'make test-site   every page of it in Chromium: errors, widths, images, contrast; installs Playwright'
 	@echo 'make lint        lint and types alone'

@@ -5,7 +5,7 @@
 
 Without --address a cluster of this machine's cores is made and ended with the command. A worker that dies is
 replaced and its trial goes on from its last checkpoint. Ctrl-C keeps what is there; the same command, given
-again, runs what is missing. docs/distribute.md says how to use a real cluster and where results land.
+again, runs what is missing. docs/agents.md says how to use a real cluster and where results land.
 """
 
 from __future__ import annotations

@@ -5,10 +5,10 @@
     python -m agents.score my_module:act --env-id hoof_env/HorseLegRail-v0
 
 A policy is what agents.evaluate takes, or MODULE:NAME, a Python function of observations, shape (n, k), that
-returns actions, shape (n, 4). Each gets the line that it would have in docs/baselines.md; several trained
-ones, as the seeds of one algorithm, also a line for all of them. A policy that was trained for another id,
-leg, setting or version is refused. A model file is a pickle and can run any code when it is loaded, and a
-module is code: give only what you trust.
+returns actions, shape (n, 4). Each gets the line that it would have in docs/evidence/baselines.md; several
+trained ones, as the seeds of one algorithm, also a line for all of them. A policy that was trained for
+another id, leg, setting or version is refused. A model file is a pickle and can run any code when it is
+loaded, and a module is code: give only what you trust.
 
 Episodes are rows of the native vector environment where the id has one. A row is the episode that `play`
 gives with the same seed, to the bit where the policy acts in a batch as alone: scripted policies do, but for

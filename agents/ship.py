@@ -260,7 +260,7 @@ def write_index(folder: Path) -> None:
         rows.append([*row, f"[card]({path.parent.name}/card.md)"])
     text = (
         "# Trained policies\n\n"
-        "One for each id, made by `python -m agents.ship`; docs/policies.md says how to use them.\n"
+        "One for each id, made by `python -m agents.ship`; docs/agents.md says how to use them.\n"
         "Mean returns in the same episodes, and the bootstrap's 95 % interval.\n\n"
     )
     titles = ["id", "policy", "return", "open-loop", "run", "card"]

@@ -63,6 +63,7 @@ nitpick_ignore_regex = [
 html_theme = "furo"
 html_title = f"hoof-env {version}"
 html_static_path = ["site"]
+html_favicon = "site/favicon.svg"
 html_css_files = ["style.css"]
 html_js_files = ["scroll.js"]
 html_extra_path = ["site/index.html"]

@@ -15,13 +15,13 @@ from hoof_env.simd.math import root_power
 
 
 def slip(step, weight):
-    """Sliding under load costs: power of friction at toe and heel [kW]."""
+    """Charge sliding under load: the power of friction at toe and heel [kW]."""
     toe, heel = step.leg.report.toe, step.leg.report.heel
     return 0.001 * weight * (toe.friction * toe.slide + heel.friction * heel.slide)
 
 
 def comfort(step, weight):
-    """An ordinary function of numbers, for `if` and `math`: paid while the trunk hardly accelerates."""
+    """An ordinary function of numbers with `if` and `math`, granted while the trunk hardly accelerates."""
     if step.failed:
         return 0.0
     return weight * math.exp(-abs(step.trunk.report.acceleration.imag) / 9.81)
@@ -32,7 +32,7 @@ def vertical_acceleration(scene):
 
 
 def turf(penetration, rate, inverse_approach_speed, ground):
-    """Firmer with depth, twice; loses more on the way out than Eq. 14 at the same chi."""
+    """Grows stiffer with depth, and loses more energy on the way out than Eq. 14."""
     spring = ground.stiffness * root_power(penetration, 12) * (1.0 + penetration / 0.05)
     damping = ground.chi * choose(rate < 0.0, 2.0 * rate, rate) * inverse_approach_speed
     return spring * larger(1.0 + damping, 0.0)

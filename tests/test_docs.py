@@ -1,4 +1,4 @@
-"""What pages say of the repository is true: their links lead somewhere, their commands and files exist."""
+"""What pages say of the repository is true: links lead somewhere, commands and files exist, examples run."""
 
 import re
 import runpy
@@ -13,6 +13,14 @@ FOLDERS = ("agents", "benchmarks", "docs", "examples", "hoof_env", "research", "
 PAGES = sorted([*ROOT.glob("*.md"), *(page for folder in FOLDERS for page in (ROOT / folder).rglob("*.md"))])
 LIVE = [page for page in PAGES if "evidence" not in page.parts]
 """Frozen pages name the commands of their commits."""
+HAND_WRITTEN = ("agents", "decisions", "engine", "horse", "own_task", "paper", "start", "task")
+BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+EXAMPLES = [
+    page
+    for page in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
+    if page.stem != "own_task" and "```python" in page.read_text(encoding="utf-8")
+]
+"""Pages whose code this file runs; the tests of tasks and legs of one's own run those of own_task."""
 
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 CODE = re.compile(r"^( {4}|```).*?$|`[^`\n]*`", re.MULTILINE)
@@ -63,10 +71,30 @@ def test_commands_and_files_exist(page):
     assert not {file for file in files if not (ROOT / file).is_file()}
 
 
+@pytest.mark.parametrize("page", EXAMPLES, ids=name)
+def test_examples_run_from_top_to_bottom(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    blocks = [code for kind, code in BLOCK.findall(page.read_text(encoding="utf-8")) if kind == "python"]
+    exec(compile("\n".join(blocks), name(page), "exec"), {})
+
+
+def test_the_hand_written_pages_are_eight():
+    assert {page.stem for page in (ROOT / "docs").glob("*.md")} - {"index"} == set(HAND_WRITTEN)
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert not [page for page in HAND_WRITTEN if f"](docs/{page}.md)" not in readme]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_a_page_has_one_title_and_its_images_have_texts(page):
+    text = BLOCK.sub("", page.read_text(encoding="utf-8"))
+    assert len(re.findall(r"^# ", text, re.MULTILINE)) == 1
+    assert "![](" not in text
+
+
 def test_every_frozen_page_says_of_which_commit_it_is():
     table = (ROOT / "docs/evidence/README.md").read_text(encoding="utf-8")
     for page in sorted((ROOT / "docs/evidence").glob("*.md")):
-        if page.name != "README.md":
+        if page.name not in ("README.md", "ecosystem.md"):  # a command writes the latter
             stamp = page.read_text(encoding="utf-8").split("\n")[2]
             commit = re.match(
                 r"> \*\*Frozen evidence, not regenerated\.\*\* Data of commit `(\w{7})`, about .", stamp

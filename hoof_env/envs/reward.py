@@ -1,6 +1,6 @@
 """The reward: one table of terms. A term is a row here, and nothing else has to be touched.
 
-The sum of all terms is the reward, `info["reward_<name>"]` has each. `docs/environment.md` gives the reasons
+The sum of all terms is the reward, `info["reward_<name>"]` has each. `docs/task.md` gives the reasons
 for the weights and what they lead to."""
 
 from __future__ import annotations

@@ -29,7 +29,7 @@ Preset = str | Path | Mapping[str, Any]
 """What names a leg: a preset by name, a file of that form by path, or the content of such a file."""
 
 PARTS = ("provenance", "units", "geometry", "ground", "gaits", "gait_provenance")
-"""What a preset holds; docs/own_leg.md says what stands in each."""
+"""What a preset holds; docs/own_task.md says what stands in each."""
 
 LINEAR_DENSITY = 1.0
 """Default mass per length of a link [kg/m]. The paper prints no masses. One kilogram a metre gives the

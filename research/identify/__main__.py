@@ -1,4 +1,4 @@
-"""Search the leg, the ground level and the gaits that the paper does not print; see docs/identification.md.
+"""Search the leg, the ground level and the gaits that the paper does not print; see docs/paper.md.
 
 python -m research.identify --out runs/identify
 """

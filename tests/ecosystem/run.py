@@ -1,7 +1,7 @@
 """Every RL library takes hoof-env unchanged: `python -m tests.ecosystem.run`, or `make test-ecosystem`.
 
 Each check of suite.toml runs in the virtual environment that it names, one after the other, whatever becomes
-of those before it. docs/ecosystem.md is written when every check has a result, old ones included.
+of those before it. docs/evidence/ecosystem.md is written when every check has a result, old ones included.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ VENVS = {
 }
 RESULTS = CACHE / "results"
 CHECKOUT_FOLDER = HERE
-PAGE = ROOT / "docs" / "ecosystem.md"
+PAGE = ROOT / "docs" / "evidence" / "ecosystem.md"
 VERSIONS = (
     "import sys, importlib.metadata as m; print(*(f'{n} {m.version(n)}' for n in sys.argv[1:]), sep='\\n')"
 )
@@ -68,10 +68,10 @@ def main() -> int:
     missing = [path.stem for path in stored if not path.exists()]
     results = [json.loads(path.read_text()) for path in stored if path.exists()]
     if missing:
-        print(f"docs/ecosystem.md stays as it is: no result yet of {', '.join(missing)}")
+        print(f"docs/evidence/ecosystem.md stays as it is: no result yet of {', '.join(missing)}")
     else:
         PAGE.write_text(markdown(results))
-        print("written: docs/ecosystem.md")
+        print("written: docs/evidence/ecosystem.md")
     print(f"failed: {', '.join(failed)}" if failed else f"all {len(chosen)} accept hoof-env")
     return 1 if failed else 0
 

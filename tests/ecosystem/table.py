@@ -1,4 +1,4 @@
-"""The acceptance table: what the suite's results come to, for a terminal and for docs/ecosystem.md."""
+"""The acceptance table of the suite's results, for a terminal and for docs/evidence/ecosystem.md."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ do not fit together have virtual environments of their own (`tests/ecosystem/sui
 
 In a training script of yours call `torch.set_num_threads(1)` first, or set `OMP_NUM_THREADS=1`: torch takes
 every core, and its threads spin while they wait for each other, which makes a busy machine ten to thirty
-times as slow ([decisions.md](decisions.md)).
+times as slow ([decisions.md](../decisions.md)).
 
 | library | version | what was run | result | s |
 |---|---|---|---|---|

@@ -95,7 +95,7 @@ def test_the_middle_of_the_ranges_creeps_forward_and_no_swing_goes_backward():
     "change", [{"approach_floor": 1e-4}, {"friction_fast": 1e-2}, {"sim_dt": 1e-4}], ids=str
 )
 def test_assumed_contact_settings_hardly_matter_to_the_run(change):
-    """As docs/environment.md says of floor, friction threshold and substep."""
+    """As docs/task.md says of floor, friction threshold and substep."""
     run = load_gait("run")
     assert speed_and_peak(run, **change) == pytest.approx(speed_and_peak(run), rel=0.01)
 

@@ -1,4 +1,4 @@
-"""A leg of one's own as `docs/own_leg.md` says: the examples run, the tables are whole, errors exact."""
+"""A leg of one's own as `docs/own_task.md` says: the examples run, the tables are whole, errors exact."""
 
 from __future__ import annotations
 
@@ -22,7 +22,9 @@ from hoof_env.leg.geometry import PARTS
 from hoof_env.leg.linkage import DYADS, LENGTHS
 from hoof_env.leg.profile import by_name, functions
 
-PAGE = (Path(__file__).parents[2] / "docs" / "own_leg.md").read_text(encoding="utf-8")
+DOCS = Path(__file__).parents[2] / "docs"
+PAGE = (DOCS / "own_task.md").read_text(encoding="utf-8").split("## A leg of your own", 1)[1]
+MASSES = (DOCS / "evidence" / "limb_masses.md").read_text(encoding="utf-8")
 LEG = "hoof_env/HorseLeg-v0"
 CONTENT = read_preset("identified")
 
@@ -30,17 +32,17 @@ CONTENT = read_preset("identified")
 def test_the_examples_run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     known: dict = {}
-    for block in re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL):
-        exec(compile(block, "own_leg.md", "exec"), known)
+    for block in re.findall(r"```python\n(.*?)```", PAGE + MASSES, re.DOTALL):
+        exec(compile(block, "own_task.md", "exec"), known)
     assert json.loads((tmp_path / "pony.json").read_text())["provenance"] == "identified at half its size"
 
     leg, fore, hind, trunk = (known[name] for name in ("leg", "fore", "hind", "trunk"))
-    assert f"# {fore.mass:.1f} and {hind.mass:.1f} kg" in PAGE
-    assert f"# {trunk:.1f} kg: " in PAGE
+    assert f"# {fore.mass:.1f} and {hind.mass:.1f} kg" in MASSES
+    assert f"# {trunk:.1f} kg: " in MASSES
     theta = np.linspace(0, 2 * np.pi, 360, endpoint=False)
     about = [by_name(functions(one, theta)[0])["frame_inertia"].mean() for one in (leg, fore, hind)]
     said = f"{leg.mass:.1f} kg and, on average over a turn, {about[0]:.1f} kg m^2 about O; the fore limb has"
-    assert f"{said} {about[1]:.1f} kg m^2 and the hind limb {about[2]:.1f}," in PAGE
+    assert f"{said} {about[1]:.1f} kg m^2 and the hind limb {about[2]:.1f}," in MASSES
 
 
 def entries(heading: str) -> dict[str, list[str]]:
@@ -55,14 +57,14 @@ def entries(heading: str) -> dict[str, list[str]]:
 
 
 def test_the_page_has_every_entry():
-    assert set(entries("## The form")) == set(PARTS)
-    geometry = entries("### geometry")
+    assert set(entries("### The form of a preset")) == set(PARTS)
+    geometry = entries("#### geometry")
     needed = {item.name: "yes" if item.default is MISSING else "no" for item in fields(Geometry)}
     assert {name: row[0] for name, row in geometry.items()} == needed
     assert re.findall(r"`(\w+)`", geometry["lengths"][2]) == list(LENGTHS)
     assert re.findall(r"`(\w+)`", geometry["assembly"][2]) == [dyad.point for dyad in DYADS]
-    assert set(entries("### gaits")) == set(LIMITS)
-    assert set(entries("### ground")) == set(ground.SETTINGS)
+    assert set(entries("#### gaits")) == set(LIMITS)
+    assert set(entries("#### ground")) == set(ground.SETTINGS)
 
 
 @pytest.mark.parametrize("make", [gym.make, gym.make_vec], ids=["single", "vector"])

@@ -32,6 +32,7 @@ from hoof_env.errors import ParameterError
 from hoof_env.simd.user_functions import fingerprint, what_cannot_be_compiled
 
 PAGE = (Path(__file__).parents[2] / "docs" / "own_task.md").read_text(encoding="utf-8")
+PAGE = PAGE.split("## A leg of your own", 1)[0]  # tests/envs/test_own_leg.py has the rest
 LEG = "hoof_env/HorseLeg-v0"
 HILLS = {"kind": "hills", "seed": 3, "stiffness": [0.25, 2.0]}
 NAMES = ("rising", "load angle", "episode seconds")
@@ -486,7 +487,7 @@ def test_the_page_has_every_name_that_functions_reach():
 def test_the_page_shows_the_example():
     example = (Path(__file__).parents[2] / "examples" / "own_task.py").read_text(encoding="utf-8")
     blocks = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
-    assert blocks
-    for block in blocks:
-        assert block in example
+    places = [example.index(block) for block in blocks]  # an error where one is not there
+    assert places == sorted(places)
+    assert len("".join(blocks).split()) > 0.6 * len(example.split())  # all but the program at the end
     assert len([line for line in example.splitlines() if line.strip()]) <= 75

@@ -1,6 +1,6 @@
 """On every id the reference gait beats the simplest policies, and no trick that was found beats it.
 
-python tests/envs/test_rewards_of_tasks.py          prints the table of docs/environment.md
+python tests/envs/test_rewards_of_tasks.py          prints the table of docs/evidence/policies.md
 """
 
 import functools
