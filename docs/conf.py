@@ -86,10 +86,13 @@ def unlink_folders(app: Sphinx, tree: nodes.document) -> None:
             link.replace_self(link.children)
 
 
-def name_level(app: Sphinx, page: str, template: str, context: dict[str, Any], tree: object) -> None:
-    """The captions of Sphinx's side bar are headings without a level, which a screen reader needs."""
+def mend_page(app: Sphinx, page: str, template: str, context: dict[str, Any], tree: object) -> None:
+    """The captions of Sphinx's side bar are headings without a level, which a screen reader needs. Links from
+    sources back to the API miss what it has under another name: none is better."""
     captions = context["furo_navigation_tree"]
     context["furo_navigation_tree"] = captions.replace('role="heading"', 'role="heading" aria-level="2"')
+    if page.startswith("_modules/"):
+        context["body"] = re.sub(r'<a class="viewcode-back".*?</a>', "", context["body"])
 
 
 def keep_text(app: Sphinx, what: str, name: str, what_has_it: Any, options: Any, lines: list[str]) -> None:
@@ -103,6 +106,6 @@ def keep_text(app: Sphinx, what: str, name: str, what_has_it: Any, options: Any,
 def setup(app: Sphinx) -> dict[str, Any]:
     app.connect("source-read", add_children)
     app.connect("autodoc-process-docstring", keep_text, priority=400)  # before napoleon
-    app.connect("html-page-context", name_level, priority=900)  # after furo
+    app.connect("html-page-context", mend_page, priority=900)  # after furo
     app.connect("doctree-read", unlink_folders)
     return {"parallel_read_safe": True}
