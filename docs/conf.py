@@ -62,15 +62,13 @@ nitpick_ignore_regex = [
 
 html_theme = "furo"
 html_title = f"hoof-env {version}"
-html_static_path = ["site"]
-html_favicon = "site/favicon.svg"
+html_static_path = ["site/static"]
+html_favicon = "site/static/favicon.svg"
 html_css_files = ["style.css"]
 html_js_files = ["scroll.js"]
-html_extra_path = ["site/index.html"]
+html_extra_path = ["site/root"]
 html_show_sourcelink = False
 html_copy_source = False
-copybutton_prompt_text = r"^\$ "
-copybutton_prompt_is_regexp = True
 
 
 def add_children(app: Sphinx, page: str, text: list[str]) -> None:
@@ -82,7 +80,7 @@ def unlink_folders(app: Sphinx, tree: nodes.document) -> None:
     """A folder is a link where the repository is browsed, and text on the site."""
     here = Path(app.srcdir, app.env.docname).parent
     for link in list(tree.findall(pending_xref)):
-        if (here / link["reftarget"]).is_dir():
+        if link["reftype"] == "myst" and (here / link["reftarget"]).is_dir():
             link.replace_self(link.children)
 
 

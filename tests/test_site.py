@@ -1,4 +1,4 @@
-"""The site builds without a warning, and what is in it leads somewhere; `make test-site` looks at it in a browser."""
+"""The site builds without a warning, and its links lead somewhere; `make test-site` has a look by browser."""
 
 import subprocess
 import sys

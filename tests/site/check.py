@@ -114,7 +114,7 @@ def main() -> int:
     windows = tuple(product(HEIGHTS, ("light", "dark"))) if given.all else WINDOWS
     started, wrong = time.monotonic(), 0
     files = sorted(file.relative_to(given.site).as_posix() for file in given.site.rglob("*.html"))
-    files = [file for file in files if given.only in file and not file.startswith("_static/")]
+    files = [file for file in files if given.only in file]
     chromium = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
     with served(given.site) as root, sync_playwright() as players:
         browser = players.chromium.launch(executable_path=chromium)
