@@ -78,10 +78,12 @@ def faults_of(browser: Browser, address: str, width: int, scheme: str) -> list[s
     return faults
 
 
-def is_searched(browser: Browser, root: str) -> list[str]:
-    """What is wrong with search and with the buttons that copy code."""
+def faults_of_use(browser: Browser, root: str) -> list[str]:
+    """What is wrong with the way in, search and the buttons that copy code; what does not come is an error."""
     page = browser.new_page()
     try:
+        page.goto(root)
+        page.wait_for_url(f"{root}/docs/index.html")
         page.goto(f"{root}/search.html?q=stance")
         page.wait_for_selector("#search-results ul.search li", timeout=20_000)
         page.goto(f"{root}/docs/environments/HorseLeg.html")
@@ -114,7 +116,9 @@ def main() -> int:
     windows = tuple(product(HEIGHTS, ("light", "dark"))) if given.all else WINDOWS
     started, wrong = time.monotonic(), 0
     files = sorted(file.relative_to(given.site).as_posix() for file in given.site.rglob("*.html"))
-    files = [file for file in files if given.only in file]
+    files = [
+        file for file in files if given.only in file and file != "index.html"
+    ]  # it leads to the front page
     chromium = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
     with served(given.site) as root, sync_playwright() as players:
         browser = players.chromium.launch(executable_path=chromium)
@@ -123,7 +127,7 @@ def main() -> int:
                 for fault in faults_of(browser, f"{root}/{file}", width, scheme):
                     wrong += 1
                     print(f"{file} at {width} px, {scheme}: {fault}", flush=True)
-        for fault in is_searched(browser, root):
+        for fault in faults_of_use(browser, root):
             wrong += 1
             print(fault)
         if given.pictures:
