@@ -79,7 +79,7 @@ def faults_of(browser: Browser, address: str, width: int, scheme: str) -> list[s
 
 
 def faults_of_use(browser: Browser, root: str) -> list[str]:
-    """What is wrong with the way in, search and the buttons that copy code; what does not come is an error."""
+    """What is wrong with the way in, search and the buttons that copy code; an error if one is not there."""
     page = browser.new_page()
     try:
         page.goto(root)
