@@ -5,7 +5,7 @@
 #   TORCH_INDEX=URL     where Linux takes PyTorch from; empty for pip's own index, which has the CUDA build
 
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-demo demo test kernels test-slow test-peers test-oldest test-ecosystem bench baselines lint clean
+.PHONY: help setup setup-demo demo test kernels test-slow test-peers test-oldest test-ecosystem bench baselines docs test-site test-links lint clean
 
 PY := .venv/bin/python
 PYTHONS := $(or $(PYTHON),$(PY) python3 python3.13 python3.12 python3.11)
@@ -21,6 +21,9 @@ help:
 	@echo 'make test-ecosystem  every RL library on every id, in environments under .ecosystem/: 6 GB, some minutes'
 	@echo 'make bench       how fast engine and environments are beside MuJoCo, Exudyn and EnvPool'
 	@echo 'make baselines   the agents of docs/evidence/baselines.md, hours; ARGS="--subset nightly": a small part, minutes'
+	@echo 'make docs        these pages and the API as a site in build/site'
+	@echo 'make test-site   every page of it in Chromium: errors, widths, images, contrast; installs Playwright'
+	@echo 'make test-links  links to other sites; needs a network'
 	@echo 'make lint        lint and types alone'
 	@echo 'make setup       make .venv with all that the commands of the README need, and nothing more'
 	@echo 'make clean       remove .venv and the caches; runs/ stays'
@@ -71,6 +74,16 @@ bench: setup
 
 baselines: setup
 	@$(PY) -m agents.baselines $(ARGS)
+
+docs: setup
+	@echo 'sphinx' && $(PY) -m sphinx -q -W --keep-going -c docs -d build/doctrees . build/site && echo 'read build/site/index.html'
+
+test-site: docs
+	@echo 'pip install playwright axe' && $(PY) -m pip install -q -c constraints.txt -e '.[site]'
+	@$(PY) -m tests.site.check $(ARGS)
+
+test-links: setup
+	@$(PY) -m sphinx -q -b linkcheck -c docs -d build/doctrees . build/links
 
 lint: setup
 	@echo 'ruff check' && $(PY) -m ruff check -q --output-format concise

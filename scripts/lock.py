@@ -44,6 +44,7 @@ def compiled(extras: list[str], *options: str, more: str = "") -> list[str]:
         out = Path(folder) / LOCK.name
         out.write_text(LOCK.read_text(encoding="utf-8"), encoding="utf-8")  # uv keeps what stands there
         command = [sys.executable, "-m", "uv", "pip", "compile", "--quiet", "--universal"]
+        command += ["--fork-strategy", "fewest"]  # one version of a package for all
         command += ["--only-binary", ":all:"]
         command += [
             "--python",

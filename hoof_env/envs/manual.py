@@ -46,6 +46,12 @@ _NAMES = {name: task.name for name, task in TASKS.items()} | {"mo": "HorseLegMO"
 
 PAGES = tuple(_NAMES)  # the tasks, and the id with three rewards
 
+FILMS = {name: TASKS.get(task, TASKS["leg"]).reference for task, name in _NAMES.items()}
+"""The gait that the film of each page shows."""
+
+FILM_SECONDS = 2.0
+"""What a film shows; longer ones are large."""
+
 GAIT = [entry for entry in observation.ENTRIES if entry.group == "gait"]
 
 
@@ -69,11 +75,13 @@ TABLES = tables()
 WORDS = TABLES["words"]
 
 
-def page(task: str) -> str:
-    """The manual page of a task in Markdown; `task` is one of `PAGES`, or an id of one's own."""
+def page(task: str, with_film: bool = False) -> str:
+    """The manual page of a task in Markdown; `task` is one of `PAGES`, or an id of one's own, which has no
+    film."""
     what = task_of("leg" if task == "mo" else task)
+    film = _film(_NAMES[task]) if with_film else ""
     if task == "mo":
-        return Template(MO_PAGE).substitute(observations=_observations(what))
+        return _tidy(Template(MO_PAGE).substitute(film=film, observations=_observations(what)))
     s, kind = what.settings({}), "horse" if what.is_horse else "leg"
     body = Horse(s) if what.is_horse else OneLeg(s)
     trunk, groups = TABLES[s.trunk], observation.groups_of(what.entries)
@@ -88,6 +96,7 @@ def page(task: str) -> str:
         name=what.name,
         id=what.id,
         summary=what.summary,
+        film=film,
         about=what.about,
         body=Template(WORDS[f"{kind}_body"].strip()).safe_substitute(trunk=trunk["moves"]),
         action_space=f"Box(-1, 1, ({body.actions},), float32)",
@@ -123,7 +132,7 @@ def page(task: str) -> str:
         settings=markdown_table(head, [*settings, RENDER_MODE]),
         terrain=WORDS["terrain"] + markdown_table(head, _rows("hills", hills)) if s.terrain else "",
     )
-    return re.sub(r"\n{3,}", "\n\n", text)
+    return _tidy(text)
 
 
 def page_of(id: str) -> str:
@@ -147,9 +156,11 @@ def index() -> str:
     return Template(WORDS["index"]).substitute(table=markdown_table(head, rows))
 
 
-def write_pages(out: Path) -> list[Path]:
-    """Write all pages and the index into a folder, which is made if need be; returns the files."""
-    texts = {"README.md": index(), **{f"{name}.md": page(task) for task, name in _NAMES.items()}}
+def write_pages(out: Path, with_films: bool = False) -> list[Path]:
+    """Write all pages and the index into a folder, which is made if need be; returns the files. With films
+    the pages show what lies in `films` beside them."""
+    pages = {f"{name}.md": page(task, with_films) for task, name in _NAMES.items()}
+    texts = {"README.md": index(), **pages}
     try:
         out.mkdir(parents=True, exist_ok=True)
         for name, text in texts.items():
@@ -162,6 +173,15 @@ def write_pages(out: Path) -> list[Path]:
 # Parts of a page
 
 RENDER_MODE = ("`render_mode`", "None", "", '"rgb_array" or "human"')
+
+
+def _tidy(text: str) -> str:
+    return re.sub(r"\n{3,}", "\n\n", text)
+
+
+def _film(name: str) -> str:
+    words = {"name": name, "gait": FILMS[name], "seconds": f"{FILM_SECONDS:g}"}
+    return Template(WORDS["film"].strip()).substitute(words)
 
 
 def _rows(table: str, values: Mapping[str, str] | None = None) -> list[tuple[str, ...]]:

@@ -48,12 +48,30 @@ def test_every_id_has_a_page():
     assert sorted(IDS.values()) == sorted(name for name in gym.registry if name.startswith("hoof_env/"))
 
 
-def test_committed_pages_are_what_the_command_writes(tmp_path, capsys):
-    assert cli.main(["manual", "--out", str(tmp_path)]) == 0
+def test_committed_pages_are_what_the_command_writes(tmp_path, capsys, monkeypatch):
+    asked, film = [], inspect.signature(cli.render)
+    monkeypatch.setattr(cli, "render", lambda *given, **named: asked.append(film.bind(*given, **named).args))
+    assert cli.main(["manual", "--out", str(tmp_path), "--films"]) == 0
     assert f"read {tmp_path / 'README.md'} first" in capsys.readouterr().out
     written = {file.name: file.read_text("utf-8") for file in tmp_path.iterdir()}
-    committed = {file.name: file.read_text("utf-8") for file in DOCS.iterdir()}
-    assert written == committed, "run `hoof-env manual --out docs/environments`"
+    committed = {file.name: file.read_text("utf-8") for file in DOCS.glob("*.md")}
+    assert written == committed, "run `hoof-env manual --out docs/environments --films`"
+    assert [env for _, _, env, *_ in asked] == list(IDS.values())
+    assert {out.relative_to(tmp_path) for out, *_ in asked} == set(in_films())
+
+
+def in_films():
+    return [film.relative_to(DOCS) for film in (DOCS / "films").iterdir()]
+
+
+@pytest.mark.parametrize("page", manual.PAGES)
+def test_every_page_shows_its_film(page):
+    name = IDS[page].removeprefix("hoof_env/").removesuffix("-v0")
+    (told, film) = re.search(r"!\[(.+?)\]\((.+?)\)", manual.page(page, with_film=True)).groups()
+    assert told.startswith(f"{name}, ")
+    assert film == f"films/{name}.gif"
+    assert (DOCS / film).stat().st_size < 450e3  # a page loads quickly
+    assert "![" not in manual.page(page)
 
 
 def test_a_page_is_printed(capsys):
