@@ -13,9 +13,10 @@ for env_id in sorted(name for name in gym.registry if name.startswith("hoof_env/
     env.action_space.seed(0)
     for _ in range(20):
         env.step(env.action_space.sample())
-    envs = gym.make_vec(env_id, num_envs=8)
-    envs.reset(seed=0)
-    envs.action_space.seed(0)
-    envs.step(envs.action_space.sample())
+    if "MO" not in env_id:  # whose vectors of rewards Gymnasium's have no room for
+        envs = gym.make_vec(env_id, num_envs=8)
+        envs.reset(seed=0)
+        envs.action_space.seed(0)
+        envs.step(envs.action_space.sample())
     print(f"{env_id}: works")
 print(f"hoof-env {hoof_env.__version__}")
