@@ -59,7 +59,7 @@ test-peers: setup
 test-oldest: setup
 	@rm -rf .oldest && $(PY) -m hatchling build -t wheel -d .oldest/dist
 	@$(PY) -m uv venv -q -p $(PY) .oldest/venv
-	@VIRTUAL_ENV=.oldest/venv $(PY) -m uv pip install -q --resolution lowest-direct -r pyproject.toml --extra render --extra plot --extra export
+	@VIRTUAL_ENV=.oldest/venv $(PY) -m uv pip install -q --only-binary :all: --resolution lowest-direct -r pyproject.toml --extra render --extra plot --extra export
 	@VIRTUAL_ENV=.oldest/venv $(PY) -m uv pip install -q --no-deps .oldest/dist/*.whl
 	@NUMBA_CACHE_DIR=.oldest/cache .oldest/venv/bin/python examples/smoke.py
 
