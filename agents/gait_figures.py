@@ -137,6 +137,8 @@ def play(envs: Any, policy: Any, speed: float) -> dict[str, Any]:
             own = stances_of(time, forces, lift_off)
             stances += own
             lags.append(lag_of(own, period))
+            if "footfall" not in result:
+                result["footfall"] = footfall_of(own, time[-1], 2 * period)
     result["lag"] = mean_lag(lags) if lags else float("nan")
     fore = [one for one in stances if one.leg < 2]
     result["two_peaked"] = float(np.mean([one.is_two_peaked for one in fore])) if fore else float("nan")
@@ -145,6 +147,16 @@ def play(envs: Any, policy: Any, speed: float) -> dict[str, Any]:
     }
     result["counts"] = which_count(result)
     return result
+
+
+def footfall_of(stances: list[Stance], end: float, span: float) -> list[list[float]]:
+    """Leg, begin and end [s] of the stances in the last `span` [s] of a record that ends there."""
+    begin = end - span
+    return [
+        [one.leg, round(max(one.began - begin, 0.0), 4), round(one.ended - begin, 4)]
+        for one in stances
+        if one.ended > begin
+    ]
 
 
 def which_count(figures: dict[str, Any]) -> dict[str, bool]:

@@ -30,7 +30,7 @@ from agents.score import find_policy, make_rows
 from agents.statistics import estimate
 from hoof_env._output import markdown_table
 from hoof_env.envs.horse import HIP_HEIGHT
-from hoof_env.envs.reference import PAIRS
+from hoof_env.envs.reference import LEGS, PAIRS
 from hoof_env.errors import ParameterError
 
 Floats = NDArray[np.float64]
@@ -53,7 +53,7 @@ class Args:
     env_kwargs: tuple[str, ...] = ()
     """arguments of the environment: key=value ..., or one JSON object"""
     out: Path = Path("runs/judge")
-    """folder for figures.json, table.md, forces.png and speeds.png"""
+    """folder for figures.json, table.md, forces.png, footfall.png and speeds.png"""
 
 
 # The judges
@@ -173,7 +173,8 @@ def shape_of(froude: float, pair: str) -> Floats | None:
 
 
 def draw(figures: dict[str, list[dict[str, Any]]], out: Path) -> None:
-    """Force curves at each speed, and lag, duty and cost over speed."""
+    """Force curves at each speed, two strides of the first policy's footfall, and lag, duty and cost of
+    transport over speed."""
     from matplotlib.figure import Figure
 
     first = next(iter(figures.values()))
@@ -199,6 +200,15 @@ def draw(figures: dict[str, list[dict[str, Any]]], out: Path) -> None:
     for row, pair in enumerate(PAIRS):
         axes[row, 0].set_ylabel(f"{pair}: normal force [N/kg]")
     picture.savefig(out / "forces.png", dpi=110)
+    picture = Figure((2.6 * len(shown), 1.9), layout="constrained")
+    for axis, one in zip(picture.subplots(1, len(shown), squeeze=False)[0], shown, strict=True):
+        for leg, began, ended in one["footfall"]:
+            axis.barh(len(LEGS) - leg, ended - began, left=began, height=0.6, color=f"C{leg // 2}")
+        axis.set_yticks(range(len(LEGS), 0, -1), [name.replace("_", " ") for name in LEGS], fontsize=8)
+        axis.set_ylim(0.4, len(LEGS) + 0.6)
+        axis.set_title(f"Fr {one['froude']:.2f}", fontsize=9)
+        axis.set_xlabel("time [s]")
+    picture.savefig(out / "footfall.png", dpi=110)
     picture = Figure((10, 3.2), layout="constrained")
     panels = picture.subplots(1, 3)
     for name, some in figures.items():

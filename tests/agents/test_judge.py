@@ -101,7 +101,12 @@ def test_the_command_writes_figures_a_table_and_pictures(tmp_path, capsys):
     share = one["mean_fore"] * one["duty_fore"] + one["mean_hind"] * one["duty_hind"]
     assert 2 * share == pytest.approx(9.81, rel=0.02)  # in the mean the legs bear the weight
     assert "| walk: lag |" in (tmp_path / "table.md").read_text()
+    assert {leg for leg, _, _ in one["footfall"]} == {0, 1, 2, 3}
+    on_the_ground = sum(ended - began for _, began, ended in one["footfall"])
+    duty = 2 * (one["duty_fore"] + one["duty_hind"])  # of all legs; two strides, but for stances cut off
+    assert 0.5 * duty < on_the_ground / max(ended for *_, ended in one["footfall"]) <= 1.1 * duty
     assert (tmp_path / "forces.png").stat().st_size > 5000
+    assert (tmp_path / "footfall.png").stat().st_size > 5000
     assert (tmp_path / "speeds.png").stat().st_size > 5000
     capsys.readouterr()
 
