@@ -330,7 +330,8 @@ class EpisodeBatch:
         assert self.target_speed
         steps = round(generator.uniform(*self.target_seconds) / self.dt)
         self.now.switch[env] = self.now.steps[env] + steps
-        self.now.next_target[env] = generator.uniform(*self.target_speed)
+        (low, high), now, step = self.target_speed, self.now.target[env], self.body.command_step
+        self.now.next_target[env] = generator.uniform(max(low, now - step), min(high, now + step))
 
     def step(self, generators: Sequence[np.random.Generator], idle: NDArray[np.bool_] | None = None) -> bool:
         """One control step under `actions`; returns whether any episode ended.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
@@ -28,7 +29,7 @@ class OneLeg:
 
     legs, actions, harmonics, filters, limits = 1, len(PARAMETERS), 1, None, None
     hips: Mapping[str, tuple[float, float]] = MappingProxyType({})
-    step_error = 0.01
+    step_error, command_step = 0.01, math.inf
     start_names, gait_names = ("crank_angle", "speed", "height", "x"), PARAMETERS
 
     def __init__(self, settings: Settings) -> None:

@@ -274,6 +274,22 @@ def test_ponies_travel(size):
     assert np.mean([one["speed_m_s"] for one in summaries]) == pytest.approx(speed, rel=0.2)
 
 
+@pytest.mark.parametrize("size", [1.0, 0.5])
+def test_commands_change_a_little_at_a_time(size):
+    env = make(HORSE, target_speed=(0.9, 2.6), target_seconds=(0.1, 0.1), size=size, episode_seconds=20.0)
+    env.reset(seed=1)
+    seen = [float(env.batch.now.target[0])]
+    for _ in range(500):
+        *_, failed, _, _ = env.step(np.zeros(16, np.float32))
+        seen.append(float(env.batch.now.target[0]))
+        if failed:
+            break
+    steps = np.abs(np.diff(seen))
+    assert 0.3 * size**0.5 < steps.max() <= 0.5 * size**0.5
+    assert np.count_nonzero(steps) > 10
+    assert 0.9 <= min(seen) <= max(seen) <= 2.6
+
+
 def test_the_reference_follows_the_command():
     env = make(HORSE, target_speed=(1.3, 2.6), target_seconds=(0.5, 1.0))
     env.reset(seed=1)
