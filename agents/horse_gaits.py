@@ -43,7 +43,7 @@ HARMONICS = 3  # of the trunk's motion
 FALLEN = 0.1  # share of falls at which the speed is raised no more
 
 WEIGHTS = {
-    "alive": 6.0, "tracking": 10.0, "peak": 0.35, "slip": 3.0, "landing": 0.3, "work": 0.5, "pitch": 4.0,
+    "alive": 11.0, "tracking": 5.0, "peak": 0.35, "slip": 6.0, "landing": 0.3, "work": 0.5, "pitch": 4.0,
     "action": 0.03, "fall": 20.0,
 }  # fmt: skip
 """Of the reward of a search. With the task's own, which charge more for slip, searches end at 2.2 m/s."""

@@ -24,7 +24,7 @@ from tyro.conf import Positional
 
 from agents import runs
 from agents.command import run
-from agents.gait_figures import mean_lag, play, which_count
+from agents.gait_figures import SECONDS, mean_lag, play, which_count
 from agents.horse_gaits import speed_of
 from agents.score import find_policy, make_rows
 from agents.statistics import estimate
@@ -257,6 +257,11 @@ def main(argv: list[str] | None = None) -> None:
     figures: dict[str, list[dict[str, Any]]] = {}
     text = []
     assert envs is not None
+    if envs.batch.episode_seconds < SECONDS:
+        raise ParameterError(
+            f"episode_seconds: expected {SECONDS:g} or more, for that long is judged, got"
+            f" {envs.batch.episode_seconds:g}"
+        )
     pace = envs.batch.body.height / HIP_HEIGHT  # Froude numbers are of the animal's own hips
     with runs.make_env(ENV_ID, **env_kwargs) as env:
         for name in args.policies:

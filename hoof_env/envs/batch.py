@@ -104,7 +104,7 @@ class EpisodeBatch:
         )
         self.steps_per_episode = round(s.episode_seconds / self.dt)
         self.groups = check_groups(s.observation, groups_of(task.entries))
-        self.target_speed = None if s.target_speed is None else pair("target_speed", s.target_speed, -20.0)
+        self.target_speed = self.body.commanded_speeds(s)
         self.speed_changes = self.target_speed is not None and self.target_speed[0] < self.target_speed[1]
         self.target_seconds = pair("target_seconds", s.target_seconds, self.dt if self.speed_changes else 0.0)
         for group, needed in (("target", "target_speed"), ("ground", "terrain")):
@@ -247,6 +247,12 @@ class EpisodeBatch:
             raise ParameterError(
                 f"options['parameters']: expected none with solver=\"paper\", got {checked['parameters']!r}"
             )
+        gaits = checked.get("gait")
+        if isinstance(gaits, np.ndarray) and gaits.ndim == 2 and len(gaits) != self.num_envs:
+            raise ParameterError(
+                f"options['gait']: expected one gait or {self.num_envs}, one for each environment, got"
+                f" {len(gaits)}"
+            )
         self._check_extremes(self.randomize | checked.get("parameters", {}))
         return checked
 
@@ -288,6 +294,9 @@ class EpisodeBatch:
                     drawn[name][k] = value
                 self._vary(int(env), values)
             self._varied[which] = bool(parameters)
+        gaits: Any = options.get("gait")
+        if np.ndim(gaits) == 2:  # one for each environment
+            options = {**options, "gait": gaits[which]}
         start = self.body.draw(options, generators, self.engine)
         now.steps[which] = 0.0
         for name in SUMS:
@@ -441,6 +450,13 @@ class EpisodeBatch:
         state["begun"] = self.begun.copy()
         return state | ({"paper": self.paper.get_state()} if self.paper else {})
 
+    def _is_possible(self, episode: Floats) -> bool:
+        """Whether weights, and the gaits of horses, are numbers that can be."""
+        layout, begun = self._episode_layout, ~np.isnan(self.begun[0])
+        rows = episode[:, begun]
+        gaits = rows[layout.rows("fore").start :] if self.body.legs > 1 else rows[:0]
+        return bool((rows[layout.rows("weight")] > 0).all() and np.isfinite(gaits).all())
+
     def set_state(self, state: Mapping[str, Any]) -> None:
         """Put back what `get_state` gave; `ParameterError` for one of another task, geometry or setting."""
         expected = (len(self.episode), self.num_envs)
@@ -448,7 +464,7 @@ class EpisodeBatch:
             episode = np.asarray(state["episode"], np.float64)
         except (TypeError, ValueError):
             episode = np.array(np.nan)
-        if np.isnan(episode).any():
+        if np.isnan(episode).any() or (episode.shape == expected and not self._is_possible(episode)):
             raise ParameterError(f"state['episode']: expected numbers, got {state['episode']!r:.60}")
         if episode.shape != expected:
             raise ParameterError(

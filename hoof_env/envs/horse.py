@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import FREE, GRAVITY, TRUNKS, HoofSpring, Limb, Limits, Trunk
-from hoof_env.envs.parameters import drive_of, ground_of
+from hoof_env.envs.parameters import drive_of, ground_of, pair
 from hoof_env.envs.reference import (
     ACTED,
     COUNT,
@@ -44,7 +44,7 @@ from hoof_env.envs.start import (
     with_parameters,
 )
 from hoof_env.envs.tasks import TASKS, Settings
-from hoof_env.errors import ParameterError, check_choice, check_number
+from hoof_env.errors import ParameterError, check_choice, check_number, count
 from hoof_env.gait import QUICK, WIDEST, FilterSettings
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import Geometry, load_geometry
@@ -112,12 +112,17 @@ class Horse:
         self.hips = {leg: (HIPS[leg.partition("_")[2]] * self.size, 0.0) for leg in LEGS}
         self.gaits = horse_gaits()
         self.gait = None if s.gait is None else self.gaits[check_choice("gait", s.gait, self.gaits)]
-        self.harmonics = int(check_number("harmonics", s.harmonics or 2, low=1, high=2))
-        self.filters = FILTERS[check_choice("filters", s.filters or "quick", FILTERS)]
+        self.harmonics = 2 if s.harmonics is None else count("harmonics", s.harmonics, most=2)
+        filters = "quick" if s.filters is None else check_choice("filters", s.filters, FILTERS)
+        self.filters = FILTERS[filters]
+        if s.hip_height is not None:
+            raise ParameterError(
+                f"hip_height: expected none of a horse, whose `size` it is, got {s.hip_height!r}"
+            )
         self.command_step = COMMAND_STEP * math.sqrt(self.size)
         self.lowest, self.highest = (self.size * height for height in HEIGHT)
-        own, stored = s.hoof_stiffness, TASKS["horse"].defaults["hoof_stiffness"]
-        self._softness = 0.0 if own is None else stored / own
+        spring, stored = self._spring(s), TASKS["horse"].defaults["hoof_stiffness"]
+        self._softness = 0.0 if spring is None else stored * self.size**2 / spring.stiffness
         self.limits = Limits((-PITCH, PITCH), (self.lowest, self.highest), CLEARANCE * self.size)
 
     def parts(self, s: Settings) -> tuple[Trunk, Ground, tuple[Limb, ...]]:
@@ -148,6 +153,15 @@ class Horse:
             damping = check_number("hoof_damping", s.hoof_damping, low=0, exclusive_low=True)
         return HoofSpring(stiffness * self.size**2, damping * self.size**2.5)
 
+    def commanded_speeds(self, s: Settings) -> tuple[float, float]:
+        """Lowest and highest commanded speed [m/s]; those of the task go with the root of the size."""
+        if s.target_speed is None:
+            raise ParameterError("target_speed: expected a speed or a range of them of a horse, got None")
+        low, high = pair("target_speed", s.target_speed, 0.1)
+        own = TASKS["horse"].defaults["target_speed"]
+        pace = math.sqrt(self.size) if (low, high) == tuple(own) else 1.0
+        return pace * low, pace * high
+
     def constants(self) -> dict[str, Any]:
         """Of the task's record: spans of actions and bounds of commands."""
         count = 2 + 2 * self.harmonics
@@ -165,7 +179,7 @@ class Horse:
     def check_options(self, options: Any, trunk: Trunk, settings: Settings) -> dict[str, Any]:
         """Reset options with their values checked; `ParameterError` of others."""
         checked = checked_options(options, OPTIONS)
-        if checked.get("gait") is not None and not isinstance(checked["gait"], np.ndarray):
+        if checked.get("gait") is not None:
             checked["gait"] = gait_numbers("options['gait']", checked["gait"], self.gaits)
         return with_parameters(checked, settings)
 

@@ -110,10 +110,10 @@ def alive(step, weight):  # type: ignore[no-untyped-def]
 
 
 def tracking(step, weight):  # type: ignore[no-untyped-def]
-    """1 at the commanded speed, less the relative error."""
+    """1 at the commanded speed, less twice the relative error: else it pays to slide less and be late."""
     asked = larger(step.commanded_progress, 1e-9)
     error = size(step.progress - asked) / asked
-    return choose(step.seconds > 0.0, weight * step.seconds * larger(1.0 - error, -1.0), 0.0)
+    return choose(step.seconds > 0.0, weight * step.seconds * larger(1.0 - 2.0 * error, -1.0), 0.0)
 
 
 def peak(step, weight):  # type: ignore[no-untyped-def]
@@ -122,8 +122,9 @@ def peak(step, weight):  # type: ignore[no-untyped-def]
 
 
 def slip(step, weight):  # type: ignore[no-untyped-def]
-    """In metres."""
-    return -weight * step.slip
+    """Over the commanded distance, for every second."""
+    asked = larger(step.commanded_progress, 1e-9)
+    return -weight * step.seconds * step.slip / asked
 
 
 def landing(step, weight):  # type: ignore[no-untyped-def]
@@ -153,7 +154,7 @@ _ACTION = next(term for term in TERMS if term.name == "action")
 HORSE_TERMS = (
     Term("alive", 6.0, "1/s", "for every second", alive),
     Term(
-        "tracking", 50.0, "1/s", "for every second, 1 less the relative error of the speed, at least -1",
+        "tracking", 50.0, "1/s", "for every second, 1 less twice the speed's relative error, at least -1",
         tracking,
     ),
     Term(
@@ -161,7 +162,10 @@ HORSE_TERMS = (
         "minus the increase of the legs' running peak GRF over the weight; each is the highest force of all"
         " substeps but at most twice the present one, so that it adds up to every stance's peak", peak,
     ),
-    Term("slip", 40.0, "1/m", "minus the way that hoofs slide in stance, to and fro", slip),
+    Term(
+        "slip", 140.0, "1/s",
+        "minus the way that all hoofs slide in stance, to and fro, over the commanded distance", slip,
+    ),
     Term("landing", 1.0, "-", "minus the stances that begin: who taps the ground pays twice", landing),
     Term(
         "work", 1.5, "1/s",

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import ONE_LEG, Limb, Trunk
 from hoof_env.envs.observation import HALF_RANGE, HIGH, LOW, MIDDLE
-from hoof_env.envs.parameters import drive_of, ground_of, hoof_spring
+from hoof_env.envs.parameters import drive_of, ground_of, hoof_spring, pair
 from hoof_env.envs.start import HIGHEST, LOWEST, Start, check_options, draw_starts
 from hoof_env.envs.tasks import Settings
 from hoof_env.errors import ParameterError, check_choice, check_number
@@ -59,6 +59,10 @@ class OneLeg:
         )  # fmt: skip
         limb = Limb(self.geometry, drive=drive_of(s), spring=self._spring)
         return trunk, ground_of(s, s.trunk_mass), (limb,)
+
+    def commanded_speeds(self, s: Settings) -> tuple[float, float] | None:
+        """Lowest and highest commanded speed [m/s], None for no command."""
+        return None if s.target_speed is None else pair("target_speed", s.target_speed, -20.0)
 
     def constants(self) -> dict[str, Any]:
         """Of the task's record."""

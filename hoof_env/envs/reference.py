@@ -128,6 +128,13 @@ def gait_numbers(name: str, given: Any, gaits: Mapping[str, HorseGait]) -> Float
             f"{name}: expected one of {', '.join(gaits)}, a HorseGait, or finite numbers of shape "
             f"({len(NAMES)},) or (n, {len(NAMES)}), got {given!r:.80}"
         )
+    low, high = np.transpose([(0.1, FASTEST), (-10.0, 10.0), *[*LIMITS.values()] * len(PAIRS)])
+    beyond = np.argwhere((numbers < low) | (numbers > high))
+    if len(beyond):
+        k = beyond[0][-1]
+        raise ParameterError(
+            f"{name}: expected {NAMES[k]} from {low[k]:g} to {high[k]:g}, got {numbers[tuple(beyond[0])]:g}"
+        )
     return numbers
 
 

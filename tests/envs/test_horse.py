@@ -12,7 +12,9 @@ from hoof_env.dynamics.parts import GRAVITY
 from hoof_env.envs.policies import make_policy
 from hoof_env.envs.reference import (
     COUPLING,
+    FASTEST,
     LEGS,
+    LIMITS,
     NAMES,
     HorseGait,
     PairReference,
@@ -23,10 +25,11 @@ from hoof_env.envs.reference import (
     trunk_motion,
 )
 from hoof_env.errors import ParameterError
+from hoof_env.leg.limb_masses import segment_masses
 
 SPEEDS = (1.853, 2.62)  # Froude numbers 0.25 and 0.5
 SEEDS = 40
-MARGIN = 60.0
+MARGIN = 100.0
 """Return over ten seconds by which the reference gait is ahead of what is no gait."""
 
 
@@ -34,7 +37,8 @@ def random_gaits(n, seed=0):
     """Some that a search might try."""
     rng = np.random.default_rng(seed)
     gaits = np.tile(reference_gaits(np.array([1.85]))[0], (n, 1))
-    return gaits + rng.uniform(-0.05, 0.05, gaits.shape)
+    low, high = np.transpose([(0.1, FASTEST), (-10.0, 10.0), *[*LIMITS.values()] * 2])
+    return np.clip(gaits + rng.uniform(-0.05, 0.05, gaits.shape), low, high)
 
 
 def commands(gait, theta, action):
@@ -313,6 +317,15 @@ def test_the_reference_follows_the_command():
         ({"hoof_stiffness": None, "hoof_damping": 100.0}, "hoof_damping: expected a hoof_stiffness"),
         ({"trunk_share": 0.5}, "trunk_share: expected trunk='suspended'"),
         ({"solver": "paper"}, "solver|trunk"),
+        ({"hip_height": 1.5}, "hip_height: expected none of a horse"),
+        ({"harmonics": 0}, "harmonics: expected a whole number"),
+        ({"harmonics": 1.5}, "harmonics: expected a whole number"),
+        ({"filters": ""}, "filters: expected one of"),
+        ({"hoof_stiffness": 0.0}, "hoof_stiffness: expected"),
+        ({"hoof_stiffness": "soft"}, "hoof_stiffness: expected"),
+        ({"target_speed": None}, "target_speed: expected a speed or a range"),
+        ({"target_speed": -2.0}, r"target_speed\[0\]: expected"),
+        ({"target_speed": (0.0, 2.0)}, r"target_speed\[0\]: expected"),
     ],
     ids=str,
 )
@@ -328,6 +341,9 @@ def test_bad_settings(settings, message):
         ({"phase": "early"}, r"options\['phase'\]"),
         ({"gait": "canter"}, r"options\['gait'\]: expected one of"),
         ({"gait": [1.0, 2.0]}, "a HorseGait, or finite numbers of shape"),
+        ({"gait": np.full(16, 5.0)}, r"options\['gait'\]: expected fore_speed_cos from -0.6 to 0.6, got 5"),
+        ({"gait": np.r_[-5.0, np.zeros(15)]}, r"options\['gait'\]: expected rate from 0.1 to"),
+        ({"gait": np.tile(np.r_[4.0, np.zeros(15)], (3, 1))}, r"options\['gait'\]: expected one gait or 1"),
         ({"pitch": 1.0}, r"options\['pitch'\]"),
     ],
     ids=str,
@@ -351,6 +367,41 @@ def test_gaits_by_name_class_and_numbers_are_the_same():
         HorseGait(6.0, 0.0, (0.0,), (0.0,))
     with pytest.raises(ParameterError, match=r"fore\['speed_cos'\]"):
         HorseGait(6.0, 0.0, (2.0, *[0.0] * 6), (0.0,) * 7)
+
+
+def test_a_gait_for_each_environment_is_that_of_those_that_start():
+    envs, gaits = gym.make_vec(HORSE, num_envs=3), random_gaits(3, seed=5)
+    envs.reset(seed=0, options={"gait": gaits})
+    same(envs.unwrapped.batch.begun[-len(NAMES) :, :], gaits.T)
+    changed = gaits[::-1].copy()
+    envs.reset(options={"gait": changed, "reset_mask": np.array([False, False, True])})
+    same(envs.unwrapped.batch.begun[-len(NAMES) :, :], np.array([gaits[0], gaits[1], changed[2]]).T)
+
+
+def test_a_pony_is_told_the_speeds_of_its_size():
+    one, half = make(HORSE), make(HORSE, size=0.5)
+    np.testing.assert_allclose(half.batch.target_speed, np.sqrt(0.5) * np.array(one.batch.target_speed))
+    assert make(HORSE, size=0.5, target_speed=1.2).batch.target_speed == (1.2, 1.2)
+
+
+def test_a_fall_ends_the_episode_and_says_why():
+    env = make(HORSE)
+    env.reset(seed=0, options={"pitch": 0.39, "target_speed": 0.5})
+    for _ in range(100):
+        *_, failed, _, info = env.step(np.zeros(16, np.float32))
+        if failed:
+            break
+    assert failed
+    assert "joint" in info["failure"]
+    assert info["reward_fall"] == pytest.approx(-60.0)
+
+
+def test_fore_limbs_bear_the_masses_of_fore_limbs():
+    limbs = make(HORSE).engine.limbs
+    for k, limb in enumerate(limbs):
+        own = sum(segment_masses(LEGS[k].partition("_")[2], 475.0).values())
+        assert limb.geometry.mass == pytest.approx(own, rel=1e-6)
+    assert limbs[0].geometry.mass != pytest.approx(limbs[2].geometry.mass, rel=0.01)
 
 
 def test_sums_of_the_legs_are_the_summary():
