@@ -1,0 +1,156 @@
+"""Episodes of policies as a Minari dataset, to learn from offline.
+
+    python -m agents.dataset run walk random --episodes 100 --dataset-id hoof_env/HorseLeg/scripted-v0
+    python -m agents.dataset agents/policies/Horse-v0 --env-id hoof_env/Horse-v0
+
+A policy is what agents.score takes. Episode k of each policy is reset with seed + k, so that whoever resets
+`dataset.recover_environment()` likewise and takes the same actions sees the same numbers. Beside Minari's
+files lies manifest.json with the command, the versions, the licence, the returns of each policy and the
+SHA-256 of every file. A dataset that is not whole is not kept: it is made in a folder of its own and moved.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import tempfile
+from dataclasses import dataclass
+from importlib.metadata import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from tyro.conf import Positional
+
+import hoof_env
+from agents import runs
+from agents.command import parse_pairs, run
+from agents.score import find_policy
+from hoof_env.errors import HoofEnvError, OutputError, ParameterError, count
+
+MANIFEST = "manifest.json"
+ROOT = "MINARI_DATASETS_PATH"  # where Minari keeps datasets
+
+
+@dataclass
+class Args:
+    """Arguments of the command."""
+
+    policies: Positional[tuple[str, ...]]
+    """whose episodes are kept, one policy after the other"""
+    env_id: str = "hoof_env/HorseLeg-v0"
+    """the environment"""
+    env_kwargs: tuple[str, ...] = ()
+    """its arguments: key=value ..., or one JSON object"""
+    episodes: int = 100
+    """of each policy"""
+    seed: int = 0
+    """of the first episode"""
+    dataset_id: str = ""
+    """NAMESPACE/NAME-vK; otherwise hoof_env/ID/POLICIES-v0"""
+    out: Path = Path("runs/datasets")
+    """folder of datasets, as Minari's MINARI_DATASETS_PATH"""
+
+
+def main(argv: list[str] | None = None) -> None:
+    """Write a dataset."""
+    import tyro
+
+    args = tyro.cli(Args, args=argv, prog="python -m agents.dataset", description=__doc__)
+    print(f"written: {write(args)}")
+
+
+def write(args: Args) -> Path:
+    """The folder of the dataset that the arguments ask for. `OutputError` where there is one already,
+    `ParameterError` of what cannot be played or named, `HoofEnvError` without Minari."""
+    try:
+        import minari
+        import minari.data_collector  # which asks for more than reading does
+    except ImportError:
+        raise HoofEnvError('agents.dataset needs Minari: pip install "hoof-env[train,minari]"') from None
+    if not args.policies:
+        raise ParameterError("policies: expected at least one, got none")
+    episodes = count("episodes", args.episodes)
+    short = args.env_id.rpartition("/")[2].removesuffix("-v0")
+    names = [Path(name).stem if Path(name).exists() else name for name in args.policies]
+    dataset_id = args.dataset_id or f"hoof_env/{short}/{'-'.join(names)}-v0"
+    folder = args.out / dataset_id
+    if folder.exists():
+        raise OutputError(f"{folder}: expected no dataset there; choose another --dataset-id or --out")
+    args.out.mkdir(parents=True, exist_ok=True)
+    kwargs = parse_pairs("--env-kwargs", args.env_kwargs)
+    before = os.environ.get(ROOT)
+    with tempfile.TemporaryDirectory(dir=args.out, prefix=".making-") as making:
+        os.environ[ROOT] = making
+        try:
+            with runs.make_env(args.env_id, **kwargs) as env:
+                returns = _collect(minari, env, args, episodes, dataset_id)
+        except ValueError as error:  # Minari's, of a name that it does not take
+            if "id" in str(error).lower() and "dataset" in str(error).lower():
+                raise ParameterError(f"dataset_id: {error}") from None
+            raise
+        finally:
+            os.environ.pop(ROOT)
+            if before is not None:
+                os.environ[ROOT] = before
+        made = Path(making, dataset_id)
+        _write_manifest(made, args, returns)
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        made.rename(folder)
+    return folder
+
+
+def _collect(minari: Any, env: Any, args: Args, episodes: int, dataset_id: str) -> dict[str, Any]:
+    """Play all episodes, and have Minari write them; returns of each policy."""
+    from tqdm import tqdm
+
+    policies = {name: find_policy(name, env, args.env_id) for name in args.policies}
+    collector, returns = minari.DataCollector(env), {}
+    with tqdm(total=len(policies) * episodes, unit=" episodes", leave=False, disable=None) as bar:
+        for name, policy in policies.items():
+            totals = []
+            for k in range(episodes):
+                observation, _ = collector.reset(seed=args.seed + k)
+                total, start, state, ended = 0.0, np.ones(1, bool), None, False
+                while not ended:
+                    action, state = policy.predict(
+                        observation, state, episode_start=start, deterministic=True
+                    )
+                    observation, reward, terminated, truncated, _ = collector.step(action)
+                    total += float(np.asarray(reward).sum())
+                    start, ended = np.zeros(1, bool), terminated or truncated
+                totals.append(total)
+                bar.update()
+            returns[name] = {
+                "episodes": episodes, "first_seed": args.seed, "mean_return": float(np.mean(totals)),
+                "sd_return": float(np.std(totals)),
+            }  # fmt: skip
+    collector.create_dataset(
+        dataset_id,
+        algorithm_name=", ".join(returns),
+        description=f"{episodes} episodes of each of {', '.join(returns)} on {args.env_id}",
+        requirements=[f"hoof-env=={hoof_env.__version__}"],
+    )
+    return returns
+
+
+def _write_manifest(folder: Path, args: Args, returns: dict[str, Any]) -> None:
+    files = sorted(file for file in folder.rglob("*") if file.is_file())
+    about = {
+        "env_id": args.env_id,
+        "env_kwargs": parse_pairs("--env-kwargs", args.env_kwargs),
+        "policies": returns,
+        "licence": metadata("hoof-env")["License-Expression"],
+        "command": runs.command(),
+        "versions": runs.versions(),
+        "sha256": {
+            file.relative_to(folder).as_posix(): hashlib.sha256(file.read_bytes()).hexdigest()
+            for file in files
+        },
+    }
+    runs.write_text(folder / MANIFEST, json.dumps(about, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    run(main)
