@@ -109,6 +109,14 @@ def verdicts(figures: list[dict[str, Any]]) -> list[tuple[str, ...]]:
         for pair in PAIRS:
             about = {**judge, "source": judges["duty"]["source"]}
             judged(f"trot-like at {froude}: duty_{pair}", one, f"duty_{pair}", about, bars, [pair])
+    for name, judge in judges["reported"].items():
+        one = near(judge["froude"], standing) if "froude" in judge else None
+        ours = one.get(name) if one else min((trot["froude"] for trot in trots), default=None)
+        off = "-" if ours is None else f"off by {ours / judge['horse'] - 1:+.0%}"
+        rows.append((
+            name, "-" if one is None else f"{one['froude']:.2f}", str(judge["horse"]), "none",
+            "-" if ours is None else f"{ours:.3g}", off, judge["source"],
+        ))  # fmt: skip
     return rows
 
 

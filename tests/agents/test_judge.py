@@ -71,7 +71,10 @@ def figures(**changes):
 def test_a_horse_meets_the_judges_and_what_slips_does_not_count():
     trot = figures(froude=1.0, lag=0.49, duty_fore=0.39, duty_hind=0.38, peak_fore=11.5, peak_hind=10.0)
     rows = judge.verdicts([figures(), trot])
-    assert {row[5] for row in rows if row[4] != "-"} == {"met"}
+    assert {row[5] for row in rows if row[4] != "-" and row[3] != "none"} == {"met"}
+    reported = {row[0]: row[5] for row in judge.verdicts([figures(stride_over_hip=1.573), trot])}
+    assert reported["stride_over_hip"] == "off by +10%"
+    assert reported["walk_to_trot"] == "off by +186%"  # the first gait that is trot-like, at 1 for 0.35
     slipping = figures(counts={"fore": True, "hind": False})
     verdict = {row[0]: row[5] for row in judge.verdicts([slipping])}
     assert verdict["walk: lag"] == verdict["walk: peak_hind"] == "does not count"
