@@ -9,6 +9,7 @@ import pytest
 
 from agents import judge
 from agents.gait_figures import Stance, lag_of, stances_of
+from hoof_env.envs.reference import reference_gaits
 from hoof_env.errors import HoofEnvError, ParameterError
 
 TIME = np.arange(0.0, 6.0, 1e-3)
@@ -104,6 +105,13 @@ def test_the_command_writes_figures_a_table_and_pictures(tmp_path, capsys):
     share = one["mean_fore"] * one["duty_fore"] + one["mean_hind"] * one["duty_hind"]
     assert 2 * share == pytest.approx(9.81, rel=0.02)  # in the mean the legs bear the weight
     assert "| walk: lag |" in (tmp_path / "table.md").read_text()
+    braking, propulsion = (
+        sum(one[f"{name}_{pair}"] * one[f"duty_{pair}"] for pair in ("fore", "hind"))
+        for name in ("braking", "propulsion")
+    )
+    assert braking == pytest.approx(propulsion, rel=0.1)  # for the speed stays
+    rate = reference_gaits(np.array([one["speed"]]))[0, 0]
+    assert one["stride_over_hip"] == pytest.approx(2 * np.pi * one["reached"] / rate / 1.4, rel=0.03)
     assert {leg for leg, _, _ in one["footfall"]} == {0, 1, 2, 3}
     on_the_ground = sum(ended - began for _, began, ended in one["footfall"])
     duty = 2 * (one["duty_fore"] + one["duty_hind"])  # of all legs; two strides, but for stances cut off

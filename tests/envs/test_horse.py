@@ -255,6 +255,54 @@ def test_tricks_stay_below_the_reference(reference, name):
     assert played(TRICKS[name])[0].mean() < reference - MARGIN
 
 
+def terms_of(act):
+    """Of the reward, by name, for a second of 40 horses that have not fallen."""
+    envs = gym.make_vec(HORSE, num_envs=SEEDS, autoreset_mode="SAME_STEP", target_speed=SPEEDS[0])
+    envs.reset(seed=0)
+    standing, total, count = np.ones(SEEDS, bool), {}, 0
+    for step in range(250):
+        taken = np.broadcast_to(np.asarray(act(None, 0.02 * step), np.float32), (SEEDS, 16))
+        _, _, failed, truncated, infos = envs.step(taken)
+        standing &= ~(failed | truncated)
+        count += standing.sum()
+        for name in (name for name in infos if name.startswith("reward_")):
+            total[name] = total.get(name, 0.0) + infos[name][standing].sum()
+    return {name: 50 * value / count for name, value in total.items()}
+
+
+@pytest.fixture(scope="module")
+def own_terms():
+    return terms_of(lambda seen, time: np.zeros(16))
+
+
+@pytest.mark.parametrize(
+    ("name", "term", "factor"),
+    [
+        ("hop", "peak", 3), ("hop", "landing", 3), ("skate", "slip", 8), ("brake", "slip", 5),
+        ("brake", "pitch", 3), ("bang-bang 3", "work", 10), ("bang-bang 3", "peak", 8),
+    ],
+)  # fmt: skip
+def test_a_trick_is_charged_for_what_it_does(own_terms, name, term, factor):
+    """So many times what the reference gait is charged for it."""
+    charged, usual = terms_of(TRICKS[name])[f"reward_{term}"], own_terms[f"reward_{term}"]
+    assert charged < factor * usual < 0
+
+
+@pytest.mark.parametrize("size", [1.0, 0.5])
+def test_the_trunk_starts_with_the_rates_of_its_motion(size):
+    """By differences over a thousandth of a stride."""
+    env, phase, speed, step = make(HORSE, size=size), 0.3, SPEEDS[0] * size**0.5, 1e-3
+    env.reset(seed=0, options={"phase": phase, "target_speed": speed})
+    now, then = (trunk_motion(np.array([SPEEDS[0]]), np.array([at])) for at in (phase, phase + step))
+    seconds = step * 2 * np.pi / reference_gaits(np.array([SPEEDS[0]]))[0, 0] * size**0.5
+    report = env.engine.report
+    rise = float((then["y"] - now["y"])[0]) * 1.4 * size / seconds
+    turn = float((then["pitch"] - now["pitch"])[0]) / seconds
+    assert report["vy"][0] == pytest.approx(rise, rel=0.02, abs=0.003)
+    assert report["pitch_rate"][0] == pytest.approx(turn, rel=0.02, abs=0.003)
+    assert abs(rise) > 0.02 * size**0.5
+
+
 @pytest.mark.parametrize("name", ["idle", "random"])
 def test_simple_policies_stay_below_the_reference(reference, name):
     policy = make_policy(name, gym.make(HORSE))
