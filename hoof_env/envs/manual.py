@@ -11,6 +11,8 @@ import math
 import re
 import tomllib
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from string import Template
 from typing import Any
@@ -30,8 +32,8 @@ from hoof_env.envs.one_leg import OneLeg
 from hoof_env.envs.parameters import HILLS, SPACING
 from hoof_env.envs.reference import ACTED, COUNT
 from hoof_env.envs.reward import check_weights
-from hoof_env.envs.tasks import PER_EPISODE, TASKS, Settings, Task, task_of, to_json
-from hoof_env.errors import OutputError, check_choice
+from hoof_env.envs.tasks import PER_EPISODE, TASKS, Settings, Task, check_effect, task_of, to_json
+from hoof_env.errors import OutputError, ParameterError, check_choice
 from hoof_env.gait import LIMITS, QUICK, FilterSettings
 from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS
 from hoof_env.leg.geometry import preset_names
@@ -120,7 +122,7 @@ def page(task: str, with_film: bool = False) -> str:
         lift_off=f"{100 * LIFT_OFF:g}",
         start=_start(s, what.start),
         options=markdown_table(("Option", "Unit", "Range", "Meaning"), _options(what.is_horse)),
-        parameters=", ".join(f"`{name}`" for name in PER_EPISODE),
+        parameters=", ".join(f"`{name}`" for name in PER_EPISODE if not what.is_horse or _can_be(name, s)),
         infos=markdown_table(("Key", "Unit", "Meaning"), _rows("horse_info" if what.is_horse else "info")),
         measured=str(len(measured_names(_features(s, body), body.legs))),
         quantities=markdown_table(("Name", "In", "Unit", "Meaning"), _quantities(what.is_horse)),
@@ -154,6 +156,15 @@ def index() -> str:
         rows.append((link, summary, actions, str(len(_observed(what))), what.reference, native))
     head = ("id", "what it is", "action", "observation", "reference gait", "native vector environment")
     return Template(WORDS["index"]).substitute(table=markdown_table(head, rows))
+
+
+def _can_be(name: str, settings: Settings) -> bool:
+    """Whether a parameter of an episode is not refused, be the crank driven or turned by a motor."""
+    for drive in ("prescribed", "motor"):
+        with suppress(ParameterError):
+            check_effect(name, replace(settings, drive=drive))
+            return True
+    return False
 
 
 def write_pages(out: Path, with_films: bool = False) -> list[Path]:
