@@ -129,7 +129,8 @@ class Horse:
         """Trunk, ground and legs of some settings."""
         size = self.size
         mass = check_number("trunk_mass", s.trunk_mass, low=0, exclusive_low=True) * size**3
-        trunk = Trunk("free", mass, height=self.height, pitch_inertia=mass * (GYRATION * size) ** 2)
+        inertia = mass * (GYRATION * size) ** 2
+        trunk = Trunk("free", mass, drag=0.0, height=self.height, pitch_inertia=inertia)
         drive, spring = drive_of(s), self._spring(s)
         fore, hind = (
             Limb(_limb(self.geometry, pair, MASS * size**3), self.hips[f"left_{pair}"], drive, spring)

@@ -444,6 +444,11 @@ def test_a_fall_ends_the_episode_and_says_why():
     assert info["reward_fall"] == pytest.approx(-60.0)
 
 
+def test_nothing_but_legs_and_weight_acts_on_the_trunk():
+    trunk = make(HORSE).engine.trunk
+    assert (trunk.kind, trunk.drag) == ("free", 0.0)
+
+
 def test_fore_limbs_bear_the_masses_of_fore_limbs():
     limbs = make(HORSE).engine.limbs
     for k, limb in enumerate(limbs):
