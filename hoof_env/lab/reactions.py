@@ -49,7 +49,8 @@ class JointReactions:
         self._engine = TrunkEngine(
             e.limbs, e.trunk, e.ground, e.terrain, sim_dt=e.sim_dt, integrator=e.integrator,
             substeps=e.substeps, step_error=e.step_error, harmonics=e.features.harmonics,
-            filters=e.filters, reactions=True, strides=e.counts_strides, limits=e.motion_limits, contact_law=e.contact_law,
+            filters=e.filters, reactions=True, strides=e.counts_strides, limits=e.motion_limits,
+            contact_law=e.contact_law,
         )  # fmt: skip
 
     def before(self) -> NDArray[np.float64]:
