@@ -38,7 +38,7 @@ FROUDE = 0.25  # where the search begins
 LOWEST = 0.1  # Froude number at which the slower gaits end
 KNOTS = (1.2, 1.5, 1.85, 2.2, 2.6, 3.0, 3.4)  # speeds that the reference gaits have, about [m/s]
 MOST = 40  # steps of speed at most
-STABLE, NEAR = 0.07, 0.05  # most falls, and distance of speeds, of what is shipped [-]
+STABLE, NEAR = 0.1, 0.05  # most falls, and distance of speeds, of what is shipped [-]
 HARMONICS = 3  # of the trunk's motion
 FALLEN = 0.1  # share of falls at which the speed is raised no more
 

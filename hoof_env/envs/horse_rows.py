@@ -163,7 +163,7 @@ HORSE_TERMS = (
         " substeps but at most twice the present one, so that it adds up to every stance's peak", peak,
     ),
     Term(
-        "slip", 140.0, "1/s",
+        "slip", 170.0, "1/s",
         "minus the way that all hoofs slide in stance, to and fro, over the commanded distance", slip,
     ),
     Term("landing", 1.0, "-", "minus the stances that begin: who taps the ground pays twice", landing),
