@@ -216,6 +216,10 @@ def run(  # type: ignore[no-untyped-def]
             shapes[k] = own[k]
     for n in range(begin, end, envs):
         memory = columns(at, lanes, form.trunk_memory, n, row, near)
+        before = memory.result
+        starts = before == STARTS
+        if steps < 0 and not anywhere(starts):
+            continue
         read_trunk(trunk, memory)
         if form.animal:
             clear_limits(trunk)
@@ -224,11 +228,7 @@ def run(  # type: ignore[no-untyped-def]
         for i in range(leg_count):
             first = (form.trunk_rows + i * form.leg_rows) * row + n
             read_leg(nth(legs, i), columns(at, lanes, form.leg_memory, first, row, far), form)
-        before = memory.result
-        starts = before == STARTS
         if steps < 0:
-            if not anywhere(starts):
-                continue
             begin_step(trunk, legs, leg_count, inside)
             if inside.kind != FIXED:
                 settle(trunk, legs, leg_count, inside, starts)

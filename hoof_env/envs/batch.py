@@ -320,7 +320,10 @@ class EpisodeBatch:
         self._refer(which, start.gaits)
         if self.paper:
             self.paper.start(which.tolist(), start.gaits, start.begun["crank_angle"], start.begun["x"])
-        self._observe(self.addresses)
+        near = self.addresses.copy()  # the groups of lanes from the first of them to the last
+        near[kernels.BEGIN] = which.min() // LANES * LANES
+        near[kernels.END] = min(self.engine.columns, (which.max() // LANES + 1) * LANES)
+        self._observe(near)
         return drawn
 
     def _vary(self, env: int, values: Mapping[str, float]) -> None:
@@ -357,8 +360,11 @@ class EpisodeBatch:
         """`step` after its kernel, which returned what happened."""
         if happened == kernels.NOT_A_NUMBER:
             raise ParameterError("action: expected finite numbers, got some that are not")
-        if happened & kernels.SOME_ENDED and not self.paper and self.engine.results.any():
-            self._observe_broken()
+        if happened & kernels.SOME_ENDED and not self.paper:
+            results = self.engine.results
+            broken = np.flatnonzero((results != Result.OK) & (results < Result.PITCH))
+            if broken.size:
+                self._observe_broken(broken)
         if happened & kernels.SOME_SWITCHED:
             due = (self.now.steps >= self.now.switch)[: self.num_envs]
             due = np.flatnonzero(due if idle is None else due & ~idle)
@@ -368,10 +374,10 @@ class EpisodeBatch:
                 self._refer(due, self.body.reference(self.now.target[due]))
         return bool(happened & kernels.SOME_ENDED)
 
-    def _observe_broken(self) -> None:
+    def _observe_broken(self, broken: NDArray[np.int64]) -> None:
         """Observe the last good state of what could not be simulated, whose report is of where it broke."""
-        data, broken = self.engine.arrays[0], np.flatnonzero(self.engine.results)
-        kept, form = data.copy(), form_of(self.engine.features)
+        data, form = self.engine.arrays[0], form_of(self.engine.features)
+        kept = data.copy()
         leg = form.leg_memory.rows("report")
         self.engine.advance(None, 0)
         reports = [form.trunk_memory.rows("report")]
