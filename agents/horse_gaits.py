@@ -46,7 +46,7 @@ WEIGHTS = {
     "alive": 11.0, "tracking": 5.0, "peak": 0.35, "slip": 6.0, "landing": 0.3, "work": 0.5, "pitch": 4.0,
     "action": 0.03, "fall": 20.0,
 }  # fmt: skip
-"""Of the reward of a search. With the task's own, which charge more for slip, searches end at 2.2 m/s."""
+"""Of the reward of a search: a first reward of the task, which charges less for slip than that of today."""
 
 CENTRE = (1.05, 0.45, -0.7, 0.0, 0.0)  # swing about which a search from nothing begins [rad]
 SPANS = (0.5, 0.4, 0.4, 0.3, 0.3)

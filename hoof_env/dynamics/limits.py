@@ -13,7 +13,7 @@ from hoof_env.simd import choose, lane_sum, level, plane, root, smaller
 from hoof_env.simd.compile import inlined
 
 LOOK = 5
-"""Whole steps from one look to the next: where the joints are costs a sixth of a step."""
+"""Whole steps from one look to the next: to find all joints takes square roots and quotients."""
 
 PITCH, HEIGHT, LOW_JOINT = float(Result.PITCH), float(Result.HEIGHT), float(Result.LOW_JOINT)
 

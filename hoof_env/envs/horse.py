@@ -79,7 +79,7 @@ others."""
 
 COMMAND_STEP = 0.5
 """From one commanded speed to the next at most [m/s]: the reference gait changes at once with the command,
-and with steps of 1.2 m/s one horse in fourteen falls."""
+and after larger changes horses fall, see docs/evidence/horse.md."""
 
 SPEED_SPREAD, PITCH_SPREAD, PHASE_SPREAD = 0.1, 0.02, 0.02
 """How far starts are from the gait: of the commanded speed [-], pitch [rad], each crank [strides]."""
