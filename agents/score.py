@@ -5,7 +5,7 @@
     python -m agents.score my_module:act --env-id hoof_env/HorseLegRail-v0
 
 A policy is what agents.evaluate takes, or MODULE:NAME, a Python function of observations, shape (n, k), that
-returns actions, shape (n, 4). Each gets the line that it would have in docs/evidence/baselines.md; several
+returns actions, one row each. Each gets the line that it would have in docs/evidence/baselines.md; several
 trained ones, as the seeds of one algorithm, also a line for all of them. A policy that was trained for
 another id, leg, setting or version is refused. A model file is a pickle and can run any code when it is
 loaded, and a module is code: give only what you trust.
@@ -173,7 +173,7 @@ class Args:
 
 @dataclass(frozen=True)
 class Function:
-    """A policy from a Python function of observations, shape (n, k), that returns actions, shape (n, 4)."""
+    """A policy from a Python function of observations, shape (n, k), that returns actions, shape (n, actions)."""
 
     name: str
     act: Callable[[Any], Any]
