@@ -173,7 +173,7 @@ class Args:
 
 @dataclass(frozen=True)
 class Function:
-    """A policy from a Python function of observations, shape (n, k), that returns actions, shape (n, actions)."""
+    """A policy from a Python function of observations, shape (n, k), that returns actions, a row each."""
 
     name: str
     act: Callable[[Any], Any]
