@@ -59,8 +59,8 @@ test-peers: setup
 test-oldest: setup
 	@rm -rf .oldest && $(PY) -m hatchling build -t wheel -d .oldest/dist
 	@$(PY) -m uv venv -q -p $(PY) .oldest/venv
-	@VIRTUAL_ENV=.oldest/venv $(PY) -m uv pip install -q --only-binary :all: --resolution lowest-direct -r pyproject.toml --extra render --extra plot --extra export
-	@VIRTUAL_ENV=.oldest/venv $(PY) -m uv pip install -q --no-deps .oldest/dist/*.whl
+	@$(PY) -m uv pip install -q --python .oldest/venv/bin/python --only-binary :all: --resolution lowest-direct -r pyproject.toml --extra render --extra plot --extra export
+	@$(PY) -m uv pip install -q --python .oldest/venv/bin/python --no-deps .oldest/dist/*.whl
 	@NUMBA_CACHE_DIR=.oldest/cache .oldest/venv/bin/python examples/smoke.py
 
 test-ecosystem: setup
