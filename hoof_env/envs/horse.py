@@ -48,7 +48,7 @@ from hoof_env.errors import ParameterError, check_choice, check_number, count
 from hoof_env.gait import QUICK, WIDEST, FilterSettings
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import Geometry, load_geometry
-from hoof_env.leg.limb_masses import trunk_mass, with_limb_masses
+from hoof_env.leg.limb_masses import with_limb_masses
 
 Floats = NDArray[np.float64]
 
@@ -163,10 +163,10 @@ class Horse:
 
     def constants(self) -> dict[str, Any]:
         """Of the task's record: spans of actions and bounds of commands."""
-        count = 2 + 2 * self.harmonics
-        low, high = np.transpose([*list(WIDEST.values())[:4], *[WIDEST["higher"]] * (count - 4)])
+        gait = 2 + 2 * self.harmonics
+        low, high = np.transpose([*list(WIDEST.values())[:4], *[WIDEST["higher"]] * (gait - 4)])
         high[0] = FASTEST
-        half = np.zeros(count)
+        half = np.zeros(gait)
         half[:ACTED] = SPANS
         return {
             "half": half, "low": low, "high": high, "height": self.height,
@@ -263,8 +263,3 @@ class Horse:
 @cache
 def _limb(geometry: Geometry, pair: str, mass: float) -> Geometry:
     return with_limb_masses(geometry, pair, mass)
-
-
-def default_trunk_mass() -> float:
-    """Of a horse of 475 kg [kg]."""
-    return trunk_mass(MASS)

@@ -9,6 +9,7 @@ from family import HORSE, actions, make, same
 
 from hoof_env import Sb3VecEnv
 from hoof_env.dynamics.parts import GRAVITY
+from hoof_env.envs.horse import MASS
 from hoof_env.envs.policies import make_policy
 from hoof_env.envs.reference import (
     COUPLING,
@@ -24,8 +25,9 @@ from hoof_env.envs.reference import (
     rows_of,
     trunk_motion,
 )
+from hoof_env.envs.tasks import TASKS
 from hoof_env.errors import ParameterError
-from hoof_env.leg.limb_masses import segment_masses
+from hoof_env.leg.limb_masses import segment_masses, trunk_mass
 
 SPEEDS = (1.853, 2.62)  # Froude numbers 0.25 and 0.5
 SEEDS = 40
@@ -149,6 +151,10 @@ def sorted_pairs(angles):
     """Angles that grow, with their phases."""
     order = np.argsort(angles)
     return angles[order], order / len(angles)
+
+
+def test_the_trunk_is_what_the_limbs_leave_of_the_horse():
+    assert TASKS["horse"].defaults["trunk_mass"] == pytest.approx(trunk_mass(MASS), abs=0.01)
 
 
 @pytest.mark.parametrize("speed", [1.3, *SPEEDS, 3.706])
