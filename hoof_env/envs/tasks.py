@@ -175,6 +175,9 @@ def check_effect(name: str, settings: Settings, within: str = "") -> None:
     if needed and (given not in values if values else _is_one(given)):
         good = " or ".join(f"{needed}={value!r}" for value in values) or f"a range of {needed}"
         named = f"{within}: {name!r}" if within else name
+        if needed == "trunk" and "free" in (given, *values):  # which no argument changes
+            who = "a horse" if given == "free" else "one leg"
+            raise ParameterError(f"{named}: expected none of {who}, where it has no effect")
         raise ParameterError(
             f"{named}: expected {good} beside it, without which it has no effect, got {needed}={given!r}"
         )
