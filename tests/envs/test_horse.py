@@ -369,7 +369,7 @@ def test_the_reference_follows_the_command():
         ({"filters": "fast"}, "filters: expected one of quick, slow, got 'fast'"),
         ({"gait": "canter"}, "gait: expected one of"),
         ({"hoof_stiffness": None, "hoof_damping": 100.0}, "hoof_damping: expected a hoof_stiffness"),
-        ({"trunk_share": 0.5}, "trunk_share: expected trunk='suspended'"),
+        ({"trunk_share": 0.5}, "trunk_share: expected none of a horse"),
         ({"solver": "paper"}, "solver|trunk"),
         ({"hip_height": 1.5}, "hip_height: expected none of a horse"),
         ({"harmonics": 0}, "harmonics: expected a whole number"),
