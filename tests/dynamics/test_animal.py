@@ -76,6 +76,19 @@ def test_beyond_a_limit_the_motion_goes_on(num_envs):
 
 
 @pytest.mark.parametrize("num_envs", [1, 9])
+@pytest.mark.parametrize(("drop", "first"), [(0.05, Result.PITCH), (0.001, Result.HEIGHT)])
+def test_the_first_limit_that_is_passed_counts(num_envs, drop, first):
+    """In one call, where both are; each by itself ends a call that has the other not."""
+    pitch, height = {"pitch": (-1.0, 0.2)}, {"height": (LOWEST + 0.3 - drop, 3.0)}
+    found = []
+    for bounds in (pitch, height, pitch | height):
+        engine = animal(Limits(**bounds), num_envs)
+        engine.reset(WALK, THETA, y=LOWEST + 0.3, pitch=0.15, pitch_rate=3.0)
+        found.append(engine.advance(steps=120).tolist())
+    assert found == [[kind] * num_envs for kind in (Result.PITCH, Result.HEIGHT, first)]
+
+
+@pytest.mark.parametrize("num_envs", [1, 9])
 def test_a_record_has_the_instant_at_which_a_limit_was_passed(num_envs):
     engine = animal(Limits(pitch=(-0.2, 0.2)), num_envs)
     engine.reset(WALK, THETA, pitch=0.15, pitch_rate=3.0)
