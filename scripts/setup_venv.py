@@ -185,7 +185,7 @@ def install(purpose: str, anew: bool) -> None:
         step("virtual environment", (python, "-I", "-m", "venv", ".venv"))
     tool = installer()
     install_torch(tool)
-    packages(tool, "all other packages", *ONLY_WHEELS, "hatchling", *requirements(purpose))
+    packages(tool, "all other packages", *ONLY_WHEELS, *requirements(purpose))
     packages(tool, "this checkout", "--no-deps", "--no-build-isolation", "--editable", ".")
 
 
@@ -227,12 +227,13 @@ def install_torch(tool: str) -> None:
 
 
 def requirements(purpose: str):
-    """What pyproject.toml asks for."""
+    """What pyproject.toml asks for, to build this checkout too."""
     import tomllib
 
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    asked = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    project = asked["project"]
     extras = [project["optional-dependencies"][extra] for extra in EXTRAS[purpose]]
-    return sum(extras, project["dependencies"])
+    return sum(extras, asked["build-system"]["requires"] + project["dependencies"])
 
 
 def packages(tool: str, title: str, *arguments: str, **environment: str) -> None:

@@ -44,6 +44,17 @@ def test_wheel_carries_licence_version_and_command(wheel):
     assert "hoof-env = hoof_env.cli:main" in wheel.read(f"{info}/entry_points.txt").decode()
 
 
+def test_the_page_on_an_index_leads_nowhere_that_is_not_there(wheel):
+    """Links and pictures of other files are left out of the README, their words stay."""
+    text = wheel.read(f"hoof_env-{hoof_env.__version__}.dist-info/METADATA").decode()
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert re.search(r"!\[.*\]\(docs/", readme)
+    assert "Description-Content-Type: text/markdown" in text
+    assert set(re.findall(r"\]\(([^)]*)\)", text)) == set(re.findall(r"\]\((https://[^)]*)\)", readme))
+    assert "To use the environments in a project of yours, install the package with pip." in text
+    assert "\n\n\n" not in text.partition("# hoof-env")[2]
+
+
 def test_import_is_quick_and_loads_nothing_heavy():
     """Processor time, which a busy machine hardly changes; the first run of five may still compile bytes."""
     program = (

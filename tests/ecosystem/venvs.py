@@ -77,7 +77,7 @@ class Venv:
             _run(base, "-I", "-m", "venv", str(CACHE / self.name))
         if self.torch and sys.platform == "linux" and TORCH_INDEX:
             self._torch()
-        self._pip("hatchling", "pytest")
+        self._pip("hatchling", "hatch-fancy-pypi-readme", "pytest")
         extras = f"[{','.join(self.extras)}]"
         if self.wheels:
             first, *others = self._build()
