@@ -31,7 +31,7 @@ from agents.statistics import estimate
 from hoof_env._output import markdown_table
 from hoof_env.envs.horse import HIP_HEIGHT
 from hoof_env.envs.reference import LEGS, PAIRS
-from hoof_env.errors import ParameterError
+from hoof_env.errors import ParameterError, check_number, count
 
 Floats = NDArray[np.float64]
 
@@ -181,12 +181,14 @@ def shape_of(froude: float, pair: str) -> Floats | None:
 
 
 def draw(figures: dict[str, list[dict[str, Any]]], out: Path) -> None:
-    """Force curves at each speed, two strides of the first policy's footfall, and lag, duty and cost of
-    transport over speed."""
+    """Force curves at each speed where the first policy stands, two strides of its footfall there, and lag,
+    duty and cost of transport over speed; none where it stands at no speed."""
     from matplotlib.figure import Figure
 
     first = next(iter(figures.values()))
     shown = [one for one in first if "curves" in one]
+    if not shown:
+        return print("no pictures: the first policy falls at every speed")
     picture = Figure((3.0 * len(shown), 5.2), layout="constrained")
     axes = picture.subplots(2, len(shown), sharex=True, sharey=True, squeeze=False)
     for column, one in enumerate(shown):
@@ -259,6 +261,9 @@ def main(argv: list[str] | None = None) -> None:
     args = tyro.cli(Args, args=argv, prog="python -m agents.judge", description=__doc__)
     if not args.policies:
         raise ParameterError("policies: expected at least one, got none")
+    count("--episodes", args.episodes)
+    for froude in args.froude or [None]:
+        check_number("--froude", froude, low=0, exclusive_low=True)
     env_kwargs = parse_pairs("--env-kwargs", args.env_kwargs)
     args.out.mkdir(parents=True, exist_ok=True)
     envs = make_rows(ENV_ID, args.episodes, **env_kwargs)

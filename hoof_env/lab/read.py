@@ -199,7 +199,8 @@ def _table(path: Path, head: str, lines: list[str], between: str, first: int) ->
                 raise ValueError(f"{len(row)} cells under {len(names)} names")
             rows.append([float(cell.replace(",", ".") if between == ";" else cell) for cell in row])
         except ValueError as error:
-            raise DataFileError(f"record {str(path)!r}: line {k}: expected numbers, got {error}") from None
+            got = str(error).removeprefix("could not convert string to float: ")
+            raise DataFileError(f"record {str(path)!r}: line {k}: expected numbers, got {got}") from None
     table = np.array(rows).reshape(-1, len(names))
     units = {part["name"]: part["unit"] for part in parts if part["unit"]}
     return Table(dict(zip(titles, table.T, strict=True)), units)

@@ -127,3 +127,16 @@ def test_bad_arguments(tmp_path):
         judge.main(["--out", str(tmp_path)])
     with pytest.raises(HoofEnvError, match="policy: expected"):
         judge.main(["canter", "--episodes", "2", "--out", str(tmp_path)])
+    with pytest.raises(ParameterError, match="--episodes: expected a whole number, 1 or more, got 0"):
+        judge.main(["reference", "--episodes", "0", "--out", str(tmp_path)])
+    with pytest.raises(ParameterError, match=r"--froude: expected a finite number in \(0, inf\], got -1"):
+        judge.main(["reference", "--froude", "-1", "--out", str(tmp_path)])
+
+
+def test_a_policy_that_stands_nowhere_has_a_table_and_no_pictures(tmp_path, capsys):
+    judge.main(["reference", "--froude", "9", "--episodes", "2", "--out", str(tmp_path)])
+    assert "no pictures: the first policy falls at every speed" in capsys.readouterr().out
+    (one,) = json.loads((tmp_path / "figures.json").read_text())["figures"]["reference"]
+    assert one["fell"] == 1.0
+    assert "| fell | 1 |" in (tmp_path / "table.md").read_text()
+    assert not list(tmp_path.glob("*.png"))

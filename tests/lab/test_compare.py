@@ -200,7 +200,7 @@ BROKEN = {
     "none.csv": (None, "expected a file, found none"),
     "empty.csv": ("", "expected two rows of numbers or more, found fewer"),
     "head.csv": ("time [s],force_y [N]\n", "expected two rows of numbers or more, found fewer"),
-    "words.csv": (STEADY + "1,x,2\n", "line 3: expected numbers, got could not"),
+    "words.csv": (STEADY + "1,x,2\n", "line 3: expected numbers, got 'x'"),
     "short.csv": (STEADY + "1,2\n", "line 3: expected numbers, got 2 cells under 3"),
     "nan.csv": (STEADY + "1,2,nan\n", "force_y: expected finite numbers, got nan"),
     "twice.csv": ("time,force_y,force_y\n0,1,2\n1,2,3\n", "expected names that differ"),
