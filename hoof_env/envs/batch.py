@@ -24,6 +24,7 @@ from hoof_env.dynamics.parts import GRAVITY, LARGEST, Result
 from hoof_env.dynamics.step_length import StepLength
 from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.envs import step as kernels
+from hoof_env.envs.episode import ACTIONS, FAILED, SUMS, episode_layout, task_type
 from hoof_env.envs.horse import Horse
 from hoof_env.envs.infos import Measurements, named
 from hoof_env.envs.observation import MIDDLE, check_groups, groups_of, observed
@@ -40,7 +41,6 @@ from hoof_env.envs.parameters import (
 )
 from hoof_env.envs.reference import rows_of
 from hoof_env.envs.reward import check_weights
-from hoof_env.envs.step import ACTIONS, FAILED, SUMS, episode_layout
 from hoof_env.envs.tasks import TASKS, Settings, Task
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait import GaitParameters
@@ -145,9 +145,7 @@ class EpisodeBatch:
 
     def _task_record(self) -> NDArray[Any]:
         slots, _, count = kernels.slots_of(self.task.entries)
-        constants = np.zeros(
-            1, kernels.task_type(len(self.task.terms), count, self.engine.features.gait_size)
-        )
+        constants = np.zeros(1, task_type(len(self.task.terms), count, self.engine.features.gait_size))
         task = constants[0]
         for name, value in self.body.constants().items():
             task[name] = value

@@ -14,10 +14,10 @@ from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
 from hoof_env.envs.base import LegBase, array_of, generator_of
+from hoof_env.envs.episode import FAILED
 from hoof_env.envs.infos import named
 from hoof_env.envs.recording import Recording
 from hoof_env.envs.reward import failure
-from hoof_env.envs.step import FAILED
 from hoof_env.envs.tasks import Keywords
 from hoof_env.errors import ParameterError, count, flag
 

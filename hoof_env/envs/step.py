@@ -10,18 +10,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from typing import Annotated, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hoof_env.dynamics.advance import LANES, MODEL, advance_kernels
-from hoof_env.dynamics.form import form_of
 from hoof_env.dynamics.layout import PLAIN, Features
+from hoof_env.envs.episode import ACTIONS, FAILED, TRUNCATED, Memories, memories_of, task_type
 from hoof_env.envs.horse_rows import HORSE_TERMS
 from hoof_env.envs.observation import Entry, Scene
-from hoof_env.envs.reference import ROOM, PairReference, command_gait
+from hoof_env.envs.reference import ROOM, command_gait
 from hoof_env.envs.reward import TERMS, Outcome, Term
-from hoof_env.gait import PARAMETERS
 from hoof_env.simd import (
     anywhere,
     choose,
@@ -38,7 +37,6 @@ from hoof_env.simd import (
     write,
 )
 from hoof_env.simd.compile import inlined, kernel, pasted
-from hoof_env.simd.layout import Block, Constants, Layout, Row, Size
 from hoof_env.simd.math import clip, tanh
 from hoof_env.simd.memory import (
     COLUMNS,
@@ -71,102 +69,6 @@ SHIPPED = tuple(term.name for term in TERMS)
 def is_own(term: Term) -> bool:
     """Whether a term is from outside the package, so that nobody knows what it does with broken reports."""
     return term.name not in SHIPPED and term not in HORSE_TERMS
-
-
-ACTIONS = len(PARAMETERS)
-"""Of a leg."""
-
-FAILED, TRUNCATED = 1, 2
-"""How an episode ended, in the place of 0."""
-
-SUMS = (
-    "time", "distance", "work", "impulse", "loaded_time", "stances", "peak_sum", "loading_rate_sum",
-    "highest", "slip",
-)  # fmt: skip
-"""Fields of `Episode` that begin at 0 and are added to."""
-
-
-ACTION, REWARD = Size("action", ACTIONS), Size("reward", len(TERMS))
-
-
-class Episode(Layout):
-    """Memory of an episode."""
-
-    action: Annotated[Block, ACTION]  # the last one, clipped to its limits
-    steps: Row  # control steps so far
-    x_before: Row  # x of the trunk before this step [m]
-    target: Row  # commanded speed [m/s]; infinite if there is none
-    weight: Row  # of trunk and leg [N]
-    time: Row  # simulated [s]
-    distance: Row  # forward [m]
-    work: Row  # positive, of both drives [J]
-    impulse: Row  # of the normal force [N s]
-    loaded_time: Row  # [s]
-    stances: Row
-    peak_sum: Row  # of the stances' peaks [N]
-    loading_rate_sum: Row  # of the stances' loading rates [N/s]
-    highest: Row  # force of the episode [N]
-    slip: Row  # of hoofs that bear load, without sign; 0 where the engine does not say [m]
-    terms: Annotated[Block, REWARD]  # of the last reward
-    ended: Row  # 0, `FAILED` or `TRUNCATED`
-    switch: Row  # the control step after which another speed is commanded
-    next_target: Row  # and which [m/s]
-
-
-class HorseEpisode(Episode):
-    """That of a horse."""
-
-    fore: PairReference  # of the reference gait
-    hind: PairReference
-
-
-@cache
-def episode_layout(terms: int, legs: int = 1) -> Any:
-    """`Episode` of so many legs with room for so many terms."""
-    layout: Any = Episode if legs == 1 else HorseEpisode
-    return layout.sized(action=legs * ACTIONS, reward=terms)
-
-
-class _Memories(NamedTuple):
-    episode: Any
-    trunk: Any
-    leg: Any
-    trunk_rows: int
-    legs: int
-    gait: int
-    animal: bool
-
-
-class Memories(Constants, _Memories):
-    """Layouts of what a step works on, how many rows the trunk's has, how many legs there are and how many
-    gait parameters each has, and whether their slip is known."""
-
-
-@cache
-def memories_of(terms: int, features: Features, legs: int = 1) -> Memories:
-    """The layouts with so many terms, of an engine of this kind."""
-    form = form_of(features)
-    return Memories(
-        episode_layout(terms, legs), form.trunk_memory, form.leg_memory, form.trunk_rows, legs, form.gait,
-        form.animal,
-    )  # fmt: skip
-
-
-def task_type(terms: int, entries: int, gait: int = ACTIONS) -> np.dtype[Any]:
-    """The record of a task's constants."""
-    return np.dtype(
-        [
-            ("base", "f8", (gait,)), ("half", "f8", (gait,)),  # command = base + half action
-            ("low", "f8", (gait,)), ("high", "f8", (gait,)),  # within these
-            ("middle", "f8", (gait,)), ("rate_bound", "f8", (gait,)),  # (value - middle) / half is observed
-            ("weights", "f8", (terms,)), ("episode_seconds", "f8"),  # of the reward
-            ("h", "f8"), ("substeps", "i8"), ("dt", "f8"), ("episode_steps", "i8"),
-            ("height", "f8"), ("lowest", "f8"), ("highest", "f8"),  # of the trunk: nominal and extreme [m]
-            ("stays", "?"),  # a fixed trunk
-            ("count", "i8"), ("places", "i8", (entries,)),  # of the observation; -1: not observed
-        ],
-        align=True,
-    )  # fmt: skip
 
 
 @inlined

@@ -24,10 +24,10 @@ from hoof_env.cli import main
 from hoof_env.dynamics.hoof import GroundHere
 from hoof_env.dynamics.layout import TRUNK_STATE, LegMemory, TrunkMemory
 from hoof_env.envs import tasks
+from hoof_env.envs.episode import Episode
 from hoof_env.envs.manual import page_of
 from hoof_env.envs.observation import Scene
 from hoof_env.envs.reward import Outcome
-from hoof_env.envs.step import Episode
 from hoof_env.errors import ParameterError
 from hoof_env.simd.user_functions import fingerprint, what_cannot_be_compiled
 
