@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.envs.batch import EpisodeBatch
-from hoof_env.envs.tasks import PER_EPISODE, SETTINGS, Settings, Task, task_of, to_json
+from hoof_env.envs.settings import PER_EPISODE, SETTINGS, Settings, to_json
+from hoof_env.envs.tasks import Task, task_of
 from hoof_env.errors import FixedSettingError, ParameterError, check_choice
 from hoof_env.gait import GaitParameters
 from hoof_env.ground.terrain import Terrain

@@ -41,7 +41,8 @@ from hoof_env.envs.parameters import (
 )
 from hoof_env.envs.reference import rows_of
 from hoof_env.envs.reward import check_weights
-from hoof_env.envs.tasks import TASKS, Settings, Task
+from hoof_env.envs.settings import Settings
+from hoof_env.envs.tasks import TASKS, Task
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait import GaitParameters
 from hoof_env.leg.profile import leg_profile

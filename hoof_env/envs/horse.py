@@ -34,6 +34,7 @@ from hoof_env.envs.reference import (
     reference_gaits,
     trunk_motion,
 )
+from hoof_env.envs.settings import Settings
 from hoof_env.envs.start import (
     FLAT,
     Start,
@@ -43,7 +44,7 @@ from hoof_env.envs.start import (
     hoof_height,
     with_parameters,
 )
-from hoof_env.envs.tasks import TASKS, Settings
+from hoof_env.envs.tasks import TASKS
 from hoof_env.errors import ParameterError, check_choice, check_number, count
 from hoof_env.gait import QUICK, WIDEST, FilterSettings
 from hoof_env.ground.contact import Ground

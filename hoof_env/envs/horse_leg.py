@@ -18,7 +18,7 @@ from hoof_env.envs.episode import FAILED
 from hoof_env.envs.infos import named
 from hoof_env.envs.recording import Recording
 from hoof_env.envs.reward import failure
-from hoof_env.envs.tasks import Keywords
+from hoof_env.envs.settings import Keywords
 from hoof_env.errors import ParameterError, count, flag
 
 
@@ -28,7 +28,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     Args:
         task: name in `tasks.TASKS`; the registered ids set it.
         render_mode: "rgb_array" or "human".
-        settings: any of `tasks.Settings`; the manual page (`manual`) says what they mean.
+        settings: any of `settings.Settings`; the manual page (`manual`) says what they mean.
 
     Attributes:
         task, settings: the task and its settings.
@@ -263,7 +263,7 @@ class RandomizeParameters(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
 
     Args:
         env: an environment of this family, wrapped or not.
-        ranges: (lowest, highest) or a number, by the names of `tasks.PER_EPISODE`.
+        ranges: (lowest, highest) or a number, by the names of `settings.PER_EPISODE`.
         enabled: False leaves the parameters as the environment was made with; can be set at any time.
 
     Raises:

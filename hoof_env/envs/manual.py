@@ -32,7 +32,8 @@ from hoof_env.envs.one_leg import OneLeg
 from hoof_env.envs.parameters import HILLS, SPACING
 from hoof_env.envs.reference import ACTED, COUNT
 from hoof_env.envs.reward import check_weights
-from hoof_env.envs.tasks import PER_EPISODE, TASKS, Settings, Task, check_effect, task_of, to_json
+from hoof_env.envs.settings import PER_EPISODE, Settings, check_effect, to_json
+from hoof_env.envs.tasks import TASKS, Task, task_of
 from hoof_env.errors import OutputError, ParameterError, check_choice
 from hoof_env.gait import LIMITS, QUICK, FilterSettings
 from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS

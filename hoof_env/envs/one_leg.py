@@ -14,8 +14,8 @@ from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import ONE_LEG, Limb, Trunk
 from hoof_env.envs.observation import HALF_RANGE, HIGH, LOW, MIDDLE
 from hoof_env.envs.parameters import drive_of, ground_of, hoof_spring, pair
+from hoof_env.envs.settings import Settings
 from hoof_env.envs.start import HIGHEST, LOWEST, Start, check_options, draw_starts
-from hoof_env.envs.tasks import Settings
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait import PARAMETERS, GaitParameters, HarmonicGait, gait_names, load_gait
 from hoof_env.ground.contact import Ground, load_ground

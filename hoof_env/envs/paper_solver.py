@@ -20,7 +20,7 @@ from hoof_env.dynamics.layout import LEG_REPORT, LEG_STATE, TRUNK_REPORT, TRUNK_
 from hoof_env.dynamics.memory import LIFT_OFF, Memory, memory_of
 from hoof_env.dynamics.observables import StanceCounter
 from hoof_env.dynamics.parts import Result
-from hoof_env.envs.tasks import Settings
+from hoof_env.envs.settings import Settings
 from hoof_env.errors import ParameterError
 from hoof_env.gait import GaitParameters
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from hoof_env.dynamics.parts import Drive, HoofSpring, Motor, Prescribed
-from hoof_env.envs.tasks import PER_EPISODE, SOLVERS, Settings, check_effect
+from hoof_env.envs.settings import PER_EPISODE, SOLVERS, Settings, check_effect
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.ground.contact import Ground, load_ground
 from hoof_env.ground.terrain import Terrain

@@ -13,7 +13,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from hoof_env.envs.base import fixed_setting
 from hoof_env.envs.infos import row_of
-from hoof_env.envs.tasks import SETTINGS, VectorKeywords
+from hoof_env.envs.settings import SETTINGS, VectorKeywords
 from hoof_env.envs.vector import OWN, HorseLegVectorEnv
 from hoof_env.errors import ParameterError
 

@@ -23,7 +23,7 @@ from hoof_env.envs.base import LegBase, array_of, fixed_setting, generator_of
 from hoof_env.envs.episode import FAILED, TRUNCATED
 from hoof_env.envs.infos import named
 from hoof_env.envs.recording import Recording
-from hoof_env.envs.tasks import Keywords
+from hoof_env.envs.settings import Keywords
 from hoof_env.errors import ParameterError, count
 
 Floats = NDArray[np.float64]

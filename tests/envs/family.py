@@ -9,7 +9,8 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
-from hoof_env.envs.tasks import TASKS, Settings, check_effect
+from hoof_env.envs.settings import Settings, check_effect
+from hoof_env.envs.tasks import TASKS
 from hoof_env.errors import ParameterError
 from hoof_env.gait import LIMITS
 

@@ -11,7 +11,7 @@ import pytest
 from family import LEGS, actions, running_peak_charge, same, together
 
 import hoof_env  # noqa: F401
-from hoof_env.envs.tasks import Settings
+from hoof_env.envs.settings import Settings
 from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.ground.contact import Ground, load_ground
 from hoof_env.leg.geometry import preset_names, read_preset

@@ -19,8 +19,9 @@ from hoof_env.envs.horse import OPTIONS as HORSE_OPTIONS
 from hoof_env.envs.manual import TABLES
 from hoof_env.envs.parameters import HILLS
 from hoof_env.envs.reference import LEGS
+from hoof_env.envs.settings import PER_EPISODE, Settings, to_json
 from hoof_env.envs.start import OPTIONS
-from hoof_env.envs.tasks import PER_EPISODE, TASKS, Settings, to_json
+from hoof_env.envs.tasks import TASKS
 from hoof_env.envs.vector import HorseLegVectorEnv
 from hoof_env.errors import ParameterError
 from hoof_env.gait import LIMITS, load_gait

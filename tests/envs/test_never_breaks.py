@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from hoof_env.dynamics.parts import GRAVITY
 from hoof_env.dynamics.stepping import SCHEMES
-from hoof_env.envs.tasks import PER_EPISODE
+from hoof_env.envs.settings import PER_EPISODE
 from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS
 from tests.legs import PRESETS
 

@@ -12,7 +12,7 @@ from family import IDS, OTHER, actions, effective, roll, same, substeps
 from hoof_env import RandomizeParameters
 from hoof_env.dynamics.parts import GRAVITY
 from hoof_env.dynamics.step_length import StepWarning
-from hoof_env.envs.tasks import PER_EPISODE
+from hoof_env.envs.settings import PER_EPISODE
 from hoof_env.errors import ParameterError
 
 LEG = "hoof_env/HorseLeg-v0"

@@ -16,7 +16,8 @@ from hoof_env import RandomizeParameters, Sb3VecEnv
 from hoof_env.dynamics.parts import ONE_LEG
 from hoof_env.envs.batch import EpisodeBatch
 from hoof_env.envs.reward import check_weights
-from hoof_env.envs.tasks import NEEDED, PER_EPISODE, TASKS, Settings, check_effect
+from hoof_env.envs.settings import NEEDED, PER_EPISODE, Settings, check_effect
+from hoof_env.envs.tasks import TASKS
 from hoof_env.errors import FixedSettingError, ParameterError
 from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS
 
