@@ -51,7 +51,7 @@ MODEL = np.dtype(
         ("legs", "i8"), ("cells", "i8"),  # how many; cells of a leg's table
         ("kind", "i8"), ("eighths", "i8"), ("friction_law", "i8"),  # of trunk, contact exponent, friction
         ("interpolated", "?"), ("is_terrain", "?"), ("new_rates", "?"),  # see `Ground`, `Terrain`, `Scheme`
-        ("strides", "?"),  # whether to count them
+        ("strides", "?"), ("motors", "?"),  # whether to count them; whether any crank has a motor
         ("stages", "i8"), ("fractions", "f8", (4,)), ("weights", "f8", (4,)),  # of the scheme
         ("settings", "f8", (12,)),  # of the filters
         ("ground_origin", "f8"), ("ground_per_metre", "f8"),  # of the terrain's grid
@@ -71,6 +71,7 @@ class Model(NamedTuple):
     is_terrain: bool
     new_rates: bool
     strides: bool
+    motors: bool
     together: bool  # the lanes are the legs of one trunk
     form: Form
     cells: int
@@ -98,7 +99,7 @@ def inner(model, tables, ground, small, together, law, form):  # type: ignore[no
         settings[k] = given.settings[k % 3 + 9]
     return Model(
         given.kind, given.eighths, given.friction_law, given.interpolated, given.is_terrain, given.new_rates,
-        given.strides, together, form, given.cells, address(tables),
+        given.strides, given.motors, together, form, given.cells, address(tables),
         settings, given.stages, small, offset(small, 4),
         carray(address(ground), ground.shape), given.ground_origin, given.ground_per_metre, law,
     )  # fmt: skip

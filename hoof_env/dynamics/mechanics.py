@@ -2,7 +2,7 @@
 
 Every function is one stage of the mechanics on rows of memory, whose names and units `layout` has. A row
 holds `Lanes`, one for each environment, which do not know of each other; compiled for one lane or eight, a
-number has the same bits: only + - * / and sqrt, no fast-math, no branch on a lane that changes a bit. Where
+number has the same bits: only + - * /, fused operations and sqrt, no fast-math, no branch on a lane that changes a bit. Where
 the lanes are the legs of one trunk (`together`) each has a copy of the trunk, and sums go over all.
 
 A leg enters as functions of its crank angle theta (`leg.profile`): toe and heel, the first moment s and the
@@ -54,13 +54,13 @@ def evaluate(trunk, legs, leg_count, model, elapsed):  # type: ignore[no-untyped
     for i in range(leg_count):
         leg = nth(legs, i)
         meet_ground(trunk, leg, model)
-        set_up_crank(trunk, leg, elapsed)
+        set_up_crank(trunk, leg, model.motors, elapsed)
         if model.kind != FIXED:
-            load_trunk(trunk, leg, model.kind, model.together)
+            load_trunk(trunk, leg, model.kind, model.motors, model.together)
     if model.kind != FIXED:
         accelerate_trunk(trunk, model.kind)
     for i in range(leg_count):
-        accelerate_crank(trunk, nth(legs, i))
+        accelerate_crank(trunk, nth(legs, i), model.motors)
 
 
 @inlined
@@ -133,7 +133,9 @@ def place_frame(trunk, leg, harmonics, elapsed):  # type: ignore[no-untyped-def]
 def filtered(leg, k, elapsed):  # type: ignore[no-untyped-def]
     """Parameter k of the gait, its rate and acceleration, `elapsed` [s] after the step's start."""
     value, rate, bend = leg.state.gait[k], leg.state.gait_rate[k], leg.gait_acceleration[k]
-    return value + elapsed * (rate + 0.5 * elapsed * bend), rate + elapsed * bend, bend
+    if elapsed != 0.0:
+        value, rate = value + elapsed * (rate + 0.5 * elapsed * bend), rate + elapsed * bend
+    return value, rate, bend
 
 
 @inlined
@@ -244,7 +246,7 @@ def settle(trunk, legs, leg_count, model, starts):  # type: ignore[no-untyped-de
 
 
 @inlined
-def set_up_crank(trunk, leg, elapsed):  # type: ignore[no-untyped-def]
+def set_up_crank(trunk, leg, motors, elapsed):  # type: ignore[no-untyped-def]
     """A crank's equation of motion (E5), with the trunk's acceleration a,
 
         crank_inertia theta_tt + moment_by_crank . a + crank_pitch_coupling pitch_tt = torque + ground - rest.
@@ -267,23 +269,24 @@ def set_up_crank(trunk, leg, elapsed):  # type: ignore[no-untyped-def]
     leg.rest_moment_theta, leg.rest_moment_beta = rest_theta, rest_beta
     leg.crank_pitch_coupling = coupling + cross(hip, leg.moment_by_crank)
     wanted, wanted_rate, _ = filtered(leg, SPEED, elapsed)
-    torque = clip(leg.settings.speed_gain * (wanted - w), leg.settings.torque_limit)
-    mobility, is_motor = 1.0 / leg.crank_inertia, leg.settings.is_motor > 0.0
-    free = mobility * (
-        torque + leg.ground_moment_theta - rest_theta + k * (leg.ground_moment_beta - rest_beta)
-    )
-    leg.crank_torque = torque
-    leg.crank_mobility = choose(is_motor, mobility, 0.0)
-    leg.free_theta_acceleration = choose(is_motor, free, wanted_rate)
+    leg.free_theta_acceleration = wanted_rate
+    if motors:
+        torque = clip(leg.settings.speed_gain * (wanted - w), leg.settings.torque_limit)
+        mobility, is_motor = 1.0 / leg.crank_inertia, leg.settings.is_motor > 0.0
+        free = mobility * (
+            torque + leg.ground_moment_theta - rest_theta + k * (leg.ground_moment_beta - rest_beta)
+        )
+        leg.crank_torque = torque
+        leg.crank_mobility = choose(is_motor, mobility, 0.0)
+        leg.free_theta_acceleration = choose(is_motor, free, wanted_rate)
 
 
 @inlined
-def load_trunk(trunk, leg, kind, together):  # type: ignore[no-untyped-def]
+def load_trunk(trunk, leg, kind, motors, together):  # type: ignore[no-untyped-def]
     """A leg's part in the trunk's equations, its crank eliminated (E8), and in outer force and moment."""
     w, frame_rate, pitch_rate = leg.theta_rate, leg.beta_rate, trunk.rates.pitch_rate
     s, hip, u, ground_force = leg.first_moment, leg.hip, leg.moment_by_crank, leg.ground_force
-    mass, coupling = leg.settings.mass, leg.crank_pitch_coupling
-    free, mobility = leg.free_theta_acceleration, leg.crank_mobility
+    mass, coupling, free = leg.settings.mass, leg.crank_pitch_coupling, leg.free_theta_acceleration
     slope = leg.turn * leg.slopes.moment_slope
     moment_acceleration = (  # of the first moment, where theta_tt, pitch_tt and a are 0
         leg.swing_acceleration * across(s)
@@ -291,11 +294,16 @@ def load_trunk(trunk, leg, kind, together):  # type: ignore[no-untyped-def]
         + frame_rate * (2.0 * w * across(leg.moment_by_theta) - frame_rate * s)
     )
     centripetal = pitch_rate * pitch_rate * hip  # minus O's acceleration there
-    mobile_u = mobility * u
     trunk.load = add(trunk.load, mass * centripetal - moment_acceleration - free * u, together)
-    trunk.mass_xx = add(trunk.mass_xx, -mobile_u.real * u.real, together)
-    trunk.mass_xy = add(trunk.mass_xy, -mobile_u.real * u.imag, together)
-    trunk.mass_yy = add(trunk.mass_yy, -mobile_u.imag * u.imag, together)
+    if motors:
+        mobile_u = leg.crank_mobility * u
+        trunk.mass_xx = add(trunk.mass_xx, -mobile_u.real * u.real, together)
+        trunk.mass_xy = add(trunk.mass_xy, -mobile_u.real * u.imag, together)
+        trunk.mass_yy = add(trunk.mass_yy, -mobile_u.imag * u.imag, together)
+        if kind == FREE:
+            trunk.mass_xp = add(trunk.mass_xp, -mobile_u.real * coupling, together)
+            trunk.mass_yp = add(trunk.mass_yp, -mobile_u.imag * coupling, together)
+            trunk.mass_pp = add(trunk.mass_pp, -leg.crank_mobility * coupling * coupling, together)
     trunk.rates.force = add(trunk.rates.force, ground_force, together)
     if kind == FREE:
         rest_force = mass * (plane(level(trunk, 0.0), trunk.settings.gravity) - centripetal)
@@ -305,9 +313,6 @@ def load_trunk(trunk, leg, kind, together):  # type: ignore[no-untyped-def]
             by_frame + cross(hip, ground_force - rest_force - moment_acceleration) - coupling * free,
             together,
         )
-        trunk.mass_xp = add(trunk.mass_xp, -mobile_u.real * coupling, together)
-        trunk.mass_yp = add(trunk.mass_yp, -mobile_u.imag * coupling, together)
-        trunk.mass_pp = add(trunk.mass_pp, -mobility * coupling * coupling, together)
         off = hip + trunk.place - trunk.stage.centre
         trunk.rates.moment = add(
             trunk.rates.moment, leg.ground_moment_beta + cross(off, ground_force), together
@@ -343,7 +348,10 @@ def accelerate_trunk(trunk, kind):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def accelerate_crank(trunk, leg):  # type: ignore[no-untyped-def]
+def accelerate_crank(trunk, leg, motors):  # type: ignore[no-untyped-def]
     """The crank's acceleration: a motor's gives way to the trunk's (E9)."""
-    pull = dot(leg.moment_by_crank, trunk.acceleration) + leg.crank_pitch_coupling * trunk.pitch_acceleration
-    leg.theta_acceleration = leg.free_theta_acceleration - leg.crank_mobility * pull
+    leg.theta_acceleration = leg.free_theta_acceleration
+    if motors:
+        u, coupling = leg.moment_by_crank, leg.crank_pitch_coupling
+        pull = dot(u, trunk.acceleration) + coupling * trunk.pitch_acceleration
+        leg.theta_acceleration = leg.free_theta_acceleration - leg.crank_mobility * pull

@@ -135,6 +135,7 @@ def new_model(scene: Scene, filters: FilterSettings, strides: bool) -> tuple[NDA
     record["interpolated"] = ground.approach == "interpolated"
     record["is_terrain"], record["new_rates"] = terrain != Terrain.flat(), scheme.new_rates
     record["strides"] = strides
+    record["motors"] = any(isinstance(limb.drive, Motor) for limb in scene.limbs)
     record["stages"] = len(scheme.weights)
     record["fractions"][: len(scheme.fractions)] = scheme.fractions
     record["weights"][: len(scheme.weights)] = scheme.weights

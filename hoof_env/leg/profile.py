@@ -29,7 +29,7 @@ from hoof_env.simd.functions import transposed
 from hoof_env.simd.layout import Block, Layout, Row, Vector
 from hoof_env.simd.math import ROUNDER
 from hoof_env.simd.memory import write_row
-from hoof_env.simd.types import DOUBLE, INDEX, Code, instruction, pick, spread, wide
+from hoof_env.simd.types import DOUBLE, INDEX, Code, fused, instruction, pick, spread, wide
 
 _HALF = 8
 """Functions that are looked up together: one vector of 512 bits."""
@@ -214,33 +214,22 @@ def _fit(geometry: Geometry, cells: int) -> NDArray[np.float64]:
 
 
 # The look-up: eight functions at once, for each lane by itself, since each has a row of its own; then rows
-# and columns are swapped. Estrin's scheme has the operations of Horner's in a chain of half the length:
-#
-#     p = c0 + c1 x, ... in pairs;  q = p + x^2 p, ...;  value = q + x^4 q,
-#
-# and likewise its derivative by the product rule.
+# and columns are swapped. Horner's scheme with fused operations takes one instruction a power for the value
+# and one for the derivative; the lanes' chains go on side by side.
 
 
 def _polynomials(builder: Any, first: Any, x: Any, sloped: bool) -> tuple[Any, Any]:
     """Values of `_HALF` functions whose coefficients begin at `first`; derivatives if `sloped`."""
-    times, plus, vector = builder.fmul, builder.fadd, ir.VectorType(DOUBLE, _HALF)
-    c = []
-    for p in range(DEGREE, -1, -1):
+    vector, x, coefficients = ir.VectorType(DOUBLE, _HALF), spread(builder, x, _HALF), []
+    for p in range(DEGREE + 1):
         place = builder.bitcast(builder.gep(first, [INDEX(p * WIDTH)]), vector.as_pointer())
-        c.append(builder.load(place, align=8))
-    x2 = times(x, x)
-    double, x4, x3 = plus(x, x), times(x2, x2), times(x2, x)
-    x, x2, x4, double, cubed = (
-        spread(builder, y, _HALF) for y in (x, x2, x4, double, times(x3, DOUBLE(4.0)))
-    )
-    pairs = [plus(c[k], times(c[k + 1], x)) for k in (0, 2, 4, 6)]
-    low, high = plus(pairs[0], times(x2, pairs[1])), plus(pairs[2], times(x2, pairs[3]))
-    value = plus(low, times(x4, high))
-    if not sloped:
-        return value, None
-    low_slope = plus(plus(c[1], times(c[3], x2)), times(double, pairs[1]))
-    high_slope = plus(plus(c[5], times(c[7], x2)), times(double, pairs[3]))
-    return value, plus(plus(low_slope, times(cubed, high)), times(x4, high_slope))
+        coefficients.append(builder.load(place, align=8))
+    value, slope = coefficients[0], None
+    for coefficient in coefficients[1:]:
+        if sloped:
+            slope = value if slope is None else fused(builder, "+", builder.fmul(slope, x), value)
+        value = fused(builder, "+", builder.fmul(value, x), coefficient)
+    return value, slope
 
 
 @instruction(

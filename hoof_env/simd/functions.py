@@ -5,9 +5,22 @@ from __future__ import annotations
 from typing import Any
 
 from llvmlite import ir
-from numba.core import cgutils, types
+from numba.core import types
 
-from hoof_env.simd.types import DOUBLE, INDEX, Code, Lanes, Plane, count_of, instruction, pick, spread, wide
+from hoof_env.simd.types import (
+    DOUBLE,
+    INDEX,
+    Code,
+    Lanes,
+    Plane,
+    call,
+    count_of,
+    fused,
+    instruction,
+    pick,
+    spread,
+    wide,
+)
 
 
 def _real(*kinds: Any) -> Any:
@@ -41,14 +54,14 @@ def across(code: Code, z: Any) -> Any:
 def dot(code: Code, z: Any, w: Any) -> Any:
     """Scalar product of planar vectors."""
     (a, b), (c, d) = code.planes(z, w)
-    return code.builder.fadd(code.builder.fmul(a, c), code.builder.fmul(b, d))
+    return fused(code.builder, "+", code.builder.fmul(a, c), code.builder.fmul(b, d))
 
 
 @instruction(_real_of_planes)
 def cross(code: Code, z: Any, w: Any) -> Any:
     """z x w, positive if w is to the left of z."""
     (a, b), (c, d) = code.planes(z, w)
-    return code.builder.fsub(code.builder.fmul(a, d), code.builder.fmul(b, c))
+    return fused(code.builder, "-", code.builder.fmul(a, d), code.builder.fmul(b, c))
 
 
 @instruction(lambda *kinds: kinds[1](*kinds) if isinstance(kinds[1], Plane) else _real(*kinds))
@@ -75,31 +88,22 @@ def smaller(code: Code, x: Any, y: Any) -> Any:
     return code.builder.select(code.builder.fcmp_ordered("<", y, x), y, x)
 
 
-def _call(code: Code, name: str, x: Any) -> Any:
-    """LLVM's own function of that name."""
-    (x,) = code.reals(x)
-    count = getattr(code.result, "count", 1)
-    full = f"llvm.{name}.{'f64' if count == 1 else f'v{count}f64'}"
-    kind = ir.FunctionType(x.type, [x.type])
-    return code.builder.call(cgutils.get_or_insert_function(code.builder.module, kind, full), [x])
-
-
 @instruction(_real)
 def root(code: Code, x: Any) -> Any:
     """The square root, rounded correctly."""
-    return _call(code, "sqrt", x)
+    return call(code.builder, "sqrt", code.reals(x))
 
 
 @instruction(_real)
 def size(code: Code, x: Any) -> Any:
     """The absolute value."""
-    return _call(code, "fabs", x)
+    return call(code.builder, "fabs", code.reals(x))
 
 
 @instruction(_real)
 def floor(code: Code, x: Any) -> Any:
     """The largest whole number that is not above it."""
-    return _call(code, "floor", x)
+    return call(code.builder, "floor", code.reals(x))
 
 
 @instruction(lambda *kinds: types.UniTuple(kinds[0], 2)(*kinds))

@@ -1,8 +1,9 @@
-"""Powers, exponential, cosine and sine that round the same alone and in lanes.
+"""Powers, exponential, cosine and sine that round the same in one lane and in many.
 
-Only + - * / and sqrt, which IEEE 754 rounds correctly in scalar and in vector code, and selections; no
-library function, no table, no branch that depends on the data. So each takes a float or `Lanes`, and a lane
-has the bits that it would have alone. What is not a number stays so.
+Only + - * /, fused operations and sqrt, which IEEE 754 rounds correctly in scalar and in vector code, and
+selections; no library function, no table, no branch that depends on the data. So a lane has the bits that it
+would have alone. Ordinary floats are taken, too, but their products are rounded before they enter a sum. What
+is not a number stays so.
 
 Sources: Cody & Waite 1980 (Software Manual for the Elementary Functions) for the reduction in two parts;
 the coefficients of sine and cosine are fdlibm's (Sun Microsystems, k_sin.c and k_cos.c, minimax on

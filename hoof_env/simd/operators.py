@@ -10,7 +10,7 @@ from numba.core import types
 from numba.core.extending import lower_builtin, make_attribute_wrapper
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 
-from hoof_env.simd.types import Code, Lanes, Mask, Plane, count_of, is_real
+from hoof_env.simd.types import Code, Lanes, Mask, Plane, count_of, fused, is_real
 
 
 def _operation(function: Any, typed: Callable[..., Any], lowered: Callable[..., Any], arity: int = 2) -> None:
@@ -57,13 +57,16 @@ def _both_masks(one: Any, two: Any) -> Any:
     return one if isinstance(one, Mask) and isinstance(two, Mask) else None
 
 
-def _elementwise(instruction: str) -> Callable[..., Any]:
+def _quotient(code: Code, one: Any, two: Any) -> Any:
+    return code.builder.fdiv(*code.reals(one, two))
+
+
+def _sum(sign: str) -> Callable[..., Any]:
     def lowered(code: Code, one: Any, two: Any) -> Any:
-        emit = getattr(code.builder, instruction)
         if isinstance(code.result, Lanes):
-            return emit(*code.reals(one, two))
+            return fused(code.builder, sign, *code.reals(one, two))
         (a, b), (c, d) = code.planes(one, two)
-        return code.join(emit(a, c), emit(b, d))
+        return code.join(fused(code.builder, sign, a, c), fused(code.builder, sign, b, d))
 
     return lowered
 
@@ -74,7 +77,8 @@ def _product(code: Code, one: Any, two: Any) -> Any:
         return times(*code.reals(one, two))
     if isinstance(left, Plane) and isinstance(right, Plane):
         (a, b), (c, d) = code.planes(one, two)
-        x, y = builder.fsub(times(a, c), times(b, d)), builder.fadd(times(a, d), times(b, c))
+        x = fused(builder, "-", times(a, c), times(b, d))
+        y = fused(builder, "+", times(a, d), times(b, c))
         return code.join(x, y)
     if isinstance(left, Plane):
         left, one, right, two = right, two, left, one
@@ -101,10 +105,10 @@ def _logic(instruction: str) -> Callable[..., Any]:
     return lambda code, one, two: getattr(code.builder, instruction)(one, two)
 
 
-_operation(operator.add, _sum_type, _elementwise("fadd"))
-_operation(operator.sub, _sum_type, _elementwise("fsub"))
+_operation(operator.add, _sum_type, _sum("+"))
+_operation(operator.sub, _sum_type, _sum("-"))
 _operation(operator.mul, _product_type, _product)
-_operation(operator.truediv, _of_reals(Lanes), _elementwise("fdiv"))
+_operation(operator.truediv, _of_reals(Lanes), _quotient)
 _operation(operator.neg, lambda z: None if isinstance(z, Mask) else z, _negative, arity=1)
 for _function, _symbol in (
     (operator.lt, "<"), (operator.le, "<="), (operator.gt, ">"), (operator.ge, ">="),

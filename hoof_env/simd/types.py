@@ -7,7 +7,7 @@ from functools import wraps
 from typing import Any, NamedTuple
 
 from llvmlite import ir
-from numba.core import extending, types
+from numba.core import cgutils, extending, types
 from numba.core.datamodel import models
 from numba.core.extending import register_model
 
@@ -119,6 +119,30 @@ def is_real(kind: Any) -> bool:
     return isinstance(kind, Lanes | types.Float | types.Integer)
 
 
+def fused(builder: Any, sign: str, x: Any, y: Any) -> Any:
+    """x + y or x - y by `sign`. If one of them is a product that was written just before, the second if both
+    are, it is not rounded: a * b + c is one fused operation. That is decided here, by the expression, and not
+    by the compiler, so that it is the same for any number of lanes."""
+    if _is_product(y):
+        a, b = y.operands
+        return call(builder, "fma", [builder.fneg(a) if sign == "-" else a, b, x])
+    if _is_product(x):
+        return call(builder, "fma", [*x.operands, builder.fneg(y) if sign == "-" else y])
+    return builder.fadd(x, y) if sign == "+" else builder.fsub(x, y)
+
+
+def _is_product(value: Any) -> bool:
+    return isinstance(value, ir.Instruction) and value.opname == "fmul"
+
+
+def call(builder: Any, name: str, values: list[Any]) -> Any:
+    """LLVM's own function of that name, of lanes."""
+    kind = values[0].type
+    full = f"llvm.{name}.{f'v{kind.count}f64' if isinstance(kind, ir.VectorType) else 'f64'}"
+    function = ir.FunctionType(kind, [kind] * len(values))
+    return builder.call(cgutils.get_or_insert_function(builder.module, function, full), values)
+
+
 class Code(NamedTuple):
     """Where instructions are written: numba's context, LLVM's builder, types of arguments and result."""
 
@@ -140,8 +164,9 @@ class Code(NamedTuple):
 
     def split(self, kind: Any, value: Any) -> tuple[Any, Any]:
         """x and y of planar vectors."""
-        pair = self.context.make_helper(self.builder, kind, value=value)
-        return pair.real, pair.imag
+        if isinstance(value, ir.instructions.InsertValue):  # as `join` made it
+            return value.operands[0].operands[1], value.operands[1]
+        return self.builder.extract_value(value, 0), self.builder.extract_value(value, 1)
 
     def planes(self, *values: Any) -> list[tuple[Any, Any]]:
         """x and y of each argument."""
@@ -149,9 +174,8 @@ class Code(NamedTuple):
 
     def join(self, x: Any, y: Any, kind: Any = None) -> Any:
         """Planar vectors, of the result's type unless `kind` is given."""
-        pair = self.context.make_helper(self.builder, kind or self.result)
-        pair.real, pair.imag = x, y
-        return pair._getvalue()
+        nothing = ir.Constant(self.context.get_value_type(kind or self.result), ir.Undefined)
+        return self.builder.insert_value(self.builder.insert_value(nothing, x, 0), y, 1)
 
 
 def instruction(typed: Callable[..., Any], literal: bool = False) -> Callable[[Callable[..., Any]], Any]:

@@ -1,5 +1,7 @@
-"""Lanes are numbers side by side: each operation is NumPy's, with the same bits in one lane and in eight."""
+"""Lanes are numbers side by side: each operation is NumPy's, but for products in sums, with the same bits in
+one lane and in eight."""
 
+from fractions import Fraction
 from typing import Annotated
 
 import numpy as np
@@ -106,6 +108,28 @@ def test_operations_are_those_of_numpy(numbers, found):
 @pytest.mark.parametrize("count", [4, 8])
 def test_a_lane_has_the_bits_that_it_has_alone(found, count):
     np.testing.assert_array_equal(found[count].view(np.int64), found[1].view(np.int64))
+
+
+def test_a_product_that_enters_a_sum_is_not_rounded():
+    def operations(x, out):
+        a, b, c, d = x[0], x[1], x[2], x[3]
+        out[0], out[1], out[2], out[3] = a * b + c, c + a * b, a * b - c, c - a * b
+        out[4], out[5] = a * b + c * d, a * b - c * d
+        out[6] = a * c
+        out[7] = out[6] + b
+
+    given = np.random.default_rng(1).normal(size=(INPUTS, 64))
+    given[2] = -given[0] * given[1] * (1 + 1e-12 * given[4])  # what is left is mostly rounding
+    a, b, c, d = ([Fraction(v) for v in row] for row in given[:4])
+    rounded = [[Fraction(float(x * y)) for x, y in zip(*two, strict=True)] for two in ((a, b), (a, c))]
+    exact = [
+        [a * b + c, c + a * b, a * b - c, c - a * b, r + c * d, r - c * d, s, s + b]
+        for a, b, c, d, r, s in zip(a, b, c, d, *rounded, strict=True)
+    ]
+    for count in (1, 8):
+        result = np.empty((OUTPUTS, 64))
+        on_lanes(count, operations)(given, result)
+        np.testing.assert_array_equal(result[:8].T, np.array(exact, float))
 
 
 def test_what_is_not_a_number_stays_so_where_it_comes_first():
