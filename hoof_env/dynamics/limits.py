@@ -19,6 +19,12 @@ PITCH, HEIGHT, LOW_JOINT = float(Result.PITCH), float(Result.HEIGHT), float(Resu
 
 
 @inlined
+def has_moved(result):  # type: ignore[no-untyped-def]
+    """Whether what a call of the engine asked for happened, be it beyond a limit."""
+    return (result == 0.0) | (result >= PITCH)
+
+
+@inlined
 def clear_limits(trunk):  # type: ignore[no-untyped-def]
     """Before a call: nothing was passed."""
     trunk.beyond[0] = 0.0

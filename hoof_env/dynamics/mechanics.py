@@ -2,7 +2,8 @@
 
 Every function is one stage of the mechanics on rows of memory, whose names and units `layout` has. A row
 holds `Lanes`, one for each environment, which do not know of each other; compiled for one lane or eight, a
-number has the same bits: only + - * /, fused operations and sqrt, no fast-math, no branch on a lane that changes a bit. Where
+number has the same bits: only + - * /, fused operations and sqrt, no fast-math, no branch on a lane that
+changes a bit. Where
 the lanes are the legs of one trunk (`together`) each has a copy of the trunk, and sums go over all.
 
 A leg enters as functions of its crank angle theta (`leg.profile`): toe and heel, the first moment s and the

@@ -14,6 +14,7 @@ from enum import IntEnum
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hoof_env.errors import Floats, ParameterError, check_choice, check_number
 from hoof_env.ground.contact import Ground
@@ -295,6 +296,11 @@ class Result(IntEnum):
     def message(self) -> str:
         """What happened, for people."""
         return _MESSAGES[self]
+
+
+def broken(results: NDArray[Any]) -> NDArray[np.bool_]:
+    """Which outcomes, values of `Result`, are of what could not be simulated, so that nothing happened."""
+    return (results != Result.OK) & (results < Result.PITCH)
 
 
 _PUT_BACK = "the state was put back to the last good one"

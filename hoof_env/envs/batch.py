@@ -20,7 +20,7 @@ from hoof_env.dynamics.advance import LANES
 from hoof_env.dynamics.constrained import INTEGRATORS
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.form import form_of
-from hoof_env.dynamics.parts import GRAVITY, LARGEST, Result
+from hoof_env.dynamics.parts import GRAVITY, LARGEST, Result, broken
 from hoof_env.dynamics.step_length import StepLength
 from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.envs import step as kernels
@@ -360,10 +360,9 @@ class EpisodeBatch:
         if happened == kernels.NOT_A_NUMBER:
             raise ParameterError("action: expected finite numbers, got some that are not")
         if happened & kernels.SOME_ENDED and not self.paper:
-            results = self.engine.results
-            broken = np.flatnonzero((results != Result.OK) & (results < Result.PITCH))
-            if broken.size:
-                self._observe_broken(broken)
+            put_back = np.flatnonzero(broken(self.engine.results))
+            if put_back.size:
+                self._observe_broken(put_back)
         if happened & kernels.SOME_SWITCHED:
             due = (self.now.steps >= self.now.switch)[: self.num_envs]
             due = np.flatnonzero(due if idle is None else due & ~idle)
@@ -373,7 +372,7 @@ class EpisodeBatch:
                 self._refer(due, self.body.reference(self.now.target[due]))
         return bool(happened & kernels.SOME_ENDED)
 
-    def _observe_broken(self, broken: NDArray[np.int64]) -> None:
+    def _observe_broken(self, envs: NDArray[np.int64]) -> None:
         """Observe the last good state of what could not be simulated, whose report is of where it broke."""
         data, form = self.engine.arrays[0], form_of(self.engine.features)
         kept = data.copy()
@@ -384,7 +383,7 @@ class EpisodeBatch:
             first = form.trunk_rows + k * form.leg_rows
             reports.append(slice(first + leg.start, first + leg.stop))
         for rows in reports:
-            kept[rows, broken] = data[rows, broken]
+            kept[rows, envs] = data[rows, envs]
         data[:] = kept
         self._observe(self.addresses)
 
@@ -395,8 +394,8 @@ class EpisodeBatch:
         n, begun, memory = self.num_envs, self.begun.copy(), self.engine.arrays[0]
         measured = self.measurements.read(memory[:, :n])
         if ended:
-            broken = self.engine.results != 0
-            measured[np.ix_(self.measurements.last_step, broken)] = 0.0  # nothing happened there
+            nothing = broken(self.engine.results)
+            measured[np.ix_(self.measurements.last_step, nothing)] = 0.0
         first, names = self.begun_rows, self.body.start_names
         infos: dict[str, NDArray[Any]] = dict(zip(names, begun, strict=False))
         infos["gait"] = named(begun[len(names) : first].T, self.body.gait_names)

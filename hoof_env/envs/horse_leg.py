@@ -13,6 +13,7 @@ from gymnasium import spaces
 from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
+from hoof_env.dynamics.parts import broken
 from hoof_env.envs.base import LegBase, array_of, generator_of
 from hoof_env.envs.episode import FAILED
 from hoof_env.envs.infos import named
@@ -160,7 +161,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             info["episode_summary"] = self.batch.summary(0)
             if failed:
                 info["failure"] = self.batch.failure(0)
-            if self.batch.engine.results[0]:  # nothing happened
+            if broken(self.batch.engine.results)[0]:
                 info["measured"][self.batch.measurements.last_step] = 0.0
         if self._recording is not None:
             self._show()

@@ -10,7 +10,8 @@ from hoof_env.envs.observation import PLAIN, TRUTH, Entry, Scale, in_contact, ta
 from hoof_env.envs.reference import LEGS
 from hoof_env.envs.reward import TERMS, Term
 from hoof_env.gait import PARAMETERS
-from hoof_env.simd import choose, larger, nth, size
+from hoof_env.ground.terrain import surface
+from hoof_env.simd import choose, larger, nth, size, smaller
 from hoof_env.simd.compile import inlined
 from hoof_env.simd.math import cos_sin
 
@@ -20,8 +21,21 @@ IN_WEIGHTS = Scale("tanh(x / weight)", lambda x, scene: x / scene.episode.weight
 """Of the whole horse."""
 
 
-def _height(x, scene):  # type: ignore[no-untyped-def]
+def _height(scene):  # type: ignore[no-untyped-def]
+    place = scene.trunk.report.place
+    return place.imag - surface(place.real, scene.ground, scene.ground_origin, scene.ground_per_metre)[0]
+
+
+def _from_hips(x, scene):  # type: ignore[no-untyped-def]
     return (x - scene.task.height) / (0.2 * scene.task.height)
+
+
+def _in_bounds(k: int) -> Scale:
+    def apply(x, scene):  # type: ignore[no-untyped-def]
+        low, high = scene.task.low[k], scene.task.high[k]
+        return (2.0 * x - (high + low)) / (high - low)
+
+    return Scale("-1 to 1 within the bounds of the command", apply)
 
 
 def _of_leg(i: int, measure: Callable[[Any], Any]) -> Callable[[Any], Any]:
@@ -61,9 +75,9 @@ _PER_LEG: tuple[tuple[str, str, str, Callable[[Any], Any], Scale], ...] = (
     ("sin(crank angle)", "crank", "-", _sine, PLAIN),
     ("cos(crank angle)", "crank", "-", _cosine, PLAIN),
     ("crank speed", "gait", "rad/s", _filter(0), tanh_of(10.0)),
-    ("swing offset", "gait", "rad", _filter(1), PLAIN),
-    ("swing sine coefficient", "gait", "rad", _filter(2), PLAIN),
-    ("swing cosine coefficient", "gait", "rad", _filter(3), PLAIN),
+    ("swing offset", "gait", "rad", _filter(1), _in_bounds(1)),
+    ("swing sine coefficient", "gait", "rad", _filter(2), _in_bounds(2)),
+    ("swing cosine coefficient", "gait", "rad", _filter(3), _in_bounds(3)),
     ("rate of crank speed", "rates", "rad/s^2", _filter_rate(0), tanh_of(50.0)),
     ("rate of swing offset", "rates", "rad/s", _filter_rate(1), tanh_of(10.0)),
     ("rate of swing sine coefficient", "rates", "rad/s", _filter_rate(2), tanh_of(10.0)),
@@ -79,8 +93,8 @@ HORSE_ENTRIES = (
     Entry("forward speed", "trunk", "m/s", lambda s: s.trunk.report.velocity.real, tanh_of(5.0)),
     Entry("vertical speed", "trunk", "m/s", lambda s: s.trunk.report.velocity.imag, tanh_of(1.0)),
     Entry(
-        "height", "trunk", "m", lambda s: s.trunk.report.place.imag,
-        Scale("tanh((x - hip height) / (0.2 hip height))", _height, True),
+        "height above the ground", "trunk", "m", _height,
+        Scale("tanh((x - hip height) / (0.2 hip height))", _from_hips, True),
     ),
     Entry("pitch", "trunk", "rad", lambda s: s.trunk.state.moving.pitch, tanh_of(0.3)),
     Entry("pitch rate", "trunk", "rad/s", lambda s: s.trunk.report.pitch_rate, tanh_of(2.0)),
@@ -122,9 +136,9 @@ def peak(step, weight):  # type: ignore[no-untyped-def]
 
 
 def slip(step, weight):  # type: ignore[no-untyped-def]
-    """Over the commanded distance, for every second."""
+    """Over the commanded distance, at most half of it, for every second."""
     asked = larger(step.commanded_progress, 1e-9)
-    return -weight * step.seconds * step.slip / asked
+    return -weight * step.seconds * smaller(step.slip / asked, 0.5)
 
 
 def landing(step, weight):  # type: ignore[no-untyped-def]
@@ -152,27 +166,28 @@ def fall(step, weight):  # type: ignore[no-untyped-def]
 _ACTION = next(term for term in TERMS if term.name == "action")
 
 HORSE_TERMS = (
-    Term("alive", 6.0, "1/s", "for every second", alive),
+    Term("alive", 45.0, "1/s", "for every second", alive),
     Term(
-        "tracking", 50.0, "1/s", "for every second, 1 less twice the speed's relative error, at least -1",
+        "tracking", 12.5, "1/s", "for every second, 1 less twice the speed's relative error, at least -1",
         tracking,
     ),
     Term(
-        "peak", 1.0, "-",
+        "peak", 0.25, "-",
         "minus the increase of the legs' running peak GRF over the weight; each is the highest force of all"
         " substeps but at most twice the present one, so that it adds up to every stance's peak", peak,
     ),
     Term(
-        "slip", 170.0, "1/s",
-        "minus the way that all hoofs slide in stance, to and fro, over the commanded distance", slip,
+        "slip", 42.5, "1/s",
+        "minus the way that all hoofs slide in stance, to and fro, over the commanded distance; 1/2 at most",
+        slip,
     ),
-    Term("landing", 1.0, "-", "minus the stances that begin: who taps the ground pays twice", landing),
+    Term("landing", 0.25, "-", "minus the stances that begin: who taps the ground pays twice", landing),
     Term(
-        "work", 1.5, "1/s",
+        "work", 0.4, "1/s",
         "minus the positive work of all drives over the weight times the commanded distance", work,
     ),
-    Term("pitch", 12.0, "1/(s rad^2)", "minus the square of the trunk's pitch", pitch),
+    Term("pitch", 3.0, "1/(s rad^2)", "minus the square of the trunk's pitch", pitch),
     _ACTION,
-    Term("fall", 60.0, "-", "once, minus this, when the episode fails", fall),
+    Term("fall", 15.0, "-", "once, minus this, when the episode fails", fall),
 )  # fmt: skip
 """The terms of `Horse-v0`."""

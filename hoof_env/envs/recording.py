@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.memory import LIFT_OFF
-from hoof_env.dynamics.parts import Result
+from hoof_env.dynamics.parts import broken
 from hoof_env.envs.batch import EpisodeBatch
 from hoof_env.render.instant import columns_of_engine, columns_of_horse, horse_instants, instants
 
@@ -48,7 +48,7 @@ class Recording:
         if self.batch.paper:
             return self.batch.paper.record(self.env)
         now, starts = engine.column(self.env), engine.state["time"][self.env] == 0.0
-        if self._before is None or starts or engine.results[self.env] != Result.OK:
+        if self._before is None or starts or broken(engine.results)[self.env]:
             return self._run(now, 0)
         return {
             name: values[1:] for name, values in self._run(self._before, self.batch.substeps, now).items()

@@ -16,6 +16,7 @@ import numpy as np
 
 from hoof_env.dynamics.advance import LANES, MODEL, advance_kernels
 from hoof_env.dynamics.layout import PLAIN, Features
+from hoof_env.dynamics.limits import has_moved
 from hoof_env.envs.episode import ACTIONS, FAILED, TRUNCATED, Memories, memories_of, task_type
 from hoof_env.envs.horse_rows import HORSE_TERMS
 from hoof_env.envs.observation import Entry, Scene
@@ -122,7 +123,7 @@ def sum_up(first_leg, layouts):  # type: ignore[no-untyped-def]
 @inlined
 def find_outcome(task, trunk, leg, episode, layouts, action_change):  # type: ignore[no-untyped-def]
     """What the step brought."""
-    works = trunk.result == 0.0  # else the state is of before: nothing is paid
+    works = has_moved(trunk.result)  # else the state is of before: nothing is paid
     x, y = trunk.report.place.real, trunk.report.place.imag
     running, peak, loading, highest, work, impulse, loaded, stances, slip = sum_up(leg, layouts)
     progress = x - episode.x_before
@@ -143,7 +144,7 @@ def find_outcome(task, trunk, leg, episode, layouts, action_change):  # type: ig
         stances=choose(works, stances, 0.0),
         slip=choose(works, slip, 0.0),
         action_change=action_change,
-        failed=choose(works & (y > task.lowest) & (y < task.highest), 0.0, 1.0),
+        failed=choose((trunk.result == 0.0) & (y > task.lowest) & (y < task.highest), 0.0, 1.0),
         episode_seconds=task.episode_seconds,
         weight=episode.weight,
         trunk=trunk,
@@ -217,7 +218,7 @@ def _with_terms(terms: tuple[Term, ...], layouts: Memories, k: int = 0) -> Calla
     @inlined
     def add_term(addresses, lanes, task, outcome, episode, n, total):  # type: ignore[no-untyped-def]
         if from_outside:
-            works = outcome.trunk.result == 0.0  # else the reports that it may read are of where it broke
+            works = has_moved(outcome.trunk.result)  # else the reports that it may read are of where it broke
             episode.terms[k] = choose(works, episode.terms[k], 0.0)
         total = episode.terms[k] if is_first else total + episode.terms[k]
         return rest(addresses, lanes, task, outcome, episode, n, total)
