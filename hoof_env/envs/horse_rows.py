@@ -9,7 +9,7 @@ from typing import Any
 from hoof_env.envs.observation import PLAIN, TRUTH, Entry, Scale, in_contact, tanh_of
 from hoof_env.envs.reference import LEGS
 from hoof_env.envs.reward import TERMS, Term
-from hoof_env.gait import PARAMETERS
+from hoof_env.gait import PARAMETERS, WIDEST
 from hoof_env.ground.terrain import surface
 from hoof_env.simd import choose, larger, nth, size, smaller
 from hoof_env.simd.compile import inlined
@@ -31,11 +31,9 @@ def _from_hips(x, scene):  # type: ignore[no-untyped-def]
 
 
 def _in_bounds(k: int) -> Scale:
-    def apply(x, scene):  # type: ignore[no-untyped-def]
-        low, high = scene.task.low[k], scene.task.high[k]
-        return (2.0 * x - (high + low)) / (high - low)
-
-    return Scale("-1 to 1 within the bounds of the command", apply)
+    low, high = list(WIDEST.values())[k]
+    middle, per = (low + high) / 2, 2 / (high - low)
+    return Scale(f"-1 to 1 from {low:g} to {high:g}", lambda x, scene: (x - middle) * per)
 
 
 def _of_leg(i: int, measure: Callable[[Any], Any]) -> Callable[[Any], Any]:

@@ -138,6 +138,9 @@ def scaled(scaling, x, leg):
     if action := re.fullmatch(r"as action (\d)", scaling):
         low, high = list(LIMITS.values())[int(action[1])]
         return (2 * x - low - high) / (high - low)
+    if bounds := re.fullmatch(r"-1 to 1 from (\S+) to (\S+)", scaling):
+        low, high = (float(bound) for bound in bounds.groups())
+        return (2 * x - low - high) / (high - low)
     if part := re.fullmatch(r"/ ([\d.]+)", scaling):
         return np.clip(x / float(part[1]), -1, 1)
     formula = scaling.replace("3 weights", "(3 * weight)").replace("hip height", f"{leg.batch.body.height}")

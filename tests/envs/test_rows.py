@@ -85,11 +85,18 @@ def test_a_mark_on_each():
             ours.call(name)
 
 
-def test_raw_observations_are_those_before_scaling():
-    envs = gym.make_vec(LEG, num_envs=9, **EVERYTHING).unwrapped
-    assert len(envs.observation_units) == len(envs.observation_names) == 29
+@pytest.mark.parametrize(
+    ("env_id", "count", "settings"),
+    [
+        (LEG, 29, EVERYTHING),
+        (HORSE, 82, {"observation": ["trunk", "target", "crank", "gait", "rates", "hoof", "action"]}),
+    ],
+)
+def test_raw_observations_are_those_before_scaling(env_id, count, settings):
+    envs = gym.make_vec(env_id, num_envs=9, **settings).unwrapped
+    assert len(envs.observation_units) == len(envs.observation_names) == count
     seen, _ = envs.reset(seed=0)
-    for taken in actions(2, 25, 9):
+    for taken in 0.2 * actions(2, 25, 9, env_id=env_id):
         raw = envs.raw_observation()
         assert tuple(raw) == envs.observation_names
         for k, entry in enumerate(envs.batch.entries):
