@@ -22,13 +22,13 @@ from numpy.typing import NDArray
 
 from agents import runs
 from agents.command import run
+from hoof_env.dynamics.parts import GRAVITY
 from hoof_env.envs.horse import HIP_HEIGHT
-from hoof_env.envs.reference import LIMITS, PAIRS, Stride
+from hoof_env.envs.reference import BOUNDS, LIMITS, PAIRS, Stride
 from hoof_env.errors import HoofEnvError
 
 Floats = NDArray[np.float64]
 
-GRAVITY = 9.81
 POPULATION, STARTS, SECONDS = 32, 8, 5.0
 """Candidates of a generation, episodes of each, and their length [s]."""
 
@@ -57,8 +57,7 @@ def decode(x: Floats) -> Floats:
     """Gaits from points of the box [-1, 1], both of shape (n, 16)."""
     low = [RATE[0], -0.5, *[-PART, -PART, *np.subtract(CENTRE, SPANS)] * len(PAIRS)]
     high = [RATE[1], 0.5, *[PART, PART, *np.add(CENTRE, SPANS)] * len(PAIRS)]
-    bounds = np.array([(0.1, 18.0), (-1.0, 1.0), *[*LIMITS.values()] * len(PAIRS)]).T
-    return np.clip(low + (x + 1) / 2 * np.subtract(high, low), *bounds)
+    return np.clip(low + (x + 1) / 2 * np.subtract(high, low), *BOUNDS)
 
 
 def encode(gaits: Floats) -> Floats:

@@ -48,6 +48,9 @@ NAMES = ("rate", "lead", *(f"{pair}_{name}" for pair in PAIRS for name in PAIR))
 """Of the numbers of a gait, in their order."""
 
 FASTEST = 6 * np.pi  # a crank [rad/s]
+RATES, LEADS = (0.1, FASTEST), (-10.0, 10.0)  # of a gait [rad/s], [strides]
+BOUNDS = np.transpose([RATES, LEADS, *[*LIMITS.values()] * len(PAIRS)])
+"""Lowest and highest of each number of a gait, shape (2, 16)."""
 COUPLING = 0.2  # most that falling out of step changes the speed of a crank [-]
 
 
@@ -71,8 +74,8 @@ class HorseGait:
     hind: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        check_number("rate", self.rate, low=0.1, high=FASTEST)
-        check_number("lead", self.lead, low=-10.0, high=10.0)
+        check_number("rate", self.rate, low=RATES[0], high=RATES[1])
+        check_number("lead", self.lead, low=LEADS[0], high=LEADS[1])
         for pair in PAIRS:
             given: Any = getattr(self, pair)
             try:
@@ -128,7 +131,7 @@ def gait_numbers(name: str, given: Any, gaits: Mapping[str, HorseGait]) -> Float
             f"{name}: expected one of {', '.join(gaits)}, a HorseGait, or finite numbers of shape "
             f"({len(NAMES)},) or (n, {len(NAMES)}), got {given!r:.80}"
         )
-    low, high = np.transpose([(0.1, FASTEST), (-10.0, 10.0), *[*LIMITS.values()] * len(PAIRS)])
+    low, high = BOUNDS
     beyond = np.argwhere((numbers < low) | (numbers > high))
     if len(beyond):
         k = beyond[0][-1]
