@@ -1,5 +1,10 @@
 """What a policy on the horse does at a commanded speed: forces, stances, slip, lag, cost of transport.
 
+Most figures are made of the engine's sums over all episodes that did not end early. Those that need forces at
+every substep are of such among the first `WATCHED`, whose substeps are run again: the lag, the force over a
+stance, and its peaks of braking and propulsion, the highest horizontal force backward and forward of each
+whole stance (0 where there is none), averaged over stances.
+
 Left and right legs of a pair are interchangeable in the plane: the lag is how long after a hind hoof the next
 fore hoof lands, over the stride and within half of one, so that 0 is a trot or a pace and 0.25 a walk.
 """
@@ -13,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.layout import Features, stride_sums
+from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.dynamics.observables import stance_figures
 from hoof_env.dynamics.parts import GRAVITY
 from hoof_env.envs.reference import LEGS, PAIRS
@@ -21,34 +27,66 @@ Floats = NDArray[np.float64]
 
 SETTLED, SECONDS = 2.0, 10.0  # from where on figures count, and the length of an episode [s]
 WATCHED = 8  # episodes whose forces are kept at every substep
-MOST_SLIP, TURNS = 0.10, (0.95, 1.05)  # where a figure counts: [m], stances a turn
-SHORTEST, DIP = 0.05, 0.05  # of a stance [s]; between two peaks, over the higher one [-]
+SHORTEST, DIP = 0.05, 0.05  # of a stance [s]; beside a peak, over the highest one [-]
+FORCES = ("toe_normal", "heel_normal", "toe_friction", "heel_friction")  # that are kept
+HORIZONTAL = ("braking", "propulsion")  # forces backward and forward
 
 
 @dataclass
 class Stance:
-    """One stance: hoof, times [s] and normal force [N] at every substep."""
+    """One stance: hoof, times [s], normal force and horizontal one, forward, [N] at every substep."""
 
     leg: int
     began: float
     ended: float
     force: Floats
+    push: Floats
 
     @property
     def is_two_peaked(self) -> bool:
-        """Whether the force, smoothed over a tenth of the stance, falls by `DIP` between two peaks."""
+        """Whether the force, smoothed over a tenth of the stance, has two peaks, neither one nor three. A
+        peak is within the stance and `DIP` of the highest force above what is on either side of it."""
+        from scipy.signal import find_peaks
+
         width = max(len(self.force) // 10, 1)
-        smooth = np.convolve(self.force, np.ones(width) / width, "same")
-        top = int(np.argmax(smooth))
-        for side in (smooth[:top][::-1], smooth[top + 1 :]):  # away from the highest peak
-            lowest = np.minimum.accumulate(side)
-            if len(side) and (side - lowest).max() > DIP * smooth[top]:
-                return True
-        return False
+        padded = np.pad(self.force, (width // 2, width - 1 - width // 2), "edge")  # no fall at the ends
+        smooth = np.convolve(padded, np.ones(width) / width, "valid")
+        return len(find_peaks(smooth, prominence=DIP * smooth.max())[0]) == 2
+
+    @property
+    def peak_braking(self) -> float:
+        """Highest force backward [N]."""
+        return max(float(-self.push.min()), 0.0)
+
+    @property
+    def peak_propulsion(self) -> float:
+        """Highest force forward [N]."""
+        return max(float(self.push.max()), 0.0)
 
 
-def stances_of(time: Floats, forces: Floats, lift_off: float) -> list[Stance]:
-    """Whole stances in a record, `forces` of shape (n, 4)."""
+@dataclass
+class Played:
+    """What episodes were from `SETTLED` on, n of them.
+
+    Attributes:
+        seconds: that they are about [s].
+        sums: of the engine over this time, each shape (4, n).
+        travelled: [m], shape (n,).
+        turns: of the cranks [-], shape (4, n).
+        upright: which did not end early, shape (n,).
+        watched: of the first `WATCHED`, what `forces_of` takes.
+    """
+
+    seconds: float
+    sums: dict[str, Floats]
+    travelled: Floats
+    turns: Floats
+    upright: NDArray[np.bool_]
+    watched: list[list[dict[str, Floats]]]
+
+
+def stances_of(time: Floats, forces: Floats, pushes: Floats, lift_off: float) -> list[Stance]:
+    """Whole stances in a record, normal and horizontal forces of shape (n, 4)."""
     found = []
     for leg in range(forces.shape[1]):
         loaded = np.concatenate([[False], forces[:, leg] > lift_off, [False]])
@@ -58,7 +96,8 @@ def stances_of(time: Floats, forces: Floats, lift_off: float) -> list[Stance]:
         )
         for begin, end in zip(begins, ends, strict=True):
             if begin > 0 and end < len(time) and time[end - 1] - time[begin] > SHORTEST:
-                found.append(Stance(leg, time[begin], time[end - 1], forces[begin:end, leg]))
+                when = slice(begin, end)
+                found.append(Stance(leg, time[begin], time[end - 1], forces[when, leg], pushes[when, leg]))
     return found
 
 
@@ -72,81 +111,112 @@ def lag_of(stances: list[Stance], stride: float) -> float:
     return mean_lag(gaps)
 
 
-def play(envs: Any, policy: Any, speed: float) -> dict[str, Any]:
-    """Episodes at one commanded speed [m/s]: figures of each pair of legs, means over the episodes that did
-    not end early; and stances of those that are watched."""
+def watch(envs: Any, policy: Any, speed: float) -> Played:
+    """Play episodes at one commanded speed [m/s]."""
     seeds = [3_000_000 + k for k in range(envs.num_envs)]
     seen, _ = envs.reset(seed=seeds, options={"target_speed": speed})
-    envs.record(0)
     n, dt = envs.num_envs, envs.dt
     features = Features(envs.batch.body.harmonics, envs.settings.hoof_stiffness is not None, True)
-    names, settled = stride_sums(features), round(SETTLED / dt)
-    sums = {name: np.zeros((4, n)) for name in names}
+    sums = {name: np.zeros((4, n)) for name in stride_sums(features)}
     start, upright, state = np.ones(n, bool), np.ones(n, bool), None
-    watched: list[list[Any]] = [[] for _ in range(min(WATCHED, n))]
-    mass = envs.weight / GRAVITY
-    steps = round(SECONDS / dt)
+    watched: list[list[dict[str, Floats]]] = [[] for _ in range(min(WATCHED, n))]
+    settled, steps = round(SETTLED / dt), round(SECONDS / dt)
     for k in range(steps):
         actions, state = policy.predict(seen, state, episode_start=start, deterministic=True)
         seen, _, failed, _, infos = envs.step(np.asarray(actions, np.float32))
         start, upright = np.zeros(n, bool), upright & ~failed
         measured = infos["measured"]
-        if k == settled:
-            began = {name: measured[name].copy() for name in ("x", *(f"{leg}_theta" for leg in LEGS))}
-        if k >= settled and k < steps - 1:  # the last one may have started again
-            for name in names:
-                sums[name] += np.array([measured[f"{leg}_{name}"] for leg in LEGS])
-            last = {name: measured[name].copy() for name in began}
+        if k == settled - 1:  # where the first step that counts begins
+            began = _place(measured)
+        if settled <= k < steps - 1:  # the last one may have started again
+            for name, total in sums.items():
+                total += np.array([measured[f"{leg}_{name}"] for leg in LEGS])
+            last = _place(measured)
             for env, kept in enumerate(watched):
                 record = envs.record(env)
-                kept.append({name: record[name] for name in ("time", "toe_normal", "heel_normal")})
-    seconds = (steps - 1 - settled) * dt
-    travelled = last["x"] - began["x"]
-    turns = np.array([last[f"{leg}_theta"] - began[f"{leg}_theta"] for leg in LEGS]) / (2 * np.pi)
-    found = stance_figures(sums, seconds, turns)
-    strides = turns.mean(0)
-    kilograms = float(mass[0])
+                kept.append({name: record[name] for name in ("time", *FORCES)})
+    moved = last - began
+    return Played((steps - 1 - settled) * dt, sums, moved[0], moved[1:] / (2 * np.pi), upright, watched)
+
+
+def _place(measured: Any) -> Floats:
+    """Place [m] and crank angles [rad], shape (5, n)."""
+    return np.array([measured[name] for name in ("x", *(f"{leg}_theta" for leg in LEGS))])
+
+
+def play(envs: Any, policy: Any, speed: float) -> dict[str, Any]:
+    """Episodes at one commanded speed [m/s]: figures of each pair of legs, means over the episodes that did
+    not end early; and stances of those that are watched."""
+    played, height = watch(envs, policy, speed), envs.batch.body.height
+    kilograms = float(envs.weight[0]) / GRAVITY
     result: dict[str, Any] = {
-        "speed": speed, "froude": speed**2 / (GRAVITY * envs.batch.body.height),
-        "fell": float(1 - upright.mean()),
+        "speed": speed, "froude": froude_of(speed, height), "fell": float(1 - played.upright.mean()),
     }  # fmt: skip
-    if not upright.any():
+    if not played.upright.any():
         return result
+    return result | _from_sums(played, kilograms, height) | _from_stances(played, kilograms)
+
+
+def froude_of(speed: float, height: float) -> float:
+    """Froude number [-] of a speed [m/s] at a height of the hips [m]."""
+    return speed**2 / (GRAVITY * height)
+
+
+def _from_sums(played: Played, kilograms: float, height: float) -> dict[str, float]:
+    """Figures that the engine's sums have, of upright episodes of an animal with its hips at a height [m]."""
+    upright, travelled = played.upright, played.travelled[played.upright]
+    found = stance_figures(played.sums, played.seconds, played.turns)
     pairs = {
-        name: np.nanmean(values.reshape(2, 2, n)[..., upright], axis=(1, 2)) for name, values in found.items()
+        name: np.nanmean(values.reshape(2, 2, -1)[..., upright], axis=(1, 2))
+        for name, values in found.items()
     }
+    result: dict[str, float] = {}
     for k, pair in enumerate(PAIRS):
-        for name in ("peak", "mean", "braking", "propulsion"):
-            result[f"{name}_{pair}"] = float(pairs[name][k]) / kilograms
+        for name, of in (("peak", "peak"), ("mean", "mean"), *((f"mean_{x}", x) for x in HORIZONTAL)):
+            result[f"{name}_{pair}"] = float(pairs[of][k]) / kilograms
         for name in ("duty", "slip", "stances_per_turn"):
             result[f"{name}_{pair}"] = float(pairs[name][k])
         result[f"peak_over_mean_{pair}"] = result[f"peak_{pair}"] / result[f"mean_{pair}"]
-    impulse = sums["load_impulse"][:, upright].reshape(2, -1).sum(1)
-    work = sums["positive_work"][:, upright].sum(0)
-    period = seconds / strides[upright].mean()
-    result |= {
-        "reached": float(travelled[upright].mean() / seconds),
-        "stride_over_hip": float(np.mean(travelled[upright] / strides[upright]) / envs.batch.body.height),
+    impulse = played.sums["load_impulse"][:, upright].reshape(2, -1).sum(1)
+    work = played.sums["positive_work"][:, upright].sum(0)
+    reached = float(travelled.mean() / played.seconds)
+    return result | {
+        "reached": reached,
+        "froude_reached": froude_of(reached, height),
+        "stride_over_hip": float(np.mean(travelled / played.turns.mean(0)[upright]) / height),
         "impulse_fore": float(impulse[0] / impulse.sum()),
-        "transport": float(np.mean(work / (kilograms * GRAVITY * travelled[upright]))),
+        "transport": float(np.mean(work / (kilograms * GRAVITY * travelled))),
     }
-    stances, lags, lift_off = [], [], 0.05 * kilograms * GRAVITY / 4
-    for env, kept in enumerate(watched):
-        if upright[env]:
-            time, forces = forces_of(kept)
-            own = stances_of(time, forces, lift_off)
-            stances += own
-            lags.append(lag_of(own, period))
-            if "footfall" not in result:
-                result["footfall"] = footfall_of(own, time[-1], 2 * period)
-    result["lag"] = mean_lag(lags) if lags else float("nan")
-    fore = [one for one in stances if one.leg < 2]
-    result["two_peaked"] = float(np.mean([one.is_two_peaked for one in fore])) if fore else float("nan")
-    result["curves"] = {
-        pair: curve_of([o for o in stances if o.leg // 2 == k], kilograms) for k, pair in enumerate(PAIRS)
+
+
+def _from_stances(played: Played, kilograms: float) -> dict[str, Any]:
+    """Figures that need the forces at every substep, of watched episodes that are upright; NaN if none is."""
+    period = played.seconds / float(played.turns.mean(0)[played.upright].mean())
+    lift_off = LIFT_OFF * kilograms * GRAVITY / len(LEGS)
+    stances, lags = [], []
+    footfall: list[list[float]] = []
+    for kept in (kept for env, kept in enumerate(played.watched) if played.upright[env]):
+        time, forces, pushes = forces_of(kept)
+        own = stances_of(time, forces, pushes, lift_off)
+        stances += own
+        lags.append(lag_of(own, period))
+        footfall = footfall or footfall_of(own, time[-1], 2 * period)
+    of_pairs = {pair: [one for one in stances if one.leg // 2 == k] for k, pair in enumerate(PAIRS)}
+    result: dict[str, Any] = {
+        "lag": mean_lag(lags) if lags else float("nan"),
+        "two_peaked": _mean([one.is_two_peaked for one in of_pairs["fore"]]),
+        "footfall": footfall,
+        "curves": {pair: curve_of(own, kilograms) for pair, own in of_pairs.items()},
     }
-    result["counts"] = which_count(result)
+    for pair, own in of_pairs.items():
+        for name in HORIZONTAL:
+            peaks = [getattr(one, f"peak_{name}") for one in own]
+            result[f"peak_{name}_{pair}"] = _mean(peaks) / kilograms
     return result
+
+
+def _mean(values: list[Any]) -> float:
+    return float(np.mean(values)) if values else float("nan")
 
 
 def footfall_of(stances: list[Stance], end: float, span: float) -> list[list[float]]:
@@ -159,25 +229,18 @@ def footfall_of(stances: list[Stance], end: float, span: float) -> list[list[flo
     ]
 
 
-def which_count(figures: dict[str, Any]) -> dict[str, bool]:
-    """Whether those of each pair of legs do."""
-    return {
-        pair: figures[f"slip_{pair}"] < MOST_SLIP
-        and TURNS[0] <= figures[f"stances_per_turn_{pair}"] <= TURNS[1]
-        for pair in PAIRS
-    }
-
-
 def mean_lag(lags: list[float]) -> float:
     """Of lags within half a stride, which is a whole turn."""
     return float(np.angle(np.nanmean(np.exp(4j * np.pi * np.array(lags)))) / (4 * np.pi) % 0.5)
 
 
-def forces_of(records: list[Any]) -> tuple[Floats, Floats]:
-    """Times, shape (n,), and normal forces of the legs, shape (n, 4), of records one after the other."""
-    time = np.concatenate([record["time"].ravel() for record in records])
-    forces = np.concatenate([(record["toe_normal"] + record["heel_normal"])[..., 0] for record in records])
-    return time, forces
+def forces_of(records: list[dict[str, Floats]]) -> tuple[Floats, Floats, Floats]:
+    """Times, shape (n,), and normal and horizontal forces of the legs, shape (n, 4), of records one after the
+    other."""
+    time, toe, heel, toe_push, heel_push = (
+        np.concatenate([record[name] for record in records]) for name in ("time", *FORCES)
+    )
+    return time.ravel(), (toe + heel)[..., 0], (toe_push + heel_push)[..., 0]
 
 
 def curve_of(stances: list[Stance], mass: float) -> list[float]:

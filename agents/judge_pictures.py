@@ -1,0 +1,107 @@
+"""Pictures of the judges: force curves, footfall, and figures over speed beside those of horses."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.judges import of_speeds, read_judges
+from hoof_env.envs.reference import LEGS, PAIRS
+
+Floats = NDArray[np.float64]
+Figures = dict[str, list[dict[str, Any]]]
+
+
+def shape_of(froude: float, pair: str) -> Floats | None:
+    """Normal force of a horse over its stance [N/kg] in the form of Alexander & Jayes (1978, J. Zool.
+    185:27), cos x - q cos 3x, scaled to the published peak: with two peaks (q = 0.4) at a walk, half a sine
+    at a trot. None at other speeds."""
+    judges = read_judges()
+    for gait, q in (("walk", 0.4), ("trot", 0.0)):
+        if abs(froude - judges[gait]["froude"]) < 0.01:
+            x = np.linspace(-0.5, 0.5, 101) * np.pi
+            shape = np.cos(x) - q * np.cos(3 * x)
+            return judges[gait][f"peak_{pair}"]["horse"] * shape / shape.max()
+    return None
+
+
+def forces(figures: Figures, shown: list[dict[str, Any]]) -> Any:
+    """Normal force over the stance of all policies, at each speed that is shown."""
+    from matplotlib.figure import Figure
+
+    picture = Figure((3.0 * len(shown), 5.2), layout="constrained")
+    axes = picture.subplots(2, len(shown), sharex=True, sharey=True, squeeze=False)
+    for column, one in enumerate(shown):
+        for row, pair in enumerate(PAIRS):
+            for other in figures.values():
+                same = next((o for o in other if o["speed"] == one["speed"] and "curves" in o), None)
+                if same and same["curves"][pair]:
+                    axes[row, column].plot(same["curves"][pair], lw=1.2, color=f"C{row}", alpha=0.8)
+            if (shape := shape_of(one["froude"], pair)) is not None:
+                axes[row, column].plot(shape, "k--", lw=1, label="horse, idealised")
+                axes[row, column].legend(fontsize=7)
+            axes[row, column].grid(alpha=0.3)
+        title = f"Fr {one['froude']:.2f}, duty {one['duty_fore']:.2f} / {one['duty_hind']:.2f}"
+        axes[0, column].set_title(title, fontsize=9)
+        axes[1, column].set_xlabel("stance [%]")
+    for row, pair in enumerate(PAIRS):
+        axes[row, 0].set_ylabel(f"{pair}: normal force [N/kg]")
+    return picture
+
+
+def footfall(shown: list[dict[str, Any]]) -> Any:
+    """Which hoofs bear load over two strides."""
+    from matplotlib.figure import Figure
+
+    picture = Figure((2.6 * len(shown), 1.9), layout="constrained")
+    for axis, one in zip(picture.subplots(1, len(shown), squeeze=False)[0], shown, strict=True):
+        for leg, began, ended in one["footfall"]:
+            axis.barh(len(LEGS) - leg, ended - began, left=began, height=0.6, color=f"C{leg // 2}")
+        axis.set_yticks(range(len(LEGS), 0, -1), [name.replace("_", " ") for name in LEGS], fontsize=8)
+        axis.set_ylim(0.4, len(LEGS) + 0.6)
+        axis.set_title(f"Fr {one['froude']:.2f}", fontsize=9)
+        axis.set_xlabel("time [s]")
+    return picture
+
+
+def speeds(figures: Figures) -> Any:
+    """Lag, duty factor and cost of transport over the Froude number reached."""
+    from matplotlib.figure import Figure
+
+    picture = Figure((10, 3.2), layout="constrained")
+    lag, duty, cost = picture.subplots(1, 3)
+    for name, some in figures.items():
+        good, label = [one for one in some if "lag" in one], Path(name).name
+        froude = [one["froude_reached"] for one in good]
+        lag.plot(froude, [min(one["lag"], 0.5 - one["lag"]) for one in good], "o-", ms=3, label=label)
+        for pair, style in zip(PAIRS, ("o-", "s--"), strict=True):
+            duty.plot(froude, [one[f"duty_{pair}"] for one in good], style, ms=3, label=f"{label}, {pair}")
+        cost.plot(froude, [one["transport"] for one in good], "o-", ms=3)
+    judges = read_judges()
+    walk, trots = judges["walk"], of_speeds(judges["duty"])
+    duty.plot([at for at, _ in trots], [one["horse"][0] for _, one in trots], "k*", label="horses, trot")
+    lag.plot([walk["froude"]], [walk["lag"]["horse"]], "k*", label="horses, walk")
+    duty.plot([walk["froude"]], [walk["duty"]["horse"]], "k^", label="horses, walk")
+    names = {lag: "lag of hind to fore [strides]", duty: "duty factor [-]", cost: "cost of transport [-]"}
+    for panel, what in names.items():
+        panel.set_xlabel("Froude number reached [-]")
+        panel.set_ylabel(what)
+        panel.grid(alpha=0.3)
+    if len(figures) <= 3:
+        lag.legend(fontsize=7)
+        duty.legend(fontsize=7)
+    return picture
+
+
+def draw(figures: Figures, out: Path) -> None:
+    """Force curves at each speed where watched episodes of the first policy stay up, its footfall there, and
+    figures over speed; none where there is no such speed."""
+    shown = [one for one in next(iter(figures.values())) if one.get("footfall")]
+    if not shown:
+        return print("no pictures: the first policy falls at every speed")
+    pictures = {"forces": forces(figures, shown), "footfall": footfall(shown), "speeds": speeds(figures)}
+    for name, picture in pictures.items():
+        picture.savefig(out / f"{name}.png", dpi=110)
