@@ -30,6 +30,7 @@ from hoof_env.dynamics.parts import (
     Scene,
     Tally,
     Trunk,
+    broken,
 )
 from hoof_env.dynamics.reactions import Reactions as ReactionRows
 from hoof_env.dynamics.step_length import StepLength
@@ -388,9 +389,14 @@ class TrunkEngine(Scene):
         return self._memory.result.astype(np.int64)
 
     def run(
-        self, command: ArrayLike | None = None, steps: int = 1, every: int = 1
+        self, command: ArrayLike | None = None, steps: int = 1, every: int = 1, *, beyond: bool = False
     ) -> dict[str, NDArray[Any]]:
         """Advance and record `state` and `report` at the start and after each `every` steps, for plots.
+
+        Args:
+            command, steps: as of `advance`.
+            every: steps from one instant of the record to the next.
+            beyond: whether to go on beyond a limit, as `advance` does.
 
         Returns:
             Arrays by name, time on the first axis, and "result", how each environment ended, shape
@@ -407,11 +413,11 @@ class TrunkEngine(Scene):
         whole[..., 0] = m.data
         for k in range(1, times):
             self._go(min(every, steps - (k - 1) * every), True)
-            if (lost := (m.result > Result.OK) & (m.result < Result.PITCH)).any():
+            if lost := broken(m.result).any():
                 self.observe()
             whole[..., k] = m.data
-            if m.result.any():
-                times = k if lost.any() else k + 1
+            if lost or (m.result.any() and not beyond):
+                times = k if lost else k + 1
                 break
         kept = memory.memory_of(whole[..., :times], self.num_envs, m.constants, m.reactions, m.features)
         named = {name: np.moveaxis(values, -1, 0) for name, values in memory.named_rows(kept).items()}

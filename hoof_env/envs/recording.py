@@ -59,7 +59,7 @@ class Recording:
     ) -> dict[str, NDArray[np.float64]]:
         self._engine.set_column(0, column)
         command = None if after is None else self._engine.command_in(after)
-        record = self._engine.run(command, steps)
+        record = self._engine.run(command, steps, beyond=True)
         record.pop("result")
         return record
 
