@@ -165,8 +165,8 @@ class LegBase:
             ResetNeeded: there is no episode yet.
         """
         self._check_started("episode_summary")
-        each = [self.batch.summary(env) for env in range(self.batch.num_envs)]
-        return {name: self._each([summary[name] for summary in each]) for name in each[0]}
+        figures = self.batch.summaries(np.arange(self.batch.num_envs))
+        return {name: self._each(values) for name, values in figures.items()}
 
     def raw_observation(self) -> dict[str, Any]:
         """What is observed now, before it is scaled: by name, in `observation_units`; of many, shape

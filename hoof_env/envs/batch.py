@@ -406,7 +406,11 @@ class EpisodeBatch:
         return infos
 
     def summary(self, env: int) -> dict[str, float]:
-        """Figures of an episode.
+        """Figures of an episode, see `summaries`."""
+        return {name: float(values[0]) for name, values in self.summaries([env]).items()}
+
+    def summaries(self, envs: Sequence[int] | NDArray[np.int64]) -> dict[str, Floats]:
+        """Figures of the episodes of some environments, by name, shape (len(envs),) each.
 
         seconds, distance_m, speed_m_s, peak_grf_n (highest of the episode), mean_grf_n (normal force over the
         whole time), stance_peak_sum_n, stances, loading_rate_n_s (mean over stances), duty_factor,
@@ -416,27 +420,30 @@ class EpisodeBatch:
         (mean over stances), and mean, sum and duty factor are of all its legs.
         """
         seconds, distance, work, impulse, loaded, stances, peaks, rates, highest, slip = (
-            float(getattr(self.now, name)[env]) for name in SUMS
+            getattr(self.now, name)[envs] for name in SUMS
         )
-        weight, time = float(self.now.weight[env]), max(seconds, 1e-12)
-        mean = impulse / time
-        slid = {"slip_m": slip / max(stances, 1.0)} if self.engine.features.animal else {}
+        weight, time = self.now.weight[envs], np.maximum(seconds, 1e-12)
+        mean, each = impulse / time, np.maximum(stances, 1.0)
+        steps = np.rint(seconds / self.dt)
+        slid = {"slip_m": slip / each} if self.engine.features.animal else {}
+        cost = np.full(len(work), np.inf)
+        np.divide(work, weight * distance, out=cost, where=distance > 0)
         return {
-            "seconds": round(round(seconds / self.dt) * self.dt, 12),  # the sum of rounded steps is 9.99...
+            "seconds": np.array([round(count * self.dt, 12) for count in steps]),  # sums of steps are 9.99...
             "distance_m": distance,
             "speed_m_s": distance / time,
             "peak_grf_n": highest,
             "mean_grf_n": mean,
             "stance_peak_sum_n": peaks,
             "stances": stances,
-            "loading_rate_n_s": rates / max(stances, 1.0),
+            "loading_rate_n_s": rates / each,
             "duty_factor": loaded / time / self.body.legs,
             **slid,
             "drive_work_j": work,
-            "cost_of_transport": work / (weight * distance) if distance > 0 else float("inf"),
+            "cost_of_transport": cost,
             "weight_share": mean / weight,
             "support_share": 1 - mean / weight,
-            "failed": float(self.now.ended[env] == FAILED),
+            "failed": (self.now.ended[envs] == FAILED).astype(np.float64),
         }
 
     def failure(self, env: int) -> str:

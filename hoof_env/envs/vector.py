@@ -163,11 +163,8 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
             self._start(np.flatnonzero(again), {})
         done, infos = terminated | truncated, batch.infos(some_ended)
         rewards = batch.rewards[:n].copy()
-        for env in np.flatnonzero(done).tolist():
-            ending: dict[str, Any] = {"episode_summary": batch.summary(env)}
-            if terminated[env]:
-                ending["failure"] = batch.failure(env)
-            infos = self._add_info(infos, ending, env)
+        if done.any():
+            infos |= self._endings(done, terminated)
         if done.any() and self.autoreset_mode == AutoresetMode.SAME_STEP:
             infos = self._same_step(infos, done)
             done = np.zeros(n, bool)
@@ -175,6 +172,20 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
             self._show()
         self._ended = done
         return self._observed(), rewards, terminated, truncated, infos
+
+    def _endings(self, done: NDArray[np.bool_], terminated: NDArray[np.bool_]) -> dict[str, Any]:
+        """What infos say of episodes that end, as Gymnasium's `_add_info` puts them together one by one."""
+        figures: dict[str, Any] = {}
+        for name, values in self.batch.summaries(np.flatnonzero(done)).items():
+            figures[name], figures[f"_{name}"] = np.zeros(self.num_envs), done.copy()
+            figures[name][done] = values
+        endings = {"episode_summary": figures, "_episode_summary": done.copy()}
+        if terminated.any():
+            reasons = np.full(self.num_envs, None, dtype=object)
+            for env in np.flatnonzero(terminated).tolist():
+                reasons[env] = self.batch.failure(env)
+            endings |= {"failure": reasons, "_failure": terminated.copy()}
+        return endings
 
     def _same_step(self, final: dict[str, Any], done: NDArray[np.bool_]) -> dict[str, Any]:
         """Start again at once what ended; the infos then, with what it ended with."""
