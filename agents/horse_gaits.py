@@ -24,7 +24,7 @@ from agents import runs
 from agents.command import run
 from hoof_env.dynamics.parts import GRAVITY
 from hoof_env.envs.horse import HIP_HEIGHT
-from hoof_env.envs.reference import BOUNDS, LIMITS, PAIRS, Stride
+from hoof_env.envs.reference import LIMITS, PAIRS, Stride, bounds
 from hoof_env.errors import HoofEnvError
 
 Floats = NDArray[np.float64]
@@ -57,7 +57,7 @@ def decode(x: Floats) -> Floats:
     """Gaits from points of the box [-1, 1], both of shape (n, 16)."""
     low = [RATE[0], -0.5, *[-PART, -PART, *np.subtract(CENTRE, SPANS)] * len(PAIRS)]
     high = [RATE[1], 0.5, *[PART, PART, *np.add(CENTRE, SPANS)] * len(PAIRS)]
-    return np.clip(low + (x + 1) / 2 * np.subtract(high, low), *BOUNDS)
+    return np.clip(low + (x + 1) / 2 * np.subtract(high, low), *bounds())
 
 
 def encode(gaits: Floats) -> Floats:

@@ -252,6 +252,13 @@ class FilterSettings:
                     f"got {self.gain:g} * {rate:g} > {acc:g}"
                 )
 
+    def sped_up(self, pace: float) -> FilterSettings:
+        """The filters of a motion that takes its course so many times as fast [-]."""
+        return FilterSettings(
+            self.gain * pace, self.crank_rate * pace**2, self.crank_acc * pace**3,
+            self.swing_rate * pace, self.swing_acc * pace**2,
+        )  # fmt: skip
+
     @property
     def longest_step(self) -> float:
         """Longest time step [s] at which the filters still keep their bounds and do not overshoot."""

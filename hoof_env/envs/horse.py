@@ -4,14 +4,18 @@ A horse of 475 kg, its hips 1.4 m high. The legs are the linkage of the preset, 
 masses of Buchner and others (1997, see `leg.limb_masses`); springs of 24 kN/m at toe and heel give a limb
 the stiffness of a horse's distal spring: 127 mm under 12.8 N/kg (McGuigan & Wilson 2003). Radius of gyration
 and hips are assumed: the leg stands half a metre behind its crank centre, so that the fore feet are half a
-metre before the trunk's centre and the hind feet 0.7 m behind. A `size` other than 1 is a similar animal:
-lengths go with it, masses with its cube, stiffnesses with its square, speeds with its root.
+metre before the trunk's centre and the hind feet 0.7 m behind.
+
+A `size` other than 1 is a similar animal, with its motors and the filters of its commands: lengths go with
+it, masses with its cube, stiffnesses with its square, speeds and times with its root, and all else by its
+dimension. The ground's stiffness and the time steps are the world's and stay.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from typing import Any, NoReturn
 
@@ -19,18 +23,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.dynamics.parts import FREE, GRAVITY, TRUNKS, HoofSpring, Limb, Limits, Trunk
+from hoof_env.dynamics.parts import FREE, GRAVITY, TRUNKS, Drive, HoofSpring, Limb, Limits, Motor, Trunk
 from hoof_env.envs.parameters import drive_of, ground_of, pair
 from hoof_env.envs.reference import (
     ACTED,
     COUNT,
-    FASTEST,
     LEGS,
     NAMES,
+    checked_size,
     commands_of,
     crank_angles,
     gait_numbers,
     horse_gaits,
+    rates,
     reference_gaits,
     trunk_motion,
 )
@@ -40,14 +45,14 @@ from hoof_env.envs.start import (
     Start,
     anywhere,
     checked_options,
-    highest,
-    hoof_height,
+    hoof_points,
     with_parameters,
 )
 from hoof_env.envs.tasks import TASKS
 from hoof_env.errors import ParameterError, check_choice, check_number, count
 from hoof_env.gait import QUICK, WIDEST, FilterSettings
 from hoof_env.ground.contact import Ground
+from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry, load_geometry
 from hoof_env.leg.limb_masses import with_limb_masses
 
@@ -55,6 +60,7 @@ Floats = NDArray[np.float64]
 
 HIP_HEIGHT, MASS, GYRATION = 1.4, 475.0, 0.5  # [m], [kg], of the trunk about its centre [m]
 HIPS = {"fore": 1.0, "hind": -0.2}  # crank centres, forward from the trunk's centre [m]
+STAND = -0.5  # of a hoof from its crank centre, in the middle of a stance [m]
 PITCH, HEIGHT, CLEARANCE = 0.5, (0.75, 1.8), 0.02
 """Where it has fallen: +-pitch [rad], heights of the trunk [m], of a joint over the ground [m]."""
 GAP = 0.005  # between the lowest rigid hoof and the ground at a start [m]
@@ -70,6 +76,9 @@ STEP_ERROR = 0.03
 the reference gaits are the same to a hundredth."""
 
 FILTERS = {"quick": QUICK, "slow": FilterSettings()}  # of commands, by the setting `filters`
+
+REFUSED = "trunk", "hip_height", "solver"
+"""Settings of which a horse takes nothing but the default."""
 
 OPTIONS = {
     "phase": (-1e6, 1e6), "speed": (-20.0, 20.0), "pitch": (-0.4, 0.4), "x": (-1e5, 1e5),
@@ -90,7 +99,8 @@ class Horse:
     """Four legs on a free trunk.
 
     Attributes:
-        gaits: that were found, by name.
+        size, pace: its length over that of a horse of 475 kg, and its speed likewise [-].
+        gaits: that were found, as an animal of this size has them, by name.
         gait: around which actions lie whatever speed is commanded; None for those of `reference_gaits`.
         hips: places of the crank centres on the trunk [m], by leg.
         harmonics, filters, limits, step_error: of the engine.
@@ -104,23 +114,24 @@ class Horse:
 
     def __init__(self, settings: Settings) -> None:
         s = settings
-        self.size = check_number("size", 1.0 if s.size is None else s.size, low=0.2, high=2.0)
+        self.size = checked_size(s.size)
+        self.pace = math.sqrt(self.size)
         if s.trunk != TRUNKS[FREE]:
             raise ParameterError(f'trunk: expected "free" of a horse, got {s.trunk!r}')
         self.geometry = load_geometry(s.preset)
         self.geometry = self.geometry.scaled(HIP_HEIGHT * self.size / self.geometry.hip_height)
         self.height = HIP_HEIGHT * self.size
         self.hips = {leg: (HIPS[leg.partition("_")[2]] * self.size, 0.0) for leg in LEGS}
-        self.gaits = horse_gaits()
+        self.gaits = {name: gait.of_size(self.size) for name, gait in horse_gaits().items()}
         self.gait = None if s.gait is None else self.gaits[check_choice("gait", s.gait, self.gaits)]
         self.harmonics = 2 if s.harmonics is None else count("harmonics", s.harmonics, most=2)
         filters = "quick" if s.filters is None else check_choice("filters", s.filters, FILTERS)
-        self.filters = FILTERS[filters]
+        self.filters = FILTERS[filters].sped_up(1 / self.pace)
         if s.hip_height is not None:
             raise ParameterError(
                 f"hip_height: expected none of a horse, whose `size` it is, got {s.hip_height!r}"
             )
-        self.command_step = COMMAND_STEP * math.sqrt(self.size)
+        self.command_step = COMMAND_STEP * self.pace
         self.lowest, self.highest = (self.size * height for height in HEIGHT)
         spring, stored = self._spring(s), TASKS["horse"].defaults["hoof_stiffness"]
         self._softness = 0.0 if spring is None else stored * self.size**2 / spring.stiffness
@@ -132,12 +143,27 @@ class Horse:
         mass = check_number("trunk_mass", s.trunk_mass, low=0, exclusive_low=True) * size**3
         inertia = mass * (GYRATION * size) ** 2
         trunk = Trunk("free", mass, drag=0.0, height=self.height, pitch_inertia=inertia)
-        drive, spring = drive_of(s), self._spring(s)
+        drive, spring = self._drive(s), self._spring(s)
         fore, hind = (
             Limb(_limb(self.geometry, pair, MASS * size**3), self.hips[f"left_{pair}"], drive, spring)
             for pair in HIPS
         )
-        return trunk, ground_of(s, mass), (fore, fore, hind, hind)
+        return trunk, self._ground(s, mass), (fore, fore, hind, hind)
+
+    def _drive(self, s: Settings) -> Drive:
+        drive, size = drive_of(s), self.size
+        if not isinstance(drive, Motor):
+            return drive
+        return replace(
+            drive, speed_gain=drive.speed_gain * size**4.5, torque_limit=drive.torque_limit * size**4,
+            rotor_inertia=drive.rotor_inertia * size**5,
+        )  # fmt: skip
+
+    def _ground(self, s: Settings, mass: float) -> Ground:
+        """The world's ground; only the speeds below which its laws are softened are the animal's."""
+        ground = ground_of(s, mass)
+        names = "approach_floor", "friction_slow", "friction_fast"
+        return replace(ground, **{name: self.pace * getattr(ground, name) for name in names})
 
     def _spring(self, s: Settings) -> HoofSpring | None:
         if s.hoof_stiffness is None:
@@ -154,19 +180,14 @@ class Horse:
         return HoofSpring(stiffness * self.size**2, damping * self.size**2.5)
 
     def commanded_speeds(self, s: Settings) -> tuple[float, float]:
-        """Lowest and highest commanded speed [m/s]; those of the task go with the root of the size."""
-        if s.target_speed is None:
-            raise ParameterError("target_speed: expected a speed or a range of them of a horse, got None")
-        low, high = pair("target_speed", s.target_speed, 0.1)
-        own = TASKS["horse"].defaults["target_speed"]
-        pace = math.sqrt(self.size) if (low, high) == tuple(own) else 1.0
-        return pace * low, pace * high
+        """Lowest and highest commanded speed [m/s]."""
+        return pair("target_speed", s.target_speed, 0.1)
 
     def constants(self) -> dict[str, Any]:
         """Of the task's record: spans of actions and bounds of commands."""
         gait = 2 + 2 * self.harmonics
         low, high = np.transpose([*list(WIDEST.values())[:4], *[WIDEST["higher"]] * (gait - 4)])
-        high[0] = FASTEST
+        high[0] = rates(self.size)[1]
         half = np.zeros(gait)
         half[:ACTED] = SPANS
         return {
@@ -180,7 +201,7 @@ class Horse:
         """Reset options with their values checked; `ParameterError` of others."""
         checked = checked_options(options, OPTIONS)
         if checked.get("gait") is not None:
-            checked["gait"] = gait_numbers("options['gait']", checked["gait"], self.gaits)
+            checked["gait"] = gait_numbers("options['gait']", checked["gait"], self.gaits, self.size)
         return with_parameters(checked, settings)
 
     def draw(
@@ -204,46 +225,58 @@ class Horse:
 
     def settle(self, start: Start, targets: Floats, options: Mapping[str, Any], engine: TrunkEngine) -> None:
         """Complete starts with the gaits of the commanded speeds [m/s]. In a reference gait the trunk moves
-        as it does in that; in others it is as low as the springs of two legs give under the weight."""
+        as it does in that, along the ground between its feet; in others it is as low as the springs of two
+        legs give under the weight."""
         begun, own = start.begun, options.get("gait")
         start.gaits = self.reference(targets, own)
         start.theta[:] = crank_angles(start.gaits, begun["phase"], start.theta)
         start.commands[:] = commands_of(start.gaits, start.theta, start.commands.shape[1])
         is_known = own is None and self.gait is None
-        motion = trunk_motion(targets / math.sqrt(self.size), begun["phase"]) if is_known else UNKNOWN
+        motion = trunk_motion(targets / self.pace, begun["phase"]) if is_known else UNKNOWN
+        slope = self._slope(engine.terrain, begun["x"])
         if "speed" not in options:
             begun["speed"] = begun["speed"] * targets * motion["vx"]
         if "pitch" not in options:
-            begun["pitch"] = begun["pitch"] + motion["pitch"]
-        hoof = np.min([
-            np.sin(begun["pitch"]) * limb.hip[0]
-            + hoof_height(profile, command.T, angle, begun["pitch"] * self.geometry.travel)
-            for limb, profile, command, angle in zip(
-                engine.limbs, engine.profiles, start.commands, start.theta, strict=True
-            )
-        ], axis=0)  # fmt: skip
-        # of the lowest hoof over the ground; below it is what the springs have given
+            begun["pitch"] = begun["pitch"] + motion["pitch"] + slope
+        x, y = self._hoofs(start, begun["pitch"], engine)
+        hoof = self._hoofs(start, begun["pitch"] - slope, engine)[1].min((0, 1))
+        # of the lowest hoof over level ground; below it is what the springs have given
         lift = hoof + self.height * motion["y"] if is_known else np.full(len(hoof), -SAG * self.size)
         lift = np.where(lift < 0, self._softness * lift, lift) + (0 if self._softness else GAP * self.size)
-        ground, rate = highest(engine.terrain, begun["x"], 2 * self.height), start.gaits[:, 0]
+        ground, rate = engine.terrain.height_at(begun["x"] + x), start.gaits[:, 0]
         start.trunk = {
-            "x": begun["x"], "y": ground - hoof + lift, "vx": begun["speed"],
-            "vy": self.height * rate * motion["vy"], "pitch": begun["pitch"],
+            "x": begun["x"], "y": (ground - y).max((0, 1)) + lift / np.cos(slope), "vx": begun["speed"],
+            "vy": self.height * rate * motion["vy"] + begun["speed"] * np.tan(slope), "pitch": begun["pitch"],
             "pitch_rate": rate * motion["pitch_rate"],
         }  # fmt: skip
+
+    def _slope(self, terrain: Terrain, x: Floats) -> Floats:
+        """Of the ground from the hind feet to the fore feet of animals at `x` [rad]."""
+        fore, hind = ((HIPS[pair] + STAND) * self.size for pair in ("fore", "hind"))
+        return np.arctan2(terrain.height_at(x + fore) - terrain.height_at(x + hind), fore - hind)
+
+    def _hoofs(self, start: Start, pitch: Floats, engine: TrunkEngine) -> tuple[Floats, Floats]:
+        """x and y of all toes and heels from the centre of trunks that pitch so [rad], in metres, shape
+        (4, 2, n) each."""
+        found = []
+        for limb, profile, command, angle in zip(
+            engine.limbs, engine.profiles, start.commands, start.theta, strict=True
+        ):
+            x, y = hoof_points(profile, command.T, angle, pitch * self.geometry.travel)
+            found.append((np.cos(pitch) * limb.hip[0] + x, np.sin(pitch) * limb.hip[0] + y))
+        places = np.array(found)
+        return places[:, 0], places[:, 1]
 
     # Gaits
 
     def reference(self, targets: Floats, given: Any = None) -> Floats:
         """Numbers of the gaits around which actions lie at commanded speeds [m/s], shape (n, 16)."""
-        own, pace = self.gait if given is None else given, math.sqrt(self.size)
-        if own is None:
-            found = reference_gaits(np.asarray(targets) / pace)
-        else:
-            found = np.array(
-                np.broadcast_to(gait_numbers("gait", own, self.gaits), (len(targets), len(NAMES)))
-            )
-        found[:, 0] /= pace
+        own = self.gait if given is None else given
+        if own is not None:
+            numbers = gait_numbers("gait", own, self.gaits, self.size)
+            return np.array(np.broadcast_to(numbers, (len(targets), len(NAMES))))
+        found = reference_gaits(np.asarray(targets) / self.pace)
+        found[:, 0] /= self.pace
         return found
 
     def command_of(self, action: Any) -> NoReturn:

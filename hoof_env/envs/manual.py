@@ -23,19 +23,18 @@ from hoof_env.dynamics.layout import Features
 from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.dynamics.parts import ONE_LEG
 from hoof_env.dynamics.stepping import SCHEMES
-from hoof_env.envs import observation, start
-from hoof_env.envs.horse import OPTIONS as HORSE_OPTIONS
-from hoof_env.envs.horse import SPANS, Horse
+from hoof_env.envs import horse, observation, start
+from hoof_env.envs.horse import Horse
 from hoof_env.envs.horse_leg import HorseLegMOEnv
 from hoof_env.envs.infos import measured_names
 from hoof_env.envs.one_leg import OneLeg
 from hoof_env.envs.parameters import HILLS, SPACING
-from hoof_env.envs.reference import ACTED, COUNT
+from hoof_env.envs.reference import ACTED, COUNT, FASTEST, SIZES, horse_gaits
 from hoof_env.envs.reward import check_weights
 from hoof_env.envs.settings import PER_EPISODE, Settings, check_effect, to_json
 from hoof_env.envs.tasks import TASKS, Task, task_of
 from hoof_env.errors import OutputError, ParameterError, check_choice
-from hoof_env.gait import LIMITS, QUICK, FilterSettings
+from hoof_env.gait import LIMITS, QUICK, WIDEST, FilterSettings
 from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS
 from hoof_env.leg.geometry import preset_names
 
@@ -62,13 +61,18 @@ def tables() -> dict[str, dict[str, Any]]:
     """What `manual.toml` says, by table and name: unit and meaning, or the words of a page."""
     names = {
         "presets": preset_names(), "trunks": ONE_LEG, "schemes": SCHEMES, "paper_schemes": INTEGRATORS,
-        "normal_laws": NORMAL_LAWS, "friction_laws": FRICTION_LAWS,
+        "normal_laws": NORMAL_LAWS, "friction_laws": FRICTION_LAWS, "horse_gaits": horse_gaits(),
     }  # fmt: skip
     values = {name: ", ".join(f'\\"{one}\\"' for one in choices) for name, choices in names.items()}
     numbers = {
         "lowest": start.LOWEST, "highest": start.HIGHEST, "spacing": SPACING, "margin": start.MARGIN,
-        "start_speed": start.START_SPEED,
+        "start_speed": start.START_SPEED, "horse_mass": horse.MASS, "fastest": FASTEST,
+        "smallest_size": SIZES[0], "largest_size": SIZES[1],
+        "speed_spread": 100 * horse.SPEED_SPREAD, "pitch_spread": horse.PITCH_SPREAD,
+        "phase_spread": horse.PHASE_SPREAD, "fall_pitch": horse.PITCH, "fall_low": horse.HEIGHT[0],
+        "fall_high": horse.HEIGHT[1], "clearance": 100 * horse.CLEARANCE,
     }  # fmt: skip
+    numbers |= {f"{name}_{end}": WIDEST[name][k] for name in WIDEST for k, end in enumerate(("low", "high"))}
     values |= {name: f"{number:g}" for name, number in numbers.items()}
     text = (HERE / "manual.toml").read_text(encoding="utf-8")
     return tomllib.loads(Template(text).safe_substitute(values))
@@ -82,7 +86,7 @@ def page(task: str, with_film: bool = False) -> str:
     """The manual page of a task in Markdown; `task` is one of `PAGES`, or an id of one's own, which has no
     film."""
     what = task_of("leg" if task == "mo" else task)
-    film = _film(_NAMES[task]) if with_film else ""
+    film = _film(_NAMES[task], what.is_horse) if with_film else ""
     if task == "mo":
         return _tidy(Template(MO_PAGE).substitute(film=film, observations=_observations(what)))
     s, kind = what.settings({}), "horse" if what.is_horse else "leg"
@@ -91,7 +95,7 @@ def page(task: str, with_film: bool = False) -> str:
     weights = check_weights(s.reward_weights, what.terms)
     rewards = [(f"`{t.key}`", f"`{t.name}`", f"{weights[t.name]:g}", t.unit, t.meaning) for t in what.terms]
     defaults = {name: literal(value) for name, value in to_json(s).items()}
-    settings = _rows("settings", defaults | {name: f"**{defaults[name]}**" for name in what.defaults})
+    defaults |= {name: f"**{defaults[name]}**" for name in what.defaults}
     hills = {name: literal(value) for name, value in HILLS.items()}
     head = ("Name", "Default", "Unit", "Meaning")
     limits = [f"{low:.5g} to {high:.5g} {GAIT[k].unit}" for k, (low, high) in enumerate(LIMITS.values())]
@@ -106,7 +110,7 @@ def page(task: str, with_film: bool = False) -> str:
         actions=_horse_actions() if what.is_horse else _actions(s.gait),
         commands=WORDS[f"{kind}_commands"].strip(),
         observed=WORDS[f"{kind}_observed"].strip(),
-        still="" if what.is_horse else WORDS["leg_still"].rstrip(),
+        still="" if what.is_horse else " " + WORDS["leg_still"].strip(),
         share="a fourth of " if what.is_horse else "",
         legs=str(body.legs),
         of_legs="legs'" if what.is_horse else "leg's",
@@ -132,7 +136,7 @@ def page(task: str, with_film: bool = False) -> str:
         figures=markdown_table(("Figure", "Unit", "Meaning"), _figures(what.is_horse)),
         vector_arguments=markdown_table(("Argument", "Default", "Meaning"), _vector_arguments()),
         bold=WORDS["bold"] if what.defaults else "",
-        settings=markdown_table(head, [*settings, RENDER_MODE]),
+        settings=markdown_table(head, [*_settings(what, defaults), RENDER_MODE]),
         terrain=WORDS["terrain"] + markdown_table(head, _rows("hills", hills)) if s.terrain else "",
     )
     return _tidy(text)
@@ -191,9 +195,23 @@ def _tidy(text: str) -> str:
     return re.sub(r"\n{3,}", "\n\n", text)
 
 
-def _film(name: str) -> str:
-    words = {"name": name, "gait": FILMS[name], "seconds": f"{FILM_SECONDS:g}"}
+def _film(name: str, is_of_horse: bool) -> str:
+    shown = WORDS["horse_film" if is_of_horse else "leg_film"]
+    words = {"name": name, "gait": FILMS[name], "seconds": f"{FILM_SECONDS:g}", "shown": shown}
     return Template(WORDS["film"].strip()).substitute(words)
+
+
+def _settings(what: Task, defaults: Mapping[str, str]) -> list[tuple[str, ...]]:
+    """The settings that an id takes, with those `defaults`."""
+    if not what.is_horse:
+        return _rows("settings", defaults)
+    s, own = what.settings({}), TABLES["horse_settings"]
+    contexts = s, replace(s, hoof_stiffness=None)  # what needs a rigid hoof can be, too
+    return [
+        (f"`{name}`", defaults[name], *own.get(name, cells))
+        for name, cells in TABLES["settings"].items()
+        if name not in horse.REFUSED and any(_can_be(name, context) for context in contexts)
+    ]
 
 
 def _rows(table: str, values: Mapping[str, str] | None = None) -> list[tuple[str, ...]]:
@@ -226,7 +244,7 @@ def _figures(of_horse: bool) -> list[tuple[str, ...]]:
 def _horse_actions() -> str:
     bounds = QUICK.to_array()[:, 1]
     rows = []
-    for k, span in enumerate(SPANS):
+    for k, span in enumerate(horse.SPANS):
         what = ("times 1 + action", "-") if k == 0 else ("plus", "rad")
         fastest = f"{bounds[k]:g} {GAIT[len(LIMITS) + k].unit}"
         numbers = ", ".join(str(ACTED * leg + k) for leg in range(COUNT))
@@ -269,7 +287,7 @@ def _start(settings: Settings, options: Mapping[str, float]) -> str:
 
 
 def _options(of_horse: bool) -> Iterable[tuple[str, ...]]:
-    ranges = HORSE_OPTIONS if of_horse else start.OPTIONS
+    ranges = horse.OPTIONS if of_horse else start.OPTIONS
     for name, (unit, meaning) in TABLES["horse_options" if of_horse else "options"].items():
         low, high = ranges.get(name, (0.0, 0.0))
         within = "" if low == high else f"{low:.7g} to {high:.7g}" if math.isfinite(high) else f"from {low:g}"

@@ -10,8 +10,9 @@ from the others, `COUPLING` of its speed at most.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
 from typing import Annotated, Any
@@ -47,10 +48,12 @@ ROOM = 3 * COUNT  # numbers that `command_gait` needs room for
 NAMES = ("rate", "lead", *(f"{pair}_{name}" for pair in PAIRS for name in PAIR))
 """Of the numbers of a gait, in their order."""
 
-FASTEST = 6 * np.pi  # a crank [rad/s]
-RATES, LEADS = (0.1, FASTEST), (-10.0, 10.0)  # of a gait [rad/s], [strides]
-BOUNDS = np.transpose([RATES, LEADS, *[*LIMITS.values()] * len(PAIRS)])
-"""Lowest and highest of each number of a gait, shape (2, 16)."""
+SIZES = 0.25, 2.0
+"""Smallest and largest horse over one of 475 kg [-]; the filters of a smaller one's commands would be too quick
+for the usual time step."""
+SLOWEST, FASTEST = 0.1, 6 * np.pi
+"""Rate of a gait, and a crank within a stride, of a horse of 475 kg [rad/s]."""
+LEADS = (-10.0, 10.0)  # of a gait [strides]
 COUPLING = 0.2  # most that falling out of step changes the speed of a crank [-]
 
 
@@ -59,7 +62,7 @@ class HorseGait:
     """A gait of a horse.
 
     Attributes:
-        rate: of the cranks, averaged over a stride [rad/s].
+        rate: of the cranks of the animal that takes it, averaged over a stride [rad/s].
         lead: how far the fore pair is ahead of the hind pair [strides]; whole strides do not count, and half
             ones change left and right.
         fore, hind: the numbers of a pair, in the order of `LIMITS`.
@@ -74,7 +77,7 @@ class HorseGait:
     hind: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        check_number("rate", self.rate, low=RATES[0], high=RATES[1])
+        check_number("rate", self.rate, low=rates(SIZES[1])[0], high=rates(SIZES[0])[1])
         check_number("lead", self.lead, low=LEADS[0], high=LEADS[1])
         for pair in PAIRS:
             given: Any = getattr(self, pair)
@@ -90,6 +93,10 @@ class HorseGait:
             )
             object.__setattr__(self, pair, tuple(checked))
 
+    def of_size(self, size: float) -> HorseGait:
+        """The similar gait of an animal so many times as long."""
+        return replace(self, rate=self.rate / math.sqrt(size))
+
     def to_array(self) -> Floats:
         """The numbers in the order of `NAMES`, shape (16,)."""
         return np.array([self.rate, self.lead, *self.fore, *self.hind])
@@ -104,6 +111,22 @@ class HorseGait:
         return cls(rate, lead, tuple(pairs[: len(PAIR)]), tuple(pairs[len(PAIR) :]))
 
 
+def checked_size(given: float | None) -> float:
+    """The setting `size`, where None is 1; `ParameterError` of one outside `SIZES`."""
+    return check_number("size", 1.0 if given is None else given, low=SIZES[0], high=SIZES[1])
+
+
+def rates(size: float) -> tuple[float, float]:
+    """Lowest and highest rate of the gaits of a horse of some size [rad/s]."""
+    return SLOWEST / math.sqrt(size), FASTEST / math.sqrt(size)
+
+
+def bounds(size: float = 1.0) -> Floats:
+    """Lowest and highest of each number of a gait of a horse of some size, shape (2, 16)."""
+    found: Floats = np.transpose([rates(size), LEADS, *[*LIMITS.values()] * len(PAIRS)])
+    return found
+
+
 @cache
 def _data() -> dict[str, Any]:
     file = resources.files("hoof_env").joinpath("data", "horse", "gaits.json")
@@ -115,13 +138,13 @@ def horse_gaits() -> dict[str, HorseGait]:
     return {name: HorseGait.from_array(values) for name, values in _data()["gaits"].items()}
 
 
-def gait_numbers(name: str, given: Any, gaits: Mapping[str, HorseGait]) -> Floats:
-    """The numbers of a gait, from the name of one of `gaits`, a `HorseGait` or its numbers; of many, shape
-    (n, 16), from theirs. `ParameterError` from anything else."""
+def gait_numbers(name: str, given: Any, gaits: Mapping[str, HorseGait], size: float) -> Floats:
+    """The numbers of a gait of a horse of some size, from the name of one of `gaits`, a `HorseGait` or its
+    numbers; of many, shape (n, 16), from theirs. `ParameterError` from anything else."""
     if isinstance(given, str):
         given = gaits[check_choice(name, given, gaits)]
     if isinstance(given, HorseGait):
-        return given.to_array()
+        given = given.to_array()
     try:
         numbers = np.asarray(given, float)
     except (TypeError, ValueError):
@@ -131,7 +154,7 @@ def gait_numbers(name: str, given: Any, gaits: Mapping[str, HorseGait]) -> Float
             f"{name}: expected one of {', '.join(gaits)}, a HorseGait, or finite numbers of shape "
             f"({len(NAMES)},) or (n, {len(NAMES)}), got {given!r:.80}"
         )
-    low, high = BOUNDS
+    low, high = bounds(size)
     beyond = np.argwhere((numbers < low) | (numbers > high))
     if len(beyond):
         k = beyond[0][-1]

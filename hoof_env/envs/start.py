@@ -62,16 +62,26 @@ class Start:
     action: NDArray[np.float32]
 
 
-def hoof_height(profile: LegProfile, gaits: Floats, theta: Floats, turn: ArrayLike = 0.0) -> Floats:
-    """Height of the lower hoof point relative to O [m], at crank angles `theta`, shape (n,), of steady gaits,
-    shape (n, 2 + 2 harmonics), of a frame turned by so much more [rad]."""
+def hoof_points(
+    profile: LegProfile, gaits: Floats, theta: Floats, turn: ArrayLike = 0.0
+) -> tuple[Floats, Floats]:
+    """x and y of toe and heel relative to O [m], shape (2, n) each, at crank angles `theta`, shape (n,), of
+    steady gaits, shape (n, 2 + 2 harmonics), of a frame turned by so much more [rad]."""
     phi: Floats = gaits[:, 1] + gaits[:, 2] * np.sin(theta) + gaits[:, 3] * np.cos(theta) + np.asarray(turn)
     for k in range(2, gaits.shape[1] // 2):
         phi = phi + gaits[:, 2 * k] * np.sin(k * theta) + gaits[:, 2 * k + 1] * np.cos(k * theta)
     sine, cosine = profile.geometry.travel * np.sin(phi), np.cos(phi)
     f = by_name(profile(theta)[0])
-    toe = sine * f["toe_x"] + cosine * f["toe_y"]
-    return np.minimum(toe, sine * f["heel_x"] + cosine * f["heel_y"])
+    places = [(f[f"{point}_x"], f[f"{point}_y"]) for point in ("toe", "heel")]
+    return (
+        np.array([cosine * x - sine * y for x, y in places]),
+        np.array([sine * x + cosine * y for x, y in places]),
+    )
+
+
+def hoof_height(profile: LegProfile, gaits: Floats, theta: Floats) -> Floats:
+    """Height of the lower hoof point relative to O [m], see `hoof_points`."""
+    return hoof_points(profile, gaits, theta)[1].min(0)
 
 
 def draw_starts(

@@ -7,6 +7,7 @@ settings, its starts and what is observed, and in nothing else.
 from __future__ import annotations
 
 import difflib
+import math
 import re
 import sys
 from collections.abc import Callable, Iterable, Mapping
@@ -21,6 +22,7 @@ import numpy as np
 
 from hoof_env.envs.horse_rows import HORSE_ENTRIES, HORSE_TERMS
 from hoof_env.envs.observation import ENTRIES, Entry, check_groups, groups_of
+from hoof_env.envs.reference import checked_size
 from hoof_env.envs.reward import TERMS, Term, check_weights
 from hoof_env.envs.settings import SETTINGS, Settings, check_effect, json_value
 from hoof_env.errors import ParameterError, UnknownArgumentError, check_choice
@@ -41,6 +43,8 @@ class Task:
         terms: of the reward.
         entries: all that can be observed.
         is_horse: it is about a trunk on four legs, see `horse.Horse`, not about one leg.
+        speeds: of a horse of size 1, between which a `target_speed` of None commands; they go with the root
+            of the size [m/s].
         contact_law: instead of `normal_law`, see `dynamics.hoof.law_of`.
         module: that registers it, which other processes import.
     """
@@ -54,6 +58,7 @@ class Task:
     terms: tuple[Term, ...] = TERMS
     entries: tuple[Entry, ...] = ENTRIES
     is_horse: bool = False
+    speeds: tuple[float, float] | None = None
     contact_law: Callable[..., Any] | None = None
     module: str = ""
 
@@ -88,6 +93,14 @@ class Task:
             UnknownArgumentError: an unknown setting.
             ParameterError: one is not the task's own and has no effect beside the others.
         """
+        settings = self.chosen(changes)
+        if self.speeds is None or settings.target_speed is not None:
+            return settings
+        pace = math.sqrt(checked_size(settings.size))
+        return replace(settings, target_speed=(pace * self.speeds[0], pace * self.speeds[1]))
+
+    def chosen(self, changes: Mapping[str, Any]) -> Settings:
+        """The same where a target speed that nobody names is None still."""
         for name in changes:
             if name not in SETTINGS:
                 near = difflib.get_close_matches(name, SETTINGS, 1)
@@ -103,10 +116,12 @@ class Task:
             raise UnknownArgumentError(f"{self.id}: unknown settings {', '.join(unknown)}")
         plain = replace(Settings(), **self.defaults)
         settings = replace(plain, **changes)
+        is_ranged = self.speeds is not None and settings.target_speed is None
+        in_effect = replace(settings, target_speed=self.speeds) if is_ranged else settings
         for name, value in changes.items():
             usual = json_value(getattr(plain, name))
             if not np.array_equal(json_value(value), usual):  # else it asks for nothing
-                check_effect(name, settings)
+                check_effect(name, in_effect)
         if self.contact_law and settings.solver == "paper":
             raise ParameterError(
                 f'{self.id}: solver: expected "exact" beside a contact law of one\'s own, got "paper"'
@@ -199,7 +214,9 @@ TASKS: Mapping[str, Task] = MappingProxyType(
                 "friction": 0.6,
                 "hoof_stiffness": 24000.0,
                 "integrator": "semi_implicit_euler",
-                "target_speed": (1.172, 3.706),
+                "motor_gain": 2000.0,
+                "motor_torque": 4000.0,
+                "target_speed": None,
                 "target_seconds": (3.0, 5.0),
                 "observation": ("trunk", "target", "crank", "gait", "hoof", "action"),
             },
@@ -207,6 +224,7 @@ TASKS: Mapping[str, Task] = MappingProxyType(
             terms=HORSE_TERMS,
             entries=HORSE_ENTRIES,
             is_horse=True,
+            speeds=(1.172, 3.706),
         ),
     }
 )
@@ -304,8 +322,8 @@ def register(
         entries=(*old.entries, *more),
         contact_law=law,
     )
-    groups = dict.fromkeys((*old.settings({}).observation, *groups_of(more)))
-    settings = task.settings({"observation": tuple(groups), **defaults})
+    groups = dict.fromkeys((*old.chosen({}).observation, *groups_of(more)))
+    settings = task.chosen({"observation": tuple(groups), **defaults})
     check_groups(settings.observation, groups_of(task.entries))
     check_weights(settings.reward_weights, task.terms)
     changed = {name: getattr(settings, name) for name in ("observation", *old.defaults, *defaults)}

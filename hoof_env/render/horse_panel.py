@@ -41,9 +41,9 @@ class HorsePanel:
         self._weight, self._lift_off = weight_n, lift_off_n
         self._inside = self._box.inflate(-36 * unit, -28 * unit)
         left, width = self._inside.left + round(34 * unit), self._inside.width - round(40 * unit)
-        top, high = self._inside.top + 124 * unit, 52 * unit
+        top, high = self._inside.top + 126 * unit, 50 * unit
         self._plots = [
-            pygame.Rect(left, round(top + k * (high + 15 * unit)), width, round(high))
+            pygame.Rect(left, round(top + k * (high + 17 * unit)), width, round(high))
             for k in range(len(legs))
         ]
         first = self._plots[-1].bottom + 34 * unit
@@ -145,7 +145,7 @@ class HorsePanel:
                 y = plot.bottom - part * plot.height
                 whole.fill(FAINT, (plot.left, round(y), plot.width, 1))
                 write(f"{part * full_scale / 1000:g}", plot.left - 7 * unit, y, 16, "midright")
-            write(leg.replace("_", " "), plot.right, plot.top + 7 * unit, 17, "midright", colour)
+            write(leg.replace("_", " "), plot.right, plot.top - 8 * unit, 17, "midright", colour)
         first, last = self._rows[0], self._rows[-1]
         write("footfall", self._inside.left, first.top - 14 * unit, 20)
         for row, leg in zip(self._rows, self._legs, strict=True):

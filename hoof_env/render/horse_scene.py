@@ -22,7 +22,7 @@ from hoof_env.render.scene import AROUND_M, ARROW_M, COAT, COAT_EDGE, Scene
 NEAR = (0, 2)  # the left legs
 FAR_COAT = 0.45  # how far the colour of far legs is from the sky's [-]
 WIDE_M, SOIL_M = (1.75, 2.25), 0.45  # seen behind and before the trunk's centre, and below the ground [m]
-ARROW_SHARE = 0.75  # length of a full-scale arrow over that of one leg's scene [-]
+ARROW_SHARE = 0.75  # length of a full-scale arrow over that of one leg's scene, at the usual hips [-]
 
 BODY = (
     ((-0.62, 0.10), (-0.05, 0.02), 0.34, 0.33), ((-0.05, 0.02), (0.72, 0.02), 0.33, 0.36),
@@ -45,6 +45,7 @@ class HorseScene(Scene):
         self._centre = (size[0] - right) * WIDE_M[0] / sum(WIDE_M)
         self._scale = (size[0] - right) / sum(WIDE_M) / self._animal
         self._girth = self._animal
+        self._share = ARROW_SHARE * self._animal
         self._level = size[1] - SOIL_M * self._animal * self._scale
         self._camera = 0j
         self._ground = GroundPainter(brush, terrain, size, self._scale, size[0] - right)
@@ -59,8 +60,9 @@ class HorseScene(Scene):
         """Nothing is kept."""
 
     def draw(self, canvas: Any, now: Any, full_scale: float) -> None:
-        """Draw an instant; the arrow of a force `full_scale` [N] is as long as `_arrow` says."""
-        level = float(self._ground.height(now.x + AROUND_M).mean())
+        """Draw an instant; the arrow of a force `full_scale` [N] is as long for animals of all sizes in the
+        picture."""
+        level = float(self._ground.height(now.x + self._animal * AROUND_M).mean())
         self._camera = complex(now.x, level)
         canvas.blit(self._sky, (0, 0))
         self._ground.draw(canvas, now.legs, self.corner)
@@ -71,7 +73,7 @@ class HorseScene(Scene):
         for i in NEAR:
             self._draw_leg(canvas, self.points_of(now.legs[i]), lettered=False)
         for leg in now.legs:
-            self._draw_forces(canvas, leg, full_scale, ARROW_SHARE, is_told=False)
+            self._draw_forces(canvas, leg, full_scale, self._share, is_told=False)
         canvas.blit(self._key(full_scale), (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
 
     def _draw_far_leg(self, canvas: Any, pixels: dict[str, complex]) -> None:
@@ -99,7 +101,7 @@ class HorseScene(Scene):
 
     def _paint_key(self, full_scale: float) -> Any:
         unit, force = self._brush.unit, full_scale / 5
-        length = ARROW_SHARE * ARROW_M * self._scale / 5
+        length = self._share * ARROW_M * self._scale / 5
         image = pygame.Surface(self._size, pygame.SRCALPHA, 32)
         rows = [(20 + (20 + 20 * k) * 1j) * unit for k in range(4)]
 

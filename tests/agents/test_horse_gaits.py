@@ -9,7 +9,7 @@ import pytest
 
 from agents import horse_gaits
 from agents.horse_gaits import Course, Search, decode, encode, shipped, speed_of
-from hoof_env.envs.reference import BOUNDS, FASTEST, HorseGait, reference_gaits
+from hoof_env.envs.reference import FASTEST, HorseGait, bounds, reference_gaits
 from hoof_env.envs.reference import horse_gaits as gaits_of_the_package
 
 
@@ -24,10 +24,10 @@ def test_every_point_of_the_box_is_a_gait_and_the_way_back_is_the_same():
 def test_a_search_ends_where_gaits_do(monkeypatch):
     """A wider box than gaits may have is cut off at their bounds, not at the search's own."""
     monkeypatch.setattr(horse_gaits, "RATE", (0.01, 100.0))
-    np.testing.assert_array_equal(decode(np.array([[-1.0] * 16, [1.0] * 16]))[:, 0], BOUNDS[:, 0])
-    for bound in BOUNDS:
+    np.testing.assert_array_equal(decode(np.array([[-1.0] * 16, [1.0] * 16]))[:, 0], bounds()[:, 0])
+    for bound in bounds():
         assert (HorseGait.from_array(bound).to_array() == bound).all()
-    assert BOUNDS[1, 0] == FASTEST
+    assert bounds()[1, 0] == FASTEST
 
 
 def test_speeds_are_those_of_their_froude_numbers():
