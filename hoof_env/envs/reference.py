@@ -49,8 +49,8 @@ NAMES = ("rate", "lead", *(f"{pair}_{name}" for pair in PAIRS for name in PAIR))
 """Of the numbers of a gait, in their order."""
 
 SIZES = 0.25, 2.0
-"""Smallest and largest horse over one of 475 kg [-]; the filters of a smaller one's commands would be too quick
-for the usual time step."""
+"""Smallest and largest horse over one of 475 kg [-]; the filters of a smaller one's commands would be too
+quick for the usual time step."""
 SLOWEST, FASTEST = 0.1, 6 * np.pi
 """Rate of a gait, and a crank within a stride, of a horse of 475 kg [rad/s]."""
 LEADS = (-10.0, 10.0)  # of a gait [strides]

@@ -11,20 +11,20 @@ from pathlib import Path
 import gymnasium as gym
 import numpy as np
 import pytest
-from family import scaled
+from family import HORSE, OTHER, scaled
 
 from hoof_env import cli
-from hoof_env.envs import manual
+from hoof_env.envs import horse, manual
 from hoof_env.envs.horse import OPTIONS as HORSE_OPTIONS
 from hoof_env.envs.manual import TABLES
 from hoof_env.envs.parameters import HILLS
-from hoof_env.envs.reference import LEGS
+from hoof_env.envs.reference import FASTEST, LEGS
 from hoof_env.envs.settings import PER_EPISODE, Settings, to_json
 from hoof_env.envs.start import OPTIONS
 from hoof_env.envs.tasks import TASKS
 from hoof_env.envs.vector import HorseLegVectorEnv
 from hoof_env.errors import ParameterError
-from hoof_env.gait import LIMITS, load_gait
+from hoof_env.gait import LIMITS, WIDEST, load_gait
 
 DOCS = Path(__file__).parents[2] / "docs" / "environments"
 OF_LEGS = [name for name, task in TASKS.items() if not task.is_horse]
@@ -70,6 +70,7 @@ def test_every_page_shows_its_film(page):
     name = IDS[page].removeprefix("hoof_env/").removesuffix("-v0")
     (told, film) = re.search(r"!\[(.+?)\]\((.+?)\)", manual.page(page, with_film=True)).groups()
     assert told.startswith(f"{name}, ")
+    assert ("footfall" in told) == (page == "horse") == ("gait parameters" not in told)
     assert film == f"films/{name}.gif"
     assert (DOCS / film).stat().st_size < 450e3  # a page loads quickly
     assert "![" not in manual.page(page)
@@ -169,11 +170,72 @@ def test_every_setting_is_documented_with_its_default(page):
     table = rows(section(manual.page(page), "Arguments"))
     *settings, render_mode = [(row[0].strip("`"), row[1].strip("*")) for row in table]
     assert render_mode == ("render_mode", "None")
-    assert [name for name, _ in settings] == [item.name for item in fields(Settings)]
+    names = [name for name, _ in settings]
+    assert names == [item.name for item in fields(Settings) if page != "horse" or item.name in names]
     for name, value in settings:
         assert eval(value) == to_json(made)[name], name
     bold = {row[0].strip("`") for row in table if row[1].startswith("**")}
-    assert bold == set(TASKS[page].defaults)
+    assert bold == set(TASKS[page].defaults) & set(names)
+
+
+CHANGED = OTHER | {
+    "preset": "identified", "gait": "walk", "trunk": "rail", "hip_height": 1.5, "normal_law": "flores",
+    "friction_law": "tanh", "hoof_stiffness": 2e4, "hoof_damping": 900.0, "terrain": {"kind": "slope"},
+    "drive": "motor", "solver": "paper", "baumgarte_alpha": 10.0, "baumgarte_beta": 10.0,
+    "integrator": "rk3", "sim_dt": 5e-4, "dt": 0.01, "episode_seconds": 5.0, "target_speed": 2.0,
+    "target_seconds": (1.0, 2.0), "observation": ("crank",), "reward_weights": {"peak": 2.0},
+    "randomize": {"friction": 0.5},
+}  # fmt: skip
+BESIDE = {name: {"drive": "motor"} for name in ("motor_gain", "motor_torque", "motor_inertia")} | {
+    f"friction_{name}": {"hoof_stiffness": None} for name in ("law", "slow", "fast")
+}
+
+
+def test_the_page_of_the_horse_lists_what_a_horse_takes():
+    """Each setting with another value than the default, beside what it needs."""
+    listed = {row[0].strip("`") for row in rows(section(manual.page("horse"), "Arguments"))}
+    for name in (item.name for item in fields(Settings)):
+        try:
+            TASKS["horse"].settings(given := {name: CHANGED[name]} | BESIDE.get(name, {}))
+            if name in ("trunk", "hip_height", "solver"):
+                gym.make(HORSE, **given)
+            is_taken = True
+        except ParameterError:
+            is_taken = False
+        assert is_taken == (name in listed), name
+
+
+def test_the_page_of_the_horse_has_the_numbers_of_the_code(monkeypatch):
+    """One that is written down instead would not follow."""
+    for name, value in (
+        ("PHASE_SPREAD", 0.0123), ("PITCH_SPREAD", 0.0234), ("SPEED_SPREAD", 0.345), ("PITCH", 0.456),
+        ("HEIGHT", (0.567, 1.678)), ("CLEARANCE", 0.0789), ("MASS", 489.0),
+    ):  # fmt: skip
+        monkeypatch.setattr(horse, name, value)
+    monkeypatch.setattr(manual, "TABLES", manual.tables())
+    monkeypatch.setattr(manual, "WORDS", manual.TABLES["words"])
+    page = manual.page("horse")
+    start, end = section(page, "Starting State"), section(page, "Episode End")
+    assert "within 0.0123 strides of it, pitch within 0.0234 rad" in start
+    assert "34.5 % up or down" in start
+    assert "more than 0.456 rad, leaves 0.567 to 1.678 m over" in end
+    assert "than 7.89 cm" in end
+    assert "under a fourth of 489 kg" in section(page, "Arguments")
+
+
+def test_the_page_of_the_horse_says_where_commands_are_clipped():
+    actions = section(manual.page("horse"), "Action Space").replace("\n", " ")
+    assert f"the crank's speed to 0 to {FASTEST:g} rad/s at `size` 1" in actions
+    for name in ("swing_offset", "swing_sin", "higher"):
+        low, high = WIDEST[name]
+        assert f"{low:g} to {high:g} rad" in actions
+    assert WIDEST["swing_sin"] == WIDEST["swing_cos"]  # the page says one range of both
+
+
+def test_sentences_are_apart():
+    for page in manual.PAGES:
+        prose = re.sub(r"```.*?```|`[^`\n]*`", "x", manual.page(page), flags=re.DOTALL)
+        assert not re.findall(r"[a-z]{3}\.[A-Z]\w* \w+", prose)
 
 
 def test_the_tables_have_what_there_is_and_nothing_else():

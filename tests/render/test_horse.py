@@ -6,6 +6,7 @@ import itertools
 
 import gymnasium as gym
 import numpy as np
+import pygame
 import pytest
 
 from hoof_env import records
@@ -14,6 +15,7 @@ from hoof_env.envs.policies import make_policy
 from hoof_env.envs.reference import LEGS
 from hoof_env.film import frames
 from hoof_env.play import Game
+from hoof_env.render.instant import HorseInstant
 from hoof_env.render.renderer import new_renderer
 
 HORSE = "hoof_env/Horse-v0"
@@ -78,6 +80,36 @@ def test_films_show_a_horse_that_goes(played):
     assert len(pictures) == 51
     assert all(picture.shape == (540, 960, 3) and picture.dtype == np.uint8 for picture in pictures)
     assert all((one != other).any() for one, other in itertools.pairwise(pictures))
+
+
+@pytest.mark.parametrize("size", [0.5, 2.0])
+def test_arrows_are_as_long_for_animals_of_all_sizes(size):
+    """In the key, and of a force on a hoof that is the same part of the full scale."""
+    scenes = [new_renderer(records.setting(gym.make(HORSE, size=each)), 25.0)._scene for each in (1.0, size)]
+    keys = [pygame.surfarray.array_alpha(scene._key(1000.0)) for scene in scenes]
+    np.testing.assert_array_equal(*keys)
+    assert scenes[1]._share * scenes[1]._scale == pytest.approx(scenes[0]._share * scenes[0]._scale)
+
+
+def test_curves_leave_the_names_of_the_legs_alone(played):
+    """Also those of hoofs that bear the full scale from the first instant to the last."""
+    env, parts = played
+    renderer = new_renderer(records.setting(env), 25.0)
+    panel, instants = renderer._panel, records.instants_of(env, parts[0])
+    panel.add(instants)
+    for curve in panel._curves:
+        curve.clear(), curve.extend((t, panel.full_scale) for t in np.linspace(-3.0, 0.0, 50))
+    bare, drawn = (pygame.Surface(renderer.size, 0, 32) for _ in range(2))
+    bare.blit(panel._card(panel.full_scale), panel._box)
+    now: HorseInstant = instants[-1]
+    panel.draw(drawn, now)
+    seen, expected = (pygame.surfarray.array3d(image).astype(int) for image in (drawn, bare))
+    for plot in panel._plots:
+        name = slice(plot.right - 60, plot.right + 1), slice(plot.top - 15, plot.top - 2)
+        assert expected[name].min() < 200
+        assert (seen[name] == expected[name]).all()
+        inside = slice(plot.left, plot.right - 1), slice(plot.top - 1, plot.top + 2)
+        assert (seen[inside] != expected[inside]).any()
 
 
 @pytest.mark.parametrize("n", [0, 3])
