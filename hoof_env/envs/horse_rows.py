@@ -33,7 +33,7 @@ def _from_hips(x, scene):  # type: ignore[no-untyped-def]
 def _in_bounds(k: int) -> Scale:
     low, high = list(WIDEST.values())[k]
     middle, per = (low + high) / 2, 2 / (high - low)
-    return Scale(f"-1 to 1 from {low:g} to {high:g}", lambda x, scene: (x - middle) * per)
+    return Scale(f"linear, -1 at {low:g} and 1 at {high:g}", lambda x, scene: (x - middle) * per)
 
 
 def _of_leg(i: int, measure: Callable[[Any], Any]) -> Callable[[Any], Any]:

@@ -138,7 +138,7 @@ def scaled(scaling, x, leg):
     if action := re.fullmatch(r"as action (\d)", scaling):
         low, high = list(LIMITS.values())[int(action[1])]
         return (2 * x - low - high) / (high - low)
-    if bounds := re.fullmatch(r"-1 to 1 from (\S+) to (\S+)", scaling):
+    if bounds := re.fullmatch(r"linear, -1 at (\S+) and 1 at (\S+)", scaling):
         low, high = (float(bound) for bound in bounds.groups())
         return (2 * x - low - high) / (high - low)
     if part := re.fullmatch(r"/ ([\d.]+)", scaling):
