@@ -12,7 +12,8 @@ def played(env_id, policy, seconds, **arguments):
     with gym.make(env_id, **arguments) as env:
         record = records.record_episode(env, make_policy(policy, env), 1, seconds)
         about = records.describe(env, environment=env_id, policy=policy, seed=1)
-    return above_threshold(record, THRESHOLD), about
+        about["threshold_n"] = THRESHOLD
+        return above_threshold(record, THRESHOLD, records.setting(env).terrain), about
 
 
 @pytest.fixture(scope="session")

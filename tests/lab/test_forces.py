@@ -7,7 +7,7 @@ import math
 import gymnasium as gym
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from hoof_env import Terrain, records
@@ -91,6 +91,53 @@ def test_vertical_forces_on_level_ground_act_at_the_weighted_mean():
     np.testing.assert_allclose(found["cop_y"], 0.0, atol=1e-15)
 
 
+def zigzag(rise, width):
+    """Up by `rise` and down again over `width` each [m]."""
+    return Terrain((0.0, rise) * 40, start=-40 * width, spacing=width)
+
+
+@pytest.mark.parametrize("ground", [
+    zigzag(0.05, 0.05), zigzag(0.05, 0.1), zigzag(0.2, 0.1), Terrain.slope(-0.6), Terrain.ramp(0.5, 0.0, 0.3),
+    Terrain((0.0, 0.3), start=0.0, spacing=0.01), Terrain.flat(),
+])  # fmt: skip
+@given(x=st.floats(-0.9, 0.9), depth=st.floats(0, 0.03), tilt=st.floats(-0.6, 0.6))
+@example(x=0.049, depth=0.02, tilt=0.6)
+def test_on_bent_ground_the_centre_is_the_nearest_meeting_of_force_and_surface(ground, x, depth, tilt):
+    """Against a walk along the line in steps of 0.2 mm; friction tilts the force from the normal."""
+    slope = float(np.diff(ground.height_at(np.array([x - 1e-6, x + 1e-6])))[0] / 2e-6)
+    force = 500 * np.exp(1j * (np.arctan(slope) + np.pi / 2 - tilt))
+    y = float(ground.height_at(np.array([x]))[0]) - depth
+    record = {name: np.array([value]) for name, value in
+              (("force_x", force.real), ("force_y", force.imag), ("cop_x", x), ("cop_y", y))}  # fmt: skip
+    found = onto_surface(record, ground)
+    centre = complex(found["cop_x"][0], found["cop_y"][0])
+    moved = centre - complex(x, y)
+    assert (moved.conjugate() * force).imag == pytest.approx(0, abs=1e-9)  # no moment
+    walk = np.arange(-0.5, 0.5, 2e-4)
+    points = complex(x, y) + walk * force / abs(force)
+    above = points.imag > ground.height_at(points.real)
+    crossings = np.abs(walk[np.flatnonzero(np.diff(above.astype(int)))])
+    if crossings.size and crossings.min() < 0.499:
+        assert float(ground.height_at(np.array([centre.real]))[0]) == pytest.approx(centre.imag, abs=1e-9)
+        assert abs(moved) <= crossings.min() + 2e-4
+    assert abs(moved) <= 0.5
+
+
+def test_the_threshold_is_of_the_force_along_the_normal():
+    """As a plate in the slope measures it: 25 N upward are 19 N across a slope of 40 degrees."""
+    angle = math.radians(40)
+    record = {
+        "force_x": np.zeros(2),
+        "force_y": np.array([25.0, 27.0]),
+        "cop_x": np.ones(2),
+        "cop_y": np.ones(2),
+    }
+    found = above_threshold(record, 20.0, Terrain.slope(angle))
+    np.testing.assert_array_equal(found["force_y"], [0.0, 27.0])
+    along = {**record, "force_x": np.array([-30.0, 0.0])}  # friction counts: the normal points backward
+    np.testing.assert_array_equal(above_threshold(along, 20.0, Terrain.slope(angle))["force_y"], [25.0, 27.0])
+
+
 forces = st.lists(st.floats(-1e4, 1e4), min_size=1, max_size=30)
 
 
@@ -98,12 +145,12 @@ forces = st.lists(st.floats(-1e4, 1e4), min_size=1, max_size=30)
 def test_nothing_is_left_below_the_threshold_and_all_above(upward, threshold):
     up = np.array(upward)
     record = {"force_y": up} | dict.fromkeys(("force_x", "cop_x", "cop_y"), up + 1.0)
-    found = above_threshold(record, threshold)
+    found = above_threshold(record, threshold, Terrain.flat())
     below = up < threshold
     for name, values in record.items():
         assert not found[name][below].any()
         np.testing.assert_array_equal(found[name][~below], values[~below])
-    again = above_threshold(found, threshold)
+    again = above_threshold(found, threshold, Terrain.flat())
     assert all((again[name] == found[name]).all() for name in found)
 
 
