@@ -21,7 +21,14 @@ import hoof_env
 from hoof_env._output import check_folder, staged
 from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.envs.policies import Scripted, load_open_loop, make_policy, policy_names
-from hoof_env.errors import HoofEnvError, OutputError, ParameterError, check_choice, check_number, parse_pairs
+from hoof_env.errors import (
+    MissingExtraError,
+    OutputError,
+    ParameterError,
+    check_choice,
+    check_number,
+    parse_pairs,
+)
 from hoof_env.gait import PARAMETERS, GaitParameters
 from hoof_env.ground.terrain import Terrain
 from hoof_env.lab.c3d import ezc3d, write_c3d
@@ -233,8 +240,12 @@ def check_place(path: Path, suffixes: Iterable[str]) -> None:
 
 
 def write_csv(record: Columns, about: Mapping[str, Any], path: Path) -> None:
-    """One row a substep under one header line with name and unit; numbers keep their bits."""
-    header = ",".join(f"{name} [{about['units'][name]}]" for name in record)
+    """One row a substep under one header line with name and unit; numbers keep their bits. Beside forces in
+    body weights stands the column `weight`, the same in all rows: there is no other place for it."""
+    units = dict(about["units"])
+    if "BW" in units.values():
+        record, units["weight"] = record | {"weight": np.full(len(record["time"]), about["weight_n"])}, "N"
+    header = ",".join(f"{name} [{units[name]}]" for name in record)
     table = np.column_stack([*record.values()])
     np.savetxt(path, table, "%.17g", delimiter=",", header=header, comments="", encoding="utf-8")
 
@@ -255,7 +266,10 @@ WRITERS: dict[str, Callable[[Columns, Mapping[str, Any], Path], None]]
 WRITERS = {
     ".csv": write_csv, ".parquet": write_parquet, ".mot": write_mot, ".sto": write_mot, ".c3d": write_c3d
 }  # fmt: skip
-NEWTONS = (".mot", ".sto", ".c3d")
+OPENSIM = (".mot", ".sto")
+"""Formats with ExternalLoads beside them."""
+
+NEWTONS = (*OPENSIM, ".c3d")
 """Formats whose readers take forces for newtons."""
 
 
@@ -268,12 +282,12 @@ def check_export(path: Path) -> None:
         try:
             import pyarrow.parquet  # noqa: F401
         except ImportError:
-            raise HoofEnvError('Parquet needs pyarrow: pip install "hoof-env[export]"') from None
+            raise MissingExtraError('Parquet needs pyarrow: pip install "hoof-env[export]"') from None
 
 
 def files_of(path: Path) -> list[Path]:
     """What `write` writes: the record and, of OpenSim's formats, the ExternalLoads XML."""
-    return [path, loads_path(path)] if path.suffix.lower() in (".mot", ".sto") else [path]
+    return [path, loads_path(path)] if path.suffix.lower() in OPENSIM else [path]
 
 
 def write(record: Columns, about: Mapping[str, Any], path: Path) -> Path:
@@ -308,6 +322,10 @@ def export_episode(
     check_choice("units", units, FORCE_UNITS)
     if units != "N" and suffix in NEWTONS:
         raise ParameterError(f"units: expected N in {suffix}, which is read as newtons, got {units}")
+    if bodies and suffix not in OPENSIM:
+        raise ParameterError(
+            f"bodies: expected a {' or '.join(OPENSIM)}, which have ExternalLoads, got {suffix}"
+        )
     if reactions and suffix == ".c3d":
         raise ParameterError("reactions: expected a .csv, .parquet, .mot or .sto, got .c3d")
     with make_env(env_id, given := parse_pairs("--args", arguments)) as env:
@@ -315,10 +333,11 @@ def export_episode(
         on = check_bodies(parse_pairs("--bodies", bodies), limbs_of(names))
         player = find_policy(policy, env, env_id, seed)
         record = record_episode(env, player, seed, seconds, reactions=reactions)
+        kept = above_threshold(record, threshold, setting(env).terrain)
         about = describe(env, environment=env_id, arguments=given, policy=policy, seed=seed) | {
             "threshold_n": threshold, "bodies": on, "units": names,
             "reactions": [name for name in names if reactions and name.endswith(tuple(REACTION_UNITS))],
         }  # fmt: skip
-    written, said = in_units(above_threshold(record, threshold), about, units)
+    written, said = in_units(kept, about, units)
     write(written, said, path)
     return len(record["time"]), about["weight_n"]

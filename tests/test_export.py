@@ -15,8 +15,9 @@ from hoof_env import __version__, cli
 from hoof_env.dynamics.layout import TRUNK_STATE
 from hoof_env.dynamics.parts import GRAVITY
 from hoof_env.envs.policies import make_policy
-from hoof_env.errors import HoofEnvError, OutputError, ParameterError, parse_pairs
+from hoof_env.errors import MissingExtraError, OutputError, ParameterError, parse_pairs
 from hoof_env.lab.opensim import MOT_COLUMNS
+from hoof_env.lab.read import read_record
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.records import (
     RECORD,
@@ -86,13 +87,38 @@ def test_parquet_has_units_version_and_geometry(episode, tmp_path):
 def test_mot_is_what_opensim_reads(episode, tmp_path):
     record, about = episode
     header, columns = read_mot(write(record, about, tmp_path / "run.mot"))
-    assert header == {"version": "1", "nRows": "2001", "nColumns": "10", "inDegrees": "yes"}
+    own = {"version": "1", "nRows": "2001", "nColumns": "10", "inDegrees": "yes"}
+    assert header == own | {"weight_n": f"{about['weight_n']:.10g}"}
     assert [*columns] == ["time", *MOT_COLUMNS]
     for name, source in (("vx", "force_x"), ("vy", "force_y"), ("px", "cop_x"), ("py", "cop_y")):
         np.testing.assert_allclose(columns[f"ground_force_{name}"], record[source], rtol=1e-9)
     np.testing.assert_allclose(columns["time"], record["time"], rtol=1e-9)
     for name in ("force_vz", "force_pz", "torque_x", "torque_y", "torque_z"):
         assert not columns[f"ground_{name}"].any()
+
+
+def test_the_header_of_mot_states_weight_and_threshold(episode, tmp_path):
+    record, about = episode
+    path = write(record, about | {"threshold_n": 50.0}, tmp_path / "run.mot")
+    header, _ = read_mot(path)
+    assert float(header["threshold_n"]) == 50.0
+    assert read_record(path).weight == pytest.approx(about["weight_n"])
+
+
+def test_csv_in_body_weights_keeps_the_weight(tmp_path):
+    out = tmp_path / "run.csv"
+    _, weight = export_episode(out, "run", LEG, seconds=0.4, units="BW")
+    found = read_record(out)
+    assert (found.unit, found.weight) == ("BW", weight)
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".c3d", ".parquet"])
+def test_bodies_are_refused_where_there_are_no_external_loads(suffix, tmp_path):
+    pytest.importorskip({".c3d": "ezc3d", ".parquet": "pyarrow"}.get(suffix, "numpy"))
+    with pytest.raises(
+        ParameterError, match=r"bodies: expected a .mot or .sto, which have ExternalLoads, got"
+    ):
+        export_episode(tmp_path / f"x{suffix}", "run", LEG, bodies=["leg=LF"])
 
 
 def test_in_swing_force_and_its_place_are_zero(episode):
@@ -169,7 +195,7 @@ def test_a_folder_in_the_file_s_place_is_refused(tmp_path, episode):
 def test_parquet_without_pyarrow_says_what_to_install_before_anything_runs(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
-    with pytest.raises(HoofEnvError, match=r'pip install "hoof-env\[export\]"'):
+    with pytest.raises(MissingExtraError, match=r'pip install "hoof-env\[export\]"'):
         export_episode(tmp_path / "x.parquet", "run", "nobody asks for this")
 
 

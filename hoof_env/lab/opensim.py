@@ -24,21 +24,25 @@ MOT_COLUMNS = {
 """OpenSim's names: force [N], point of application [m], free moment [N m]; and the column of the record, none
 for zeros."""
 
+STATED = ("weight_n", "threshold_n")
+"""What the header says beyond OpenSim's own entries, which keeps and ignores others [N]."""
+
 IDENTIFIERS = {"force": "ground_force_v", "point": "ground_force_p", "torque": "ground_torque_"}
 """What the columns of a limb begin with; x, y and z follow."""
 
 
 def write_mot(record: Columns, about: Mapping[str, Any], path: Path) -> None:
-    """Write `time` and `MOT_COLUMNS` of each limb, then joint reactions, if any; and beside it `loads_of`."""
+    """Write `time` and `MOT_COLUMNS` of each limb, then joint reactions, if any; and beside it `loads_of`.
+    The header says the weight and the threshold of stances, too, in `STATED`."""
     limbs, nothing = limbs_of(record), np.zeros(len(record["time"]))
     columns = {"time": record["time"]} | {
         f"{limb}{name}": record[f"{limb}{column}"] if column else nothing
         for limb in limbs for name, column in MOT_COLUMNS.items()
     }  # fmt: skip
     columns |= {name: record[name] for name in about.get("reactions", ())}
-    header = (
-        f"{path.name}\nversion=1\nnRows={len(nothing)}\nnColumns={len(columns)}\ninDegrees=yes\nendheader\n"
-    )
+    stated = "".join(f"{name}={about[name]:.10g}\n" for name in STATED if name in about)
+    counts = f"nRows={len(nothing)}\nnColumns={len(columns)}"
+    header = f"{path.name}\nversion=1\n{counts}\ninDegrees=yes\n{stated}endheader\n"
     table = np.column_stack([*columns.values()]) + 0.0  # no -0
     names = "\t".join(columns)
     np.savetxt(path, table, "%.10g", delimiter="\t", header=header + names, comments="", encoding="utf-8")
