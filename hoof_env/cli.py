@@ -119,7 +119,8 @@ def export(
         args: its arguments: key=value ..., or one JSON object.
         seed: of the episode and of "random".
         seconds: of the episode at most; its own end otherwise.
-        threshold: vertical force below which a limb counts as unloaded, as on a force plate [N].
+        threshold: force along the ground's normal below which a limb counts as unloaded, as on a force
+            plate [N].
         units: of forces: N, or BW for body weights (.csv and .parquet).
         reactions: add the forces in the joints of each leg (not in .c3d).
         bodies: bodies of your OpenSim model that carry the forces: leg=BODY, or left_fore=BODY ...
@@ -150,7 +151,7 @@ def compare(
     mass_a: float | None = None,
     mass_b: float | None = None,
     align: str = "stances",
-    threshold: float = 20.0,
+    threshold: float | None = None,
     units: str = "auto",
     overwrite: bool = False,
 ) -> None:
@@ -165,8 +166,8 @@ def compare(
         map_b: columns of B.
         units_a: unit of A's forces: N, kN, N/kg, BW or %BW; auto takes what the file says.
         units_b: unit of B's forces.
-        reverse_a: components of A that point the other way: none, x, y or xy; auto turns both if the vertical
-            force points into the ground.
+        reverse_a: components of A that point the other way: none, x, y or xy; auto turns both of each limb
+            whose vertical force points into the ground.
         reverse_b: components of B that do.
         rate_a: samples a second of A, if it has no time.
         rate_b: samples a second of B.
@@ -174,7 +175,8 @@ def compare(
         mass_b: of B's animal [kg].
         align: stances lays each pair touchdown on touchdown, shift shifts B as a whole, none takes the times
             of the files.
-        threshold: vertical force that makes a stance [N].
+        threshold: vertical force that makes a stance [N]; 20, or 1 % of the weight in body weights of an
+            animal whose weight is not known.
         units: of the errors: N or BW; auto is N where both records can be in N.
         overwrite: replace the picture if there is one.
     """

@@ -1,17 +1,13 @@
-"""Force records from files, ours or a laboratory's: columns, units, signs, and what limbs are called.
+"""Force records from files, ours or a laboratory's: columns, signs, times, and what limbs are called.
 
-Text tables (.csv, .txt, .tsv) have one line of names, with units as in `force_y [N]` or `Fz (kN)`, and rows
-of numbers; Parquet has the unit in a field's metadata; .mot and .sto are OpenSim's, in N and s; of a .c3d the
-force plates are read, see `c3d.read_c3d`. Columns that our files and OpenSim's use are found by their names;
-others are named by a mapping.
+`lab.tables` reads the files. Columns that our files and OpenSim's use are found by their names; others are
+named by a mapping. Columns that nobody asks for may hold anything.
 """
 
 from __future__ import annotations
 
-import csv
-import json
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -20,40 +16,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.parts import GRAVITY
-from hoof_env.errors import (
-    DataFileError,
-    HoofEnvError,
-    MissingExtraError,
-    ParameterError,
-    check_choice,
-    check_number,
-)
-from hoof_env.lab.c3d import read_c3d
+from hoof_env.errors import DataFileError, HoofEnvError, ParameterError, check_choice, check_number
 from hoof_env.lab.forces import limb_name
+from hoof_env.lab.tables import READERS, Table
 
 Floats = NDArray[np.float64]
-Columns = dict[str, Floats]
 
 FORCE_UNITS = ("N", "kN", "N/kg", "BW", "%BW")
 """Of measured forces; BW are body weights."""
 
 TIMES = {"s": 1.0, "ms": 1e-3}
 REVERSED = {"auto": None, "none": (1, 1), "x": (-1, 1), "y": (1, -1), "xy": (-1, -1)}
-"""Which components count the other way; "auto" turns both where the vertical force points down, as that of
-the limb on the plate does."""
+"""Which components count the other way; "auto" turns both of every limb whose vertical force points down, as
+that of the limb on the plate does."""
+
+STRONG, IDLE = 0.2, 0.05
+"""Share of the highest vertical force of a limb from which on samples tell its direction, so that an offset
+does not; and share of that of all limbs up to which a limb has no direction."""
 
 UNEVEN = 0.01  # most that sampling intervals may differ from each other, of their mean
-HEAD = re.compile(r"\s*(?P<name>.*?)\s*(?:[\[(]\s*(?P<unit>[^\[\]()]*?)\s*[\])])?\s*")
 OPENSIM = re.compile(r"(?:(?P<before>.+)_)?ground_force_(?:(?P<behind>.+)_)?vy")
-
-
-@dataclass
-class Table:
-    """Columns of shape (n,) and their units, as far as the file says, and the weight [N], if it does."""
-
-    columns: Columns
-    units: dict[str, str] = field(default_factory=dict)
-    weight: float | None = None
 
 
 @dataclass
@@ -63,10 +45,12 @@ class ForceRecord:
     Attributes:
         name: of the file.
         time: shape (n,), evenly spaced [s].
-        limbs: forces forward and upward by limb, shape (n, 2), in `unit`.
+        limbs: forces forward and upward by limb, shape (n, 2), in `unit`; forward is not a number where the
+            file has no such force.
         unit: one of `FORCE_UNITS`.
         weight: of the animal [N], or None if unknown.
-        turned: whether "auto" has turned both components.
+        signs: what components forward and upward of a limb in the file are multiplied with; (1, 1) of others.
+        turned: limbs of which "auto" has turned both components.
     """
 
     name: str
@@ -74,7 +58,8 @@ class ForceRecord:
     limbs: dict[str, Floats]
     unit: str
     weight: float | None = None
-    turned: bool = False
+    signs: dict[str, tuple[int, int]] = field(default_factory=dict)
+    turned: tuple[str, ...] = ()
 
     @property
     def rate(self) -> float:
@@ -123,7 +108,7 @@ def read_record(
             check_number(name, number, low=0.0, exclusive_low=True)
     table, given = _load(path), dict(mapping or {})
     limbs, time = _named(path, table, given)
-    forces = {limb: [_column(path, table, name) for name in pair] for limb, pair in limbs.items()}
+    columns = {limb: [_column(path, table, name) for name in pair] for limb, pair in limbs.items()}
     first = {name.removeprefix("-") for pair in limbs.values() for name in pair if name}
     said = {table.units.get(name) for name in first}
     if unit == "auto":
@@ -131,18 +116,29 @@ def read_record(
         if len(said) != 1 or not known:
             found = ", ".join(sorted(str(one) for one in said if one)) or "none"
             raise ParameterError(
-                f"units: expected one of {', '.join(FORCE_UNITS)} for {path.name}, which says {found}"
+                f"units: expected one of {', '.join(FORCE_UNITS)} for {path.name}, which says {found}; name "
+                "it by --units-a or --units-b"
             )
         unit = known[0]
-    stacked = {limb: np.column_stack(pair) for limb, pair in forces.items()}
+    stacked = {limb: np.column_stack(pair) for limb, pair in columns.items()}
     times = _times(path, table, time, rate, len(next(iter(stacked.values()))))
-    signs, turned = REVERSED[reverse], False
-    if signs is None:
-        turned = sum(float(force[:, 1].sum()) for force in stacked.values()) < 0
-        signs = (-1, -1) if turned else (1, 1)
+    chosen = REVERSED[reverse]
+    down = _downward(stacked) if chosen is None else []
+    signs = {limb: chosen or ((-1, -1) if limb in down else (1, 1)) for limb in stacked}
     weight = table.weight if mass is None else mass * GRAVITY
-    turned_limbs = {limb: force * np.array(signs) + 0.0 for limb, force in stacked.items()}
-    return ForceRecord(path.name, times, turned_limbs, unit, weight, turned)
+    forces = {limb: force * np.array(signs[limb]) + 0.0 for limb, force in stacked.items()}
+    return ForceRecord(path.name, times, forces, unit, weight, signs, tuple(down))
+
+
+def _downward(forces: dict[str, Floats]) -> list[str]:
+    """Limbs whose vertical force points down. Each limb is looked at alone, as one plate may lie the other
+    way round; what is hardly loaded points nowhere."""
+    highest = {limb: float(np.abs(force[:, 1]).max()) for limb, force in forces.items()}
+    least = IDLE * max(highest.values())
+    return [
+        limb for limb, force in forces.items()
+        if highest[limb] > least and force[np.abs(force[:, 1]) > STRONG * highest[limb], 1].sum() < 0
+    ]  # fmt: skip
 
 
 def _load(path: Path) -> Table:
@@ -160,78 +156,9 @@ def _load(path: Path) -> Table:
     except Exception as error:  # of readers that are not ours, which raise all kinds
         reason = " ".join(str(error).split()) or type(error).__name__
         raise DataFileError(f"record {str(path)!r}: cannot read it ({reason:.200})") from None
-    if not table.columns or min(len(values) for values in table.columns.values()) < 2:
+    if not table.names or any(len(values) < 2 for values in table.columns.values()):
         raise DataFileError(f"record {str(path)!r}: expected two rows of numbers or more, found fewer")
     return table
-
-
-def _read_text(path: Path) -> Table:
-    lines = path.read_text(encoding="utf-8-sig").splitlines()
-    if not lines:
-        return Table({})
-    between = max("\t;,", key=lines[0].count)
-    return _table(path, lines[0], lines[1:], between, first=2)
-
-
-def _read_opensim(path: Path) -> Table:
-    lines = path.read_text(encoding="utf-8-sig").splitlines()
-    ends = [k for k, line in enumerate(lines) if line.strip().lower() == "endheader"]
-    if not ends or len(lines) < ends[0] + 2:
-        raise DataFileError(f"record {str(path)!r}: expected a line endheader and names below it")
-    top = ends[0] + 1
-    table = _table(path, lines[top].strip(), [line.strip() for line in lines[top + 1 :]], "\t", top + 2)
-    forces = {name: "N" for name in table.columns if "force" in name and re.search(r"_(v[xyz]|[xyz])$", name)}
-    return Table(table.columns, forces | {"time": "s"})
-
-
-def _table(path: Path, head: str, lines: list[str], between: str, first: int) -> Table:
-    names = next(csv.reader([head], delimiter=between))
-    parts = [match for name in names if (match := HEAD.fullmatch(name))]
-    titles = [part["name"] for part in parts]
-    if len(set(titles)) < len(titles):
-        raise DataFileError(f"record {str(path)!r}: expected names that differ, got {head[:80]!r}")
-    rows = []
-    for k, row in enumerate(csv.reader(lines, delimiter=between), first):
-        if not any(cell.strip() for cell in row):
-            continue
-        try:
-            if len(row) != len(names):
-                raise ValueError(f"{len(row)} cells under {len(names)} names")
-            rows.append([float(cell.replace(",", ".") if between == ";" else cell) for cell in row])
-        except ValueError as error:
-            got = str(error).removeprefix("could not convert string to float: ")
-            raise DataFileError(f"record {str(path)!r}: line {k}: expected numbers, got {got}") from None
-    table = np.array(rows).reshape(-1, len(names))
-    units = {part["name"]: part["unit"] for part in parts if part["unit"]}
-    return Table(dict(zip(titles, table.T, strict=True)), units)
-
-
-def _read_parquet(path: Path) -> Table:
-    try:
-        from pyarrow import parquet
-    except ImportError:
-        raise MissingExtraError('Parquet needs pyarrow: pip install "hoof-env[export]"') from None
-    table = parquet.read_table(path)
-    units = {one.name: (one.metadata or {}).get(b"unit", b"").decode() for one in table.schema}
-    about = json.loads((table.schema.metadata or {}).get(b"hoof_env", b"{}"))
-    columns = {name: np.asarray(table[name].to_numpy(), float) for name in table.column_names}
-    return Table(columns, units, about.get("weight_n"))
-
-
-def _read_c3d(path: Path) -> Table:
-    columns, units, about = read_c3d(path)
-    forward = {name: name.removesuffix("_x") + "_force_x" for name in columns if name.endswith("_x")}
-    upward = {name: name.removesuffix("_z") + "_force_y" for name in columns if name.endswith("_z")}
-    own = {new: old for old, new in (forward | upward).items()}  # the laboratory's z is up
-    columns |= {new: columns[old] for new, old in own.items()}
-    return Table(columns, units | {new: units[old] for new, old in own.items()}, about.get("weight_n"))
-
-
-READERS: dict[str, Callable[[Path], Table]] = {
-    **dict.fromkeys((".csv", ".txt", ".tsv"), _read_text),
-    **dict.fromkeys((".mot", ".sto"), _read_opensim),
-    ".parquet": _read_parquet, ".c3d": _read_c3d,
-}  # fmt: skip
 
 
 def _named(path: Path, table: Table, given: dict[str, Any]) -> tuple[dict[str, tuple[str, str]], str]:
@@ -249,16 +176,16 @@ def _named(path: Path, table: Table, given: dict[str, Any]) -> tuple[dict[str, t
                 raise ParameterError(f"map: expected {limb}_y beside {limb}_x={columns[f'{limb}_x']}")
             limbs[limb_name(limb.removesuffix("force"))] = (columns.get(f"{limb}_x", ""), up)
     else:
-        for name in table.columns:
+        for name in table.names:
             if (match := OPENSIM.fullmatch(name)) is not None:
                 limb = match["before"] or match["behind"] or "leg"
-                limbs[limb] = (name.removesuffix("y") + "x", name)
+                limbs[limb] = (_forward(table, name), name)
             elif name.endswith("force_y") and not name.removesuffix("_force_y").endswith(("toe", "heel")):
-                limbs[limb_name(name.removesuffix("force_y"))] = (name.removesuffix("y") + "x", name)
+                limbs[limb_name(name.removesuffix("force_y"))] = (_forward(table, name), name)
     if not limbs:
         raise ParameterError(
             f"map: expected columns of {path.name} for time, force_x and force_y, as in force_y=Fz; it has "
-            f"{_few(table.columns)}"
+            f"{_few(table.names)}"
         )
     for new, old in known.items():
         if old not in limbs:
@@ -267,18 +194,26 @@ def _named(path: Path, table: Table, given: dict[str, Any]) -> tuple[dict[str, t
     return {back.get(limb, limb): pair for limb, pair in limbs.items()}, time
 
 
+def _forward(table: Table, upward: str) -> str:
+    """The column beside the vertical force; "" if there is none."""
+    name = upward.removesuffix("y") + "x"
+    return name if name in table.names else ""
+
+
 def _few(names: Any) -> str:
     shown = list(names)
     return ", ".join(shown[:8]) + (f" and {len(shown) - 8} more" if len(shown) > 8 else "")
 
 
 def _column(path: Path, table: Table, name: str) -> Floats:
-    """The column of that name, turned round where "-" is before it; zeros of none."""
+    """The column of that name, turned round where "-" is before it; not a number if there is none."""
     if not name:
-        return np.zeros(len(next(iter(table.columns.values()))))
-    bare = name if name in table.columns else name.removeprefix("-")
+        return np.full(table.rows, np.nan)
+    bare = name if name in table.names else name.removeprefix("-")
+    if bare in table.unread:
+        raise DataFileError(f"record {str(path)!r}: {table.unread[bare]}")
     if bare not in table.columns:
-        raise ParameterError(f"map: expected a column of {path.name} ({_few(table.columns)}), got {bare!r}")
+        raise ParameterError(f"map: expected a column of {path.name} ({_few(table.names)}), got {bare!r}")
     values = table.columns[bare]
     if not np.isfinite(values).all():
         row = int(np.argmin(np.isfinite(values)))
@@ -292,10 +227,11 @@ def _times(path: Path, table: Table, name: str, rate: float | None, n: int) -> F
     """Times of the rows [s], evenly spaced."""
     if rate is not None:
         return np.arange(n) / rate
-    if name not in table.columns:
+    if name not in table.names:
         raise ParameterError(
-            f"map: expected a column of {path.name} for time, as in time=Seconds, or its rate; it has "
-            f"{_few(table.columns)}"
+            f"map: expected a column of {path.name} for time, as in time=Seconds, or its rate (--rate-a, "
+            f"--rate-b); it has "
+            f"{_few(table.names)}"
         )
     said = table.units.get(name) or "s"
     if said not in TIMES:
@@ -306,6 +242,7 @@ def _times(path: Path, table: Table, name: str, rate: float | None, n: int) -> F
     if mean <= 0 or np.abs(steps - mean).max() > UNEVEN * mean:
         raise DataFileError(
             f"record {str(path)!r}: {name}: expected times that increase evenly, got steps of "
-            f"{steps.min():g} to {steps.max():g} s"
+            f"{steps.min():g} to {steps.max():g} s; if they are only rounded, give the rate instead "
+            "(--rate-a, --rate-b)"
         )
     return time

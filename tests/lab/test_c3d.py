@@ -9,7 +9,7 @@ import pytest
 
 from hoof_env import records
 from hoof_env.envs.reference import LEGS
-from hoof_env.errors import MissingExtraError, ParameterError
+from hoof_env.errors import DataFileError, MissingExtraError, ParameterError
 from hoof_env.ground.terrain import Terrain
 from hoof_env.lab.c3d import CHANNELS, MARKERS, plane_of
 from hoof_env.lab.forces import loaded
@@ -42,6 +42,7 @@ def test_every_limb_has_a_plate(of_horse, tmp_path):
     assert p["POINT"]["UNITS"] == ["mm"]
     assert p["ANALOG"]["RATE"][0] == p["POINT"]["RATE"][0] == pytest.approx(1000.0)
     assert p["HOOF_ENV"]["LIMBS"] == list(LEGS)
+    assert list(p["HOOF_ENV"]["THRESHOLD"]) == [about["threshold_n"]]
     assert file["data"]["points"].shape == (4, 9, len(record["time"]))
     np.testing.assert_allclose(file["data"]["points"][0, 0], 1e3 * record["left_fore_toe_x"], rtol=1e-6)
     np.testing.assert_allclose(file["data"]["points"][2, -1], 1e3 * record["y"], rtol=1e-6)
@@ -95,6 +96,51 @@ def test_a_record_that_is_too_long_is_refused(of_leg, tmp_path):
     with pytest.raises(ParameterError, match="at most 65535 frames of a c3d, got 70000"):
         records.write(long, about, tmp_path / "long.c3d")
     assert not list(tmp_path.iterdir())
+
+
+def changed(path, change):
+    """The c3d file once more, after `change(file)`."""
+    file = read(path)
+    change(file)
+    file.write(str(path))
+    return path
+
+
+@pytest.mark.usefixtures("need_ezc3d")
+@pytest.mark.parametrize("part", [0.6, 0.95])
+def test_a_file_that_is_cut_off_is_refused(part, of_horse, tmp_path):
+    path = records.write(*of_horse, tmp_path / "horse.c3d")
+    content = path.read_bytes()
+    path.write_bytes(content[: int(part * len(content))])
+    with pytest.raises(DataFileError, match=r"frames, as its header says, found .*: is the file cut off"):
+        read_record(path)
+
+
+@pytest.mark.usefixtures("need_ezc3d")
+def test_units_are_those_of_the_channels(of_leg, tmp_path):
+    path = records.write(*of_leg, tmp_path / "x.c3d")
+    newtons = read_record(path)
+
+    def name(unit):
+        return changed(path, lambda file: file["parameters"]["ANALOG"]["UNITS"].update(value=unit))
+
+    name(["kN"] * 3 + ["kNm"] * 3)
+    thousands = read_record(path)
+    assert (newtons.unit, thousands.unit, thousands.per("N")) == ("N", "kN", 1000.0)
+    np.testing.assert_allclose(thousands.limbs["leg"], newtons.limbs["leg"])
+    for units, said in ((["V"] * 6, "V"), (["N", "N", "kN", "V", "V", "V"], "N and kN")):
+        name(units)
+        with pytest.raises(ParameterError, match=f"x.c3d, which says {said}; name it by --units-a"):
+            read_record(path)
+    assert read_record(path, unit="N").unit == "N"
+
+
+@pytest.mark.usefixtures("need_ezc3d")
+def test_a_file_without_plates_says_so(of_leg, tmp_path):
+    path = records.write(*of_leg, tmp_path / "x.c3d")
+    changed(path, lambda file: file["parameters"]["FORCE_PLATFORM"]["USED"].update(value=[0]))
+    with pytest.raises(DataFileError, match="found no force plates"):
+        read_record(path)
 
 
 def test_without_ezc3d_the_extra_is_named(tmp_path, monkeypatch):
