@@ -1,16 +1,15 @@
 """Two force records beside each other, limb by limb: `hoof-env compare`.
 
-Both are resampled by linear interpolation to the higher of both rates, so that no peak of either is lost. A
-stance of a limb is a stretch of at least `SHORTEST` whose vertical force is above the threshold; gaps that
-are shorter are closed, and stances that a record cuts off are left out.
+Both are resampled by linear interpolation to the higher of both rates, so that no peak of either is lost.
+`lab.stances` says what a stance is.
 
 Three ways to align B with A. "none": the times of the files. "shift": one shift for all limbs. It is a
 difference of the touchdowns of one stance of A and one of B, the one under which the vertical forces of all
 limbs differ least (root mean square over at least half of the shorter record; of shifts within 10 % of the
 least, the shortest, as strides repeat), then moved within two sampling intervals to the least difference.
 "stances": that shift tells which stances belong together, and then each pair is laid touchdown on touchdown.
-The pairs of a limb begin with the two whose touchdowns are nearest under the shift, and go on from there in
-order, so that records of different stride times can be compared.
+Of a limb those are paired whose touchdowns are nearest under the shift. Where stride periods differ by more
+than 10 %, pairs begin with the two that are nearest and go on from there in order.
 """
 
 from __future__ import annotations
@@ -18,8 +17,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import product
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,14 +24,14 @@ from numpy.typing import NDArray
 from hoof_env.errors import DataFileError, ParameterError, check_choice, check_number
 from hoof_env.lab.forces import THRESHOLD
 from hoof_env.lab.read import ForceRecord
+from hoof_env.lab.stances import Pair, Side, best_shift, pairs_of, whole_stances
 
 Floats = NDArray[np.float64]
 
-SHORTEST = 0.02  # stances and gaps that count [s]
 ALIGNMENTS = ("stances", "shift", "none")
 ONE_PERCENT = 0.01  # threshold in body weights of an animal whose weight is not known
-NEAR = 1.1  # of the least difference, within which the shortest shift is taken
-MOST_SHIFTS = 400  # of touchdowns that are tried
+WIDE = 0.1  # share of a stride that touchdowns may scatter by unremarked
+MOST_SAMPLES = 20_000_000  # of a record at the common rate: some hours of a force plate
 
 
 @dataclass(frozen=True)
@@ -63,7 +60,7 @@ class LimbErrors:
     Attributes:
         pairs: how many stances are compared.
         forces: by component: "vertical", "fore-aft", and of the latter "braking" and "propulsion" alone,
-            whose peaks and impulses are positive.
+            whose peaks and impulses are positive; the vertical alone where a record has no other.
         contact, contact_error: how long a stance lasts in A, and the error [s].
         touchdown_error: how much later B touches down after the shift [s], mean over the pairs.
         touchdown_spread: their standard deviation [s].
@@ -87,26 +84,32 @@ class Comparison:
         a, b: the records.
         unit: of all forces, "N" or "BW".
         rate: that both are resampled to [Hz].
+        levels: vertical force of A and of B that makes a stance [unit].
         shift: added to the times of B [s].
         limbs: errors by limb, in the order of A.
         curves: by limb, of each pair the time from A's touchdown [s], shape (n,), the forces of A and those
             of B there, forward and upward, shape (n, 2).
+        missing: limbs that are not compared, and why.
+        warnings: what makes a limb's errors doubtful.
     """
 
     a: ForceRecord
     b: ForceRecord
     unit: str
     rate: float
+    levels: tuple[float, float]
     shift: float
     limbs: dict[str, LimbErrors]
     curves: dict[str, list[tuple[Floats, Floats, Floats]]]
+    missing: dict[str, str]
+    warnings: list[str]
 
 
 def compare(
     a: ForceRecord,
     b: ForceRecord,
     align: str = "stances",
-    threshold: float = THRESHOLD,
+    threshold: float | None = None,
     units: str = "auto",
 ) -> Comparison:
     """Errors of B against A.
@@ -114,48 +117,127 @@ def compare(
     Args:
         a, b: the records; limbs of the same name are compared, and where both have one only, those.
         align: one of `ALIGNMENTS`; see above.
-        threshold: vertical force that makes a stance [N]; 1 % of the weight where the weight is not known.
+        threshold: vertical force that makes a stance [N]; None is `THRESHOLD`, or 1 % of the weight where
+            forces are in body weights of a weight that is not known.
         units: "N" or "BW" for the errors; "auto" is N where both records can be in N, else BW.
 
     Raises:
-        ParameterError: an argument is wrong, records have no limb or no unit in common, or do not overlap.
+        ParameterError: an argument is wrong, records have no limb or no unit in common, do not overlap or
+            would be too long at the common rate.
         DataFileError: a record has no whole stance of any of those limbs.
     """
     check_choice("align", align, ALIGNMENTS)
     check_choice("units", units, ("auto", "N", "BW"))
-    check_number("threshold", threshold, low=0.0, high=1e6)
     unit, (by_a, by_b) = _common_unit(a, b, units)
     names = _common_limbs(a, b)
+    levels = _levels(a, b, threshold, unit)
     rate = max(a.rate, b.rate)
+    _check_length(a, b, rate)
     starts = (a.time[0], b.time[0]) if align == "none" else (0.0, 0.0)
     time_a, forces_a = _resampled(a, [one for one, _ in names], by_a, rate, starts[0])
     time_b, forces_b = _resampled(b, [two for _, two in names], by_b, rate, starts[1])
-    weight = a.weight or b.weight
-    level = threshold if unit == "N" else threshold / weight if weight else ONE_PERCENT
-    stances = [[_stances(force[:, 1], level, rate) for force in forces] for forces in (forces_a, forces_b)]
-    for record, found in zip((a, b), stances, strict=True):
+    stances = [
+        [whole_stances(force[:, 1], level, rate) for force in forces]
+        for forces, level in zip((forces_a, forces_b), levels, strict=True)
+    ]
+    for record, found, forces, level in zip((a, b), stances, (forces_a, forces_b), levels, strict=True):
         if not any(found):
-            raise DataFileError(
-                f"record {record.name!r}: expected a whole stance above {level:g} {unit}, found none"
-            )
+            why = _why_none(np.concatenate([force[:, 1] for force in forces]), level, unit)
+            raise DataFileError(f"record {record.name!r}: expected a whole stance {why}")
     near = math.ceil(2 * rate / min(a.rate, b.rate))
-    shift = 0.0 if align == "none" else _shift(forces_a, forces_b, stances, rate, near)
-    limbs, curves = {}, {}
+    shift = 0.0 if align == "none" else best_shift(forces_a, forces_b, stances, rate, near)
+    limbs, curves, missing, warnings = {}, {}, _unshared(a, b, names), []
     for k, (name, _) in enumerate(names):
         sides = (
-            _Side(time_a, forces_a[k], stances[0][k]),
-            _Side(time_b + shift, forces_b[k], stances[1][k]),
+            Side(time_a, forces_a[k], stances[0][k]),
+            Side(time_b + shift, forces_b[k], stances[1][k]),
         )
-        pairs = _pairs(*sides, rate, by_touchdown=align == "stances")
+        pairs = pairs_of(*sides, rate, by_touchdown=align == "stances")
         if pairs:
             limbs[name] = _errors(pairs, rate)
             curves[name] = [(pair.time, pair.a, pair.b) for pair in pairs]
+            warnings += [f"{name}: {doubt}" for doubt in _doubts(sides, limbs[name])]
+        else:
+            missing[name] = _why_missing(sides, levels, unit)
     if not limbs:
         raise ParameterError(
             f"align: expected stances of a limb in {a.name} and {b.name} at the same times, found none with "
             f"align={align!r}"
         )
-    return Comparison(a, b, unit, rate, shift, limbs, curves)
+    return Comparison(a, b, unit, rate, levels, shift, limbs, curves, missing, warnings)
+
+
+def _levels(a: ForceRecord, b: ForceRecord, threshold: float | None, unit: str) -> tuple[float, float]:
+    """The vertical force of A and of B that makes a stance, in `unit`: each by its own weight."""
+    newtons = THRESHOLD if threshold is None else check_number("threshold", threshold, low=0.0, high=1e6)
+    if unit == "N":
+        return newtons, newtons
+    if a.weight and b.weight:
+        return newtons / a.weight, newtons / b.weight
+    if threshold is None:
+        return ONE_PERCENT, ONE_PERCENT
+    lacking, record = ("b", b) if a.weight else ("a", a)
+    raise ParameterError(
+        f"mass-{lacking}: expected the mass [kg] of the animal of {record.name}, to know {newtons:g} N in "
+        "body weights, or no threshold"
+    )
+
+
+def _check_length(a: ForceRecord, b: ForceRecord, rate: float) -> None:
+    longest = max(float(record.time[-1] - record.time[0]) for record in (a, b))
+    if longest * rate > MOST_SAMPLES:
+        raise ParameterError(
+            f"rate: expected at most {MOST_SAMPLES} samples of a record at the higher of both rates, got "
+            f"{longest:g} s at {rate:g} Hz"
+        )
+
+
+def _why_none(vertical: Floats, level: float, unit: str) -> str:
+    """What to say of vertical forces without a whole stance; the remedy for a plate that is not zeroed."""
+    low, high = float(np.percentile(vertical, 5)), float(vertical.max())
+    why = f"above {level:g} {unit}, found none"
+    if low > level:
+        why += f": it hardly falls below {low:.4g} {unit}; subtract the plate's offset, or raise --threshold"
+    elif high <= level:
+        why += f": the highest force is {high:.4g} {unit}"
+    return why
+
+
+def _why_missing(sides: tuple[Side, Side], levels: tuple[float, float], unit: str) -> str:
+    for name, side, level in zip("AB", sides, levels, strict=True):
+        if not side.stances:
+            return f"{name} has no whole stance: expected one {_why_none(side.force[:, 1], level, unit)}"
+    return "no stance of A has one of B at the same time"
+
+
+def _unshared(a: ForceRecord, b: ForceRecord, names: list[tuple[str, str]]) -> dict[str, str]:
+    """Limbs that only one of the records has, and which."""
+    shared = [{one for one, _ in names}, {two for _, two in names}]
+    return {
+        limb: f"only {which} has it" for which, record, known in zip("AB", (a, b), shared, strict=True)
+        for limb in record.limbs if limb not in known
+    }  # fmt: skip
+
+
+def _doubts(sides: tuple[Side, Side], errors: LimbErrors) -> list[str]:
+    """What makes the errors of a limb doubtful: stances that one record lacks, touchdowns that scatter."""
+    a, b = sides
+    period = a.period if a.period > 0 else b.period
+    edge = 0.1 * period if period > 0 else 0.0  # a stance may be whole in one record and not in the other
+    low, high = max(a.time[0], b.time[0]) + edge, min(a.time[-1], b.time[-1]) - edge
+    counts = [side.whole_between(low, high) for side in sides]
+    found = []
+    if counts[0] != counts[1]:
+        found.append(
+            f"A has {counts[0]} whole stances and B {counts[1]} in the same time, {errors.pairs} are "
+            "compared; if noise makes or splits stances, raise --threshold"
+        )
+    if period > 0 and errors.touchdown_spread > WIDE * period:
+        found.append(
+            f"touchdowns scatter by {1e3 * errors.touchdown_spread:.0f} ms, of a stride of "
+            f"{1e3 * period:.0f} ms: the records differ in pace, or stances are paired wrongly"
+        )
+    return found
 
 
 def _common_unit(a: ForceRecord, b: ForceRecord, units: str) -> tuple[str, tuple[float, float]]:
@@ -195,93 +277,6 @@ def _resampled(
     return start + time, forces
 
 
-def _stances(vertical: Floats, level: float, rate: float) -> list[tuple[int, int]]:
-    """First and last-but-one sample of each whole stance."""
-    edges = np.flatnonzero(np.diff((vertical > level).astype(int), prepend=0, append=0))
-    spans: list[tuple[int, int]] = []
-    for first, last in edges.reshape(-1, 2).tolist():
-        if spans and first - spans[-1][1] < SHORTEST * rate:
-            spans[-1] = spans[-1][0], last
-        else:
-            spans.append((first, last))
-    n = len(vertical)
-    return [(i, j) for i, j in spans if j - i >= SHORTEST * rate and i > 0 and j < n]
-
-
-def _shift(
-    forces_a: list[Floats],
-    forces_b: list[Floats],
-    stances: list[list[list[tuple[int, int]]]],
-    rate: float,
-    near: int,
-) -> float:
-    """What is added to the times of B [s], both from their starts; touchdowns are known to `near` samples."""
-    whole_a, whole_b = (np.array([force[:, 1] for force in forces]) for forces in (forces_a, forces_b))
-    touch = [(one, two) for one, two in zip(*stances, strict=True) if one and two]
-    if not touch:
-        raise ParameterError("align: expected stances of one limb in both records, found none")
-    lags = sorted({i - j for (i, _), (j, _) in product(*touch[0])}, key=abs)[:MOST_SHIFTS]
-    least = min(whole_a.shape[1], whole_b.shape[1]) // 2
-
-    def difference(lag: int) -> float:
-        first, last = max(0, lag), min(whole_a.shape[1], whole_b.shape[1] + lag)
-        if last - first < max(least, 1):
-            return math.inf
-        off = whole_a[:, first:last] - whole_b[:, first - lag : last - lag]
-        return math.sqrt((off * off).mean())
-
-    found = {lag: difference(lag) for lag in lags}
-    best = next(lag for lag in lags if found[lag] <= NEAR * min(found.values()))
-    around = sorted(range(best - near, best + near + 1), key=lambda lag: abs(lag - best))
-    return min(around, key=difference) / rate  # the first of equals
-
-
-class _Side(NamedTuple):
-    """A limb in one of the records: times after the shift [s], forces of shape (n, 2), whole stances."""
-
-    time: Floats
-    force: Floats
-    stances: list[tuple[int, int]]
-
-
-class _Pair(NamedTuple):
-    """Two stances: the time from A's touchdown [s], the forces of A and B over both stances, those of each
-    stance alone, and how much later B touches down [s]."""
-
-    time: Floats
-    a: Floats
-    b: Floats
-    own: tuple[Floats, Floats]
-    late: float
-
-
-def _pairs(a: _Side, b: _Side, rate: float, by_touchdown: bool) -> list[_Pair]:
-    """Stances that belong together. By touchdown: in order, from the two that are nearest on. Else each with
-    the nearest one, if that is mutual."""
-    if not a.stances or not b.stances:
-        return []
-    touch_a, touch_b = (side.time[[first for first, _ in side.stances]] for side in (a, b))
-    apart = np.abs(touch_a[:, None] - touch_b)
-    i, j = np.unravel_index(int(apart.argmin()), apart.shape)
-    later = int(i - j)
-    together = [(m, m - later) for m in range(len(touch_a)) if 0 <= m - later < len(touch_b)]
-    if not by_touchdown:
-        nearest = apart.argmin(axis=1).tolist()
-        together = [(m, n) for m, n in enumerate(nearest) if apart[:, n].argmin() == m]
-    found = []
-    for m, n in together:
-        (first_a, last_a), (first_b, last_b) = a.stances[m], b.stances[n]
-        ahead = first_b - first_a if by_touchdown else round((a.time[0] - b.time[0]) * rate)
-        low = max(min(first_a, first_b - ahead), 0, -ahead)
-        high = min(max(last_a, last_b - ahead), len(a.force), len(b.force) - ahead)
-        if high - low > 1:
-            time = (np.arange(low, high) - first_a) / rate
-            own = a.force[first_a:last_a], b.force[first_b:last_b]
-            late = float(touch_b[n] - touch_a[m])
-            found.append(_Pair(time, a.force[low:high], b.force[low + ahead : high + ahead], own, late))
-    return found
-
-
 PARTS: dict[str, Callable[[Floats], Floats]] = {
     "vertical": lambda force: force[:, 1],
     "fore-aft": lambda force: force[:, 0],
@@ -291,10 +286,13 @@ PARTS: dict[str, Callable[[Floats], Floats]] = {
 """Components of forces of shape (n, 2)."""
 
 
-def _errors(pairs: list[_Pair], rate: float) -> LimbErrors:
+def _errors(pairs: list[Pair], rate: float) -> LimbErrors:
     """Errors of a limb over pairs of stances."""
     forces = {}
+    has_fore_aft = all(np.isfinite(force).all() for pair in pairs for force in (pair.a, pair.b))
     for name, part in PARTS.items():
+        if name != "vertical" and not has_fore_aft:
+            continue
         x = np.concatenate([part(pair.a) for pair in pairs])
         y = np.concatenate([part(pair.b) for pair in pairs])
         figures = np.array([

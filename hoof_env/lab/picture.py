@@ -11,7 +11,7 @@ import numpy as np
 from hoof_env._output import check_folder, markdown_table, staged
 from hoof_env.errors import MissingExtraError, ParameterError
 from hoof_env.lab.compare import Comparison, Force
-from hoof_env.lab.read import ForceRecord
+from hoof_env.lab.read import REVERSED, ForceRecord
 from hoof_env.paper.figures import BLUE, GREY, ORANGE, STYLE
 
 SUFFIXES = (".pdf", ".png", ".svg")
@@ -20,24 +20,49 @@ POINTS = 201  # of a mean curve
 
 
 def report(found: Comparison) -> str:
-    """What was compared, a table of errors, and a hint where fore-aft forces point opposite ways."""
+    """What was compared, a table of errors, and warnings: of limbs that are left out, of doubtful stances,
+    and of fore-aft forces that point opposite ways, with the option that turns them."""
     lines = [
         _about("A", found.a),
         _about("B", found.b),
         f"Errors are B less A, means over the stances, at {found.rate:g} Hz; "
-        f"times of B {found.shift:+.3f} s. A's own value is in brackets.",
+        f"times of B {found.shift:+.3f} s. A's own value is in brackets. {_levels(found)}",
         "",
         _table(found),
     ]
+    doubts = [f"{limb} is not compared: {why}" for limb, why in found.missing.items()] + found.warnings
     for limb, errors in found.limbs.items():
-        if errors.forces["fore-aft"].r < -0.5:
-            lines.append(f"{limb}: fore-aft forces point opposite ways; --reverse-b x turns those of B")
-    return "\n".join(lines)
+        if "fore-aft" in errors.forces and errors.forces["fore-aft"].r < -0.5:
+            doubts.append(f"{limb}: fore-aft forces point opposite ways; {_remedy(found, limb)}")
+    return "\n".join([*lines, *(f"warning: {doubt}" for doubt in doubts)])
+
+
+def _remedy(found: Comparison, limb: str) -> str:
+    """The option that turns the fore-aft forces of a limb. It counts from what the file has: where "auto" has
+    turned both components, the vertical alone is to be turned. A is at fault if only A was turned."""
+    of_b = limb if limb in found.b.limbs else next(iter(found.b.limbs))  # the only ones may differ in name
+    at_a = limb in found.a.turned and of_b not in found.b.turned
+    which, record, limb = ("a", found.a, limb) if at_a else ("b", found.b, of_b)
+    forward, upward = record.signs.get(limb, (1, 1))
+    if len({record.signs.get(one, (1, 1)) for one in record.limbs}) > 1:  # an option is for all limbs
+        return f"a minus before the column of {limb}_force_x in --map-{which} turns those of {which.upper()}"
+    option = next(name for name, signs in REVERSED.items() if signs == (-forward, upward))
+    return f"--reverse-{which} {option} turns those of {which.upper()}"
+
+
+def _levels(found: Comparison) -> str:
+    of_a, of_b = (f"{level:.4g} {found.unit}" for level in found.levels)
+    return f"Stances are above {of_a}." if of_a == of_b else f"Stances are above {of_a} in A and {of_b} in B."
 
 
 def _about(which: str, record: ForceRecord) -> str:
-    turned = "; forces pointed into the ground and are turned round" if record.turned else ""
-    return f"{which}  {record.name}: {record.rate:g} Hz, {record.unit}, {', '.join(record.limbs)}{turned}"
+    limbs = "" if len(record.turned) == len(record.limbs) else f" of {', '.join(record.turned)}"
+    turned = f"; forces{limbs} pointed into the ground and are turned round" if record.turned else ""
+    level = [limb for limb, force in record.limbs.items() if not np.isfinite(force[:, 0]).any()]
+    only = f"; no fore-aft force of {', '.join(level)}" if level else ""
+    return (
+        f"{which}  {record.name}: {record.rate:g} Hz, {record.unit}, {', '.join(record.limbs)}{turned}{only}"
+    )
 
 
 def _table(found: Comparison) -> str:
@@ -63,6 +88,7 @@ def _table(found: Comparison) -> str:
                     f"{round(1e3 * errors.peak_time_error):+d}",
                 ]
             rows.append(row)
+    rows += [[limb, "not compared", "0"] for limb in found.missing]
     return markdown_table(head, rows)
 
 
@@ -76,18 +102,22 @@ def _pair(error: float, of: float, places: int) -> str:
 
 def draw(found: Comparison, path: Path) -> Path:
     """Write a picture, a row of panels for each limb: the vertical and the fore-aft force from touchdown on,
-    each stance thin and their mean heavy, A and B."""
+    each stance thin and their mean heavy, A and B; no panel for a force that a record does not have."""
     check_picture(path)
     from matplotlib import style
     from matplotlib.figure import Figure
 
     limbs = list(found.curves)
+    columns = 2 if any("fore-aft" in errors.forces for errors in found.limbs.values()) else 1
     with style.context(["default", STYLE]), staged(path.parent) as stage:
         figure = Figure(figsize=(7.5, 1.1 + 1.9 * len(limbs)), layout="constrained")
-        axes = figure.subplots(len(limbs), 2, sharex=True, sharey="col", squeeze=False)
+        axes = figure.subplots(len(limbs), columns, sharex=True, sharey="col", squeeze=False)
         for row, limb in zip(axes, limbs, strict=True):
             pairs = found.curves[limb]
-            for panel, component, title in zip(row, (1, 0), ("vertical", "fore-aft"), strict=True):
+            for panel, component, title in zip(row, (1, 0), ("vertical", "fore-aft"), strict=False):
+                if title not in found.limbs[limb].forces:
+                    panel.set_visible(False)
+                    continue
                 for side, colour, width in ((1, BLUE, 2.4), (2, ORANGE, 1.2)):
                     for pair in pairs:
                         panel.plot(pair[0], pair[side][:, component], color=colour, lw=0.5, alpha=0.35)

@@ -14,7 +14,7 @@ from hoof_env.dynamics.parts import GRAVITY
 from hoof_env.envs.reference import LEGS
 from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.lab.compare import THRESHOLD, compare
-from hoof_env.lab.picture import report
+from hoof_env.lab.picture import draw, report
 from hoof_env.lab.read import ForceRecord, read_record
 
 PERIOD, CONTACT, PEAK = 1.0, 0.4, 900.0
@@ -115,8 +115,16 @@ def test_the_times_of_the_files_are_kept_on_demand():
 
 def test_what_cannot_be_compared_is_one_line():
     empty = strides(scale=0.0)
-    with pytest.raises(DataFileError, match=r"'0.csv': expected a whole stance above 20 N, found none"):
+    with pytest.raises(
+        DataFileError, match=r"'0.csv': expected a whole stance above 20 N, found none: the h"
+    ):
         compare(strides(), empty)
+    raised = strides()
+    raised.limbs = {limb: force + np.array([0.0, 30.0]) for limb, force in raised.limbs.items()}
+    with pytest.raises(
+        DataFileError, match=r"hardly falls below 30 N; subtract the plate's offset, or raise"
+    ):
+        compare(strides(), raised)
     other = strides()
     other.limbs = {f"plate_{k}": force for k, force in enumerate(other.limbs.values(), 1)}
     with pytest.raises(ParameterError, match=r"has left, right, .* has plate_1, plate_2; name one as in"):
@@ -128,8 +136,174 @@ def test_what_cannot_be_compared_is_one_line():
 def test_opposite_fore_aft_forces_are_told():
     other = strides()
     other.limbs = {limb: force * [-1, 1] for limb, force in other.limbs.items()}
-    assert "left: fore-aft forces point opposite ways; --reverse-b x" in report(compare(strides(), other))
+    assert "warning: left: fore-aft forces point opposite ways; --reverse-b x" in report(
+        compare(strides(), other)
+    )
     assert "opposite" not in report(compare(strides(), strides()))
+
+
+def idle(record, limb="right"):
+    """The record with a limb that is not loaded."""
+    record.limbs[limb] = 0 * record.limbs[limb]
+    return record
+
+
+def test_a_limb_that_is_not_compared_is_named_with_the_reason():
+    found = compare(strides(), idle(strides()))
+    assert list(found.limbs) == ["left"]
+    said = report(found)
+    assert "| right | not compared | 0 |" in said
+    assert "warning: right is not compared: B has no whole stance: expected one above 20 N" in said
+    more, fewer = strides(), strides()
+    del fewer.limbs["right"]
+    assert "warning: right is not compared: only A has it" in report(compare(more, fewer))
+    assert "warning: right is not compared: only B has it" in report(compare(fewer, more))
+    assert "warning" not in report(compare(strides(), strides()))
+
+
+def noisy(record, size, seed=0):
+    random = np.random.default_rng(seed)
+    record.limbs = {
+        limb: force + random.normal(0, size, force.shape) for limb, force in record.limbs.items()
+    }  # fmt: skip
+    return record
+
+
+@pytest.mark.parametrize("size", [8.0, 15.0])
+def test_noise_makes_no_stances(size):
+    """The threshold is a little above the noise, so that swing has bursts above it all the time."""
+    found = compare(strides(), noisy(strides(), size))
+    assert found.warnings == []
+    for errors in found.limbs.values():
+        assert errors.pairs >= 4
+        assert abs(errors.contact_error) < 0.02
+        assert errors.touchdown_spread < 0.01
+        assert errors.forces["vertical"].r > 0.99
+
+
+def test_stances_that_one_record_lacks_are_told():
+    step = strides()
+    extra = strides()
+    time = extra.time
+    extra.limbs["left"][(time > 2.85) & (time < 3.0)] = [0.0, 300.0]  # in the swing of left
+    said = report(compare(step, extra))
+    assert "warning: left: A has 5 whole stances and B 6 in the same time, 5 are compared" in said
+    assert "warning: right" not in said
+
+
+def uneven():
+    """Six strides of other sizes, so that the shift is known and not up to whole strides alone."""
+    record = strides(seconds=6.0)
+    size = np.take([0.7, 1.0, 0.4, 1.3, 0.6, 1.2, 0.5], np.floor(record.time + 0.7).astype(int))
+    record.limbs = {limb: force * size[:, None] for limb, force in record.limbs.items()}
+    return record
+
+
+@pytest.mark.parametrize("missed", [1, 2, 3])
+def test_a_missed_step_leaves_the_other_pairs_where_they_are(missed):
+    other, begin = uneven(), 0.3 + missed
+    other.limbs["left"][(other.time >= begin) & (other.time <= begin + CONTACT)] = 0.0
+    for pair in ((uneven(), other), (other, uneven())):
+        found = compare(*pair)
+        assert (found.shift, found.limbs["left"].pairs) == (0.0, 5)
+        assert found.limbs["left"].touchdown_spread < 0.001
+        assert found.limbs["left"].forces["vertical"].rmse < 1e-6
+
+
+def test_touchdowns_that_scatter_are_told():
+    quick = strides()
+    quick.time = quick.time * 0.8
+    assert "left: touchdowns scatter by" in report(compare(strides(), quick))
+
+
+def test_a_record_without_fore_aft_force_is_not_scored_for_it(tmp_path):
+    pytest.importorskip("matplotlib", reason='pip install "hoof-env[lab]"')
+    time = strides().time
+    rows = [f"{t:.3f},{fz:.4f}" for t, fz in zip(time, strides().limbs["left"][:, 1], strict=True)]
+    (tmp_path / "b.csv").write_text("\n".join(["time [s],left_force_y [N]", *rows]))
+    for mapping in (None, {"left_force_y": "left_force_y"}):
+        b = read_record(tmp_path / "b.csv", mapping)
+        assert np.isnan(b.limbs["left"][:, 0]).all()
+        found = compare(strides(), b)
+        assert list(found.limbs["left"].forces) == ["vertical"]
+        assert found.limbs["left"].forces["vertical"].rmse < 0.01
+        said = report(found)
+        assert "no fore-aft force of left" in said
+        assert "braking" not in said
+        assert draw(found, tmp_path / "x.svg").read_text().count("fore-aft") == 0
+
+
+def test_each_record_s_threshold_is_by_its_own_weight_and_is_printed():
+    heavy, light = strides(weight=6000.0), strides(weight=500.0)
+    found = compare(heavy, light, units="BW", threshold=60.0)
+    assert found.levels == (60 / 6000, 60 / 500)
+    assert "Stances are above 0.01 BW in A and 0.12 BW in B." in report(found)
+    assert "Stances are above 20 N." in report(compare(heavy, light))
+    assert (
+        compare(heavy, light, threshold=300.0).limbs["left"].contact
+        < compare(heavy, light).limbs["left"].contact
+    )
+
+
+def test_a_threshold_in_newtons_needs_the_weight_where_forces_are_in_body_weights():
+    known, unknown = strides(unit="BW", scale=1 / PEAK, weight=900.0), strides(unit="BW", scale=1 / PEAK)
+    assert compare(known, unknown).levels == (0.01, 0.01)
+    with pytest.raises(
+        ParameterError, match=r"mass-b: expected the mass \[kg\] .* to know 50 N in body weights"
+    ):
+        compare(known, unknown, threshold=50.0)
+    with pytest.raises(ParameterError, match="mass-a: expected"):
+        compare(unknown, known, threshold=50.0)
+
+
+def as_file(path, record, left=(1, 1), right=(1, 1)):
+    """The record as a text file whose components of each limb are multiplied by signs."""
+    table = {"time [s]": record.time}
+    for limb, signs in (("left", left), ("right", right)):
+        for axis, (name, sign) in enumerate(zip("xy", signs, strict=True)):
+            table[f"{limb}_force_{name} [N]"] = sign * record.limbs[limb][:, axis]
+    np.savetxt(path, np.column_stack([*table.values()]), "%.6g", ",", header=",".join(table), comments="")
+    return path
+
+
+def test_a_plate_upside_down_turns_its_own_limb_alone(tmp_path):
+    larger = strides()
+    larger.limbs["right"] = larger.limbs["right"] * 3  # its sum decides of all limbs together
+    found = read_record(as_file(tmp_path / "x.csv", larger, right=(-1, -1)))
+    assert found.turned == ("right",)
+    for limb, force in larger.limbs.items():
+        np.testing.assert_allclose(found.limbs[limb], force, atol=1e-2)
+    said = report(compare(strides(), found))
+    assert "forces of right pointed into the ground and are turned round" in said
+    drifting = idle(strides())
+    drifting.limbs["right"] = drifting.limbs["right"] - [0.0, 10.0]
+    assert read_record(as_file(tmp_path / "y.csv", drifting)).turned == ()
+
+
+@pytest.mark.parametrize(("of_a", "of_b", "remedy"), [
+    ((1, 1), (-1, 1), "--reverse-b x turns those of B"),
+    ((1, 1), (1, -1), "--reverse-b y turns those of B"),
+    ((1, -1), (1, 1), "--reverse-a y turns those of A"),
+    ((-1, -1), (1, -1), "--reverse-b y turns those of B"),
+])  # fmt: skip
+def test_the_remedy_for_opposite_forces_remedies(of_a, of_b, remedy, tmp_path):
+    a = as_file(tmp_path / "a.csv", strides(), of_a, of_a)
+    b = as_file(tmp_path / "b.csv", strides(), of_b, of_b)
+    said = report(compare(read_record(a), read_record(b)))
+    assert f"left: fore-aft forces point opposite ways; {remedy}" in said
+    which, how = remedy[10], remedy[12]
+    cured = compare(
+        read_record(a, reverse=how if which == "a" else "auto"),
+        read_record(b, reverse=how if which == "b" else "auto"),
+    )
+    assert cured.limbs["left"].forces["fore-aft"].r > 0.99
+
+
+def test_the_remedy_for_one_of_several_limbs_is_a_minus(tmp_path):
+    b = read_record(as_file(tmp_path / "b.csv", strides(), right=(1, -1)))
+    assert "a minus before the column of right_force_x in --map-b turns those of B" in report(
+        compare(strides(), b)
+    )
 
 
 @pytest.fixture(scope="module")
@@ -210,6 +384,10 @@ BROKEN = {
     "names.csv": ("t,Fx,Fz\n0,1,2\n1,1,2\n", "expected columns of names.csv for time, force_x and force_y"),
     "timeless.csv": ("force_x [N],force_y [N]\n1,2\n1,2\n", "expected a column of timeless.csv for time"),
     "hours.csv": ("time [h],force_x [N],force_y [N]\n0,1,2\n1,1,2\n", "in s or ms, got h"),
+    "rounded.csv": (STEADY + "4e-3,1,2\n9e-3,1,2\n", "give the rate instead (--rate-a, --rate-b)"),
+    "rows.mot": ("x\nnRows=3\nendheader\ntime ground_force_vy\n0 1\n1 1\n", "expected 3 rows, as its"),
+    "columns.mot": ("x\nnColumns=3\nendheader\ntime ground_force_vy\n0 1\n1 1\n", "expected 3 columns, as"),
+    "row.mot": ("x\nendheader\ntime a ground_force_vy\n0 1 2\n1 1\n", "got 2 cells under 3 names"),
     "headless.mot": ("time\tground_force_vy\n0\t1\n", "expected a line endheader"),
     "bytes.parquet": ("not a table", "cannot read it"),
     "bytes.c3d": ("not a c3d", "cannot read it"),
@@ -242,6 +420,7 @@ WRONG = [
     (["--threshold", "-1"], "threshold: expected"),
     (["--threshold", "1e5"], "expected a whole stance above 100000 N, found none"),
     (["--rate-b", "0"], "rate: expected"),
+    (["--rate-b", "1e9"], "rate: expected at most 20000000 samples"),
     (["--mass-b", "-3"], "mass: expected"),
     (["--align", "best"], "align: expected one of"),
     (["--units", "lb"], "units: expected one of"),
@@ -279,6 +458,25 @@ def test_a_record_without_time_takes_a_rate_and_milliseconds_are_known(tmp_path)
     (tmp_path / "a.csv").write_text("time [ms],force_x [N],force_y [N]\n" + rows)
     assert read_record(tmp_path / "a.csv").rate == pytest.approx(1000.0)
     assert read_record(tmp_path / "a.csv", rate=50.0).rate == pytest.approx(50.0)
+
+
+LENIENT = {
+    "words.csv": "time [s],event,force_x [N],force_y [N]\n0,on,1,2\n1,,1,2\n",
+    "empty.csv": "time [s],force_x [N],force_y [N],note,\n0,1,2,,\n1,1,2,,\n",
+    "twice.csv": "x,x,time [s],force_x [N],force_y [N]\n7,7,0,1,2\n7,7,1,1,2\n",
+    "units.csv": "time,force_x,force_y\ns,N,N\n0,1,2\n1,1,2\n",
+    "brackets.tsv": "time\tforce_x\tforce_y\n[ms]\t[N]\t[N]\n0\t1\t2\n1000\t1\t2\n",
+    "blanks.txt": "time force_x [N]  force_y (N)\n 0  1 2\n 1  1 2\n",
+    "blanks.mot": "x\nnRows=2\nendheader\n time   ground_force_vx ground_force_vy\n  0 1  2\n1 1 2\n",
+}
+
+
+@pytest.mark.parametrize("name", LENIENT)
+def test_what_is_not_needed_may_be_as_it_likes(name, tmp_path):
+    (tmp_path / name).write_text(LENIENT[name], encoding="utf-8")
+    found = read_record(tmp_path / name)
+    assert (found.unit, found.rate) == ("N", 1.0)
+    np.testing.assert_array_equal(found.limbs["leg"], [[1.0, 2.0]] * 2)
 
 
 def test_a_minus_turns_a_column_and_a_limb_can_be_renamed(tmp_path):
