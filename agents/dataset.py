@@ -5,8 +5,9 @@
 
 A policy is what agents.score takes. Episode k of each policy is reset with seed + k, so that whoever resets
 `dataset.recover_environment()` likewise and takes the same actions sees the same numbers. Beside Minari's
-files lies manifest.json with the command, the versions, the licence, the returns of each policy and the
-SHA-256 of every file. A dataset that is not whole is not kept: it is made in a folder of its own and moved.
+files lies manifest.json with the command, the versions, the licence, the returns of each policy, and the
+SHA-256 of every file and of the files of trained policies. A dataset that is not whole is not kept: it is
+made in a folder of its own and moved.
 """
 
 from __future__ import annotations
@@ -14,9 +15,12 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 import tempfile
+import tomllib
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib.metadata import metadata
 from pathlib import Path
 from typing import Any
 
@@ -26,10 +30,13 @@ from tyro.conf import Positional
 import hoof_env
 from agents import runs
 from agents.command import parse_pairs, run
-from agents.score import find_policy
-from hoof_env.errors import HoofEnvError, OutputError, ParameterError, count
+from agents.score import find_policy, is_model
+from hoof_env.errors import MissingExtraError, OutputError, ParameterError, count
+from hoof_env.saved_policy import ABOUT, STATISTICS, WEIGHTS, find_saved
 
 MANIFEST = "manifest.json"
+PROJECT = Path(__file__).parents[1] / "pyproject.toml"  # of the checkout, which need not be installed
+ID = re.compile(r"(?:[-\w][-\w/]*[-\w]/)?[-\w]+-v\d+")  # as Minari takes it, but always with a version
 ROOT = "MINARI_DATASETS_PATH"  # where Minari keeps datasets
 
 
@@ -63,18 +70,15 @@ def main(argv: list[str] | None = None) -> None:
 
 def write(args: Args) -> Path:
     """The folder of the dataset that the arguments ask for. `OutputError` where there is one already,
-    `ParameterError` of what cannot be played or named, `HoofEnvError` without Minari."""
+    `ParameterError` of what cannot be played or named, `MissingExtraError` without Minari."""
     try:
         import minari
         import minari.data_collector  # which asks for more than reading does
     except ImportError:
-        raise HoofEnvError('agents.dataset needs Minari: pip install "hoof-env[train,minari]"') from None
-    if not args.policies:
-        raise ParameterError("policies: expected at least one, got none")
+        raise MissingExtraError('agents.dataset needs Minari: pip install "hoof-env[minari]"') from None
+    _check_policies(args.policies)
     episodes = count("episodes", args.episodes)
-    short = args.env_id.rpartition("/")[2].removesuffix("-v0")
-    names = [Path(name).stem if Path(name).exists() else name for name in args.policies]
-    dataset_id = args.dataset_id or f"hoof_env/{short}/{'-'.join(names)}-v0"
+    dataset_id = check_id(args.dataset_id or default_id(args.env_id, args.policies))
     folder = args.out / dataset_id
     if folder.exists():
         raise OutputError(f"{folder}: expected no dataset there; choose another --dataset-id or --out")
@@ -86,10 +90,6 @@ def write(args: Args) -> Path:
         try:
             with runs.make_env(args.env_id, **kwargs) as env:
                 returns = _collect(minari, env, args, episodes, dataset_id)
-        except ValueError as error:  # Minari's, of a name that it does not take
-            if "id" in str(error).lower() and "dataset" in str(error).lower():
-                raise ParameterError(f"dataset_id: {error}") from None
-            raise
         finally:
             os.environ.pop(ROOT)
             if before is not None:
@@ -101,11 +101,50 @@ def write(args: Args) -> Path:
     return folder
 
 
+def _check_policies(policies: Sequence[str]) -> None:
+    if not policies:
+        raise ParameterError("policies: expected at least one, got none")
+    for name, times in Counter(policies).items():
+        if times > 1:
+            raise ParameterError(f"policies: expected each one once, got {name} {times} times")
+
+
+def check_id(dataset_id: str) -> str:
+    """The id, or `ParameterError` of one that Minari does not take; before anything is played."""
+    if not ID.fullmatch(dataset_id):
+        raise ParameterError(
+            "dataset_id: expected NAMESPACE/NAME-vK of letters, digits, _ and -, the namespace of two or "
+            f"more, got {dataset_id!r}"
+        )
+    return dataset_id
+
+
+def default_id(env_id: str, policies: Sequence[str]) -> str:
+    """Of policies on an environment; what an id cannot hold, as the points of numbers, is _ in it."""
+    short = env_id.rpartition("/")[2].removesuffix("-v0")
+    names = [Path(name).stem if Path(name).exists() else name for name in policies]
+    plain = [re.sub(r"[^\w-]+", "_", part) for part in (short, "-".join(names))]
+    return f"hoof_env/{plain[0]}/{plain[1]}-v0"
+
+
+def policy_files(name: str) -> list[Path]:
+    """The files that a trained policy or a gait is read from; none of a scripted policy."""
+    path = Path(name)
+    if name.endswith(".json"):
+        return [path]
+    if not (is_model(name) or path.is_dir()):
+        return []
+    found = find_saved(path).path
+    beside = () if found.suffix == ".onnx" else (ABOUT, WEIGHTS, STATISTICS)
+    return [file for file in (found, *(found.with_name(one) for one in beside)) if file.is_file()]
+
+
 def _collect(minari: Any, env: Any, args: Args, episodes: int, dataset_id: str) -> dict[str, Any]:
     """Play all episodes, and have Minari write them; returns of each policy."""
     from tqdm import tqdm
 
     policies = {name: find_policy(name, env, args.env_id) for name in args.policies}
+    files = {name: {file.name: _sha256(file) for file in policy_files(name)} for name in policies}
     collector, returns = minari.DataCollector(env), {}
     with tqdm(total=len(policies) * episodes, unit=" episodes", leave=False, disable=None) as bar:
         for name, policy in policies.items():
@@ -124,7 +163,7 @@ def _collect(minari: Any, env: Any, args: Args, episodes: int, dataset_id: str) 
                 bar.update()
             returns[name] = {
                 "episodes": episodes, "first_seed": args.seed, "mean_return": float(np.mean(totals)),
-                "sd_return": float(np.std(totals)),
+                "sd_return": float(np.std(totals)), **({"sha256": files[name]} if files[name] else {}),
             }  # fmt: skip
     collector.create_dataset(
         dataset_id,
@@ -141,15 +180,16 @@ def _write_manifest(folder: Path, args: Args, returns: dict[str, Any]) -> None:
         "env_id": args.env_id,
         "env_kwargs": parse_pairs("--env-kwargs", args.env_kwargs),
         "policies": returns,
-        "licence": metadata("hoof-env")["License-Expression"],
+        "licence": tomllib.loads(PROJECT.read_text(encoding="utf-8"))["project"]["license"],
         "command": runs.command(),
         "versions": runs.versions(),
-        "sha256": {
-            file.relative_to(folder).as_posix(): hashlib.sha256(file.read_bytes()).hexdigest()
-            for file in files
-        },
+        "sha256": {file.relative_to(folder).as_posix(): _sha256(file) for file in files},
     }
     runs.write_text(folder / MANIFEST, json.dumps(about, indent=1) + "\n")
+
+
+def _sha256(file: Path) -> str:
+    return hashlib.sha256(file.read_bytes()).hexdigest()
 
 
 if __name__ == "__main__":

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import hashlib
 import json
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from hoof_env.errors import OutputError, ParameterError
+from hoof_env.errors import MissingExtraError, OutputError, ParameterError
 
 minari = pytest.importorskip("minari", reason='needs pip install "hoof-env[minari]"')
 
 from agents import dataset  # noqa: E402
 
+TRAINED = "agents/policies/Horse-v0"
 SHORT = ("--env-kwargs", "episode_seconds=0.4", "--episodes", "2")
 
 
@@ -33,10 +36,12 @@ def written(shelf, *arguments):
     [
         ("hoof_env/HorseLeg-v0", ("run", "random")),
         ("hoof_env/HorseLegFixed-v0", ("walk",)),
-        ("hoof_env/Horse-v0", ("reference", "agents/policies/Horse-v0")),
+        ("hoof_env/Horse-v0", ("reference", TRAINED)),
     ],
 )
 def test_a_replay_gives_the_same_bits(shelf, env_id, policies):
+    if TRAINED in policies:
+        pytest.importorskip("onnxruntime", reason='needs pip install "hoof-env[onnx]"')
     data, _ = written(shelf, *policies, "--env-id", env_id, "--seed", "7")
     env = data.recover_environment()
     assert (env.spec.id, env.spec.kwargs["episode_seconds"]) == (env_id, 0.4)
@@ -64,6 +69,60 @@ def test_the_manifest_has_hashes_licence_and_returns(shelf):
     assert about["policies"]["run"]["mean_return"] == pytest.approx(np.mean(totals))
 
 
+def test_the_manifest_names_the_files_of_a_trained_policy(shelf):
+    pytest.importorskip("onnxruntime", reason='needs pip install "hoof-env[onnx]"')
+    _, folder = written(shelf, "reference", TRAINED, "--env-id", "hoof_env/Horse-v0")
+    policies = json.loads((folder / dataset.MANIFEST).read_text())["policies"]
+    assert "sha256" not in policies["reference"]
+    digest = hashlib.sha256(Path(TRAINED, "policy.onnx").read_bytes()).hexdigest()
+    assert policies[TRAINED]["sha256"] == {"policy.onnx": digest}
+
+
+def test_the_licence_is_the_checkout_s_which_need_not_be_installed(shelf, monkeypatch):
+    project = shelf / "pyproject.toml"
+    project.write_text('[project]\nlicense = "ISC"\n')
+    monkeypatch.setattr(dataset, "PROJECT", project)
+    _, folder = written(shelf, "run")
+    assert json.loads((folder / dataset.MANIFEST).read_text())["licence"] == "ISC"
+
+
+def test_the_files_of_policies(tmp_path):
+    assert dataset.policy_files("run") == dataset.policy_files("6.28,0.7,-0.2,-0.3") == []
+    assert dataset.policy_files("gait.json") == [Path("gait.json")]
+    for name in ("model.zip", "vecnormalize.pkl", "other.txt"):
+        (tmp_path / name).touch()
+    (tmp_path / "run.json").write_text('{"env_id": "hoof_env/HorseLeg-v0", "algo": "ppo"}')
+    assert [file.name for file in dataset.policy_files(str(tmp_path))] == ["model.zip", "vecnormalize.pkl"]
+
+
+def test_default_ids_are_ids():
+    numbers = dataset.default_id("hoof_env/HorseLeg-v0", ["6.28,0.7,-0.2,-0.3", "run"])
+    assert numbers == "hoof_env/HorseLeg/6_28_0_7_-0_2_-0_3-run-v0"
+    assert dataset.check_id(numbers) == numbers
+    assert dataset.default_id("hoof_env/Horse-v0", [TRAINED]) == "hoof_env/Horse/Horse-v0-v0"
+
+
+@pytest.mark.parametrize("name", ["foo", "x/foo-v0", "a b-v0", "ab/../foo-v0", "/foo-v0", "ab/foo-v"])
+def test_an_id_is_refused_before_anything_is_played(name, shelf, monkeypatch):
+    monkeypatch.setattr(dataset, "_collect", pytest.fail)
+    with pytest.raises(ParameterError, match="dataset_id: expected NAMESPACE/NAME-vK"):
+        dataset.main(["run", "--dataset-id", name, "--out", str(shelf)])
+    assert list(shelf.iterdir()) == []
+
+
+def test_ids_that_are_taken_are_minari_s():
+    from minari.dataset.minari_dataset import parse_dataset_id
+
+    for name in ("foo-v0", "ab/foo-v12", "ab/c/foo_1-x-v0"):
+        assert parse_dataset_id(dataset.check_id(name))
+
+
+def test_without_minari_its_extra_is_named(shelf, monkeypatch):
+    monkeypatch.setitem(sys.modules, "minari", None)
+    with pytest.raises(MissingExtraError, match=r'pip install "hoof-env\[minari\]"'):
+        dataset.main(["run", "--out", str(shelf)])
+
+
 def test_two_runs_have_the_same_data(tmp_path, monkeypatch):
     found = []
     for name in ("one", "two"):
@@ -88,6 +147,8 @@ def test_nothing_half_made_stays(shelf, monkeypatch):
 def test_bad_arguments(shelf):
     with pytest.raises(ParameterError, match="policies: expected at least one"):
         dataset.main(["--out", str(shelf)])
+    with pytest.raises(ParameterError, match="policies: expected each one once, got run 2 times"):
+        dataset.main(["run", "walk", "run", "--out", str(shelf)])
     with pytest.raises(ParameterError, match="episodes: expected a whole number"):
         dataset.main(["run", "--episodes", "0", "--out", str(shelf)])
     with pytest.raises(ParameterError, match="hoof_env/Cow-v0"):
