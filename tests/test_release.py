@@ -11,6 +11,7 @@ import pytest
 import yaml
 
 import hoof_env
+from scripts.check_release import unfilled
 
 ROOT = Path(__file__).resolve().parent.parent
 CITATION = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
@@ -30,15 +31,49 @@ def test_the_changelog_begins_with_this_version():
     assert re.search(r"^## \[(.+?)\]", text, re.MULTILINE)[1] == hoof_env.__version__
 
 
-def test_the_address_of_the_repository_is_filled_in_everywhere_or_nowhere():
-    """Skipped, with the places named, as long as it is known nowhere."""
-    places = {
-        "pyproject.toml: [project.urls] Repository": PROJECT.get("urls", {}).get("Repository"),
-        "CITATION.cff: repository-code": CITATION.get("repository-code"),
-    }
-    if not any(places.values()):
+def release(root, urls="", email="", cited=""):
+    """Files of a project with an address in `[project.urls]`, an e-mail and an address in CITATION.cff."""
+    table = f'urls = {{ Repository = "{urls}" }}\n' if urls else ""
+    author = f', email = "{email}"' if email else ""
+    (root / "pyproject.toml").write_text(f'[project]\n{table}authors = [{{ name = "x"{author} }}]\n')
+    (root / "CITATION.cff").write_text("title: x\n" + (f"repository-code: {cited}\n" if cited else ""))
+    return root
+
+
+def test_addresses_of_the_repository_agree():
+    """pyproject.toml and CITATION.cff hold it both; nowhere is right until the first release."""
+    assert not [place for place in unfilled() if place.startswith("one address")]
+
+
+def test_all_that_a_release_needs_is_filled_in():
+    """Skipped with the places named; the workflow that publishes fails instead."""
+    if places := unfilled():
         pytest.skip("to fill in before a release: " + "; ".join(places))
-    assert len(set(places.values())) == 1, f"expected one address in all places, got {places}"
+
+
+def test_what_is_not_filled_in_is_found(tmp_path):
+    assert [place.split(":")[0] for place in unfilled(release(tmp_path))] == [
+        "pyproject.toml", "CITATION.cff", "pyproject.toml",
+    ]  # fmt: skip
+    whole = {"urls": "https://x.org/a", "email": "a@x.org", "cited": "https://x.org/a"}
+    assert unfilled(release(tmp_path, **whole)) == []
+    assert unfilled(release(tmp_path, **whole | {"email": ""})) == [
+        "pyproject.toml: [project] authors, e-mail"
+    ]
+    (unlike,) = unfilled(release(tmp_path, **whole | {"cited": "https://x.org/b"}))
+    assert unlike == "one address of the repository, got https://x.org/a and https://x.org/b"
+
+
+def test_publishing_checks_that_before_it_builds():
+    workflow = yaml.safe_load((ROOT / ".github" / "workflows" / "publish.yml").read_text(encoding="utf-8"))
+    jobs = workflow["jobs"]
+    steps = [step.get("run", "") for step in jobs["build"]["steps"]]
+    assert steps.index("python scripts/check_release.py") < steps.index("python -m build")
+    assert jobs["publish"]["needs"] == "build"
+    script = [sys.executable, "scripts/check_release.py"]
+    done = subprocess.run(script, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (done.returncode == 0) == (unfilled() == [])
+    assert len(done.stderr.splitlines()) == len(unfilled())
 
 
 def test_workflows_and_templates_are_whole():
