@@ -5,7 +5,7 @@
 #   TORCH_INDEX=URL     where Linux takes PyTorch from; empty for pip's own index, which has the CUDA build
 
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-demo demo test kernels test-slow test-peers test-oldest test-ecosystem bench baselines docs test-site test-links lint clean
+.PHONY: help setup setup-demo demo test kernels test-slow test-peers test-oldest test-lab test-ecosystem bench baselines docs test-site test-links lint clean
 
 PY := .venv/bin/python
 PYTHONS := $(or $(PYTHON),$(PY) python3 python3.13 python3.12 python3.11)
@@ -18,6 +18,7 @@ help:
 	@echo 'make test-slow   in full what make test samples'
 	@echo 'make test-peers  the engine against MuJoCo and Exudyn, which it installs'
 	@echo 'make test-oldest the wheel on the oldest dependencies that pyproject.toml names, some minutes'
+	@echo 'make test-lab    force records and datasets with OpenSim, ezc3d and Minari, in an environment under .lab/'
 	@echo 'make test-ecosystem  every RL library on every id, in environments under .ecosystem/: 6 GB, some minutes'
 	@echo 'make bench       how fast engine and environments are beside MuJoCo, Exudyn and EnvPool'
 	@echo 'make baselines   the agents of docs/evidence/baselines.md, hours; ARGS="--subset nightly": a small part, minutes'
@@ -63,6 +64,13 @@ test-oldest: setup
 	@$(PY) -m uv pip install -q --python .oldest/venv/bin/python --no-deps .oldest/dist/*.whl
 	@NUMBA_CACHE_DIR=.oldest/cache .oldest/venv/bin/python examples/smoke.py
 
+# Minari and OpenSim would change the versions of .venv. Tests skip where a library is missing: imported first.
+test-lab: setup
+	@$(PY) -m uv venv -q --allow-existing -p $(PY) .lab
+	@$(PY) -m uv pip install -q --python .lab/bin/python -e '.[minari,opensim,onnx,lab,export,dev]'
+	@.lab/bin/python -c 'import ezc3d, matplotlib, minari, onnxruntime, opensim, pyarrow'
+	@.lab/bin/python -m pytest -q $(ARGS) tests/lab tests/agents/test_dataset.py
+
 test-ecosystem: setup
 	@$(PY) -m tests.ecosystem.run $(ARGS)
 
@@ -92,5 +100,5 @@ lint: setup
 	@echo 'mypy' && $(PY) -m mypy
 
 clean:
-	@rm -rf .venv .ecosystem .oldest dist build .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	@rm -rf .venv .ecosystem .oldest .lab dist build .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	@find . -name __pycache__ -type d -prune -exec rm -rf {} +
