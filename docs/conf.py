@@ -31,7 +31,7 @@ CHILDREN = {
     "docs/paper": ("paper/reproduction",),
     "docs/agents": ("/agents/policies/README",),
     "docs/environments/README": ("HorseLeg", "HorseLeg*", "*"),
-    "docs/api/README": ("environments", "engine", "leg", "task", "errors"),
+    "docs/api/README": ("environments", "engine", "leg", "task", "lab", "errors"),
     "docs/evidence/README": ("*", "/benchmarks/results/**"),
     "agents/policies/README": ("*/card",),
 }

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from hoof_env.cli import COMMANDS
+from tests.test_rooms import FLOORS
 
 ROOT = Path(__file__).resolve().parent.parent
 FOLDERS = ("agents", "benchmarks", "docs", "examples", "hoof_env", "research", "scripts", "tests")
@@ -76,6 +77,37 @@ def test_examples_run_from_top_to_bottom(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     blocks = [code for kind, code in BLOCK.findall(page.read_text(encoding="utf-8")) if kind == "python"]
     exec(compile("\n".join(blocks), name(page), "exec"), {})
+
+
+def test_files_that_compare_reads_are_made_on_the_page():
+    text = (ROOT / "docs" / "task.md").read_text(encoding="utf-8")
+    made = set(re.findall(r"hoof-env export --out (\S+)", text)) | {"lab.csv"}  # which is the reader's
+    read = {name for pair in re.findall(r"hoof-env compare (\S+) (\S+)", text) for name in pair}
+    assert read
+    assert not read - made
+
+
+def test_the_rooms_of_contributing_are_those_of_the_house():
+    """In the order of tests/test_rooms.py, by the names that the page has for rooms."""
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    told = re.search(r"packages before it: (.+?)\. `agents`", text)[1]
+    names = [Path(room).stem for floor in FLOORS for room in floor if room.startswith("hoof_env/")]
+    inner = [name for name in names if not name.startswith("_") and name not in ("errors", "saved_policy")]
+    assert re.split(r", | and ", told) == sorted(set(inner), key=lambda name: inner.index(name))
+
+
+def test_every_call_of_posix_is_in_the_table_of_contributing():
+    """What the table lists is searched for in the code, and where it is found must be told."""
+    rows = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8").partition("| call |")[2].splitlines()
+    for call in ("os.sched_getaffinity", "os.kill", "os.fork", "os.killpg", "fcntl.flock"):
+        files = {
+            name(path)
+            for folder in ("agents", "benchmarks", "hoof_env", "research", "scripts")
+            for path in (ROOT / folder).rglob("*.py")
+            if f"{call}(" in path.read_text(encoding="utf-8")
+        }
+        told = " ".join(row for row in rows if f"`{call}`" in row)
+        assert not {file for file in files if f"`{file}`" not in told}, call
 
 
 def test_the_hand_written_pages_are_eight():
