@@ -60,7 +60,7 @@ def onto_surface(record: Columns, terrain: Terrain) -> Columns:
         bears = loaded(record, limb)
         at = record[f"{limb}cop_x"][bears] + 1j * record[f"{limb}cop_y"][bears]
         force = record[f"{limb}force_x"][bears] + 1j * record[f"{limb}force_y"][bears]
-        along: Complex = force / np.abs(force)
+        along = (force / np.abs(force)).astype(complex)
         way = _to_surface(at, along, terrain)
         found = at + np.where(np.isfinite(way), way, 0.0) * along
         for axis, values in (("x", found.real), ("y", found.imag)):
