@@ -3,8 +3,9 @@
 The search plays zero actions on `hoof_env/Horse-v0` around gaits of its own and knows nothing but the return,
 with weights of its own.
 It begins from nothing at Froude number 0.25, and then asks for a little more speed every few generations, or
-for less, so that neighbours are alike: actions lie around what is between them. A second family keeps fore
-and hind legs in time, as in a trot or a pace. What was found already is not searched for again.
+for less, so that neighbours are alike: actions lie around what is between them. A second family, trot-like,
+is asked besides to land fore and hind hoofs at once, as horses do in a trot or a pace. What was found already
+is not searched for again.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from agents import runs
 from agents.command import run
 from hoof_env.dynamics.parts import GRAVITY
 from hoof_env.envs.horse import HIP_HEIGHT
-from hoof_env.envs.reference import LIMITS, PAIRS, Stride, bounds
+from hoof_env.envs.reference import LEGS, LIMITS, PAIRS, Stride, bounds
 from hoof_env.errors import HoofEnvError
 
 Floats = NDArray[np.float64]
@@ -41,6 +42,10 @@ MOST = 40  # steps of speed at most
 STABLE, NEAR = 0.1, 0.05  # most falls, and distance of speeds, of what is shipped [-]
 HARMONICS = 3  # of the trunk's motion
 FALLEN = 0.1  # share of falls at which the speed is raised no more
+TROT_FROUDE = 0.5  # where the trot-like family begins
+TROT_SLIP = 24.0  # weight of slip there, for with that of the walk hind hoofs slide
+LAG = 200.0  # what a stride between the landings of hind and fore hoofs costs a trot-like gait
+TROT, SLIP = 0.05, 0.07  # largest lag [strides] and mean slip of a stance [m] of what is shipped as trot-like
 
 WEIGHTS = {
     "alive": 11.0, "tracking": 5.0, "peak": 0.35, "slip": 6.0, "landing": 0.3, "work": 0.5, "pitch": 4.0,
@@ -69,23 +74,25 @@ def encode(gaits: Floats) -> Floats:
 class Course:
     """Many horses that are asked for one speed [m/s], on ground of a stiffness [N/m^1.5] perhaps."""
 
-    def __init__(self, speed: float, num_envs: int, **settings: Any) -> None:
+    def __init__(self, speed: float, num_envs: int, slip: float = WEIGHTS["slip"], **settings: Any) -> None:
         envs: Any = gym.make_vec(
             "hoof_env/Horse-v0", num_envs, num_threads=2, target_speed=speed,
-            autoreset_mode=AutoresetMode.SAME_STEP, reward_weights=WEIGHTS,
+            autoreset_mode=AutoresetMode.SAME_STEP, reward_weights=WEIGHTS | {"slip": slip},
             **{"episode_seconds": SECONDS, **settings},
         )  # fmt: skip
         self.envs, self.steps = envs, int(envs.unwrapped.batch.steps_per_episode)
 
-    def play(self, gaits: Floats, seed: int, starts: int = STARTS) -> tuple[Floats, list[dict[str, float]]]:
-        """Returns of the first episodes of some gaits, shape (n, 16), and their figures. So many after each
-        other meet different starts, the same as the next ones."""
+    def play(
+        self, gaits: Floats, seed: int, starts: int = STARTS
+    ) -> tuple[Floats, list[dict[str, float]], Floats]:
+        """Returns of the first episodes of some gaits, shape (n, 16), their figures and lags [strides]. So
+        many after each other meet different starts, the same as the next ones."""
         envs, n = self.envs, len(gaits)
         envs.reset(seed=[seed + k % starts for k in range(n)], options={"gait": gaits})
         returns, ended = np.zeros(n), np.zeros(n, bool)
         summaries: list[dict[str, float]] = [{} for _ in range(n)]
-        idle = np.zeros((n, 16), np.float32)
-        for _ in range(self.steps):
+        idle, lags = np.zeros((n, 16), np.float32), np.zeros(n, complex)
+        for step in range(self.steps):
             _, rewards, terminated, truncated, infos = envs.step(idle)
             returns += np.where(ended, 0.0, rewards)
             for env in np.flatnonzero((terminated | truncated) & ~ended):
@@ -96,7 +103,28 @@ class Course:
             ended |= terminated | truncated
             if ended.all():
                 break
-        return returns, summaries
+            if step > self.steps // 3:  # hoofs have landed in the gait
+                m = infos["measured"]
+                lags += ~ended * landings(gaits, np.array([m[f"{leg}_stance_began"] for leg in LEGS]))
+        return returns, summaries, np.angle(lags) / (4 * np.pi)
+
+
+def landings(gaits: Floats, theta: Floats) -> NDArray[np.complex128]:
+    """Where fore hoofs land beside hind ones in gaits, shape (n, 16), whose hoofs land at crank angles [rad],
+    shape (4, n): a mean of e^(4 pi i lag), with the time from hind to fore as the lag [strides]. Left and
+    right are half a stride apart, so half a stride is a whole turn of it."""
+    at = []
+    for k, numbers in enumerate(gaits[:, 2:].reshape(len(gaits), len(PAIRS), -1).transpose(1, 2, 0)):
+        stride, lead = Stride(numbers[0], numbers[1]), gaits[:, 1] * (k == 0)
+        begin = _complex(stride.phase(np.ones(len(gaits)), np.zeros(len(gaits))))
+        phases = [_complex(stride.phase(np.cos(each), np.sin(each))) for each in theta[2 * k : 2 * k + 2]]
+        at.append((np.array(phases) / (begin * np.exp(2j * np.pi * lead))) ** 2)
+    found: NDArray[np.complex128] = at[0].mean(0) * at[1].mean(0).conj()
+    return found
+
+
+def _complex(pair: tuple[Floats, Floats]) -> NDArray[np.complex128]:
+    return pair[0] + 1j * pair[1]
 
 
 class Search:
@@ -104,43 +132,44 @@ class Search:
 
     Args:
         first: a gait to begin with, shape (16,); None is from nothing.
-        lead: of the fore pair [strides], fixed if it is given.
+        lag: what a stride between the landings of hind and fore hoofs costs.
     """
 
-    def __init__(self, seed: int, first: Floats | None = None, lead: float | None = None) -> None:
+    def __init__(self, seed: int, first: Floats | None = None, lag: float = 0.0) -> None:
         try:
             import cma
         except ModuleNotFoundError:
             raise HoofEnvError(
                 'agents.horse_gaits needs cma: pip install "hoof-env[train,identify]"'
             ) from None
-        self.lead, self.seed, self.count = lead, seed, 0
+        self.lag, self.seed, self.count = lag, seed, 0
         start = np.zeros(2 + len(PAIRS) * len(LIMITS)) if first is None else encode(first[None])[0]
         options = {"bounds": [-1, 1], "popsize": POPULATION, "seed": seed + 1, "verbose": -9, "verb_log": 0}
         self.strategy = cma.CMAEvolutionStrategy(start, FIRST if first is None else NEXT, options)
 
     def gaits(self, points: Any) -> Floats:
         """Of points of the box, shape (n, 16)."""
-        found = decode(np.clip(np.asarray(points), -1, 1))
-        if self.lead is not None:
-            found[:, 1] = self.lead
-        return found
+        return decode(np.clip(np.asarray(points), -1, 1))
 
     def run(self, speed: float, generations: int, tick: Any) -> dict[str, Any]:
         """Search on at a commanded speed [m/s]; what the mean of the distribution is worth there."""
-        course = Course(speed, POPULATION * STARTS)
+        course = Course(speed, POPULATION * STARTS, TROT_SLIP if self.lag else WEIGHTS["slip"])
         for _ in range(generations):
             points = self.strategy.ask()
             gaits = np.repeat(self.gaits(points), STARTS, axis=0)
             self.count += 1
-            returns, _ = course.play(gaits, 10_000 * self.seed + STARTS * self.count)
+            returns, _, lags = course.play(gaits, 10_000 * self.seed + STARTS * self.count)
+            returns = returns - self.lag * np.abs(lags)
             self.strategy.tell(points, (-returns.reshape(-1, STARTS).mean(1)).tolist())
             self.strategy.sigma = max(self.strategy.sigma, NEXT)
             tick(speed, returns.max())
         gait = self.gaits(self.strategy.result.xfavorite[None])[0].round(5)
-        returns, summaries = course.play(np.tile(gait, (POPULATION * STARTS, 1)), 10**6, POPULATION * STARTS)
+        returns, summaries, lags = course.play(
+            np.tile(gait, (POPULATION * STARTS, 1)), 10**6, POPULATION * STARTS
+        )
         shown = ("speed_m_s", "slip_m", "cost_of_transport", "duty_factor", "failed")
         figures = {key: round(float(np.mean([one[key] for one in summaries])), 4) for key in shown}
+        figures["lag"] = round(float(np.abs(lags).mean()), 4)
         return {"speed": round(speed, 4), "gait": gait.tolist(), "return": float(returns.mean()), **figures}
 
 
@@ -211,13 +240,15 @@ class Finder:
                 break
         return steps
 
-    def family(self, name: str, lead: float | None, first: Floats | None) -> None:
-        """A walk from nothing, or from a gait, and where more and less speed lead from there."""
-        args, speed = self.args, speed_of(FROUDE)
+    def family(
+        self, name: str, froude: float = FROUDE, first: Floats | None = None, lag: float = 0.0
+    ) -> None:
+        """A gait from nothing, or from another, and where more and less speed lead from there."""
+        args, speed = self.args, speed_of(froude)
         begins = [
             self.keep(
                 f"{name} {seed}",
-                lambda tick, seed=seed: [Search(seed, first, lead).run(speed, args.generations, tick)],
+                lambda tick, seed=seed: [Search(seed, first, lag).run(speed, args.generations, tick)],
             )[0]
             for seed in range(args.restarts if first is None else 1)
         ]
@@ -226,7 +257,7 @@ class Finder:
             self.keep(
                 f"{name}, {way}",
                 lambda tick, ratio=ratio, last=last: self.ramp(
-                    Search(7, best, lead), speed, ratio, last, tick
+                    Search(7, best, lag), speed, ratio, last, tick
                 ),
             )
 
@@ -262,7 +293,8 @@ def trunk_series(gait: list[float], speed: float) -> list[list[float]]:
 def shipped(searches: dict[str, Any]) -> dict[str, Any]:
     """What comes with the package, but for how the trunk moves. Gaits go by the speed that they have, not by
     the one that was asked for; of those within `NEAR` of a knot it is the one that slips least. By name there
-    are the reference at Froude number 0.25, the fastest one, and the fastest of the family in time."""
+    are the reference at Froude number 0.25, the fastest one, and the fastest trot-like one that slips
+    little."""
 
     def steps_of(family: str) -> list[dict[str, Any]]:
         begins = [found["steps"][0] for name, found in searches.items() if name[:-1] == f"{family} "]
@@ -275,12 +307,13 @@ def shipped(searches: dict[str, Any]) -> dict[str, Any]:
         close = [step for step in steps if abs(step["speed_m_s"] / speed - 1) < NEAR]
         return min(close, key=lambda step: float(step["slip_m"])) if close else None
 
-    free, in_time = steps_of("free"), steps_of("in time")
+    free = steps_of("free")
+    trots = [step for step in steps_of("trot-like") if step["lag"] < TROT and step["slip_m"] < SLIP]
     knots = {step["speed_m_s"]: step["gait"] for speed in KNOTS if (step := near(free, speed))}
     named = {
         "walk": near(free, KNOTS[2]),
         "fast": max(free, key=lambda step: float(step["speed_m_s"]), default=None),
-        "in time": max(in_time, key=lambda step: float(step["speed_m_s"]), default=None),
+        "trot-like": max(trots, key=lambda step: float(step["speed_m_s"]), default=None),
     }
     return {
         "reference": {"speeds": list(knots), "gaits": list(knots.values())},
@@ -294,10 +327,10 @@ def main(argv: list[str] | None = None) -> None:
 
     args = tyro.cli(Args, args=argv, prog="python -m agents.horse_gaits", description=__doc__)
     finder = Finder(args)
-    finder.family("free", None, None)
-    begins = [finder.content["searches"][f"free {seed}"]["steps"][0] for seed in range(args.restarts)]
-    best = max(begins, key=lambda one: float(one["return"]))
-    finder.family("in time", 0.0, np.array(best["gait"]))
+    finder.family("free")
+    faster = finder.content["searches"]["free, faster"]["steps"]
+    first = min(faster, key=lambda step: abs(float(step["speed"]) - speed_of(TROT_FROUDE)))
+    finder.family("trot-like", TROT_FROUDE, np.array(first["gait"]), LAG)
     found = shipped(finder.content["searches"])
     reference = found["reference"]
     each = zip(reference["gaits"], reference["speeds"], strict=True)

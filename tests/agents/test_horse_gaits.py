@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from agents import horse_gaits
-from agents.horse_gaits import Course, Search, decode, encode, shipped, speed_of
-from hoof_env.envs.reference import FASTEST, HorseGait, bounds, reference_gaits
+from agents.horse_gaits import Course, Search, decode, encode, landings, shipped, speed_of
+from hoof_env.envs.reference import FASTEST, HorseGait, bounds, crank_angles, reference_gaits
 from hoof_env.envs.reference import horse_gaits as gaits_of_the_package
 
 
@@ -36,25 +36,46 @@ def test_speeds_are_those_of_their_froude_numbers():
 
 def test_the_same_gait_has_the_same_return_in_every_row():
     gait = reference_gaits(np.array([1.85]))
-    returns, figures = Course(1.85, 8, episode_seconds=0.5).play(np.tile(gait, (8, 1)), 3, starts=4)
+    returns, figures, lags = Course(1.85, 8, episode_seconds=0.5).play(np.tile(gait, (8, 1)), 3, starts=4)
+    assert (lags[:4] == lags[4:]).all()
     assert (returns[:4] == returns[4:]).all()
     assert len(set(returns[:4])) == 4
     assert all(one["seconds"] <= 0.5 for one in figures)
 
 
-def test_a_search_goes_on_and_keeps_a_fixed_lead():
-    search = Search(1, reference_gaits(np.array([1.85]))[0], lead=0.0)
+@pytest.mark.parametrize("lag", [-0.2, 0.0, 0.07, 0.24])
+def test_the_lag_is_the_time_from_a_hind_hoof_s_landing_to_a_fore_hoof_s(lag):
+    gaits, lands = reference_gaits(np.array([1.2, 1.85, 2.6])), np.array([0.1, 0.4, 0.9])
+    fore, hind = (crank_angles(gaits, at, np.zeros((4, 3))) for at in (lands + lag, lands))
+    found = np.angle(landings(gaits, np.array([*fore[:2], *hind[2:]]))) / (4 * np.pi)
+    np.testing.assert_allclose(found, lag, atol=1e-12)
+
+
+def test_a_search_goes_on_and_charges_the_lag(monkeypatch):
+    asked, play = [], Course.play
+
+    def played(self, gaits, seed, starts=horse_gaits.STARTS):
+        returns, figures, lags = play(self, gaits, seed, starts)
+        return returns, figures, np.full_like(lags, 0.1)
+
+    search = Search(1, reference_gaits(np.array([1.85]))[0], lag=1e6)
+    tell = search.strategy.tell
+    monkeypatch.setattr(Course, "play", played)
+    monkeypatch.setattr(
+        search.strategy, "tell", lambda points, costs: (asked.extend(costs), tell(points, costs))
+    )
     found = search.run(1.85, 2, lambda speed, best: None)
-    assert found["gait"][1] == 0.0
     assert search.count == 2
+    assert found["lag"] == 0.1
+    np.testing.assert_allclose(asked, 1e5, rtol=0.01)
     assert {"speed_m_s", "slip_m", "failed", "return"} <= set(found)
 
 
 def test_what_is_shipped_goes_by_the_speed_that_a_gait_has():
-    def step(speed, reached, slip=0.1, failed=0.0):
+    def step(speed, reached, slip=0.1, failed=0.0, lag=0.2):
         return {
             "speed": speed, "speed_m_s": reached, "failed": failed, "gait": [reached] * 16, "slip_m": slip,
-            "return": 10.0 - speed,
+            "return": 10.0 - speed, "lag": lag,
         }  # fmt: skip
 
     searches = {
@@ -62,13 +83,15 @@ def test_what_is_shipped_goes_by_the_speed_that_a_gait_has():
         "free 1": {"steps": [step(1.9, 1.85, slip=0.01)]},
         "free, faster": {"steps": [step(2.5, 2.2), step(2.6, 2.19, 0.05), step(4.5, 4.0, failed=0.5)]},
         "free, slower": {"steps": [step(1.2, 1.2)]},
-        "in time, faster": {"steps": [step(2.5, 2.4)]},
+        "trot-like, faster": {
+            "steps": [step(2.5, 2.4, 0.05, lag=0.01), step(2.6, 2.5, lag=0.01), step(2.7, 2.6, 0.05)]
+        },
     }
     found = shipped(searches)
     assert found["reference"]["speeds"] == [1.2, 1.8, 2.19]  # of two alike, the one that slips less
     assert found["gaits"]["fast"][0] == 2.2  # the faster one fell
     assert found["gaits"]["walk"][0] == 1.8
-    assert found["gaits"]["in time"][0] == 2.4
+    assert found["gaits"]["trot-like"][0] == 2.4  # the others slide, or land apart
 
 
 def test_the_package_has_gaits_in_the_order_of_their_speeds():
@@ -77,8 +100,7 @@ def test_the_package_has_gaits_in_the_order_of_their_speeds():
     speeds = _data()["reference"]["speeds"]
     assert speeds == sorted(set(speeds))
     np.testing.assert_allclose(reference_gaits(np.array(speeds)), _data()["reference"]["gaits"], rtol=1e-12)
-    assert {"walk", "fast", "in time"} <= set(gaits_of_the_package())
-    assert gaits_of_the_package()["in time"].lead == 0.0
+    assert {"walk", "fast", "trot-like"} <= set(gaits_of_the_package())
 
 
 def test_the_file_is_gone_on_with(tmp_path, monkeypatch, capsys):
@@ -89,7 +111,7 @@ def test_the_file_is_gone_on_with(tmp_path, monkeypatch, capsys):
     arguments += ["--shipped", str(shipped)]
     horse_gaits.main(arguments)
     first = json.loads(out.read_text())
-    assert {"free 0", "free, faster", "free, slower", "in time 0"} <= set(first["searches"])
+    assert {"free 0", "free, faster", "free, slower", "trot-like 0"} <= set(first["searches"])
     written = capsys.readouterr().out
     horse_gaits.main(arguments)
     assert capsys.readouterr().out == f"written: {shipped}\n"
