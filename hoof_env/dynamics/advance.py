@@ -129,15 +129,15 @@ def read_leg(leg, memory, form):  # type: ignore[no-untyped-def]
 
 @inlined
 def find_result(trunk, legs, leg_count, together, form):  # type: ignore[no-untyped-def]
-    """How the environments ended, numbers of `parts.Result`."""
+    """How the environments ended, numbers of `parts.Result`. A number whose square is none counts as none."""
     total, stuck = level(trunk, 0.0), trunk.at_dead_point
     for k in range(form.trunk_state):
-        total = total + trunk.state[k]
+        total = total + trunk.state[k] * trunk.state[k]
     for i in range(leg_count):
         leg = nth(legs, i)
-        total = total + leg.theta_acceleration
+        total = total + leg.theta_acceleration * leg.theta_acceleration
         for k in range(form.leg_state):
-            total = total + leg.state[k]
+            total = total + leg.state[k] * leg.state[k]
     if together:
         total, stuck = lane_sum(level(trunk, 0.0), total), lane_sum(level(trunk, 0.0), stuck)
     lost = choose(stuck > 0.0, DEAD_POINT, NOT_FINITE)

@@ -154,7 +154,7 @@ def ground_spring(ground, stiffness_scale, penetration, eighths):  # type: ignor
 def contact_force(ground, stiffness_scale, penetration, rate, inverse_speed, eighths):  # type: ignore[no-untyped-def]
     """Normal force on a point inside the ground (Eq. 14), and its spring's part [N]."""
     spring = ground_spring(ground, stiffness_scale, penetration, eighths)
-    return normal_force(spring, ground.chi * rate * inverse_speed, ground.dashpot * rate), spring
+    return normal_force(spring, ground.chi, ground.dashpot, rate, inverse_speed), spring
 
 
 class GroundHere(NamedTuple):

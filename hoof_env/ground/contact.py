@@ -145,8 +145,7 @@ def touch(contact, position, velocity, ground):  # type: ignore[no-untyped-def]
     contact.friction = 0.0
     if contact.inside:
         spring = ground.stiffness * contact.penetration**ground.exponent
-        damping = ground.chi * contact.rate / contact.approach
-        contact.normal = normal_force(spring, damping, ground.dashpot * contact.rate)
+        contact.normal = normal_force(spring, ground.chi, ground.dashpot, contact.rate, 1 / contact.approach)
         speed = abs(contact.vx)
         part = friction_part(speed, ground.friction_law, ground.friction_slow, ground.friction_fast)
         if speed > 0.0:

@@ -114,10 +114,10 @@ def _bisect(f: Callable[[float], float], low: float, high: float) -> float:
 
 
 @inlined
-def normal_force(spring, damping, dashpot):  # type: ignore[no-untyped-def]
-    """Normal force [N] on a point inside the ground (Eq. 14) from K d^n [N], chi v / v0 [-] and c v [N]. The
-    ground does not pull."""
-    return larger(spring * (1.0 + damping) + dashpot, 0.0)
+def normal_force(spring, chi, dashpot, rate, inverse_speed):  # type: ignore[no-untyped-def]
+    """Normal force [N] on a point inside the ground (Eq. 14) from K d^n [N], chi [-], c [N s/m], v [m/s] and
+    1 / v0 [s/m]. The ground does not pull."""
+    return larger(spring * (1.0 + chi * rate * inverse_speed) + dashpot * rate, 0.0)
 
 
 FRICTION_LAWS = ("ambrosio", "threlfall", "tanh")

@@ -143,5 +143,6 @@ def scaled(scaling, x, leg):
         return (2 * x - low - high) / (high - low)
     if part := re.fullmatch(r"/ ([\d.]+)", scaling):
         return np.clip(x / float(part[1]), -1, 1)
-    formula = scaling.replace("3 weights", "(3 * weight)").replace("hip height", f"{leg.batch.body.height}")
+    formula = scaling.replace("3 weights", "(3 * weight)").replace("0.2 hip height", "0.2 * hip height")
+    formula = formula.replace("hip height", f"{leg.batch.body.height}")
     return eval(formula, {"tanh": np.tanh, "x": x, "weight": leg.weight})

@@ -672,7 +672,7 @@ def test_a_fall_ends_the_episode_and_says_why():
             break
     assert failed
     assert "joint" in info["failure"]
-    assert info["reward_fall"] == pytest.approx(-60.0)
+    assert info["reward_fall"] == pytest.approx(-15.0)
 
 
 def test_nothing_but_legs_and_weight_acts_on_the_trunk():

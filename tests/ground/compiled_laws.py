@@ -21,4 +21,4 @@ def normal_force(penetration, rate, approach, stiffness, exponent, chi, dashpot)
     if penetration <= 0.0:
         return 0.0
     spring = stiffness * penetration**exponent
-    return laws.normal_force(spring, chi * rate / approach, dashpot * rate)
+    return laws.normal_force(spring, chi, dashpot, rate, 1.0 / approach)

@@ -74,18 +74,23 @@ def test_regimes(law, speed, expected):
     assert part(speed, law) == pytest.approx(expected, abs=1e-12)
 
 
-@njit(error_model="numpy")
-def all_lanes(speed, law, out):
-    row = rows(doubles(8), 8, None)
-    for n in range(0, speed.size, 8):
-        x = laws.friction_part(read(row, address(speed), n, 1), law, SLOW, FAST)
-        write(x, address(out), n, 1)
+def in_lanes(lanes):
+    @njit(error_model="numpy")
+    def loop(speed, law, out):
+        row = rows(doubles(lanes), lanes, None)
+        for n in range(0, speed.size, lanes):
+            x = laws.friction_part(read(row, address(speed), n, 1), law, SLOW, FAST)
+            write(x, address(out), n, 1)
+
+    return loop
 
 
 @pytest.mark.parametrize("law", LAWS)
 def test_a_lane_has_the_bits_that_it_has_alone(law):
     speed = np.abs(np.random.default_rng(0).normal(scale=0.02, size=1000))
-    together = np.empty(1000)
-    all_lanes(speed, law, together)
-    alone = np.array([part(v, law) for v in speed])
+    together, alone = np.empty((2, 1000))
+    in_lanes(8)(speed, law, together)
+    in_lanes(1)(speed, law, alone)
     np.testing.assert_array_equal(together.view(np.int64), alone.view(np.int64))
+    plain = [part(v, law) for v in speed]  # which is not fused
+    np.testing.assert_allclose(together, plain, rtol=1e-15, atol=1e-15)
