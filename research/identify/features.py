@@ -118,7 +118,7 @@ def force_within(cycle, approach, chi, k, s):  # type: ignore[no-untyped-def]
             d0, d1 = -height - at[i, k].imag, -height - at[i, k + 1].imag
             d, v = cubic(d0, d1, -velocity[i, k].imag, -velocity[i, k + 1].imag, cycle.h, s)
             if d > 0.0:
-                total += normal_force(cycle.stiffness * d**cycle.exponent, chi * v / speed, 0.0)
+                total += normal_force(cycle.stiffness * d**cycle.exponent, chi, 0.0, v, 1 / speed)
     return total
 
 
@@ -247,7 +247,7 @@ def press(cycle, work, out):  # type: ignore[no-untyped-def]
                     enter[i] = min(enter[i], (k - 1 + s) * h)
                 elastic = cycle.stiffness * d**cycle.exponent
                 work[EL, k] += elastic
-                work[INEL, k] += normal_force(elastic, CHI * rate / approach, 0.0)
+                work[INEL, k] += normal_force(elastic, CHI, 0.0, rate, 1 / approach)
                 slide = velocity[i, k].real
                 part = friction_part(abs(slide), AMBROSIO, SLOW, FAST)
                 work[PUSH, k] -= math.copysign(elastic * (MU * part), slide)
