@@ -175,7 +175,7 @@ HORSE_TERMS = (
         " substeps but at most twice the present one, so that it adds up to every stance's peak", peak,
     ),
     Term(
-        "slip", 50.0, "1/s",
+        "slip", 45.0, "1/s",
         "minus the way that all hoofs slide in stance, to and fro, over the commanded distance; 0.5 at most",
         slip,
     ),
