@@ -166,7 +166,7 @@ _ACTION = next(term for term in TERMS if term.name == "action")
 HORSE_TERMS = (
     Term("alive", 40.0, "1/s", "for every second", alive),
     Term(
-        "tracking", 12.5, "1/s", "for every second, 1 less twice the speed's relative error, at least -1",
+        "tracking", 16.0, "1/s", "for every second, 1 less twice the speed's relative error, at least -1",
         tracking,
     ),
     Term(
@@ -175,7 +175,7 @@ HORSE_TERMS = (
         " substeps but at most twice the present one, so that it adds up to every stance's peak", peak,
     ),
     Term(
-        "slip", 45.0, "1/s",
+        "slip", 35.0, "1/s",
         "minus the way that all hoofs slide in stance, to and fro, over the commanded distance; 0.5 at most",
         slip,
     ),
