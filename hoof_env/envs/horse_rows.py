@@ -134,9 +134,9 @@ def peak(step, weight):  # type: ignore[no-untyped-def]
 
 
 def slip(step, weight):  # type: ignore[no-untyped-def]
-    """Over the commanded distance, at most half of it, for every second."""
+    """Over the commanded distance, at most all of it, for every second."""
     asked = larger(step.commanded_progress, 1e-9)
-    return -weight * step.seconds * smaller(step.slip / asked, 0.5)
+    return -weight * step.seconds * smaller(step.slip / asked, 1.0)
 
 
 def landing(step, weight):  # type: ignore[no-untyped-def]
@@ -164,7 +164,7 @@ def fall(step, weight):  # type: ignore[no-untyped-def]
 _ACTION = next(term for term in TERMS if term.name == "action")
 
 HORSE_TERMS = (
-    Term("alive", 40.0, "1/s", "for every second", alive),
+    Term("alive", 45.0, "1/s", "for every second", alive),
     Term(
         "tracking", 16.0, "1/s", "for every second, 1 less twice the speed's relative error, at least -1",
         tracking,
@@ -176,7 +176,7 @@ HORSE_TERMS = (
     ),
     Term(
         "slip", 35.0, "1/s",
-        "minus the way that all hoofs slide in stance, to and fro, over the commanded distance; 0.5 at most",
+        "minus the way that all hoofs slide in stance, to and fro, over the commanded distance; 1 at most",
         slip,
     ),
     Term("landing", 0.25, "-", "minus the stances that begin: who taps the ground pays twice", landing),
