@@ -352,21 +352,21 @@ def step_kernels(
         return Scene(trunk, leg, episode, task, ground, model.ground_origin, model.ground_per_metre)
 
     @pasted
-    def apply_actions(addresses, lanes):  # type: ignore[no-untyped-def]
-        """All, or none: returns whether they are numbers, those of other blocks, too."""
-        actions, count = singles_at(addresses[AT.actions]), addresses[AT.data + COLUMNS]
-        task, good = task_at(addresses[AT.task])[0], True
+    def are_numbers(addresses):  # type: ignore[no-untyped-def]
+        """Whether all actions are, those of other blocks, too."""
+        actions, count, good = singles_at(addresses[AT.actions]), addresses[AT.data + COLUMNS], True
         for k in range(count * (legs * ACTIONS)):
             good &= size(float(actions[k])) < np.inf
-        if good:
-            room = rows(doubles(ROOM * lanes), lanes, None)
-            for n in range(addresses[BEGIN], addresses[END], lanes):
-                _, leg, episode = memories(addresses, lanes, layouts, n)
-                if legs == 1:
-                    apply_action(task, actions, leg, n)
-                else:
-                    command_gait(task, actions, episode, leg, layouts.gait, n, room)
         return good
+
+    @pasted
+    def apply_actions(addresses, lanes, task, n, room):  # type: ignore[no-untyped-def]
+        _, leg, episode = memories(addresses, lanes, layouts, n)
+        actions = singles_at(addresses[AT.actions])
+        if legs == 1:
+            apply_action(task, actions, leg, n)
+        else:
+            command_gait(task, actions, episode, leg, layouts.gait, n, rows(room, lanes, None))
 
     @pasted
     def observe(addresses, lanes, task, n, memory):  # type: ignore[no-untyped-def]
@@ -388,37 +388,40 @@ def step_kernels(
                 write(clip(numbers[slot], 1.0), observations, n * task.count + place, task.count)
 
     @pasted
-    def finish(addresses, lanes):  # type: ignore[no-untyped-def]
+    def finish(addresses, lanes, task, n, memory):  # type: ignore[no-untyped-def]
         """What follows the engine: reward, end and observation."""
-        task, actions = task_at(addresses[AT.task])[0], singles_at(addresses[AT.actions])
-        rewards, memory, happened = doubles_at(addresses[AT.rewards]), doubles(slots * lanes), 0
-        for n in range(addresses[BEGIN], addresses[END], lanes):
-            trunk, leg, episode = memories(addresses, lanes, layouts, n)
-            change = remember_action(actions, episode, legs, n)
-            outcome = find_outcome(task, trunk, leg, episode, layouts, change)
-            add_up(outcome, episode)
-            ended, switched = decide(task, outcome, episode)
-            nothing = level(episode, 0.0)
-            reward = compute_reward(addresses, lanes, task, outcome, episode, n, nothing)
-            write(reward, rewards, n, 1)
-            if anywhere(ended):
-                happened |= SOME_ENDED
-            if anywhere(switched):
-                happened |= SOME_SWITCHED
-            observe(addresses, lanes, task, n, memory)
+        actions, happened = singles_at(addresses[AT.actions]), 0
+        trunk, leg, episode = memories(addresses, lanes, layouts, n)
+        change = remember_action(actions, episode, legs, n)
+        outcome = find_outcome(task, trunk, leg, episode, layouts, change)
+        add_up(outcome, episode)
+        ended, switched = decide(task, outcome, episode)
+        nothing = level(episode, 0.0)
+        reward = compute_reward(addresses, lanes, task, outcome, episode, n, nothing)
+        write(reward, doubles_at(addresses[AT.rewards]), n, 1)
+        if anywhere(ended):
+            happened |= SOME_ENDED
+        if anywhere(switched):
+            happened |= SOME_SWITCHED
+        observe(addresses, lanes, task, n, memory)
         return happened
 
     @pasted
     def step(addresses, lanes, advance):  # type: ignore[no-untyped-def]
-        if not apply_actions(addresses, lanes):
+        """One group of lanes after the other, whose memory stays in the cache from action to observation."""
+        if not are_numbers(addresses):
             return NOT_A_NUMBER
-        task = task_at(addresses[AT.task])[0]
-        advance(
-            matrix_at(addresses, AT.data), model_at(addresses[AT.model]), matrix_at(addresses, AT.tables),
-            matrix_at(addresses, AT.ground), matrix_at(addresses, AT.constants),
-            cube_at(addresses, AT.reactions), task.h, task.substeps, False, addresses[BEGIN], addresses[END],
-        )  # fmt: skip
-        return finish(addresses, lanes)
+        task, happened = task_at(addresses[AT.task])[0], 0
+        room, memory = doubles(ROOM * lanes), doubles(slots * lanes)
+        for n in range(addresses[BEGIN], addresses[END], lanes):
+            apply_actions(addresses, lanes, task, n, room)
+            advance(
+                matrix_at(addresses, AT.data), model_at(addresses[AT.model]), matrix_at(addresses, AT.tables),
+                matrix_at(addresses, AT.ground), matrix_at(addresses, AT.constants),
+                cube_at(addresses, AT.reactions), task.h, task.substeps, False, n, n + lanes,
+            )  # fmt: skip
+            happened |= finish(addresses, lanes, task, n, memory)
+        return happened
 
     @pasted
     def observe_all(addresses, lanes):  # type: ignore[no-untyped-def]
@@ -433,10 +436,17 @@ def step_kernels(
         return step(addresses, LANES, advance_batch)
 
     def apply_one(addresses):  # type: ignore[no-untyped-def]
-        return apply_actions(addresses, 1)
+        task, room, good = task_at(addresses[AT.task])[0], doubles(ROOM), are_numbers(addresses)
+        if good:
+            for n in range(addresses[BEGIN], addresses[END]):
+                apply_actions(addresses, 1, task, n, room)
+        return good
 
     def finish_one(addresses):  # type: ignore[no-untyped-def]
-        return finish(addresses, 1)
+        task, memory, happened = task_at(addresses[AT.task])[0], doubles(slots), 0
+        for n in range(addresses[BEGIN], addresses[END]):
+            happened |= finish(addresses, 1, task, n, memory)
+        return happened
 
     def observe_one(addresses):  # type: ignore[no-untyped-def]
         observe_all(addresses, 1)
