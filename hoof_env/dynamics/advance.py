@@ -124,6 +124,8 @@ def read_leg(leg, memory, form):  # type: ignore[no-untyped-def]
         leg.command[k] = memory.command[k]
     fill(leg.settings, memory.settings)
     leg.hip = leg.settings.hip_on_trunk  # stays so unless the trunk pitches
+    for k in range(form.springs):
+        leg.hoof_yield[k] = 1.0 / leg.settings.hoof_damping[k]
     level_ground(leg)
 
 

@@ -62,9 +62,12 @@ def meet_point(trunk, leg, point, memory, arm, arm_by_theta, hip, hip_velocity, 
         press_through_spring(trunk, leg, point, memory, model)
     else:
         press_rigidly(trunk, point, memory, penetration, rate, sliding_speed, model)
-    normal = point.ground_normal
-    point.force = point.normal_force * normal - point.friction_force * across(normal)
-    return point.force, dot(point.force, by_theta), cross(arm, point.force)
+    force = plane(point.friction_force, point.normal_force)
+    if model.is_terrain:
+        normal = point.ground_normal
+        force = point.normal_force * normal - point.friction_force * across(normal)
+    point.force = force
+    return force, dot(force, by_theta), cross(arm, force)
 
 
 @inlined
@@ -101,7 +104,7 @@ def press_through_spring(trunk, leg, point, memory, model):  # type: ignore[no-u
     laws, stiffness, damping = trunk.settings, leg.settings.hoof_stiffness, leg.settings.hoof_damping
     give, along, speed = point.give[0], point.give[1], point.sliding_speed
     depth_rate, elastic = point.penetration_rate, stiffness[0] * give
-    penetration, alone = point.penetration - give, -elastic / damping[0]
+    penetration, alone = point.penetration - give, -elastic * leg.hoof_yield[0]
     nothing = 0.0 * size(penetration)
     spring, resistance = nothing, nothing
     inverse_speed, inside = memory.inverse_approach_speed, penetration > 0.0
@@ -119,7 +122,7 @@ def press_through_spring(trunk, leg, point, memory, model):  # type: ignore[no-u
     sticking = stiffness[1] * along + damping[1] * speed
     grip = laws.friction * point.friction_scale * force
     held = clip(sticking, grip)
-    shear = choose(size(sticking) <= grip, speed, (held - stiffness[1] * along) / damping[1])
+    shear = choose(size(sticking) <= grip, speed, (held - stiffness[1] * along) * leg.hoof_yield[1])
     point.give_rate[0], point.give_rate[1] = rate, shear
     point.penetration, point.penetration_rate = penetration, depth_rate - rate
     point.sliding_speed = speed - shear

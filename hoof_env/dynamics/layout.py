@@ -299,6 +299,7 @@ class LegRows(Layout):
     frame_torque: Row  # along beta
     crank_power: Row
     swing_power: Row
+    hoof_yield: Annotated[Block, SPRING]  # 1 / damping of the hoof's springs [m/(N s)]
     toe: Contact
     heel: Contact
     settings: LegSettings
