@@ -26,7 +26,7 @@ help:
 	@echo 'make test-site   every page of it in Chromium: errors, widths, images, contrast; installs Playwright'
 	@echo 'make test-links  links to other sites; needs a network'
 	@echo 'make lint        lint and types alone'
-	@echo 'make setup       make .venv with all that the commands of the README need, and nothing more'
+	@echo 'make setup       make .venv with what the README commands need'
 	@echo 'make clean       remove .venv and the caches; runs/ stays'
 
 setup setup-demo:

@@ -27,7 +27,6 @@ from numpy.typing import NDArray
 
 from hoof_env._version import __version__
 from hoof_env.errors import DataFileError, HoofEnvError, MissingExtraError, ParameterError, check_choice
-from hoof_env.gait import PARAMETERS
 
 FILE, WEIGHTS, ABOUT, STATISTICS = "policy.onnx", "policy.safetensors", "policy.json", "vecnormalize.pkl"
 CHECKPOINTS = "checkpoints"
@@ -72,8 +71,8 @@ def describe_spaces(env: Any) -> dict[str, Any]:
 
 def describe(env: Any) -> dict[str, Any]:
     """What an environment says of what it takes and gives: spaces, and names where it has them."""
-    names = getattr(env.unwrapped, "observation_names", None)
-    told = {} if names is None else {"observation_names": list(names), "action_names": list(PARAMETERS)}
+    keys = ("observation_names", "action_names")
+    told = {key: list(names) for key in keys if (names := getattr(env.unwrapped, key, None))}
     return describe_spaces(env) | told
 
 

@@ -78,7 +78,7 @@ class LegBase:
         self.settings = self.task.settings(given)
         self.batch = EpisodeBatch(self.task, self.settings, n, num_threads)
         self.metadata = {**self.metadata, "render_fps": max(1, round(1 / self.batch.dt))}
-        sizes = len(self.batch.names), self.batch.body.actions
+        sizes = len(self.batch.names), len(self.batch.body.action_names)
         return [spaces.Box(-1.0, 1.0, (size,), np.float32) for size in sizes]
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -150,6 +150,12 @@ class LegBase:
     def observation_names(self) -> tuple[str, ...]:
         """Of the observation's entries."""
         return tuple(self.batch.names)
+
+    @property
+    def action_names(self) -> tuple[str, ...]:
+        """Of the action's numbers; of a horse with the leg before each."""
+        names: tuple[str, ...] = self.batch.body.action_names
+        return names
 
     @property
     def observation_units(self) -> tuple[str, ...]:

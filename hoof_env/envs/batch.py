@@ -133,7 +133,7 @@ class EpisodeBatch:
             raise ParameterError(f"observation: nothing of {s.observation!r} is observed on a fixed trunk")
         columns = self.engine.columns
         self.episode = np.zeros((self._episode_layout.size, columns))
-        self.actions = np.zeros((columns, self.body.actions), np.float32)
+        self.actions = np.zeros((columns, len(self.body.action_names)), np.float32)
         self.observations = np.zeros((columns, len(self.names)), np.float32)
         self.rewards = np.zeros(columns)
         self._task = self._task_record()

@@ -17,6 +17,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
+from itertools import product
 from typing import Any, NoReturn
 
 import numpy as np
@@ -50,7 +51,7 @@ from hoof_env.envs.start import (
 )
 from hoof_env.envs.tasks import TASKS
 from hoof_env.errors import ParameterError, check_choice, check_number, count
-from hoof_env.gait import QUICK, WIDEST, FilterSettings
+from hoof_env.gait import PARAMETERS, QUICK, WIDEST, FilterSettings
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry, load_geometry
@@ -106,9 +107,10 @@ class Horse:
         harmonics, filters, limits, step_error: of the engine.
         command_step: from one commanded speed to the next at most [m/s].
         start_names, gait_names: of what an episode starts with.
+        action_names: of its actions, leg after leg.
     """
 
-    legs, actions = COUNT, COUNT * ACTED
+    legs, action_names = COUNT, tuple(f"{leg}_{name}" for leg, name in product(LEGS, PARAMETERS))
     step_error = STEP_ERROR
     start_names, gait_names = ("phase", "speed", "pitch", "x"), NAMES
 
@@ -220,7 +222,7 @@ class Horse:
             begun["x"] = anywhere(engine.terrain, begun["x"], options, generators)
         begun |= {name: np.full(n, options[name]) for name in begun if name in options}
         commands = np.zeros((self.legs, 2 + 2 * self.harmonics, n))
-        theta, action = PHASE_SPREAD * off[:, 3:].T, np.zeros((n, self.actions), np.float32)
+        theta, action = PHASE_SPREAD * off[:, 3:].T, np.zeros((n, len(self.action_names)), np.float32)
         return Start(begun, np.empty(0), commands, theta, {}, action)
 
     def settle(self, start: Start, targets: Floats, options: Mapping[str, Any], engine: TrunkEngine) -> None:

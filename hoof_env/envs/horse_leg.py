@@ -188,7 +188,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def _read_action(self, action: Any) -> None:
         given = array_of(action)
-        count = self.batch.body.actions
+        count = len(self.batch.body.action_names)
         if given.shape != (count,) or given.dtype.kind not in "fiu":
             raise ParameterError(f"action: expected {count} finite numbers in [-1, 1], got {action!r}")
         with np.errstate(over="ignore"):  # to infinity, which is refused

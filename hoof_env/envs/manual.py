@@ -106,7 +106,7 @@ def page(task: str, with_film: bool = False) -> str:
         film=film,
         about=what.about,
         body=Template(WORDS[f"{kind}_body"].strip()).safe_substitute(trunk=trunk["moves"]),
-        action_space=f"Box(-1, 1, ({body.actions},), float32)",
+        action_space=f"Box(-1, 1, ({len(body.action_names)},), float32)",
         actions=_horse_actions() if what.is_horse else _actions(s.gait),
         commands=WORDS[f"{kind}_commands"].strip(),
         observed=WORDS[f"{kind}_observed"].strip(),

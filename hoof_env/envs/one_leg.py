@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 class OneLeg:
     """A leg under a trunk; attributes and methods are as of `horse.Horse`."""
 
-    legs, actions, harmonics, filters, limits = 1, len(PARAMETERS), 1, None, None
+    legs, action_names, harmonics, filters, limits = 1, PARAMETERS, 1, None, None
     hips: Mapping[str, tuple[float, float]] = MappingProxyType({})
     step_error, command_step = 0.01, math.inf
     start_names, gait_names = ("crank_angle", "speed", "height", "x"), PARAMETERS
@@ -101,7 +101,7 @@ class OneLeg:
             values = gaits.to_array() if isinstance(gaits, GaitParameters) else np.asarray(gaits, np.float64)
         except (TypeError, ValueError):
             values = np.empty(0)
-        if values.shape[-1:] != (self.actions,) or not np.isfinite(values).all():
+        if values.shape[-1:] != (len(self.action_names),) or not np.isfinite(values).all():
             raise ParameterError(
                 f"gait: expected one of {', '.join(self.gaits)}, GaitParameters or an array of shape (4,) or "
                 f"(n, 4), got {gaits!r}"

@@ -97,7 +97,7 @@ def make_policy(name: str, env: Any, seed: int = 0) -> Scripted:
             f"env: expected an environment of this package, make_policy(name, env), got {env!r}"
         )
     check_choice("policy", name, policy_names(env))
-    count = leg.batch.body.actions
+    count = len(leg.batch.body.action_names)
     if leg.batch.body.legs > 1 and name in ("reference", "idle"):
         still = np.zeros(count, np.float32)
         still[::ACTED] = -1.0 if name == "idle" else 0.0

@@ -329,7 +329,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         return mask
 
     def _check_actions(self, actions: Any) -> NDArray[np.float32]:
-        given, shape = array_of(actions), (self.num_envs, self.batch.body.actions)
+        given, shape = array_of(actions), (self.num_envs, len(self.batch.body.action_names))
         if given.dtype.kind not in "fiu" or given.shape != shape:
             raise ParameterError(
                 f"actions: expected finite numbers in [-1, 1], shape {shape}, "

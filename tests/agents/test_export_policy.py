@@ -27,7 +27,7 @@ from agents.runs import SavedModel, TrainedPolicy, make_env
 from agents.score import play
 from hoof_env.errors import DataFileError, HoofEnvError, OutputError, ParameterError
 from hoof_env.records import find_policy
-from hoof_env.saved_policy import OnnxPolicy, check_record
+from hoof_env.saved_policy import OnnxPolicy, check_record, describe
 from tests.agents.conftest import ENV_ID, KWARGS
 
 ROOT = Path(__file__).parents[2]
@@ -99,6 +99,10 @@ def test_metadata(env, exported):
     assert record["env_kwargs"] == KWARGS
     assert (record["algo"], record["seed"]) == ("ppo", "0")
     assert record["action_names"] == ["crank_speed", "swing_offset", "swing_sin", "swing_cos"]
+    with make_env("hoof_env/Horse-v0") as horse:
+        names = describe(horse)["action_names"]
+    assert len(names) == 16
+    assert (names[0], names[-1]) == ("left_fore_crank_speed", "right_hind_swing_cos")
     assert str(ROOT).encode() not in exported.read_bytes()
 
 
