@@ -71,7 +71,9 @@ def test_a_search_goes_on_and_charges_the_lag(monkeypatch):
     assert {"speed_m_s", "slip_m", "failed", "return"} <= set(found)
 
 
-def test_what_is_shipped_goes_by_the_speed_that_a_gait_has():
+def test_what_is_shipped_goes_by_the_speed_that_a_gait_has(monkeypatch):
+    monkeypatch.setattr(horse_gaits, "slip_at", lambda gait, speed: 0.2 if speed == 2.5 else 0.05)
+
     def step(speed, reached, slip=0.1, failed=0.0, lag=0.2):
         return {
             "speed": speed, "speed_m_s": reached, "failed": failed, "gait": [reached] * 16, "slip_m": slip,
