@@ -39,7 +39,7 @@ from agents.score import FINAL_SEEDS
 from agents.settings import load_settings
 from agents.statistics import PUBLISHED, TABLE, Floats, Scored, cells, iqm
 from hoof_env._output import markdown_table
-from hoof_env.paper.figures import BLUE, GREEN, GREY, ORANGE, PURPLE, STYLE
+from hoof_env._plotting import BLUE, GREEN, GREY, ORANGE, PURPLE, STYLE
 
 TEMPLATES = Path(__file__).with_name("templates")
 

@@ -111,10 +111,11 @@ def lag_of(stances: list[Stance], stride: float) -> float:
     return mean_lag(gaps)
 
 
-def watch(envs: Any, policy: Any, speed: float) -> Played:
-    """Play episodes at one commanded speed [m/s]."""
+def watch(envs: Any, policy: Any, speed: float, gait: Floats | None = None) -> Played:
+    """Play episodes at one commanded speed [m/s], perhaps around a gait of one's own, shape (16,)."""
     seeds = [3_000_000 + k for k in range(envs.num_envs)]
-    seen, _ = envs.reset(seed=seeds, options={"target_speed": speed})
+    around = {} if gait is None else {"gait": gait}
+    seen, _ = envs.reset(seed=seeds, options={"target_speed": speed, **around})
     n, dt = envs.num_envs, envs.dt
     features = Features(envs.batch.body.harmonics, envs.settings.hoof_stiffness is not None, True)
     sums = {name: np.zeros((4, n)) for name in stride_sums(features)}
@@ -144,10 +145,10 @@ def _place(measured: Any) -> Floats:
     return np.array([measured[name] for name in ("x", *(f"{leg}_theta" for leg in LEGS))])
 
 
-def play(envs: Any, policy: Any, speed: float) -> dict[str, Any]:
+def play(envs: Any, policy: Any, speed: float, gait: Floats | None = None) -> dict[str, Any]:
     """Episodes at one commanded speed [m/s]: figures of each pair of legs, means over the episodes that did
     not end early; and stances of those that are watched."""
-    played, height = watch(envs, policy, speed), envs.batch.body.height
+    played, height = watch(envs, policy, speed, gait), envs.batch.body.height
     kilograms = float(envs.weight[0]) / GRAVITY
     result: dict[str, Any] = {
         "speed": speed, "froude": froude_of(speed, height), "fell": float(1 - played.upright.mean()),

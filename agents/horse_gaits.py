@@ -26,7 +26,8 @@ from agents.command import run
 from agents.score import make_rows
 from hoof_env.dynamics.parts import GRAVITY
 from hoof_env.envs.horse import HIP_HEIGHT
-from hoof_env.envs.reference import ACTED, LEGS, LIMITS, PAIRS, Stride, bounds
+from hoof_env.envs.policies import make_policy
+from hoof_env.envs.reference import LEGS, LIMITS, PAIRS, Stride, bounds
 from hoof_env.errors import HoofEnvError
 
 Floats = NDArray[np.float64]
@@ -46,7 +47,10 @@ FALLEN = 0.1  # share of falls at which the speed is raised no more
 TROT_FROUDE = 0.5  # where the trot-like family begins
 TROT_SLIP = 24.0  # weight of slip there, for with that of the walk hind hoofs slide
 LAG = 200.0  # what a stride between the landings of hind and fore hoofs costs a trot-like gait
-TROT, SLIP = 0.05, 0.1  # largest lag [strides] and slip of a stance [m] of what is shipped as trot-like
+TROT, SLIP = (
+    0.05,
+    0.1,
+)  # largest lag [strides] and slip of a stance [m] of what is shipped as trot-like: as for agents
 
 WEIGHTS = {
     "alive": 11.0, "tracking": 5.0, "peak": 0.35, "slip": 6.0, "landing": 0.3, "work": 0.5, "pitch": 4.0,
@@ -291,21 +295,12 @@ def trunk_series(gait: list[float], speed: float) -> list[list[float]]:
     return found
 
 
-class Zeros:
-    """The policy whose actions are zero, in the form of Stable-Baselines3."""
-
-    def predict(self, seen: Floats, state: Any = None, **kwargs: Any) -> tuple[Floats, Any]:
-        """Actions, shape (n, 16)."""
-        return np.zeros((len(seen), len(LEGS) * ACTED), np.float32), state
-
-
 def slip_at(gait: list[float], speed: float) -> float:
     """How far the hoofs of a gait slide in a stance once it goes at its speed [m/s]: the larger mean of fore
-    and hind hoofs [m], infinite where horses fall."""
+    and hind hoofs [m], infinite where more than a tenth of the horses fall."""
     envs: Any = make_rows("hoof_env/Horse-v0", 32)
-    envs.batch.body.gait = np.array(gait)
-    figures = gait_figures.play(envs, Zeros(), speed)
-    return max(figures["slip_fore"], figures["slip_hind"]) if figures["fell"] == 0 else np.inf
+    figures = gait_figures.play(envs, make_policy("reference", envs), speed, np.array(gait))
+    return max(figures["slip_fore"], figures["slip_hind"]) if figures["fell"] < STABLE else np.inf
 
 
 def shipped(searches: dict[str, Any]) -> dict[str, Any]:

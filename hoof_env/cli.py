@@ -25,7 +25,7 @@ def reproduce(out: Path, figures: bool = True, preset: str | None = None) -> Non
         preset: geometry and gaits, a name or a JSON file; the package's default if left out.
     """
     from hoof_env._output import check_folder
-    from hoof_env.paper.figures import check_matplotlib
+    from hoof_env._plotting import check_matplotlib
 
     options = ([] if figures else ["--no-figures"]) + (["--preset", preset] if preset else [])
     command = shlex.join(["hoof-env", "reproduce", "--out", str(out), *options])

@@ -62,7 +62,7 @@ def meet_point(trunk, leg, point, memory, arm, arm_by_theta, hip, hip_velocity, 
         press_through_spring(trunk, leg, point, memory, model)
     else:
         press_rigidly(trunk, point, memory, penetration, rate, sliding_speed, model)
-    force = plane(point.friction_force, point.normal_force)
+    force = plane(point.friction_force, point.normal_force)  # on level ground
     if model.is_terrain:
         normal = point.ground_normal
         force = point.normal_force * normal - point.friction_force * across(normal)

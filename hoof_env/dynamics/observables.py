@@ -149,8 +149,8 @@ def count_stride(trunk, leg, form, h):  # type: ignore[no-untyped-def]
     leg.sums.normal_impulse = leg.sums.normal_impulse + h * load
     down = load > 0.0
     leg.sums.loaded_time = leg.sums.loaded_time + choose(down, h, 0.0)
-    slid, per_load = leg.toe.normal_force * leg.toe.sliding_speed, h / choose(down, load, 1.0)
-    slid = slid + leg.heel.normal_force * leg.heel.sliding_speed
+    per_load = h / choose(down, load, 1.0)
+    slid = leg.toe.normal_force * leg.toe.sliding_speed + leg.heel.normal_force * leg.heel.sliding_speed
     leg.sums.travel = leg.sums.travel - choose(down, slid * per_load, 0.0)
     if form.animal:
         slid = leg.toe.normal_force * size(leg.toe.sliding_speed)

@@ -20,23 +20,10 @@ from hoof_env.dynamics.limits import has_moved
 from hoof_env.envs.episode import ACTIONS, FAILED, TRUNCATED, Memories, memories_of, task_type
 from hoof_env.envs.horse_rows import HORSE_TERMS
 from hoof_env.envs.observation import Entry, Scene
+from hoof_env.envs.outcome import add_up, decide, find_outcome, outcome_of_one, remember_action
 from hoof_env.envs.reference import ROOM, command_gait
-from hoof_env.envs.reward import TERMS, Outcome, Term
-from hoof_env.simd import (
-    anywhere,
-    choose,
-    columns,
-    lane_of,
-    larger,
-    level,
-    nth,
-    read,
-    rows,
-    set_lane,
-    size,
-    smaller,
-    write,
-)
+from hoof_env.envs.reward import TERMS, Term
+from hoof_env.simd import anywhere, choose, columns, larger, level, read, rows, set_lane, size, smaller, write
 from hoof_env.simd.compile import inlined, kernel, pasted
 from hoof_env.simd.math import clip, tanh
 from hoof_env.simd.memory import (
@@ -63,7 +50,6 @@ ADDRESSES = Addresses(
 """The arrays of a step, those of the engine first."""
 
 AT, BEGIN, END = ADDRESSES.slots, ADDRESSES.begin, ADDRESSES.end
-
 SHIPPED = tuple(term.name for term in TERMS)
 
 
@@ -81,106 +67,6 @@ def apply_action(task, actions, leg, n):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def remember_action(actions, episode, legs, n):  # type: ignore[no-untyped-def]
-    """Keep the clipped action; returns the mean square of its change."""
-    change, count = level(episode, 0.0), legs * ACTIONS
-    for k in range(count):
-        action = clip(read(episode, actions, n * count + k, count), 1.0)
-        difference = action - episode.action[k]
-        change = change + difference * difference
-        episode.action[k] = action
-    return change * (1.0 / count)
-
-
-@inlined
-def sum_up(first_leg, layouts):  # type: ignore[no-untyped-def]
-    """What all legs did in the step, and the highest of their forces."""
-    sums, slip = first_leg.sums, 0.0 * first_leg.sums.travel
-    running_peak_increase, peak_grf_increase = sums.running_peak_increase, sums.peak_grf_increase
-    loading_rate_increase, highest_grf = sums.loading_rate_increase, sums.highest_grf
-    positive_work, normal_impulse = sums.positive_work, sums.normal_impulse
-    loaded_time, stances = sums.loaded_time, sums.stances
-    if layouts.animal:
-        slip = sums.slip[0]
-    for i in range(1, layouts.legs):
-        sums = nth(first_leg, i).sums
-        running_peak_increase = running_peak_increase + sums.running_peak_increase
-        peak_grf_increase = peak_grf_increase + sums.peak_grf_increase
-        loading_rate_increase = loading_rate_increase + sums.loading_rate_increase
-        highest_grf = larger(highest_grf, sums.highest_grf)
-        positive_work = positive_work + sums.positive_work
-        normal_impulse = normal_impulse + sums.normal_impulse
-        loaded_time = loaded_time + sums.loaded_time
-        stances = stances + sums.stances
-        if layouts.animal:
-            slip = slip + sums.slip[0]
-    return (
-        running_peak_increase, peak_grf_increase, loading_rate_increase, highest_grf, positive_work,
-        normal_impulse, loaded_time, stances, slip,
-    )  # fmt: skip
-
-
-@inlined
-def find_outcome(task, trunk, leg, episode, layouts, action_change):  # type: ignore[no-untyped-def]
-    """What the step brought."""
-    works = has_moved(trunk.result)  # else the state is of before: nothing is paid
-    x, y = trunk.report.place.real, trunk.report.place.imag
-    running, peak, loading, highest, work, impulse, loaded, stances, slip = sum_up(leg, layouts)
-    progress = x - episode.x_before
-    if task.stays:
-        progress = leg.sums.travel
-    episode.x_before = x
-    return Outcome(
-        seconds=choose(works, task.dt, 0.0),
-        progress=choose(works, progress, 0.0),
-        commanded_progress=task.dt * episode.target,
-        running_peak_increase=choose(works, running, 0.0),
-        peak_grf_increase=choose(works, peak, 0.0),
-        loading_rate_increase=choose(works, loading, 0.0),
-        highest_grf=choose(works, highest, 0.0),
-        positive_work=choose(works, work, 0.0),
-        normal_impulse=choose(works, impulse, 0.0),
-        loaded_time=choose(works, loaded, 0.0),
-        stances=choose(works, stances, 0.0),
-        slip=choose(works, slip, 0.0),
-        action_change=action_change,
-        failed=choose((trunk.result == 0.0) & (y > task.lowest) & (y < task.highest), 0.0, 1.0),
-        episode_seconds=task.episode_seconds,
-        weight=episode.weight,
-        trunk=trunk,
-        leg=leg,
-        episode=episode,
-    )
-
-
-@inlined
-def add_up(outcome, episode):  # type: ignore[no-untyped-def]
-    """The sums of the episode."""
-    episode.time = episode.time + outcome.seconds
-    episode.distance = episode.distance + outcome.progress
-    episode.work = episode.work + outcome.positive_work
-    episode.impulse = episode.impulse + outcome.normal_impulse
-    episode.loaded_time = episode.loaded_time + outcome.loaded_time
-    episode.stances = episode.stances + outcome.stances
-    episode.peak_sum = episode.peak_sum + outcome.peak_grf_increase
-    episode.loading_rate_sum = episode.loading_rate_sum + outcome.loading_rate_increase
-    episode.highest = larger(episode.highest, outcome.highest_grf)
-    episode.slip = episode.slip + outcome.slip
-
-
-@inlined
-def decide(task, outcome, episode):  # type: ignore[no-untyped-def]
-    """Whether the episode ends, and whether another speed is commanded from the next step on."""
-    steps = episode.steps + 1.0
-    late = choose(steps >= task.episode_steps, float(TRUNCATED), 0.0)
-    ended = choose(outcome.failed > 0.0, float(FAILED), late)
-    switched = steps >= episode.switch
-    episode.steps, episode.ended = steps, ended
-    episode.target = choose(switched, episode.next_target, episode.target)
-    return ended > 0.0, switched
-
-
-@inlined
 def memories(addresses, lanes, layouts, n):  # type: ignore[no-untyped-def]
     """Trunk, leg and episode of environments n, n + 1, ..., as `lanes` columns, see `simd.columns`."""
     row = addresses[AT.data + COLUMNS]
@@ -190,21 +76,6 @@ def memories(addresses, lanes, layouts, n):  # type: ignore[no-untyped-def]
         columns(data, lanes, layouts.leg, layouts.trunk_rows * row + n, row, 1),
         columns(episode, lanes, layouts.episode, n, row, 1),
     )
-
-
-@inlined
-def outcome_of_one(outcome, lane, trunk, leg, episode):  # type: ignore[no-untyped-def]
-    """One lane of an `Outcome`, ordinary numbers."""
-    return Outcome(
-        lane_of(outcome.seconds, lane), lane_of(outcome.progress, lane),
-        lane_of(outcome.commanded_progress, lane), lane_of(outcome.running_peak_increase, lane),
-        lane_of(outcome.peak_grf_increase, lane), lane_of(outcome.loading_rate_increase, lane),
-        lane_of(outcome.highest_grf, lane), lane_of(outcome.positive_work, lane),
-        lane_of(outcome.normal_impulse, lane), lane_of(outcome.loaded_time, lane),
-        lane_of(outcome.stances, lane), lane_of(outcome.slip, lane), lane_of(outcome.action_change, lane),
-        lane_of(outcome.failed, lane),
-        outcome.episode_seconds, lane_of(outcome.weight, lane), trunk, leg, episode,
-    )  # fmt: skip
 
 
 def _with_terms(terms: tuple[Term, ...], layouts: Memories, k: int = 0) -> Callable[..., Any]:

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from hoof_env._output import check_folder, markdown_table, staged
+from hoof_env._plotting import BLUE, GREY, ORANGE, STYLE
 from hoof_env.errors import MissingExtraError, ParameterError
 from hoof_env.lab.compare import Comparison, Force
 from hoof_env.lab.read import REVERSED, ForceRecord
-from hoof_env.paper.figures import BLUE, GREY, ORANGE, STYLE
 
 SUFFIXES = (".pdf", ".png", ".svg")
 NO_DATE = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}

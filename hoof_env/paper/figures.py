@@ -9,281 +9,41 @@ they count as reproduced.
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hoof_env._output import staged
-from hoof_env.errors import HoofEnvError
-from hoof_env.leg.geometry import Geometry
-from hoof_env.leg.kinematics import FrameMotion, pose
+from hoof_env._plotting import BLUE, GREY, SKY, check_matplotlib
 from hoof_env.leg.linkage import BODIES
-from hoof_env.leg.linkage import POINTS as JOINTS
+from hoof_env.paper.drawing import (
+    CONDITION_COLOURS,
+    FORWARD,
+    GAITS,
+    HEIGHT,
+    POINT_COLOURS,
+    PRINT,
+    SMALL,
+    Point,
+    contact_rows,
+    draw_arrow,
+    draw_ground,
+    elastic_cycles,
+    half_bar,
+    head,
+    leg_at,
+    legend_below,
+    mark_contacts,
+    mark_published,
+    panel_height,
+    shade,
+    show_box,
+)
 from hoof_env.paper.measure import POINTS, Stance, Trace, measure_stance
-from hoof_env.paper.rows import CONDITIONS, EXACT, PublishedRow, Reproduction
+from hoof_env.paper.mechanism import draw_mechanism
+from hoof_env.paper.rows import EXACT, Reproduction
 from hoof_env.paper.shapes import find_peaks
-
-BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER, GREY, SOIL = (
-    "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#666666", "#EFE6D8",
-)  # fmt: skip
-"""Okabe and Ito's colours, told apart by colour-blind readers, a grey and the ground."""
-
-STYLE: dict[Any, Any] = {
-    "font.size": 9,
-    "axes.titlesize": 10,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "legend.frameon": False,
-    "legend.fontsize": 8,
-    "svg.hashsalt": "hoof-env",
-    "savefig.dpi": 200,
-}
-"""For pictures on a page."""
-
-SMALL = 7.0  # smallest type [points]
-PRINT: dict[Any, Any] = {
-    **STYLE,
-    "font.family": "sans-serif",
-    "font.sans-serif": ["DejaVu Sans", "Verdana", "Arial", "sans-serif"],
-    "font.size": 8,
-    "axes.titlesize": 8,
-    "axes.titlelocation": "left",
-    "axes.labelsize": 8,
-    "xtick.labelsize": SMALL,
-    "ytick.labelsize": SMALL,
-    "legend.fontsize": SMALL,
-    "svg.fonttype": "none",
-    "savefig.dpi": 300,
-}
-"""For print over two columns; in SVG text stays text."""
-
-WIDTH, HEAD = 6.9, 0.5  # two columns of a journal, height of the lines above the panels [inch]
-
-GAITS = {"walk": "(a) Walking", "run": "(b) Running"}
-CONDITION_COLOURS = dict(zip(CONDITIONS, (BLUE, ORANGE), strict=True))
-POINT_COLOURS = {"toe": PURPLE, "heel": GREEN}
-PHASES = {
-    ("heel",): ("#D5EEE5", "heel alone: strike or off"),
-    ("toe", "heel"): ("#FBF2D3", "toe and heel: flat or roll-over"),
-    ("toe",): ("#F6E4EE", "toe alone: strike or off"),
-}
-"""Colour and name of the sub-phases of stance, by the points that bear."""
-
-FORWARD = "x forward of O [m]"
-HEIGHT = "height above the ground [m]"
-
-Point = NDArray[np.float64]
-
-
-def leg_at(geometry: Geometry, trace: Trace, t: float) -> dict[str, Point]:
-    """World position (x, y) [m] of every named point at the row of a trace nearest to an instant [s]."""
-    row = trace[int(np.argmin(np.abs(trace["time"] - t)))]
-    frame = FrameMotion(phi=float(row["phi"]), position=(float(row["x"]), float(row["y"])))
-    return dict(zip(JOINTS, pose(geometry, float(row["theta"]), frame=frame).points, strict=True))
-
-
-def elastic_cycles(reproduction: Reproduction) -> dict[str, tuple[Trace, Stance]]:
-    """Trace and stance of each gait on elastic ground."""
-    traces = {gait: reproduction.traces[gait, "elastic", EXACT] for gait in GAITS}
-    return {gait: (trace, measure_stance(trace)) for gait, trace in traces.items()}
-
-
-def head(figure: Any, height: float, reproduction: Reproduction, title: str, ground: str, note: str) -> None:
-    """Make the figure `height` [inch] high and head it: what it shows; that the leg is identified, its
-    preset, solver and ground; a note."""
-    figure.set_size_inches(WIDTH, height)
-    figure.set_layout_engine("constrained", rect=(0, 0, 1, 1 - HEAD / height))
-    preset = Path(reproduction.geometry.name).name
-    leg = f"Identified leg, not published (preset {preset}); {EXACT} solver; {ground} ground"
-    figure.text(0.01, 1 - 0.05 / height, title, va="top", weight="bold")
-    for top, text in ((0.2, f"{leg}; travel to the right."), (0.34, note)):
-        place = 0.01, 1 - top / height
-        figure.text(*place, text, va="top", fontsize=SMALL, color=GREY, parse_math=False)
-
-
-def panel_height(*boxes: Point) -> float:
-    """Height [inch] at which panels of these boxes, lower left and upper right corner [m], as high as each
-    other, fill the figure side by side."""
-    return (WIDTH - 1.2) / float(sum(across / up for across, up in (high - low for low, high in boxes)))
-
-
-def show_box(ax: Any, box: Point) -> None:
-    """Show a box, lower left and upper right corner [m], in its true shape."""
-    ax.set(xlim=box[:, 0], ylim=box[:, 1], aspect="equal")
-
-
-def legend_below(figure: Any, columns: int) -> None:
-    """One legend at the foot of the figure, every label once."""
-    entries = {
-        label: line for ax in figure.axes for line, label in zip(*ax.get_legend_handles_labels(), strict=True)
-    }
-    figure.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=columns)
-
-
-def draw_ground(ax: Any) -> None:
-    """Level ground y = 0, shaded down to the end of the axes, whose limits stay."""
-    low, high = ax.get_ylim()
-    ax.axhspan(low - (high - low), 0, color=SOIL, zorder=0, lw=0)
-    ax.axhline(0, color=GREY, lw=0.8, zorder=1)
-    ax.set_ylim(low, high)
-
-
-def draw_arrow(ax: Any, start: Any, end: Any, colour: str) -> None:
-    look = {"arrowstyle": "-|>", "color": colour, "lw": 1.2, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 8}
-    ax.annotate("", end, start, arrowprops=look, zorder=8)
-
-
-def mark_published(ax: Any, x: Any, y: Any, *, xerr: Any = None, yerr: Any = None) -> None:
-    """Published values: one mark in all figures, with the bars within which they count as reproduced."""
-    ax.errorbar(
-        x, y, yerr, xerr, fmt="D", ms=4.2, mfc="white", mec="black", mew=0.9, ecolor="black",
-        elinewidth=0.7, capsize=1.8, capthick=0.7, clip_on=False, zorder=9, label="published",
-    )  # fmt: skip
-
-
-def half_bar(row: PublishedRow) -> float:
-    """How far a value may lie from the published one, in the row's unit; 0 where it is only reported."""
-    limit = row.bar.limit or 0.0
-    return abs(row.value) * limit / 100 if row.bar.measure == "%" else limit
-
-
-def contact_rows(reproduction: Reproduction, gait: str) -> list[PublishedRow]:
-    return [reproduction.published.row(f"{gait}.{name}") for name in ("contact_start", "contact_end")]
-
-
-def mark_contacts(ax: Any, reproduction: Reproduction, gait: str, y: float) -> None:
-    """The published instants of contact on an axis of time [s]."""
-    for row in contact_rows(reproduction, gait):
-        mark_published(ax, row.value, y, xerr=half_bar(row))
-
-
-def shade(ax: Any, stance: Stance) -> None:
-    """Shade the stance behind curves over time [s], cut where toe or heel enters or leaves the ground."""
-    instants = sorted({t for name in POINTS for interval in getattr(stance, name) for t in interval})
-    for start, end in pairwise(instants):
-        bearing = tuple(n for n in POINTS if any(a <= start and end <= b for a, b in getattr(stance, n)))
-        if bearing:
-            colour, label = PHASES[bearing]
-            ax.axvspan(start, end, fc=colour, lw=0, zorder=0, label=label)
-
-
-ROLE_COLOURS = {
-    "crank": ORANGE,
-    "coupler": GREY,
-    "upper triangle": AMBER,
-    "connecting rod": GREY,
-    "shank, upper part": GREEN,
-    "shank, lower part": GREEN,
-    "rocker": PURPLE,
-    "strut": GREY,
-    "hoof tie rod": GREY,
-    "hoof triangle": BLUE,
-    "hoof triangle, sole": BLUE,
-}
-NUMBER_AT = {8: 0.75, 10: 0.65, 12: 0.35}  # where on its link a number stands, from the tail; 0.5 elsewhere
-NAME_TO = {"C": (1.0, 0.3)}  # the side of a name that cannot stand where its links leave room
-
-
-def draw_mechanism(figure: Any, reproduction: Reproduction) -> None:
-    """Figure 1: the leg in its walking stance: all of it, and its hoof with the forces on the point that
-    bears most, slip, penetration and angle; every point named, every link numbered as in Eq. 2."""
-    geometry, (trace, _) = reproduction.geometry, elastic_cycles(reproduction)["walk"]
-    tip = max(POINTS, key=lambda point: trace[f"{point}_normal"].max())
-    row = trace[int(np.argmax(trace[f"{tip}_normal"] * (0.01 + np.abs(trace["hoof_angle"]))))]
-    at = leg_at(geometry, trace, float(row["time"]))
-    points = np.array(list(at.values()))
-    hoof = np.array([at["G"], at[geometry.toe], at[geometry.heel]])
-    side = float(np.ptp(hoof, axis=0).max())
-    boxes = [
-        np.array([np.minimum(points.min(axis=0) - 0.2, (np.inf, -0.2)), points.max(axis=0) + 0.2]),
-        np.array([hoof.min(axis=0) - 0.45 * side, hoof.max(axis=0) + np.array([0.65, 0.1]) * side]),
-    ]
-    head(
-        figure, panel_height(*boxes) + 1.7, reproduction,
-        "Figure 1. Mechanism of the leg and its contact with the ground", "elastic",
-        f"Walking at {row['time']:.3f} s. Links numbered as in Eq. 2.",
-    )  # fmt: skip
-    axes = figure.subplots(1, 2, width_ratios=[across / up for across, up in np.ptp(boxes, axis=1)])
-    sole = {geometry.toe, geometry.heel}
-    titles = "(a) the leg", f"(b) its hoof, the {tip} in the ground"
-    for ax, box, names, title in zip(axes, boxes, (at.keys() - sole, {"G", *sole}), titles, strict=True):
-        show_box(ax, box)
-        draw_ground(ax)
-        _draw_links(ax, at, close=names == {"G", *sole})
-        _name_points(ax, at, names, geometry)
-        ax.set(title=title, xlabel=FORWARD, ylabel=HEIGHT)
-    _draw_contact(axes[1], at[getattr(geometry, tip)], at[geometry.toe], at[geometry.heel], tip, row, side)
-    legend_below(figure, 4)
-
-
-def _draw_links(ax: Any, at: dict[str, Point], *, close: bool) -> None:
-    """All links, numbered: those of the hoof in the close view, the others in that of the whole leg."""
-    numbers: dict[str, str] = {}
-    for number, body in enumerate(BODIES, start=1):
-        numbers[body.role] = f"{numbers[body.role]}, {number}" if body.role in numbers else str(number)
-    for number, body in enumerate(BODIES, start=1):
-        tail, tip, colour = at[body.tail], at[body.head], ROLE_COLOURS[body.role]
-        label = f"{numbers[body.role]}  {body.role}"
-        ax.plot(*np.array([tail, tip]).T, color=colour, lw=2, label=label, solid_capstyle="round")
-        if close == body.role.startswith("hoof triangle"):
-            ring = {"boxstyle": "circle,pad=0.2", "fc": "white", "ec": colour, "lw": 0.7}
-            place = tail + NUMBER_AT.get(number, 0.5) * (tip - tail)
-            ax.text(*place, str(number), fontsize=6, ha="center", va="center", bbox=ring, zorder=6)
-    ax.plot(*np.array([at["C"], at["A"]]).T, color=ROLE_COLOURS["rocker"], lw=2)
-    for corners, colour in (("CBD", AMBER), ("GJI", SKY)):
-        ax.fill(*np.array([at[name] for name in corners]).T, color=colour, alpha=0.2, lw=0)
-
-
-def _name_points(ax: Any, at: dict[str, Point], names: Any, geometry: Geometry) -> None:
-    """Mark every joint, and name some of them on the side that their links leave free."""
-    sole = {geometry.toe: "toe", geometry.heel: "heel"}
-    for name, point in at.items():
-        fixed, fill = name in ("O", "C"), POINT_COLOURS.get(sole.get(name, ""), "white")
-        look = {"marker": "^", "ms": 6, "mfc": "black"} if fixed else {"marker": "o", "ms": 4, "mfc": fill}
-        ax.plot(*point, mec="black", mew=0.8, zorder=7, **look)
-        if name in names:
-            ends = [(body.tail, body.head) for body in BODIES if name in (body.tail, body.head)]
-            others = np.array([at[two if one == name else one] - point for one, two in ends])
-            free = -(others / np.linalg.norm(others, axis=1, keepdims=True)).sum(axis=0)
-            away = np.array(NAME_TO.get(name, free))
-            offset = 10 * away / max(float(np.linalg.norm(away)), 1e-9)
-            text = {"toe": f"{name} = K (toe)", "heel": f"{name} = H (heel)"}.get(sole.get(name, ""), name)
-            side = "right" if name in sole and offset[0] < 0 else "left" if name in sole else "center"
-            ax.annotate(
-                text, point, offset, textcoords="offset points", ha=side, va="center", weight="bold", zorder=9
-            )
-
-
-def _draw_contact(
-    ax: Any, press: Point, toe: Point, heel: Point, tip: str, row: np.void, side: float
-) -> None:
-    """Forces, slip, penetration and hoof angle of the point that presses; the hoof is `side` [m] large."""
-    normal = 0.75 * side
-    friction = normal * row[f"{tip}_friction"] / row[f"{tip}_normal"]
-    slip = np.sign(row[f"{tip}_slide"]) * 0.3 * side
-    below = press - (0, 0.15 * side)
-    for start, vector, text, colour in (
-        (press, (0, normal), "$F_n$", BLUE),
-        (press, (friction, 0), "$F_f$", BLUE),
-        (press, (friction, normal), "GRF", ORANGE),
-        (below, (slip, 0), "$v_t$", GREEN),
-    ):
-        draw_arrow(ax, start, start + vector, colour)
-        ax.annotate(text, start + vector, (3, 4), textcoords="offset points", color=colour, zorder=9)
-    gauge = press[0] + 0.5 * side
-    ax.plot([press[0], gauge], [press[1]] * 2, color="black", lw=0.6, ls=":")
-    ax.plot([gauge] * 2, [press[1], 0], color="black", lw=0.8, marker="_", ms=5)
-    ax.annotate(r"$\delta$", (gauge, press[1] / 2), (5, 0), textcoords="offset points", va="center")
-    length = float(np.linalg.norm(heel - toe))
-    turn = np.linspace(np.pi - row["hoof_angle"], np.pi, 30)
-    arc = toe + 0.75 * length * np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    ax.plot([toe[0] - length, toe[0]], [toe[1]] * 2, color="black", lw=0.6, ls=":")
-    ax.plot(*arc.T, color="black", lw=0.8)
-    ax.annotate(r"$\alpha$", arc[-1], (-3, -8), textcoords="offset points", va="center")
-
 
 HOOVES = 8  # the hoof is drawn at this many equally spaced instants of the cycle
 
@@ -513,16 +273,6 @@ def draw_vectors(figure: Any, reproduction: Reproduction) -> None:
         draw_ground(ax)
         bar = figure.colorbar(arrows, ax=ax, orientation="horizontal", label="time [s]", aspect=30)
         mark_contacts(bar.ax, reproduction, gait, 0.5)
-
-
-def check_matplotlib() -> None:
-    """Raise `HoofEnvError` with the way out unless matplotlib can be imported."""
-    try:
-        import matplotlib  # noqa: F401
-    except ImportError:
-        raise HoofEnvError(
-            'figures need matplotlib: pip install "hoof-env[plot]", or leave them out with --no-figures'
-        ) from None
 
 
 DRAWINGS: dict[str, Callable[[Any, Reproduction], None]] = {

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from agents import horse_gaits
-from agents.horse_gaits import Course, Search, decode, encode, landings, shipped, speed_of
+from agents.horse_gaits import Course, Search, decode, encode, landings, shipped, slip_at, speed_of
 from hoof_env.envs.reference import FASTEST, HorseGait, bounds, crank_angles, reference_gaits
 from hoof_env.envs.reference import horse_gaits as gaits_of_the_package
 
@@ -85,15 +85,30 @@ def test_what_is_shipped_goes_by_the_speed_that_a_gait_has(monkeypatch):
         "free 1": {"steps": [step(1.9, 1.85, slip=0.01)]},
         "free, faster": {"steps": [step(2.5, 2.2), step(2.6, 2.19, 0.05), step(4.5, 4.0, failed=0.5)]},
         "free, slower": {"steps": [step(1.2, 1.2)]},
-        "trot-like, faster": {
-            "steps": [step(2.5, 2.4, 0.05, lag=0.01), step(2.6, 2.5, lag=0.01), step(2.7, 2.6, 0.05)]
-        },
+        "trot-like, faster": {"steps": [step(2.5, 2.4, lag=0.01), step(2.6, 2.5, lag=0.01), step(2.7, 2.6)]},
     }
     found = shipped(searches)
     assert found["reference"]["speeds"] == [1.2, 1.8, 2.19]  # of two alike, the one that slips less
     assert found["gaits"]["fast"][0] == 2.2  # the faster one fell
     assert found["gaits"]["walk"][0] == 1.8
     assert found["gaits"]["trot-like"][0] == 2.4  # the others slide, or land apart
+
+
+@pytest.mark.parametrize(("name", "speed", "slides"), [("walk", 1.85, False), ("fast", 3.29, True)])
+def test_the_slip_of_a_gait_is_that_of_its_hoofs_at_its_speed(name, speed, slides):
+    """Half of the summary's mean of all hoofs to twice that, for it is of the pair that slides more."""
+    gait = gaits_of_the_package()[name].to_array()
+    slip = slip_at(gait.tolist(), speed)
+    _, summaries, _ = Course(speed, 32, episode_seconds=10.0).play(np.tile(gait, (32, 1)), 0, starts=32)
+    mean = np.mean([one["slip_m"] for one in summaries])
+    assert mean < slip < 2.5 * mean
+    assert (slip > horse_gaits.SLIP) == slides
+
+
+def test_a_gait_that_falls_has_no_slip_and_the_trot_like_one_little():
+    gait = gaits_of_the_package()["trot-like"].to_array().tolist()
+    assert slip_at(gait, 3.45) < horse_gaits.SLIP
+    assert slip_at(gait, 1.85) == np.inf  # falls from the start at another speed
 
 
 def test_the_package_has_gaits_in_the_order_of_their_speeds():

@@ -6,17 +6,10 @@ import pytest
 
 from hoof_env.leg.linkage import BODIES, POINTS
 from hoof_env.paper import figures
-from hoof_env.paper.figures import (
-    DRAWINGS,
-    PRINT,
-    draw_angles,
-    draw_forces,
-    draw_mechanism,
-    draw_paths,
-    draw_vectors,
-    shade,
-)
+from hoof_env.paper.drawing import PRINT, shade
+from hoof_env.paper.figures import DRAWINGS, draw_angles, draw_forces, draw_paths, draw_vectors
 from hoof_env.paper.measure import measure_stance
+from hoof_env.paper.mechanism import draw_mechanism
 from hoof_env.paper.reproduce import run_cycle
 from hoof_env.paper.rows import EXACT
 

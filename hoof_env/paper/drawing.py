@@ -1,0 +1,142 @@
+"""What the redrawn figures of the paper share: type, names and colours, heads and legends, the ground, arrows
+and published values."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoof_env._plotting import BLUE, GREEN, GREY, ORANGE, PURPLE, SOIL, STYLE
+from hoof_env.leg.geometry import Geometry
+from hoof_env.leg.kinematics import FrameMotion, pose
+from hoof_env.leg.linkage import POINTS as JOINTS
+from hoof_env.paper.measure import POINTS, Stance, Trace, measure_stance
+from hoof_env.paper.rows import CONDITIONS, EXACT, PublishedRow, Reproduction
+
+SMALL = 7.0  # smallest type [points]
+PRINT: dict[Any, Any] = {
+    **STYLE,
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans", "Verdana", "Arial", "sans-serif"],
+    "font.size": 8,
+    "axes.titlesize": 8,
+    "axes.titlelocation": "left",
+    "axes.labelsize": 8,
+    "xtick.labelsize": SMALL,
+    "ytick.labelsize": SMALL,
+    "legend.fontsize": SMALL,
+    "svg.fonttype": "none",
+    "savefig.dpi": 300,
+}
+"""For print over two columns; in SVG text stays text."""
+
+WIDTH, HEAD = 6.9, 0.5  # two columns of a journal, height of the lines above the panels [inch]
+GAITS = {"walk": "(a) Walking", "run": "(b) Running"}
+CONDITION_COLOURS = dict(zip(CONDITIONS, (BLUE, ORANGE), strict=True))
+POINT_COLOURS = {"toe": PURPLE, "heel": GREEN}
+PHASES = {
+    ("heel",): ("#D5EEE5", "heel alone: strike or off"),
+    ("toe", "heel"): ("#FBF2D3", "toe and heel: flat or roll-over"),
+    ("toe",): ("#F6E4EE", "toe alone: strike or off"),
+}
+"""Colour and name of the sub-phases of stance, by the points that bear."""
+
+FORWARD = "x forward of O [m]"
+HEIGHT = "height above the ground [m]"
+Point = NDArray[np.float64]
+
+
+def leg_at(geometry: Geometry, trace: Trace, t: float) -> dict[str, Point]:
+    """World position (x, y) [m] of every named point at the row of a trace nearest to an instant [s]."""
+    row = trace[int(np.argmin(np.abs(trace["time"] - t)))]
+    frame = FrameMotion(phi=float(row["phi"]), position=(float(row["x"]), float(row["y"])))
+    return dict(zip(JOINTS, pose(geometry, float(row["theta"]), frame=frame).points, strict=True))
+
+
+def elastic_cycles(reproduction: Reproduction) -> dict[str, tuple[Trace, Stance]]:
+    """Trace and stance of each gait on elastic ground."""
+    traces = {gait: reproduction.traces[gait, "elastic", EXACT] for gait in GAITS}
+    return {gait: (trace, measure_stance(trace)) for gait, trace in traces.items()}
+
+
+def head(figure: Any, height: float, reproduction: Reproduction, title: str, ground: str, note: str) -> None:
+    """Make the figure `height` [inch] high and head it: what it shows; that the leg is identified, its
+    preset, solver and ground; a note."""
+    figure.set_size_inches(WIDTH, height)
+    figure.set_layout_engine("constrained", rect=(0, 0, 1, 1 - HEAD / height))
+    preset = Path(reproduction.geometry.name).name
+    leg = f"Identified leg, not published (preset {preset}); {EXACT} solver; {ground} ground"
+    figure.text(0.01, 1 - 0.05 / height, title, va="top", weight="bold")
+    for top, text in ((0.2, f"{leg}; travel to the right."), (0.34, note)):
+        place = 0.01, 1 - top / height
+        figure.text(*place, text, va="top", fontsize=SMALL, color=GREY, parse_math=False)
+
+
+def panel_height(*boxes: Point) -> float:
+    """Height [inch] at which panels of these boxes, lower left and upper right corner [m], as high as each
+    other, fill the figure side by side."""
+    return (WIDTH - 1.2) / float(sum(across / up for across, up in (high - low for low, high in boxes)))
+
+
+def show_box(ax: Any, box: Point) -> None:
+    """Show a box, lower left and upper right corner [m], in its true shape."""
+    ax.set(xlim=box[:, 0], ylim=box[:, 1], aspect="equal")
+
+
+def legend_below(figure: Any, columns: int) -> None:
+    """One legend at the foot of the figure, every label once."""
+    entries = {
+        label: line for ax in figure.axes for line, label in zip(*ax.get_legend_handles_labels(), strict=True)
+    }
+    figure.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=columns)
+
+
+def draw_ground(ax: Any) -> None:
+    """Level ground y = 0, shaded down to the end of the axes, whose limits stay."""
+    low, high = ax.get_ylim()
+    ax.axhspan(low - (high - low), 0, color=SOIL, zorder=0, lw=0)
+    ax.axhline(0, color=GREY, lw=0.8, zorder=1)
+    ax.set_ylim(low, high)
+
+
+def draw_arrow(ax: Any, start: Any, end: Any, colour: str) -> None:
+    look = {"arrowstyle": "-|>", "color": colour, "lw": 1.2, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 8}
+    ax.annotate("", end, start, arrowprops=look, zorder=8)
+
+
+def mark_published(ax: Any, x: Any, y: Any, *, xerr: Any = None, yerr: Any = None) -> None:
+    """Published values: one mark in all figures, with the bars within which they count as reproduced."""
+    ax.errorbar(
+        x, y, yerr, xerr, fmt="D", ms=4.2, mfc="white", mec="black", mew=0.9, ecolor="black",
+        elinewidth=0.7, capsize=1.8, capthick=0.7, clip_on=False, zorder=9, label="published",
+    )  # fmt: skip
+
+
+def half_bar(row: PublishedRow) -> float:
+    """How far a value may lie from the published one, in the row's unit; 0 where it is only reported."""
+    limit = row.bar.limit or 0.0
+    return abs(row.value) * limit / 100 if row.bar.measure == "%" else limit
+
+
+def contact_rows(reproduction: Reproduction, gait: str) -> list[PublishedRow]:
+    return [reproduction.published.row(f"{gait}.{name}") for name in ("contact_start", "contact_end")]
+
+
+def mark_contacts(ax: Any, reproduction: Reproduction, gait: str, y: float) -> None:
+    """The published instants of contact on an axis of time [s]."""
+    for row in contact_rows(reproduction, gait):
+        mark_published(ax, row.value, y, xerr=half_bar(row))
+
+
+def shade(ax: Any, stance: Stance) -> None:
+    """Shade the stance behind curves over time [s], cut where toe or heel enters or leaves the ground."""
+    instants = sorted({t for name in POINTS for interval in getattr(stance, name) for t in interval})
+    for start, end in pairwise(instants):
+        bearing = tuple(n for n in POINTS if any(a <= start and end <= b for a, b in getattr(stance, n)))
+        if bearing:
+            colour, label = PHASES[bearing]
+            ax.axvspan(start, end, fc=colour, lw=0, zorder=0, label=label)
