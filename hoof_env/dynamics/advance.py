@@ -52,7 +52,7 @@ MODEL = np.dtype(
         ("kind", "i8"), ("eighths", "i8"), ("friction_law", "i8"),  # of trunk, contact exponent, friction
         ("interpolated", "?"), ("is_terrain", "?"), ("new_rates", "?"),  # see `Ground`, `Terrain`, `Scheme`
         ("strides", "?"), ("motors", "?"),  # whether to count them; whether any crank has a motor
-        ("stages", "i8"), ("fractions", "f8", (4,)), ("weights", "f8", (4,)),  # of the scheme
+        ("averages", "?"), ("stages", "i8"), ("fractions", "f8", (4,)), ("weights", "f8", (4,)),  # `Scheme`
         ("settings", "f8", (12,)),  # of the filters
         ("ground_origin", "f8"), ("ground_per_metre", "f8"),  # of the terrain's grid
     ],
@@ -77,6 +77,7 @@ class Model(NamedTuple):
     cells: int
     tables: Any  # pointer to the tables of all legs, one after the other
     settings: Any  # pointer to memory on the stack, as are fractions and weights
+    averages: bool
     stages: int
     fractions: Any
     weights: Any
@@ -100,7 +101,7 @@ def inner(model, tables, ground, small, together, law, form):  # type: ignore[no
     return Model(
         given.kind, given.eighths, given.friction_law, given.interpolated, given.is_terrain, given.new_rates,
         given.strides, given.motors, together, form, given.cells, address(tables),
-        settings, given.stages, small, offset(small, 4),
+        settings, given.averages, given.stages, small, offset(small, 4),
         carray(address(ground), ground.shape), given.ground_origin, given.ground_per_metre, law,
     )  # fmt: skip
 
@@ -247,9 +248,10 @@ def run(  # type: ignore[no-untyped-def]
             result, good = choose(starts, result, before), starts
         memory.result = result
         store(memory.state, trunk.state, form.trunk_state, good)
-        for k in range(form.account_size):
-            account[k] = account[k] + memory.account[k]
-        store(memory.account, account, form.account_size, good)
+        if keeps_account:
+            for k in range(form.account_size):
+                account[k] = account[k] + memory.account[k]
+            store(memory.account, account, form.account_size, good)
         for i in range(leg_count):
             leg = nth(legs, i)
             first = (form.trunk_rows + i * form.leg_rows) * row + n

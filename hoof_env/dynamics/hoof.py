@@ -55,7 +55,6 @@ def meet_point(trunk, leg, point, memory, arm, arm_by_theta, hip, hip_velocity, 
         sliding_speed = -cross(normal, velocity)
         point.ground_normal = normal
         point.stiffness_scale, point.friction_scale = stiffness_scale, friction_scale
-    point.place = place
     point.penetration, point.penetration_rate, point.sliding_speed = penetration, rate, sliding_speed
 
     if model.form.springs:
@@ -64,10 +63,14 @@ def meet_point(trunk, leg, point, memory, arm, arm_by_theta, hip, hip_velocity, 
         press_rigidly(trunk, point, memory, penetration, rate, sliding_speed, model)
     force = plane(point.friction_force, point.normal_force)  # on level ground
     if model.is_terrain:
-        normal = point.ground_normal
-        force = point.normal_force * normal - point.friction_force * across(normal)
-    point.force = force
+        force = force_of(point)
     return force, dot(force, by_theta), cross(arm, force)
+
+
+@inlined
+def force_of(point):  # type: ignore[no-untyped-def]
+    """Of the ground on a hoof point, in the world [N]."""
+    return point.normal_force * point.ground_normal - point.friction_force * across(point.ground_normal)
 
 
 @inlined
@@ -213,6 +216,12 @@ def begin_springs(leg, count):  # type: ignore[no-untyped-def]
     """The first stage is at the state itself."""
     for k in range(count):
         leg.toe.give[k], leg.heel.give[k] = leg.state.toe.give[k], leg.state.heel.give[k]
+
+
+@inlined
+def clear_springs(leg, count):  # type: ignore[no-untyped-def]
+    """Before the first stage is weighed."""
+    for k in range(count):
         leg.toe.mean_give_rate[k], leg.heel.mean_give_rate[k] = 0.0, 0.0
 
 
@@ -233,8 +242,11 @@ def move_springs(leg, count, elapsed):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def end_springs(leg, count, h):  # type: ignore[no-untyped-def]
+def end_springs(leg, count, averages, h):  # type: ignore[no-untyped-def]
     """The state a step of `h` [s] later."""
     for k in range(count):
-        leg.state.toe.give[k] = leg.state.toe.give[k] + h * leg.toe.mean_give_rate[k]
-        leg.state.heel.give[k] = leg.state.heel.give[k] + h * leg.heel.mean_give_rate[k]
+        toe, heel = leg.toe.give_rate[k], leg.heel.give_rate[k]
+        if averages:
+            toe, heel = leg.toe.mean_give_rate[k], leg.heel.mean_give_rate[k]
+        leg.state.toe.give[k] = leg.state.toe.give[k] + h * toe
+        leg.state.heel.give[k] = leg.state.heel.give[k] + h * heel

@@ -242,7 +242,6 @@ class LegSettings(Layout):
 class Contact(Layout):
     """A hoof point on the ground."""
 
-    place: Vector  # [m]
     penetration: Row  # of the ground; with a spring less than that of the leg's point [m]
     penetration_rate: Row  # [m/s]
     give: Annotated[Block, SPRING]  # of the spring at the present stage [m]
@@ -256,7 +255,6 @@ class Contact(Layout):
     inverse_approach_speed: Row  # [s/m]
     normal_force: Row  # [N]
     friction_force: Row  # along the ground [N]
-    force: Vector  # in the world [N]
 
 
 class LegRows(Layout):
@@ -267,6 +265,8 @@ class LegRows(Layout):
     sums: StrideSums
     functions: Functions  # of the crank angle, at the present stage
     slopes: Slopes
+    sine: Row  # of the crank angle [-]
+    cosine: Row
     command: Annotated[Block, GAIT]
     gait_acceleration: Annotated[Block, GAIT]  # of the command filters
     theta: Row  # crank angle, rate and acceleration at the present stage

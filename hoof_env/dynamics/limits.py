@@ -60,7 +60,7 @@ def heed_trunk(trunk, model):  # type: ignore[no-untyped-def]
 @inlined
 def heed_joints(trunk, leg, shape, model):  # type: ignore[no-untyped-def]
     """Whether a joint other than the hoof's corners is too near the ground; `shape` are `LegConstants`."""
-    crank = shape.crank * plane(shape.travel * leg.functions.cosine, -leg.functions.sine)
+    crank = shape.crank * plane(shape.travel * leg.cosine, -leg.sine)
     b = meeting(shape.B, shape.pivot, crank)
     d = shape.pivot + (b - shape.pivot) * shape.D.place
     f = meeting(shape.F, shape.pivot, crank)

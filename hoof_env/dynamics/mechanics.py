@@ -71,6 +71,7 @@ def look_up_functions(trunk, leg, model):  # type: ignore[no-untyped-def]
     look_up(leg.functions, leg.slopes, model.tables, leg.settings.first_row, model.cells, angle)
     if model.form.animal:
         scale_functions(leg.functions, leg.slopes, leg.settings.length_scale[0], leg.settings.mass_scale[0])
+    leg.cosine, leg.sine = cos_sin(angle)
     value = leg.functions[0]
     trunk.at_dead_point = choose((size(angle) <= FARTHEST) & (value != value), 1.0, trunk.at_dead_point)
 
@@ -93,7 +94,7 @@ def scale_functions(value, slope, length, mass):  # type: ignore[no-untyped-def]
 def place_frame(trunk, leg, harmonics, elapsed):  # type: ignore[no-untyped-def]
     """The leg's frame (E1), its first moment and inertia in the world. The swing is phi = offset +
     A sin(theta) + B cos(theta), perhaps with higher harmonics, each parameter moving as its filter does."""
-    sine, cosine, w = leg.functions.sine, leg.functions.cosine, leg.theta_rate
+    sine, cosine, w = leg.sine, leg.cosine, leg.theta_rate
     offset, rate, bend = filtered(leg, OFFSET, elapsed)
     part_a, rate_a, bend_a = filtered(leg, SIN, elapsed)
     part_b, rate_b, bend_b = filtered(leg, COS, elapsed)

@@ -113,7 +113,8 @@ def new_memory(scene: Scene, num_envs: int, columns: int, reacts: bool) -> Memor
     constants = np.array([leg_constants(limb.geometry) for limb in scene.limbs])
     reactions = np.zeros((legs, Reactions.size, columns if reacts else 0))
     form = form_of(scene.features)
-    data = np.zeros((form.trunk_rows + legs * form.leg_rows, columns))
+    data = aligned(form.trunk_rows + legs * form.leg_rows, columns)
+    data[:] = 0.0
     whole = memory_of(data, columns, constants, reactions, scene.features)
     whole.trunk[:], whole.limbs[:] = np.nan, np.nan
     trunk, limbs = settings_of(scene, scene.trunk, scene.ground, scene.limbs)
@@ -136,7 +137,7 @@ def new_model(scene: Scene, filters: FilterSettings, strides: bool) -> tuple[NDA
     record["is_terrain"], record["new_rates"] = terrain != Terrain.flat(), scheme.new_rates
     record["strides"] = strides
     record["motors"] = any(isinstance(limb.drive, Motor) for limb in scene.limbs)
-    record["stages"] = len(scheme.weights)
+    record["averages"], record["stages"] = scheme.averages, len(scheme.weights)
     record["fractions"][: len(scheme.fractions)] = scheme.fractions
     record["weights"][: len(scheme.weights)] = scheme.weights
     record["settings"] = filters.to_array().ravel()

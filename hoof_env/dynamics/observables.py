@@ -108,14 +108,15 @@ def report_leg(trunk, leg, report):  # type: ignore[no-untyped-def]
     report.phi_acc = side * (k * acc + leg.swing_acceleration)
     report.crank_torque, report.hip_torque = leg.crank_torque, side * leg.frame_torque
     report.crank_power, report.hip_power = leg.crank_power, leg.swing_power
-    report_point(leg.toe, report.toe)
-    report_point(leg.heel, report.heel)
+    hip = trunk.place + leg.hip
+    report_point(leg.toe, hip + leg.turn * leg.functions.toe, report.toe)
+    report_point(leg.heel, hip + leg.turn * leg.functions.heel, report.heel)
 
 
 @inlined
-def report_point(point, report):  # type: ignore[no-untyped-def]
+def report_point(point, place, report):  # type: ignore[no-untyped-def]
     """Fill a `PointReport`."""
-    report.x, report.y, report.slide = point.place.real, point.place.imag, point.sliding_speed
+    report.x, report.y, report.slide = place.real, place.imag, point.sliding_speed
     report.normal, report.friction = point.normal_force, point.friction_force
 
 

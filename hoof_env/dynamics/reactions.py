@@ -18,6 +18,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hoof_env.dynamics.hoof import force_of
 from hoof_env.leg.geometry import Geometry
 from hoof_env.leg.linkage import CONSTRUCTION, JOINTS, Dyad
 from hoof_env.simd import across, choose, cross, dot, level, plane, root, store_vectors
@@ -299,10 +300,10 @@ def react(trunk, leg, constants, reactions):  # type: ignore[no-untyped-def]
     lift = trunk.acceleration + weight + pitch_acc * across(hip) - pitch_rate * pitch_rate * hip
     joints, lock, driver, by_trunk = leg_reactions(
         constants,
-        plane(leg.functions.cosine, leg.functions.sine), leg.theta_rate, leg.theta_acceleration,
+        plane(leg.cosine, leg.sine), leg.theta_rate, leg.theta_acceleration,
         leg.turn, leg.beta_rate,
         pitch_acc + leg.beta_by_theta * leg.theta_acceleration + leg.swing_acceleration,
-        lift, leg.toe.force, leg.heel.force,
+        lift, force_of(leg.toe), force_of(leg.heel),
     )  # fmt: skip
     store_vectors(reactions.joints, joints)
     reactions.lock, reactions.driver, reactions.hip = lock, driver, by_trunk

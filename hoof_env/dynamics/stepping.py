@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from hoof_env.dynamics.hoof import begin_springs, end_springs, move_springs, weigh_springs
+from hoof_env.dynamics.hoof import begin_springs, clear_springs, end_springs, move_springs, weigh_springs
 from hoof_env.dynamics.mechanics import MOVING
 from hoof_env.dynamics.parts import FIXED, FREE
 from hoof_env.gait import INNER, SPEED
@@ -47,19 +47,24 @@ def begin_step(trunk, legs, leg_count, model):  # type: ignore[no-untyped-def]
     if model.kind != FIXED:
         for k in range(MOVING):
             trunk.stage[k] = trunk.state.moving[k]
-            trunk.mean_rates[k] = 0.0
+        if model.averages:
+            for k in range(MOVING):
+                trunk.mean_rates[k] = 0.0
     for i in range(leg_count):
         leg = nth(legs, i)
         filter_accelerations(leg, model.form.gait, model.settings)
         leg.theta, leg.theta_rate = leg.state.theta, leg.state.theta_rate
-        leg.mean_theta_rate, leg.mean_theta_acceleration = 0.0, 0.0
         begin_springs(leg, model.form.springs)
+        if model.averages:
+            leg.mean_theta_rate, leg.mean_theta_acceleration = 0.0, 0.0
+            clear_springs(leg, model.form.springs)
 
 
 @inlined
 def weigh_stage(trunk, legs, leg_count, model, weight):  # type: ignore[no-untyped-def]
-    """Add the derivatives at the present stage to their means."""
-    if weight == 0.0:
+    """Add the derivatives at the present stage to their means; where the last stage's are those of the step
+    there is nothing to do."""
+    if not model.averages or weight == 0.0:
         return
     if model.kind != FIXED:
         go_on(model.kind, trunk.mean_rates, trunk.mean_rates, weight, trunk.rates)
@@ -95,9 +100,9 @@ def next_stage(trunk, legs, leg_count, model, elapsed):  # type: ignore[no-untyp
 @inlined
 def use_new_rates(trunk, h):  # type: ignore[no-untyped-def]
     """Semi-implicit Euler: centre and pitch go with the velocities that the step ends with."""
-    mean = trunk.mean_rates
-    mean.velocity = mean.velocity + h * trunk.rates.force * trunk.settings.inverse_mass
-    mean.pitch_rate = mean.pitch_rate + h * trunk.pitch_acceleration
+    rates = trunk.rates
+    rates.velocity = rates.velocity + h * rates.force * trunk.settings.inverse_mass
+    rates.pitch_rate = rates.pitch_rate + h * trunk.pitch_acceleration
 
 
 @inlined
@@ -106,18 +111,22 @@ def end_step(trunk, legs, leg_count, model, h):  # type: ignore[no-untyped-def]
     if model.kind != FIXED:
         if model.new_rates:
             use_new_rates(trunk, h)
-        go_on(model.kind, trunk.state.moving, trunk.state.moving, h, trunk.mean_rates)
+        rates = trunk.mean_rates if model.averages else trunk.rates
+        go_on(model.kind, trunk.state.moving, trunk.state.moving, h, rates)
     trunk.state.time = trunk.state.time + h
     for i in range(leg_count):
         leg = nth(legs, i)
         is_motor = leg.settings.is_motor > 0.0
         angle, spin = prescribed(leg, h)
-        omega, mean = leg.state.theta_rate + h * leg.mean_theta_acceleration, leg.mean_theta_rate
+        rate, acceleration = leg.theta_rate, leg.theta_acceleration
+        if model.averages:
+            rate, acceleration = leg.mean_theta_rate, leg.mean_theta_acceleration
+        omega = leg.state.theta_rate + h * acceleration
         if model.new_rates:
-            mean = omega
-        leg.state.theta = choose(is_motor, leg.state.theta + h * mean, angle)
+            rate = omega
+        leg.state.theta = choose(is_motor, leg.state.theta + h * rate, angle)
         leg.state.theta_rate = choose(is_motor, omega, spin)
-        end_springs(leg, model.form.springs, h)
+        end_springs(leg, model.form.springs, model.averages, h)
         for k in range(model.form.gait):
             rate, bend = leg.state.gait_rate[k], leg.gait_acceleration[k]
             leg.state.gait[k] = leg.state.gait[k] + h * (rate + 0.5 * h * bend)
@@ -132,6 +141,11 @@ class Scheme:
     fractions: tuple[float, ...]  # a_j, one less than stages
     weights: tuple[float, ...]  # w_j
     new_rates: bool = False  # coordinates move with the rates of the step's end
+
+    @property
+    def averages(self) -> bool:
+        """Whether stages before the last have weight."""
+        return any(self.weights[:-1])
 
 
 SCHEMES = MappingProxyType(

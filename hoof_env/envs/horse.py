@@ -241,8 +241,8 @@ class Horse:
         if "pitch" not in options:
             begun["pitch"] = begun["pitch"] + motion["pitch"] + slope
         x, y = self._hoofs(start, begun["pitch"], engine)
-        hoof = self._hoofs(start, begun["pitch"] - slope, engine)[1].min((0, 1))
-        # of the lowest hoof over level ground; below it is what the springs have given
+        hoof = (y * np.cos(slope) - x * np.sin(slope)).min((0, 1))
+        # of the lowest hoof over the slope; below it is what the springs have given
         lift = hoof + self.height * motion["y"] if is_known else np.full(len(hoof), -SAG * self.size)
         lift = np.where(lift < 0, self._softness * lift, lift) + (0 if self._softness else GAP * self.size)
         ground, rate = engine.terrain.height_at(begun["x"] + x), start.gaits[:, 0]
@@ -260,14 +260,15 @@ class Horse:
     def _hoofs(self, start: Start, pitch: Floats, engine: TrunkEngine) -> tuple[Floats, Floats]:
         """x and y of all toes and heels from the centre of trunks that pitch so [rad], in metres, shape
         (4, 2, n) each."""
-        found = []
-        for limb, profile, command, angle in zip(
-            engine.limbs, engine.profiles, start.commands, start.theta, strict=True
-        ):
-            x, y = hoof_points(profile, command.T, angle, pitch * self.geometry.travel)
-            found.append((np.cos(pitch) * limb.hip[0] + x, np.sin(pitch) * limb.hip[0] + y))
-        places = np.array(found)
-        return places[:, 0], places[:, 1]
+        found, n = [], len(pitch)
+        for k in range(0, COUNT, 2):  # the legs of a pair have one profile and one hip
+            gaits = np.concatenate(start.commands[k : k + 2], axis=1).T
+            angles, turn = start.theta[k : k + 2].ravel(), np.tile(pitch * self.geometry.travel, 2)
+            points = hoof_points(engine.profiles[k], gaits, angles, turn)
+            hip = engine.limbs[k].hip[0] * np.array([np.cos(pitch), np.sin(pitch)])
+            found.append([at + of.reshape(2, 2, n) for at, of in zip(hip, points, strict=True)])
+        x, y = np.array(found).transpose(1, 0, 3, 2, 4).reshape(2, COUNT, 2, n)
+        return x, y
 
     # Gaits
 

@@ -164,13 +164,33 @@ def gait_numbers(name: str, given: Any, gaits: Mapping[str, HorseGait], size: fl
     return numbers
 
 
+@cache
+def _reference() -> tuple[Floats, Floats, Floats]:
+    """Speeds [m/s] of the stored reference gaits, shape (m,), those gaits, (m, 16), and how the trunk moves
+    in them, (m, 3, coefficients)."""
+    stored = _data()["reference"]
+    speeds, gaits, trunk = (np.array(stored[name]) for name in ("speeds", "gaits", "trunk"))
+    return speeds, gaits, trunk
+
+
+def _mixed(speeds: Floats, values: Floats) -> Floats:
+    """Values that go with speeds [m/s], shape (n, ...), between those of the stored ones."""
+    stored = _reference()[0]
+    at = np.clip(speeds, stored[0], stored[-1])
+    k = np.minimum(np.searchsorted(stored, at, "right"), len(stored) - 1)
+    part = (at - stored[k - 1]) / (stored[k] - stored[k - 1])
+    part = part.reshape(-1, *[1] * (values.ndim - 1))
+    found: Floats = (1 - part) * values[k - 1] + part * values[k]
+    return found
+
+
 def reference_gaits(speeds: Floats) -> Floats:
     """The gaits that go with speeds [m/s] of a horse of 475 kg, shape (n, 16): between those that are stored
     they are mixed, beyond them the rate alone changes."""
-    stored = _data()["reference"]
-    found = [np.interp(speeds, stored["speeds"], column) for column in np.transpose(stored["gaits"])]
-    found[0] = found[0] * speeds / np.clip(speeds, stored["speeds"][0], stored["speeds"][-1])
-    return np.transpose(found)
+    stored, gaits, _ = _reference()
+    found = _mixed(speeds, gaits)
+    found[:, 0] *= speeds / np.clip(speeds, stored[0], stored[-1])
+    return found
 
 
 def trunk_motion(speeds: Floats, phase: Floats) -> dict[str, Floats]:
@@ -178,10 +198,8 @@ def trunk_motion(speeds: Floats, phase: Floats) -> dict[str, Floats]:
     reference gaits of some speeds [m/s], all of shape (n,): "y" over the height of the hips [-] and its rate
     "vy" over the rate of the crank [1/rad], "vx" over the speed [-], "pitch" [rad] and "pitch_rate" over the
     rate of the crank [-]. From simulation, in harmonics of half a stride, after which left is right."""
-    stored = _data()["reference"]
-    series = np.moveaxis(np.array(stored["trunk"]), 0, -1)  # of y, vx and pitch: mean, cosine and sine, ...
-    mixed = np.array([[np.interp(speeds, stored["speeds"], c) for c in one] for one in series])
-    order = 2 * np.arange(1, series.shape[1] // 2 + 1)[:, None]
+    mixed = np.moveaxis(_mixed(speeds, _reference()[2]), 0, -1)  # of y, vx, pitch: mean, cosine and sine, ...
+    order = 2 * np.arange(1, mixed.shape[1] // 2 + 1)[:, None]
     cosine, sine = np.cos(2 * np.pi * order * phase), np.sin(2 * np.pi * order * phase)
     value = mixed[:, 0] + (mixed[:, 1::2] * cosine + mixed[:, 2::2] * sine).sum(1)
     slope = (order * (mixed[:, 2::2] * cosine - mixed[:, 1::2] * sine)).sum(1)
@@ -222,7 +240,7 @@ class Stride:
         self.half, by = (1 + self.r) / 2, 2 + 2 * self.r
         self.fold = (cosine * cosine - sine * sine) / by, 2 * cosine * sine / by
 
-    def phase(self, x: Floats, y: Floats) -> tuple[Floats, Floats]:
+    def phase(self, x: Floats | float, y: Floats | float) -> tuple[Floats, Floats]:
         """e^(i phase) where e^(i theta) is x + i y."""
         return self._map(x, y, 1.0)
 
@@ -230,7 +248,7 @@ class Stride:
         """Inverse of `phase`."""
         return self._map(x, y, -1.0)
 
-    def _map(self, x: Floats, y: Floats, sign: float) -> tuple[Floats, Floats]:
+    def _map(self, x: Floats | float, y: Floats | float, sign: float) -> tuple[Floats, Floats]:
         (u, v), (f, g) = self.wave, self.fold
         speed = 1 + sign * (u * x + v * y)
         return (
@@ -241,15 +259,15 @@ class Stride:
 
 def rows_of(gaits: Floats) -> Floats:
     """Gaits of shape (n, 16) as rows of a `PairReference` for each pair, shape (2 PairReference.size, n)."""
-    rate, lead = gaits[:, 0], gaits[:, 1]
-    found = []
-    for numbers, ahead in zip(_pairs(gaits), (lead, 0 * lead), strict=True):
-        stride = Stride(numbers[0], numbers[1])
-        x, y = stride.phase(1 + 0 * rate, 0 * rate)  # the phase of a gait begins at angle 0
-        c, s = np.cos(2 * np.pi * ahead), np.sin(2 * np.pi * ahead)
-        turn = x * c - y * s, -(x * s + y * c)
-        found += [rate / stride.r, *stride.wave, *stride.fold, stride.half, *turn, *numbers[2:]]
-    return np.array(found)
+    rate, lead, pairs = gaits[:, 0], gaits[:, 1], _pairs(gaits)
+    stride = Stride(pairs[:, 0], pairs[:, 1])
+    x, y = stride.phase(1.0, 0.0)  # the phase of a gait begins at angle 0
+    ahead = 2 * np.pi * np.array([lead, 0 * lead])
+    c, s = np.cos(ahead), np.sin(ahead)
+    turn = x * c - y * s, -(x * s + y * c)
+    swing = pairs[:, 2:].transpose(1, 0, 2)
+    rows = [rate / stride.r, *stride.wave, *stride.fold, stride.half, *turn, *swing]
+    return np.stack(rows, axis=1).reshape(len(PAIRS) * PairReference.size, len(gaits))
 
 
 def _pairs(gaits: Floats) -> Floats:
@@ -261,27 +279,24 @@ def _pairs(gaits: Floats) -> Floats:
 def crank_angles(gaits: Floats, phase: Floats, off: Floats) -> Floats:
     """Angles [rad] of the cranks of gaits, shape (n, 16), at a phase of the stride, shape (n,), from which
     each is off, shape (4, n), both [strides]; shape (4, n)."""
-    found, pairs = np.empty((COUNT, len(gaits))), _pairs(gaits)
-    for i in range(COUNT):
-        stride = Stride(pairs[i // 2, 0], pairs[i // 2, 1])
-        turned = 2 * np.pi * (phase + off[i] + (gaits[:, 1] if i < 2 else 0.0) + 0.5 * (i % 2))
-        (x, y), c, s = stride.phase(1 + 0 * phase, 0 * phase), np.cos(turned), np.sin(turned)
-        x, y = stride.angle(x * c - y * s, x * s + y * c)
-        found[i] = np.arctan2(y, x) % (2 * np.pi)
+    wave = np.repeat(_pairs(gaits)[:, :2], 2, axis=0)
+    stride = Stride(wave[:, 0], wave[:, 1])
+    ahead, half = np.zeros((COUNT, len(gaits))), 0.5 * (np.arange(COUNT) % 2)[:, None]
+    ahead[:2] = gaits[:, 1]
+    turned = 2 * np.pi * (phase + off + ahead + half)
+    (x, y), c, s = stride.phase(1.0, 0.0), np.cos(turned), np.sin(turned)
+    x, y = stride.angle(x * c - y * s, x * s + y * c)
+    found: Floats = np.arctan2(y, x) % (2 * np.pi)
     return found
 
 
 def commands_of(gaits: Floats, theta: Floats, count: int) -> Floats:
     """What legs that are in step are commanded at crank angles, shape (4, n), by gaits, shape (n, 16):
     `count` gait parameters of an engine, shape (4, count, n)."""
-    found = np.empty((COUNT, count, len(gaits)))
-    pairs = rows_of(gaits).reshape(len(PAIRS), PairReference.size, -1)
-    for i in range(COUNT):
-        pair = views(PairReference, pairs[i // 2])
-        wave = pair.wave[0] * np.cos(theta[i]) + pair.wave[1] * np.sin(theta[i])
-        found[i, 0] = pair.speed * (1 + wave)
-        found[i, 1:] = pair.swing[: count - 1]
-    return found
+    pairs = rows_of(gaits).reshape(len(PAIRS), PairReference.size, len(gaits))
+    pair = views(PairReference, np.repeat(pairs.transpose(1, 0, 2), 2, axis=1))
+    wave = pair.wave[0] * np.cos(theta) + pair.wave[1] * np.sin(theta)
+    return np.stack([pair.speed * (1 + wave), *pair.swing[: count - 1]], axis=1)
 
 
 @inlined

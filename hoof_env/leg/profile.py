@@ -13,7 +13,7 @@ Everything is in the frame of the leg with O at the origin, after the mirror int
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 from llvmlite import ir
@@ -26,13 +26,10 @@ from hoof_env.leg.kinematics import solve_points
 from hoof_env.leg.linkage import HEADS, NUMBER, POINTS, TAILS
 from hoof_env.simd.compile import kernel
 from hoof_env.simd.functions import transposed
-from hoof_env.simd.layout import Block, Layout, Row, Vector
+from hoof_env.simd.layout import Layout, Row, Vector
 from hoof_env.simd.math import ROUNDER
 from hoof_env.simd.memory import write_row
 from hoof_env.simd.types import DOUBLE, INDEX, Code, fused, instruction, pick, spread, wide
-
-_HALF = 8
-"""Functions that are looked up together: one vector of 512 bits."""
 
 
 class Functions(Layout):
@@ -47,9 +44,6 @@ class Functions(Layout):
     first_moment: Vector  # s: sum of m z over the links [kg m]
     frame_inertia: Row  # c, of the frame's turning: sum of m |z|^2 + J [kg m^2]
     frame_inertia_slope: Row  # c'
-    sine: Row  # of the crank angle [-]
-    cosine: Row
-    padding: Annotated[Block, 2]  # to whole vectors
 
 
 class Slopes(Layout):
@@ -62,8 +56,8 @@ class Slopes(Layout):
     coupling: Row
 
 
-FUNCTIONS, SLOPED, WIDTH = Functions.fields["padding"].start, Slopes.size, Functions.size
-"""How many functions there are, how many of them have derivatives, and the numbers of a table row."""
+FUNCTIONS, SLOPED = Functions.size, Slopes.size
+"""How many functions there are, and how many of them have derivatives."""
 
 
 def by_name(values: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
@@ -106,7 +100,7 @@ def functions(
     value = [
         z[:, toe].real, z[:, toe].imag, z[:, heel].real, z[:, heel].imag, ds.real, ds.imag,
         np.abs(v) ** 2 @ m + turn**2 @ inertia, cross(r, v) @ m + turn @ inertia,
-        s.real, s.imag, np.abs(r) ** 2 @ m + inertia.sum(), 2 * _dot(r, v) @ m, np.sin(theta), np.cos(theta),
+        s.real, s.imag, np.abs(r) ** 2 @ m + inertia.sum(), 2 * _dot(r, v) @ m,
     ]  # fmt: skip
     slope = [
         dz[:, toe].real, dz[:, toe].imag, dz[:, heel].real, dz[:, heel].imag, dds.real, dds.imag,
@@ -130,10 +124,11 @@ class LegProfile:
     Attributes:
         geometry: the leg.
         cells: number of cells of a revolution.
-        table: shape (cells, (DEGREE + 1) * WIDTH): row j belongs to the crank angles within half a cell of
-            2 pi j / cells and holds, highest power of the angle from there first, `WIDTH` coefficients a
-            power. Of a crank that rocks, rows are NaN where its links have no place, and in some 7 cells
-            beside each end, for derivatives grow there without bound.
+        table: shape (cells, (DEGREE + 1) * FUNCTIONS): row j belongs to the crank angles within half a cell
+            of 2 pi j / cells and holds the coefficients, highest power of the angle from there first, of the
+            functions that have derivatives and then of the others. Of a crank that rocks, rows are NaN where
+            its links have no place, and in some 7 cells beside each end, for derivatives grow there without
+            bound.
         derivative_error: largest error of a derivative over its largest value, between the nodes [-].
 
     Raises:
@@ -166,12 +161,14 @@ class LegProfile:
         theta = np.asarray(theta, dtype=np.float64)
         cell = np.rint(theta * (self.cells / (2 * np.pi)))
         x = (theta - cell * (2 * np.pi / self.cells))[:, None]
-        rows = self.table[cell.astype(np.int64) % self.cells].reshape(-1, DEGREE + 1, WIDTH)
-        slope, value = np.zeros((2, len(theta), WIDTH))
+        rows, first = self.table[cell.astype(np.int64) % self.cells], (DEGREE + 1) * SLOPED
+        powers = [part.reshape(len(theta), DEGREE + 1, -1) for part in (rows[:, :first], rows[:, first:])]
+        rows = np.concatenate(powers, axis=2)
+        slope, value = np.zeros((2, len(theta), FUNCTIONS))
         for p in range(DEGREE + 1):
             slope = slope * x + value
             value = value * x + rows[:, p]
-        return value[:, :FUNCTIONS], slope[:, :SLOPED]
+        return value, slope[:, :SLOPED]
 
     def _errors(self) -> NDArray[np.float64]:
         """Largest error of a derivative in each cell over its largest value [-], NaN without a place."""
@@ -207,29 +204,38 @@ def _fit(geometry: Geometry, cells: int) -> NDArray[np.float64]:
     value = value.reshape(cells, DEGREE + 1, -1).transpose(1, 0, 2).reshape(DEGREE + 1, -1)
     powers = np.linalg.solve(np.vander(nodes), value).reshape(DEGREE + 1, cells, -1)
     powers /= (half ** np.arange(DEGREE, -1, -1))[:, None, None]
-    table = np.zeros((cells, DEGREE + 1, WIDTH))
-    table[:, :, : powers.shape[2]] = powers.transpose(1, 0, 2)
-    table[~np.isfinite(table).all((1, 2))] = np.nan
-    return np.ascontiguousarray(table.reshape(cells, -1))
+    powers = powers.transpose(1, 0, 2)
+    parts = [part.reshape(cells, -1) for part in (powers[:, :, :SLOPED], powers[:, :, SLOPED:])]
+    table = np.concatenate(parts, axis=1)
+    table[~np.isfinite(table).all(1)] = np.nan
+    return table
 
 
-# The look-up: eight functions at once, for each lane by itself, since each has a row of its own; then rows
-# and columns are swapped. Horner's scheme with fused operations takes one instruction a power for the value
-# and one for the derivative; the lanes' chains go on side by side.
+# The look-up: functions side by side, for each lane by itself, since each has a row of its own; then rows and
+# columns are swapped. Horner's scheme with fused operations takes one instruction a power for the value and
+# one for the derivative. Each waits for the one before, so the lanes go through the powers together.
 
 
-def _polynomials(builder: Any, first: Any, x: Any, sloped: bool) -> tuple[Any, Any]:
-    """Values of `_HALF` functions whose coefficients begin at `first`; derivatives if `sloped`."""
-    vector, x, coefficients = ir.VectorType(DOUBLE, _HALF), spread(builder, x, _HALF), []
-    for p in range(DEGREE + 1):
-        place = builder.bitcast(builder.gep(first, [INDEX(p * WIDTH)]), vector.as_pointer())
-        coefficients.append(builder.load(place, align=8))
-    value, slope = coefficients[0], None
-    for coefficient in coefficients[1:]:
-        if sloped:
-            slope = value if slope is None else fused(builder, "+", builder.fmul(slope, x), value)
-        value = fused(builder, "+", builder.fmul(value, x), coefficient)
-    return value, slope
+def _polynomials(builder: Any, rows: list[Any], angles: list[Any], first: int, last: int) -> tuple[Any, Any]:
+    """Values and derivatives of functions `first` to `last` in each lane, whose row of the table holds their
+    coefficients together; a vector a lane."""
+    count = last - first
+    vector = ir.VectorType(DOUBLE, count)
+
+    def coefficients(power: int) -> list[Any]:
+        at = INDEX(first * (DEGREE + 1) + power * count)
+        places = [builder.bitcast(builder.gep(row, [at]), vector.as_pointer()) for row in rows]
+        return [builder.load(place, align=8) for place in places]
+
+    def next_power(sums: list[Any], added: list[Any]) -> list[Any]:
+        return [fused(builder, "+", builder.fmul(s, x), y) for s, x, y in zip(sums, xs, added, strict=True)]
+
+    xs = [spread(builder, angle, count) for angle in angles]
+    values = slopes = coefficients(0)
+    for power in range(1, DEGREE + 1):
+        slopes = next_power(slopes, values) if power > 1 else values
+        values = next_power(values, coefficients(power))
+    return values, slopes
 
 
 @instruction(
@@ -252,18 +258,14 @@ def look_up(code: Code, functions: Any, slopes: Any, table: Any, first: Any, cel
     row = builder.add(row, builder.fptosi(first, whole))
     cell, width = builder.fsub(shifted, rounder), builder.fdiv(DOUBLE(2 * np.pi), per_cell)
     x = builder.fsub(theta, builder.fmul(cell, spread(builder, width, count)))
-    low, high, derivatives = [], [], []
-    for lane in range(count):
-        at = builder.mul(pick(builder, row, lane, count), INDEX(WIDTH * (DEGREE + 1)))
-        angle, place = pick(builder, x, lane, count), builder.gep(table, [at])
-        value, slope = _polynomials(builder, place, angle, sloped=True)
-        low.append(value)
-        derivatives.append(slope)
-        other = builder.gep(place, [INDEX(_HALF)])
-        high.append(_polynomials(builder, other, angle, sloped=False)[0])
+    angles = [pick(builder, x, lane, count) for lane in range(count)]
+    row = builder.mul(row, spread(builder, INDEX(FUNCTIONS * (DEGREE + 1)), count))
+    places = [builder.gep(table, [pick(builder, row, lane, count)]) for lane in range(count)]
+    sloped, derivatives = _polynomials(builder, places, angles, 0, SLOPED)
+    others, _ = _polynomials(builder, places, angles, SLOPED, FUNCTIONS)
     for memory, rows, begin, lanes in (
-        (code.args[0], functions, 0, low), (code.args[0], functions, _HALF, high),
+        (code.args[0], functions, 0, sloped), (code.args[0], functions, SLOPED, others),
         (code.args[1], slopes, 0, derivatives),
     ):  # fmt: skip
-        for k, column in enumerate(transposed(builder, lanes, _HALF)):
+        for k, column in enumerate(transposed(builder, lanes, lanes[0].type.count)):
             write_row(code, memory, rows, INDEX(begin + k), column)

@@ -159,20 +159,26 @@ def _shuffle(builder: Any, one: Any, two: Any, mask: list[int]) -> Any:
 
 
 def transposed(builder: Any, rows: list[Any], width: int) -> list[Any]:
-    """The columns of rows of so many numbers, one row a lane: squares are transposed in log2 steps of
-    exchanging blocks between pairs of rows."""
+    """The columns of rows of so many numbers, one row a lane; both numbers are powers of two. Squares are
+    transposed in log2 steps of exchanging blocks between pairs of rows; where rows are shorter than columns,
+    squares lie side by side."""
     n = len(rows)
     if n == 1:
         return [pick(builder, rows[0], k, width) for k in range(width)]
-    found = []
-    for begin in range(0, width, n):
-        square = [_shuffle(builder, row, row, list(range(begin, begin + n))) for row in rows]
+    side, found = min(n, width), []
+    for begin in range(0, width, side):
+        square = [_shuffle(builder, row, row, list(range(begin, begin + side))) for row in rows]
+        size = side
+        while size < n:  # rows i, i + side, i + 2 side, ... become one vector
+            firsts = [k for k in range(len(square)) if not k & side]
+            square = [_shuffle(builder, square[k], square[k + side], list(range(2 * size))) for k in firsts]
+            size *= 2
         block = 1
-        while block < n:
+        while block < side:
             swapped = list(square)
             low = [i + (n - block if i & block else 0) for i in range(n)]
             high = [i + block if not i & block else n + i for i in range(n)]
-            for i in range(n):
+            for i in range(side):
                 if not i & block:
                     one, two = square[i], square[i + block]
                     swapped[i] = _shuffle(builder, one, two, low)

@@ -40,12 +40,19 @@ LINE = 64
 """Bytes of a line of the cache, and of the widest vector."""
 
 
+HUGE, MANY = 2**21, 2**22
+"""Bytes of a large page of the system, and of the smallest array for which NumPy asks for them."""
+
+
 def aligned(*shape: int) -> NDArray[np.float64]:
     """A new array of doubles, not filled, that begins with a line of the cache: a vector that lies across two
-    takes two loads."""
+    takes two loads. One of a quarter of a large page or more lies in large pages where the system has them:
+    each row of many environments would be in a page of its own, and finding pages takes time, too."""
     size, each = math.prod(shape), np.dtype(np.float64).itemsize
-    room = np.empty(size + LINE // each)
-    first = -room.ctypes.data % LINE // each
+    is_large = 4 * size * each >= HUGE
+    step = HUGE if is_large else LINE
+    room = np.empty(max(size, MANY // each if is_large else 0) + step // each)
+    first = -room.ctypes.data % step // each
     return room[first : first + size].reshape(shape)
 
 
