@@ -179,11 +179,12 @@ class TrunkEngine(Scene):
         m, parts = self._memory, {name: part for name, part in vars(self).items() if name != "_run"}
         return {
             **parts,
-            "_memory": (m.data.copy(), self.num_envs, m.constants, m.reactions.copy(), m.features),
+            "_memory": (m.data, self.num_envs, m.constants, m.reactions.copy(), m.features),
         }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        vars(self).update(state, _memory=memory.memory_of(*state["_memory"]))
+        data, *others = state["_memory"]
+        vars(self).update(state, _memory=memory.memory_of(memory.copy_of(data), *others))
         self.num_threads = limit_threads(self.num_threads)
         self._choose_kernel()
 

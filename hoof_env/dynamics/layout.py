@@ -110,7 +110,7 @@ class TrunkRows(Layout):
     state: TrunkState
     stage: Moving  # at the present stage of a step
     rates: Rates  # there
-    mean_rates: Rates  # weighted mean over the stages so far
+    mean_rates: Rates  # weighted mean over the stages so far; means are of schemes that average alone
     place: Vector  # of the trunk's own centre of mass [m]
     velocity: Vector  # [m/s]
     acceleration: Vector  # [m/s^2]
@@ -272,7 +272,7 @@ class LegRows(Layout):
     theta: Row  # crank angle, rate and acceleration at the present stage
     theta_rate: Row
     theta_acceleration: Row
-    mean_theta_rate: Row  # weighted means over the stages so far
+    mean_theta_rate: Row  # weighted means over the stages so far, where the scheme averages
     mean_theta_acceleration: Row
     phi: Row  # swing [rad]
     beta_by_theta: Row  # beta' with time and pitch held [-]

@@ -107,14 +107,20 @@ def columns_for(num_envs: int) -> int:
     return columns + LANES if columns % 128 == 0 else columns
 
 
+def copy_of(data: Floats) -> Floats:
+    """A copy where the kernels like it best."""
+    copy = aligned(*data.shape)
+    copy[:] = data
+    return copy
+
+
 def new_memory(scene: Scene, num_envs: int, columns: int, reacts: bool) -> Memory:
     """Memory of an engine whose environments are nowhere, that is not a number, until they are reset."""
     legs = len(scene.limbs)
     constants = np.array([leg_constants(limb.geometry) for limb in scene.limbs])
     reactions = np.zeros((legs, Reactions.size, columns if reacts else 0))
     form = form_of(scene.features)
-    data = aligned(form.trunk_rows + legs * form.leg_rows, columns)
-    data[:] = 0.0
+    data = copy_of(np.zeros((form.trunk_rows + legs * form.leg_rows, columns)))
     whole = memory_of(data, columns, constants, reactions, scene.features)
     whole.trunk[:], whole.limbs[:] = np.nan, np.nan
     trunk, limbs = settings_of(scene, scene.trunk, scene.ground, scene.limbs)

@@ -144,8 +144,8 @@ class Scheme:
 
     @property
     def averages(self) -> bool:
-        """Whether stages before the last have weight."""
-        return any(self.weights[:-1])
+        """Whether a step goes with the mean of several stages' rates, and not with those of the last."""
+        return self.weights[-1] != 1.0
 
 
 SCHEMES = MappingProxyType(

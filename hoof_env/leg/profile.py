@@ -162,8 +162,9 @@ class LegProfile:
         cell = np.rint(theta * (self.cells / (2 * np.pi)))
         x = (theta - cell * (2 * np.pi / self.cells))[:, None]
         rows, first = self.table[cell.astype(np.int64) % self.cells], (DEGREE + 1) * SLOPED
-        powers = [part.reshape(len(theta), DEGREE + 1, -1) for part in (rows[:, :first], rows[:, first:])]
-        rows = np.concatenate(powers, axis=2)
+        sloped = rows[:, :first].reshape(-1, DEGREE + 1, SLOPED)
+        others = rows[:, first:].reshape(-1, DEGREE + 1, FUNCTIONS - SLOPED)
+        rows = np.concatenate([sloped, others], axis=2)
         slope, value = np.zeros((2, len(theta), FUNCTIONS))
         for p in range(DEGREE + 1):
             slope = slope * x + value

@@ -40,18 +40,19 @@ LINE = 64
 """Bytes of a line of the cache, and of the widest vector."""
 
 
-HUGE, MANY = 2**21, 2**22
+LARGE, ENOUGH = 2**21, 2**22
 """Bytes of a large page of the system, and of the smallest array for which NumPy asks for them."""
 
 
 def aligned(*shape: int) -> NDArray[np.float64]:
     """A new array of doubles, not filled, that begins with a line of the cache: a vector that lies across two
-    takes two loads. One of a quarter of a large page or more lies in large pages where the system has them:
-    each row of many environments would be in a page of its own, and finding pages takes time, too."""
+    takes two loads. One as large as a large page begins with one, where the system has them: else each row of
+    many environments is in a page of its own, and to find pages takes time. That reserves up to 4 MiB more,
+    of which nothing is touched."""
     size, each = math.prod(shape), np.dtype(np.float64).itemsize
-    is_large = 4 * size * each >= HUGE
-    step = HUGE if is_large else LINE
-    room = np.empty(max(size, MANY // each if is_large else 0) + step // each)
+    is_large = size * each >= LARGE
+    step, least = (LARGE, ENOUGH // each) if is_large else (LINE, 0)
+    room = np.empty(max(size, least) + step // each)
     first = -room.ctypes.data % step // each
     return room[first : first + size].reshape(shape)
 

@@ -8,6 +8,7 @@ from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import GRAVITY, Limb, Motor, Prescribed, Trunk
 from hoof_env.errors import ParameterError
 from hoof_env.gait import load_gait
+from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
 from hoof_env.leg.linkage import FRAME, JOINTS
@@ -46,20 +47,23 @@ def leg_motion(engine, i):
     return motion, *(np.array([r[f"{p}_friction"][i], r[f"{p}_normal"][i]]) for p in ("toe", "heel"))
 
 
+@pytest.mark.parametrize("slope", [0.0, 0.2])
 @pytest.mark.parametrize("height", [-0.05, 10.0], ids=["ground", "air"])
 @pytest.mark.parametrize("geometry", LEGS.values(), ids=LEGS)
-def test_every_body_obeys_newton_and_euler(geometry, height):
+def test_every_body_obeys_newton_and_euler(geometry, height, slope):
     """Under a trunk that moves and pitches, with commands on the move, a motor and a prescribed crank."""
     limbs = [Limb(geometry, (0.4, 0.1), Motor()), Limb(geometry, (-0.4, 0.0), Prescribed())]
     trunk = Trunk("free", mass=150.0, height=geometry.hip_height + height, pitch_inertia=30.0)
-    engine = TrunkEngine(limbs, trunk, NATURAL, reactions=True)
+    terrain = Terrain.slope(slope) if slope else None
+    engine = TrunkEngine(limbs, trunk, NATURAL, terrain, reactions=True)
     engine.reset([RUN, WALK], [0.4, 2.0], vx=1.0, pitch_rate=0.3)
-    highest = 0.0
+    highest, turned = 0.0, np.array([[np.cos(slope), -np.sin(slope)], [np.sin(slope), np.cos(slope)]])
     for k in range(8):
         assert not engine.advance([9.0 - k, 0.3 + 0.1 * k, -0.4, 0.1 * k], 30).any()
         found = engine.reactions()
         for i in range(2):
-            motion, toe, heel = leg_motion(engine, i)
+            motion, *ground = leg_motion(engine, i)
+            toe, heel = (turned @ force for force in ground)  # from tangent and normal to the world
             joints, *moments = (part[i, ..., 0] for part in found)
             force, moment = loads(geometry, motion, joints, *moments, toe, heel)
             need, turn = inertia(geometry, motion)

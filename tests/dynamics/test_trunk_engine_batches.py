@@ -1,5 +1,8 @@
 """A number of the engine of several legs has the same bits alone, in any batch, in parts and put back."""
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 
@@ -114,6 +117,18 @@ def test_tables_begin_with_a_line_of_the_cache():
     for legs in range(1, 6):  # NumPy's own arrays do by chance
         limbs = [Limb(LEG.replace(linear_density=1.0 + i)) for i in range(legs)]
         assert TrunkEngine(limbs, Trunk("free"), Ground())._model[1].ctypes.data % 64 == 0
+
+
+@pytest.mark.parametrize(("n", "place"), [(16, 64), (4000, 2**21)])
+def test_memory_lies_where_it_is_quick_in_copies_too_and_begins_with_nothing(n, place):
+    made = TrunkEngine([Limb(LEG)], Trunk("free"), Ground(), num_envs=n)
+    assert made._memory.data.nbytes > place or n < 4000
+    for one in (made, copy.copy(made), pickle.loads(pickle.dumps(made))):
+        data = one._memory.data
+        assert data.ctypes.data % place == 0
+        assert not any(values.any() for values in (one.account | one.report).values())
+        data[:] = 1.0
+        assert one.report["x"].all()
 
 
 @pytest.mark.parametrize("n", [4, 40])

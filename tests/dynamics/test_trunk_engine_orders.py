@@ -90,3 +90,16 @@ def test_all_schemes_move_the_filters_alike():
         ends.append([state[k] for k in ("theta", "crank_speed", "swing_sin", "swing_cos_rate")])
     for other in ends[1:]:
         np.testing.assert_array_equal(ends[0], other)
+
+
+def test_semi_implicit_euler_moves_with_the_rates_of_the_end():
+    limbs, trunk = horse("free", "motor")
+    engine = TrunkEngine(limbs, trunk, FAR, sim_dt=1e-3, integrator="semi_implicit_euler", substeps=1)
+    engine.reset(GAITS, THETA, y=3.0, vx=1.0, pitch_rate=0.5, theta_rate=RATE)
+    before = engine.state
+    engine.advance(steps=1)
+    after = engine.state
+    assert (np.abs(after["theta_rate"] - before["theta_rate"]) > 1e-3).all()
+    np.testing.assert_allclose(after["theta"], before["theta"] + 1e-3 * after["theta_rate"], rtol=1e-15)
+    speed = after["momentum_x"] / engine.total_mass
+    np.testing.assert_allclose(after["centre_x"], before["centre_x"] + 1e-3 * speed, rtol=1e-14)

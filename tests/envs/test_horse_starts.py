@@ -7,7 +7,7 @@ from family import HORSE, make, same
 from horses import SEEDS, SPEEDS
 
 from hoof_env.envs.horse import GAP, PHASE_SPREAD, PITCH_SPREAD, SPEED_SPREAD
-from hoof_env.envs.reference import LEGS, crank_angles, reference_gaits, trunk_motion
+from hoof_env.envs.reference import LEGS, _data, crank_angles, reference_gaits, trunk_motion
 
 
 def test_rates_of_the_trunk_are_those_of_its_places():
@@ -17,6 +17,20 @@ def test_rates_of_the_trunk_are_those_of_its_places():
     for place, rate in (("y", "vy"), ("pitch", "pitch_rate")):
         slope = (there[place] - here[place]) / (2 * step * 2 * np.pi)
         np.testing.assert_allclose(trunk_motion(speeds, phase)[rate], slope, rtol=1e-6, atol=1e-9)
+
+
+def test_gaits_are_mixed_between_the_stored_ones_and_beyond_them_the_rate_alone_changes():
+    stored = _data()["reference"]
+    ends, beyond, phase = np.array(stored["speeds"])[[0, -1]], np.array([0.2, 9.0]), np.array([0.3, 0.8])
+    gaits, last = reference_gaits(beyond), reference_gaits(ends)
+    np.testing.assert_allclose(gaits[:, 1:], last[:, 1:], rtol=1e-14)
+    np.testing.assert_allclose(gaits[:, 0] / beyond, last[:, 0] / ends, rtol=1e-14)
+    here, there = trunk_motion(beyond, phase), trunk_motion(ends, phase)
+    for name in here:
+        np.testing.assert_allclose(here[name], there[name], rtol=1e-13)
+    between = np.random.default_rng(0).uniform(*ends, 200)
+    columns = [np.interp(between, stored["speeds"], column) for column in np.transpose(stored["gaits"])]
+    np.testing.assert_allclose(reference_gaits(between), np.transpose(columns), rtol=1e-12, atol=1e-14)
 
 
 @pytest.mark.parametrize("size", [1.0, 0.5])

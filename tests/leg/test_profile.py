@@ -11,7 +11,7 @@ from hoof_env.dynamics.constrained import ConstrainedLeg
 from hoof_env.errors import GeometryError, ParameterError
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import Geometry, load_geometry
-from hoof_env.leg.profile import DERIVATIVE_ERROR, LegProfile, functions, leg_profile
+from hoof_env.leg.profile import DERIVATIVE_ERROR, FUNCTIONS, SLOPED, LegProfile, functions, leg_profile
 from tests.legs import FIRST_FIT, PRESETS
 
 LEG = load_geometry(FIRST_FIT)
@@ -74,6 +74,13 @@ def test_of_a_crank_that_rocks_it_knows_where_the_links_have_a_place():
     assert value < 1e-11
     assert slope < 2 * DERIVATIVE_ERROR
     assert profile.derivative_error <= DERIVATIVE_ERROR
+
+
+@pytest.mark.parametrize("leg", [LEG, ROCKER], ids=["turns", "rocks"])
+def test_no_angles_have_no_values(leg):
+    value, slope = leg_profile(leg)(np.empty(0))
+    assert value.shape == (0, FUNCTIONS)
+    assert slope.shape == (0, SLOPED)
 
 
 def test_a_leg_without_a_place_anywhere():
