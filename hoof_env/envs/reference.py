@@ -240,7 +240,12 @@ class Stride:
         self.half, by = (1 + self.r) / 2, 2 + 2 * self.r
         self.fold = (cosine * cosine - sine * sine) / by, 2 * cosine * sine / by
 
-    def phase(self, x: Floats | float, y: Floats | float) -> tuple[Floats, Floats]:
+    def begin(self) -> tuple[Floats, Floats]:
+        """`phase` at angle 0."""
+        (u, v), (f, g) = self.wave, self.fold
+        return (self.half + f + u) / (1 + u), (g + v) / (1 + u)
+
+    def phase(self, x: Floats, y: Floats) -> tuple[Floats, Floats]:
         """e^(i phase) where e^(i theta) is x + i y."""
         return self._map(x, y, 1.0)
 
@@ -248,7 +253,7 @@ class Stride:
         """Inverse of `phase`."""
         return self._map(x, y, -1.0)
 
-    def _map(self, x: Floats | float, y: Floats | float, sign: float) -> tuple[Floats, Floats]:
+    def _map(self, x: Floats, y: Floats, sign: float) -> tuple[Floats, Floats]:
         (u, v), (f, g) = self.wave, self.fold
         speed = 1 + sign * (u * x + v * y)
         return (
@@ -261,7 +266,7 @@ def rows_of(gaits: Floats) -> Floats:
     """Gaits of shape (n, 16) as rows of a `PairReference` for each pair, shape (2 PairReference.size, n)."""
     rate, lead, pairs = gaits[:, 0], gaits[:, 1], _pairs(gaits)
     stride = Stride(pairs[:, 0], pairs[:, 1])
-    x, y = stride.phase(1.0, 0.0)  # the phase of a gait begins at angle 0
+    x, y = stride.begin()  # the phase of a gait begins at angle 0
     ahead = 2 * np.pi * np.array([lead, 0 * lead])
     c, s = np.cos(ahead), np.sin(ahead)
     turn = x * c - y * s, -(x * s + y * c)
@@ -284,7 +289,7 @@ def crank_angles(gaits: Floats, phase: Floats, off: Floats) -> Floats:
     ahead, half = np.zeros((COUNT, len(gaits))), 0.5 * (np.arange(COUNT) % 2)[:, None]
     ahead[:2] = gaits[:, 1]
     turned = 2 * np.pi * (phase + off + ahead + half)
-    (x, y), c, s = stride.phase(1.0, 0.0), np.cos(turned), np.sin(turned)
+    (x, y), c, s = stride.begin(), np.cos(turned), np.sin(turned)
     x, y = stride.angle(x * c - y * s, x * s + y * c)
     found: Floats = np.arctan2(y, x) % (2 * np.pi)
     return found
