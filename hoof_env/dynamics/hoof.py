@@ -119,9 +119,9 @@ def press_through_spring(trunk, leg, point, memory, model):  # type: ignore[no-u
         spring = choose(inside, pushed, nothing)
         resistance = choose(inside, laws.chi * spring * inverse_speed + laws.dashpot, nothing)
     rate = (spring + resistance * depth_rate - elastic) / (damping[0] + resistance)
+    pushes = inside & (rate > alone)
     rate = larger(rate, alone)
-    force = elastic + damping[0] * rate
-    force = choose(inside, larger(force, 0.0), nothing)
+    force = choose(pushes, larger(elastic + damping[0] * rate, 0.0), nothing)
     sticking = stiffness[1] * along + damping[1] * speed
     grip = laws.friction * point.friction_scale * force
     held = clip(sticking, grip)

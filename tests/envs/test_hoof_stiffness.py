@@ -106,3 +106,18 @@ def test_a_law_of_ones_own_has_none():
     hoof_env.register("test/OwnLaw-v0", contact_law=lambda d, rate, slowness, ground: 1e4 * d)
     with pytest.raises(ParameterError, match="contact_law: expected none beside springs"):
         gym.make("test/OwnLaw-v0", **SOFT)
+
+
+def test_a_sole_whose_spring_goes_back_by_itself_bears_nothing():
+    """Not what rounding leaves, which would count as time under load."""
+    envs = gym.make_vec("hoof_env/Horse-v0", num_envs=64, target_speed=3.7)
+    envs.reset(seed=0)
+    forces, gives = [], []
+    for _ in range(100):
+        envs.step(np.zeros((64, 16), np.float32))
+        engine = envs.unwrapped.batch.engine
+        forces.append([engine.report[f"{point}_normal"] for point in ("toe", "heel")])
+        gives.append([engine.state[f"{point}_give_normal"] for point in ("toe", "heel")])
+    force, goes_back = np.array(forces), np.array(gives) > 1e-4
+    assert ((force == 0.0) & goes_back).sum() > 1000
+    assert force[force > 0.0].min() > 1e-6
