@@ -48,7 +48,7 @@ CONSTANTS_SIZE, REACTIONS_SIZE = LegConstants.size, Reactions.size
 
 MODEL = np.dtype(
     [
-        ("legs", "i8"), ("cells", "i8"),  # how many; cells of a leg's table
+        ("legs", "i8"), ("cells", "f8"),  # how many; cells of a leg's table
         ("kind", "i8"), ("eighths", "i8"), ("friction_law", "i8"),  # of trunk, contact exponent, friction
         ("interpolated", "?"), ("is_terrain", "?"), ("new_rates", "?"),  # see `Ground`, `Terrain`, `Scheme`
         ("strides", "?"), ("motors", "?"),  # whether to count them; whether any crank has a motor
@@ -74,7 +74,7 @@ class Model(NamedTuple):
     motors: bool
     together: bool  # the lanes are the legs of one trunk
     form: Form
-    cells: int
+    cells: float
     tables: Any  # pointer to the tables of all legs, one after the other
     settings: Any  # pointer to memory on the stack, as are fractions and weights
     averages: bool

@@ -263,6 +263,8 @@ class LegRows(Layout):
     state: LegState
     strides: Strides
     sums: StrideSums
+    row_begin: Row  # of the leg's table where the crank angle is, plus `profile.WHOLE`
+    cell_angle: Row  # from the middle of that row's cell [rad]
     functions: Functions  # of the crank angle, at the present stage
     slopes: Slopes
     sine: Row  # of the crank angle [-]

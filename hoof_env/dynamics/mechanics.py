@@ -22,7 +22,7 @@ from hoof_env.dynamics.hoof import meet_ground
 from hoof_env.dynamics.layout import FARTHEST, Moving
 from hoof_env.dynamics.parts import FIXED, FREE, RAIL, SUSPENDED
 from hoof_env.gait import COS, OFFSET, SIN, SPEED
-from hoof_env.leg.profile import look_up
+from hoof_env.leg.profile import locate, look_up
 from hoof_env.simd import across, choose, cross, dot, lane_sum, level, nth, plane, size
 from hoof_env.simd.compile import inlined, pasted
 from hoof_env.simd.math import clip, cos_sin
@@ -45,6 +45,8 @@ def evaluate(trunk, legs, leg_count, model, elapsed):  # type: ignore[no-untyped
     if model.kind != FIXED:
         clear_trunk(trunk, model.kind)
     for i in range(leg_count):
+        find_crank(nth(legs, i), model)
+    for i in range(leg_count):
         leg = nth(legs, i)
         look_up_functions(trunk, leg, model)
         place_frame(trunk, leg, model.form.harmonics, elapsed)
@@ -65,15 +67,20 @@ def evaluate(trunk, legs, leg_count, model, elapsed):  # type: ignore[no-untyped
 
 
 @inlined
+def find_crank(leg, model):  # type: ignore[no-untyped-def]
+    """What the crank angle itself tells, of all legs before their look-ups, which wait for it."""
+    locate(leg, model.cells)
+    leg.cosine, leg.sine = cos_sin(leg.theta)
+
+
+@inlined
 def look_up_functions(trunk, leg, model):  # type: ignore[no-untyped-def]
     """The functions of the crank angle and their derivatives."""
-    angle = leg.theta
-    look_up(leg.functions, leg.slopes, model.tables, leg.settings.first_row, model.cells, angle)
+    look_up(leg, model.tables)
     if model.form.animal:
         scale_functions(leg.functions, leg.slopes, leg.settings.length_scale[0], leg.settings.mass_scale[0])
-    leg.cosine, leg.sine = cos_sin(angle)
     value = leg.functions[0]
-    trunk.at_dead_point = choose((size(angle) <= FARTHEST) & (value != value), 1.0, trunk.at_dead_point)
+    trunk.at_dead_point = choose((size(leg.theta) <= FARTHEST) & (value != value), 1.0, trunk.at_dead_point)
 
 
 @inlined
@@ -228,6 +235,7 @@ def settle(trunk, legs, leg_count, model, starts):  # type: ignore[no-untyped-de
     clear_trunk(trunk, model.kind)
     for i in range(leg_count):
         leg = nth(legs, i)
+        find_crank(leg, model)
         look_up_functions(trunk, leg, model)
         place_frame(trunk, leg, model.form.harmonics, 0.0)
         gather_leg(trunk, leg, model.kind, model.together)

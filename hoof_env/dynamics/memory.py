@@ -133,6 +133,7 @@ def new_model(scene: Scene, filters: FilterSettings, strides: bool) -> tuple[NDA
     ground, terrain = scene.ground, scene.terrain
     cells = max(profile.cells for profile in scene.profiles)
     tables = [profile.with_cells(cells).table for profile in dict.fromkeys(scene.profiles)]
+    tables = [np.concatenate([table, table[:1]]) for table in tables]
     scheme, grid = SCHEMES[scene.integrator], terrain.to_grid()
     model = np.zeros(1, MODEL)
     record = model[0]
@@ -234,7 +235,7 @@ def settings_of(scene: Scene, trunk: Trunk, ground: Ground, limbs: Sequence[Limb
     values |= _numbered("limits", bounds.tolist())
     lift_off = LIFT_OFF * mass * GRAVITY / len(limbs)
     unique, cells = list(dict.fromkeys(scene.profiles)), max(profile.cells for profile in scene.profiles)
-    firsts = [unique.index(profile) * cells for profile in scene.profiles]  # where each leg's table begins
+    firsts = [unique.index(profile) * (cells + 1) for profile in scene.profiles]  # where a leg's table begins
     names, each = scene.features.of(LegSettings).names, []
     for k, (limb, own, first) in enumerate(zip(limbs, scene.limbs, firsts, strict=True)):
         rows = _limb_settings(limb, first, lift_off, scales_of(f"limbs[{k}]", limb, own))

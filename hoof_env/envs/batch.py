@@ -39,7 +39,6 @@ from hoof_env.envs.parameters import (
     resolved,
     substeps_of,
 )
-from hoof_env.envs.reference import rows_of
 from hoof_env.envs.reward import check_weights
 from hoof_env.envs.settings import Settings
 from hoof_env.envs.tasks import TASKS, Task
@@ -138,7 +137,7 @@ class EpisodeBatch:
         self.rewards = np.zeros(columns)
         self._task = self._task_record()
         self._open()
-        self.now.weight[:] = self.engine.weight
+        self.now.weight[:], self.now.switch[:] = self.engine.weight, np.inf  # of idle columns, too
         try:
             self._compile()
         except NumbaError as error:
@@ -146,7 +145,9 @@ class EpisodeBatch:
 
     def _task_record(self) -> NDArray[Any]:
         slots, _, count = kernels.slots_of(self.task.entries)
-        constants = np.zeros(1, task_type(len(self.task.terms), count, self.engine.features.gait_size))
+        constants = np.zeros(
+            1, task_type(len(self.task.terms), count, self.engine.features.gait_size, self.body.legs)
+        )
         task = constants[0]
         for name, value in self.body.constants().items():
             task[name] = value
@@ -305,9 +306,8 @@ class EpisodeBatch:
         if self.target_speed:
             now.target[which] = self.target_speed[0]
         if self.target_speed and self.speed_changes:
-            for env, generator in zip(which, generators, strict=True):
-                now.target[env] = generator.uniform(*self.target_speed)
-                self._draw_target(int(env), generator)
+            now.target[which] = [generator.uniform(*self.target_speed) for generator in generators]
+            self._draw_targets(which, generators)
         if "target_speed" in options:  # of a horse, and for the whole episode
             now.target[which], now.switch[which] = options["target_speed"], np.inf
         self.body.settle(start, now.target[which], options, self.engine)
@@ -316,7 +316,8 @@ class EpisodeBatch:
         self.begun[:, which] = [*begun, *(drawn[name] for name in self.randomize)]
         now.action[:, which] = start.action.T
         now.x_before[which], now.ended[which] = start.trunk["x"], 0.0
-        self._refer(which, start.gaits)
+        if self.body.legs > 1:
+            now.gait[:, which] = start.gaits.T
         if self.paper:
             self.paper.start(which.tolist(), start.gaits, start.begun["crank_angle"], start.begun["x"])
         near = self.addresses.copy()  # the groups of lanes from the first of them to the last
@@ -331,18 +332,16 @@ class EpisodeBatch:
         self.engine.vary(env, trunk, ground, limbs=limbs)
         self.now.weight[env] = (trunk.mass + sum(limb.geometry.mass for limb in limbs)) * GRAVITY
 
-    def _refer(self, envs: NDArray[np.int64], gaits: Floats) -> None:
-        """Let the actions of a horse lie around these gaits from now on."""
-        if self.body.legs > 1:
-            rows = self._episode_layout.rows("fore").start
-            self.episode[rows:, envs] = rows_of(gaits)
-
-    def _draw_target(self, env: int, generator: np.random.Generator) -> None:
+    def _draw_targets(self, envs: NDArray[np.int64], generators: Sequence[np.random.Generator]) -> None:
+        """When other speeds are commanded, and which, with a generator for each of `envs`."""
         assert self.target_speed
-        steps = round(generator.uniform(*self.target_seconds) / self.dt)
-        self.now.switch[env] = self.now.steps[env] + steps
-        (low, high), now, step = self.target_speed, self.now.target[env], self.body.command_step
-        self.now.next_target[env] = generator.uniform(max(low, now - step), min(high, now + step))
+        when, which = np.array([generator.random(2) for generator in generators]).reshape(-1, 2).T
+        (shortest, longest), (low, high) = self.target_seconds, self.target_speed
+        steps = np.rint((shortest + (longest - shortest) * when) / self.dt)
+        now, step = self.now.target[envs], self.body.command_step
+        low, high = np.maximum(low, now - step), np.minimum(high, now + step)
+        self.now.switch[envs] = self.now.steps[envs] + steps
+        self.now.next_target[envs] = low + (high - low) * which
 
     def step(self, generators: Sequence[np.random.Generator], idle: NDArray[np.bool_] | None = None) -> bool:
         """One control step under `actions`; returns whether any episode ended.
@@ -366,10 +365,7 @@ class EpisodeBatch:
         if happened & kernels.SOME_SWITCHED:
             due = (self.now.steps >= self.now.switch)[: self.num_envs]
             due = np.flatnonzero(due if idle is None else due & ~idle)
-            for env in due:
-                self._draw_target(int(env), generators[int(env)])
-            if isinstance(self.body, Horse):
-                self._refer(due, self.body.reference(self.now.target[due]))
+            self._draw_targets(due, [generators[env] for env in due.tolist()])
         return bool(happened & kernels.SOME_ENDED)
 
     def _observe_broken(self, envs: NDArray[np.int64]) -> None:
@@ -465,7 +461,7 @@ class EpisodeBatch:
         """Whether weights, and the gaits of horses, are numbers that can be."""
         layout, begun = self._episode_layout, ~np.isnan(self.begun[0])
         rows = episode[:, begun]
-        gaits = rows[layout.rows("fore").start :] if self.body.legs > 1 else rows[:0]
+        gaits = rows[layout.rows("gait")] if self.body.legs > 1 else rows[:0]
         return bool((rows[layout.rows("weight")] > 0).all() and np.isfinite(gaits).all())
 
     def set_state(self, state: Mapping[str, Any]) -> None:

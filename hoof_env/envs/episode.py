@@ -10,7 +10,7 @@ import numpy as np
 
 from hoof_env.dynamics.form import form_of
 from hoof_env.dynamics.layout import Features
-from hoof_env.envs.reference import PairReference
+from hoof_env.envs.reference import GaitRows, reference_type
 from hoof_env.envs.reward import TERMS
 from hoof_env.gait import PARAMETERS
 from hoof_env.simd.layout import Block, Constants, Layout, Row, Size
@@ -58,8 +58,7 @@ class Episode(Layout):
 class HorseEpisode(Episode):
     """That of a horse."""
 
-    fore: PairReference  # of the reference gait
-    hind: PairReference
+    gait: GaitRows  # around which its actions lie
 
 
 @cache
@@ -94,7 +93,7 @@ def memories_of(terms: int, features: Features, legs: int = 1) -> Memories:
     )  # fmt: skip
 
 
-def task_type(terms: int, entries: int, gait: int = ACTIONS) -> np.dtype[Any]:
+def task_type(terms: int, entries: int, gait: int = ACTIONS, legs: int = 1) -> np.dtype[Any]:
     """The record of a task's constants."""
     return np.dtype(
         [
@@ -106,6 +105,7 @@ def task_type(terms: int, entries: int, gait: int = ACTIONS) -> np.dtype[Any]:
             ("height", "f8"), ("lowest", "f8"), ("highest", "f8"),  # of the trunk: nominal and extreme [m]
             ("stays", "?"),  # a fixed trunk
             ("count", "i8"), ("places", "i8", (entries,)),  # of the observation; -1: not observed
+            *(reference_type() if legs > 1 else ()),
         ],
         align=True,
     )  # fmt: skip

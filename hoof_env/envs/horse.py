@@ -37,6 +37,7 @@ from hoof_env.envs.reference import (
     gait_numbers,
     horse_gaits,
     rates,
+    reference_constants,
     reference_gaits,
     trunk_motion,
 )
@@ -195,6 +196,7 @@ class Horse:
         return {
             "half": half, "low": low, "high": high, "height": self.height,
             "lowest": -np.inf, "highest": np.inf,  # the engine's own limits end episodes
+            **reference_constants(self.pace, follows=self.gait is None),
         }  # fmt: skip
 
     # Starts

@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait import WIDEST
-from hoof_env.simd import larger, level, nth, read, smaller
+from hoof_env.simd import anywhere, choose, cross, dot, larger, level, nth, plane, read, root, smaller
 from hoof_env.simd.compile import inlined
-from hoof_env.simd.layout import Block, Layout, Row, Vector, views
+from hoof_env.simd.layout import Block, Layout, Row, Vector
 from hoof_env.simd.math import clip, cos_sin
 
 Floats = NDArray[np.float64]
@@ -173,6 +173,19 @@ def _reference() -> tuple[Floats, Floats, Floats]:
     return speeds, gaits, trunk
 
 
+def reference_type() -> list[Any]:
+    """What `refer_to_target` reads of a task's record: whether it is to, the animal's pace, and the stored
+    speeds and gaits."""
+    n = len(_reference()[0])
+    return [("follows", "?"), ("pace", "f8"), ("speeds", "f8", (n,)), ("gaits", "f8", (n, len(NAMES)))]
+
+
+def reference_constants(pace: float, follows: bool) -> dict[str, Any]:
+    """Their values for a horse whose speed is `pace` times that of one of 475 kg."""
+    speeds, gaits, _ = _reference()
+    return {"follows": follows, "pace": pace, "speeds": speeds, "gaits": gaits}
+
+
 def _mixed(speeds: Floats, values: Floats) -> Floats:
     """Values that go with speeds [m/s], shape (n, ...), between those of the stored ones."""
     stored = _reference()[0]
@@ -206,18 +219,20 @@ def trunk_motion(speeds: Floats, phase: Floats) -> dict[str, Floats]:
     return {"y": value[0], "vy": slope[0], "vx": value[1], "pitch": value[2], "pitch_rate": slope[2]}
 
 
-# What the kernels read
+class PairGait(Layout):
+    """A pair's numbers, in the order of `LIMITS`."""
 
-
-class PairReference(Layout):
-    """A pair's part of a gait; see `Stride`."""
-
-    speed: Row  # of the crank without its harmonic [rad/s]
-    wave: Vector  # its cosine and sine coefficient over that [-]
-    fold: Vector
-    half: Row
-    turn: Vector  # of what leads e^(i phase) of the pair's first leg to that of the horse
+    wave: Vector  # cosine and sine coefficient of the crank's speed over its mean [-]
     swing: Annotated[Block, SWING]  # coefficients [rad]
+
+
+class GaitRows(Layout):
+    """A gait in the kernels' memory, in the order of `NAMES`."""
+
+    rate: Row  # [rad/s]
+    lead: Row  # [strides]
+    fore: PairGait
+    hind: PairGait
 
 
 class Stride:
@@ -262,19 +277,6 @@ class Stride:
         )
 
 
-def rows_of(gaits: Floats) -> Floats:
-    """Gaits of shape (n, 16) as rows of a `PairReference` for each pair, shape (2 PairReference.size, n)."""
-    rate, lead, pairs = gaits[:, 0], gaits[:, 1], _pairs(gaits)
-    stride = Stride(pairs[:, 0], pairs[:, 1])
-    x, y = stride.begin()  # the phase of a gait begins at angle 0
-    ahead = 2 * np.pi * np.array([lead, 0 * lead])
-    c, s = np.cos(ahead), np.sin(ahead)
-    turn = x * c - y * s, -(x * s + y * c)
-    swing = pairs[:, 2:].transpose(1, 0, 2)
-    rows = [rate / stride.r, *stride.wave, *stride.fold, stride.half, *turn, *swing]
-    return np.stack(rows, axis=1).reshape(len(PAIRS) * PairReference.size, len(gaits))
-
-
 def _pairs(gaits: Floats) -> Floats:
     """The numbers of the pairs, shape (2, 7, n)."""
     pairs = gaits[:, 2:].reshape(len(gaits), len(PAIRS), len(PAIR))
@@ -298,37 +300,42 @@ def crank_angles(gaits: Floats, phase: Floats, off: Floats) -> Floats:
 def commands_of(gaits: Floats, theta: Floats, count: int) -> Floats:
     """What legs that are in step are commanded at crank angles, shape (4, n), by gaits, shape (n, 16):
     `count` gait parameters of an engine, shape (4, count, n)."""
-    pairs = rows_of(gaits).reshape(len(PAIRS), PairReference.size, len(gaits))
-    pair = views(PairReference, np.repeat(pairs.transpose(1, 0, 2), 2, axis=1))
-    wave = pair.wave[0] * np.cos(theta) + pair.wave[1] * np.sin(theta)
-    return np.stack([pair.speed * (1 + wave), *pair.swing[: count - 1]], axis=1)
+    pairs = np.repeat(_pairs(gaits), 2, axis=0)
+    stride = Stride(pairs[:, 0], pairs[:, 1])
+    wave = stride.wave[0] * np.cos(theta) + stride.wave[1] * np.sin(theta)
+    speed = gaits[:, 0] / stride.r * (1 + wave)
+    return np.concatenate([speed[:, None], pairs[:, 2 : count + 1]], axis=1)
+
+
+# In the kernels
 
 
 @inlined
-def command_gait(task, actions, episode, first_leg, gait, n, room):  # type: ignore[no-untyped-def]
-    """Command the reference gait, and what actions change of it; `room` is for `ROOM` numbers.
+def command_gait(task, actions, episode, first_leg, parameters, n, room):  # type: ignore[no-untyped-def]
+    """Command the gait of the episode, and what actions change of it; `room` is for `ROOM` numbers.
 
     The first action of a leg scales its crank's speed, the others are added to the swing's first three
     coefficients."""
-    together_cos, together_sin = level(episode, 0.0), level(episode, 0.0)
+    gait, together = episode.gait, plane(level(episode, 0.0), 0.0)
+    for p in range(len(PAIRS)):
+        wave = nth(gait.fore, p).wave
+        r = root(1.0 - dot(wave, wave))
+        half, fold, speed = 0.5 * (1.0 + r), (1.0 / (2.0 + 2.0 * r)) * (wave * wave), gait.rate / r
+        cosine, sine = cos_sin(2.0 * math.pi * gait.lead * (1.0 - p))
+        begin = plane(cosine, sine) * phase_of(wave, half, fold, plane(level(episode, 1.0), 0.0))
+        for side in range(2):
+            i, sign = 2 * p + side, 1.0 - 2.0 * side
+            cosine, sine = cos_sin(nth(first_leg, i).state.theta)
+            crank = plane(cosine, sine)
+            phase = sign * (conjugate(begin) * phase_of(wave, half, fold, crank))
+            room[3 * i] = speed * (1.0 + dot(wave, crank))
+            room[3 * i + 1], room[3 * i + 2] = phase.real, phase.imag
+            together = together + phase
     for i in range(COUNT):
-        pair, theta = nth(episode.fore, i // 2), nth(first_leg, i).state.theta
-        c, s = cos_sin(theta)
-        wave, fold = pair.wave, pair.fold
-        pace = 1.0 + (wave.real * c + wave.imag * s)
-        x = (pair.half * c + (fold.real * c + fold.imag * s) + wave.real) / pace
-        y = (pair.half * s + (fold.imag * c - fold.real * s) + wave.imag) / pace
-        sign = 1.0 - 2.0 * (i % 2)
-        phase_cos = sign * (x * pair.turn.real - y * pair.turn.imag)
-        phase_sin = sign * (x * pair.turn.imag + y * pair.turn.real)
-        room[3 * i] = pair.speed * pace
-        room[3 * i + 1], room[3 * i + 2] = phase_cos, phase_sin
-        together_cos, together_sin = together_cos + phase_cos, together_sin + phase_sin
-    for i in range(COUNT):
-        leg, pair = nth(first_leg, i), nth(episode.fore, i // 2)
-        behind = together_sin * room[3 * i + 1] - together_cos * room[3 * i + 2]
+        leg, pair = nth(first_leg, i), nth(gait.fore, i // 2)
+        behind = cross(plane(room[3 * i + 1], room[3 * i + 2]), together)
         speed = room[3 * i] * (1.0 + (COUPLING / COUNT) * behind)
-        for k in range(gait):
+        for k in range(parameters):
             action = 0.0 * speed
             if k < ACTED:
                 at = (n * COUNT + i) * ACTED + k
@@ -337,3 +344,32 @@ def command_gait(task, actions, episode, first_leg, gait, n, room):  # type: ign
             if k > 0:
                 wanted = pair.swing[k - 1] + action
             leg.command[k] = smaller(larger(wanted, task.low[k]), task.high[k])
+
+
+@inlined
+def phase_of(wave, half, fold, crank):  # type: ignore[no-untyped-def]
+    """e^(i phase) of a pair where e^(i theta) is `crank`; see `Stride`."""
+    return (1.0 / (1.0 + dot(wave, crank))) * (half * crank + fold * conjugate(crank) + wave)
+
+
+@inlined
+def conjugate(z):  # type: ignore[no-untyped-def]
+    return plane(z.real, -z.imag)
+
+
+@inlined
+def refer_to_target(task, episode, switched):  # type: ignore[no-untyped-def]
+    """Where another speed is commanded its reference gait is the episode's, see `reference_gaits`."""
+    if not (task.follows and anywhere(switched)):
+        return
+    speeds, gaits, last = task.speeds, task.gaits, len(task.speeds) - 1
+    speed = episode.target * (1.0 / task.pace)
+    within = smaller(larger(speed, speeds[0]), speeds[last])
+    for k in range(len(NAMES)):
+        mixed = level(episode, gaits[0, k])
+        for j in range(last):
+            part = (within - speeds[j]) * (1.0 / (speeds[j + 1] - speeds[j]))
+            mixed = mixed + (gaits[j + 1, k] - gaits[j, k]) * smaller(larger(part, 0.0), 1.0)
+        if k == 0:
+            mixed = mixed * speed / (within * task.pace)
+        episode.gait[k] = choose(switched, mixed, episode.gait[k])

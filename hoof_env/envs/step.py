@@ -21,7 +21,7 @@ from hoof_env.envs.episode import ACTIONS, FAILED, TRUNCATED, Memories, memories
 from hoof_env.envs.horse_rows import HORSE_TERMS
 from hoof_env.envs.observation import Entry, Scene
 from hoof_env.envs.outcome import add_up, decide, find_outcome, outcome_of_one, remember_action
-from hoof_env.envs.reference import ROOM, command_gait
+from hoof_env.envs.reference import ROOM, command_gait, refer_to_target
 from hoof_env.envs.reward import TERMS, Term
 from hoof_env.simd import anywhere, choose, columns, larger, level, read, rows, set_lane, size, smaller, write
 from hoof_env.simd.compile import inlined, kernel, pasted
@@ -214,7 +214,7 @@ def step_kernels(
     advance = advance_kernels(contact_law, features)
     advance_one = advance.advance_leg if legs == 1 else advance.advance_four
     advance_batch = advance.advance_batch
-    task_at, model_at = record_at(task_type(len(terms), slots, layouts.gait)), record_at(MODEL)
+    task_at, model_at = record_at(task_type(len(terms), slots, layouts.gait, legs)), record_at(MODEL)
 
     @pasted
     def scene_of(addresses, lanes, task, n):  # type: ignore[no-untyped-def]
@@ -267,6 +267,8 @@ def step_kernels(
         outcome = find_outcome(task, trunk, leg, episode, layouts, change)
         add_up(outcome, episode)
         ended, switched = decide(task, outcome, episode)
+        if legs > 1:
+            refer_to_target(task, episode, switched)
         nothing = level(episode, 0.0)
         reward = compute_reward(addresses, lanes, task, outcome, episode, n, nothing)
         write(reward, doubles_at(addresses[AT.rewards]), n, 1)

@@ -2,9 +2,9 @@
 
 Nothing about the linkage enters the equations of motion but a few functions of the crank angle: where toe and
 heel are, the first moment of the links about O, and three inertias. `LegProfile` computes them from the
-closed form of `leg.kinematics` and keeps each as one polynomial of degree 7 a cell of crank angle. A
+closed form of `leg.kinematics` and keeps each as one polynomial of degree 5 a cell of crank angle. A
 polynomial costs neither square root nor division, and all functions share one look-up. Values are good to
-some 1e-13, derivatives to `derivative_error` (some 1e-10) of their largest value.
+some 1e-12, derivatives to `derivative_error` (below 1e-9) of their largest value.
 
 Everything is in the frame of the leg with O at the origin, after the mirror into the world's sense
 (`kinematics.mirror`), so that the world's x points forward and angles are counter-clockwise.
@@ -24,12 +24,13 @@ from hoof_env.errors import GeometryError
 from hoof_env.leg.geometry import Geometry, tables
 from hoof_env.leg.kinematics import solve_points
 from hoof_env.leg.linkage import HEADS, NUMBER, POINTS, TAILS
-from hoof_env.simd.compile import kernel
+from hoof_env.simd import floor, larger, smaller
+from hoof_env.simd.compile import inlined, kernel
 from hoof_env.simd.functions import transposed
 from hoof_env.simd.layout import Layout, Row, Vector
 from hoof_env.simd.math import ROUNDER
 from hoof_env.simd.memory import write_row
-from hoof_env.simd.types import DOUBLE, INDEX, Code, fused, instruction, pick, spread, wide
+from hoof_env.simd.types import DOUBLE, INDEX, Code, fused, instruction, spread
 
 
 class Functions(Layout):
@@ -59,15 +60,20 @@ class Slopes(Layout):
 FUNCTIONS, SLOPED = Functions.size, Slopes.size
 """How many functions there are, and how many of them have derivatives."""
 
+TURN = 2 * np.pi
+WHOLE = 2.0**52  # added to a whole number it leaves it in the last bits
+
 
 def by_name(values: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
     """What `functions` gives, or its derivatives: `Functions` by name, shape (len(theta),) each."""
     return dict(zip(Functions.names, values.T, strict=False))
 
 
-DEGREE = 7
-CELLS = (256, 512, 1024, 2048)
-"""Numbers of cells that are tried: powers of two, so that an angle's cell needs no division."""
+DEGREE = 5
+CELLS, ROCKING_CELLS = (1024, 1280, 1536, 2048), (6144,)
+"""Numbers of cells that are tried; of a crank that rocks, so many that it comes near to its ends."""
+
+ROW = float(FUNCTIONS * (DEGREE + 1))  # numbers in a row of the table
 
 DERIVATIVE_ERROR = 1e-9
 """The number of cells is the smallest that keeps derivatives this good, relative to their largest value."""
@@ -137,8 +143,7 @@ class LegProfile:
 
     def __init__(self, geometry: Geometry, cells: int | None = None) -> None:
         self.geometry = geometry
-        finest = CELLS if geometry.full_turn else CELLS[-1:]  # a rocking crank: as near to its ends as can be
-        for tried in (cells,) if cells else finest:
+        for tried in (cells,) if cells else CELLS if geometry.full_turn else ROCKING_CELLS:
             self.cells, self.table = tried, _fit(geometry, tried)
             error = self._errors()
             while not geometry.full_turn and np.nanmax(error, initial=0.0) > DERIVATIVE_ERROR:
@@ -153,7 +158,7 @@ class LegProfile:
             )
 
     def with_cells(self, cells: int) -> LegProfile:
-        """The same leg with so many cells, a power of two."""
+        """The same leg with so many cells."""
         return self if cells == self.cells else leg_profile(self.geometry, cells)
 
     def __call__(self, theta: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -191,22 +196,27 @@ def leg_profile(geometry: Geometry, cells: int | None = None) -> LegProfile:
 
 
 def _fit(geometry: Geometry, cells: int) -> NDArray[np.float64]:
-    """Interpolate at the Chebyshev points of every cell."""
-    half = np.pi / cells
-    nodes = np.cos(np.pi * (2 * np.arange(DEGREE + 1) + 1) / (2 * DEGREE + 2))
+    """Fit values and derivatives at the Chebyshev points of every cell, by least squares."""
+    half, count = np.pi / cells, 2 * (DEGREE + 1)
+    nodes = np.cos(np.pi * (2 * np.arange(count) + 1) / (2 * count))
     theta = 2 * half * np.arange(cells)[:, None] + half * nodes
-    value, _ = functions(geometry, theta.ravel())
+    value, slope = functions(geometry, theta.ravel())
     if geometry.full_turn and not np.isfinite(value).all():
         where = theta.ravel()[~np.isfinite(value).all(1)][0]
         raise GeometryError(
             f"geometry {geometry.name!r}: expected a leg whose links have a place at every crank angle, "
             f"but at {np.degrees(where) % 360:.2f} deg it has none"
         )
-    value = value.reshape(cells, DEGREE + 1, -1).transpose(1, 0, 2).reshape(DEGREE + 1, -1)
-    powers = np.linalg.solve(np.vander(nodes), value).reshape(DEGREE + 1, cells, -1)
-    powers /= (half ** np.arange(DEGREE, -1, -1))[:, None, None]
-    powers = powers.transpose(1, 0, 2)
-    parts = [part.reshape(cells, -1) for part in (powers[:, :, :SLOPED], powers[:, :, SLOPED:])]
+    powers, rates = np.vander(nodes, DEGREE + 1), np.zeros((count, DEGREE + 1))
+    rates[:, :-1] = np.vander(nodes, DEGREE) * np.arange(DEGREE, 0, -1)
+    scale = half ** np.arange(DEGREE, -1, -1)
+    parts = []
+    for fitted, sample in (
+        (np.concatenate([powers, rates]), (value[:, :SLOPED], half * slope)), (powers, (value[:, SLOPED:],)),
+    ):  # fmt: skip
+        known = np.concatenate([part.reshape(cells, count, -1) for part in sample], axis=1)
+        found = np.einsum("pk,ckf->cpf", np.linalg.pinv(fitted), known) / scale[:, None]
+        parts.append(found.reshape(cells, -1))
     table = np.concatenate(parts, axis=1)
     table[~np.isfinite(table).all(1)] = np.nan
     return table
@@ -239,34 +249,39 @@ def _polynomials(builder: Any, rows: list[Any], angles: list[Any], first: int, l
     return values, slopes
 
 
-@instruction(
-    lambda functions, slopes, table, first, cells, theta: types.void(
-        functions, slopes, table, first, types.int64, theta
-    )
-)
-def look_up(code: Code, functions: Any, slopes: Any, table: Any, first: Any, cells: Any, theta: Any) -> None:
-    """Fill `Rows` with all functions and derivatives at the crank angles `theta` [rad]; what is not a number
-    gives values that are none. The table has so many `cells` and begins at row `first` behind the pointer."""
-    builder, count = code.builder, code.args[0].count
-    whole = wide(INDEX, count)
-    # The sum's last bits are the number of the cell, turns included: those of one turn are its row.
-    per_cell = builder.uitofp(cells, DOUBLE)
-    scaled = builder.fmul(theta, spread(builder, builder.fmul(per_cell, DOUBLE(1 / (2 * np.pi))), count))
-    rounder = spread(builder, DOUBLE(ROUNDER), count)
-    shifted = builder.fadd(scaled, rounder)
-    mask = spread(builder, builder.sub(cells, INDEX(1)), count)
-    row = builder.and_(builder.bitcast(shifted, whole), mask)
-    row = builder.add(row, builder.fptosi(first, whole))
-    cell, width = builder.fsub(shifted, rounder), builder.fdiv(DOUBLE(2 * np.pi), per_cell)
-    x = builder.fsub(theta, builder.fmul(cell, spread(builder, width, count)))
-    angles = [pick(builder, x, lane, count) for lane in range(count)]
-    row = builder.mul(row, spread(builder, INDEX(FUNCTIONS * (DEGREE + 1)), count))
-    places = [builder.gep(table, [pick(builder, row, lane, count)]) for lane in range(count)]
+@inlined
+def locate(leg, cells):  # type: ignore[no-untyped-def]
+    """In which of `cells` of its table the crank angle of a leg is, and how far from its middle.
+
+    To be asked some while before `look_up`, which waits for the answer. What is not a number is in some cell,
+    not a number from its middle."""
+    angle = leg.theta
+    cell = (angle * (cells / TURN) + ROUNDER) - ROUNDER
+    # Whole turns that are taken off: too few by one where cell 0 begins, whose row is there at the end again.
+    turns = floor(angle * (1 / TURN) + (0.5 / cells - 1e-6))
+    row = smaller(cells, larger(0.0, cell - cells * turns))
+    leg.row_begin = (row + leg.settings.first_row) * ROW + WHOLE
+    leg.cell_angle = angle - cell * (TURN / cells)
+
+
+@instruction(lambda leg, table: types.void(leg, table))
+def look_up(code: Code, leg: Any, table: Any) -> None:
+    """Fill a leg's functions and slopes, see `Functions`, where `locate` found its crank angle to be; what is
+    not a number gives values that are none."""
+    (rows,), builder, fields = code.args[:1], code.builder, code.args[0].layout.fields
+    lanes, half = range(rows.count), ir.IntType(32)
+
+    def loaded(name: str, kind: Any, per_lane: int) -> list[Any]:  # one by one: each is needed in all lanes
+        first = builder.gep(leg, [INDEX(fields[name].start * rows.count)], inbounds=True)
+        first = builder.bitcast(first, kind.as_pointer())
+        return [builder.load(builder.gep(first, [INDEX(per_lane * lane)], inbounds=True)) for lane in lanes]
+
+    # What was added to the number of a row's first element is in the upper half of its bits.
+    begins = [builder.zext(begin, INDEX) for begin in loaded("row_begin", half, 2)]
+    places, angles = [builder.gep(table, [begin]) for begin in begins], loaded("cell_angle", DOUBLE, 1)
     sloped, derivatives = _polynomials(builder, places, angles, 0, SLOPED)
     others, _ = _polynomials(builder, places, angles, SLOPED, FUNCTIONS)
-    for memory, rows, begin, lanes in (
-        (code.args[0], functions, 0, sloped), (code.args[0], functions, SLOPED, others),
-        (code.args[1], slopes, 0, derivatives),
-    ):  # fmt: skip
-        for k, column in enumerate(transposed(builder, lanes, lanes[0].type.count)):
-            write_row(code, memory, rows, INDEX(begin + k), column)
+    values, slopes = fields["functions"].start, fields["slopes"].start
+    for first, found in ((values, sloped), (values + SLOPED, others), (slopes, derivatives)):
+        for k, column in enumerate(transposed(builder, found, found[0].type.count)):
+            write_row(code, rows, leg, INDEX(first + k), column)

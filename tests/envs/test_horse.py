@@ -14,11 +14,11 @@ from hoof_env.envs.reference import (
     LEGS,
     NAMES,
     HorseGait,
-    PairReference,
+    Stride,
+    commands_of,
     crank_angles,
     horse_gaits,
     reference_gaits,
-    rows_of,
 )
 from hoof_env.envs.tasks import TASKS
 from hoof_env.errors import ParameterError
@@ -80,8 +80,7 @@ def test_an_action_changes_the_command_of_its_name():
 def test_the_phase_grows_evenly_in_time():
     gaits, phase = random_gaits(3), np.array([0.1, 0.4, 0.9])
     theta = crank_angles(gaits, phase, np.zeros((4, 3)))
-    rows = rows_of(gaits).reshape(2, -1, 3)
-    speed = rows[:, 0] * (1 + rows[:, 1] * np.cos(theta[::2]) + rows[:, 2] * np.sin(theta[::2]))
+    speed = commands_of(gaits, theta, 2)[::2, 0]
     later = crank_angles(gaits, phase + 1e-6, np.zeros((4, 3)))
     passed = (later - theta)[::2] / (1e-6 * 2 * np.pi / gaits[:, 0])
     np.testing.assert_allclose(passed, speed, rtol=1e-5)
@@ -94,14 +93,14 @@ def test_cranks_that_are_out_of_step_come_back():
     rate = reference_gaits(np.array([1.5]))[0, 0]
 
     def ahead():
-        """Of the other legs' mean phase [rad], by the kernels' own rows."""
-        theta, rows = env.engine.state["theta"][:, 0], env.batch.episode[-2 * PairReference.size :, 0]
+        """Of the other legs' mean phase [rad], by the gait that the kernels follow."""
+        theta, gait = env.engine.state["theta"][:, 0], env.batch.now.gait[:, 0]
         found = []
         for i in range(4):
-            _, u, v, f, g, half, turn_x, turn_y, *_ = rows[PairReference.size * (i // 2) :]
-            z, w = np.exp(1j * theta[i]), u + 1j * v
-            phase = (half * z + (f + 1j * g) * z.conj() + w) / (1 + (w.conjugate() * z).real)
-            found.append(phase * (turn_x + 1j * turn_y) * (-1) ** i)
+            first = 2 + 7 * (i // 2)
+            stride, lead = Stride(*gait[first : first + 2]), gait[1] * (i < 2)
+            phase, begin = (complex(*stride.phase(np.cos(x), np.sin(x))) for x in (theta[i], 0.0))
+            found.append(phase / begin * np.exp(-2j * np.pi * lead) * (-1) ** i)
         return np.angle(found[0] / np.sum(found[1:]))
 
     state = env.get_state()
@@ -167,16 +166,32 @@ def test_commands_change_a_little_at_a_time(size):
     assert 0.9 <= min(seen) <= max(seen) <= 2.6
 
 
-def test_the_reference_follows_the_command():
-    env = make(HORSE, target_speed=(1.3, 2.6), target_seconds=(0.5, 1.0))
+@pytest.mark.parametrize("size", [1.0, 0.6])
+def test_the_reference_follows_the_command(size):
+    """Between the stored speeds and beyond them, for an animal of any size; not while the command stays."""
+    envs = Sb3VecEnv(HORSE, 16, size=size, target_speed=(0.5, 4.0), target_seconds=(0.2, 0.5))
+    envs.seed(1)
+    envs.reset()
+    now, seen = envs.unwrapped.envs.batch.now, set()
+    for _ in range(60):
+        envs.step(np.zeros((16, 16), np.float32))
+        expected = reference_gaits(now.target[:16] / size**0.5)
+        expected[:, 0] /= size**0.5
+        np.testing.assert_allclose(now.gait[:, :16].T, expected, rtol=1e-13, atol=1e-15)
+        seen |= set(now.target[:16].tolist())
+    assert len(seen) >= 48
+    assert min(seen) < SPEEDS[0] * size**0.5 < max(seen)
+
+
+def test_a_gait_that_is_given_lasts_while_commands_change():
+    env = make(HORSE, gait="walk", target_speed=(1.3, 1.8), target_seconds=(0.1, 0.2))
     env.reset(seed=1)
     seen = set()
-    for _ in range(150):
+    for _ in range(40):
         env.step(np.zeros(16, np.float32))
-        rows = env.batch.episode[env.batch._episode_layout.rows("fore").start :, 0]
-        same(rows, rows_of(reference_gaits(env.batch.now.target[:1]))[:, 0])
+        same(env.batch.now.gait[:, 0], horse_gaits()["walk"].to_array())
         seen.add(float(env.batch.now.target[0]))
-    assert len(seen) >= 3
+    assert len(seen) >= 4
 
 
 @pytest.mark.parametrize(
