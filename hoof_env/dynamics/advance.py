@@ -138,9 +138,10 @@ def find_result(trunk, legs, leg_count, together, form):  # type: ignore[no-unty
         total = total + trunk.state[k] * trunk.state[k]
     for i in range(leg_count):
         leg = nth(legs, i)
-        total = total + leg.theta_acceleration * leg.theta_acceleration
+        own = leg.theta_acceleration * leg.theta_acceleration  # a sum for each leg: long chains of sums wait
         for k in range(form.leg_state):
-            total = total + leg.state[k] * leg.state[k]
+            own = own + leg.state[k] * leg.state[k]
+        total = total + own
     if together:
         total, stuck = lane_sum(level(trunk, 0.0), total), lane_sum(level(trunk, 0.0), stuck)
     lost = choose(stuck > 0.0, DEAD_POINT, NOT_FINITE)
