@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from hoof_env.dynamics.parts import Result
 from hoof_env.ground.terrain import surface
-from hoof_env.simd import choose, lane_sum, level, plane, root, smaller
+from hoof_env.simd import anywhere, choose, lane_sum, level, plane, root, smaller
 from hoof_env.simd.compile import inlined
 
 LOOK = 5
 """Whole steps from one look to the next: to find all joints takes square roots and quotients."""
+
+ROUNDING = 1e-6  # [m], more than G's places differ by rounding
 
 PITCH, HEIGHT, LOW_JOINT = float(Result.PITCH), float(Result.HEIGHT), float(Result.LOW_JOINT)
 
@@ -60,6 +62,8 @@ def heed_trunk(trunk, model):  # type: ignore[no-untyped-def]
 @inlined
 def heed_joints(trunk, leg, shape, model):  # type: ignore[no-untyped-def]
     """Whether a joint other than the hoof's corners is too near the ground; `shape` are `LegConstants`."""
+    if not (model.is_terrain or anywhere(may_be_low(trunk, leg, shape))):
+        return
     crank = shape.crank * plane(shape.travel * leg.cosine, -leg.sine)
     b = meeting(shape.B, shape.pivot, crank)
     d = shape.pivot + (b - shape.pivot) * shape.D.place
@@ -73,6 +77,16 @@ def heed_joints(trunk, leg, shape, model):  # type: ignore[no-untyped-def]
     if model.together:
         is_low = lane_sum(level(trunk, 0.0), is_low)
     note(trunk, is_low > 0.0, LOW_JOINT)
+
+
+@inlined
+def may_be_low(trunk, leg, shape):  # type: ignore[no-untyped-def]
+    """Whether level ground is too near G, which the hoof's corners tell, or another joint, were it as far
+    from O as any comes: where not, the joints need not be found."""
+    toe, heel = leg.functions.toe, leg.functions.heel
+    origin, low = trunk.place.imag + leg.hip.imag, trunk.settings.limits[4] + ROUNDING
+    fetlock = origin + (leg.turn * (toe + shape.fetlock * (heel - toe))).imag
+    return (fetlock < low) | (origin - leg.settings.length_scale[0] * shape.reach < low)
 
 
 @inlined

@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.hoof import force_of
 from hoof_env.leg.geometry import Geometry
-from hoof_env.leg.linkage import CONSTRUCTION, JOINTS, Dyad
+from hoof_env.leg.linkage import CONSTRUCTION, JOINTS, NUMBER, Dyad
+from hoof_env.leg.profile import places
 from hoof_env.simd import across, choose, cross, dot, level, plane, root, store_vectors
 from hoof_env.simd.compile import inlined
 from hoof_env.simd.layout import Block, Layout, Row, Vector
@@ -66,6 +67,8 @@ class LegConstants(Layout):
     toe_is_i: Row  # 1 if the toe is I, 0 if it is J
     shank: Row  # FG / EF
     rocker: Row  # CA / CF
+    fetlock: Vector  # of G from the toe, over that of the heel from the toe [-]
+    reach: Row  # farthest of any joint but G and the hoof's corners from O, at any crank angle [m]
     B: HingeDyad
     F: HingeDyad
     E: HingeDyad
@@ -88,6 +91,8 @@ class LegConstants(Layout):
     IJ: Link
 
 
+BETWEEN_ANGLES = 1.05  # more than a point comes farther out between the angles that are looked at
+
 _STEPS = {step.point: step for step in CONSTRUCTION}
 _HINGES, _TRIANGLES = ("B", "F", "E", "J"), ("D", "I")
 
@@ -97,6 +102,11 @@ def leg_constants(geometry: Geometry) -> NDArray[np.float64]:
     lengths = geometry.lengths
     values = [lengths["OP"], geometry.travel * geometry.pivot[0], geometry.pivot[1], float(geometry.travel)]
     values += [float(geometry.toe == "I"), lengths["FG"] / lengths["EF"], lengths["CA"] / lengths["CF"]]
+    z = places(geometry, np.linspace(0.0, 2 * np.pi, 1000))[0]
+    hoof = [NUMBER[point] for point in ("G", geometry.toe, geometry.heel)]
+    g, toe, heel = z[np.isfinite(z).all(1)][0, hoof]
+    fetlock, others = (g - toe) / (heel - toe), np.delete(z, hoof, axis=1)
+    values += [fetlock.real, fetlock.imag, BETWEEN_ANGLES * float(np.nanmax(np.abs(others)))]
     spans = {"D": lengths["CB"], "I": lengths["GJ"]}
     for point in _HINGES + _TRIANGLES:
         step = _STEPS[point]

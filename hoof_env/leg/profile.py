@@ -85,17 +85,22 @@ def _solve_all(theta, crank, pivot, steps, values, z, dz, ddz):  # type: ignore[
         solve_points(theta[k], crank, pivot, steps, values, z[k], dz[k], ddz[k])
 
 
-def functions(
-    geometry: Geometry, theta: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """`Functions` in closed form, shape (len(theta), FUNCTIONS), and derivatives of the first `SLOPED`."""
+def places(geometry: Geometry, theta: NDArray[np.float64]) -> tuple[NDArray[np.complex128], ...]:
+    """Of the points from O in the leg's frame, and their first and second derivative by the crank angle, each
+    of shape (len(theta), 11), points as in `linkage.POINTS`; not numbers where there is none."""
     theta = np.asarray(theta, dtype=np.float64)
     z, dz, ddz = (np.empty((theta.size, len(POINTS)), np.complex128) for _ in range(3))
     crank, pivot = geometry.lengths["OP"], complex(*geometry.pivot)
     with np.errstate(invalid="ignore", divide="ignore"):
         _solve_all(theta, crank, pivot, *tables(geometry), z, dz, ddz)
-    if geometry.travel < 0:
-        z, dz, ddz = (-w.conj() for w in (z, dz, ddz))  # the mirror
+    return (z, dz, ddz) if geometry.travel > 0 else (-z.conj(), -dz.conj(), -ddz.conj())  # the mirror
+
+
+def functions(
+    geometry: Geometry, theta: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """`Functions` in closed form, shape (len(theta), FUNCTIONS), and derivatives of the first `SLOPED`."""
+    z, dz, ddz = places(geometry, theta)
     m, inertia = geometry.body_masses, geometry.body_inertias
     r, v, acc = ((w[:, TAILS] + w[:, HEADS]) / 2 for w in (z, dz, ddz))
     link, dlink, ddlink = (w[:, HEADS] - w[:, TAILS] for w in (z, dz, ddz))

@@ -12,15 +12,18 @@ from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.dynamics.observables import stance_figures
 from hoof_env.dynamics.parts import HoofSpring, Limb, Limits, Motor, Prescribed, Result, Trunk
+from hoof_env.dynamics.reactions import LegConstants, leg_constants
 from hoof_env.errors import ParameterError
 from hoof_env.gait import GaitParameters, HarmonicGait
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.kinematics import FrameMotion, pose
 from hoof_env.leg.linkage import POINTS
+from hoof_env.leg.profile import places
 from tests.dynamics.scenes import HIPS, LEG, LOWEST, NATURAL, THETA, WALK, horse
 
 SPRING = HoofSpring(4e4, 600.0)
+ROCKER = LEG.replace(lengths={"CF": 0.8 * LEG.lengths["CF"]}, full_turn=False)
 FREE = Trunk("free", mass=320.0, height=LOWEST, drag=0.0, pitch_inertia=80.0)
 
 
@@ -35,10 +38,14 @@ def animal(limits, num_envs=1, trunk=FREE, ground=NATURAL, terrain=None, **setti
 
 
 @settings(max_examples=30, deadline=None)
-@given(st.floats(-10, 10), st.floats(-0.1, 1.2), st.floats(-0.5, 0.5), st.floats(0.7, 1.3), st.booleans())
-def test_the_lowest_joint_is_where_the_closed_form_has_it(theta, swing, pitch, size, mirrored):
+@given(
+    st.floats(-10, 10), st.floats(-0.1, 1.2), st.floats(-3.1, 3.1), st.floats(0.7, 1.3), st.booleans(),
+    st.booleans(),
+)  # fmt: skip
+def test_the_lowest_joint_is_where_the_closed_form_has_it(theta, swing, pitch, size, mirrored, turned):
     """Without forces for a moment: the limit is passed just below the height of the lowest joint."""
     leg = LEG.replace(travel=-LEG.travel) if mirrored else LEG
+    leg = leg.replace(toe=leg.heel, heel=leg.toe) if turned else leg
     scaled, gait = leg.scaled(size), GaitParameters(0.0, swing, 0.1, 0.05)
     phi = swing + 0.1 * np.sin(theta) + 0.05 * np.cos(theta)
     hip = (0.3, -0.1)
@@ -54,6 +61,14 @@ def test_the_lowest_joint_is_where_the_closed_form_has_it(theta, swing, pitch, s
         engine.vary(0, limbs=[Limb(scaled, hip, Prescribed())])
         engine.reset(gait, theta, y=9.0, pitch=pitch)
         assert engine.advance() == result
+
+
+@pytest.mark.parametrize("leg", [LEG, ROCKER], ids=["turns", "rocks"])
+def test_no_joint_is_farther_from_the_crank_centre_than_limits_take_it_to_be(leg):
+    z = places(leg, np.random.default_rng(0).uniform(0, 2 * np.pi, 10**5))[0]
+    others = [k for k, point in enumerate(POINTS) if point not in "GIJ"]
+    reach = leg_constants(leg)[LegConstants.rows("reach")][0]
+    assert 0.9 * reach < np.nanmax(np.abs(z[:, others])) < 0.99 * reach
 
 
 @pytest.mark.parametrize("num_envs", [1, 9])
