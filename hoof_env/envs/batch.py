@@ -137,7 +137,7 @@ class EpisodeBatch:
         self.rewards = np.zeros(columns)
         self._task = self._task_record()
         self._open()
-        self.now.weight[:], self.now.switch[:] = self.engine.weight, np.inf  # of idle columns, too
+        self.now.weight[:], self.now.switch[:] = self.engine.weight, np.inf  # idle columns never switch
         try:
             self._compile()
         except NumbaError as error:

@@ -206,15 +206,16 @@ def step_kernels(
     identity = fingerprint(*parts, contact_law, flags, layouts.episode.names, (FAILED, TRUNCATED))
     if features != PLAIN:
         identity += f" {tuple(features)}"
+    _, vectors, slots = slots_of(entries)
+    task_record = task_type(len(terms), slots, layouts.gait, legs)
     if legs > 1:
-        identity += f" {legs} legs"
+        identity += f" {legs} legs, {task_record.descr}"  # how many gaits there are is data
     compute_reward = _with_terms(terms, layouts)
     put_scaled, put_measured = (_with_entries(entries, layouts, scaled) for scaled in (True, False))
-    _, vectors, slots = slots_of(entries)
     advance = advance_kernels(contact_law, features)
     advance_one = advance.advance_leg if legs == 1 else advance.advance_four
     advance_batch = advance.advance_batch
-    task_at, model_at = record_at(task_type(len(terms), slots, layouts.gait, legs)), record_at(MODEL)
+    task_at, model_at = record_at(task_record), record_at(MODEL)
 
     @pasted
     def scene_of(addresses, lanes, task, n):  # type: ignore[no-untyped-def]

@@ -4,7 +4,8 @@ Nothing about the linkage enters the equations of motion but a few functions of 
 heel are, the first moment of the links about O, and three inertias. `LegProfile` computes them from the
 closed form of `leg.kinematics` and keeps each as one polynomial of degree 5 a cell of crank angle. A
 polynomial costs neither square root nor division, and all functions share one look-up. Values are good to
-some 1e-12, derivatives to `derivative_error` (below 1e-9) of their largest value.
+some 1e-12, derivatives to `derivative_error` (below 1e-9) of their largest value; both are worse where links
+come near a dead point, which no leg that ships does.
 
 Everything is in the frame of the leg with O at the origin, after the mirror into the world's sense
 (`kinematics.mirror`), so that the world's x points forward and angles are counter-clockwise.
@@ -70,13 +71,14 @@ def by_name(values: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
 
 
 DEGREE = 5
-CELLS, ROCKING_CELLS = (1024, 1280, 1536, 2048), (6144,)
-"""Numbers of cells that are tried; of a crank that rocks, so many that it comes near to its ends."""
+CELLS = (1024, 1280, 1536, 2048, 3072, 4096, 6144)
+"""Numbers of cells that are tried."""
 
 ROW = float(FUNCTIONS * (DEGREE + 1))  # numbers in a row of the table
 
 DERIVATIVE_ERROR = 1e-9
-"""The number of cells is the smallest that keeps derivatives this good, relative to their largest value."""
+"""The number of cells is the smallest that keeps derivatives this good, relative to their largest value, or the
+largest where none does."""
 
 
 @kernel
@@ -138,7 +140,7 @@ class LegProfile:
         table: shape (cells, (DEGREE + 1) * FUNCTIONS): row j belongs to the crank angles within half a cell
             of 2 pi j / cells and holds the coefficients, highest power of the angle from there first, of the
             functions that have derivatives and then of the others. Of a crank that rocks, rows are NaN where
-            its links have no place, and in some 7 cells beside each end, for derivatives grow there without
+            its links have no place, and within some 1.5 degrees of each end, for derivatives grow there without
             bound.
         derivative_error: largest error of a derivative over its largest value, between the nodes [-].
 
@@ -148,7 +150,8 @@ class LegProfile:
 
     def __init__(self, geometry: Geometry, cells: int | None = None) -> None:
         self.geometry = geometry
-        for tried in (cells,) if cells else CELLS if geometry.full_turn else ROCKING_CELLS:
+        finest = CELLS if geometry.full_turn else CELLS[-1:]  # a rocking crank: as near to its ends as can be
+        for tried in (cells,) if cells else finest:
             self.cells, self.table = tried, _fit(geometry, tried)
             error = self._errors()
             while not geometry.full_turn and np.nanmax(error, initial=0.0) > DERIVATIVE_ERROR:
@@ -183,7 +186,7 @@ class LegProfile:
 
     def _errors(self) -> NDArray[np.float64]:
         """Largest error of a derivative in each cell over its largest value [-], NaN without a place."""
-        between = np.array([-0.49, -0.23, 0.06, 0.31, 0.48])
+        between = np.array([-0.4999, -0.23, 0.06, 0.31, 0.4999])
         theta = (np.arange(self.cells)[:, None] + between).ravel() * (2 * np.pi / self.cells)
         slope = self(theta)[1]
         known = np.isfinite(slope[:, 0])
@@ -262,9 +265,8 @@ def locate(leg, cells):  # type: ignore[no-untyped-def]
     not a number from its middle."""
     angle = leg.theta
     cell = (angle * (cells / TURN) + ROUNDER) - ROUNDER
-    # Whole turns that are taken off: too few by one where cell 0 begins, whose row is there at the end again.
-    turns = floor(angle * (1 / TURN) + (0.5 / cells - 1e-6))
-    row = smaller(cells, larger(0.0, cell - cells * turns))
+    # Cell 0 begins before its turn does: its row is there again at the end of the table.
+    row = smaller(cells, larger(0.0, cell - cells * floor(angle * (1 / TURN))))
     leg.row_begin = (row + leg.settings.first_row) * ROW + WHOLE
     leg.cell_angle = angle - cell * (TURN / cells)
 
