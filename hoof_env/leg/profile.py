@@ -77,8 +77,8 @@ CELLS = (1024, 1280, 1536, 2048, 3072, 4096, 6144)
 ROW = float(FUNCTIONS * (DEGREE + 1))  # numbers in a row of the table
 
 DERIVATIVE_ERROR = 1e-9
-"""The number of cells is the smallest that keeps derivatives this good, relative to their largest value, or the
-largest where none does."""
+"""The number of cells is the smallest that keeps derivatives this good, relative to their largest value, or
+the largest where none does."""
 
 
 @kernel
@@ -140,7 +140,7 @@ class LegProfile:
         table: shape (cells, (DEGREE + 1) * FUNCTIONS): row j belongs to the crank angles within half a cell
             of 2 pi j / cells and holds the coefficients, highest power of the angle from there first, of the
             functions that have derivatives and then of the others. Of a crank that rocks, rows are NaN where
-            its links have no place, and within some 1.5 degrees of each end, for derivatives grow there without
+            its links have no place, and within about a degree of each end, for derivatives grow there without
             bound.
         derivative_error: largest error of a derivative over its largest value, between the nodes [-].
 
