@@ -63,6 +63,22 @@ def test_the_lowest_joint_is_where_the_closed_form_has_it(theta, swing, pitch, s
         assert engine.advance() == result
 
 
+def test_of_a_larger_leg_the_farthest_joint_is_the_lowest():
+    """D right below O, the hoof beside them: only how far D comes from O says that it may be low."""
+    theta = np.linspace(0, 2 * np.pi, 1000)
+    joint = places(LEG, theta)[0][:, POINTS.index("D")]
+    k = np.argmax(np.abs(joint))
+    pitch, lowest = -np.pi / 2 - np.angle(joint[k]), 9.0 - 1.3 * np.abs(joint[k])
+    for below, result in ((-1e-6, Result.OK), (1e-6, Result.LOW_JOINT)):
+        engine = TrunkEngine(
+            Limb(LEG, (0.0, 0.0), Prescribed()), FREE, Ground(stiffness=100.0), sim_dt=1e-5, substeps=1,
+            limits=Limits(clearance=lowest + below),
+        )  # fmt: skip
+        engine.vary(0, limbs=[Limb(LEG.scaled(1.3), (0.0, 0.0), Prescribed())])
+        engine.reset(GaitParameters(0.0, 0.0, 0.0, 0.0), theta[k], y=9.0, pitch=pitch)
+        assert engine.advance() == result
+
+
 @pytest.mark.parametrize("leg", [LEG, ROCKER], ids=["turns", "rocks"])
 def test_no_joint_is_farther_from_the_crank_centre_than_limits_take_it_to_be(leg):
     z = places(leg, np.random.default_rng(0).uniform(0, 2 * np.pi, 10**5))[0]

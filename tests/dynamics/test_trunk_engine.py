@@ -13,6 +13,8 @@ from hoof_env.ground.contact import Ground
 from hoof_env.ground.laws import FRICTION_LAWS
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import load_geometry
+from hoof_env.leg.linkage import NUMBER
+from hoof_env.leg.profile import leg_profile, places
 from tests.legs import FIRST_FIT
 from tests.oracle.horse import PlainHorse
 
@@ -248,3 +250,20 @@ def _soles(engine, horse, now, e):
     ahead = (now.hoof_velocity * (normals(horse, now) / 1j).conj()).real
     found = np.stack([engine.report["toe_slide"], engine.report["heel_slide"]], 1)[..., e]
     return (("slide", found, ahead - now.give_rate[..., 1], max(1.0, np.abs(now.give_rate).max())),)
+
+
+def test_hoofs_are_where_the_closed_form_has_them_at_the_borders_of_turns_and_cells():
+    """Of two legs, whose tables lie one behind the other: cell 0 begins half a cell before its turn."""
+    legs = (IDENTIFIED, FIRST)
+    cell = 2 * np.pi / max(leg_profile(leg).cells for leg in legs)
+    off = np.array([-1.0, -0.5, -0.499, -1e-9, 0.0, 1e-9, 0.499, 0.5, 1.0]) * cell
+    theta = (off + 2 * np.pi * np.array([-7, -1, 0, 1, 1000])[:, None]).ravel()
+    trunk = Trunk("fixed", mass=1.0, height=9.0)
+    engine = TrunkEngine([Limb(leg) for leg in legs], trunk, Ground(stiffness=100.0), num_envs=len(theta))
+    engine.reset(GaitParameters(0.0, 0.0, 0.0, 0.0), np.tile(theta, (2, 1)))
+    engine.advance(steps=0)
+    for k, leg in enumerate(legs):
+        hoof = places(leg, theta)[0][:, [NUMBER[leg.toe], NUMBER[leg.heel]]]
+        for j, name in enumerate(("toe", "heel")):
+            found = engine.report[f"{name}_x"][k] + 1j * engine.report[f"{name}_y"][k]
+            np.testing.assert_allclose(found, hoof[:, j] + 9j, rtol=0, atol=1e-11)

@@ -1,5 +1,7 @@
 """`Horse-v0`: what it commands and what it may be told, how its reference gait goes, and how episodes end."""
 
+import copy
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -7,7 +9,9 @@ from family import HORSE, actions, make, same
 from horses import SPEEDS, played, random_gaits
 
 from hoof_env import Sb3VecEnv
-from hoof_env.envs.horse import MASS
+from hoof_env.dynamics.layout import Features
+from hoof_env.envs import reference, step
+from hoof_env.envs.horse import COMMAND_STEP, MASS
 from hoof_env.envs.reference import (
     COUPLING,
     FASTEST,
@@ -181,6 +185,34 @@ def test_the_reference_follows_the_command(size):
         seen |= set(now.target[:16].tolist())
     assert len(seen) >= 48
     assert min(seen) < SPEEDS[0] * size**0.5 < max(seen)
+
+
+def test_commands_are_drawn_as_numbers_between_their_bounds():
+    """One draw for the time and one for the speed, as `Generator.uniform` makes them."""
+    env = make(HORSE, target_speed=(1.3, 2.6), target_seconds=(0.5, 1.0))
+    env.reset(seed=3)
+    now, twin = env.batch.now, copy.deepcopy(env.np_random)
+    for _ in range(50):
+        if now.steps[0] + 1 == now.switch[0]:
+            break
+        env.step(np.zeros(16, np.float32))
+    env.step(np.zeros(16, np.float32))
+    steps, target = now.steps[0], now.target[0]
+    assert now.switch[0] == steps + round(twin.uniform(0.5, 1.0) / 0.02)
+    low, high = max(1.3, target - COMMAND_STEP), min(2.6, target + COMMAND_STEP)
+    assert now.next_target[0] == pytest.approx(twin.uniform(low, high), rel=1e-15)
+
+
+def test_kernels_are_others_where_the_number_of_stored_gaits_is(monkeypatch):
+    def name_of_kernel():
+        task, features = TASKS["horse"], Features(2, springs=True, animal=True)
+        found = step.step_kernels.__wrapped__(task.terms, task.entries, None, features, 4)
+        return found.step_batch.py_func.__qualname__
+
+    before, stored = name_of_kernel(), reference._reference()
+    assert name_of_kernel() == before
+    monkeypatch.setattr(reference, "_reference", lambda: tuple(values[::2] for values in stored))
+    assert name_of_kernel() != before
 
 
 def test_a_gait_that_is_given_lasts_while_commands_change():

@@ -16,6 +16,7 @@ from tests.legs import FIRST_FIT, PRESETS
 
 LEG = load_geometry(FIRST_FIT)
 SHORT = {"CF": 0.8 * LEG.lengths["CF"]}
+IDENTIFIED = load_geometry("identified")
 ROCKER = LEG.replace(lengths=SHORT, full_turn=False)
 
 
@@ -29,6 +30,15 @@ def errors(profile, theta):
 def test_it_is_the_closed_form(preset):
     profile = leg_profile(load_geometry(preset))
     value, slope = errors(profile, np.random.default_rng(0).uniform(-10, 10, 5000))
+    assert value < 1e-11
+    assert slope < 2 * profile.derivative_error < 2 * DERIVATIVE_ERROR
+
+
+@pytest.mark.parametrize(("link", "longer"), [("PB", 1.04), ("EF", 1.1)])
+def test_a_leg_nearer_to_a_dead_point_has_more_cells(link, longer):
+    profile = LegProfile(IDENTIFIED.replace(lengths={link: longer * IDENTIFIED.lengths[link]}))
+    value, slope = errors(profile, np.random.default_rng(0).uniform(-10, 10, 5000))
+    assert profile.cells > leg_profile(IDENTIFIED).cells
     assert value < 1e-11
     assert slope < 2 * profile.derivative_error < 2 * DERIVATIVE_ERROR
 
