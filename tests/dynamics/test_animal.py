@@ -64,9 +64,10 @@ def test_the_lowest_joint_is_where_the_closed_form_has_it(theta, swing, pitch, s
 
 
 def test_of_a_larger_leg_the_farthest_joint_is_the_lowest():
-    """D right below O, the hoof beside them: only how far D comes from O says that it may be low."""
+    """Right below O, the hoof beside them: only how far joints come from O says that one may be low."""
     theta = np.linspace(0, 2 * np.pi, 1000)
-    joint = places(LEG, theta)[0][:, POINTS.index("D")]
+    z = places(LEG, theta)[0][:, [k for k, point in enumerate(POINTS) if point not in "GIJ"]]
+    joint = z[:, np.argmax(np.abs(z).max(0))]
     k = np.argmax(np.abs(joint))
     pitch, lowest = -np.pi / 2 - np.angle(joint[k]), 9.0 - 1.3 * np.abs(joint[k])
     for below, result in ((-1e-6, Result.OK), (1e-6, Result.LOW_JOINT)):
