@@ -7,10 +7,11 @@ import copy
 import gymnasium as gym
 import numpy as np
 import pytest
-from family import IDS, actions, same
+from family import HORSE, IDS, actions, same
 from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 
 from hoof_env import Sb3VecEnv, make_policy, read_preset
+from hoof_env.envs.episode import episode_layout
 from hoof_env.errors import ParameterError
 from hoof_env.gait import load_gait
 
@@ -340,6 +341,18 @@ def test_states(kind, name):
     change, message = STATES[name]
     given = change(env.get_state())
     check_nothing_lost(env, twin, lambda e: e.set_state(given), message)
+
+
+@pytest.mark.parametrize(("row", "value"), [("weight", 0.0), ("gait", np.inf)])
+def test_states_of_a_horse_that_cannot_be(row, value):
+    """Of no weight, or of a gait without end, which would be found only as a failure of the next step."""
+    env = gym.make(HORSE).unwrapped
+    env.reset(seed=0)
+    state, before = env.get_state(), env.get_state()
+    state["episode"][episode_layout(len(env.batch.task.terms), 4).rows(row).start] = value
+    with pytest.raises(ParameterError, match=r"state\['episode'\]: expected numbers"):
+        env.set_state(state)
+    same(env.get_state(), before)
 
 
 @pytest.mark.parametrize(
