@@ -44,8 +44,8 @@ def forces(figures: Figures, shown: list[dict[str, Any]]) -> Any:
                 axes[row, column].plot(shape, "k--", lw=1, label="horse, idealised")
                 axes[row, column].legend(fontsize=7)
             axes[row, column].grid(alpha=0.3)
-        title = f"Fr {one['froude']:.2f}, duty {one['duty_fore']:.2f} / {one['duty_hind']:.2f}"
-        axes[0, column].set_title(title, fontsize=9)
+        duty = f", duty {one['duty_fore']:.2f} / {one['duty_hind']:.2f}" if len(figures) == 1 else ""
+        axes[0, column].set_title(f"Fr {one['froude']:.2f}{duty}", fontsize=9)
         axes[1, column].set_xlabel("stance [%]")
     for row, pair in enumerate(PAIRS):
         axes[row, 0].set_ylabel(f"{pair}: normal force [N/kg]")
