@@ -249,12 +249,12 @@ def write_card(
 
 def write_index(folder: Path) -> None:
     """Write README.md, the table of the policies in `folder`."""
-    rows = []
+    rows, beside = [], ("open-loop", "run", "reference")
     for path in sorted(folder.glob("*/score.json")):
         score = json.loads(path.read_text(encoding="utf-8"))
         algo = json.loads(path.with_name(runs.RECORD).read_text(encoding="utf-8"))["algo"]
         row = [f"`{score['env_id']}`", algo.upper()]
-        for name in ("policy", "open-loop", "run"):
+        for name in ("policy", *beside):
             one = score["policies"].get(name)
             row.append(Interval(one["mean"]["return"], *one["interval95"]["return"]).text(2) if one else "")
         rows.append([*row, f"[card]({path.parent.name}/card.md)"])
@@ -263,7 +263,7 @@ def write_index(folder: Path) -> None:
         "One for each id, made by `python -m agents.ship`; docs/agents.md says how to use them.\n"
         "Mean returns in the same episodes, and the bootstrap's 95 % interval.\n\n"
     )
-    titles = ["id", "policy", "return", "open-loop", "run", "card"]
+    titles = ["id", "policy", "return", *beside, "card"]
     runs.write_text(folder / "README.md", text + markdown_table(titles, rows) + "\n")
 
 
