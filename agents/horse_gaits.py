@@ -4,14 +4,15 @@ The search plays zero actions on `hoof_env/Horse-v0` around gaits of its own and
 with weights of its own.
 It begins from nothing at Froude number 0.25, and then asks for a little more speed every few generations, or
 for less, so that neighbours are alike: actions lie around what is between them. A second family, trot-like,
-is asked besides to land fore and hind hoofs at once, as horses do in a trot or a pace. What was found already
-is not searched for again.
+has the weights of the task and is asked besides to land fore and hind hoofs at once, as horses do in a trot
+or a pace. What was found already is not searched for again.
 """
 
 from __future__ import annotations
 
 import json
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,7 @@ from hoof_env.dynamics.parts import GRAVITY
 from hoof_env.envs.horse import HIP_HEIGHT
 from hoof_env.envs.policies import make_policy
 from hoof_env.envs.reference import LEGS, LIMITS, PAIRS, Stride, bounds
+from hoof_env.envs.tasks import TASKS
 from hoof_env.errors import HoofEnvError
 
 Floats = NDArray[np.float64]
@@ -45,8 +47,7 @@ STABLE, NEAR = 0.1, 0.05  # most falls, and distance of speeds, of what is shipp
 HARMONICS = 3  # of the trunk's motion
 FALLEN = 0.1  # share of falls at which the speed is raised no more
 TROT_FROUDE = 0.5  # where the trot-like family begins
-TROT_SLIP = 24.0  # weight of slip there, for with that of the walk hind hoofs slide
-LAG = 200.0  # what a stride between the landings of hind and fore hoofs costs a trot-like gait
+LAG = 600.0  # what a stride between the landings of hind and fore hoofs costs a trot-like gait
 TROT, SLIP = (
     0.05,
     0.1,
@@ -56,7 +57,11 @@ WEIGHTS = {
     "alive": 11.0, "tracking": 5.0, "peak": 0.35, "slip": 6.0, "landing": 0.3, "work": 0.5, "pitch": 4.0,
     "action": 0.03, "fall": 20.0,
 }  # fmt: skip
-"""Of the reward of a search: a first reward of the task, which charges less for slip than that of today."""
+"""Of the reward of the search for the reference gaits: a first reward of the task, which charges less for
+slip than that of today."""
+
+TROT_WEIGHTS = {"landing": 2.0}
+"""What the search for trot-like gaits changes of the task's: with less, hind hoofs land twice a stride."""
 
 CENTRE = (1.05, 0.45, -0.7, 0.0, 0.0)  # swing about which a search from nothing begins [rad]
 SPANS = (0.5, 0.4, 0.4, 0.3, 0.3)
@@ -77,12 +82,15 @@ def encode(gaits: Floats) -> Floats:
 
 
 class Course:
-    """Many horses that are asked for one speed [m/s], on ground of a stiffness [N/m^1.5] perhaps."""
+    """Many horses that are asked for one speed [m/s], on ground of a stiffness [N/m^1.5] perhaps. Weights of
+    the reward that are not given are the task's."""
 
-    def __init__(self, speed: float, num_envs: int, slip: float = WEIGHTS["slip"], **settings: Any) -> None:
+    def __init__(
+        self, speed: float, num_envs: int, weights: Mapping[str, float] = WEIGHTS, **settings: Any
+    ) -> None:
         envs: Any = gym.make_vec(
             "hoof_env/Horse-v0", num_envs, num_threads=2, target_speed=speed,
-            autoreset_mode=AutoresetMode.SAME_STEP, reward_weights=WEIGHTS | {"slip": slip},
+            autoreset_mode=AutoresetMode.SAME_STEP, reward_weights=weights,
             **{"episode_seconds": SECONDS, **settings},
         )  # fmt: skip
         self.envs, self.steps = envs, int(envs.unwrapped.batch.steps_per_episode)
@@ -137,7 +145,8 @@ class Search:
 
     Args:
         first: a gait to begin with, shape (16,); None is from nothing.
-        lag: what a stride between the landings of hind and fore hoofs costs.
+        lag: what a stride between the landings of hind and fore hoofs costs; with any, the weights are the
+            task's.
     """
 
     def __init__(self, seed: int, first: Floats | None = None, lag: float = 0.0) -> None:
@@ -158,7 +167,7 @@ class Search:
 
     def run(self, speed: float, generations: int, tick: Any) -> dict[str, Any]:
         """Search on at a commanded speed [m/s]; what the mean of the distribution is worth there."""
-        course = Course(speed, POPULATION * STARTS, TROT_SLIP if self.lag else WEIGHTS["slip"])
+        course = Course(speed, POPULATION * STARTS, TROT_WEIGHTS if self.lag else WEIGHTS)
         for _ in range(generations):
             points = self.strategy.ask()
             gaits = np.repeat(self.gaits(points), STARTS, axis=0)
@@ -245,17 +254,15 @@ class Finder:
                 break
         return steps
 
-    def family(
-        self, name: str, froude: float = FROUDE, first: Floats | None = None, lag: float = 0.0
-    ) -> None:
-        """A gait from nothing, or from another, and where more and less speed lead from there."""
+    def family(self, name: str, froude: float = FROUDE, lag: float = 0.0) -> None:
+        """A gait from nothing, and where more and less speed lead from there."""
         args, speed = self.args, speed_of(froude)
         begins = [
             self.keep(
                 f"{name} {seed}",
-                lambda tick, seed=seed: [Search(seed, first, lag).run(speed, args.generations, tick)],
+                lambda tick, seed=seed: [Search(seed, lag=lag).run(speed, args.generations, tick)],
             )[0]
-            for seed in range(args.restarts if first is None else 1)
+            for seed in range(args.restarts)
         ]
         best = np.array(max(begins, key=lambda one: float(one["return"]))["gait"])
         for way, ratio, last in (("faster", STEP, 8.0), ("slower", 1 / STEP, speed_of(LOWEST) / STEP)):
@@ -306,8 +313,8 @@ def slip_at(gait: list[float], speed: float) -> float:
 def shipped(searches: dict[str, Any]) -> dict[str, Any]:
     """What comes with the package, but for how the trunk moves. Gaits go by the speed that they have, not by
     the one that was asked for; of those within `NEAR` of a knot it is the one that slips least. By name there
-    are the reference at Froude number 0.25, the fastest one, and the fastest trot-like one that slips
-    little."""
+    are the reference at Froude number 0.25, the fastest one of all, and of the trot-like ones that slip little
+    the fastest that the task may command."""
 
     def steps_of(family: str) -> list[dict[str, Any]]:
         begins = [found["steps"][0] for name, found in searches.items() if name[:-1] == f"{family} "]
@@ -320,14 +327,18 @@ def shipped(searches: dict[str, Any]) -> dict[str, Any]:
         close = [step for step in steps if abs(step["speed_m_s"] / speed - 1) < NEAR]
         return min(close, key=lambda step: float(step["slip_m"])) if close else None
 
+    def may_be_commanded(trot: dict[str, Any]) -> bool:
+        speed = trot["speed_m_s"]
+        return bool(speed <= TASKS["horse"].speeds[1] and slip_at(trot["gait"], speed) < SLIP)
+
     free = steps_of("free")
     trots = sorted(steps_of("trot-like"), key=lambda step: -float(step["speed_m_s"]))
     trots = [step for step in trots if step["lag"] < TROT]
     knots = {step["speed_m_s"]: step["gait"] for speed in KNOTS if (step := near(free, speed))}
     named = {
         "walk": near(free, KNOTS[2]),
-        "fast": max(free, key=lambda step: float(step["speed_m_s"]), default=None),
-        "trot-like": next((step for step in trots if slip_at(step["gait"], step["speed_m_s"]) < SLIP), None),
+        "fast": max(free + trots, key=lambda step: float(step["speed_m_s"]), default=None),
+        "trot-like": next((step for step in trots if may_be_commanded(step)), None),
     }
     return {
         "reference": {"speeds": list(knots), "gaits": list(knots.values())},
@@ -342,9 +353,7 @@ def main(argv: list[str] | None = None) -> None:
     args = tyro.cli(Args, args=argv, prog="python -m agents.horse_gaits", description=__doc__)
     finder = Finder(args)
     finder.family("free")
-    faster = finder.content["searches"]["free, faster"]["steps"]
-    first = min(faster, key=lambda step: abs(float(step["speed"]) - speed_of(TROT_FROUDE)))
-    finder.family("trot-like", TROT_FROUDE, np.array(first["gait"]), LAG)
+    finder.family("trot-like", TROT_FROUDE, LAG)
     found = shipped(finder.content["searches"])
     reference = found["reference"]
     each = zip(reference["gaits"], reference["speeds"], strict=True)
