@@ -29,7 +29,6 @@ from hoof_env.dynamics.parts import GRAVITY
 from hoof_env.envs.horse import HIP_HEIGHT
 from hoof_env.envs.policies import make_policy
 from hoof_env.envs.reference import LEGS, LIMITS, PAIRS, Stride, bounds
-from hoof_env.envs.tasks import TASKS
 from hoof_env.errors import HoofEnvError
 
 Floats = NDArray[np.float64]
@@ -40,7 +39,7 @@ POPULATION, STARTS, SECONDS = 32, 8, 5.0
 FIRST, NEXT = 0.4, 0.05  # spread of a search from nothing, and at least where the speed changes
 STEP = 1.03  # ratio of one speed to the next
 FROUDE = 0.25  # where the search begins
-LOWEST = 0.1  # Froude number at which the slower gaits end
+LOWEST, HIGHEST = 0.1, 1.0  # Froude numbers that the task commands; the slower gaits end at the first
 KNOTS = (1.2, 1.5, 1.85, 2.2, 2.6, 3.0, 3.4)  # speeds that the reference gaits have, about [m/s]
 MOST = 40  # steps of speed at most
 STABLE, NEAR = 0.1, 0.05  # most falls, and distance of speeds, of what is shipped [-]
@@ -313,8 +312,8 @@ def slip_at(gait: list[float], speed: float) -> float:
 def shipped(searches: dict[str, Any]) -> dict[str, Any]:
     """What comes with the package, but for how the trunk moves. Gaits go by the speed that they have, not by
     the one that was asked for; of those within `NEAR` of a knot it is the one that slips least. By name there
-    are the reference at Froude number 0.25, the fastest one of all, and of the trot-like ones that slip little
-    the fastest that the task may command."""
+    are the reference at Froude number 0.25, the fastest one of all, and the fastest that the task may command
+    of the trot-like ones that slip little."""
 
     def steps_of(family: str) -> list[dict[str, Any]]:
         begins = [found["steps"][0] for name, found in searches.items() if name[:-1] == f"{family} "]
@@ -328,8 +327,8 @@ def shipped(searches: dict[str, Any]) -> dict[str, Any]:
         return min(close, key=lambda step: float(step["slip_m"])) if close else None
 
     def may_be_commanded(trot: dict[str, Any]) -> bool:
-        speed = trot["speed_m_s"]
-        return bool(speed <= TASKS["horse"].speeds[1] and slip_at(trot["gait"], speed) < SLIP)
+        speed = float(trot["speed_m_s"])
+        return speed <= speed_of(HIGHEST) and slip_at(trot["gait"], speed) < SLIP
 
     free = steps_of("free")
     trots = sorted(steps_of("trot-like"), key=lambda step: -float(step["speed_m_s"]))
