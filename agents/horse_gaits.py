@@ -4,8 +4,8 @@ The search plays zero actions on `hoof_env/Horse-v0` around gaits of its own and
 with weights of its own.
 It begins from nothing at Froude number 0.25, and then asks for a little more speed every few generations, or
 for less, so that neighbours are alike: actions lie around what is between them. A second family, trot-like,
-has the weights of the task and is asked besides to land fore and hind hoofs at once, as horses do in a trot
-or a pace. What was found already is not searched for again.
+has the weights of the task and is asked besides to land fore and hind hoofs at once, and once a stride, as
+horses do in a trot or a pace. What was found already is not searched for again.
 """
 
 from __future__ import annotations
@@ -81,8 +81,8 @@ def encode(gaits: Floats) -> Floats:
 
 
 class Course:
-    """Many horses that are asked for one speed [m/s], on ground of a stiffness [N/m^1.5] perhaps. Weights of
-    the reward that are not given are the task's."""
+    """Many horses that are asked for one speed [m/s], on ground of a stiffness [N/m^1.5] perhaps. Terms of
+    the reward that `weights` lacks have the task's."""
 
     def __init__(
         self, speed: float, num_envs: int, weights: Mapping[str, float] = WEIGHTS, **settings: Any
@@ -144,8 +144,8 @@ class Search:
 
     Args:
         first: a gait to begin with, shape (16,); None is from nothing.
-        lag: what a stride between the landings of hind and fore hoofs costs; with any, the weights are the
-            task's.
+        lag: what a stride between the landings of hind and fore hoofs costs; with any, the weights are
+            `TROT_WEIGHTS`.
     """
 
     def __init__(self, seed: int, first: Floats | None = None, lag: float = 0.0) -> None:
