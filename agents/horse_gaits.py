@@ -47,10 +47,8 @@ HARMONICS = 3  # of the trunk's motion
 FALLEN = 0.1  # share of falls at which the speed is raised no more
 TROT_FROUDE = 0.5  # where the trot-like family begins
 LAG = 600.0  # what a stride between the landings of hind and fore hoofs costs a trot-like gait
-TROT, SLIP = (
-    0.05,
-    0.1,
-)  # largest lag [strides] and slip of a stance [m] of what is shipped as trot-like: as for agents
+TROT, SLIP = 0.05, 0.1
+"""Largest lag [strides] and slip of a stance [m] of what is shipped as trot-like: as for agents."""
 
 WEIGHTS = {
     "alive": 11.0, "tracking": 5.0, "peak": 0.35, "slip": 6.0, "landing": 0.3, "work": 0.5, "pitch": 4.0,

@@ -231,7 +231,7 @@ def start() -> dict[str, float]:
         return float(done.stdout)
 
     with tempfile.TemporaryDirectory() as folder:
-        load = "from hoof_env.envs.batch import compile_kernels"
+        load = "from hoof_env.envs.compile_ahead import compile_kernels"
         cold = {"NUMBA_CACHE_DIR": folder, "HOOF_ENV_QUIET": "1"}
         compiled = seconds_of("compile_kernels(lambda line: None)", load, **cold)
     imported = float(np.median([seconds_of("import hoof_env") for _ in range(5)]))

@@ -222,7 +222,7 @@ def compile() -> None:
     They are kept in the folder NUMBA_CACHE_DIR. Environments with a hoof_stiffness, an engine with four
     legs and `reproduce` have more of their own, which the first use compiles.
     """
-    from hoof_env.envs.batch import compile_kernels
+    from hoof_env.envs.compile_ahead import compile_kernels
 
     compile_kernels(_say)
 

@@ -5,7 +5,7 @@ is compiled by the first test that wants it.
 """
 
 from benchmarks.scenes import engine, scenes
-from hoof_env.envs.batch import compile_kernels
+from hoof_env.envs.compile_ahead import compile_kernels
 from hoof_env.paper.reproduce import run_cycle
 from research.identify.leg import encode
 from research.identify.objective import Objective

@@ -374,4 +374,4 @@ def account(features: Features = PLAIN) -> tuple[str, ...]:
     return (*Account.names, *("hoof_stored", "hoof_loss")[: 2 * features.springs])
 
 
-LEG_STATE, STRIDE_SUMS, ACCOUNT = leg_state(), stride_sums(), account()
+LEG_STATE, ACCOUNT = leg_state(), account()

@@ -7,8 +7,7 @@ number of its neighbours: starts are drawn from a generator of its own, and the 
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -41,11 +40,10 @@ from hoof_env.envs.parameters import (
 )
 from hoof_env.envs.reward import check_weights
 from hoof_env.envs.settings import Settings
-from hoof_env.envs.tasks import TASKS, Task
+from hoof_env.envs.tasks import Task
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait import GaitParameters
 from hoof_env.leg.profile import leg_profile
-from hoof_env.simd.cache import COMPILED, given_folder
 from hoof_env.simd.layout import views
 from hoof_env.simd.threads import run_together
 from hoof_env.simd.user_functions import what_cannot_be_compiled
@@ -500,31 +498,3 @@ class EpisodeBatch:
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
         self._open()
-
-
-KERNELS: dict[str, Callable[[], object]] = {
-    "one environment": lambda: EpisodeBatch(TASKS["leg"], TASKS["leg"].settings({}), 1),
-    "many side by side": lambda: EpisodeBatch(TASKS["leg"], TASKS["leg"].settings({}), LANES),
-    "the paper's solver": lambda: EpisodeBatch(
-        TASKS["fixed"], TASKS["fixed"].settings({"solver": "paper"}), 1
-    ),
-    "one horse": lambda: EpisodeBatch(TASKS["horse"], TASKS["horse"].settings({}), 1),
-    "many horses": lambda: EpisodeBatch(TASKS["horse"], TASKS["horse"].settings({}), LANES),
-}
-"""What uses kernels of its own; all ids share these, and all settings but `hoof_stiffness` of one leg, and
-`harmonics` and a rigid hoof of a horse."""
-
-
-def compile_kernels(say: Callable[[str], None]) -> list[str]:
-    """Compile what is not in numba's cache, telling of each of `KERNELS`; returns the names of those kernels.
-    `OutputError` where there is something to compile and the cache folder is not writable."""
-    first = len(COMPILED)
-    for name, make in KERNELS.items():
-        begun, count = time.monotonic(), len(COMPILED)
-        make()
-        if found := COMPILED[count:]:
-            say(f"{name}: {time.monotonic() - begun:.1f} s for {', '.join(found)}")
-    folder = given_folder() or "numba's own folders; NUMBA_CACHE_DIR names another"
-    compiled = COMPILED[first:]
-    say(f"{f'{len(compiled)} kernels compiled' if compiled else 'nothing to compile'}; they are in {folder}")
-    return compiled

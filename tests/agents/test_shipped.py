@@ -42,6 +42,15 @@ def test_every_id_has_a_policy():
     assert all(f"({path.name}/card.md)" in index for path in FOLDERS)
 
 
+def test_the_index_is_what_the_command_writes(tmp_path):
+    for folder in FOLDERS:
+        (tmp_path / folder.name).mkdir()
+        for name in ("score.json", "run.json"):
+            shutil.copy(folder / name, tmp_path / folder.name)
+    ship.write_index(tmp_path)
+    assert (tmp_path / "README.md").read_text() == (ship.POLICIES / "README.md").read_text()
+
+
 @SHIPPED
 def test_score(folder):
     score = read(folder / "score.json")
@@ -52,7 +61,8 @@ def test_score(folder):
     assert checked_mean(policy, score) == pytest.approx(recorded, abs=allowed)
     assert allowed < 0.2 * recorded  # so that it can fail
     assert recorded > max(
-        score["policies"].get(name, {"mean": {"return": 0.0}})["mean"]["return"] for name in ("run", "walk")
+        score["policies"].get(name, {"mean": {"return": 0.0}})["mean"]["return"]
+        for name in ("run", "walk", "reference")
     )
 
 

@@ -290,10 +290,10 @@ def test_compiling_is_said_once_and_only_when_it_happens(start, tmp_path):
 def test_all_kernels_are_told_once_and_then_there_is_nothing_to_compile(start, tmp_path):
     (tmp_path / "go").touch()
     code = """
-        from hoof_env.envs import batch
+        from hoof_env.envs import compile_ahead
         import tiny
-        batch.KERNELS = {"two kernels": lambda: tiny.tiny(3.0)}
-        batch.compile_kernels(print)
+        compile_ahead.KERNELS = {"two kernels": lambda: tiny.tiny(3.0)}
+        compile_ahead.compile_kernels(print)
     """
     out, _ = ended(start(code))
     first, second = out.splitlines()
@@ -308,7 +308,7 @@ def test_an_environment_has_all_its_kernels_once_it_is_made(start):
     code = """
         import numpy as np
         from hoof_env.simd.cache import KernelCache
-        from hoof_env.envs import batch
+        from hoof_env.envs.compile_ahead import KERNELS
         from hoof_env.envs.horse_leg import HorseLegEnv
         from hoof_env.envs.vector import HorseLegVectorEnv
         wanted, load = [], KernelCache.load_overload
@@ -320,7 +320,7 @@ def test_an_environment_has_all_its_kernels_once_it_is_made(start):
             HorseLegEnv, lambda: HorseLegVectorEnv(8), lambda: HorseLegEnv(task="fixed", solver="paper"),
             lambda: HorseLegEnv(task="horse"), lambda: HorseLegVectorEnv(8, task="horse"),
         )
-        for compile_ahead, make in zip(batch.KERNELS.values(), makers, strict=True):
+        for compile_ahead, make in zip(KERNELS.values(), makers, strict=True):
             compile_ahead()
             print(len(wanted) > 0, end=" ")
             wanted.clear()

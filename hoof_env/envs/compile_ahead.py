@@ -1,0 +1,38 @@
+"""Compile the kernels of all environments before any is made."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from hoof_env.dynamics.advance import LANES
+from hoof_env.envs.batch import EpisodeBatch
+from hoof_env.envs.tasks import TASKS
+from hoof_env.simd.cache import COMPILED, given_folder
+
+KERNELS: dict[str, Callable[[], object]] = {
+    "one environment": lambda: EpisodeBatch(TASKS["leg"], TASKS["leg"].settings({}), 1),
+    "many side by side": lambda: EpisodeBatch(TASKS["leg"], TASKS["leg"].settings({}), LANES),
+    "the paper's solver": lambda: EpisodeBatch(
+        TASKS["fixed"], TASKS["fixed"].settings({"solver": "paper"}), 1
+    ),
+    "one horse": lambda: EpisodeBatch(TASKS["horse"], TASKS["horse"].settings({}), 1),
+    "many horses": lambda: EpisodeBatch(TASKS["horse"], TASKS["horse"].settings({}), LANES),
+}
+"""What uses kernels of its own; all ids share these, and all settings but `hoof_stiffness` of one leg, and
+`harmonics` and a rigid hoof of a horse."""
+
+
+def compile_kernels(say: Callable[[str], None]) -> list[str]:
+    """Compile what is not in numba's cache, telling of each of `KERNELS`; returns the names of those kernels.
+    `OutputError` where there is something to compile and the cache folder is not writable."""
+    first = len(COMPILED)
+    for name, make in KERNELS.items():
+        begun, count = time.monotonic(), len(COMPILED)
+        make()
+        if found := COMPILED[count:]:
+            say(f"{name}: {time.monotonic() - begun:.1f} s for {', '.join(found)}")
+    folder = given_folder() or "numba's own folders; NUMBA_CACHE_DIR names another"
+    compiled = COMPILED[first:]
+    say(f"{f'{len(compiled)} kernels compiled' if compiled else 'nothing to compile'}; they are in {folder}")
+    return compiled
