@@ -200,8 +200,9 @@ def test_of_all_policies_there_are_means_and_intervals():
 def test_only_the_forces_of_one_policy_are_titled_with_its_duty_factors():
     curves = {"fore": [0.0] * 101, "hind": [0.0] * 101}
     one = {"speed": 1.85, "froude": 0.25, "duty_fore": 0.46, "duty_hind": 0.5, "curves": curves}
-    for figures, title in (({"a": [one]}, "Fr 0.25, duty 0.46 / 0.50"), ({"a": [one], "b": [one]}, "Fr 0.25")):
-        assert judge_pictures.forces(figures, [one]).axes[0].get_title() == title
+    for names, title in (("a", "Fr 0.25, duty 0.46 / 0.50"), ("ab", "Fr 0.25")):
+        picture = judge_pictures.forces({name: [one] for name in names}, [one])
+        assert picture.axes[0].get_title() == title
 
 
 def test_the_command_writes_figures_a_table_and_pictures(tmp_path, capsys):
