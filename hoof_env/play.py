@@ -14,16 +14,14 @@ from numpy.typing import NDArray
 
 from hoof_env import records
 from hoof_env.errors import HoofEnvError, check_number, parse_pairs
-from hoof_env.gait import GaitParameters
+from hoof_env.gait import PARAMETERS, GaitParameters
 from hoof_env.render.instant import HorseInstant
 
 HELD = {
     "up": (0, 1), "down": (0, -1), "right": (1, 1), "left": (1, -1),
     "w": (2, 1), "s": (2, -1), "d": (3, 1), "a": (3, -1),
 }  # fmt: skip
-"""What a key does while it is held: which entry of the action it moves, and which way."""
-
-RATE = 0.8  # how fast a held key moves its entry of the action [1/s]; the whole range is 2
+"""What a key does while it is held: which entry of the action it sets to 1, and with which sign."""
 
 HELP = (
     (("up, down", "crank faster, slower"), ("left, right", "swing offset"), ("w, s", "swing sine")),
@@ -41,7 +39,7 @@ class Game:
         seed: of the first episode; each further one takes the next.
 
     Attributes:
-        action: what is commanded, in [-1, 1]: four numbers, or those of each of a horse's legs.
+        action: of the last step, in [-1, 1]: four numbers, or those of each of a horse's legs.
         news: what happened since the last tick or restart.
         score: sum of the rewards of the episode, of all objectives alike.
         paused, ended, quit: whether it waits, the episode is over, or the player has left.
@@ -60,12 +58,10 @@ class Game:
     def restart(self) -> None:
         """Begin a new episode with the gait that it starts in."""
         options = {"gait": self._gait} if self._gait else {}
-        _, info = self._env.reset(seed=self._seed, options=options)
+        self._env.reset(seed=self._seed, options=options)
         self._seed += 1
-        gait = info.get("gait")
         self.action: NDArray[np.float32] = np.zeros(self._env.action_space.shape, np.float32)
-        if gait and not self._of_horse:  # whose actions lie around it
-            self.action = self._leg.action_for(GaitParameters(**gait))
+        self._wanted: Any = None
         self.news = self._happened()
         self.score = 0.0
         self.distance_from = way_of(self.news[0])
@@ -81,23 +77,34 @@ class Game:
         elif key == "space":
             self.paused = not self.paused
         elif key == "0":
-            self.action[::4] = -1.0
-        elif key.isdecimal() and 0 < int(key) <= len(self.gaits) and self._of_horse:
-            self._gait = self.gaits[int(key) - 1]
-            self.restart()
+            self._stop_the_crank()
         elif key.isdecimal() and 0 < int(key) <= len(self.gaits):
-            self.action = self._leg.action_for(self._leg.gaits[self.gaits[int(key) - 1]])
+            self._gait = self.gaits[int(key) - 1]
+            if self._of_horse:
+                self.restart()
+            else:
+                self._wanted = self._leg.gaits[self._gait]
+
+    def _stop_the_crank(self) -> None:
+        """Keep the swing as it is; a horse's cranks cannot be stopped."""
+        if not self._of_horse:
+            state = self._leg.engine.state
+            swing = (float(state[name][0, 0]) for name in PARAMETERS[1:])
+            self._wanted = GaitParameters(0.0, *swing)
 
     def tick(self, held: Collection[str] = ()) -> None:
         """One control step with these keys held down; nothing moves while the game is paused or over."""
         self.news = []
         if self.paused or self.ended:
             return
-        for key in held:
-            if key in HELD:
-                entry, way = HELD[key]
-                moved = self.action[entry::4] + way * RATE * self.dt  # of a horse in all legs alike
-                self.action[entry::4] = np.clip(moved, -1.0, 1.0)
+        moves = [HELD[key] for key in held if key in HELD]
+        if moves:
+            self._wanted = None
+        self.action = np.zeros_like(self.action)
+        if self._wanted is not None:
+            self.action = self._leg.action_for(self._wanted)
+        for entry, way in moves:
+            self.action[entry::4] = way  # of a horse in all legs alike
         _, reward, failed, truncated, info = self._env.step(self.action.copy())
         self.score += float(np.sum(reward))
         self.news = self._happened()
@@ -113,8 +120,7 @@ class Game:
         return "paused; space goes on" if self.paused else ""
 
     def _happened(self) -> list[Any]:
-        command = None if self._of_horse else self._leg.command_of(self.action)
-        return records.instants_of(self._env, records.substeps(self._env, command))
+        return records.instants_of(self._env, records.substeps(self._env))
 
 
 def way_of(now: Any) -> float:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 import hoof_env
 from hoof_env._output import check_folder, staged
 from hoof_env.dynamics.memory import LIFT_OFF
-from hoof_env.envs.policies import Scripted, load_open_loop, make_policy, policy_names
+from hoof_env.envs.policies import constant_gait, load_open_loop, make_policy, policy_names, start_of
 from hoof_env.errors import (
     MissingExtraError,
     OutputError,
@@ -74,14 +74,14 @@ def setting(env: Any) -> Setting:
         ) from None
 
 
-def substeps(env: Any, command: NDArray[np.float64] | None = None) -> Columns:
+def substeps(env: Any) -> Columns:
     """What happened in the last control step of an environment of this package, one row a substep, or the
-    start after a reset; `command`, shape (4,), is what was commanded of one leg, if known."""
+    start after a reset, with what was commanded."""
     leg = env.unwrapped
+    command = leg.engine.command_in(leg.engine.column(0))
     if hips := leg.batch.body.hips:
-        engine = leg.engine
-        return columns_of_horse(leg.record(), hips, leg.terrain, command=engine.command_in(engine.column(0)))
-    return columns_of_engine(leg.record(), leg.terrain, command=command)
+        return columns_of_horse(leg.record(), hips, leg.terrain, command=command)
+    return columns_of_engine(leg.record(), leg.terrain, command=command[0])
 
 
 def instants_of(env: Any, columns: Columns) -> list[Any]:
@@ -129,8 +129,7 @@ def find_policy(name: str | None, env: gym.Env[Any, Any], env_id: str, seed: int
     except ValueError:
         numbers = []
     if len(numbers) == len(PARAMETERS):
-        action = env.unwrapped.action_for(GaitParameters(*numbers))  # type: ignore[attr-defined]
-        return Scripted(lambda observation, time: action, setting(env).dt)
+        return constant_gait(GaitParameters(*numbers), env, starts_in_it=True)
     raise ParameterError(
         f"policy: expected a name ({', '.join(names)}, open-loop), four gait parameters as "
         f"6.28,0.7,-0.2,-0.3, or the path of a trained model or a gait's .json, got {name!r}"
@@ -152,10 +151,8 @@ def episode(
     """
     if seconds is not None:
         check_number("seconds", seconds, low=0, exclusive_low=True)
-    leg: Any = env.unwrapped
-    observation, info = env.reset(seed=seed, options=dict(options or {}))
-    gait, of_horse = info.get("gait"), bool(setting(env).hips)
-    here = substeps(env, np.array([gait[name] for name in PARAMETERS]) if gait and not of_horse else None)
+    observation, _ = env.reset(seed=seed, options=start_of(policy) | dict(options or {}))
+    here = substeps(env)
     yield here | (_named(env, joints.now()) if joints else {})
     start, ended = np.ones(1, bool), False
     while not ended and (seconds is None or here["time"][-1] < seconds - 1e-9):
@@ -164,7 +161,7 @@ def episode(
         observation, _, failed, truncated, _ = env.step(action)
         start, ended = np.zeros(1, bool), failed or truncated
         before = here["time"][-1]
-        here = substeps(env, None if of_horse else leg.command_of(np.asarray(action, np.float32)))
+        here = substeps(env)
         if here["time"][-1] > before:  # else the simulation failed and nothing happened
             if joints and began is not None:
                 here |= _named(env, joints.after(began, len(here["time"])))

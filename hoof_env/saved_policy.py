@@ -73,13 +73,20 @@ def describe(env: Any) -> dict[str, Any]:
     """What an environment says of what it takes and gives: spaces, and names where it has them."""
     keys = ("observation_names", "action_names")
     told = {key: list(names) for key in keys if (names := getattr(env.unwrapped, key, None))}
-    return describe_spaces(env) | told
+    return describe_spaces(env) | told | describe_actions(env)
+
+
+def describe_actions(env: Any) -> dict[str, str]:
+    """What the actions of an environment of this package are, to be kept beside a policy; empty for another
+    package's."""
+    form = getattr(env.unwrapped, "action_form", None)
+    return {"actions": form} if form else {}
 
 
 def describe_env(env: gym.Env[Any, Any]) -> dict[str, Any]:
     """What run.json says of an environment: spaces and all settings."""
     settings = settings_of(env)
-    return describe_spaces(env) | ({"settings": settings} if settings else {})
+    return describe_spaces(env) | describe_actions(env) | ({"settings": settings} if settings else {})
 
 
 def settings_of(env: Any) -> dict[str, Any]:
@@ -95,6 +102,8 @@ def settings_of(env: Any) -> dict[str, Any]:
 def refuse_misfit(path: Path, there: dict[str, Any], here: dict[str, Any]) -> None:
     """`DataFileError` where a policy was trained for something else than what is `here`."""
     unlike = [f"{key} {there[key]}, expected {x}" for key, x in here.items() if there.get(key, x) != x]
+    if there and "actions" in here and "actions" not in there:
+        unlike.insert(0, f"actions of an older form (positions in a box), expected {here['actions']}")
     if unlike:
         (one, old), (other, new) = (str(of.get("env_id")).rpartition("-v")[::2] for of in (there, here))
         if one == other != "" and old != new:

@@ -89,7 +89,7 @@ class TrunkEngine(Scene):
         reactions: compute the joint reactions of every step; `reactions()` has those of the last.
         strides: count stances, peak forces and work; `strides` has them.
         limits: where the motion should end, see `parts.Result`. An engine with limits, if only `Limits()`,
-            takes legs of other sizes in `vary`, and its `strides` have slip and horizontal impulses.
+            takes legs of other sizes in `vary`, and its `strides` have horizontal impulses.
         contact_law: instead of the ground's normal law, see `hoof.law_of`.
 
     Attributes:

@@ -30,7 +30,7 @@ class Features(NamedTuple):
     Attributes:
         harmonics: of the swing law, 1 to `gait.MOST_HARMONICS`.
         springs: in series with the ground at each hoof point, see `parts.HoofSpring`.
-        animal: legs of other sizes in some environments, limits of the motion, slip and horizontal impulses.
+        animal: legs of other sizes in some environments, limits of the motion, horizontal impulses.
     """
 
     harmonics: int = 1
@@ -214,7 +214,7 @@ class StrideSums(Layout):
     loaded_time: Row  # [s]
     stances: Row  # that began
     travel: Row  # backward, of the hoof along the ground, weighted with the load [m]
-    slip: Annotated[Block, ANIMAL]  # in stance, the same without sign, so that to and fro adds up [m]
+    slip: Row  # in stance, the same without sign, so that to and fro adds up [m]
     braking: Annotated[Block, ANIMAL]  # impulse of the ground backward [N s]
     propulsion: Annotated[Block, ANIMAL]  # forward [N s]
 
@@ -364,8 +364,8 @@ def stride_sums(features: Features = PLAIN) -> tuple[str, ...]:
     """Names of the rows of `StrideSums`."""
     return (
         "peak_increase", "running_peak_increase", "loading_rate_increase", "highest", "positive_work",
-        "load_impulse", "loaded_time", "stances", "travel",
-        *("slip", "braking", "propulsion")[: 3 * features.animal],
+        "load_impulse", "loaded_time", "stances", "travel", "slip",
+        *("braking", "propulsion")[: 2 * features.animal],
     )  # fmt: skip
 
 

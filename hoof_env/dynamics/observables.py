@@ -153,11 +153,11 @@ def count_stride(trunk, leg, form, h):  # type: ignore[no-untyped-def]
     per_load = h / choose(down, load, 1.0)
     slid = leg.toe.normal_force * leg.toe.sliding_speed + leg.heel.normal_force * leg.heel.sliding_speed
     leg.sums.travel = leg.sums.travel - choose(down, slid * per_load, 0.0)
+    rubbed = leg.toe.normal_force * size(leg.toe.sliding_speed)
+    rubbed = rubbed + leg.heel.normal_force * size(leg.heel.sliding_speed)
+    # in stance alone: a sole without mass flies back as it is unloaded, which is no slip of the hoof
+    leg.sums.slip = leg.sums.slip + choose(loaded, rubbed * per_load, 0.0)
     if form.animal:
-        slid = leg.toe.normal_force * size(leg.toe.sliding_speed)
-        slid = slid + leg.heel.normal_force * size(leg.heel.sliding_speed)
-        # in stance alone: a sole without mass flies back as it is unloaded, which is no slip of the hoof
-        leg.sums.slip[0] = leg.sums.slip[0] + choose(loaded, slid * per_load, 0.0)
         leg.sums.braking[0] = leg.sums.braking[0] + h * larger(-push.real, 0.0)
         leg.sums.propulsion[0] = leg.sums.propulsion[0] + h * larger(push.real, 0.0)
 
@@ -202,9 +202,9 @@ def stance_figures(sums: Mapping[str, Floats], seconds: ArrayLike, turns: ArrayL
 
     Returns:
         "peak", mean of the stances' highest resultant forces, and "mean", of the normal force while the hoof
-        bears load [N]; "duty", part of the time that it does [-]; "stances_per_turn" [-]; and of an engine
-        with limits "slip" of a stance [m], "braking" and "propulsion", mean horizontal forces backward and
-        forward while the hoof bears load [N]. Not a number where there was no stance.
+        bears load [N]; "duty", part of the time that it does [-]; "stances_per_turn" [-]; "slip" of a
+        stance [m]; and of an engine with limits "braking" and "propulsion", mean horizontal forces backward
+        and forward while the hoof bears load [N]. Not a number where there was no stance.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         stances, loaded = sums["stances"] / (sums["stances"] > 0), sums["loaded_time"]
@@ -213,8 +213,8 @@ def stance_figures(sums: Mapping[str, Floats], seconds: ArrayLike, turns: ArrayL
             "mean": sums["load_impulse"] / loaded,
             "duty": loaded / np.asarray(seconds),
             "stances_per_turn": sums["stances"] / np.asarray(turns),
+            "slip": sums["slip"] / stances,
         }
-        if "slip" in sums:
-            found["slip"] = sums["slip"] / stances
+        if "braking" in sums:
             found |= {name: sums[name] / loaded for name in ("braking", "propulsion")}
     return found

@@ -188,20 +188,28 @@ class LegBase:
         """What every environment has, as an array; a single environment gives its own."""
         return np.array(values)
 
-    def command_of(self, action: Any) -> NDArray[np.float64]:
-        """Gait parameters that an action commands, shape (4,); the action is clipped to [-1, 1]."""
-        return self.batch.body.command_of(action)
+    @property
+    def action_form(self) -> str:
+        """What actions are: "rates" of the gait parameters of one leg, or "offsets" from a horse's gait. It
+        is in states and in files of policies, so that none of another form is taken."""
+        form: str = self.batch.body.action_form
+        return form
 
     def action_for(self, gait: str | GaitParameters | NDArray[np.float64]) -> NDArray[np.float32]:
-        """The action that commands a gait, to float32 precision; the nearest one if it is out of reach.
+        """The action that goes towards a gait from the present one, as fast as is allowed: given again at
+        every step it ends there and keeps it. Shape (4,); of many environments (num_envs, 4).
 
         Args:
-            gait: the name of one of `gaits`, or its four parameters; as an array also many, shape (n, 4).
+            gait: the name of one of `gaits`, or its four parameters; as an array also many, shape
+                (num_envs, 4).
 
         Raises:
             ParameterError: an unknown name, or not four parameters.
+            ResetNeeded: there is no episode yet, so no present gait.
         """
-        return self.batch.body.action_for(gait)
+        self._check_started("action_for")
+        actions: NDArray[np.float32] = self._each(self.batch.body.action_for(gait, self.engine))
+        return actions
 
     def _check_open(self, call: str) -> None:
         if self._phase == "closed":
@@ -215,12 +223,16 @@ class LegBase:
     def _check_state(self, state: Any, *parts: str) -> None:
         """`ParameterError` unless `state` is one that `get_state` of such an environment gave."""
         self._check_open("set_state")
-        names = ("id", "settings", "engine", "episode", "generator", *parts)
+        names = ("id", "actions", "settings", "engine", "episode", "generator", *parts)
         missing = [name for name in names if not isinstance(state, Mapping) or name not in state]
         if missing:
             raise ParameterError(f"state: expected what get_state gives, but {', '.join(missing)} is missing")
         if state["id"] != self.task.id:
             raise ParameterError(f"state: expected one of {self.task.id}, got one of {state['id']}")
+        if state["actions"] != self.action_form:
+            raise ParameterError(
+                f"state: expected one whose actions are {self.action_form}, got {state['actions']!r}"
+            )
         there = state["settings"] if isinstance(state["settings"], Mapping) else {}
         here = to_json(self.settings)
         unlike = [f"{k}: {v!r} here, {there.get(k)!r} there" for k, v in here.items() if there.get(k) != v]
@@ -230,4 +242,5 @@ class LegBase:
     def _state_of_batch(self) -> dict[str, Any]:
         """What `get_state` gives but for the generators."""
         self._check_started("get_state")
-        return {"id": self.task.id, "settings": to_json(self.settings), **self.batch.get_state()}
+        about = {"id": self.task.id, "actions": self.action_form, "settings": to_json(self.settings)}
+        return about | self.batch.get_state()

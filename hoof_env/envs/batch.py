@@ -38,7 +38,7 @@ from hoof_env.envs.parameters import (
     resolved,
     substeps_of,
 )
-from hoof_env.envs.reward import check_weights
+from hoof_env.envs.reward import BEARING, LONGEST_STRIDE, check_weights
 from hoof_env.envs.settings import Settings
 from hoof_env.envs.tasks import Task
 from hoof_env.errors import ParameterError, check_choice, check_number
@@ -125,7 +125,7 @@ class EpisodeBatch:
         self.paper = PaperSolver(s, self.engine, self.substeps) if is_paper else None
         self._varied = np.zeros(num_envs, bool)
         self.begun = np.full((self.begun_rows + len(self.randomize), num_envs), np.nan)
-        self.names = [entry.name for entry in observed(self.groups, s.trunk, task.entries)]
+        self.names = [entry.name for entry in observed(self.groups, s.trunk, s.drive, task.entries)]
         if not self.names:
             raise ParameterError(f"observation: nothing of {s.observation!r} is observed on a fixed trunk")
         columns = self.engine.columns
@@ -172,7 +172,8 @@ class EpisodeBatch:
 
     def _open(self) -> None:
         """Find the arrays where they are now, and the kernels."""
-        self.entries = observed(self.groups, self.settings.trunk, self.task.entries)
+        s = self.settings
+        self.entries = observed(self.groups, s.trunk, s.drive, self.task.entries)
         self.now = views(self._episode_layout, self.episode)
         self.measurements = Measurements(self.engine.features, self.body.legs)
         self._kernels = k = kernels.step_kernels(
@@ -300,6 +301,7 @@ class EpisodeBatch:
         for name in SUMS:
             getattr(now, name)[which] = 0.0
         self.rewards[which] = 0.0
+        now.allowance[which] = BEARING * LONGEST_STRIDE
         now.terms[:, which], now.target[which], now.switch[which] = 0.0, np.inf, np.inf
         if self.target_speed:
             now.target[which] = self.target_speed[0]
@@ -312,10 +314,10 @@ class EpisodeBatch:
         self.engine.reset(start.commands, start.theta, envs=which, **start.trunk)
         begun = [*(start.begun[name] for name in self.body.start_names), *start.gaits.T]
         self.begun[:, which] = [*begun, *(drawn[name] for name in self.randomize)]
-        now.action[:, which] = start.action.T
         now.x_before[which], now.ended[which] = start.trunk["x"], 0.0
         if self.body.legs > 1:
             now.gait[:, which] = start.gaits.T
+            now.offset[:, which] = 0.0
         if self.paper:
             self.paper.start(which.tolist(), start.gaits, start.begun["crank_angle"], start.begun["x"])
         near = self.addresses.copy()  # the groups of lanes from the first of them to the last
@@ -410,8 +412,8 @@ class EpisodeBatch:
         whole time), stance_peak_sum_n, stances, loading_rate_n_s (mean over stances), duty_factor,
         drive_work_j (braking is not recovered), cost_of_transport (work per weight and distance; infinite
         without forward progress), weight_share (mean normal force over weight: what the leg bore),
-        support_share (the rest: what the rail or the suspension bore), failed (0 or 1); of a horse slip_m
-        (mean over stances), and mean, sum and duty factor are of all its legs.
+        support_share (the rest: what the rail or the suspension bore), slip_m (mean over stances), failed
+        (0 or 1); of a horse mean, sum and duty factor are of all its legs.
         """
         seconds, distance, work, impulse, loaded, stances, peaks, rates, highest, slip = (
             getattr(self.now, name)[envs] for name in SUMS
@@ -419,7 +421,6 @@ class EpisodeBatch:
         weight, time = self.now.weight[envs], np.maximum(seconds, 1e-12)
         mean, each = impulse / time, np.maximum(stances, 1.0)
         steps = np.rint(seconds / self.dt)
-        slid = {"slip_m": slip / each} if self.engine.features.animal else {}
         cost = np.full(len(work), np.inf)
         np.divide(work, weight * distance, out=cost, where=distance > 0)
         return {
@@ -432,7 +433,7 @@ class EpisodeBatch:
             "stances": stances,
             "loading_rate_n_s": rates / each,
             "duty_factor": loaded / time / self.body.legs,
-            **slid,
+            "slip_m": slip / each,
             "drive_work_j": work,
             "cost_of_transport": cost,
             "weight_share": mean / weight,

@@ -34,8 +34,8 @@ ACTION, REWARD = Size("action", ACTIONS), Size("reward", len(TERMS))
 class Episode(Layout):
     """Memory of an episode."""
 
-    action: Annotated[Block, ACTION]  # the last one, clipped to its limits
     steps: Row  # control steps so far
+    allowance: Row  # impulse over the weight that bearing is still paid for [s], see `reward.BEARING`
     x_before: Row  # x of the trunk before this step [m]
     target: Row  # commanded speed [m/s]; infinite if there is none
     weight: Row  # of trunk and leg [N]
@@ -59,6 +59,7 @@ class HorseEpisode(Episode):
     """That of a horse."""
 
     gait: GaitRows  # around which its actions lie
+    offset: Annotated[Block, ACTION]  # what actions have made of it so far, 1 is the whole span
 
 
 @cache
@@ -97,7 +98,7 @@ def task_type(terms: int, entries: int, gait: int = ACTIONS, legs: int = 1) -> n
     """The record of a task's constants."""
     return np.dtype(
         [
-            ("base", "f8", (gait,)), ("half", "f8", (gait,)),  # command = base + half action
+            ("reach", "f8", (gait,)), ("half", "f8", (gait,)),  # of an action of 1; of a range
             ("low", "f8", (gait,)), ("high", "f8", (gait,)),  # within these
             ("middle", "f8", (gait,)), ("rate_bound", "f8", (gait,)),  # (value - middle) / half is observed
             ("weights", "f8", (terms,)), ("episode_seconds", "f8"),  # of the reward

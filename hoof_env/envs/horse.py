@@ -14,6 +14,7 @@ dimension. The ground's stiffness and the time steps are the world's and stay.
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
@@ -70,8 +71,9 @@ SAG = MASS * GRAVITY / (4 * TASKS["horse"].defaults["hoof_stiffness"])  # of two
 UNKNOWN: dict[str, Any] = {"vx": 1.0, "vy": 0.0, "pitch": 0.0, "pitch_rate": 0.0}
 """How a trunk starts in a gait that is not a reference gait."""
 
-SPANS = (1.0, 0.2, 0.2, 0.2)
-"""What an action of 1 changes: of the crank's speed [-], of the swing's offset, sine and cosine [rad]."""
+SPANS = tuple(float(x) for x in os.environ.get("SPANS", ".5,.06,.06,.06").split(","))
+"""What actions of 1 change after a while: of the crank's speed [-], of the swing's offset, sine and cosine
+[rad]."""
 
 STEP_ERROR = 0.03
 """With 0.01 semi-implicit Euler would take three steps for a millisecond; speeds, peaks and duty factors of
@@ -112,6 +114,7 @@ class Horse:
     """
 
     legs, action_names = COUNT, tuple(f"{leg}_{name}" for leg, name in product(LEGS, PARAMETERS))
+    action_form = "offsets"
     step_error = STEP_ERROR
     start_names, gait_names = ("phase", "speed", "pitch", "x"), NAMES
 
@@ -224,8 +227,8 @@ class Horse:
             begun["x"] = anywhere(engine.terrain, begun["x"], options, generators)
         begun |= {name: np.full(n, options[name]) for name in begun if name in options}
         commands = np.zeros((self.legs, 2 + 2 * self.harmonics, n))
-        theta, action = PHASE_SPREAD * off[:, 3:].T, np.zeros((n, len(self.action_names)), np.float32)
-        return Start(begun, np.empty(0), commands, theta, {}, action)
+        theta = PHASE_SPREAD * off[:, 3:].T
+        return Start(begun, np.empty(0), commands, theta, {})
 
     def settle(self, start: Start, targets: Floats, options: Mapping[str, Any], engine: TrunkEngine) -> None:
         """Complete starts with the gaits of the commanded speeds [m/s]. In a reference gait the trunk moves
@@ -284,14 +287,7 @@ class Horse:
         found[:, 0] /= self.pace
         return found
 
-    def command_of(self, action: Any) -> NoReturn:
-        """There is none: `ParameterError`."""
-        raise ParameterError(
-            "command_of: expected an environment of one leg; what an action of a horse commands depends on"
-            " the angles of its cranks, and is in info['measured']"
-        )
-
-    def action_for(self, gait: Any) -> NoReturn:
+    def action_for(self, gait: Any, engine: TrunkEngine) -> NoReturn:
         """There is none: `ParameterError`."""
         raise ParameterError(
             "action_for: expected an environment of one leg; actions of a horse lie around a gait, zeros are"

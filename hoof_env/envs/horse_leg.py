@@ -121,7 +121,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     def step(
         self, action: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
-        """Command the gait parameters for `dt`.
+        """Change the gait for `dt`, by the rates of its parameters, or by offsets to a horse's gait.
 
         Args:
             action: 4 finite numbers, clipped to [-1, 1].
@@ -296,14 +296,14 @@ OBJECTIVES = ("progress", "peak force", "energy")
 def vector_reward(terms: Mapping[str, Any]) -> NDArray[np.float32]:
     """The reward of each objective, shape (3,), from the terms that `info` holds.
 
-    Energy takes the charge for changing the action, which is effort too, the peak force that for its rate,
-    and progress what is paid for bearing weight and charged for speed beyond the commanded one. A failure is
+    Energy takes the charge for sliding, which is lost to friction, the peak force that for its rate, and
+    progress what is paid for bearing weight and charged for speed beyond the commanded one. A failure is
     charged to all three in equal parts: under preference weights that sum to 1 a fall costs the same,
     whatever the weights, so that falling early to save force or energy pays under none.
     """
     progress = terms["reward_progress"] + terms["reward_support"] + terms["reward_overspeed"]
     peak = terms["reward_peak"] + terms["reward_loading"]
-    energy = terms["reward_energy"] + terms["reward_action"]
+    energy = terms["reward_energy"] + terms["reward_slip"]
     return np.array([progress, peak, energy], np.float32) + np.float32(terms["reward_failure"] / 3)
 
 

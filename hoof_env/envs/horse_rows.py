@@ -6,9 +6,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from hoof_env.envs.observation import PLAIN, TRUTH, Entry, Scale, in_contact, tanh_of
+from hoof_env.envs.observation import PLAIN, TRUE_RATE, TRUTH, Entry, Scale, in_contact, tanh_of
 from hoof_env.envs.reference import LEGS
-from hoof_env.envs.reward import TERMS, Term
+from hoof_env.envs.reward import Term
 from hoof_env.gait import PARAMETERS, WIDEST
 from hoof_env.ground.terrain import surface
 from hoof_env.simd import choose, larger, nth, size, smaller
@@ -65,13 +65,14 @@ def _filter_rate(k: int) -> Callable[[Any], Any]:
     return lambda leg: leg.state.gait_rate[k]
 
 
-def _action(k: int) -> Callable[[Any], Any]:
-    return lambda scene: scene.episode.action[k]
+def _offset(k: int) -> Callable[[Any], Any]:
+    return lambda scene: scene.episode.offset[k]
 
 
 _PER_LEG: tuple[tuple[str, str, str, Callable[[Any], Any], Scale], ...] = (
     ("sin(crank angle)", "crank", "-", _sine, PLAIN),
     ("cos(crank angle)", "crank", "-", _cosine, PLAIN),
+    (TRUE_RATE, "crank", "rad/s", lambda leg: leg.state.theta_rate, tanh_of(10.0)),
     ("crank speed", "gait", "rad/s", _filter(0), tanh_of(10.0)),
     ("swing offset", "gait", "rad", _filter(1), _in_bounds(1)),
     ("swing sine coefficient", "gait", "rad", _filter(2), _in_bounds(2)),
@@ -104,8 +105,8 @@ HORSE_ENTRIES = (
     ),
     *(
         Entry(
-            f"previous action: {leg.replace('_', ' ')}, {name.replace('_', ' ')}", "action", "-",
-            _action(len(PARAMETERS) * i + k), PLAIN,
+            f"offset: {leg.replace('_', ' ')}, {name.replace('_', ' ')}", "offset", "-",
+            _offset(len(PARAMETERS) * i + k), PLAIN,
         )
         for i, leg in enumerate(LEGS)
         for k, name in enumerate(PARAMETERS)
@@ -161,8 +162,6 @@ def fall(step, weight):  # type: ignore[no-untyped-def]
     return choose(step.failed > 0.0, -weight, 0.0)
 
 
-_ACTION = next(term for term in TERMS if term.name == "action")
-
 HORSE_TERMS = (
     Term("alive", 45.0, "1/s", "for every second", alive),
     Term(
@@ -185,7 +184,6 @@ HORSE_TERMS = (
         "minus the positive work of all drives over the weight times the commanded distance", work,
     ),
     Term("pitch", 3.0, "1/(s rad^2)", "minus the square of the trunk's pitch", pitch),
-    _ACTION,
     Term("fall", 15.0, "-", "once, minus this, when the episode fails", fall),
 )  # fmt: skip
 """The terms of `Horse-v0`."""

@@ -224,7 +224,7 @@ def _rows(table: str, values: Mapping[str, str] | None = None) -> list[tuple[str
 
 def _observed(what: Task) -> list[observation.Entry]:
     settings = what.settings({})
-    return observation.observed(settings.observation, settings.trunk, what.entries)
+    return observation.observed(settings.observation, settings.trunk, settings.drive, what.entries)
 
 
 def _features(s: Settings, body: Horse | OneLeg) -> Features:

@@ -110,6 +110,7 @@ def tanh_of(scale: float, text: str = "") -> Scale:
 
 PLAIN, TRUTH = Scale("none"), Scale("0 or 1")
 IN_WEIGHTS = Scale("tanh(x / 3 weights)", lambda x, scene: x / (3.0 * scene.episode.weight), True)
+RISE = Scale("tanh(x / (30 weights / s))", lambda x, scene: x / (30.0 * scene.episode.weight), True)
 
 
 def _height(x, scene):  # type: ignore[no-untyped-def]
@@ -136,10 +137,6 @@ def _gait(k: int) -> Callable[[Any], Any]:
 
 def _gait_rate(k: int) -> Callable[[Any], Any]:
     return lambda scene: scene.leg.state.gait_rate[k]
-
-
-def _action(k: int) -> Callable[[Any], Any]:
-    return lambda scene: scene.episode.action[k]
 
 
 def _sine(scene):  # type: ignore[no-untyped-def]
@@ -170,12 +167,16 @@ def _ahead(distance: float) -> Callable[[Any], Any]:
     return rise
 
 
+TRUE_RATE = "true rate of the crank"
+"""What a motor makes of the commanded one; observed where there is a motor."""
+
 _PARAMETERS = ("crank speed", "swing offset", "swing sine coefficient", "swing cosine coefficient")
 _UNITS = ("rad/s", "rad", "rad", "rad")
 
 ENTRIES = (
     Entry("sin(crank angle)", "crank", "-", _sine, PLAIN),
     Entry("cos(crank angle)", "crank", "-", _cosine, PLAIN),
+    Entry(TRUE_RATE, "crank", "rad/s", lambda s: s.leg.state.theta_rate, _in_range(0)),
     *(Entry(name, "gait", _UNITS[k], _gait(k), _in_range(k)) for k, name in enumerate(_PARAMETERS)),
     *(
         Entry(f"rate of {name}", "gait", "rad/s^2" if k == 0 else "rad/s", _gait_rate(k), _in_rate(k))
@@ -187,6 +188,7 @@ ENTRIES = (
         "height", "trunk", "m", lambda s: s.trunk.report.place.imag,
         Scale("tanh((x - hip height) / 0.3)", _height, True),
     ),
+    Entry("bearing allowance", "trunk", "s", lambda s: s.episode.allowance, PLAIN),
     Entry("toe contact", "hoof", "-", lambda s: in_contact(s.leg.state.toe), TRUTH),
     Entry("heel contact", "hoof", "-", lambda s: in_contact(s.leg.state.heel), TRUTH),
     Entry("toe load", "hoof", "N", lambda s: s.leg.report.toe.normal, IN_WEIGHTS),
@@ -194,10 +196,7 @@ ENTRIES = (
     Entry("toe approach speed", "hoof", "m/s", lambda s: _approach_speed(s.leg.state.toe), tanh_of(2.0)),
     Entry("heel approach speed", "hoof", "m/s", lambda s: _approach_speed(s.leg.state.heel), tanh_of(2.0)),
     Entry("running peak force", "hoof", "N", lambda s: s.leg.strides.running_peak, IN_WEIGHTS),
-    *(
-        Entry(f"previous action: {name}", "action", "-", _action(k), PLAIN)
-        for k, name in enumerate(_PARAMETERS)
-    ),
+    Entry("steepest rise of the force", "hoof", "N/s", lambda s: s.leg.strides.steepest_rise, RISE),
     Entry("commanded speed", "target", "m/s", lambda s: s.episode.target, tanh_of(5.0)),
     *(Entry(f"height of the ground {x:g} m ahead", "ground", "m", _ahead(x), tanh_of(0.5)) for x in AHEAD),
 )  # fmt: skip
@@ -210,13 +209,24 @@ def groups_of(entries: Iterable[Entry]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(entry.group for entry in entries))
 
 
-def observed(groups: Iterable[str], trunk: str, entries: tuple[Entry, ...] = ENTRIES) -> list[Entry]:
-    """The entries of some groups on a kind of trunk: what cannot move is not observed."""
-    absent = {"fixed": ("forward speed", "vertical speed", "height"), "rail": ("vertical speed", "height")}
-    still = absent.get(trunk, ())
-    return [
-        entry for group in groups for entry in entries if entry.group == group and entry.name not in still
-    ]
+ABSENT = {
+    "fixed": ("forward speed", "vertical speed", "height", "bearing allowance"),
+    "rail": ("vertical speed", "height", "bearing allowance"),
+}
+"""What is not observed on a kind of trunk: what cannot move, and what is never borne."""
+
+
+def observed(
+    groups: Iterable[str], trunk: str, drive: str = "prescribed", entries: tuple[Entry, ...] = ENTRIES
+) -> list[Entry]:
+    """The entries of some groups on a kind of trunk, with a kind of drive."""
+
+    def is_observed(entry: Entry) -> bool:
+        if entry.name.endswith(TRUE_RATE):
+            return drive == "motor"
+        return entry.name not in ABSENT.get(trunk, ())
+
+    return [entry for group in groups for entry in entries if entry.group == group and is_observed(entry)]
 
 
 def check_groups(groups: Any, known: Iterable[str]) -> tuple[str, ...]:

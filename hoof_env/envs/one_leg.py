@@ -17,17 +17,56 @@ from hoof_env.envs.parameters import drive_of, ground_of, hoof_spring, pair
 from hoof_env.envs.settings import Settings
 from hoof_env.envs.start import HIGHEST, LOWEST, Start, check_options, draw_starts
 from hoof_env.errors import ParameterError, check_choice, check_number
-from hoof_env.gait import PARAMETERS, GaitParameters, HarmonicGait, gait_names, load_gait
+from hoof_env.gait import PARAMETERS, FilterSettings, GaitParameters, HarmonicGait, gait_names, load_gait
 from hoof_env.ground.contact import Ground, load_ground
 from hoof_env.leg.geometry import load_geometry, named, wrong
 
 Floats = NDArray[np.float64]
 
 
+def reach_of(s: Settings) -> Floats:
+    """How far from the gait as it is an action of 1 puts the command, shape (4,) [rad/s, rad, rad, rad].
+
+    A filter that follows a steady rate lags 1 / gain behind its command, and a command stands for a control
+    step, of which half has passed in the mean.
+
+    Raises:
+        ParameterError: a rate is not above 0, or beyond the bound of the filters.
+    """
+    filters = FilterSettings()
+    crank = check_number("crank_rate", s.crank_rate, low=0, high=filters.crank_rate, exclusive_low=True)
+    swing = check_number("swing_rate", s.swing_rate, low=0, high=filters.swing_rate, exclusive_low=True)
+    return np.array([crank, swing, swing, swing]) * (1 / filters.gain + s.dt / 2)
+
+
+AT_REST = 1e-6
+"""Differences from a gait that are as good as none [rad/s, rad]: observations are rounded to float32."""
+
+
+def action_towards(gaits: Floats, now: Floats, reach: Floats) -> NDArray[np.float32]:
+    """Actions that go towards gaits, shape (..., 4), from those of now as fast as is allowed, and stop there.
+
+    Args:
+        gaits, now: gait parameters [rad/s, rad, rad, rad].
+        reach: see `reach_of`.
+    """
+    gap = gaits - now
+    gap = np.where(np.abs(gap) < AT_REST, 0.0, gap)
+    return np.clip(gap / reach, -1.0, 1.0).astype(np.float32)
+
+
+def gait_now(engine: TrunkEngine) -> Floats:
+    """Gait parameters of the first leg at present, shape (num_envs, 4)."""
+    state = engine.state
+    return np.stack([state[name][0] for name in PARAMETERS], axis=-1)
+
+
 class OneLeg:
     """A leg under a trunk; attributes and methods are as of `horse.Horse`."""
 
-    legs, action_names, harmonics, filters, limits = 1, PARAMETERS, 1, None, None
+    legs, harmonics, filters, limits = 1, 1, None, None
+    action_names = tuple(f"rate_of_{name}" for name in PARAMETERS)
+    action_form = "rates"
     hips: Mapping[str, tuple[float, float]] = MappingProxyType({})
     step_error, command_step = 0.01, math.inf
     start_names, gait_names = ("crank_angle", "speed", "height", "x"), PARAMETERS
@@ -46,7 +85,7 @@ class OneLeg:
                 )
         self.gait = None if s.gait is None else self.gaits[check_choice("gait", s.gait, self.gaits)]
         self._spring = hoof_spring(s)
-        self._base = MIDDLE if self.gait is None else self.gait.to_array()
+        self.reach = reach_of(s)
         nominal = self.geometry.hip_height
         height = nominal if s.hip_height is None else s.hip_height
         self.height = check_number("hip_height", height, low=LOWEST * nominal, high=HIGHEST * nominal)
@@ -67,7 +106,7 @@ class OneLeg:
     def constants(self) -> dict[str, Any]:
         """Of the task's record."""
         return {
-            "base": self._base, "middle": MIDDLE, "half": HALF_RANGE, "low": LOW, "high": HIGH,
+            "reach": self.reach, "middle": MIDDLE, "half": HALF_RANGE, "low": LOW, "high": HIGH,
             "height": self.height, "lowest": LOWEST * self.height, "highest": HIGHEST * self.height,
         }  # fmt: skip
 
@@ -79,31 +118,24 @@ class OneLeg:
         self, options: Mapping[str, Any], generators: Sequence[np.random.Generator], engine: TrunkEngine
     ) -> Start:
         """Starts of episodes; see `start.draw_starts`."""
-        start = draw_starts(
+        return draw_starts(
             options, generators, engine.profiles[0], engine.trunk, self.gaits, engine.terrain, self.gait
         )
-        start.action = self.action_for(start.gaits)
-        return start
 
     def settle(self, start: Start, targets: Floats, options: Any, engine: TrunkEngine) -> None:
         """Nothing depends on the commanded speeds."""
 
-    def command_of(self, action: Any) -> Floats:
-        """See `LegBase.command_of`; they are clipped to their limits."""
-        wanted = self._base + HALF_RANGE * np.clip(np.asarray(action, np.float64), -1.0, 1.0)
-        return np.clip(wanted, LOW, HIGH)
-
-    def action_for(self, gaits: str | GaitParameters | Floats) -> NDArray[np.float32]:
-        """See `LegBase.action_for`."""
+    def action_for(self, gaits: str | GaitParameters | Floats, engine: TrunkEngine) -> NDArray[np.float32]:
+        """See `LegBase.action_for`; shape (num_envs, 4)."""
         if isinstance(gaits, str):
             gaits = self.gaits[check_choice("gait", gaits, self.gaits)]
         try:
             values = gaits.to_array() if isinstance(gaits, GaitParameters) else np.asarray(gaits, np.float64)
         except (TypeError, ValueError):
             values = np.empty(0)
-        if values.shape[-1:] != (len(self.action_names),) or not np.isfinite(values).all():
+        if values.shape[-1:] != (len(PARAMETERS),) or not np.isfinite(values).all():
             raise ParameterError(
                 f"gait: expected one of {', '.join(self.gaits)}, GaitParameters or an array of shape (4,) or "
                 f"(n, 4), got {gaits!r}"
             )
-        return np.clip((values - self._base) / HALF_RANGE, -1, 1).astype(np.float32)
+        return action_towards(values, gait_now(engine), self.reach)

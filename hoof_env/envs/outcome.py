@@ -3,35 +3,30 @@
 from __future__ import annotations
 
 from hoof_env.dynamics.limits import has_moved
-from hoof_env.envs.episode import ACTIONS, FAILED, TRUNCATED
-from hoof_env.envs.reward import Outcome
-from hoof_env.simd import choose, lane_of, larger, level, nth, read
+from hoof_env.envs.episode import FAILED, TRUNCATED
+from hoof_env.envs.reward import BEARING, LONGEST_STRIDE, Outcome
+from hoof_env.simd import choose, lane_of, larger, nth, smaller
 from hoof_env.simd.compile import inlined
-from hoof_env.simd.math import clip
 
 
 @inlined
-def remember_action(actions, episode, legs, n):  # type: ignore[no-untyped-def]
-    """Keep the clipped action; returns the mean square of its change."""
-    change, count = level(episode, 0.0), legs * ACTIONS
-    for k in range(count):
-        action = clip(read(episode, actions, n * count + k, count), 1.0)
-        difference = action - episode.action[k]
-        change = change + difference * difference
-        episode.action[k] = action
-    return change * (1.0 / count)
+def bear(episode, impulse, seconds):  # type: ignore[no-untyped-def]
+    """What of an impulse over the weight [s] bearing is paid for: all within the allowance, and what goes
+    beyond it is taken off again. The allowance grows with time and is used up by the impulse."""
+    allowance = smaller(episode.allowance + BEARING * seconds, BEARING * LONGEST_STRIDE)
+    borne = smaller(impulse, allowance)
+    episode.allowance = allowance - borne
+    return borne - (impulse - borne)
 
 
 @inlined
 def sum_up(first_leg, layouts):  # type: ignore[no-untyped-def]
     """What all legs did in the step, and the highest of their forces."""
-    sums, slip = first_leg.sums, 0.0 * first_leg.sums.travel
+    sums, slip = first_leg.sums, first_leg.sums.slip
     running_peak_increase, peak_grf_increase = sums.running_peak_increase, sums.peak_grf_increase
     loading_rate_increase, highest_grf = sums.loading_rate_increase, sums.highest_grf
     positive_work, normal_impulse = sums.positive_work, sums.normal_impulse
     loaded_time, stances = sums.loaded_time, sums.stances
-    if layouts.animal:
-        slip = sums.slip[0]
     for i in range(1, layouts.legs):
         sums = nth(first_leg, i).sums
         running_peak_increase = running_peak_increase + sums.running_peak_increase
@@ -42,8 +37,7 @@ def sum_up(first_leg, layouts):  # type: ignore[no-untyped-def]
         normal_impulse = normal_impulse + sums.normal_impulse
         loaded_time = loaded_time + sums.loaded_time
         stances = stances + sums.stances
-        if layouts.animal:
-            slip = slip + sums.slip[0]
+        slip = slip + sums.slip
     return (
         running_peak_increase, peak_grf_increase, loading_rate_increase, highest_grf, positive_work,
         normal_impulse, loaded_time, stances, slip,
@@ -51,7 +45,7 @@ def sum_up(first_leg, layouts):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def find_outcome(task, trunk, leg, episode, layouts, action_change):  # type: ignore[no-untyped-def]
+def find_outcome(task, trunk, leg, episode, layouts):  # type: ignore[no-untyped-def]
     """What the step brought."""
     works = has_moved(trunk.result)  # else the state is of before: nothing is paid
     x, y = trunk.report.place.real, trunk.report.place.imag
@@ -60,8 +54,11 @@ def find_outcome(task, trunk, leg, episode, layouts, action_change):  # type: ig
     if task.stays:
         progress = leg.sums.travel
     episode.x_before = x
+    seconds = choose(works, task.dt, 0.0)
+    impulse = choose(works, impulse, 0.0)
+    borne = bear(episode, impulse / episode.weight, seconds)
     return Outcome(
-        seconds=choose(works, task.dt, 0.0),
+        seconds=seconds,
         progress=choose(works, progress, 0.0),
         commanded_progress=task.dt * episode.target,
         running_peak_increase=choose(works, running, 0.0),
@@ -69,11 +66,11 @@ def find_outcome(task, trunk, leg, episode, layouts, action_change):  # type: ig
         loading_rate_increase=choose(works, loading, 0.0),
         highest_grf=choose(works, highest, 0.0),
         positive_work=choose(works, work, 0.0),
-        normal_impulse=choose(works, impulse, 0.0),
+        normal_impulse=impulse,
+        borne=borne,
         loaded_time=choose(works, loaded, 0.0),
         stances=choose(works, stances, 0.0),
         slip=choose(works, slip, 0.0),
-        action_change=action_change,
         failed=choose((trunk.result == 0.0) & (y > task.lowest) & (y < task.highest), 0.0, 1.0),
         episode_seconds=task.episode_seconds,
         weight=episode.weight,
@@ -118,8 +115,8 @@ def outcome_of_one(outcome, lane, trunk, leg, episode):  # type: ignore[no-untyp
         lane_of(outcome.commanded_progress, lane), lane_of(outcome.running_peak_increase, lane),
         lane_of(outcome.peak_grf_increase, lane), lane_of(outcome.loading_rate_increase, lane),
         lane_of(outcome.highest_grf, lane), lane_of(outcome.positive_work, lane),
-        lane_of(outcome.normal_impulse, lane), lane_of(outcome.loaded_time, lane),
-        lane_of(outcome.stances, lane), lane_of(outcome.slip, lane), lane_of(outcome.action_change, lane),
+        lane_of(outcome.normal_impulse, lane), lane_of(outcome.borne, lane),
+        lane_of(outcome.loaded_time, lane), lane_of(outcome.stances, lane), lane_of(outcome.slip, lane),
         lane_of(outcome.failed, lane),
         outcome.episode_seconds, lane_of(outcome.weight, lane), trunk, leg, episode,
     )  # fmt: skip

@@ -173,9 +173,13 @@ class PaperSolver:
         friction = trace["toe_friction"] + trace["heel_friction"]
         force = np.sqrt(normal * normal + friction * friction)
         sliding = trace["toe_normal"] * trace["toe_slide"] + trace["heel_normal"] * trace["heel_slide"]
-        columns = trace["theta"], normal, force, sliding, trace["crank_power"], trace["hip_power"]
-        growth = higher = steeper = work = travel = 0.0
-        for theta, n, f, slid, crank, hip in zip(*(values.tolist() for values in columns), strict=True):
+        rubbing = trace["toe_normal"] * np.abs(trace["toe_slide"])
+        rubbing = rubbing + trace["heel_normal"] * np.abs(trace["heel_slide"])
+        powers = trace["crank_power"], trace["hip_power"]
+        columns = trace["theta"], normal, force, sliding, rubbing, *powers
+        growth = higher = steeper = work = travel = slip = 0.0
+        rows = zip(*(values.tolist() for values in columns), strict=True)
+        for theta, n, f, slid, rubbed, crank, hip in rows:
             grown = since.add(theta, n, f, h)
             growth, higher, steeper = growth + grown[0], higher + grown[1], steeper + grown[2]
             work += h * (max(crank, 0.0) + max(hip, 0.0))
@@ -183,9 +187,11 @@ class PaperSolver:
             if n > 0.0:
                 loaded += h
                 travel -= h * slid / n
+            if n > self._threshold:
+                slip += h * rubbed / n
         sums = growth, higher, steeper, force.max(), work, impulse - impulse_before, loaded - loaded_before
         self._accounts[env] = *astuple(since)[1:], impulse, loaded
-        return *sums, since.count - stances, travel
+        return *sums, since.count - stances, travel, slip
 
 
 def _state_like(own: ConstrainedState, given: Mapping[str, Any]) -> ConstrainedState:

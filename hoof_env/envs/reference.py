@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache
@@ -309,6 +310,10 @@ def commands_of(gaits: Floats, theta: Floats, count: int) -> Floats:
 
 # In the kernels
 
+FOLLOWED = float(os.environ.get("FOLLOWED", ".1"))
+"""Part of the way from an offset to the action that a control step goes [-]: an offset is a mean of the last
+actions, and zero actions let it fade."""
+
 
 @inlined
 def command_gait(task, actions, episode, first_leg, parameters, n, room):  # type: ignore[no-untyped-def]
@@ -336,13 +341,17 @@ def command_gait(task, actions, episode, first_leg, parameters, n, room):  # typ
         behind = cross(plane(room[3 * i + 1], room[3 * i + 2]), together)
         speed = room[3 * i] * (1.0 + (COUPLING / COUNT) * behind)
         for k in range(parameters):
-            action = 0.0 * speed
+            offset = 0.0 * speed
             if k < ACTED:
-                at = (n * COUNT + i) * ACTED + k
-                action = task.half[k] * clip(read(leg, actions, at, COUNT * ACTED), 1.0)
-            wanted = speed * (1.0 + action)
+                at = i * ACTED + k
+                action = clip(read(leg, actions, n * (COUNT * ACTED) + at, COUNT * ACTED), 1.0)
+                offset = episode.offset[at]
+                offset = offset + FOLLOWED * (action - offset)
+                episode.offset[at] = offset
+                offset = task.half[k] * offset
+            wanted = speed * (1.0 + offset)
             if k > 0:
-                wanted = pair.swing[k - 1] + action
+                wanted = pair.swing[k - 1] + offset
             leg.command[k] = smaller(larger(wanted, task.low[k]), task.high[k])
 
 

@@ -30,10 +30,10 @@ class Outcome(NamedTuple):
         highest_grf: [N].
         positive_work: of both drives; braking is not recovered [J].
         normal_impulse: of the ground on the hoof [N s].
+        borne: impulse over the weight that bearing is paid for [s], see `BEARING`.
         loaded_time: [s].
         stances: that began.
-        slip: of hoofs in stance, without sign [m]; 0 where the engine does not say.
-        action_change: mean square of the action's change [-].
+        slip: of hooves in stance, without sign [m].
         failed: 1 where the episode ends by failure, else 0.
         episode_seconds: of a whole episode [s].
         weight: of trunk and legs [N].
@@ -50,10 +50,10 @@ class Outcome(NamedTuple):
     highest_grf: Any
     positive_work: Any
     normal_impulse: Any
+    borne: Any
     loaded_time: Any
     stances: Any
     slip: Any
-    action_change: Any
     failed: Any
     episode_seconds: Any
     weight: Any
@@ -62,12 +62,16 @@ class Outcome(NamedTuple):
     episode: Any
 
 
-MOST_BEARING = 1.2
-"""Of the weight, which is paid for at most: a leg that bears its animal bears 1 on the average."""
+BEARING = 0.9
+"""Part of the weight [-] that is paid for at most, in the mean: between what the leg must bear, by default
+0.8, and the whole weight, beyond which the suspension would have to pull the animal down."""
 
-STEPPING = 1.0
-"""Rate of the crank from which a leg counts as stepping, a sixth of that of the paper's gaits [rad/s]: agents
-slow the crank down in a stance, and those who stop it tremble."""
+LONGEST_STRIDE = 1.0
+"""Time [s] over which that mean is taken: what was not borne for longer cannot be made up for."""
+
+STEPPING = 0.5
+"""Rate of the crank from which a leg counts as stepping, a twelfth of that of the paper's gaits [rad/s]:
+agents slow the crank down in a stance, and a leg whose crank stands still can only tremble."""
 
 
 def progress(step, weight):  # type: ignore[no-untyped-def]
@@ -95,24 +99,24 @@ def energy(step, weight):  # type: ignore[no-untyped-def]
     return -0.001 * weight * step.positive_work
 
 
-def action(step, weight):  # type: ignore[no-untyped-def]
-    """Effort of commanding."""
-    return -weight * step.action_change
+def slip(step, weight):  # type: ignore[no-untyped-def]
+    """Way that the hoof slides in stance, to and fro."""
+    return -weight * step.slip
 
 
 def failure(step, weight):  # type: ignore[no-untyped-def]
-    """Charged once."""
-    return choose(step.failed > 0.0, -weight * step.episode_seconds, 0.0)
+    """Charged once, for the rest of the episode."""
+    return choose(step.failed > 0.0, -weight * (step.episode_seconds - step.episode.time), 0.0)
 
 
 def support(step, weight):  # type: ignore[no-untyped-def]
-    """Impulse in units of the weight's, in proportion to the speed, up to the commanded one, and to the
-    crank's rate, up to `STEPPING`: who stands and presses, or trembles with the swing, is not paid, and who
-    rubs to and fro earns nothing."""
+    """What was borne, in proportion to the speed, up to the commanded one, and to the crank's rate, up to
+    `STEPPING`: standing and pressing, or trembling with the swing, is not paid, and rubbing to and fro earns
+    nothing."""
     commanded = larger(step.commanded_progress, 1e-9)
     pace = smaller(larger(step.progress / commanded, -1.0), 1.0)
     pace = smaller(choose(commanded < np.inf, pace, 1.0), step.leg.state.theta_rate * (1.0 / STEPPING))
-    return weight * pace * smaller(step.normal_impulse / step.weight, MOST_BEARING * step.seconds)
+    return weight * pace * step.borne
 
 
 @dataclass(frozen=True)
@@ -162,25 +166,25 @@ class Term:
 TERMS = (
     Term("progress", 2.5, "1/m", "forward travel of the trunk, up to the commanded speed", progress),
     Term(
-        "peak", 0.75, "1/kN",
+        "peak", 0.5, "1/kN",
         "minus the increase of the running peak GRF, the highest of all substeps but at most twice the"
         " present one; it adds up to a stance's peak, and to each further one behind a fall by half", peak,
     ),
     Term(
-        "energy", 2.0, "1/kJ",
+        "energy", 1.0, "1/kJ",
         "minus the positive work of crank and swing drive; braking is not recovered", energy,
     ),
-    Term("action", 0.03, "-", "minus the mean squared change of the action", action),
-    Term("failure", 70.0, "1/s", "once, minus `episode_seconds`, when the episode fails", failure),
+    Term("slip", 1.0, "1/m", "minus the way that the hoof slides in stance, to and fro", slip),
+    Term("failure", 25.0, "1/s", "once, minus the rest of `episode_seconds`, if the episode fails", failure),
     Term(
         "support", 17.0, "1/s",
-        "normal force over the weight of trunk and leg, integrated over the step, at most"
-        f" {MOST_BEARING:g} times its length; times the speed over the commanded one, within"
-        " +-1, and no more than the crank's rate in rad/s", support,
+        "impulse of the normal force over the weight of trunk and leg, less twice what goes beyond a mean of"
+        f" {BEARING:g}; times the speed over the commanded one, within +-1, and no more than the crank's rate"
+        f" over {STEPPING:g} rad/s", support,
     ),
     Term("overspeed", 0.0, "1/m", "minus the forward travel beyond the commanded speed", overspeed),
     Term(
-        "loading", 0.0, "s/MN",
+        "loading", 60.0, "s/MN",
         "minus the increase of the stance's running loading rate, the steepest rise of the normal force from"
         " one substep to the next while the peak grows", loading,
     ),

@@ -45,6 +45,8 @@ class Settings:
     hoof_stiffness: float | None = None
     hoof_damping: float | None = None
     terrain: Mapping[str, Any] | None = None
+    crank_rate: float = 16.0
+    swing_rate: float = 0.8
     drive: str = "prescribed"
     motor_gain: float = 100.0
     motor_torque: float = 600.0
@@ -61,7 +63,7 @@ class Settings:
     size: float | None = None
     harmonics: int | None = None
     filters: str | None = None
-    observation: tuple[str, ...] = ("crank", "gait", "trunk", "hoof", "action")
+    observation: tuple[str, ...] = ("crank", "gait", "trunk", "hoof")
     reward_weights: Mapping[str, float] | None = None
     randomize: Mapping[str, Any] | None = None
 
@@ -94,6 +96,8 @@ class Keywords(TypedDict, total=False):
     hoof_stiffness: float | None
     hoof_damping: float | None
     terrain: Mapping[str, Any] | None
+    crank_rate: float
+    swing_rate: float
     drive: str
     motor_gain: float
     motor_torque: float
@@ -138,6 +142,7 @@ PER_EPISODE = (
 NEEDED: Mapping[str, tuple[str, tuple[str, ...]]] = MappingProxyType(
     dict.fromkeys(("trunk_share", "trunk_stiffness", "trunk_damping"), ("trunk", ("suspended",)))
     | {"trunk_drag": ("trunk", ("suspended", "rail")), "friction_slow": ("friction_law", ("ambrosio",))}
+    | dict.fromkeys(("crank_rate", "swing_rate"), ("trunk", ("suspended", "rail", "fixed")))
     | dict.fromkeys(("motor_gain", "motor_torque", "motor_inertia"), ("drive", ("motor",)))
     | dict.fromkeys(("baumgarte_alpha", "baumgarte_beta"), ("solver", ("paper",)))
     | dict.fromkeys(("size", "harmonics", "filters"), ("trunk", ("free",)))

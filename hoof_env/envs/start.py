@@ -51,7 +51,6 @@ class Start:
         commands: of the engine, shape (legs, gait parameters, n).
         theta: crank angles [rad], shape (legs, n).
         trunk: arguments of `TrunkEngine.reset` by name, shape (n,).
-        action: that commands the gait, shape (n, actions).
     """
 
     begun: dict[str, Floats]
@@ -59,7 +58,6 @@ class Start:
     commands: Floats
     theta: Floats
     trunk: dict[str, Floats]
-    action: NDArray[np.float32]
 
 
 def hoof_points(
@@ -102,8 +100,6 @@ def draw_starts(
         terrain: an episode begins anywhere on it but near its ends; at 0 if it is level, short, or one slope,
             which leaves the height at which a trunk can hang.
         own_gait: instead of one between walk and run.
-
-    The action is left to the caller.
     """
     n = len(generators)
     drawn = np.array([generator.random(3) for generator in generators])
@@ -130,7 +126,7 @@ def draw_starts(
             theta[below] = [2 * np.pi * generators[int(k)].random() for k in below]
     begun = {"crank_angle": theta, "speed": speed, "height": height, "x": x}
     trunk_at = {"x": x, "y": height, "vx": speed}
-    return Start(begun, chosen, chosen.T[None], theta[None], trunk_at, np.empty(0, np.float32))
+    return Start(begun, chosen, chosen.T[None], theta[None], trunk_at)
 
 
 def anywhere(

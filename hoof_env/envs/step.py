@@ -20,7 +20,7 @@ from hoof_env.dynamics.limits import has_moved
 from hoof_env.envs.episode import ACTIONS, FAILED, TRUNCATED, Memories, memories_of, task_type
 from hoof_env.envs.horse_rows import HORSE_TERMS
 from hoof_env.envs.observation import Entry, Scene
-from hoof_env.envs.outcome import add_up, decide, find_outcome, outcome_of_one, remember_action
+from hoof_env.envs.outcome import add_up, decide, find_outcome, outcome_of_one
 from hoof_env.envs.reference import ROOM, command_gait, refer_to_target
 from hoof_env.envs.reward import TERMS, Term
 from hoof_env.simd import anywhere, choose, columns, larger, level, read, rows, set_lane, size, smaller, write
@@ -60,10 +60,11 @@ def is_own(term: Term) -> bool:
 
 @inlined
 def apply_action(task, actions, leg, n):  # type: ignore[no-untyped-def]
-    """Command what an action says, within its limits."""
+    """Command the rates that an action asks for, from the gait as it is now and within its limits."""
     for k in range(ACTIONS):
         action = clip(read(leg, actions, n * ACTIONS + k, ACTIONS), 1.0)
-        leg.command[k] = smaller(larger(task.base[k] + task.half[k] * action, task.low[k]), task.high[k])
+        command = leg.state.gait[k] + task.reach[k] * action
+        leg.command[k] = smaller(larger(command, task.low[k]), task.high[k])
 
 
 @inlined
@@ -262,10 +263,9 @@ def step_kernels(
     @pasted
     def finish(addresses, lanes, task, n, memory):  # type: ignore[no-untyped-def]
         """What follows the engine: reward, end and observation."""
-        actions, happened = singles_at(addresses[AT.actions]), 0
+        happened = 0
         trunk, leg, episode = memories(addresses, lanes, layouts, n)
-        change = remember_action(actions, episode, legs, n)
-        outcome = find_outcome(task, trunk, leg, episode, layouts, change)
+        outcome = find_outcome(task, trunk, leg, episode, layouts)
         add_up(outcome, episode)
         ended, switched = decide(task, outcome, episode)
         if legs > 1:

@@ -132,7 +132,14 @@ class Task:
 RACING: Mapping[str, Any] = MappingProxyType(
     {
         "target_speed": None,
-        "reward_weights": {"progress": 1.0, "peak": 0.3, "energy": 0.1, "support": 0.0},
+        "reward_weights": {
+            "progress": 1.0,
+            "peak": 0.3,
+            "energy": 0.1,
+            "slip": 0.0,
+            "support": 0.0,
+            "loading": 0.0,
+        },
     }
 )
 """Settings of a task that pays for every metre, however fast, and not for bearing weight."""
@@ -160,8 +167,8 @@ TASKS: Mapping[str, Task] = MappingProxyType(
             {
                 "target_speed": (1.0, 3.5),
                 "target_seconds": (3.0, 5.0),
-                "reward_weights": {"progress": 12.0, "overspeed": 12.0},
-                "observation": ("crank", "gait", "trunk", "hoof", "action", "target"),
+                "reward_weights": {"progress": 12.0, "overspeed": 12.0, "failure": 60.0},
+                "observation": ("crank", "gait", "trunk", "hoof", "target"),
             },
         ),
         "terrain": Task(
@@ -172,7 +179,7 @@ TASKS: Mapping[str, Task] = MappingProxyType(
             " begins anywhere on it. The heights ahead are observed, what the ground is made of is not.",
             {
                 "terrain": {"kind": "hills", "seed": 0, "rise": 0.05, "stiffness": [0.25, 2.0]},
-                "observation": ("crank", "gait", "trunk", "hoof", "action", "ground"),
+                "observation": ("crank", "gait", "trunk", "hoof", "ground"),
             },
         ),
         "fixed": Task(
@@ -218,7 +225,7 @@ TASKS: Mapping[str, Task] = MappingProxyType(
                 "motor_torque": 4000.0,
                 "target_speed": None,
                 "target_seconds": (3.0, 5.0),
-                "observation": ("trunk", "target", "crank", "gait", "hoof", "action"),
+                "observation": ("trunk", "target", "crank", "gait", "hoof", "offset"),
             },
             reference="reference",
             terms=HORSE_TERMS,
