@@ -14,7 +14,7 @@ from hoof_env.simd import choose, larger
 from hoof_env.simd.math import root_power
 
 
-def slip(step, weight):
+def friction(step, weight):
     """Charge sliding under load: the power of friction at toe and heel [kW]."""
     toe, heel = step.leg.report.toe, step.leg.report.heel
     return 0.001 * weight * (toe.friction * toe.slide + heel.friction * heel.slide)
@@ -42,7 +42,7 @@ hoof_env.register(
     "my_lab/Turf-v0",
     base="leg",
     terms=[
-        hoof_env.Term("slip", 0.5, "1/kJ", "power of friction", slip),
+        hoof_env.Term("friction", 0.5, "1/kJ", "power of friction", friction),
         hoof_env.Term("comfort", 0.1, "-", "per step without acceleration", comfort, scalar=True),
     ],
     entries=[
@@ -63,5 +63,5 @@ if __name__ == "__main__":
         observation, reward, *_, info = env.step(np.zeros(4, np.float32))
         rewards = envs.step(np.zeros((64, 4), np.float32))[1]
         assert reward == rewards[0]  # the same bits alone and among many
-    slip_paid, comfort_paid = info["reward_slip"], info["reward_comfort"]
-    print(f"reward {reward:.4f}, of which {slip_paid:.4f} for slip and {comfort_paid:.4f} for comfort")
+    friction_paid, comfort_paid = info["reward_friction"], info["reward_comfort"]
+    print(f"reward {reward:.4f}, of which {friction_paid:.4f} for friction and {comfort_paid:.4f} for comfort")

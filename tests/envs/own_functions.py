@@ -19,7 +19,7 @@ def friction_power(point):
     return point.friction * point.slide
 
 
-def slip(step, weight):
+def friction(step, weight):
     report = step.leg.report
     return 0.001 * weight * (friction_power(report.toe) + friction_power(report.heel))
 
@@ -48,7 +48,7 @@ def equation_14(penetration, rate, inverse_approach_speed, ground):
 
 
 TERMS = (
-    Term("slip", 0.5, "1/kJ", "power of friction", slip),
+    Term("friction", 0.5, "1/kJ", "power of friction", friction),
     Term("comfort", 0.1, "-", "per step without acceleration", comfort, scalar=True),
 )
 ENTRIES = (

@@ -104,30 +104,30 @@ def test_a_law_that_states_equation_14_has_the_bits_of_the_built_in_one(own, mak
 
 
 def test_infos_sums_weights_names_and_units(own):
-    env = gym.make(own.ID, reward_weights={"slip": 2.0}).unwrapped
+    env = gym.make(own.ID, reward_weights={"friction": 2.0}).unwrapped
     observation, info = env.reset(seed=0)
     terms = [key for key in info if key.startswith("reward_")]
-    assert terms[-2:] == ["reward_slip", "reward_comfort"]
+    assert terms[-2:] == ["reward_friction", "reward_comfort"]
     assert env.observation_names[-3:] == NAMES
     assert env.observation_units[-3:] == ("m/s^2", "rad", "s")
     assert env.observation_space.shape == observation.shape == (len(env.observation_names),)
-    slipped = set()
+    rubbed = set()
     for action in actions(1, 60):
         observation, reward, *_, info = env.step(action)
         assert [key for key in info if key.startswith("reward_")] == terms
         assert reward == sum(info[key] for key in terms)
         record = {name: values.ravel()[-1] for name, values in env.record().items()}
         power = sum(record[f"{p}_friction"] * record[f"{p}_slide"] for p in ("toe", "heel"))
-        assert info["reward_slip"] == pytest.approx(0.001 * 2.0 * power, rel=1e-12)
-        slipped.add(info["reward_slip"])
+        assert info["reward_friction"] == pytest.approx(0.001 * 2.0 * power, rel=1e-12)
+        rubbed.add(info["reward_friction"])
         assert info["reward_comfort"] == pytest.approx(0.1 * np.exp(-abs(record["ay"]) / 9.81), rel=1e-12)
         raw = env.raw_observation()
         assert raw["rising"] == (record["ay"] if record["vy"] > 0 else 0.0)
         assert observation[-3] == pytest.approx(np.tanh(raw["rising"] / 9.81), abs=1e-6)
         assert observation[-2] == pytest.approx(raw["load angle"] / np.pi, abs=1e-6)
         assert observation[-1] == pytest.approx(raw["episode seconds"] / 10, abs=1e-6)
-    assert len(slipped) > 10
-    names = "some of .*support, overspeed, loading, slip, comfort"
+    assert len(rubbed) > 10
+    names = "some of .*support, overspeed, loading, friction, comfort"
     with pytest.raises(ParameterError, match=rf"{names}, got \{{'slop': 1\}}"):
         gym.make(own.ID, reward_weights={"slop": 1})
 
@@ -179,7 +179,7 @@ def test_stable_baselines_sees_it(own):
     same(plain.reset(seed=0)[0], (envs.seed(0), envs.reset())[1][0])
     _, rewards, *_ = envs.step(np.zeros((9, 4), np.float32))
     assert np.float32(plain.step(np.zeros(4, np.float32))[1]) == rewards[0]
-    assert {"reward_slip", "reward_comfort"} < set(envs.terms)
+    assert {"reward_friction", "reward_comfort"} < set(envs.terms)
 
 
 def test_a_spec_makes_it_again(own):
@@ -201,7 +201,7 @@ def test_its_manual_page_has_its_rows(own, capsys):
     page = page_of(own.ID)
     assert page == page_of(own.MODULE_ID) == gym.make(own.ID).unwrapped.manual
     assert page == gym.make_vec(own.ID, num_envs=9).unwrapped.manual
-    assert "| `reward_slip` | `slip` | 0.5 | 1/kJ | power of friction |" in page
+    assert "| `reward_friction` | `friction` | 0.5 | 1/kJ | power of friction |" in page
     assert re.search(r"\| \d+ \| load angle \| / pi \| rad \| feel \|", page)
     assert "`own_functions.equation_14`" in page
     assert f'gym.make("{own.ID}"' in page
@@ -345,7 +345,7 @@ def test_a_step_that_could_not_be_simulated_pays_for_nothing_but_the_failure(own
     env.set_state(state)
     observation, reward, terminated, _, info = env.step(np.zeros(4, np.float32))
     assert terminated
-    assert info["reward_slip"] == info["reward_comfort"] == 0.0
+    assert info["reward_friction"] == info["reward_comfort"] == 0.0
     assert reward == info["reward_failure"] + info["reward_action"]
     assert info["reward_failure"] == -140.0
     assert np.isfinite(observation).all()
