@@ -21,6 +21,7 @@ from hoof_env.dynamics.layout import Features, stride_sums
 from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.dynamics.observables import stance_figures
 from hoof_env.dynamics.parts import GRAVITY
+from hoof_env.envs.policies import start_of
 from hoof_env.envs.reference import LEGS, PAIRS
 
 Floats = NDArray[np.float64]
@@ -115,7 +116,7 @@ def watch(envs: Any, policy: Any, speed: float, gait: Floats | None = None) -> P
     """Play episodes at one commanded speed [m/s], perhaps around a gait of one's own, shape (16,)."""
     seeds = [3_000_000 + k for k in range(envs.num_envs)]
     around = {} if gait is None else {"gait": gait}
-    seen, _ = envs.reset(seed=seeds, options={"target_speed": speed, **around})
+    seen, _ = envs.reset(seed=seeds, options={**start_of(policy), "target_speed": speed, **around})
     n, dt = envs.num_envs, envs.dt
     features = Features(envs.batch.body.harmonics, envs.settings.hoof_stiffness is not None, True)
     sums = {name: np.zeros((4, n)) for name in stride_sums(features)}

@@ -4,8 +4,9 @@
     python -m agents.open_loop --env-id hoof_env/HorseLegRail-v0 --family clocked
     python -m agents.evaluate --policy run runs/open_loop/HorseLeg-v0-constant.json
 
-Families: "constant", the paper's gaits, four numbers that are held; "clocked", each of the four actions with
-a first harmonic of one clock beside it, which starts with the episode, thirteen numbers. The best of several
+Families: "constant", the paper's gaits, four gait parameters that are held; "clocked", each of the four with
+a first harmonic of one clock beside it, which starts with the episode, thirteen numbers. An episode starts in
+a gait of its own, and goes from there to the one that was found as fast as is allowed. The best of several
 searches is chosen by starts that none has met and scored with yet others, the episodes of agents.evaluate.
 The file is written after every search; searches that are in it are not made again. `agents.horse_gaits` finds
 the gaits of the horse.
@@ -31,7 +32,8 @@ from agents.command import parse_pairs, run
 from agents.score import make_rows, play_rows
 from agents.statistics import estimate
 from hoof_env._output import check_folder
-from hoof_env.envs.policies import open_loop, open_loop_record
+from hoof_env.envs.observation import HALF_RANGE, MIDDLE
+from hoof_env.envs.policies import FORM, open_loop, open_loop_record
 from hoof_env.errors import DataFileError, HoofEnvError, ParameterError, check_number
 from hoof_env.gait import PARAMETERS
 
@@ -86,22 +88,33 @@ class Args:
 
 
 def decode(family: str, x: Floats) -> dict[str, Floats]:
-    """Parameters of `open_loop` for points of the box [-1, 1], shape (..., SIZES[family])."""
+    """Parameters of `open_loop` for points of the box [-1, 1], shape (..., SIZES[family]): the box is the
+    range of the gait parameters, and the unit of a harmonic is half of it."""
+    constant = MIDDLE + HALF_RANGE * x[..., :4]
     if family == "constant":
-        return {"constant": x}
+        return {"constant": constant}
     frequency = SLOWEST * (FASTEST / SLOWEST) ** ((x[..., 12] + 1) / 2)
-    return {"constant": x[..., :4], "sin": x[..., 4:8], "cos": x[..., 8:12], "frequency_hz": frequency}
+    sine, cosine = HALF_RANGE * x[..., 4:8], HALF_RANGE * x[..., 8:12]
+    return {"constant": constant, "sin": sine, "cos": cosine, "frequency_hz": frequency}
+
+
+def encode(constant: Sequence[float]) -> Floats:
+    """Inverse of `decode` for a constant gait, shape (4,), within the box."""
+    return np.clip((np.asarray(constant, float) - MIDDLE) / HALF_RANGE, -1.0, 1.0)
 
 
 class Objective:
     """Scores candidates of a family by episodes in the rows of one vector environment; `leg` is a single one
-    like them, `spent` counts episodes. `ParameterError`: no such environment, or one without many at once."""
+    like them, `spent` counts episodes. `ParameterError`: no such environment, one without many at once, or
+    one that is not of one leg."""
 
     def __init__(self, env_id: str, env_kwargs: dict[str, Any], family: str) -> None:
         self.leg: Any = runs.make_env(env_id, **env_kwargs).unwrapped
         envs = make_rows(env_id, ROWS, **env_kwargs)
         if envs is None:
             raise ParameterError(f"env_id: expected an id of this package with many at once, got {env_id!r}")
+        if envs.action_form != "rates":
+            raise ParameterError(f"env_id: expected an id of one leg, got {env_id!r}")
         self.envs, self.spent, self.family = envs, 0, family
 
     def costs(self, x: Floats, seeds: Sequence[int]) -> list[float]:
@@ -120,7 +133,7 @@ class Objective:
 
     def _play(self, parameters: dict[str, Any], seeds: Sequence[int]) -> Episodes:
         self.spent += len(seeds)
-        return play_rows(self.envs, open_loop(parameters, self.leg.dt), seeds)
+        return play_rows(self.envs, open_loop(parameters, self.leg), seeds)
 
 
 def search(
@@ -130,7 +143,7 @@ def search(
     tick: Callable[[int, float], Any],
     start: Sequence[float] | None = None,
 ) -> tuple[Floats, float, bool]:
-    """One CMA-ES from the best point of a random screening, or from the constant action `start`, shape (4,).
+    """One CMA-ES from the best point of a random screening, or from the constant gait `start`, shape (4,).
 
     Candidates of a generation meet the same starts, those of the next and other searches others. At the end
     the mean of the distribution, the luckiest candidate and the best of the last generation meet more. About
@@ -151,7 +164,7 @@ def search(
 
     size, step = SIZES[objective.family], STEP
     if start is not None:
-        first, step = np.array([*start, *[0.0] * (size - len(start))]), STEP / 3
+        first, step = np.array([*encode(start), *[0.0] * (size - len(start))]), STEP / 3
     else:
         screened = generator.uniform(-1, 1, (ROWS // 4, size))
         screened[:, 4:12] *= HARMONIC
@@ -184,7 +197,7 @@ def optimise(args: Args) -> dict[str, Any]:
     path = place(args)
     about: dict[str, Any] = {
         "env_id": args.env_id, "env_kwargs": parse_pairs("--env-kwargs", args.env_kwargs),
-        "family": args.family, "objective": "return",
+        "form": FORM, "family": args.family, "objective": "return",
         "episodes_of_a_search": episodes, "test_episodes": args.test_episodes,
         "start": open_loop_record(args.start)["parameters"]["constant"] if args.start else None,
     }  # fmt: skip
@@ -256,11 +269,10 @@ def write(
     for key, mean in score["mean"].items():
         interval = estimate([one[key] for one in episodes]) if mean is not None else None
         score["interval95"][key] = [interval.low, interval.high] if interval else None
-    gait = objective.leg.command_of(np.array(best["parameters"]["constant"])).tolist()
     content = {
         **about,
         "parameters": best["parameters"],
-        "gait": dict(zip(PARAMETERS, gait, strict=True)),
+        "gait": dict(zip(PARAMETERS, best["parameters"]["constant"], strict=True)),
         "dt": objective.leg.dt,
         "score": score,
         "episodes": sum(one["episodes"] for one in restarts),

@@ -35,7 +35,7 @@ from agents.command import parse_pairs, run
 from agents.statistics import PUBLISHED, TABLE, Scored, cells, mean_figures, over_episodes, over_seeds
 from hoof_env import records
 from hoof_env._output import check_folder, markdown_table
-from hoof_env.envs.policies import open_loop_record
+from hoof_env.envs.policies import open_loop_record, start_of
 from hoof_env.envs.vector import HorseLegVectorEnv
 from hoof_env.errors import DataFileError, OutputError, ParameterError
 from hoof_env.saved_policy import find_saved
@@ -55,10 +55,11 @@ def play(
     seeds: Sequence[int],
     tick: Any = lambda: None,
 ) -> list[dict[str, float]]:
-    """One episode per seed; its return and its summary. `tick` is called after each."""
+    """One episode per seed, which starts as the policy wants it; its return and its summary. `tick` is called
+    after each."""
     episodes = []
     for seed in seeds:
-        observation, info = env.reset(seed=seed)
+        observation, info = env.reset(seed=seed, options=start_of(policy))
         total, start, done = 0.0, np.ones(1, bool), False
         while not done:
             action, _ = policy.predict(observation, episode_start=start, deterministic=True)
@@ -102,7 +103,7 @@ def make_rows(env_id: str, num_envs: int, **env_kwargs: Any) -> HorseLegVectorEn
 
 def play_rows(envs: HorseLegVectorEnv, policy: Any, seeds: Sequence[int]) -> list[dict[str, float]]:
     """`score_vector` with an environment that is there already, one row for each seed."""
-    observation, _ = envs.reset(seed=list(seeds))
+    observation, _ = envs.reset(seed=list(seeds), options=start_of(policy))
     start, going = np.ones(envs.num_envs, bool), np.ones(envs.num_envs, bool)
     total, state = np.zeros(envs.num_envs), None
     episodes: list[dict[str, float]] = [{} for _ in seeds]

@@ -329,14 +329,16 @@ def test_who_follows_half_of_a_command(monkeypatch, tmp_path):
 
 
 def test_the_settled_speed_is_that_behind_the_start():
-    """A constant action: its speed after four seconds, from the environment's own account."""
-    held = open_loop({"constant": np.array([0.0, 0.5, -0.5, -0.5])}, 1.0)
-    speed = baselines_results.settled_speed(held, 2.0)
+    """A constant gait: its speed after four seconds, from the environment's own account."""
     env = gym.make(baselines_results.SPEED, target_speed=2.0)
+    held = open_loop({"constant": env.unwrapped.gaits["run"].to_array()}, env)
+    speed = baselines_results.settled_speed(held, 2.0)
     each = []
     for seed in FINAL_SEEDS[:10]:
-        env.reset(seed=seed)
-        x = [env.step(held.predict(np.zeros(1))[0])[4]["measured"]["x"] for _ in range(500)]
+        (seen, _), x = env.reset(seed=seed), []
+        for _ in range(500):
+            seen, _, _, _, info = env.step(held.predict(seen)[0])
+            x.append(info["measured"]["x"])
         each.append((x[-1] - x[199]) / 6)
     assert speed == pytest.approx(np.mean(each), rel=0.02)
 

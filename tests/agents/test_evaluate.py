@@ -11,7 +11,7 @@ import pytest
 from agents.evaluate import METRICS, Args, Score, estimate, evaluate, film_paths, main, table, to_json
 from agents.runs import make_env
 from agents.score import find_policy, play
-from hoof_env.envs.policies import GAITS
+from hoof_env.envs.policies import GAITS, start_of
 from hoof_env.errors import DataFileError, OutputError, ParameterError
 from tests.agents.conftest import ENV_ID, SHORT, train_tiny
 
@@ -45,7 +45,7 @@ def test_no_interval(values):
 def test_a_return_is_the_sum_of_its_rewards(env, name):
     (episode,) = play(env, find_policy(name, env, ENV_ID), [7])
     policy, total, done = find_policy(name, env, ENV_ID), 0.0, False
-    observation, _ = env.reset(seed=7)
+    observation, _ = env.reset(seed=7, options=start_of(policy))
     while not done:
         observation, reward, terminated, truncated, info = env.step(policy.predict(observation)[0])
         total, done = total + reward, terminated or truncated

@@ -9,16 +9,15 @@ import numpy as np
 import pytest
 
 from agents import open_loop
-from agents.open_loop import SIZES, Args, decode, main, optimise, search
+from agents.open_loop import SIZES, Args, decode, encode, main, optimise, search
 from agents.runs import make_env
 from agents.score import find_policy, play, score_vector
 from hoof_env import records
 from hoof_env.envs import policies
+from hoof_env.envs.observation import HIGH, LOW
 from hoof_env.envs.policies import GAITS, load_open_loop, open_loop_record
 from hoof_env.errors import DataFileError, HoofEnvError, ParameterError
 from tests.agents.conftest import ENV_ID, KWARGS, SHORT
-
-WAVES = (("sin", np.sin), ("cos", np.cos))
 
 
 @pytest.fixture(autouse=True)
@@ -77,8 +76,24 @@ def test_an_interrupted_search_keeps_the_best_so_far():
 
 def test_a_start_is_the_first_point(monkeypatch):
     objective = Bowl()
-    x, _, _ = search(objective, 0, 64 * 3, lambda *_: None, start=objective.middle)
+    start = decode("constant", objective.middle)["constant"]
+    x, _, _ = search(objective, 0, 64 * 3, lambda *_: None, start=start)
     assert ((x - objective.middle) ** 2).sum() < 0.1
+
+
+def test_the_box_is_the_range_of_the_gait_parameters():
+    for end, limits in ((-1.0, LOW), (1.0, HIGH)):
+        np.testing.assert_allclose(decode("constant", np.full(4, end))["constant"], limits, atol=1e-12)
+        found = decode("clocked", np.full(13, end))
+        np.testing.assert_allclose(found["constant"], limits, atol=1e-12)
+        np.testing.assert_allclose(found["sin"], end * (HIGH - LOW) / 2)
+        np.testing.assert_array_equal(found["cos"], found["sin"])
+
+
+def test_the_way_back_is_the_same_and_ends_at_the_box():
+    x = np.random.default_rng(0).uniform(-1, 1, 4)
+    np.testing.assert_allclose(encode(decode("constant", x)["constant"]), x)
+    np.testing.assert_array_equal(encode(HIGH + 1.0), np.ones(4))
 
 
 def test_decoding_reaches_all_frequencies():
@@ -89,10 +104,12 @@ def test_decoding_reaches_all_frequencies():
 
 
 def test_a_cost_is_minus_the_mean_return():
-    actions, seeds = np.random.default_rng(0).uniform(-1, 1, (16, 4)), range(7, 11)
-    costs = open_loop.Objective(ENV_ID, KWARGS, "constant").costs(actions, seeds)
-    for action, cost in zip(actions[:3], costs, strict=False):
-        episodes = score_vector(policies.open_loop({"constant": action}, 1.0), ENV_ID, seeds, **KWARGS)
+    points, seeds = np.random.default_rng(0).uniform(-1, 1, (16, 4)), range(7, 11)
+    objective = open_loop.Objective(ENV_ID, KWARGS, "constant")
+    costs = objective.costs(points, seeds)
+    for point, cost in zip(points[:3], costs, strict=False):
+        policy = policies.open_loop(decode("constant", point), objective.leg)
+        episodes = score_vector(policy, ENV_ID, seeds, **KWARGS)
         assert cost == pytest.approx(-np.mean([one["return"] for one in episodes]), abs=1e-6)
 
 
@@ -108,11 +125,13 @@ def test_a_file_is_whole_and_its_gait_gets_the_score_it_names(tmp_path, env, fam
     assert found["score"]["mean"] == best["mean"]
     low, high = found["score"]["interval95"]["return"]
     assert low < found["score"]["mean"]["return"] < high
+    assert found["form"] == policies.FORM
+    assert list(found["gait"].values()) == found["parameters"]["constant"]
     assert found["command"].startswith("python")
     assert {"cma", "numpy", "python"} <= set(found["versions"])
     episodes = play(env, find_policy(str(args.out), env, ENV_ID), range(1000, 1008))
     assert np.mean([one["return"] for one in episodes]) == pytest.approx(found["score"]["mean"]["return"])
-    assert score_vector(load_open_loop(args.out), ENV_ID, range(1000, 1008), **KWARGS) == episodes
+    assert score_vector(load_open_loop(args.out, env), ENV_ID, range(1000, 1008), **KWARGS) == episodes
 
 
 def test_searches_that_are_there_are_not_made_again(tmp_path, monkeypatch):
@@ -159,6 +178,8 @@ def test_the_command_prints_scores(tmp_path, capsys):
         ({"test_episodes": 1}, "test_episodes"),
         ({"env_id": "hoof_env/Cow-v0"}, "Cow"),
         ({"env_id": "Pendulum-v1", "env_kwargs": ()}, "many at once"),
+        ({"env_id": "hoof_env/Horse-v0"}, "expected an id of one leg, got 'hoof_env/Horse-v0'"),
+        ({"env_kwargs": ('observation=["crank"]',)}, "'gait' among the observed groups"),
     ],
 )  # fmt: skip
 def test_bad_input(tmp_path, changes, message):
@@ -196,13 +217,15 @@ def test_an_id_names_its_best_stored_gait(env_id):
     with make_env(env_id) as env, warnings.catch_warnings():
         warnings.simplefilter("error", UserWarning)
         for policy in (find_policy("open-loop", env, env_id), records.find_policy("open-loop", env, env_id)):
-            for step in range(3):
-                phase = 2 * np.pi * best["parameters"]["frequency_hz"] * step * env.unwrapped.dt
-                harmonic = [np.multiply(best["parameters"][name], wave(phase)) for name, wave in WAVES]
-                wanted = best["parameters"]["constant"] + np.sum(harmonic, axis=0)
-                np.testing.assert_allclose(policy.predict(np.zeros(24))[0], wanted, atol=1e-6)
+            same = policies.open_loop(best["parameters"], env)
+            seen, _ = env.reset(seed=0, options={"gait": best["gait"]})
+            for _ in range(3):
+                action, _ = policy.predict(seen)
+                np.testing.assert_array_equal(action, same.predict(seen)[0])
+                assert np.abs(action).max() < 1  # as only the gait itself has it
+                seen = env.step(action)[0]
 
 
-def test_an_id_without_a_gait():
+def test_an_id_without_a_gait(env):
     with pytest.raises(DataFileError, match=r"Cow-v0.*HorseLeg-v0-constant\.json"):
-        load_open_loop("hoof_env/Cow-v0")
+        load_open_loop("hoof_env/Cow-v0", env)

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from agents import score
+from agents.open_loop import decode
 from agents.runs import make_env
 from agents.score import Args, find_policy, play, score_vector
-from hoof_env.envs.policies import GAITS, open_loop
+from hoof_env.envs.policies import GAITS, Scripted, open_loop
 from hoof_env.errors import DataFileError, HoofEnvError, ParameterError
 from tests.agents.conftest import ENV_ID, KWARGS, SHORT
 
@@ -46,12 +47,27 @@ def test_a_trained_policy(trained):
         assert one == pytest.approx(other, rel=1e-3)
 
 
-def test_held_actions_for_all_or_for_each():
-    actions = np.random.default_rng(0).uniform(-1, 1, (len(SEEDS), 4)).astype(np.float32)
-    rows = score_vector(open_loop({"constant": actions}, 1.0), ENV_ID, SEEDS, **KWARGS)
-    for seed, action, row in zip(SEEDS, actions, rows, strict=True):
-        assert one_by_one(open_loop({"constant": action}, 1.0), ENV_ID, [seed], **KWARGS) == [row]
-        assert score_vector(open_loop({"constant": action}, 1.0), ENV_ID, [seed], **KWARGS) == [row]
+def test_held_gaits_for_all_or_for_each(env):
+    gaits = decode("constant", np.random.default_rng(0).uniform(-1, 1, (len(SEEDS), 4)))["constant"]
+    rows = score_vector(open_loop({"constant": gaits}, env), ENV_ID, SEEDS, **KWARGS)
+    for seed, gait, row in zip(SEEDS, gaits, rows, strict=True):
+        assert one_by_one(open_loop({"constant": gait}, env), ENV_ID, [seed], **KWARGS) == [row]
+        assert score_vector(open_loop({"constant": gait}, env), ENV_ID, [seed], **KWARGS) == [row]
+
+
+def test_episodes_of_a_gait_start_in_it(env):
+    """Its actions are zero from the first to the last, so it is the zero action that starts there, too."""
+    zero = Scripted(lambda observation, time: np.zeros(4), 1.0, start={"gait": "run"})
+    for policy in ("run", zero):
+        rows = score_vector(policy, ENV_ID, SEEDS, **KWARGS)
+        assert rows == one_by_one(policy, ENV_ID, SEEDS, **KWARGS)
+        for seed, row in zip(SEEDS, rows, strict=True):
+            env.reset(seed=seed, options={"gait": "run"})
+            total, ended = 0.0, False
+            while not ended:
+                _, reward, failed, through, _ = env.step(np.zeros(4, np.float32))
+                total, ended = total + reward, failed or through
+            assert row["return"] == pytest.approx(total, abs=1e-9)
 
 
 def test_an_environment_without_rows_is_played_one_by_one(monkeypatch):
