@@ -14,7 +14,6 @@ dimension. The ground's stiffness and the time steps are the world's and stay.
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
@@ -71,7 +70,7 @@ SAG = MASS * GRAVITY / (4 * TASKS["horse"].defaults["hoof_stiffness"])  # of two
 UNKNOWN: dict[str, Any] = {"vx": 1.0, "vy": 0.0, "pitch": 0.0, "pitch_rate": 0.0}
 """How a trunk starts in a gait that is not a reference gait."""
 
-SPANS = tuple(float(x) for x in os.environ.get("SPANS", ".5,.06,.06,.06").split(","))
+SPANS = (0.25, 0.03, 0.03, 0.03)
 """What actions of 1 change after a while: of the crank's speed [-], of the swing's offset, sine and cosine
 [rad]."""
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache
@@ -310,7 +309,7 @@ def commands_of(gaits: Floats, theta: Floats, count: int) -> Floats:
 
 # In the kernels
 
-FOLLOWED = float(os.environ.get("FOLLOWED", ".1"))
+FOLLOWED = 0.1
 """Part of the way from an offset to the action that a control step goes [-]: an offset is a mean of the last
 actions, and zero actions let it fade."""
 

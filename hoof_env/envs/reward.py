@@ -184,7 +184,7 @@ TERMS = (
     ),
     Term("overspeed", 0.0, "1/m", "minus the forward travel beyond the commanded speed", overspeed),
     Term(
-        "loading", 60.0, "s/MN",
+        "loading", 75.0, "s/MN",
         "minus the increase of the stance's running loading rate, the steepest rise of the normal force from"
         " one substep to the next while the peak grows", loading,
     ),

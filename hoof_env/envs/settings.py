@@ -45,7 +45,7 @@ class Settings:
     hoof_stiffness: float | None = None
     hoof_damping: float | None = None
     terrain: Mapping[str, Any] | None = None
-    crank_rate: float = 16.0
+    crank_rate: float = 12.0
     swing_rate: float = 0.8
     drive: str = "prescribed"
     motor_gain: float = 100.0
