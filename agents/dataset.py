@@ -3,11 +3,14 @@
     python -m agents.dataset run walk random --episodes 100 --dataset-id hoof_env/HorseLeg/scripted-v0
     python -m agents.dataset agents/policies/Horse-v0 --env-id hoof_env/Horse-v0
 
-A policy is what agents.score takes. Episode k of each policy is reset with seed + k, so that whoever resets
-`dataset.recover_environment()` likewise and takes the same actions sees the same numbers. Beside Minari's
-files lies manifest.json with the command, the versions, the licence, the returns of each policy, and the
-SHA-256 of every file and of the files of trained policies. A dataset that is not whole is not kept: it is
-made in a folder of its own and moved.
+A policy is what agents.score takes. Episode k of each policy is reset with seed + k and the options that its
+policy starts with, so that whatever resets `dataset.recover_environment()` likewise and takes the same
+actions sees the same numbers. Beside Minari's files lies manifest.json with the command, the versions, the
+licence, the returns of each policy and how its episodes start, and the SHA-256 of every file and of the files
+of trained policies. A dataset that is not whole is not kept: it is made in a folder of its own and moved.
+
+Minari's metadata say what the actions are: `load` and `check_actions` refuse a dataset whose actions are of
+another form, which may have the same shape.
 """
 
 from __future__ import annotations
@@ -20,7 +23,7 @@ import tempfile
 import tomllib
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -31,13 +34,16 @@ import hoof_env
 from agents import runs
 from agents.command import parse_pairs, run
 from agents.score import find_policy, is_model
-from hoof_env.errors import MissingExtraError, OutputError, ParameterError, count
-from hoof_env.saved_policy import ABOUT, STATISTICS, WEIGHTS, find_saved
+from hoof_env.envs.policies import start_of
+from hoof_env.errors import DataFileError, MissingExtraError, OutputError, ParameterError, count
+from hoof_env.gait import GaitParameters
+from hoof_env.saved_policy import ABOUT, STATISTICS, WEIGHTS, describe_actions, find_saved
 
 MANIFEST = "manifest.json"
 PROJECT = Path(__file__).parents[1] / "pyproject.toml"  # of the checkout, which need not be installed
 ID = re.compile(r"(?:[-\w][-\w/]*[-\w]/)?[-\w]+-v\d+")  # as Minari takes it, but always with a version
 ROOT = "MINARI_DATASETS_PATH"  # where Minari keeps datasets
+ACTIONS = "actions"  # the key of what actions are
 
 
 @dataclass
@@ -101,6 +107,32 @@ def write(args: Args) -> Path:
     return folder
 
 
+def load(dataset_id: str) -> Any:
+    """A dataset as `minari.load_dataset` gives it. `DataFileError`: its actions are not what its environment
+    takes today; others as Minari's."""
+    try:
+        import minari
+    except ImportError:
+        raise MissingExtraError('agents.dataset needs Minari: pip install "hoof-env[minari]"') from None
+    dataset = minari.load_dataset(dataset_id)
+    with dataset.recover_environment() as env:
+        check_actions(dataset, env)
+    return dataset
+
+
+def check_actions(dataset: Any, env: Any) -> None:
+    """Refuse a dataset, to read it or to add to it, whose actions are not of the form that an environment
+    takes: `DataFileError`."""
+    here = describe_actions(env)
+    there = dataset.storage.metadata.get(ACTIONS)
+    if there != here.get(ACTIONS):
+        form = "actions of an older form (positions in a box)" if there is None else f"actions {there}"
+        raise DataFileError(
+            f"dataset {dataset.spec.dataset_id}: expected actions {here.get(ACTIONS)}, got {form}; make it"
+            " again by agents.dataset"
+        )
+
+
 def _check_policies(policies: Sequence[str]) -> None:
     if not policies:
         raise ParameterError("policies: expected at least one, got none")
@@ -139,6 +171,14 @@ def policy_files(name: str) -> list[Path]:
     return [file for file in (found, *(found.with_name(one) for one in beside)) if file.is_file()]
 
 
+def plain_start(policy: Any) -> dict[str, Any]:
+    """Reset options that episodes of a policy begin with, as data that files can hold."""
+    start = start_of(policy)
+    return {
+        key: asdict(value) if isinstance(value, GaitParameters) else value for key, value in start.items()
+    }
+
+
 def _collect(minari: Any, env: Any, args: Args, episodes: int, dataset_id: str) -> dict[str, Any]:
     """Play all episodes, and have Minari write them; returns of each policy."""
     from tqdm import tqdm
@@ -148,9 +188,9 @@ def _collect(minari: Any, env: Any, args: Args, episodes: int, dataset_id: str) 
     collector, returns = minari.DataCollector(env), {}
     with tqdm(total=len(policies) * episodes, unit=" episodes", leave=False, disable=None) as bar:
         for name, policy in policies.items():
-            totals = []
+            totals, options = [], plain_start(policy)
             for k in range(episodes):
-                observation, _ = collector.reset(seed=args.seed + k)
+                observation, _ = collector.reset(seed=args.seed + k, options=options)
                 total, start, state, ended = 0.0, np.ones(1, bool), None, False
                 while not ended:
                     action, state = policy.predict(
@@ -163,14 +203,16 @@ def _collect(minari: Any, env: Any, args: Args, episodes: int, dataset_id: str) 
                 bar.update()
             returns[name] = {
                 "episodes": episodes, "first_seed": args.seed, "mean_return": float(np.mean(totals)),
-                "sd_return": float(np.std(totals)), **({"sha256": files[name]} if files[name] else {}),
+                "sd_return": float(np.std(totals)), **({"start": options} if options else {}),
+                **({"sha256": files[name]} if files[name] else {}),
             }  # fmt: skip
-    collector.create_dataset(
+    dataset = collector.create_dataset(
         dataset_id,
         algorithm_name=", ".join(returns),
         description=f"{episodes} episodes of each of {', '.join(returns)} on {args.env_id}",
         requirements=[f"hoof-env=={hoof_env.__version__}"],
     )
+    dataset.storage.update_metadata(describe_actions(env))
     return returns
 
 

@@ -3,9 +3,9 @@
 The search plays zero actions on `hoof_env/Horse-v0` around gaits of its own and knows nothing but the return,
 with weights of its own.
 It begins from nothing at Froude number 0.25, and then asks for a little more speed every few generations, or
-for less, so that neighbours are alike: actions lie around what is between them. A second family, trot-like,
-has the weights of the task and is asked besides to land fore and hind hoofs at once, and once a stride, as
-horses do in a trot or a pace. What was found already is not searched for again.
+for less, so that neighbours are alike: actions set offsets to what is between them. A second family,
+trot-like, has the weights of the task and is asked besides to land fore and hind hooves at once, and once a
+stride, as horses do in a trot or a pace. What was found already is not searched for again.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ TROT, SLIP = 0.05, 0.1
 
 WEIGHTS = {
     "alive": 11.0, "tracking": 5.0, "peak": 0.35, "slip": 6.0, "landing": 0.3, "work": 0.5, "pitch": 4.0,
-    "action": 0.03, "fall": 20.0,
+    "fall": 20.0,
 }  # fmt: skip
 """Of the reward of the search for the reference gaits: a first reward of the task, which charges less for
 slip than that of today."""

@@ -101,8 +101,10 @@ def settings_of(env: Any) -> dict[str, Any]:
 
 def refuse_misfit(path: Path, there: dict[str, Any], here: dict[str, Any]) -> None:
     """`DataFileError` where a policy was trained for something else than what is `here`."""
-    unlike = [f"{key} {there[key]}, expected {x}" for key, x in here.items() if there.get(key, x) != x]
-    if there and "actions" in here and "actions" not in there:
+    is_old = bool(there) and "actions" in here and "actions" not in there
+    asked = {"env_id": here["env_id"]} if is_old else here  # what else is unlike follows from the form
+    unlike = [f"{key} {there[key]}, expected {x}" for key, x in asked.items() if there.get(key, x) != x]
+    if is_old:
         unlike.insert(0, f"actions of an older form (positions in a box), expected {here['actions']}")
     if unlike:
         (one, old), (other, new) = (str(of.get("env_id")).rpartition("-v")[::2] for of in (there, here))

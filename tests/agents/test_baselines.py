@@ -397,9 +397,10 @@ def test_the_page_says_what_the_runs_say(page, tmp_path):
 
 def test_what_the_plan_does_not_ask_for_is_not_shown(page, tmp_path):
     folder = tmp_path / "runs" / "ppo-HorseLeg-v0-s1"
-    asked = (folder / "config.yml").read_text()
-    (folder / "config.yml").write_text(asked.replace("n_timesteps: 5000000", "n_timesteps: 64000"))
-    with pytest.raises(DataFileError, match=r"-s1: expected .*'n_timesteps': 5000000.*got .*64000"):
+    asked, steps = (folder / "config.yml").read_text(), expected_settings(SMALL[0])["n_timesteps"]
+    (folder / "config.yml").write_text(asked.replace(f"n_timesteps: {steps}", "n_timesteps: 64000"))
+    wanted = rf"-s1: expected .*'n_timesteps': {steps}.*got .*64000"
+    with pytest.raises(DataFileError, match=wanted):
         read_results(SMALL, tmp_path / "runs")
     (folder / "config.yml").write_text(asked)
     final = json.loads((folder / FINAL).read_text())

@@ -7,10 +7,11 @@ import json
 import sys
 from pathlib import Path
 
+import gymnasium as gym
 import numpy as np
 import pytest
 
-from hoof_env.errors import MissingExtraError, OutputError, ParameterError
+from hoof_env.errors import DataFileError, MissingExtraError, OutputError, ParameterError
 
 minari = pytest.importorskip("minari", reason='needs pip install "hoof-env[minari]"')
 
@@ -42,12 +43,15 @@ def written(shelf, *arguments):
 def test_a_replay_gives_the_same_bits(shelf, env_id, policies):
     if TRAINED in policies:
         pytest.importorskip("onnxruntime", reason='needs pip install "hoof-env[onnx]"')
-    data, _ = written(shelf, *policies, "--env-id", env_id, "--seed", "7")
+    data, folder = written(shelf, *policies, "--env-id", env_id, "--seed", "7")
+    about = json.loads((folder / dataset.MANIFEST).read_text())["policies"]
     env = data.recover_environment()
     assert (env.spec.id, env.spec.kwargs["episode_seconds"]) == (env_id, 0.4)
     assert data.total_episodes == 2 * len(policies)
     for k, episode in enumerate(data.iterate_episodes()):
-        seen, _ = env.reset(seed=7 + k % 2)
+        start = about[policies[k // 2]].get("start")
+        assert bool(start) == (policies[k // 2] in ("run", "walk"))
+        seen, _ = env.reset(seed=7 + k % 2, options=start)
         np.testing.assert_array_equal(seen, episode.observations[0])
         for step, action in enumerate(episode.actions):
             seen, reward, terminated, truncated, _ = env.step(action)
@@ -55,6 +59,29 @@ def test_a_replay_gives_the_same_bits(shelf, env_id, policies):
             assert reward == episode.rewards[step]
             assert (terminated, truncated) == (episode.terminations[step], episode.truncations[step])
         assert terminated or truncated
+
+
+def test_a_dataset_says_what_its_actions_are(shelf):
+    data, _ = written(shelf, "run")
+    assert dataset.load("hoof_env/some-v0").total_episodes == 2
+    for form, said in (("offsets", "got actions offsets"), (None, "got actions of an older form")):
+        data.storage.update_metadata({"actions": form})
+        with pytest.raises(DataFileError, match=f"some-v0: expected actions rates, {said}"):
+            dataset.load("hoof_env/some-v0")
+
+
+def test_a_dataset_without_a_tag_is_neither_read_nor_added_to(shelf):
+    """As Minari writes it, and as this package wrote it before actions were rates."""
+    env = gym.make("hoof_env/HorseLeg-v0", episode_seconds=0.1)
+    collector = minari.DataCollector(env)
+    collector.reset(seed=0)
+    for _ in range(5):
+        collector.step(np.zeros(4, np.float32))
+    old = collector.create_dataset("hoof_env/old-v0")
+    with pytest.raises(DataFileError, match="older form"):
+        dataset.load("hoof_env/old-v0")
+    with pytest.raises(DataFileError, match="older form"):
+        dataset.check_actions(old, env)
 
 
 def test_the_manifest_has_hashes_licence_and_returns(shelf):

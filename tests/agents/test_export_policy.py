@@ -98,9 +98,11 @@ def test_metadata(env, exported):
     assert record["env_id"] == ENV_ID
     assert record["env_kwargs"] == KWARGS
     assert (record["algo"], record["seed"]) == ("ppo", "0")
-    assert record["action_names"] == ["crank_speed", "swing_offset", "swing_sin", "swing_cos"]
+    assert record["action_names"] == list(env.unwrapped.action_names)
+    assert record["actions"] == "rates"
     with make_env("hoof_env/Horse-v0") as horse:
         names = describe(horse)["action_names"]
+        assert describe(horse)["actions"] == "offsets"
     assert len(names) == 16
     assert (names[0], names[-1]) == ("left_fore_crank_speed", "right_hind_swing_cos")
     assert str(ROOT).encode() not in exported.read_bytes()
@@ -136,6 +138,22 @@ def test_other_settings_and_another_version_are_told(env, exported, trained, tmp
         find_policy(str(exported), env, ENV_ID)
 
 
+@pytest.mark.parametrize(
+    ("form", "said"),
+    [(None, "actions of an older form .*, expected rates"), ("offsets", "actions offsets, expected rates")],
+)
+def test_actions_of_another_form_are_refused(env, exported, tmp_path, form, said):
+    """A file of before may have the same shapes."""
+    import onnx
+
+    graph = onnx.load(exported)
+    kept = {entry.key: entry.value for entry in graph.metadata_props if entry.key != "actions"}
+    onnx.helper.set_model_props(graph, kept | ({"actions": form} if form else {}))
+    onnx.save(graph, tmp_path / "other.onnx")
+    with pytest.raises(DataFileError, match=said):
+        find_policy(str(tmp_path / "other.onnx"), env, ENV_ID)
+
+
 def test_a_file_names_the_version_that_trained(env):
     there = {"versions": {"hoof-env": "0.0.1"}, "settings": {"dt": 0.5}}
     about = export.about(env, ENV_ID, KWARGS, there)
@@ -158,7 +176,7 @@ def test_a_policy_that_does_not_fit_is_refused(exported):
     for env_id, kwargs, said in (
         ("hoof_env/HorseLegRail-v0", {}, "env_id hoof_env/HorseLeg-v0, expected hoof_env/HorseLegRail-v0"),
         (ENV_ID, {"trunk": "rail"}, "observation_space"),
-        (ENV_ID, {"observation": ["gait", "crank", "trunk", "hoof", "action"]}, "observation_names"),
+        (ENV_ID, {"observation": ["gait", "crank", "trunk", "hoof"]}, "observation_names"),
     ):
         with make_env(env_id, **kwargs) as env, pytest.raises(DataFileError, match=said):
             find_policy(str(exported), env, env_id)

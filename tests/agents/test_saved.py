@@ -32,6 +32,7 @@ def save(folder, env, algo="ppo", seed=0, **policy_kwargs):
     record = {
         "env_id": ENV_ID,
         "algo": algo,
+        "actions": env.unwrapped.action_form,
         "settings": {**vars(env.unwrapped.settings), "episode_seconds": 0.4},
         "versions": {},
     }
@@ -113,6 +114,7 @@ def test_a_zip_of_another_name_is_not_mistaken_for_the_plain_policy(env, tmp_pat
     [
         ({"env_id": "hoof_env/HorseLeg-v7"}, "HorseLeg-v7, expected hoof_env/HorseLeg-v0; another version"),
         ({"env_id": "hoof_env/HorseLegRail-v0"}, "HorseLegRail-v0, expected"),
+        ({"actions": "offsets"}, "actions offsets, expected rates"),
         (
             {"observation_space": "Box(3)", "action_space": "Box(1)"},
             r"Box\(3\), expected .*; action_space Box\(1\)",
@@ -124,6 +126,15 @@ def test_a_model_for_something_else(env, tmp_path, values, said):
     save(tmp_path, env)
     change(tmp_path / "run.json", **values)
     with pytest.raises(DataFileError, match=said):
+        SavedModel.find(tmp_path).load(env, ENV_ID)
+
+
+def test_a_model_without_the_form_of_its_actions(env, tmp_path):
+    save(tmp_path, env)
+    record = json.loads((tmp_path / "run.json").read_text())
+    del record["actions"]
+    (tmp_path / "run.json").write_text(json.dumps(record))
+    with pytest.raises(DataFileError, match=r"actions of an older form .*, expected rates"):
         SavedModel.find(tmp_path).load(env, ENV_ID)
 
 
