@@ -16,6 +16,7 @@ values. Of the losses those of policy and value are logged.
 from __future__ import annotations
 
 import copy
+import inspect
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -245,6 +246,33 @@ class Scale:
         return np.float32(np.sqrt(self.square + 1e-8))
 
 
+class UnusedAdam(torch.optim.Adam):
+    """Torch's Adam in name: `FlatPPO.descend` takes its steps. Making a real one loads torch's compiler, a
+    third of the time from the start of Python to the first step."""
+
+    def __init__(self, params: Any, lr: float = 1e-3, **kwargs: Any) -> None:
+        usual = inspect.signature(torch.optim.Adam.__init__).parameters
+        defaults = {name: one.default for name, one in usual.items() if name not in ("self", "params")}
+        self.defaults = {**defaults, "lr": lr, **kwargs}
+        self.state: Any = {}
+        self.param_groups = [{"params": list(params), **self.defaults}]
+
+    def state_dict(self) -> dict[str, Any]:
+        """That of an Adam that has not taken a step."""
+        (group,) = self.param_groups
+        return {"state": {}, "param_groups": [{**group, "params": list(range(len(group["params"])))}]}
+
+    def load_state_dict(self, state_dict: Any) -> None:
+        """Take nothing: there is nothing to go on with."""
+
+
+class FlatPolicy(ActorCriticPolicy):
+    """Stable-Baselines3's policy without an optimiser of torch's."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **{**kwargs, "optimizer_class": UnusedAdam})
+
+
 class FlatPPO(OnPolicyAlgorithm):
     """PPO; arguments as those of Stable-Baselines3's, which its policies are loaded as.
 
@@ -258,7 +286,7 @@ class FlatPPO(OnPolicyAlgorithm):
             step, or rewards that would be normalised twice.
     """
 
-    policy_aliases: ClassVar[dict[str, Any]] = {"MlpPolicy": ActorCriticPolicy}
+    policy_aliases: ClassVar[dict[str, Any]] = {"MlpPolicy": FlatPolicy}
     plays_as = "ppo"
 
     def __init__(
