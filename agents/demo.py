@@ -1,12 +1,12 @@
 """All of it in one go, with a report to read: what `make demo` runs.
 
-    python -m agents.demo              into runs/demo, a few minutes
+    python -m agents.demo              into runs/demo, in a minute or two
     python -m agents.demo --quick      tiny numbers, only to see that everything works
 
 The paper's four conditions with every solver, published beside simulated; scripted gaits and the simplest
-policies in hoof_env/HorseLeg-v0; a small PPO agent, trained and scored on the same episodes; and report.html,
-one file with tables, figures and films. The folder is a run folder, too, which agents.evaluate plays. Ctrl-C
-leaves an older report as it was.
+policies in hoof_env/HorseLeg-v0; a small PPO agent, trained for five seconds and scored on the same episodes;
+and report.html, one file with tables, figures and films. The folder is a run folder, too, which
+agents.evaluate plays. Ctrl-C leaves an older report as it was.
 """
 
 from __future__ import annotations
@@ -32,23 +32,33 @@ from hoof_env.paper.reproduce import GAITS, SOLVERS, reproduce, write_reproducti
 from hoof_env.paper.rows import Reproduction, counted
 
 ENV_ID, FIXED_ID = "hoof_env/HorseLeg-v0", "hoof_env/HorseLegFixed-v0"
-SCRIPTED = ("walk", "run", "idle", "random", "bang-bang")
-TRAINED = "trained agent"
+TRAINED, OPEN_LOOP = "trained agent", "open-loop"
+SCRIPTED = ("walk", "run", OPEN_LOOP, "idle", "random", "bang-bang")
 FIRST_SEED = 1000  # of the scored episodes; training starts its own from another seed
 SLOW = 4  # how many times slower than life the films of the fixed trunk play
 
 
 @dataclass(frozen=True)
 class Budget:
+    """How long things may take.
+
+    Attributes:
+        seconds: of learning; importing, compiling and scoring come on top.
+        steps: after which learning ends if it is through earlier, and to which rates of learning fall.
+        episodes: of each policy that is scored.
+        film_seconds: of each film.
+        params: hyperparameters that differ from the file's.
+    """
+
+    seconds: float
     steps: int
-    max_minutes: float
     episodes: int
     film_seconds: float
     params: tuple[str, ...] = ()
 
 
-FULL = Budget(steps=3_000_000, max_minutes=3.0, episodes=20, film_seconds=8.0)
-QUICK = Budget(2_048, 1.0, 2, 0.4, params=("n_envs=4", "n_steps=512", "batch_size=512", "n_epochs=1"))
+FULL = Budget(seconds=5.0, steps=1_000_000, episodes=20, film_seconds=8.0)
+QUICK = Budget(60.0, 2_048, 2, 0.4, params=("n_envs=4", "n_steps=512", "batch_size=512", "n_epochs=1"))
 
 
 @dataclass(frozen=True)
@@ -78,9 +88,9 @@ def demo(args: Args) -> Path:
             scores, _ = evaluate.evaluate(playing)
             evaluate.print_table(scores)
 
-        with announced(3, f"PPO learns for {budget.steps:,} steps, {budget.max_minutes:g} minutes at most"):
+        with announced(3, f"PPO learns for {budget.seconds:g} s, or {budget.steps:,} steps"):
             trained = train_agent(args, budget, stage)
-            say(f"{trained.steps:,} steps at {trained.rate:,.0f} steps/s")
+            say(f"{trained.steps:,} steps in {trained.seconds:.1f} s, {trained.rate:,.0f} steps/s")
             (score,), setting = evaluate.evaluate(replace(playing, policy=(str(stage / runs.MODEL),)))
             scores.append(replace(score, policy=TRAINED))
             evaluate.print_table(scores)
@@ -113,7 +123,7 @@ def train_agent(args: Args, budget: Budget, stage: Path) -> train.Trained:
     trained = train.train(
         train.Args(
             env_id=ENV_ID, algo="ppo_flat", seed=args.seed, steps=budget.steps,
-            max_minutes=budget.max_minutes, params=budget.params, out=folder, checkpoint_every=0,
+            max_minutes=budget.seconds / 60, params=budget.params, out=folder, checkpoint_every=0,
         )
     )  # fmt: skip
     if trained.stopped_by:
@@ -171,7 +181,8 @@ def render(
     *others, agent = scores
     episodes = len(agent.episodes)
     gaits = [score for score in others if score.policy in GAITS]
-    draw_learning_curve(folder, [agent, *gaits], folder / "curve.svg", metadata={"Date": None})
+    beside = [*gaits, *(score for score in others if score.policy == OPEN_LOOP)]
+    draw_learning_curve(folder, [agent, *beside], folder / "curve.svg", metadata={"Date": None})
     return render_template(
         "report.html.j2",
         quick=args.quick,
@@ -190,6 +201,7 @@ def render(
         seeds=(FIRST_SEED, FIRST_SEED + episodes - 1),
         by_policy={score.policy: score.estimates for score in scores},
         agent=agent.policy,
+        open_loop=OPEN_LOOP,
         gaits=[score.policy for score in gaits],
         trained=trained,
         training_seed=args.seed,
