@@ -63,5 +63,5 @@ if __name__ == "__main__":
         observation, reward, *_, info = env.step(np.zeros(4, np.float32))
         rewards = envs.step(np.zeros((64, 4), np.float32))[1]
         assert reward == rewards[0]  # the same bits alone and among many
-    friction_paid, comfort_paid = info["reward_friction"], info["reward_comfort"]
-    print(f"reward {reward:.4f}, of which {friction_paid:.4f} for friction and {comfort_paid:.4f} for comfort")
+    rubbed, rode = info["reward_friction"], info["reward_comfort"]
+    print(f"reward {reward:.4f}, of which {rubbed:.4f} for friction and {rode:.4f} for comfort")

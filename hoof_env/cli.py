@@ -54,10 +54,10 @@ def render(
 
     Args:
         out: the film; ends in .mp4 or .gif. Its folder is made if need be.
-        policy: a gait of the preset, idle, random, bang-bang, drag or airborne; four gait parameters as
-            6.28,0.7,-0.2,-0.3; the .json of an open-loop gait, or open-loop for the best that the package
-            holds; or a trained model (a trusted one only: a model is code). Otherwise run, and of a horse
-            its reference gait.
+        policy: a gait of the preset, or four gait parameters as 6.28,0.7,-0.2,-0.3, in which the episode
+            starts; idle, random, bang-bang, drag or airborne; the .json of an open-loop gait, to which the
+            policy goes, or open-loop for the best that the package holds; or a trained model (a trusted one
+            only: a model is code). Otherwise run, and of a horse its reference gait.
         id: the environment.
         args: its arguments: key=value ..., or one JSON object.
         seed: of the episode and of "random".

@@ -1,5 +1,6 @@
 """What pages say of the repository is true: links lead somewhere, commands and files exist, examples run."""
 
+import json
 import re
 import runpy
 from pathlib import Path
@@ -7,6 +8,8 @@ from pathlib import Path
 import pytest
 
 from hoof_env.cli import COMMANDS
+from hoof_env.envs.reward import BEARING, STEPPING, check_weights
+from hoof_env.envs.tasks import TASKS
 from tests.test_rooms import FLOORS
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -85,6 +88,16 @@ def test_files_that_compare_reads_are_made_on_the_page():
     read = {name for pair in re.findall(r"hoof-env compare (\S+) (\S+)", text) for name in pair}
     assert read
     assert not read - made
+
+
+def test_the_weights_on_the_page_of_the_task_are_those_of_the_code():
+    text = (ROOT / "docs" / "task.md").read_text(encoding="utf-8")
+    told = dict(re.findall(r"^\| `(\w+)` \| ([\d.]+) per ", text, re.MULTILINE))
+    assert {name: float(weight) for name, weight in told.items()} == check_weights(None)
+    rail = json.loads(re.search(r"^weights = (\{.+\})$", text, re.MULTILINE)[1])
+    assert check_weights(rail) == check_weights(TASKS["rail"].settings({}).reward_weights)
+    assert f"up to a mean of {BEARING:g}, " in text
+    assert f"the crank's rate over {STEPPING:g} rad/s" in text
 
 
 def test_the_rooms_of_contributing_are_those_of_the_house():

@@ -48,7 +48,7 @@ class Episode(Layout):
     peak_sum: Row  # of the stances' peaks [N]
     loading_rate_sum: Row  # of the stances' loading rates [N/s]
     highest: Row  # force of the episode [N]
-    slip: Row  # of hoofs that bear load, without sign; 0 where the engine does not say [m]
+    slip: Row  # of hooves in stance, without sign [m]
     terms: Annotated[Block, REWARD]  # of the last reward
     ended: Row  # 0, `FAILED` or `TRUNCATED`
     switch: Row  # the control step after which another speed is commanded

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, ClassVar, NoReturn, Unpack
 
 import gymnasium as gym
@@ -24,7 +25,7 @@ from hoof_env.errors import ParameterError, count, flag
 
 
 class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
-    """A horse's leg: commands of its gait in, a trunk that moves, a ground reaction force that costs.
+    """A horse's leg: rates of its gait in, a trunk that moves, a ground reaction force that costs.
 
     Args:
         task: name in `tasks.TASKS`; the registered ids set it.
@@ -289,8 +290,14 @@ class RandomizeParameters(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         return self.env.reset(seed=seed, options=options)
 
 
-OBJECTIVES = ("progress", "peak force", "energy")
-"""What the entries of the vector reward stand for; more is better in each."""
+OBJECTIVES = MappingProxyType(
+    {
+        "progress": ("progress", "support", "overspeed"),
+        "peak force": ("peak", "loading"),
+        "energy": ("energy", "slip"),
+    }
+)
+"""What the entries of the vector reward stand for, with the terms of each; more is better in each."""
 
 
 def vector_reward(terms: Mapping[str, Any]) -> NDArray[np.float32]:
@@ -301,10 +308,8 @@ def vector_reward(terms: Mapping[str, Any]) -> NDArray[np.float32]:
     charged to all three in equal parts: under preference weights that sum to 1 a fall costs the same,
     whatever the weights, so that falling early to save force or energy pays under none.
     """
-    progress = terms["reward_progress"] + terms["reward_support"] + terms["reward_overspeed"]
-    peak = terms["reward_peak"] + terms["reward_loading"]
-    energy = terms["reward_energy"] + terms["reward_slip"]
-    return np.array([progress, peak, energy], np.float32) + np.float32(terms["reward_failure"] / 3)
+    sums = [sum(terms[f"reward_{name}"] for name in names) for names in OBJECTIVES.values()]
+    return np.array(sums, np.float32) + np.float32(terms["reward_failure"] / len(sums))
 
 
 def refuse_many(**kwargs: Any) -> NoReturn:

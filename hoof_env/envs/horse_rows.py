@@ -175,7 +175,7 @@ HORSE_TERMS = (
     ),
     Term(
         "slip", 35.0, "1/s",
-        "minus the way that all hoofs slide in stance, to and fro, over the commanded distance; 1 at most",
+        "minus the way that all hooves slide in stance, to and fro, over the commanded distance; 1 at most",
         slip,
     ),
     Term("landing", 0.25, "-", "minus the stances that begin: who taps the ground pays twice", landing),

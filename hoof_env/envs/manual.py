@@ -25,12 +25,12 @@ from hoof_env.dynamics.parts import ONE_LEG
 from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.envs import horse, observation, start
 from hoof_env.envs.horse import Horse
-from hoof_env.envs.horse_leg import HorseLegMOEnv
+from hoof_env.envs.horse_leg import OBJECTIVES, HorseLegMOEnv
 from hoof_env.envs.infos import measured_names
 from hoof_env.envs.one_leg import OneLeg
 from hoof_env.envs.parameters import HILLS, SPACING
-from hoof_env.envs.reference import ACTED, COUNT, FASTEST, SIZES, horse_gaits
-from hoof_env.envs.reward import check_weights
+from hoof_env.envs.reference import ACTED, COUNT, FASTEST, FOLLOWED, SIZES, horse_gaits
+from hoof_env.envs.reward import BEARING, LONGEST_STRIDE, check_weights
 from hoof_env.envs.settings import PER_EPISODE, Settings, check_effect, to_json
 from hoof_env.envs.tasks import TASKS, Task, task_of
 from hoof_env.errors import OutputError, ParameterError, check_choice
@@ -70,7 +70,9 @@ def tables() -> dict[str, dict[str, Any]]:
         "smallest_size": SIZES[0], "largest_size": SIZES[1],
         "speed_spread": 100 * horse.SPEED_SPREAD, "pitch_spread": horse.PITCH_SPREAD,
         "phase_spread": horse.PHASE_SPREAD, "fall_pitch": horse.PITCH, "fall_low": horse.HEIGHT[0],
-        "fall_high": horse.HEIGHT[1], "clearance": 100 * horse.CLEARANCE,
+        "fall_high": horse.HEIGHT[1], "clearance": 100 * horse.CLEARANCE, "followed": FOLLOWED,
+        "crank_bound": FilterSettings().crank_rate, "swing_bound": FilterSettings().swing_rate,
+        "bearing": BEARING, "full_allowance": BEARING * LONGEST_STRIDE,
     }  # fmt: skip
     numbers |= {f"{name}_{end}": WIDEST[name][k] for name in WIDEST for k, end in enumerate(("low", "high"))}
     values |= {name: f"{number:g}" for name, number in numbers.items()}
@@ -88,7 +90,10 @@ def page(task: str, with_film: bool = False) -> str:
     what = task_of("leg" if task == "mo" else task)
     film = _film(_NAMES[task], what.is_horse) if with_film else ""
     if task == "mo":
-        return _tidy(Template(MO_PAGE).substitute(film=film, observations=_observations(what)))
+        objectives = _objectives(check_weights(what.settings({}).reward_weights))
+        return _tidy(
+            Template(MO_PAGE).substitute(film=film, observations=_observations(what), objectives=objectives)
+        )
     s, kind = what.settings({}), "horse" if what.is_horse else "leg"
     body = Horse(s) if what.is_horse else OneLeg(s)
     trunk, groups = TABLES[s.trunk], observation.groups_of(what.entries)
@@ -98,7 +103,6 @@ def page(task: str, with_film: bool = False) -> str:
     defaults |= {name: f"**{defaults[name]}**" for name in what.defaults}
     hills = {name: literal(value) for name, value in HILLS.items()}
     head = ("Name", "Default", "Unit", "Meaning")
-    limits = [f"{low:.5g} to {high:.5g} {GAIT[k].unit}" for k, (low, high) in enumerate(LIMITS.values())]
     text = Template(PAGE).substitute(
         name=what.name,
         id=what.id,
@@ -107,7 +111,7 @@ def page(task: str, with_film: bool = False) -> str:
         about=what.about,
         body=Template(WORDS[f"{kind}_body"].strip()).safe_substitute(trunk=trunk["moves"]),
         action_space=f"Box(-1, 1, ({len(body.action_names)},), float32)",
-        actions=_horse_actions() if what.is_horse else _actions(s.gait),
+        actions=_horse_actions() if what.is_horse else _actions(s),
         commands=WORDS[f"{kind}_commands"].strip(),
         observed=WORDS[f"{kind}_observed"].strip(),
         still="" if what.is_horse else " " + WORDS["leg_still"].strip(),
@@ -116,9 +120,6 @@ def page(task: str, with_film: bool = False) -> str:
         of_legs="legs'" if what.is_horse else "leg's",
         prefixes=WORDS["prefixes"] if what.is_horse else "",
         example='"phase": 0.0' if what.is_horse else '"gait": "run", "crank_angle": 0.0',
-        offsets=Template(WORDS["offsets"]).substitute(gait=s.gait, limits=", ".join(limits))
-        if s.gait
-        else "",
         observation_space=f"Box(-1, 1, ({len(_observed(what))},), float32)",
         observations=_observations(what),
         other_groups=", ".join(f"`{group}`" for group in groups if group not in s.observation),
@@ -133,7 +134,7 @@ def page(task: str, with_film: bool = False) -> str:
         quantities=markdown_table(("Name", "In", "Unit", "Meaning"), _quantities(what.is_horse)),
         leaves=Template(trunk["leaves"]).substitute(height=f"{body.height:.4g}"),
         seconds=literal(s.episode_seconds),
-        figures=markdown_table(("Figure", "Unit", "Meaning"), _figures(what.is_horse)),
+        figures=markdown_table(("Figure", "Unit", "Meaning"), _rows("summary")),
         vector_arguments=markdown_table(("Argument", "Default", "Meaning"), _vector_arguments()),
         bold=WORDS["bold"] if what.defaults else "",
         settings=markdown_table(head, [*_settings(what, defaults), RENDER_MODE]),
@@ -237,10 +238,6 @@ def _quantities(of_horse: bool) -> list[tuple[str, ...]]:
     return [(", ".join(f"`{one}`" for one in names.split(", ")), *cells) for names, cells in own.items()]
 
 
-def _figures(of_horse: bool) -> list[tuple[str, ...]]:
-    return [row for row in _rows("summary") if of_horse or row[0] != "`slip_m`"]
-
-
 def _horse_actions() -> str:
     bounds = QUICK.to_array()[:, 1]
     rows = []
@@ -249,20 +246,28 @@ def _horse_actions() -> str:
         fastest = f"{bounds[k]:g} {GAIT[len(LIMITS) + k].unit}"
         numbers = ", ".join(str(ACTED * leg + k) for leg in range(COUNT))
         rows.append((numbers, GAIT[k].name, what[0], f"{-span:g}", f"{span:g}", what[1], fastest))
-    head = ("Num", "Of the reference", "Is", "At -1", "At +1", "Unit", "Fastest change")
+    head = ("Num", "Offset of the reference's", "Is", "At -1", "At +1", "Unit", "Fastest change")
     return markdown_table(head, rows)
 
 
-def _actions(gait: str | None) -> str:
-    bounds = FilterSettings().to_array()[:, 1]
+def _actions(settings: Settings) -> str:
+    rates = [settings.crank_rate, *[settings.swing_rate] * (len(LIMITS) - 1)]
     rows = []
     for k, (low, high) in enumerate(LIMITS.values()):
-        if gait:
-            low, high = -(high - low) / 2, (high - low) / 2
-        fastest = f"{bounds[k]:g} {GAIT[len(LIMITS) + k].unit}"
-        rows.append((str(k), GAIT[k].name, f"{low:.5g}", f"{high:.5g}", GAIT[k].unit, fastest))
-    head = ("Num", "Offset of" if gait else "Command", "At -1", "At +1", "Unit", "Fastest change")
-    return markdown_table(head, rows)
+        value, rate = GAIT[k], GAIT[len(LIMITS) + k]
+        limits = f"{low:.5g} to {high:.5g} {value.unit}"
+        rows.append((str(k), value.name, f"{-rates[k]:g}", f"{rates[k]:g}", rate.unit, limits))
+    return markdown_table(("Num", "Rate of", "At -1", "At +1", "Unit", "Limits of the value"), rows)
+
+
+def _objectives(weights: Mapping[str, float]) -> str:
+    """The three rewards of `HorseLegMO-v0`: the terms of each, and the weights of those that are not 0."""
+    units, rows = {term.name: term.unit for term in TASKS["leg"].terms}, []
+    for number, (objective, names) in enumerate(OBJECTIVES.items()):
+        each = ", ".join(f"{weights[name]:g} {units[name]}" for name in names if weights[name])
+        terms = " + ".join(f"`reward_{name}`" for name in names)
+        rows.append((str(number), objective, terms, each))
+    return markdown_table(("Num", "Objective", "Terms", "Weights by default"), rows)
 
 
 def _observations(what: Task) -> str:

@@ -121,7 +121,7 @@ def _in_range(k: int) -> Scale:
     def apply(x, scene):  # type: ignore[no-untyped-def]
         return (x - scene.task.middle[k]) / scene.task.half[k]
 
-    return Scale(f"as action {k}", apply)
+    return Scale(f"linear, -1 at {LOW[k]:.8g} and 1 at {HIGH[k]:.8g}", apply)
 
 
 def _in_rate(k: int) -> Scale:

@@ -155,7 +155,7 @@ TASKS: Mapping[str, Task] = MappingProxyType(
         "rail": Task(
             "HorseLegRail",
             "A horse's leg that pulls its trunk along a rail.",
-            "The trunk slides along x at fixed height: nobody has to be carried, only moved.",
+            "The trunk slides along x at fixed height: nothing has to be carried, only moved.",
             {"trunk": "rail", **RACING},
         ),
         "speed": Task(
@@ -185,8 +185,8 @@ TASKS: Mapping[str, Task] = MappingProxyType(
         "fixed": Task(
             "HorseLegFixed",
             "The paper's set-up: one gait on a fixed trunk, one crank revolution.",
-            "The trunk stays where it is and a policy commands offsets from the paper's walk or run; the zero"
-            " action is exactly that gait, and reproduces the paper: `hoof-env reproduce` runs this"
+            "The trunk stays where it is. Episodes start in the paper's walk, or in its run (`gait`),"
+            " and the zero action keeps that gait, which reproduces the paper: `hoof-env reproduce` runs this"
             ' environment. `solver="exact"` follows the closed form at 0.1 ms, `solver="paper"` integrates'
             " Eq. 8 (42 coordinates, 42 multipliers, Baumgarte) with explicit Euler at 1 ms and samples the"
             " approach speed at the first step inside the ground. Restitution 1 is the paper's elastic"
@@ -211,7 +211,7 @@ TASKS: Mapping[str, Task] = MappingProxyType(
             "Four legs carry a trunk that moves along x and y and pitches, in the plane. Every 3 to 5 s a new"
             " speed is commanded, between the Froude numbers 0.1 and 1 (v^2 over g times the height of the"
             " hips) and at most 0.5 m/s from the last, and with it the gait"
-            " around which actions lie: zeros are the reference gait of it.",
+            " from which actions make offsets: its reference gait.",
             {
                 "trunk": "free",
                 "trunk_mass": 365.84,

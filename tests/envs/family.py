@@ -12,7 +12,6 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from hoof_env.envs.settings import Settings, check_effect
 from hoof_env.envs.tasks import TASKS
 from hoof_env.errors import ParameterError
-from hoof_env.gait import LIMITS
 
 HORSE = "hoof_env/Horse-v0"
 
@@ -135,14 +134,12 @@ def scaled(scaling, x, leg):
     """What the manual page says that becomes of a measured number, or of a row of them."""
     if scaling in ("none", "0 or 1"):
         return x
-    if action := re.fullmatch(r"as action (\d)", scaling):
-        low, high = list(LIMITS.values())[int(action[1])]
-        return (2 * x - low - high) / (high - low)
     if bounds := re.fullmatch(r"linear, -1 at (\S+) and 1 at (\S+)", scaling):
         low, high = (float(bound) for bound in bounds.groups())
         return (2 * x - low - high) / (high - low)
     if part := re.fullmatch(r"/ ([\d.]+)", scaling):
         return np.clip(x / float(part[1]), -1, 1)
-    formula = scaling.replace("3 weights", "(3 * weight)").replace("0.2 hip height", "0.2 * hip height")
+    formula = scaling.replace("30 weights / s", "30 * weight").replace("3 weights", "(3 * weight)")
+    formula = formula.replace("0.2 hip height", "0.2 * hip height")
     formula = formula.replace("hip height", f"{leg.batch.body.height}")
     return eval(formula, {"tanh": np.tanh, "x": x, "weight": leg.weight})
