@@ -19,7 +19,7 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,10 @@ from numpy.typing import NDArray
 from agents import runs
 from agents.command import run
 from agents.score import FINAL_SEEDS, find_policy, make_rows, play_rows
+from agents.settings import FOLDER, load_settings
 from agents.statistics import iqm
+from agents.train import Args as TrainArgs
+from agents.train import make_model
 from hoof_env._output import check_folder, markdown_table, staged
 from hoof_env.errors import DataFileError, ParameterError, check_choice, check_number
 from hoof_env.saved_policy import ALGORITHMS, algorithm_class
@@ -53,6 +56,9 @@ class Curves:
     every: int  # steps between two scores
 
 
+TUNED: Final = "ppo_flat"
+"""The one learner that is not stock, for comparison: its settings are those of agents/hyperparams."""
+
 LEG, RAIL, SPEED, TERRAIN, FIXED, HORSE = (
     f"hoof_env/{name}-v0"
     for name in ("HorseLeg", "HorseLegRail", "HorseLegSpeed", "HorseLegTerrain", "HorseLegFixed", "Horse")
@@ -65,6 +71,7 @@ PLAN = (
     *(Curves(env_id, "ppo", 5, 300_000, 20_480) for env_id in OTHERS),
     Curves(LEG, "td3", 5, 60_000, 6_000),
     Curves(LEG, "tqc", 5, 60_000, 6_000),
+    Curves(LEG, TUNED, 10, 3_000_000, 40_960),
     *(Curves(env_id, "sac", 3, 60_000, 6_000) for env_id in OTHERS),
 )
 """The published table, in the order in which it is trained."""
@@ -75,7 +82,7 @@ class Args:
     env_id: str | None = None
     """only this id"""
     algo: str | None = None
-    """only this algorithm: ppo, sac, td3 or tqc"""
+    """only this algorithm: ppo, sac, td3, tqc, or ppo_flat with the settings of agents/hyperparams"""
     seeds: int | None = None
     """trainings of each, from seed 0 on; otherwise those of the table"""
     steps: int | None = None
@@ -108,7 +115,7 @@ def jobs(args: Args) -> list[Job]:
         ParameterError: an unknown id or algorithm, or a count out of range.
     """
     if args.algo is not None:
-        check_choice("algo", args.algo, ALGORITHMS)
+        check_choice("algo", args.algo, (*ALGORITHMS, TUNED))
     for name in ("seeds", "steps", "workers"):
         if getattr(args, name) is not None:
             check_number(name, getattr(args, name), low=1, high=1e9)
@@ -159,11 +166,25 @@ def train(job: Job) -> list[dict[str, Any]]:
         figures = (steps, round(mean_return(model, envs), 2), round(seconds, 1))
         rows.append(dict(zip(COLUMNS, (*job.key, *figures), strict=True)))
 
-    with runs.make_env(curves.env_id) as env:
-        model = algorithm_class(curves.algo)("MlpPolicy", env, seed=job.seed, device="cpu")
-        add(model, 0, 0.0)
-        model.learn(curves.steps, callback=Curve())
+    model = tuned_model(job) if curves.algo == TUNED else stock_model(job)
+    add(model, 0, 0.0)
+    model.learn(curves.steps, callback=Curve())
+    model.env.close()
     return rows
+
+
+def stock_model(job: Job) -> Any:
+    """The learner as its library makes it."""
+    env = runs.make_env(job.curves.env_id)
+    return algorithm_class(job.curves.algo)("MlpPolicy", env, seed=job.seed, device="cpu")
+
+
+def tuned_model(job: Job) -> Any:
+    """The learner with the settings of agents/hyperparams, for as many steps."""
+    curves = job.curves
+    settings = load_settings(FOLDER / f"{curves.algo}.yml", curves.env_id) | {"n_timesteps": curves.steps}
+    many = runs.make_vec_env(curves.env_id, settings["n_envs"])
+    return make_model(TrainArgs(env_id=curves.env_id, algo=TUNED, seed=job.seed), settings, many)
 
 
 def trained(pending: Sequence[Job], workers: int) -> Iterator[list[dict[str, Any]]]:
@@ -227,7 +248,11 @@ def anchors(env_id: str) -> dict[str, float]:
     return found
 
 
-# Table and picture
+# Tables and picture
+
+AT_STEPS = (20_480, 61_440, 204_800, 400_000, 3_000_000)
+AT_SECONDS = (5.0, 20.0, 60.0, 180.0, 600.0)
+"""Where learners of HorseLeg-v0 are compared."""
 
 
 def at(rows: Sequence[dict[str, Any]], steps: int) -> list[float]:
@@ -264,6 +289,35 @@ def table(rows: Sequence[dict[str, Any]], beside: dict[str, dict[str, float]]) -
         *ANCHORS,
     )  # fmt: skip
     return markdown_table(head, lines)
+
+
+def compared(rows: Sequence[dict[str, Any]], column: str, places: Sequence[float]) -> str:
+    """A line for each learner of HorseLeg-v0: the interquartile mean of its last returns up to so many steps,
+    or so many seconds of learning; nothing where its trainings do not go so far."""
+    lines = []
+    for algo in dict.fromkeys(curves.algo for curves in PLAN if curves.env_id == LEG):
+        own = [row for row in rows if (row["env_id"], row["algo"]) == (LEG, algo)]
+        if not own:
+            continue
+        ends: dict[int, float] = {}
+        for row in own:
+            ends[row["seed"]] = max(row[column], ends.get(row["seed"], 0.0))
+        cells = []
+        for place in places:
+            latest: dict[int, dict[str, Any]] = {}
+            for row in own:
+                if row[column] <= place and row["steps"] >= latest.get(row["seed"], row)["steps"]:
+                    latest[row["seed"]] = row
+            is_reached = all(end >= 0.9 * place for end in ends.values())
+            values = [row["return"] for row in latest.values()]
+            cells.append(f"{float(iqm(values)[0]):.1f}" if is_reached else "")
+        lines.append([title(algo), *cells])
+    return markdown_table(("learner", *(f"{place:,.0f}" for place in places)), lines)
+
+
+def title(algo: str) -> str:
+    """Name of a learner for people, with what its settings are."""
+    return "ppo_flat, tuned, 16 environments" if algo == TUNED else f"{algo.upper()}, stock"
 
 
 def draw(rows: Sequence[dict[str, Any]], beside: dict[str, dict[str, float]], path: Path) -> None:
@@ -313,11 +367,24 @@ Learning curves of Stable-Baselines3's PPO, SAC and TD3 and of sb3-contrib's TQC
 defaults: one environment, no wrapper. Written by `python -m agents.stock`, which trains what is missing in
 [curves.csv](curves.csv). Returns are those of the policy without its noise on {starts} starts that no
 training meets: the interquartile mean over seeds, and the lowest and highest seed. Seconds are those of
-learning on one thread, with another training on the other core.
+learning on one thread, with other work on the other core.
 
 ![Return against environment steps](stock.png)
 
 {table}
+
+## Compared at equal steps and equal seconds
+
+`HorseLeg-v0`, the interquartile mean over seeds. `ppo_flat` has the settings of agents/hyperparams and 16
+environments; the others have none, and no settings that were tuned for them are known to be better.
+
+Returns after so many steps:
+
+{by_steps}
+
+Returns after so many seconds of learning on one thread:
+
+{by_seconds}
 """
 
 
@@ -326,7 +393,12 @@ def write(out: Path, rows: Sequence[dict[str, Any]]) -> None:
     beside = {env_id: anchors(env_id) for env_id in dict.fromkeys(row["env_id"] for row in rows)}
     with staged(out) as stage:
         draw(rows, beside, stage / "stock.png")
-        text = PAGE.format(starts=len(FINAL_SEEDS), table=table(rows, beside))
+        text = PAGE.format(
+            starts=len(FINAL_SEEDS),
+            table=table([row for row in rows if row["algo"] != TUNED], beside),
+            by_steps=compared(rows, "steps", AT_STEPS),
+            by_seconds=compared(rows, "train_seconds", AT_SECONDS),
+        )
         (stage / "README.md").write_text(text, encoding="utf-8")
 
 
