@@ -1,5 +1,5 @@
 """When figures of a gait count beside a horse's: where the policy stays up and keeps the commanded speed, the
-hoofs stand and land once a turn of their crank, and the speed is about that of the horse."""
+hooves stand and land once a turn of their crank, and the speed is about that of the horse."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def objection(figures: dict[str, Any], pairs: Sequence[str]) -> str:
     for pair in pairs:
         slip, stances = figures[f"slip_{pair}"], figures[f"stances_per_turn_{pair}"]
         if not slip < MOST_SLIP:
-            found.append(f"{pair} hoofs slip {slip:.2f} m")
+            found.append(f"{pair} hooves slip {slip:.2f} m")
         if not TURNS[0] <= stances <= TURNS[1]:
             found.append(f"{stances:.2f} {pair} stances a turn")
     return ", ".join(found)

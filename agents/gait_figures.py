@@ -103,7 +103,7 @@ def stances_of(time: Floats, forces: Floats, pushes: Floats, lift_off: float) ->
 
 
 def lag_of(stances: list[Stance], stride: float) -> float:
-    """From hind to fore hoofs [strides], within half a stride, as a circular mean; NaN without any."""
+    """From hind to fore hooves [strides], within half a stride, as a circular mean; NaN without any."""
     fore = np.array([one.began for one in stances if one.leg < 2])
     hind = np.array([one.began for one in stances if one.leg >= 2])
     if not len(fore) or not len(hind):

@@ -46,7 +46,7 @@ STABLE, NEAR = 0.1, 0.05  # most falls, and distance of speeds, of what is shipp
 HARMONICS = 3  # of the trunk's motion
 FALLEN = 0.1  # share of falls at which the speed is raised no more
 TROT_FROUDE = 0.5  # where the trot-like family begins
-LAG = 600.0  # what a stride between the landings of hind and fore hoofs costs a trot-like gait
+LAG = 600.0  # what a stride between the landings of hind and fore hooves costs a trot-like gait
 TROT, SLIP = 0.05, 0.1
 """Largest lag [strides] and slip of a stance [m] of what is shipped as trot-like: as for agents."""
 
@@ -58,7 +58,7 @@ WEIGHTS = {
 slip than that of today."""
 
 TROT_WEIGHTS = {"landing": 2.0}
-"""What the search for trot-like gaits changes of the task's: with less, hind hoofs land twice a stride."""
+"""What the search for trot-like gaits changes of the task's: with less, hind hooves land twice a stride."""
 
 CENTRE = (1.05, 0.45, -0.7, 0.0, 0.0)  # swing about which a search from nothing begins [rad]
 SPANS = (0.5, 0.4, 0.4, 0.3, 0.3)
@@ -113,15 +113,15 @@ class Course:
             ended |= terminated | truncated
             if ended.all():
                 break
-            if step > self.steps // 3:  # hoofs have landed in the gait
+            if step > self.steps // 3:  # hooves have landed in the gait
                 m = infos["measured"]
                 lags += ~ended * landings(gaits, np.array([m[f"{leg}_stance_began"] for leg in LEGS]))
         return returns, summaries, np.angle(lags) / (4 * np.pi)
 
 
 def landings(gaits: Floats, theta: Floats) -> NDArray[np.complex128]:
-    """Where fore hoofs land beside hind ones in gaits, shape (n, 16), whose hoofs land at crank angles [rad],
-    shape (4, n): a mean of e^(4 pi i lag), with the time from hind to fore as the lag [strides]. Left and
+    """Where fore hooves land beside hind ones in gaits, shape (n, 16), whose hooves land at crank angles
+    [rad], shape (4, n): a mean of e^(4 pi i lag), with the time from hind to fore as the lag [strides]. Left and
     right are half a stride apart, so half a stride is a whole turn of it."""
     at = []
     for k, numbers in enumerate(gaits[:, 2:].reshape(len(gaits), len(PAIRS), -1).transpose(1, 2, 0)):
@@ -142,7 +142,7 @@ class Search:
 
     Args:
         first: a gait to begin with, shape (16,); None is from nothing.
-        lag: what a stride between the landings of hind and fore hoofs costs; with any, the weights are
+        lag: what a stride between the landings of hind and fore hooves costs; with any, the weights are
             `TROT_WEIGHTS`.
     """
 
@@ -300,8 +300,8 @@ def trunk_series(gait: list[float], speed: float) -> list[list[float]]:
 
 
 def slip_at(gait: list[float], speed: float) -> float:
-    """How far the hoofs of a gait slide in a stance once it goes at its speed [m/s]: the larger mean of fore
-    and hind hoofs [m], infinite where more than a tenth of the horses fall."""
+    """How far the hooves of a gait slide in a stance once it goes at its speed [m/s]: the larger mean of fore
+    and hind hooves [m], infinite where more than a tenth of the horses fall."""
     envs: Any = make_rows("hoof_env/Horse-v0", 32)
     figures = gait_figures.play(envs, make_policy("reference", envs), speed, np.array(gait))
     return max(figures["slip_fore"], figures["slip_hind"]) if figures["fell"] < STABLE else np.inf

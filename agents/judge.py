@@ -9,7 +9,7 @@ nothing in it may enter a reward, a search or a choice of settings.
 
 A horse's figure at a Froude number stands beside that of the gait whose speed comes nearest. Ours counts only
 where the policy falls in a tenth of the episodes at most and keeps the commanded speed to 15 %, where the
-hoofs slip less than 0.10 m a stance and land 0.95 to 1.05 times a turn of their crank, and where the Froude
+hooves slip less than 0.10 m a stance and land 0.95 to 1.05 times a turn of their crank, and where the Froude
 number of the speed that was reached is within 0.1 of the horse's. The last does not hold for the peaks of a
 trot: they stand beside the trot-like gait nearest Froude number 1, but not below 0.35, where horses walk.
 
@@ -181,7 +181,7 @@ def of_all(each: list[list[dict[str, Any]]]) -> list[dict[str, Any]]:
         for name in SHOWN if standing else ("fell",):
             who = same if name == "fell" else standing
             values = [other[name] for other in who if np.isfinite(other[name])]
-            if not values:  # nobody who was watched stayed up
+            if not values:  # none that was watched stayed up
                 continue
             if name == "lag":  # a trot may be just before 0 or just after
                 middle = mean_lag(values)

@@ -53,7 +53,7 @@ def forces(figures: Figures, shown: list[dict[str, Any]]) -> Any:
 
 
 def footfall(shown: list[dict[str, Any]]) -> Any:
-    """Which hoofs bear load over two strides."""
+    """Which hooves bear load over two strides."""
     from matplotlib.figure import Figure
 
     picture = Figure((2.6 * len(shown), 1.9), layout="constrained")

@@ -2,7 +2,7 @@
 
 All walk: contact, motors, steps of 1 ms. MuJoCo's legs keep their swing, so here all legs do; the engine has
 no branch on a swing, so its cost is that of any gait. MuJoCo's contact is not in N/m: its time constant here
-is chosen so that the cranks turn about as fast and the hoofs are down about as long as on this project's
+is chosen so that the cranks turn about as fast and the hooves are down about as long as on this project's
 ground (docs/evidence/speed_512.md, "Do they walk"). With the usual one, 0.02 s, a leg on a fixed trunk is
 jammed against the floor and stalls.
 """
@@ -71,7 +71,7 @@ def scenes(preset: str) -> dict[str, Scene]:
 
 
 def with_springs(scene: Scene) -> Scene:
-    """The scene with springs at the hoofs."""
+    """The scene with springs at the hooves."""
     spring = HoofSpring.with_ratio(4e4, 475.0 / 4)
     return replace(scene, limbs=tuple(replace(limb, spring=spring) for limb in scene.limbs))
 

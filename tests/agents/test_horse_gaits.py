@@ -106,8 +106,8 @@ def test_what_is_shipped_goes_by_the_speed_that_a_gait_has(monkeypatch):
 
 
 @pytest.mark.parametrize(("name", "speed", "slides"), [("walk", 1.85, False), ("fast", 4.46, True)])
-def test_the_slip_of_a_gait_is_that_of_its_hoofs_at_its_speed(name, speed, slides):
-    """Half of the summary's mean of all hoofs to twice that, for it is of the pair that slides more."""
+def test_the_slip_of_a_gait_is_that_of_its_hooves_at_its_speed(name, speed, slides):
+    """Half of the summary's mean of all hooves to twice that, for it is of the pair that slides more."""
     gait = gaits_of_the_package()[name].to_array()
     slip = slip_at(gait.tolist(), speed)
     _, summaries, _ = Course(speed, 32, episode_seconds=10.0).play(np.tile(gait, (32, 1)), 0, starts=32)

@@ -22,7 +22,7 @@ PUSHES = np.zeros((len(TIME), 4))
 
 
 def forces(lag, duty=0.5, stride=0.8):
-    """Of four legs with stances like half sines, fore hoofs `lag` strides after the hind ones."""
+    """Of four legs with stances like half sines, fore hooves `lag` strides after the hind ones."""
     phases = [lag, lag + 0.5, 0.0, 0.5]
     parts = [(TIME / stride - phase) % 1.0 for phase in phases]
     return np.array([np.where(part < duty, 1e3 * np.sin(np.pi * part / duty), 0.0) for part in parts]).T
@@ -112,12 +112,12 @@ def test_a_horse_meets_the_judges():
 @pytest.mark.parametrize(
     ("changes", "why"),
     [
-        ({"slip_hind": 0.12}, "hind hoofs slip 0.12 m"),
+        ({"slip_hind": 0.12}, "hind hooves slip 0.12 m"),
         ({"stances_per_turn_hind": 1.2}, "1.20 hind stances a turn"),
         ({"stances_per_turn_hind": 0.9}, "0.90 hind stances a turn"),
     ],
 )
-def test_figures_of_hoofs_that_slip_or_land_twice_do_not_count(changes, why):
+def test_figures_of_hooves_that_slip_or_land_twice_do_not_count(changes, why):
     found = verdicts_of(figures(**changes))
     assert found["walk: lag"] == found["walk: peak_hind"] == f"does not count: {why}"
     assert found["walk: peak_fore"] == found["walk: duty_fore"] == found["walk: two_peaked"] == "met"
@@ -167,7 +167,7 @@ def test_what_was_not_measured_has_no_verdict():
 
 def test_the_distance_of_a_figure_without_a_bar_has_its_conditions_too():
     found = verdicts_of({**TROT, "peak_braking_fore": 2.26, "slip_fore": 0.2})
-    assert found["peak_braking_fore"] == "off by +100%, does not count: fore hoofs slip 0.20 m"
+    assert found["peak_braking_fore"] == "off by +100%, does not count: fore hooves slip 0.20 m"
 
 
 def test_every_figure_of_a_horse_has_a_source_that_was_read():
@@ -263,7 +263,7 @@ WEIGHT = KILOGRAMS * 9.81
 
 class Toy:
     """Horses that travel at `SPEED` and turn their cranks once in 0.8 s, in as far as `play` looks at them.
-    Fore hoofs differ from hind ones, and every sum from every other."""
+    Fore hooves differ from hind ones, and every sum from every other."""
 
     dt = DT
     settings = SimpleNamespace(hoof_stiffness=1.0)
@@ -346,7 +346,7 @@ def test_horizontal_forces_are_judged_by_their_peaks_in_a_stance():
         assert one[f"peak_braking_{pair}"] == pytest.approx(0.3 * by, rel=1e-3)
         assert one[f"peak_propulsion_{pair}"] == pytest.approx(0.7 * by, rel=1e-3)
     assert one["lag"] == pytest.approx(0.25, abs=0.01)
-    assert len(one["footfall"]) >= 8  # with a higher load that counts, or a lower one, hoofs never lift
+    assert len(one["footfall"]) >= 8  # with a higher load that counts, or a lower one, hooves never lift
 
 
 def test_where_all_who_are_watched_fall_the_others_have_figures():

@@ -212,7 +212,7 @@ def test_stored_gaits_get_their_scores(path):
 
 @pytest.mark.parametrize("env_id", [ENV_ID, "hoof_env/HorseLegMO-v0"])
 def test_an_id_names_its_best_stored_gait(env_id):
-    files = [GAITS / f"HorseLeg-v0-{family}.json" for family in SIZES]
+    files = sorted(GAITS.glob("HorseLeg-v0-*.json"))
     best = max(map(open_loop_record, files), key=lambda one: one["score"]["mean"]["return"])
     with make_env(env_id) as env, warnings.catch_warnings():
         warnings.simplefilter("error", UserWarning)

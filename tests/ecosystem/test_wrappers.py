@@ -323,7 +323,7 @@ def test_dict_info_to_list(env_id):
         told = envs.step(np.array([action, action]))[-1]
         *_, wanted = alone.step(action)
         assert told[0].keys() == wanted.keys()
-        assert told[0]["reward_action"] == wanted["reward_action"]
+        assert told[0]["reward_peak"] == wanted["reward_peak"]
     assert told[0]["episode_summary"] == pytest.approx(wanted["episode_summary"])
 
 
