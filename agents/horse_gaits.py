@@ -121,8 +121,8 @@ class Course:
 
 def landings(gaits: Floats, theta: Floats) -> NDArray[np.complex128]:
     """Where fore hooves land beside hind ones in gaits, shape (n, 16), whose hooves land at crank angles
-    [rad], shape (4, n): a mean of e^(4 pi i lag), with the time from hind to fore as the lag [strides]. Left and
-    right are half a stride apart, so half a stride is a whole turn of it."""
+    [rad], shape (4, n): a mean of e^(4 pi i lag), with the time from hind to fore as the lag [strides]. Left
+    and right are half a stride apart, so half a stride is a whole turn of it."""
     at = []
     for k, numbers in enumerate(gaits[:, 2:].reshape(len(gaits), len(PAIRS), -1).transpose(1, 2, 0)):
         stride, lead = Stride(numbers[0], numbers[1]), gaits[:, 1] * (k == 0)
