@@ -16,6 +16,7 @@ from hoof_env.dynamics.layout import TRUNK_STATE
 from hoof_env.dynamics.parts import GRAVITY
 from hoof_env.envs.policies import make_policy
 from hoof_env.errors import MissingExtraError, OutputError, ParameterError, parse_pairs
+from hoof_env.gait import PARAMETERS, load_gait
 from hoof_env.lab.opensim import MOT_COLUMNS
 from hoof_env.lab.read import read_record
 from hoof_env.leg.geometry import load_geometry
@@ -30,7 +31,7 @@ from hoof_env.records import (
 )
 from tests.legs import FIRST_FIT, OLD_HORSE
 
-LEG = "hoof_env/HorseLeg-v0"
+LEG, FIXED = "hoof_env/HorseLeg-v0", "hoof_env/HorseLegFixed-v0"
 LOOSE = OLD_HORSE | {"trunk_drag": 0.0, "trunk_stiffness": 0.0, "trunk_damping": 0.0}
 """Its run bears the trunk alone."""
 
@@ -202,9 +203,52 @@ def test_parquet_without_pyarrow_says_what_to_install_before_anything_runs(tmp_p
 def test_policies_by_name_and_by_four_numbers():
     with make_env(LEG) as env:
         constant = find_policy("6.0,0.7,-0.2,-0.3", env, LEG)
-        action, _ = constant.predict(None)
-        np.testing.assert_allclose(env.unwrapped.command_of(action), [6.0, 0.7, -0.2, -0.3], atol=1e-6)
-        assert find_policy("idle", env, LEG).predict(None)[0].shape == (4,)
+        record = record_episode(env, constant, 0, 0.2)
+        for name, value in zip(PARAMETERS, (6.0, 0.7, -0.2, -0.3), strict=True):
+            assert (record[f"command_{name}"] == value).all(), name
+        assert (record["crank_speed"] == 6.0).all()
+        seen, _ = env.reset(seed=0)
+        assert find_policy("idle", env, LEG).predict(seen)[0].shape == (4,)
+
+
+def column_of(table, name):
+    """Of a .csv, whose header has the units."""
+    return next(table[key] for key in table.dtype.names if key.startswith(f"{name}_["))
+
+
+@pytest.mark.parametrize("env_id", [LEG, FIXED])
+@pytest.mark.parametrize("name", ["run", "walk", "carrying_walk"])
+def test_the_commands_start_in_the_gait_that_they_name(tmp_path, env_id, name):
+    """And keep it, also where episodes start in another one: no gait is clipped."""
+    out = tmp_path / "x.csv"
+    command = ["export", "--out", str(out), "--id", env_id, "--policy", name, "--seconds", "0.1"]
+    assert cli.main(command) == 0
+    table = np.genfromtxt(out, delimiter=",", names=True, deletechars="")
+    for parameter, value in vars(load_gait(name)).items():
+        np.testing.assert_array_equal(column_of(table, f"command_{parameter}"), value)
+    np.testing.assert_array_equal(column_of(table, "crank_speed"), load_gait(name).crank_speed)
+
+
+def test_the_run_on_the_fixed_trunk_is_the_papers(tmp_path):
+    """Peak and mean of the normal force, by the exact solver, over the stride that an episode lasts."""
+    out = tmp_path / "run.csv"
+    assert cli.main(["export", "--out", str(out), "--id", FIXED, "--policy", "run"]) == 0
+    table = np.genfromtxt(out, delimiter=",", names=True, deletechars="")
+    normal = column_of(table, "toe_normal") + column_of(table, "heel_normal")
+    assert round(normal.max()) == 5697
+    assert round(normal[1:].mean()) == 809  # the first row is the start
+
+
+def test_a_gait_of_a_file_is_gone_to(tmp_path):
+    """From the gait that the episode starts in, and not begun with."""
+    path = tmp_path / "gait.json"
+    wanted = [4.0, 0.6, -0.1, 0.1]
+    path.write_text(json.dumps({"env_id": LEG, "form": "gait", "parameters": {"constant": wanted}}))
+    with make_env(LEG) as env:
+        record = record_episode(env, find_policy(str(path), env, LEG), 0, 2.0)
+    for name, value in zip(PARAMETERS, wanted, strict=True):
+        assert abs(record[f"command_{name}"][0] - value) > 0.01
+        assert record[f"command_{name}"][-1] == pytest.approx(value, abs=1e-4)
 
 
 def test_the_commands_play_the_gait_of_a_file_and_the_best_of_the_repository(tmp_path):

@@ -11,7 +11,7 @@ import pytest
 from hoof_env import cli
 from hoof_env.errors import HoofEnvError, ParameterError
 from hoof_env.gait import PARAMETERS
-from hoof_env.play import HELD, HELP, RATE, Game, play
+from hoof_env.play import HELD, HELP, Game, play
 from hoof_env.records import make_env
 
 pygame = pytest.importorskip("pygame")
@@ -32,44 +32,70 @@ def spy_on(env):
     return rewards
 
 
+def gait_of(env):
+    """Gait parameters at present."""
+    return np.array([env.unwrapped.engine.state[name].item() for name in PARAMETERS])
+
+
 @pytest.mark.parametrize("key", HELD)
-def test_a_held_key_moves_its_command_and_no_other(env, key):
-    game = Game(env)
-    game.action[:] = 0
+def test_a_held_key_moves_its_parameter_and_no_other(env, key):
+    game, before = Game(env, seed=3), gait_of(env)
+    entry, way = HELD[key]
     for _ in range(5):
         game.tick({key})
-    entry, way = HELD[key]
-    expected = np.zeros(4)
-    expected[entry] = 5 * way * RATE * game.dt
-    np.testing.assert_allclose(game.action, expected, atol=1e-6)
+        np.testing.assert_array_equal(game.action, way * np.eye(4)[entry])
+    moved = gait_of(env) - before
+    assert way * moved[entry] > 0.01
+    np.testing.assert_array_equal(np.delete(moved, entry), 0.0)
     commanded = [getattr(game.news[-1], f"command_{name}") for name in PARAMETERS]
-    np.testing.assert_allclose(commanded, env.unwrapped.command_of(game.action))
+    assert way * (commanded[entry] - gait_of(env)[entry]) > 0
+    game.tick()  # a key that is let go of leaves the gait where it is
+    np.testing.assert_array_equal(game.action, 0.0)
 
 
-def test_commands_stop_at_their_limits_and_keys_held_against_each_other_cancel(env):
-    game = Game(env)
-    game.action[:] = 0.999
-    game.tick(["up", "w", "d", "right"])
-    np.testing.assert_array_equal(game.action, 1.0)
-    game.tick({"left", "right", "a", "d"})
-    np.testing.assert_allclose(game.action, 1.0, atol=RATE * game.dt + 1e-6)
-    game.tick(["nothing"])
+def test_keys_held_against_each_other_cancel():
+    """The last one counts while both are held."""
+    with make_env(LEG, {}) as env:
+        game, before = Game(env), gait_of(env)
+        for pair in (["left", "right"], ["right", "left"]) * 5:
+            game.tick(pair)
+            assert np.abs(game.action[1]) == 1.0
+        assert abs(gait_of(env)[1] - before[1]) < 0.02
+        game.tick(["nothing"])
+        np.testing.assert_array_equal(game.action, 0.0)
 
 
-def test_the_leg_starts_in_its_gait_and_a_digit_commands_another(env):
-    game = Game(env, seed=4)
-    first = game.news[0]
-    assert first.time == 0
-    assert first.command_crank_speed == pytest.approx(first.crank_speed, abs=1e-5)
-    for number, name in enumerate(game.gaits, 1):
-        game.press(str(number))
-        np.testing.assert_array_equal(game.action, env.unwrapped.action_for(env.unwrapped.gaits[name]))
-    game.press("0")
-    assert env.unwrapped.command_of(game.action)[0] == 0
-    before = game.action.copy()
-    for key in ("9", "x", "f1", "²"):
-        game.press(key)
-    np.testing.assert_array_equal(game.action, before)
+@pytest.mark.parametrize("seed", range(3))
+def test_the_leg_starts_in_its_gait_and_a_digit_goes_to_another(seed):
+    with make_env(LEG, {}) as env:
+        game = Game(env, seed=seed)
+        first, before = game.news[0], gait_of(env)
+        assert first.time == 0
+        assert first.command_crank_speed == first.crank_speed
+        game.tick()
+        np.testing.assert_array_equal(gait_of(env), before)
+        for number, name in enumerate(game.gaits, 1):
+            game.press(str(number))
+            for _ in range(100):
+                expected = env.unwrapped.action_for(name)
+                game.tick()
+                np.testing.assert_array_equal(game.action, expected)
+            np.testing.assert_allclose(gait_of(env), env.unwrapped.gaits[name].to_array(), atol=1e-4)
+
+
+def test_zero_stops_the_crank_and_keeps_the_swing():
+    with make_env(LEG, {}) as env:
+        game, before = Game(env, seed=4), gait_of(env)
+        game.press("0")
+        for key in ("9", "x", "f1", "²"):  # which mean nothing
+            game.press(key)
+        for _ in range(100):
+            game.tick()
+        np.testing.assert_allclose(gait_of(env), [0.0, *before[1:]], atol=1e-5)
+        game.press("1")
+        game.tick(["up"])  # who holds a key has it in hand
+        game.tick()
+        np.testing.assert_array_equal(game.action, 0.0)
 
 
 def test_the_score_is_the_return_and_the_end_is_told(env):
@@ -100,12 +126,15 @@ def test_a_pause_stops_the_clock(env):
     assert game.quit
 
 
-def test_the_fixed_leg_is_played_by_offsets():
-    with make_env("hoof_env/HorseLegFixed-v0") as env:
-        game = Game(env)
-        np.testing.assert_array_equal(game.action, 0)
-        game.tick(["up"])
-        assert game.news[-1].command_crank_speed > game.news[0].crank_speed
+def test_a_game_in_a_gait_starts_in_it_whatever_is_played():
+    for name in ("hoof_env/HorseLegFixed-v0", LEG):
+        with make_env(name) as env:
+            game = Game(env, "run")
+            np.testing.assert_array_equal(game.action, 0)
+            game.tick()
+            np.testing.assert_array_equal(gait_of(env), env.unwrapped.gaits["run"].to_array())
+            game.tick(["down"])
+            assert game.news[-1].command_crank_speed < game.news[0].crank_speed
 
 
 def test_a_vector_reward_scores_by_its_sum():

@@ -223,16 +223,15 @@ class LegBase:
     def _check_state(self, state: Any, *parts: str) -> None:
         """`ParameterError` unless `state` is one that `get_state` of such an environment gave."""
         self._check_open("set_state")
-        names = ("id", "actions", "settings", "engine", "episode", "generator", *parts)
+        names = ("id", "settings", "engine", "episode", "generator", *parts)
         missing = [name for name in names if not isinstance(state, Mapping) or name not in state]
         if missing:
             raise ParameterError(f"state: expected what get_state gives, but {', '.join(missing)} is missing")
         if state["id"] != self.task.id:
             raise ParameterError(f"state: expected one of {self.task.id}, got one of {state['id']}")
-        if state["actions"] != self.action_form:
-            raise ParameterError(
-                f"state: expected one whose actions are {self.action_form}, got {state['actions']!r}"
-            )
+        if (form := state.get("actions")) != self.action_form:
+            got = repr(form) if "actions" in state else "one of an older form (positions in a box)"
+            raise ParameterError(f"state: expected one whose actions are {self.action_form}, got {got}")
         there = state["settings"] if isinstance(state["settings"], Mapping) else {}
         here = to_json(self.settings)
         unlike = [f"{k}: {v!r} here, {there.get(k)!r} there" for k, v in here.items() if there.get(k) != v]

@@ -133,9 +133,9 @@ class OneLeg:
             values = gaits.to_array() if isinstance(gaits, GaitParameters) else np.asarray(gaits, np.float64)
         except (TypeError, ValueError):
             values = np.empty(0)
-        if values.shape[-1:] != (len(PARAMETERS),) or not np.isfinite(values).all():
+        if values.shape not in ((4,), (engine.num_envs, 4)) or not np.isfinite(values).all():
             raise ParameterError(
                 f"gait: expected one of {', '.join(self.gaits)}, GaitParameters or an array of shape (4,) or "
-                f"(n, 4), got {gaits!r}"
+                f"({engine.num_envs}, 4), got {gaits!r}"
             )
         return action_towards(values, gait_now(engine), self.reach)

@@ -30,7 +30,7 @@ OTHER = {
     "trunk_drag": 60.0, "stiffness": 4e4, "restitution": 0.9, "approach_floor": 2.0, "friction": 0.1,
     "friction_slow": 0.04, "friction_fast": 0.2, "motor_gain": 30.0, "motor_torque": 100.0,
     "motor_inertia": 2.0, "target_seconds": (0.02, 0.1), "exponent": 1.25, "size": 1.2, "harmonics": 1,
-    "filters": "slow",
+    "filters": "slow", "crank_rate": 5.0, "swing_rate": 0.3,
 }  # fmt: skip
 """Values of settings that are not the defaults."""
 
@@ -100,12 +100,14 @@ def together(records):
     return trace | {"normal": normal, "grf": np.hypot(normal, friction)}
 
 
-def substeps(env, action) -> dict[str, np.ndarray]:
-    """Substeps of an episode, from its start to its end, under one action."""
-    records, done = [env.unwrapped.record()], False
+def substeps(env, gait=None) -> dict[str, np.ndarray]:
+    """Substeps of an episode, from its start to its end, in the gait that it has, or on the way to another
+    one and in that."""
+    leg, zero = env.unwrapped, np.zeros(4, np.float32)
+    records, done = [leg.record()], False
     while not done:
-        *_, terminated, truncated, _ = env.step(action)
-        records.append(env.unwrapped.record())
+        *_, terminated, truncated, _ = env.step(zero if gait is None else leg.action_for(gait))
+        records.append(leg.record())
         done = terminated or truncated
     return together(records[1:])
 

@@ -34,6 +34,11 @@ ARGUMENTS = [
         "observation: 'target' is constant without target_speed",
     ),
     ({"observation": ["crank", "ground"]}, "observation: 'ground' is constant without terrain"),
+    *(
+        ({name: value}, rf"{name}: expected .*\(0, {bound}\].*got {value!r}")
+        for name, bound in (("crank_rate", 20), ("swing_rate", 6))
+        for value in (0.0, -1.0, NAN, float("inf"), 1.001 * bound, "fast", None)
+    ),
     ({"drive": "belt"}, "drive: expected one of motor, prescribed, got 'belt'"),
     ({"normal_law": "hertz"}, "normal_law: expected one of .*lankarani-nikravesh.*got 'hertz'"),
     ({"friction_law": "stick"}, "friction_law: expected one of ambrosio.*got 'stick'"),
@@ -268,7 +273,7 @@ def test_actions_beyond_the_box_are_clipped(kind):
 def test_nothing_goes_before_reset_or_after_close(kind):
     env = BOTH[kind](render_mode="rgb_array")
     taken = env.action_space.sample()
-    figures = (env.record, env.episode_summary, env.raw_observation)
+    figures = (env.record, env.episode_summary, env.raw_observation, lambda: env.action_for("run"))
     for call in (lambda: env.step(taken), env.render, env.get_state, *figures):
         with pytest.raises(ResetNeeded, match=r"\(\) was called before reset\(\): expected reset\(\)"):
             call()
@@ -316,6 +321,10 @@ def foreign(kind, **kwargs):
 STATES = {
     "nothing": (lambda state: None, "state: expected what get_state gives, but id, settings.* is missing"),
     "a part": (lambda state: without(state, "episode"), "but episode is missing"),
+    "no form": (
+        lambda state: without(state, "actions"), r"actions are rates, got one of an older form \(positions",
+    ),
+    "a form": (lambda state: {**state, "actions": "offsets"}, "whose actions are rates, got 'offsets'"),
     "an id": (lambda state: {**state, "id": IDS[1]}, f"expected one of {LEG}, got one of {IDS[1]}"),
     "a version": (
         lambda state: {**state, "id": "hoof_env/HorseLeg-v1"}, "got one of hoof_env/HorseLeg-v1",
@@ -390,6 +399,7 @@ def test_states_of_other_numbers_of_environments():
 def test_gaits_and_policies_by_name_or_refused_in_words():
     env = gym.make(LEG)
     leg, run = env.unwrapped, load_gait("run")
+    env.reset(seed=0, options={"gait": "walk"})
     for gait in ("run", run.to_array(), run.to_array().tolist()):
         same(leg.action_for(gait), leg.action_for(run))
     for gait in ("trot", None, 3, [1.0, 2.0], {"crank_speed": 1.0}, [1.0, 2.0, 3.0, NAN]):

@@ -26,7 +26,7 @@ def steady(gait, **settings):
     """The environment, and its substeps by name over the last whole strides of an episode."""
     env = HorseLegEnv(episode_seconds=SETTLE + WINDOW, **settings)
     env.reset(seed=5, options={"gait": "walk", "crank_angle": 0.0, "speed": 0.0})
-    trace = substeps(env, env.action_for(gait))
+    trace = substeps(env, gait)
     assert env.episode_summary()["failed"] == 0.0
     stride = 2 * np.pi / load_gait(gait, env.settings.preset).crank_speed
     last = round(int(WINDOW / stride) * stride / env.sim_dt)

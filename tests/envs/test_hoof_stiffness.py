@@ -15,7 +15,8 @@ SOFT = {"hoof_stiffness": 4e4}
 
 
 def play(env, steps=150):
-    """Observations and rewards of the paper's run from one start, and the info of the last step."""
+    """Observations and rewards on the way to the paper's run and in it, from one start, and the info of the
+    last step."""
     observation, info = env.reset(seed=3)
     seen = [observation]
     for _ in range(steps):
@@ -40,9 +41,8 @@ def test_a_row_of_many_has_the_bits_of_one_alone(soft):
     envs = gym.make_vec(LEG, num_envs=9, **SOFT)
     observations, _ = envs.reset(seed=3)
     seen, rewards = [observations[0]], []
-    action = np.tile(soft.unwrapped.action_for("run"), (9, 1))
     for _ in range(50):
-        observations, reward, *_ = envs.step(action)
+        observations, reward, *_ = envs.step(envs.unwrapped.action_for("run"))
         seen.append(observations[0])
         rewards.append(reward[0])
     alone, _ = play(soft, 50)

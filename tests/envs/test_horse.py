@@ -11,10 +11,11 @@ from horses import SPEEDS, played, random_gaits
 from hoof_env import Sb3VecEnv
 from hoof_env.dynamics.layout import Features
 from hoof_env.envs import reference, step
-from hoof_env.envs.horse import COMMAND_STEP, MASS
+from hoof_env.envs.horse import COMMAND_STEP, MASS, SPANS
 from hoof_env.envs.reference import (
     COUPLING,
     FASTEST,
+    FOLLOWED,
     LEGS,
     NAMES,
     HorseGait,
@@ -30,8 +31,8 @@ from hoof_env.gait import PARAMETERS, WIDEST
 from hoof_env.leg.limb_masses import segment_masses, trunk_mass
 
 
-def commands(gait, theta, action):
-    """What the legs are commanded, written out: shape (4, 6)."""
+def commands(gait, theta, offset):
+    """What the legs are commanded under offsets from a gait, written out: shape (4, 6)."""
     found, phases = np.zeros((4, 6)), np.zeros(4)
     grid = np.linspace(0, 2 * np.pi, 20001)
     for i in range(4):
@@ -45,25 +46,76 @@ def commands(gait, theta, action):
         phases[i] = np.interp(theta[i] % (2 * np.pi), grid, passed) - np.pi * (i % 2)
         phases[i] -= 2 * np.pi * gait[1] * (i < 2)
     found[:, 0] *= 1 + COUPLING / 4 * np.sin(phases - phases[:, None]).sum(1)
-    each = action.reshape(4, 4)
+    each = SPANS * offset.reshape(4, 4)
     found[:, 0] *= 1 + each[:, 0]
-    found[:, 1:4] += 0.2 * each[:, 1:]
+    found[:, 1:4] += each[:, 1:]
     return found
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_the_command_is_the_reference_with_the_action_and_the_pull(seed):
+def test_the_command_is_the_reference_with_the_offset_and_the_pull(seed):
     """Against the sums written out, with the phase by quadrature."""
     env, rng = make(HORSE, target_speed=1.85), np.random.default_rng(seed)
     gait, action = random_gaits(1, seed)[0], rng.uniform(-1, 1, 16).astype(np.float32)
     env.reset(seed=seed, options={"gait": gait})
     theta = env.engine.state["theta"][:, 0]
     measured = env.step(action)[4]["measured"]
-    expected = commands(gait, theta, action.astype(float))
+    expected = commands(gait, theta, FOLLOWED * action.astype(float))
     names = ("crank_speed", "swing_offset", "swing_sin", "swing_cos", "swing_sin_2", "swing_cos_2")
     found = np.array([[measured[f"{leg}_command_{name}"] for name in names] for leg in LEGS])
     np.testing.assert_allclose(found[:, 1:], expected[:, 1:], atol=1e-6)
     np.testing.assert_allclose(found[:, 0], expected[:, 0], rtol=1e-6)
+
+
+def test_offsets_follow_actions_and_fade_under_zeros():
+    """Each goes its part of the way to the action in every step, none beyond 1, and starts at nothing."""
+    env = make(HORSE, target_speed=1.85)
+    places = [k for k, name in enumerate(env.observation_names) if name.startswith("offset: ")]
+    seen, _ = env.reset(seed=0)
+    expected = np.zeros(16)
+    same(seen[places], expected.astype(np.float32))
+    taken = np.concatenate([actions(1, 10, env_id=HORSE), np.full((10, 16), 5.0), np.zeros((30, 16))])
+    for k, action in enumerate(taken):
+        seen, *_ = env.step(action.astype(np.float32))
+        expected += FOLLOWED * (np.clip(action, -1.0, 1.0) - expected)
+        np.testing.assert_allclose(env.batch.now.offset[:, 0], expected, rtol=1e-6, atol=1e-9)
+        np.testing.assert_allclose(seen[places], expected, atol=1e-6)
+        if k == 19:
+            assert 0.3 < expected.min() < expected.max() < 1.0
+    assert 0.0 < np.abs(expected).max() < 0.05
+    env.reset(seed=0)
+    assert not env.batch.now.offset.any()
+
+
+def test_zeros_from_the_start_are_the_reference_gait():
+    env, gait = make(HORSE, target_speed=1.85), reference_gaits(np.array([1.85]))[0]
+    env.reset(seed=0)
+    for _ in range(20):
+        theta = env.engine.state["theta"][:, 0]
+        measured = env.step(np.zeros(16, np.float32))[4]["measured"]
+        expected = commands(gait, theta, np.zeros(16))[:, 0]
+        found = [measured[f"{leg}_command_crank_speed"] for leg in LEGS]
+        np.testing.assert_allclose(found, expected, rtol=1e-5)
+
+
+def test_the_motors_of_a_horse_are_observed_beside_what_they_are_asked_for():
+    names = [f"{leg.replace('_', ' ')}: true rate of the crank" for leg in LEGS]
+    plain = make(HORSE, drive="prescribed")
+    assert not set(names) & set(plain.observation_names)
+    plain.reset(seed=0)
+    env = make(HORSE, drive="motor")
+    assert set(names) <= set(env.observation_names)
+    env.reset(seed=0)
+    apart = 0.0
+    for action in actions(0, 30, env_id=HORSE):
+        for one in (plain, env):
+            one.step(action)
+        state = plain.engine.state
+        np.testing.assert_array_equal(state["theta_rate"], state["crank_speed"])
+        raw, state = env.raw_observation(), env.engine.state
+        np.testing.assert_array_equal([raw[name] for name in names], state["theta_rate"][:, 0])
+        apart = max(apart, np.abs(state["theta_rate"] - state["crank_speed"]).max())
+    assert apart > 0.01
 
 
 def test_an_action_changes_the_command_of_its_name():

@@ -184,7 +184,8 @@ def test_a_linkage_that_diverges_ends_the_episode_and_pays_nothing(settings):
         assert np.isfinite(observation).all()
         assert done or abs(reward) < 10
     assert "last good" in info["failure"]
-    assert reward == info["reward_failure"] == -70.0
+    rest = env.settings.episode_seconds - before["seconds"]
+    assert reward == info["reward_failure"] == pytest.approx(-env.batch.weights["failure"] * rest)
     assert info["episode_summary"] == {**before, "failed": 1.0}
     assert env.record()["time"].ravel() == pytest.approx([time])  # where it is
 

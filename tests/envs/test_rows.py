@@ -13,7 +13,7 @@ from hoof_env.errors import FixedSettingError, ParameterError
 
 LEG = "hoof_env/HorseLeg-v0"
 EVERYTHING = {
-    "observation": ["crank", "gait", "trunk", "hoof", "action", "target", "ground"],
+    "observation": ["crank", "gait", "trunk", "hoof", "target", "ground"],
     "target_speed": (0.5, 3.0),
     "terrain": {"kind": "hills"},
     "randomize": {"trunk_mass": (60.0, 90.0)},
@@ -36,7 +36,7 @@ def test_each_answers_as_the_single_environment(env_id, mode):
                 same(ours.call(name), theirs.call(name))
     assert ours.get_attr("action_space") == theirs.get_attr("action_space")
     if env_id != HORSE:
-        same(ours.call("command_of", np.ones(4)), theirs.call("command_of", np.ones(4)))
+        same(ours.call("action_for", "run"), theirs.call("action_for", "run"))
     assert [ours.weight[env] for env in range(4)] == list(theirs.get_attr("weight"))
     assert ours.episode_summary()["distance_m"].shape == (4,)
 
@@ -88,8 +88,9 @@ def test_a_mark_on_each():
 @pytest.mark.parametrize(
     ("env_id", "count", "settings"),
     [
-        (LEG, 29, EVERYTHING),
-        (HORSE, 82, {"observation": ["trunk", "target", "crank", "gait", "rates", "hoof", "action"]}),
+        (LEG, 27, EVERYTHING),
+        (LEG, 28, EVERYTHING | {"drive": "motor"}),
+        (HORSE, 82, {"observation": ["trunk", "target", "crank", "gait", "rates", "hoof", "offset"]}),
     ],
 )
 def test_raw_observations_are_those_before_scaling(env_id, count, settings):
@@ -103,6 +104,6 @@ def test_raw_observations_are_those_before_scaling(env_id, count, settings):
             expected = scaled(entry.scale.text, raw[entry.name], envs)
             assert expected.shape == (9,)
             np.testing.assert_allclose(expected, seen[:, k], atol=2e-7)
-            if entry.group in ("hoof", "action") and entry.scale.text in ("none", "0 or 1"):
+            if entry.group in ("hoof", "offset") and entry.scale.text in ("none", "0 or 1"):
                 same(expected.astype(np.float32), seen[:, k])
         seen = envs.step(taken)[0]

@@ -125,14 +125,11 @@ def test_a_friction_law_without_a_lower_threshold_does_not_compare_with_one():
         )
 
 
-RACING = {"progress": 1.0, "peak": 0.3, "energy": 0.1, "support": 0.0}
-OWN_WEIGHTS = {RAIL: RACING, FIXED: RACING, SPEED: {"progress": 12.0, "overspeed": 12.0}}
-
-
 @pytest.mark.parametrize("env_id", IDS)
 def test_reward_weights_that_are_not_named_keep_the_values_of_the_task(env_id):
-    terms = TASKS[gym.spec(env_id).kwargs["task"]].terms
-    plain = check_weights(OWN_WEIGHTS.get(env_id), terms)
+    task = TASKS[gym.spec(env_id).kwargs["task"]]
+    terms, plain = task.terms, check_weights(task.defaults.get("reward_weights"), task.terms)
+    assert (plain != check_weights(None, terms)) == (env_id in (RAIL, FIXED, SPEED))
     assert gym.make(env_id).unwrapped.batch.weights == plain
     for given in ({"peak": 1.0}, {}, None, {terms[0].name: 3.0, terms[1].name: 1.0}):
         for env in (gym.make(env_id, reward_weights=given), gym.make_vec(env_id, reward_weights=given)):
