@@ -14,7 +14,7 @@ import pytest
 from hoof_env import __version__, cli
 from hoof_env.dynamics.layout import TRUNK_STATE
 from hoof_env.dynamics.parts import GRAVITY
-from hoof_env.envs.policies import make_policy
+from hoof_env.envs.policies import GAITS, make_policy, open_loop_record
 from hoof_env.errors import MissingExtraError, OutputError, ParameterError, parse_pairs
 from hoof_env.gait import PARAMETERS, load_gait
 from hoof_env.lab.opensim import MOT_COLUMNS
@@ -252,8 +252,10 @@ def test_a_gait_of_a_file_is_gone_to(tmp_path):
 
 
 def test_the_commands_play_the_gait_of_a_file_and_the_best_of_the_repository(tmp_path):
-    gait = "hoof_env/data/gaits/HorseLeg-v0-clocked.json"
-    for name, policy in (("file", str(Path(__file__).parents[1] / gait)), ("name", "open-loop")):
+    best = max(
+        GAITS.glob("HorseLeg-v0-*.json"), key=lambda path: open_loop_record(path)["score"]["mean"]["return"]
+    )
+    for name, policy in (("file", str(best)), ("name", "open-loop")):
         out = str(tmp_path / f"{name}.csv")
         assert cli.main(["export", "--out", out, "--policy", policy, "--seconds", "0.1"]) == 0
     assert (tmp_path / "file.csv").read_bytes() == (tmp_path / "name.csv").read_bytes()

@@ -126,15 +126,18 @@ def test_a_pause_stops_the_clock(env):
     assert game.quit
 
 
-def test_a_game_in_a_gait_starts_in_it_whatever_is_played():
-    for name in ("hoof_env/HorseLegFixed-v0", LEG):
-        with make_env(name) as env:
-            game = Game(env, "run")
-            np.testing.assert_array_equal(game.action, 0)
-            game.tick()
-            np.testing.assert_array_equal(gait_of(env), env.unwrapped.gaits["run"].to_array())
-            game.tick(["down"])
-            assert game.news[-1].command_crank_speed < game.news[0].crank_speed
+@pytest.mark.parametrize("env_id", ["hoof_env/HorseLegFixed-v0", LEG])
+def test_a_new_episode_starts_in_the_gait_that_was_chosen_last(env_id):
+    with make_env(env_id) as env:
+        game = Game(env)
+        game.press(str(game.gaits.index("run") + 1))
+        game.tick()
+        game.press("r")
+        np.testing.assert_array_equal(game.action, 0)
+        game.tick()
+        np.testing.assert_array_equal(gait_of(env), env.unwrapped.gaits["run"].to_array())
+        game.tick(["down"])
+        assert game.news[-1].command_crank_speed < game.news[0].crank_speed
 
 
 def test_a_vector_reward_scores_by_its_sum():

@@ -171,6 +171,7 @@ def _at_a_posture(name: str, env: Any, middle: float) -> Scripted:
             f"policy {name!r}: expected 'crank' among the observed groups, got {leg.settings.observation!r}"
         )
     sine, cosine = map(leg.observation_names.index, seen)
+    brakes = leg.settings.crank_rate
     offsets = np.linspace(*LIMITS["swing_offset"], 14) if name == "airborne" else [middle]
     rests = np.array([(0.0, offset, 0.0, 0.0) for offset in offsets])
     posture, target = extreme_posture(leg_profile(leg.geometry), rests, name == "drag")
@@ -178,7 +179,9 @@ def _at_a_posture(name: str, env: Any, middle: float) -> Scripted:
     def hold(observation: Any, time: Any) -> Any:
         here = np.asarray(observation, float)
         ahead = (target - np.arctan2(here[..., sine], here[..., cosine])) % (2 * np.pi)
-        speed = np.where((ahead > 0.05) & (ahead < np.pi * 1.5), np.minimum(2 * ahead, 2 * np.pi), 0.0)
+        speed = np.minimum(np.minimum(2 * ahead, np.sqrt(1.6 * brakes * ahead)), 2 * np.pi)
+        # a crank that was too fast to stop there goes round once more
+        speed = np.where((ahead > 0.05) & (ahead < 2 * np.pi - 0.3), speed, 0.0)
         swing = 0.15 * np.sin(np.pi * np.asarray(time)) if name == "drag" else 0.0
         return np.stack(np.broadcast_arrays(speed, posture[1] + swing, *posture[2:]), -1)
 

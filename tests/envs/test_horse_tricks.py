@@ -8,8 +8,15 @@ from horses import SEEDS, SPEEDS, die, played
 
 from hoof_env.envs.policies import make_policy
 
-MARGIN = 100.0
-"""Return over ten seconds by which the reference gait is ahead of what is no gait."""
+MARGIN = 5.0
+"""Return over ten seconds by which the reference gait is ahead, at least: offsets are small and fade, so that
+no trick is far from a gait."""
+
+
+def assert_below(reference, found):
+    """From the same starts, and by four standard errors of the differences."""
+    lost = reference - found
+    assert lost.mean() > max(MARGIN, 4 * lost.std() / np.sqrt(SEEDS))
 
 
 def bang_bang(pace):
@@ -17,7 +24,7 @@ def bang_bang(pace):
 
 
 def hop(seen, time):
-    """All cranks stopped, all legs swung together."""
+    """All cranks as slow as actions make them, all legs swung together."""
     action = np.zeros((4, 4))
     action[:, 0], action[:, 1] = -1.0, np.sin(2 * np.pi * 3 * time)
     return action.ravel()
@@ -31,7 +38,7 @@ def brake(seen, time):
 
 
 def skate(seen, time):
-    """Cranks slowed down, hoofs dragged by the swing."""
+    """Cranks slowed down, hooves dragged by the swing."""
     action = np.zeros((4, 4))
     action[:, 0] = -0.5
     action[::2, 1] = np.sin(2 * np.pi * time)
@@ -46,12 +53,12 @@ TRICKS = {"hop": hop, "brake": brake, "skate": skate, "die": die} | {
 
 @pytest.fixture(scope="module")
 def reference():
-    return played(lambda seen, time: np.zeros(16))[0].mean()
+    return played(lambda seen, time: np.zeros(16))[0]
 
 
 @pytest.mark.parametrize("name", TRICKS)
 def test_tricks_stay_below_the_reference(reference, name):
-    assert played(TRICKS[name])[0].mean() < reference - MARGIN
+    assert_below(reference, played(TRICKS[name])[0])
 
 
 def terms_of(act):
@@ -77,8 +84,9 @@ def own_terms():
 @pytest.mark.parametrize(
     ("name", "term", "factor"),
     [
-        ("hop", "peak", 3), ("hop", "landing", 3), ("skate", "slip", 8), ("brake", "slip", 5),
-        ("brake", "pitch", 3), ("bang-bang 3", "work", 10), ("bang-bang 3", "peak", 8),
+        ("hop", "pitch", 2), ("skate", "slip", 1.4), ("brake", "slip", 1.7), ("brake", "peak", 1.2),
+        ("bang-bang 3", "slip", 1.4), ("bang-bang 12", "peak", 1.25), ("bang-bang 25", "pitch", 4),
+        ("die", "slip", 4),
     ],
 )  # fmt: skip
 def test_a_trick_is_charged_for_what_it_does(own_terms, name, term, factor):
@@ -90,4 +98,4 @@ def test_a_trick_is_charged_for_what_it_does(own_terms, name, term, factor):
 @pytest.mark.parametrize("name", ["random", "bang-bang"])
 def test_simple_policies_stay_below_the_reference(reference, name):
     policy = make_policy(name, gym.make(HORSE))
-    assert played(lambda seen, time: policy.predict(seen)[0])[0].mean() < reference - MARGIN
+    assert_below(reference, played(lambda seen, time: policy.predict(seen)[0])[0])
