@@ -32,7 +32,7 @@ MOST_ENVS = 1_000_000
 
 MOST_DRAWN = 16  # so many are drawn by default; a picture takes as long as some hundred steps
 
-OWN = ("weight", "render", "episode_summary", "raw_observation", "record", "np_random")
+OWN = ("weight", "render", "episode_summary", "raw_observation", "record", "np_random", "action_for")
 """What each environment has of its own; the rest is of all."""
 
 SINGLE = {"action_space": "single_action_space", "observation_space": "single_observation_space"}

@@ -72,11 +72,10 @@ def speed_and_peak(gait, **kwargs):
     return info["episode_summary"]["speed_m_s"], info["episode_summary"]["peak_grf_n"]
 
 
-def test_the_middle_of_the_ranges_is_no_good_gait_and_no_swing_goes_backward():
+@pytest.mark.parametrize("gait", [MIDDLE, [2 * np.pi, 0.7, 0.0, 0.0]], ids=["middle", "paper's"])
+def test_the_middle_of_the_ranges_is_no_gait_for_without_swing_it_goes_backward(gait):
     """A policy has to find one."""
-    middle = GaitParameters.from_array(MIDDLE)
-    assert 0.0 < speed_and_peak(middle)[0] < 0.25 * speed_and_peak(load_gait("run"))[0]
-    assert speed_and_peak(GaitParameters(2 * np.pi, 0.7, 0.0, 0.0))[0] < -0.5
+    assert speed_and_peak(GaitParameters.from_array(gait))[0] < -0.5
 
 
 @pytest.mark.filterwarnings("ignore::hoof_env.dynamics.step_length.StepWarning")

@@ -4,6 +4,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from family import HORSE
+from horses import die
 
 from hoof_env.envs.horse_rows import HORSE_TERMS
 from hoof_env.envs.reference import LEGS
@@ -32,9 +33,10 @@ def test_terms_are_what_the_measurements_say():
     envs = make(target_speed=SPEEDS[1])
     _, infos = envs.reset(seed=0)
     take, before, weight = noise(0.3), infos["measured"]["x"], envs.unwrapped.weight
+    slide = np.tile(die(None, 0.0), (MANY, 1)).astype(np.float32)
     asked = DT * SPEEDS[1]
-    for _ in range(12):
-        _, rewards, failed, _, infos = envs.step(take())
+    for _ in range(60):
+        _, rewards, failed, _, infos = envs.step(slide + take())
         m, paid = infos["measured"], {name: infos[f"reward_{name}"] / WEIGHTS[name] for name in WEIGHTS}
         total = {
             name: sum(m[f"{leg}_{name}"] for leg in LEGS)
