@@ -102,6 +102,6 @@ def test_a_task_of_ones_own_runs_with_the_package_from_the_wheel(wheel, tmp_path
     assert run.returncode == 0, run.stderr
     package, paid = run.stdout.splitlines()
     assert Path(package).is_relative_to(tmp_path / "site")
-    found = re.fullmatch(r"reward .*, of which (.*) for slip and (.*) for comfort", paid)
+    found = re.fullmatch(r"reward .*, of which (.*) for friction and (.*) for comfort", paid)
     assert found
     assert float(found[1]) < 0.0 < float(found[2])

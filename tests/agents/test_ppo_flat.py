@@ -167,7 +167,8 @@ def test_what_it_leaves_is_played_as_stable_baselines_plays(tmp_path):
     train(Args(algo="ppo_flat", steps=256, params=small, env_kwargs=("episode_seconds=0.4",), out=folder))
     with gym.make("hoof_env/HorseLeg-v0", episode_seconds=0.4) as env:
         played = find_saved(folder).load(env, "hoof_env/HorseLeg-v0")
-        observations = np.random.default_rng(0).uniform(-1, 1, (50, 24)).astype(np.float32)
+        shape = (50, *env.observation_space.shape)
+        observations = np.random.default_rng(0).uniform(-1, 1, shape).astype(np.float32)
     assert type(played.model) is PPO
     kept = FlatPPO.load(folder / "model.zip")
     expected = np.clip(kept.weights.actor(observations), -1, 1)

@@ -27,6 +27,7 @@ from hoof_env.render.ground import find_patches, footprint
 from hoof_env.render.instant import Instant, columns_of_engine, instants
 from hoof_env.render.panel import Stances
 from hoof_env.render.renderer import Renderer, open_window
+from hoof_env.render.scene import TRUNK_M
 from tests.legs import FIRST_FIT
 
 pygame = pytest.importorskip("pygame")
@@ -174,7 +175,7 @@ def surface(frame: np.ndarray, column: int) -> int:
 def test_the_ground_is_as_high_as_the_terrain(run):
     """A rise of 0.2 m a metre ahead; the metre marks of level ground say how long a metre is."""
     level = draw(run[0])
-    metre = 146  # pixels between two ticks at this size and leg, seen below
+    metre = renderer()._scene._scale  # pixels between two ticks, seen below
     row = surface(level, 5) + 8
     ticks = np.flatnonzero((level[row, :640] == LINE).all(axis=-1))
     assert np.diff(ticks)[np.diff(ticks) > 2] == pytest.approx(metre, abs=2)
@@ -211,7 +212,8 @@ def test_the_ground_gives_way_under_the_hoof(run):
     """Where the leg is not in front of it: both points 0.8 m ahead of the trunk, 10 cm deep."""
     at = {"x": run[0][0].trunk_x + 1.2, "y": -0.1, "depth": 0.1}
     both = {f"{point}_{name}": value for point in ("toe", "heel") for name, value in at.items()}
-    column, metre = 312 + round(1.2 * 146), 146
+    metre = renderer()._scene._scale
+    column = 312 + round(1.2 * metre)
     beside = column + round(0.06 * metre)
     deep = 0.1 * metre * np.exp(-((0.06 / 0.09) ** 2))
     found = surface(draw(loaded(run, 900.0, **both)), beside) - surface(draw(run[0]), beside)
@@ -306,8 +308,11 @@ def test_a_trunk_that_pitches_turns_its_leg(run):
 )
 def test_a_trunk_is_drawn_as_it_is_held(run, trunk, held):
     """Above it: a spring in its middle, a rail across the whole picture, a plate as long as the trunk."""
-    above = draw(run[0], trunk=trunk)[90:136]
-    sky = above[:, 2] if trunk != "rail" else draw(run[0], trunk="fixed")[90:136, 2]
+    scene = renderer()._scene
+    top = round(scene.look_at(run[0][0])["O"].imag - TRUNK_M[1] * scene._scale)
+    rows = slice(top - 46, top)
+    above = draw(run[0], trunk=trunk)[rows]
+    sky = above[:, 2] if trunk != "rail" else draw(run[0], trunk="fixed")[rows, 2]
     assert [(above[:, column] != sky).any() for column in (5, 260, 312)] == held
 
 

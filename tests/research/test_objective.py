@@ -160,7 +160,7 @@ def test_it_repeats_bit_for_bit():
     [
         ("hip_height", 1.8, {"hip_high"}), ("hip_height", 1.1, {"hip_low"}),
         ("log IJ", np.log(0.04), {"sole_short"}), ("log IJ", np.log(0.4), {"sole_long"}),
-        ("log BD", np.log(0.05), {"lengths"}), ("run.swing_sin", -0.9, {"run.limits"}),
+        ("log BD", np.log(0.05), {"lengths"}), ("run.swing_sin", -1.1, {"run.limits"}),
         ("log OP", np.log(2.0), {"assembles", "transmission"}),
         ("hip_height", 5.0, {"walk.both_touch", "run.both_touch", "walk.heel_first"}),
         ("hip_height", 0.9, {"joints", "walk.starts_in_air"}),
