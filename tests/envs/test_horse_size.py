@@ -4,7 +4,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from family import HORSE, actions, make, same
-from horses import SEEDS, die, played
+from horses import SEEDS, played
 
 from hoof_env import register
 from hoof_env.dynamics.parts import GRAVITY
@@ -47,29 +47,36 @@ def dimensionless(env, measured):
 @pytest.mark.parametrize("size", [0.7, 2.0])
 def test_in_a_similar_world_all_sizes_move_alike(size, drive):
     """Filters, the cap on a crank's speed, springs, dampers, motors and the approach floor are scaled: else
-    this differs in the first digits. Actions are large enough for commands to meet their cap."""
-    envs = [make(HORSE, drive=drive, **similar_world(each)) for each in (1.0, size)]
+    this differs in the first digits. The commanded speed is so high that commands meet their cap."""
+    worlds = [similar_world(each) | {"target_speed": 6.0 * each**0.5} for each in (1.0, size)]
+    envs = [make(HORSE, drive=drive, **world) for world in worlds]
     for env in envs:
         env.reset(seed=3)
-    capped = 0
-    for action in 0.5 * actions(4, 25, env_id=HORSE):
-        action[::4] += 0.5
-        one, other = (dimensionless(env, env.step(action)[4]["measured"]) for env in envs)
+    capped, failed = 0, False
+    for action in actions(4, 25, env_id=HORSE):
+        action[::4] = 1.0
+        steps = [env.step(action) for env in envs]
+        one, other = (dimensionless(env, step[4]["measured"]) for env, step in zip(envs, steps, strict=True))
         np.testing.assert_allclose(other, one, rtol=1e-5, atol=1e-5)
         capped += int((one == FASTEST).sum())
+        failed = steps[0][2]
+        assert steps[1][2] == failed
+        if failed:
+            break
     assert capped > 3
 
 
 @pytest.mark.parametrize("size", [0.5, 2.0])
 def test_horses_of_all_sizes_fall_at_the_same_instant(size):
-    """The fore legs folded, to the thousandth of a second of a horse of size 1: limits go with the size."""
+    """From a start that goes backward, to the thousandth of a second of a horse of size 1: limits go with the
+    size."""
     last = []
     for each in (1.0, size):
         env = make(HORSE, **similar_world(each) | {"dt": 1e-3 * each**0.5, "target_speed": 1.5 * each**0.5})
-        env.reset(seed=0)
+        env.reset(seed=0, options={"speed": -1.0 * each**0.5})
         steps, failed = 0, False
         while not failed and steps < 1500:
-            *_, failed, _, info = env.step(die(None, 0.0).astype(np.float32))
+            *_, failed, _, info = env.step(np.zeros(16, np.float32))
             steps += 1
         last.append((steps, info.get("failure", "")))
     assert "joint" in last[0][1]
