@@ -176,12 +176,12 @@ TASKS: Mapping[str, Task] = MappingProxyType(
             "A horse's leg on slopes and on patches of stiff, soft and slippery ground.",
             _SUSPENDED
             + " The ground rises and falls, and is harder, softer or more slippery in places; an episode"
-            " begins anywhere on it. The heights ahead are observed, what the ground is made of is not, so that"
-            " loading costs a third of what it costs elsewhere.",
+            " begins anywhere on it. The heights ahead are observed, what the ground is made of is not: a hoof"
+            " loads hard patches as fast as soft ones before it can know, so that loading costs less here.",
             {
                 "terrain": {"kind": "hills", "seed": 0, "rise": 0.05, "stiffness": [0.25, 2.0]},
                 "observation": ("crank", "gait", "trunk", "hoof", "ground"),
-                "reward_weights": {"loading": 25.0},
+                "reward_weights": {"loading": 10.0},
             },
         ),
         "fixed": Task(
