@@ -176,8 +176,8 @@ TASKS: Mapping[str, Task] = MappingProxyType(
             "A horse's leg on slopes and on patches of stiff, soft and slippery ground.",
             _SUSPENDED
             + " The ground rises and falls, and is harder, softer or more slippery in places; an episode"
-            " begins anywhere on it. The heights ahead are observed, what the ground is made of is not: a hoof"
-            " loads hard patches as fast as soft ones before it can know, so that loading costs less here.",
+            " begins anywhere on it. The heights ahead are observed, its material is not: a hoof"
+            " cannot know a hard patch before it lands, so that loading costs less here than elsewhere.",
             {
                 "terrain": {"kind": "hills", "seed": 0, "rise": 0.05, "stiffness": [0.25, 2.0]},
                 "observation": ("crank", "gait", "trunk", "hoof", "ground"),
