@@ -21,7 +21,9 @@ from hoof_env.envs.tasks import TASKS
 from hoof_env.errors import FixedSettingError, ParameterError
 from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS
 
-LEG, RAIL, FIXED, SPEED = (f"hoof_env/HorseLeg{name}-v0" for name in ("", "Rail", "Fixed", "Speed"))
+LEG, RAIL, FIXED, SPEED, TERRAIN = (
+    f"hoof_env/HorseLeg{name}-v0" for name in ("", "Rail", "Fixed", "Speed", "Terrain")
+)
 HORSE = "hoof_env/Horse-v0"
 
 
@@ -129,7 +131,7 @@ def test_a_friction_law_without_a_lower_threshold_does_not_compare_with_one():
 def test_reward_weights_that_are_not_named_keep_the_values_of_the_task(env_id):
     task = TASKS[gym.spec(env_id).kwargs["task"]]
     terms, plain = task.terms, check_weights(task.defaults.get("reward_weights"), task.terms)
-    assert (plain != check_weights(None, terms)) == (env_id in (RAIL, FIXED, SPEED))
+    assert (plain != check_weights(None, terms)) == (env_id in (RAIL, FIXED, SPEED, TERRAIN))
     assert gym.make(env_id).unwrapped.batch.weights == plain
     for given in ({"peak": 1.0}, {}, None, {terms[0].name: 3.0, terms[1].name: 1.0}):
         for env in (gym.make(env_id, reward_weights=given), gym.make_vec(env_id, reward_weights=given)):
