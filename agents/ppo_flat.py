@@ -343,11 +343,21 @@ class FlatPPO(OnPolicyAlgorithm):
         return [*super()._excluded_save_params(), "weights"]
 
     def _setup_learn(self, total_timesteps: int, callback: Any = None, *args: Any, **kwargs: Any) -> Any:
+        self._load_kernels()
         before = self._last_obs
         found = super()._setup_learn(total_timesteps, callback, *args, **kwargs)
         if self._last_obs is not before:  # the environments were reset
             self.scale.restart()
         return found
+
+    def _load_kernels(self) -> None:
+        """Have the kernels compiled, or loaded, before a training's clock starts; nothing is learned."""
+        inputs = self.weights.actor.matrices[0].shape[1]
+        observations = np.zeros((2, inputs), np.float32)
+        steps = np.zeros((2, ACTIONS + self.weights.log_std.size), np.float32)
+        self.weights.actor(observations)
+        self.weights.critic(observations)
+        Gradient(self, 0.2).compute(observations, steps, np.arange(2))
 
     def collect_rollouts(
         self, env: Any, callback: BaseCallback, rollout_buffer: Any, n_rollout_steps: int
