@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hoof_env.errors import ParameterError, check_number
-from hoof_env.simd import choose, larger, smaller
+from hoof_env.simd import choose, larger, size, smaller
 from hoof_env.simd.user_functions import check_function
 
 
@@ -116,7 +116,8 @@ def support(step, weight):  # type: ignore[no-untyped-def]
     commanded = larger(step.commanded_progress, 1e-9)
     pace = smaller(larger(step.progress / commanded, -1.0), 1.0)
     pace = smaller(choose(commanded < np.inf, pace, 1.0), step.leg.state.theta_rate * (1.0 / STEPPING))
-    return weight * pace * step.borne
+    # What was borne too much is charged backward, too, where both factors are negative
+    return weight * smaller(pace * step.borne, size(pace) * step.borne)
 
 
 @dataclass(frozen=True)

@@ -114,10 +114,11 @@ def test_terms_are_what_they_say_of_the_substeps(name, trunk):
         progress = np.diff(ends_of(trace["x"]), prepend=0.0)
     commanded = 2.5 * DT
     pace = np.minimum(np.clip(progress / commanded, -1, 1), ends_of(trace["theta_rate"]) / STEPPING)
+    bore = borne(impulses_of(trace, env.unwrapped.weight))
     expected = {
         "reward_progress": WEIGHTS["progress"] * np.minimum(progress, commanded),
         "reward_overspeed": -3.0 * np.maximum(progress - commanded, 0.0),
-        "reward_support": WEIGHTS["support"] * pace * borne(impulses_of(trace, env.unwrapped.weight)),
+        "reward_support": WEIGHTS["support"] * np.minimum(pace * bore, np.abs(pace) * bore),
     }
     for term, values in expected.items():
         np.testing.assert_allclose(paid[term], values, rtol=1e-9, atol=1e-12, err_msg=term)
