@@ -208,7 +208,9 @@ class LegBase:
             ResetNeeded: there is no episode yet, so no present gait.
         """
         self._check_started("action_for")
-        actions: NDArray[np.float32] = self._each(self.batch.body.action_for(gait, self.engine))
+        actions: NDArray[np.float32] = self._each(
+            self.batch.body.action_for(gait, self.engine, self.batch.dt)
+        )
         return actions
 
     def _check_open(self, call: str) -> None:

@@ -147,7 +147,7 @@ class EpisodeBatch:
             1, task_type(len(self.task.terms), count, self.engine.features.gait_size, self.body.legs)
         )
         task = constants[0]
-        for name, value in self.body.constants().items():
+        for name, value in self.body.constants(self.engine, self.dt).items():
             task[name] = value
         task["rate_bound"][:ACTIONS] = self.engine.filters.to_array()[:, 1]
         task["weights"] = [self.weights[term.name] for term in self.task.terms]

@@ -98,7 +98,8 @@ def task_type(terms: int, entries: int, gait: int = ACTIONS, legs: int = 1) -> n
     """The record of a task's constants."""
     return np.dtype(
         [
-            ("reach", "f8", (gait,)), ("half", "f8", (gait,)),  # of an action of 1; of a range
+            ("reach", "f8", (gait,)), ("lead", "f8"),  # of an action of 1; of a command [s]
+            ("half", "f8", (gait,)),  # of a range
             ("low", "f8", (gait,)), ("high", "f8", (gait,)),  # within these
             ("middle", "f8", (gait,)), ("rate_bound", "f8", (gait,)),  # (value - middle) / half is observed
             ("weights", "f8", (terms,)), ("episode_seconds", "f8"),  # of the reward

@@ -188,7 +188,7 @@ class Horse:
         """Lowest and highest commanded speed [m/s]."""
         return pair("target_speed", s.target_speed, 0.1)
 
-    def constants(self) -> dict[str, Any]:
+    def constants(self, engine: TrunkEngine, dt: float) -> dict[str, Any]:
         """Of the task's record: spans of actions and bounds of commands."""
         gait = 2 + 2 * self.harmonics
         low, high = np.transpose([*list(WIDEST.values())[:4], *[WIDEST["higher"]] * (gait - 4)])
@@ -286,7 +286,7 @@ class Horse:
         found[:, 0] /= self.pace
         return found
 
-    def action_for(self, gait: Any, engine: TrunkEngine) -> NoReturn:
+    def action_for(self, gait: Any, engine: TrunkEngine, dt: float) -> NoReturn:
         """There is none: `ParameterError`."""
         raise ParameterError(
             "action_for: expected an environment of one leg; actions of a horse lie around a gait, zeros are"

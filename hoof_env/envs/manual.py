@@ -27,7 +27,7 @@ from hoof_env.envs import horse, observation, start
 from hoof_env.envs.horse import Horse
 from hoof_env.envs.horse_leg import OBJECTIVES, HorseLegMOEnv
 from hoof_env.envs.infos import measured_names
-from hoof_env.envs.one_leg import OneLeg
+from hoof_env.envs.one_leg import CARRIED, OneLeg
 from hoof_env.envs.parameters import HILLS, SPACING
 from hoof_env.envs.reference import ACTED, COUNT, FASTEST, FOLLOWED, SIZES, horse_gaits
 from hoof_env.envs.reward import BEARING, LONGEST_STRIDE, check_weights
@@ -71,6 +71,7 @@ def tables() -> dict[str, dict[str, Any]]:
         "speed_spread": 100 * horse.SPEED_SPREAD, "pitch_spread": horse.PITCH_SPREAD,
         "phase_spread": horse.PHASE_SPREAD, "fall_pitch": horse.PITCH, "fall_low": horse.HEIGHT[0],
         "fall_high": horse.HEIGHT[1], "clearance": 100 * horse.CLEARANCE, "followed": FOLLOWED,
+        "carried": round(100 * CARRIED),
         "crank_bound": FilterSettings().crank_rate, "swing_bound": FilterSettings().swing_rate,
         "bearing": BEARING, "full_allowance": BEARING * LONGEST_STRIDE,
     }  # fmt: skip

@@ -17,18 +17,34 @@ from hoof_env.envs.parameters import drive_of, ground_of, hoof_spring, pair
 from hoof_env.envs.settings import Settings
 from hoof_env.envs.start import HIGHEST, LOWEST, Start, check_options, draw_starts
 from hoof_env.errors import ParameterError, check_choice, check_number
-from hoof_env.gait import PARAMETERS, FilterSettings, GaitParameters, HarmonicGait, gait_names, load_gait
+from hoof_env.gait import (
+    INNER,
+    PARAMETERS,
+    FilterSettings,
+    GaitParameters,
+    HarmonicGait,
+    gait_names,
+    load_gait,
+)
 from hoof_env.ground.contact import Ground, load_ground
 from hoof_env.leg.geometry import load_geometry, named, wrong
 
 Floats = NDArray[np.float64]
 
 
-def reach_of(s: Settings) -> Floats:
-    """How far from the gait as it is an action of 1 puts the command, shape (4,) [rad/s, rad, rad, rad].
+CARRIED = 5 / 6
+"""Part of a change that a zero action carries on with: 0 would end a rate with its action, and rates would
+jump in every step; with 1 a change would go on."""
 
-    A filter that follows a steady rate lags 1 / gain behind its command, and a command stands for a control
-    step, of which half has passed in the mean.
+
+def lead_of(dt: float) -> float:
+    """Time by which a zero action commands what is ahead of a gait that changes [s]: a part of the lag of the
+    filters behind a command that moves at a steady rate, in control steps of `dt` [s]."""
+    return CARRIED * (1 / FilterSettings().gain + dt / 2)
+
+
+def check_rates(s: Settings) -> Floats:
+    """The rates at which an action of 1 changes the gait, shape (4,) [rad/s^2, rad/s, rad/s, rad/s].
 
     Raises:
         ParameterError: a rate is not above 0, or beyond the bound of the filters.
@@ -36,29 +52,68 @@ def reach_of(s: Settings) -> Floats:
     filters = FilterSettings()
     crank = check_number("crank_rate", s.crank_rate, low=0, high=filters.crank_rate, exclusive_low=True)
     swing = check_number("swing_rate", s.swing_rate, low=0, high=filters.swing_rate, exclusive_low=True)
-    return np.array([crank, swing, swing, swing]) * (1 / filters.gain + s.dt / 2)
+    return np.array([crank, swing, swing, swing])
+
+
+def reach_per_rate(dt: float, substep: float) -> float:
+    """How far a command must be from where the gait is heading, over the rate at which the gait then changes
+    if this is repeated in every control step [s].
+
+    While a command stands, its distance d from the gait and the gait's rate v change in a substep h by
+
+        d -= h v + h^2/2 a,    v += h a,    a = INNER gain (gain d - v),
+
+    which has two modes: v = m d, both becoming l times as much. A gait changes steadily by r where both modes
+    lose in a control step what a command that moves by r dt adds to them,
+
+        d_1 (1 - l_1^n) = r dt m_2 / (m_2 - m_1),    d_2 (1 - l_2^n) = r dt m_1 / (m_1 - m_2).
+
+    Args:
+        dt: control step [s].
+        substep: of the filters [s].
+    """
+    gain = FilterSettings().gain
+    follow, h, n = INNER * gain, substep, round(dt / substep)
+    keeps_distance, from_speed = 1 - 0.5 * h * h * follow * gain, -h + 0.5 * h * h * follow
+    from_distance, keeps_speed = h * follow * gain, 1 - h * follow
+    middle, product = 0.5 * (keeps_distance + keeps_speed), keeps_distance * keeps_speed
+    apart = math.sqrt(middle**2 - product + from_speed * from_distance)
+    factors = middle + apart, middle - apart
+    slopes = [from_distance / (factor - keeps_speed) for factor in factors]
+    reach, lead = 0.0, lead_of(dt)
+    for factor, slope, other in zip(factors, slopes, reversed(slopes), strict=True):
+        distance = dt * other / (other - slope) / (1 - factor**n)
+        reach += distance * (1 - lead * slope)
+    return reach
 
 
 AT_REST = 1e-6
 """Differences from a gait that are as good as none [rad/s, rad]: observations are rounded to float32."""
 
 
-def action_towards(gaits: Floats, now: Floats, reach: Floats) -> NDArray[np.float32]:
-    """Actions that go towards gaits, shape (..., 4), from those of now as fast as is allowed, and stop there.
+def action_towards(gaits: Floats, heading: Floats, reach: Floats) -> NDArray[np.float32]:
+    """Actions that go towards gaits, shape (..., 4), as fast as is allowed, and stop there.
 
     Args:
-        gaits, now: gait parameters [rad/s, rad, rad, rad].
-        reach: see `reach_of`.
+        gaits: gait parameters [rad/s, rad, rad, rad].
+        heading: see `heading_now`.
+        reach: how far from there an action of 1 puts the command, shape (4,).
     """
-    gap = gaits - now
+    gap = gaits - heading
     gap = np.where(np.abs(gap) < AT_REST, 0.0, gap)
     return np.clip(gap / reach, -1.0, 1.0).astype(np.float32)
 
 
-def gait_now(engine: TrunkEngine) -> Floats:
-    """Gait parameters of the first leg at present, shape (num_envs, 4)."""
+def heading_now(engine: TrunkEngine, dt: float) -> Floats:
+    """Where the gait of the first leg is heading, shape (num_envs, 4): what a zero action commands.
+
+    `step` has the same in a kernel, and `policies.heading_seen` of what is observed."""
     state = engine.state
-    return np.stack([state[name][0] for name in PARAMETERS], axis=-1)
+    gait, rate = (
+        np.stack([state[name + suffix][0] for name in PARAMETERS], axis=-1) for suffix in ("", "_rate")
+    )
+    heading: Floats = gait + lead_of(dt) * rate
+    return heading
 
 
 class OneLeg:
@@ -85,7 +140,7 @@ class OneLeg:
                 )
         self.gait = None if s.gait is None else self.gaits[check_choice("gait", s.gait, self.gaits)]
         self._spring = hoof_spring(s)
-        self.reach = reach_of(s)
+        self.rates = check_rates(s)
         nominal = self.geometry.hip_height
         height = nominal if s.hip_height is None else s.hip_height
         self.height = check_number("hip_height", height, low=LOWEST * nominal, high=HIGHEST * nominal)
@@ -103,10 +158,16 @@ class OneLeg:
         """Lowest and highest commanded speed [m/s], None for no command."""
         return None if s.target_speed is None else pair("target_speed", s.target_speed, -20.0)
 
-    def constants(self) -> dict[str, Any]:
-        """Of the task's record."""
+    def reach(self, engine: TrunkEngine, dt: float) -> Floats:
+        """How far an action of 1 puts the command from where the gait is heading, shape (4,) [rad/s, and rad
+        thrice]."""
+        return self.rates * reach_per_rate(dt, engine.substep)
+
+    def constants(self, engine: TrunkEngine, dt: float) -> dict[str, Any]:
+        """Of the task's record, with a control step of `dt` [s]."""
         return {
-            "reach": self.reach, "middle": MIDDLE, "half": HALF_RANGE, "low": LOW, "high": HIGH,
+            "reach": self.reach(engine, dt), "lead": lead_of(dt),
+            "middle": MIDDLE, "half": HALF_RANGE, "low": LOW, "high": HIGH,
             "height": self.height, "lowest": LOWEST * self.height, "highest": HIGHEST * self.height,
         }  # fmt: skip
 
@@ -125,7 +186,9 @@ class OneLeg:
     def settle(self, start: Start, targets: Floats, options: Any, engine: TrunkEngine) -> None:
         """Nothing depends on the commanded speeds."""
 
-    def action_for(self, gaits: str | GaitParameters | Floats, engine: TrunkEngine) -> NDArray[np.float32]:
+    def action_for(
+        self, gaits: str | GaitParameters | Floats, engine: TrunkEngine, dt: float
+    ) -> NDArray[np.float32]:
         """See `LegBase.action_for`; shape (num_envs, 4)."""
         if isinstance(gaits, str):
             gaits = self.gaits[check_choice("gait", gaits, self.gaits)]
@@ -138,4 +201,4 @@ class OneLeg:
                 f"gait: expected one of {', '.join(self.gaits)}, GaitParameters or an array of shape (4,) or "
                 f"({engine.num_envs}, 4), got {gaits!r}"
             )
-        return action_towards(values, gait_now(engine), self.reach)
+        return action_towards(values, heading_now(engine, dt), self.reach(engine, dt))

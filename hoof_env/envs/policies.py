@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from hoof_env._version import __version__
 from hoof_env.envs.observation import HALF_RANGE, HIGH, LOW, MIDDLE
-from hoof_env.envs.one_leg import action_towards
+from hoof_env.envs.one_leg import action_towards, lead_of
 from hoof_env.envs.start import extreme_posture
 from hoof_env.errors import DataFileError, ParameterError, check_choice
 from hoof_env.gait import LIMITS, GaitParameters, paper_gaits
@@ -86,9 +86,9 @@ def policy_names(env: Any) -> list[str]:
     return sorted(env.unwrapped.gaits) + list(POLICIES)
 
 
-def gait_seen(env: Any) -> Any:
-    """A function that reads the present gait, shape (..., 4), from observations of an environment of one leg,
-    shape (..., k).
+def heading_seen(env: Any) -> Any:
+    """A function that reads where the gait is heading, shape (..., 4), from observations of an environment of
+    one leg, shape (..., k); see `one_leg.heading_now`.
 
     Raises:
         ParameterError: the environment does not observe it.
@@ -100,17 +100,27 @@ def gait_seen(env: Any) -> Any:
             f" present one; got {leg.settings.observation!r}"
         )
     first = leg.observation_names.index("crank speed")
-    columns = slice(first, first + len(LIMITS))
-    return lambda observation: MIDDLE + HALF_RANGE * np.asarray(observation, float)[..., columns]
+    middle = first + len(LIMITS)
+    last = middle + len(LIMITS)
+    lead = lead_of(leg.batch.dt)
+    rate_bounds = leg.batch.engine.filters.to_array()[:, 1]
+
+    def heading(observation: Any) -> Any:
+        seen = np.asarray(observation, float)
+        gait = MIDDLE + HALF_RANGE * seen[..., first:middle]
+        return gait + lead * rate_bounds * seen[..., middle:last]
+
+    return heading
 
 
 def towards(env: Any, gait_at: Any) -> Any:
     """A function of observations and times that goes to the gait that `gait_at` gives for them, as fast as is
     allowed; see `LegBase.action_for`."""
-    seen, reach = gait_seen(env), env.unwrapped.batch.body.reach
+    batch = env.unwrapped.batch
+    heading, reach = heading_seen(env), batch.body.reach(batch.engine, batch.dt)
 
     def act(observation: Any, time: Any) -> Action:
-        return action_towards(np.asarray(gait_at(observation, time), float), seen(observation), reach)
+        return action_towards(np.asarray(gait_at(observation, time), float), heading(observation), reach)
 
     return act
 

@@ -45,8 +45,8 @@ class Settings:
     hoof_stiffness: float | None = None
     hoof_damping: float | None = None
     terrain: Mapping[str, Any] | None = None
-    crank_rate: float = 12.0
-    swing_rate: float = 0.8
+    crank_rate: float = 18.0
+    swing_rate: float = 1.2
     drive: str = "prescribed"
     motor_gain: float = 100.0
     motor_torque: float = 600.0

@@ -60,10 +60,11 @@ def is_own(term: Term) -> bool:
 
 @inlined
 def apply_action(task, actions, leg, n):  # type: ignore[no-untyped-def]
-    """Command the rates that an action asks for, from the gait as it is now and within its limits."""
+    """Command the rates that an action asks for, from where the gait is heading and within the limits."""
     for k in range(ACTIONS):
         action = clip(read(leg, actions, n * ACTIONS + k, ACTIONS), 1.0)
-        command = leg.state.gait[k] + task.reach[k] * action
+        heading = leg.state.gait[k] + task.lead * leg.state.gait_rate[k]
+        command = heading + task.reach[k] * action
         leg.command[k] = smaller(larger(command, task.low[k]), task.high[k])
 
 

@@ -51,15 +51,18 @@ def test_so_it_does_in_the_papers_solver():
         same(gaits_of(env), before)
 
 
-def test_a_zero_action_ends_a_change_within_the_filters_lag():
+def test_a_change_fades_under_zero_actions():
+    """To a hundredth in half a second, and without a sign of oscillation."""
     env = gym.make(LEG)
     env.reset(seed=0, options={"gait": "run"})
     for action in actions(0, 10):
         env.step(action)
-    assert np.abs(rates_of(env)).max() > 0.1
-    for _ in range(30):
+    before = rates_of(env)
+    assert np.abs(before).max() > 0.1
+    for _ in range(25):
         env.step(ZERO)
-    np.testing.assert_allclose(rates_of(env), 0.0, atol=1e-4)
+        assert (rates_of(env) * before > -1e-12).all()
+    assert np.abs(rates_of(env)).max() < 0.01 * np.abs(before).max()
 
 
 def test_zeros_from_the_run_are_the_papers_run():
@@ -72,9 +75,11 @@ def test_zeros_from_the_run_are_the_papers_run():
 
 
 def change_in(env, parameter, sign, steps, settle=6):
-    """Rate at which a parameter changes under a steady action after the filter has got under way, and how
+    """Rate at which a parameter changes under a steady action once the filter is under way, and how
     much the others do."""
-    env.reset(seed=0, options={"gait": GaitParameters.from_array(MIDDLE)})
+    begin = MIDDLE.copy()
+    begin[parameter] = (LOW if sign > 0 else HIGH)[parameter]  # with the whole range to go
+    env.reset(seed=0, options={"gait": GaitParameters.from_array(begin)})
     action = ZERO.copy()
     action[parameter] = sign
     for _ in range(settle):
@@ -89,14 +94,14 @@ def change_in(env, parameter, sign, steps, settle=6):
 @pytest.mark.parametrize("sign", [1.0, -1.0, 0.5])
 @pytest.mark.parametrize("parameter", range(4), ids=PARAMETERS)
 @pytest.mark.parametrize(
-    "rates", [{}, {"crank_rate": 2.0, "swing_rate": 3.0}, {"crank_rate": 10.0, "dt": 0.01}], ids=str
+    "rates", [{}, {"crank_rate": 2.0, "swing_rate": 2.5}, {"crank_rate": 10.0, "dt": 0.01}], ids=str
 )
 def test_a_steady_action_changes_the_gait_at_the_rate_of_its_setting(rates, parameter, sign):
     env = gym.make(LEG, trunk="fixed", **rates)
     s = env.unwrapped.settings
-    settle = round(0.14 / s.dt)
+    settle = round(0.5 / s.dt)
     rate, others = change_in(env, parameter, sign, 4, settle)
-    assert rate == pytest.approx(sign * (s.swing_rate if parameter else s.crank_rate), rel=0.01)
+    assert rate == pytest.approx(sign * (s.swing_rate if parameter else s.crank_rate), rel=0.015)
     assert not others.any()
 
 
@@ -106,7 +111,7 @@ def test_rates_as_fast_as_the_filters_hardly_lag_behind_them(parameter):
     bounds = FilterSettings()
     env = gym.make(LEG, trunk="fixed", crank_rate=bounds.crank_rate, swing_rate=bounds.swing_rate)
     bound = bounds.swing_rate if parameter else bounds.crank_rate
-    rate, _ = change_in(env, parameter, 1.0, 2, 5 if parameter == 0 else 3)
+    rate, _ = change_in(env, parameter, 1.0, 3, 8)
     assert 0.88 * bound < rate < bound
 
 

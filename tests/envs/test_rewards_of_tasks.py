@@ -14,7 +14,7 @@ from family import running_peak_charge, together
 from hoof_env._output import markdown_table
 from hoof_env.envs import tasks
 from hoof_env.envs.observation import HIGH, LOW
-from hoof_env.envs.policies import gait_seen, make_policy, start_of, towards
+from hoof_env.envs.policies import heading_seen, make_policy, start_of, towards
 from hoof_env.envs.reward import STEPPING, check_weights
 from hoof_env.envs.start import HIGHEST, LOWEST
 from hoof_env.gait import FilterSettings
@@ -23,7 +23,7 @@ TASKS = {name: task for name, task in tasks.TASKS.items() if not task.is_horse}
 """Of one leg; test_horse.py has the horse's."""
 
 SEEDS = 40
-MARGIN = dict.fromkeys(TASKS, 3.0) | {"fixed": 0.3}
+MARGIN = dict.fromkeys(TASKS, 3.0) | {"fixed": 0.25}
 """Return by which the reference gait is ahead over ten seconds, or the one of the paper's set-up, in the mean
 of so many episodes."""
 
@@ -116,7 +116,7 @@ def shaking(crank_speed, frequencies):
         size, phase = generator.uniform(0, 1, (2, SEEDS, 4))
         pulse = 2 * np.pi * generator.uniform(*frequencies, (SEEDS, 1))
         at_speed = towards(
-            env, lambda seen, time: gait_seen(env)(seen) * [0, 1, 1, 1] + [crank_speed, 0, 0, 0]
+            env, lambda seen, time: heading_seen(env)(seen) * [0, 1, 1, 1] + [crank_speed, 0, 0, 0]
         )
 
         def act(seen, time):
@@ -309,11 +309,18 @@ def test_wild_policies_stay_below_the_reference(task, name):
     assert wild_returns(task)[name].mean() < bar(task)
 
 
+def is_trick(task, name):
+    """Whether a policy of before is still what it was: flips of 0.06 s hardly move the gait that an episode
+    starts in, and on the paper's set-up no flips of positions do more than shake it, see `SHAKEABLE`."""
+    if "bang-bang" not in name:
+        return True
+    return task in ("leg", "speed") or (task != "fixed" and f" {PACES[0] * DT:g} s" not in name)
+
+
 @pytest.mark.parametrize(
-    ("task", "name"), [(t, n) for t in TASKS for n in BEFORE if t != "fixed" or "bang-bang" not in n]
+    ("task", "name"), [(task, name) for task in TASKS for name in BEFORE if is_trick(task, name)]
 )
 def test_tricks_of_before_do_not_pay_at_the_rates_of_before(task, name):
-    """Of the paper's set-up bang-bang is left out, see `SHAKEABLE`."""
     assert quick_returns(task)[name].mean() < bar(task)
 
 
@@ -342,24 +349,6 @@ def test_no_random_wave_on_a_slow_crank_pays():
     assert truncated.all()
     assert total.max() > 20  # it does find policies that make way
     assert total.max() < bar("leg")
-
-
-def test_paddling_under_one_held_peak_does_not_pay():
-    """From the start that it was found for it is as fast as the run, in a few stances. The peak is not held:
-    a charge for the peaks of stances would be a tenth of this one."""
-    env = gym.make(TASKS["leg"].id, **QUICK).unwrapped
-    observation, _ = env.reset(seed=0, options={"crank_angle": 7.835, "speed": 0.5, "gait": "run"})
-    act, total, records = towards(env, lambda seen, time: paddle(time)), 0.0, [env.record()]
-    for step in range(500):
-        observation, reward, _, _, info = env.step(act(observation, step * DT))
-        total += reward
-        records.append(env.record())
-    summary, forces = info["episode_summary"], together(records[1:])["grf"]
-    assert summary["duty_factor"] > 0.95
-    assert summary["distance_m"] > 20
-    assert summary["stances"] <= 3
-    assert running_peak_charge(forces) > 10 * summary["stance_peak_sum_n"]
-    assert total < bar("leg")
 
 
 STANDING = {

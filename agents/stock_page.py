@@ -1,0 +1,197 @@
+"""The page of `agents.stock`: learning curves as tables and as a picture, and the returns of what needs no
+learning."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents import runs
+from agents.score import FINAL_SEEDS, find_policy, make_rows, play_rows
+from agents.statistics import iqm
+from agents.stock_plan import LEG, OTHERS, PLAN, TUNED
+from hoof_env._output import markdown_table, staged
+
+ANCHORS = ("zero action", "scripted gait", "best open loop")
+"""What stands beside the curves."""
+
+
+def mean_return(policy: Any, envs: Any) -> float:
+    """Mean return of a policy on the starts of the final scores."""
+    return float(np.mean([one["return"] for one in play_rows(envs, policy, FINAL_SEEDS)]))
+
+
+def anchors(env_id: str) -> dict[str, float]:
+    """Returns of what needs no learning, by name, those that an id has."""
+    envs = make_rows(env_id, len(FINAL_SEEDS))
+    assert envs is not None
+    zero = np.zeros((len(FINAL_SEEDS), *(envs.single_action_space.shape or ())), np.float32)
+
+    class Zero:
+        """The zero action."""
+
+        def predict(self, *args: Any, **kwargs: Any) -> tuple[NDArray[np.float32], None]:
+            return zero, None
+
+    found = {"zero action": mean_return(Zero(), envs)}
+    with runs.make_env(env_id) as env:
+        if envs.action_form == "rates":
+            for title, name in (("scripted gait", envs.task.reference), ("best open loop", "open-loop")):
+                found[title] = mean_return(find_policy(name, env, env_id), envs)
+    return found
+
+
+AT_STEPS = (20_480, 61_440, 204_800, 400_000, 3_000_000)
+AT_SECONDS = (5.0, 20.0, 60.0, 180.0, 600.0)
+"""Where learners of HorseLeg-v0 are compared."""
+
+
+def at(rows: Sequence[dict[str, Any]], steps: int) -> list[float]:
+    """The returns of all seeds at the last score up to so many steps."""
+    latest: dict[int, dict[str, Any]] = {}
+    for row in rows:
+        if row["steps"] <= steps and row["steps"] >= latest.get(row["seed"], row)["steps"]:
+            latest[row["seed"]] = row
+    return [row["return"] for row in latest.values()]
+
+
+def table(rows: Sequence[dict[str, Any]], beside: dict[str, dict[str, float]]) -> str:
+    """A line for each algorithm and id: interquartile mean, lowest and highest seed in the middle and at the
+    end, and what needs no learning."""
+    lines = []
+    for curves in PLAN:
+        own = [row for row in rows if (row["env_id"], row["algo"]) == (curves.env_id, curves.algo)]
+        if not own:
+            continue
+        last = max(row["steps"] for row in own)
+        cells = []
+        for steps in (last // 2, last):
+            values = at(own, steps)
+            cells.append(f"{float(iqm(values)[0]):.1f} ({min(values):.1f} to {max(values):.1f})")
+        seconds = np.median([row["train_seconds"] for row in own if row["steps"] == last])
+        known = beside[curves.env_id]
+        references = [f"{known[name]:.1f}" if name in known else "" for name in ANCHORS]
+        seeds = str(len({row["seed"] for row in own}))
+        name = curves.env_id.rpartition("/")[2].removesuffix("-v0")
+        own_cells = [name, curves.algo.upper(), seeds, *cells, f"{last:,}", f"{seconds:.0f}"]
+        lines.append(own_cells + references)
+    head = (
+        "id", "algorithm", "seeds", "return at half the steps", "return at the end", "steps", "seconds",
+        *ANCHORS,
+    )  # fmt: skip
+    return markdown_table(head, lines)
+
+
+def compared(rows: Sequence[dict[str, Any]], column: str, places: Sequence[float]) -> str:
+    """A line for each learner of HorseLeg-v0: the interquartile mean of its last returns up to so many steps,
+    or so many seconds of learning; nothing where its trainings do not go so far."""
+    lines = []
+    for algo in dict.fromkeys(curves.algo for curves in PLAN if curves.env_id == LEG):
+        own = [row for row in rows if (row["env_id"], row["algo"]) == (LEG, algo)]
+        if not own:
+            continue
+        ends: dict[int, float] = {}
+        for row in own:
+            ends[row["seed"]] = max(row[column], ends.get(row["seed"], 0.0))
+        cells = []
+        for place in places:
+            latest: dict[int, dict[str, Any]] = {}
+            for row in own:
+                if row[column] <= place and row["steps"] >= latest.get(row["seed"], row)["steps"]:
+                    latest[row["seed"]] = row
+            is_reached = all(end >= 0.9 * place for end in ends.values())
+            values = [row["return"] for row in latest.values()]
+            cells.append(f"{float(iqm(values)[0]):.1f}" if is_reached else "")
+        lines.append([title(algo), *cells])
+    return markdown_table(("learner", *(f"{place:,.0f}" for place in places)), lines)
+
+
+def title(algo: str) -> str:
+    """Name of a learner for people, with what its settings are."""
+    return "ppo_flat, tuned, 16 environments" if algo == TUNED else f"{algo.upper()}, stock"
+
+
+def draw(rows: Sequence[dict[str, Any]], beside: dict[str, dict[str, float]], path: Path) -> None:
+    """A panel for each id: the median of all seeds and their range against steps, and lines for what needs no
+    learning."""
+    import matplotlib
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import EngFormatter
+
+    from hoof_env._plotting import BLUE, GREEN, GREY, ORANGE, PURPLE, STYLE
+
+    colours = {"ppo": BLUE, "sac": ORANGE, "td3": GREEN, "tqc": PURPLE}
+    styles = dict(zip(ANCHORS, (":", "--", "-"), strict=True))
+    ids = [env_id for env_id in (LEG, *OTHERS) if any(row["env_id"] == env_id for row in rows)]
+    with matplotlib.rc_context(STYLE):
+        across = min(3, len(ids))
+        down = -(-len(ids) // across)
+        figure = Figure(figsize=(3.4 * across, 2.6 * down), layout="constrained")
+        panels = figure.subplots(down, across, squeeze=False).ravel()
+        for panel, env_id in zip(panels, ids, strict=False):
+            for algo, colour in colours.items():
+                own = [row for row in rows if (row["env_id"], row["algo"]) == (env_id, algo)]
+                steps = sorted({row["steps"] for row in own})
+                if not steps:
+                    continue
+                values = [[row["return"] for row in own if row["steps"] == step] for step in steps]
+                panel.plot(steps, [np.median(each) for each in values], color=colour, label=algo.upper())
+                panel.fill_between(
+                    steps, [min(each) for each in values], [max(each) for each in values], color=colour,
+                    alpha=0.2, linewidth=0,
+                )  # fmt: skip
+            for name, value in beside[env_id].items():
+                panel.axhline(value, color=GREY, linewidth=0.8, linestyle=styles[name], label=name)
+            panel.set_title(env_id.rpartition("/")[2])
+            panel.set_xlabel("environment steps")
+            panel.set_ylabel("return")
+            panel.xaxis.set_major_formatter(EngFormatter(sep=""))
+        for panel in panels[len(ids) :]:
+            panel.set_axis_off()
+        panels[0].legend(loc="lower right")
+        figure.savefig(path, metadata={"Software": None})
+
+
+PAGE = """# Stock learners
+
+Learning curves of Stable-Baselines3's PPO, SAC and TD3 and of sb3-contrib's TQC with their library's own
+defaults: one environment, no wrapper. Written by `python -m agents.stock`, which trains what is missing in
+[curves.csv](curves.csv). Returns are those of the policy without its noise on {starts} starts that no
+training meets: the interquartile mean over seeds, and the lowest and highest seed. Seconds are those of
+learning on one thread, with other work on the other core.
+
+![Return against environment steps](stock.png)
+
+{table}
+
+## Compared at equal steps and equal seconds
+
+`HorseLeg-v0`, the interquartile mean over seeds. `ppo_flat` has the settings of agents/hyperparams and 16
+environments; the others have none, and no settings that were tuned for them are known to be better.
+
+Returns after so many steps:
+
+{by_steps}
+
+Returns after so many seconds of learning on one thread:
+
+{by_seconds}
+"""
+
+
+def write(out: Path, rows: Sequence[dict[str, Any]]) -> None:
+    """Write table and picture of the curves that are there."""
+    beside = {env_id: anchors(env_id) for env_id in dict.fromkeys(row["env_id"] for row in rows)}
+    with staged(out) as stage:
+        draw(rows, beside, stage / "stock.png")
+        text = PAGE.format(
+            starts=len(FINAL_SEEDS),
+            table=table([row for row in rows if row["algo"] != TUNED], beside),
+            by_steps=compared(rows, "steps", AT_STEPS),
+            by_seconds=compared(rows, "train_seconds", AT_SECONDS),
+        )
+        (stage / "README.md").write_text(text, encoding="utf-8")

@@ -1,0 +1,72 @@
+"""What `agents.stock` trains, and the file of its learning curves."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from hoof_env.errors import DataFileError
+
+
+@dataclass(frozen=True)
+class Curves:
+    """Trainings of one algorithm on one id."""
+
+    env_id: str
+    algo: str
+    seeds: int
+    steps: int
+    every: int  # steps between two scores
+
+
+TUNED: Final = "ppo_flat"
+"""The one learner that is not stock, for comparison: its settings are those of agents/hyperparams."""
+
+LEG, RAIL, SPEED, TERRAIN, FIXED, HORSE = (
+    f"hoof_env/{name}-v0"
+    for name in ("HorseLeg", "HorseLegRail", "HorseLegSpeed", "HorseLegTerrain", "HorseLegFixed", "Horse")
+)
+OTHERS = (RAIL, SPEED, TERRAIN, HORSE, FIXED)
+
+PLAN = (
+    Curves(LEG, "ppo", 10, 400_000, 20_480),
+    Curves(LEG, "sac", 10, 60_000, 6_000),
+    *(Curves(env_id, "ppo", 5, 300_000, 20_480) for env_id in OTHERS),
+    Curves(LEG, "td3", 5, 60_000, 6_000),
+    Curves(LEG, "tqc", 5, 60_000, 6_000),
+    Curves(LEG, TUNED, 10, 3_000_000, 40_960),
+    *(Curves(env_id, "sac", 3, 60_000, 6_000) for env_id in OTHERS),
+)
+"""The published table, in the order in which it is trained."""
+
+
+COLUMNS = ("env_id", "algo", "seed", "steps", "return", "train_seconds")
+"""Of curves.csv: a line for each score; the seconds are those of learning alone, so far."""
+
+
+def read_curves(folder: Path) -> list[dict[str, Any]]:
+    """The rows of curves.csv; none where there is no such file.
+
+    Raises:
+        DataFileError: it cannot be read.
+    """
+    path = folder / "curves.csv"
+    if not path.is_file():
+        return []
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            return [
+                {
+                    "env_id": row["env_id"],
+                    "algo": row["algo"],
+                    "seed": int(row["seed"]),
+                    "steps": int(row["steps"]),
+                    "return": float(row["return"]),
+                    "train_seconds": float(row["train_seconds"]),
+                }
+                for row in csv.DictReader(file)
+            ]
+    except (OSError, KeyError, TypeError, ValueError) as error:
+        raise DataFileError(f"{path}: expected columns {', '.join(COLUMNS)}: {error!r}") from None
