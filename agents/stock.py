@@ -100,6 +100,7 @@ def train(job: Job) -> list[dict[str, Any]]:
     curves = job.curves
     envs = make_rows(curves.env_id, len(FINAL_SEEDS))
     rows: list[dict[str, Any]] = []
+    commit = runs.versions().get("commit", "")
 
     class Curve(BaseCallback):
         """Scores the policy every so many steps."""
@@ -116,7 +117,7 @@ def train(job: Job) -> list[dict[str, Any]]:
             return True
 
     def add(model: Any, steps: int, seconds: float) -> None:
-        figures = (steps, round(stock_page.mean_return(model, envs), 2), round(seconds, 1))
+        figures = (steps, round(stock_page.mean_return(model, envs), 2), round(seconds, 1), commit)
         rows.append(dict(zip(COLUMNS, (*job.key, *figures), strict=True)))
 
     model = tuned_model(job) if curves.algo == TUNED else stock_model(job)

@@ -16,7 +16,9 @@ from agents.statistics import iqm
 from agents.stock_plan import LEG, OTHERS, PLAN, TUNED
 from hoof_env._output import markdown_table, staged
 
-ANCHORS = ("zero action", "scripted gait", "best open loop")
+BEST = "best open loop"
+
+ANCHORS = ("zero action", "scripted gait", BEST)
 """What stands beside the curves."""
 
 
@@ -40,7 +42,7 @@ def anchors(env_id: str) -> dict[str, float]:
     found = {"zero action": mean_return(Zero(), envs)}
     with runs.make_env(env_id) as env:
         if envs.action_form == "rates":
-            for title, name in (("scripted gait", envs.task.reference), ("best open loop", "open-loop")):
+            for title, name in (("scripted gait", envs.task.reference), (BEST, "open-loop")):
                 found[title] = mean_return(find_policy(name, env, env_id), envs)
     return found
 
@@ -75,13 +77,17 @@ def table(rows: Sequence[dict[str, Any]], beside: dict[str, dict[str, float]]) -
         seconds = np.median([row["train_seconds"] for row in own if row["steps"] == last])
         known = beside[curves.env_id]
         references = [f"{known[name]:.1f}" if name in known else "" for name in ANCHORS]
+        above = ""
+        if BEST in known:
+            finals = at(own, last)
+            above = f"{sum(value > known[BEST] for value in finals)} of {len(finals)}"
         seeds = str(len({row["seed"] for row in own}))
         name = curves.env_id.rpartition("/")[2].removesuffix("-v0")
         own_cells = [name, curves.algo.upper(), seeds, *cells, f"{last:,}", f"{seconds:.0f}"]
-        lines.append(own_cells + references)
+        lines.append([*own_cells, *references, above])
     head = (
         "id", "algorithm", "seeds", "return at half the steps", "return at the end", "steps", "seconds",
-        *ANCHORS,
+        *ANCHORS, "seeds above it at the end",
     )  # fmt: skip
     return markdown_table(head, lines)
 
@@ -162,7 +168,7 @@ Learning curves of Stable-Baselines3's PPO, SAC and TD3 and of sb3-contrib's TQC
 defaults: one environment, no wrapper. Written by `python -m agents.stock`, which trains what is missing in
 [curves.csv](curves.csv). Returns are those of the policy without its noise on {starts} starts that no
 training meets: the interquartile mean over seeds, and the lowest and highest seed. Seconds are those of
-learning on one thread, with other work on the other core.
+learning on one thread, with other work on the other core. Trained by the code of {commits}.
 
 ![Return against environment steps](stock.png)
 
@@ -190,6 +196,7 @@ def write(out: Path, rows: Sequence[dict[str, Any]]) -> None:
         draw(rows, beside, stage / "stock.png")
         text = PAGE.format(
             starts=len(FINAL_SEEDS),
+            commits=", ".join(sorted({f"`{row['commit'] or 'unknown'}`" for row in rows})),
             table=table([row for row in rows if row["algo"] != TUNED], beside),
             by_steps=compared(rows, "steps", AT_STEPS),
             by_seconds=compared(rows, "train_seconds", AT_SECONDS),

@@ -42,8 +42,9 @@ PLAN = (
 """The published table, in the order in which it is trained."""
 
 
-COLUMNS = ("env_id", "algo", "seed", "steps", "return", "train_seconds")
-"""Of curves.csv: a line for each score; the seconds are those of learning alone, so far."""
+COLUMNS = ("env_id", "algo", "seed", "steps", "return", "train_seconds", "commit")
+"""Columns of curves.csv: a line for each score. The seconds are those of learning alone so far; the commit is
+that of the code that trained, empty where there is no git."""
 
 
 def read_curves(folder: Path) -> list[dict[str, Any]]:
@@ -65,6 +66,7 @@ def read_curves(folder: Path) -> list[dict[str, Any]]:
                     "steps": int(row["steps"]),
                     "return": float(row["return"]),
                     "train_seconds": float(row["train_seconds"]),
+                    "commit": row["commit"] or "",
                 }
                 for row in csv.DictReader(file)
             ]
