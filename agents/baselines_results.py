@@ -1,7 +1,8 @@
 """What the trainings of a plan left, and what policies without learning get in the same episodes.
 
-An agent dominates the paper's run where it is faster, its forces and its cost of transport are lower by at
-least what `LOWER` says, and it bears no less of the weight: bearing less is a way to be soft. An agent of
+An agent dominates the scripted run where it is faster, its forces, its cost of transport and its loading rate
+are lower by at least what `LOWER` says, and its share of the weight lies between the run's and 1: bearing less
+is a way to be soft, and with more the suspension pulls the animal down. An agent of
 HorseLegSpeed-v0 follows its command by the slope of its speed over constant commands.
 """
 
@@ -35,7 +36,7 @@ SPEED = "hoof_env/HorseLegSpeed-v0"
 COMMANDS = 5  # speeds between the lowest and the highest command
 SETTLED = 4.0  # seconds after which the speed is that of the command
 
-LOWER = {"stance_peak_n": 0.75, "peak_grf_n": 0.85, "cost_of_transport": 0.7}
+LOWER = {"stance_peak_n": 0.75, "peak_grf_n": 0.85, "cost_of_transport": 0.7, "loading_rate_n_s": 1.0}
 """What an agent that dominates has at most of the run's."""
 
 
@@ -188,16 +189,16 @@ def settled_speed(policy: str, command: float) -> float:
 def meets(figures: Mapping[str, float], run: Mapping[str, float]) -> bool:
     """Whether some means dominate those of the run."""
     lower = all(figures[key] <= part * run[key] for key, part in LOWER.items())
-    return (
-        lower and figures["speed_m_s"] > run["speed_m_s"] and figures["weight_share"] >= run["weight_share"]
-    )
+    bears = run["weight_share"] <= figures["weight_share"] <= 1.0
+    return lower and bears and figures["speed_m_s"] > run["speed_m_s"]
 
 
 def apart(agent: Scored, run: Scored) -> bool:
-    """Whether the intervals lie apart, too; that of the weight share must not lie below the run's."""
+    """Whether the intervals lie apart, too; that of the weight share must lie neither below the run's nor
+    above 1."""
     ours, theirs = agent.intervals, run.intervals
     lower = all(theirs[key].above(ours[key]) for key in LOWER)
-    bears = not theirs["weight_share"].above(ours["weight_share"])
+    bears = not theirs["weight_share"].above(ours["weight_share"]) and ours["weight_share"].low <= 1.0
     return lower and bears and ours["speed_m_s"].above(theirs["speed_m_s"])
 
 

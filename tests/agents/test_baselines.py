@@ -297,7 +297,8 @@ def scored(figures, width=0.01, seeds=()):
         ({"speed_m_s": 1.9}, False),
         ({"weight_share": 0.6}, False),  # bearing less is a way to be soft
         *(({key: 1.01 * part * RUN[key]}, False) for key, part in LOWER.items()),
-        ({"loading_rate_n_s": 9.0}, True),  # shown, and not asked for
+        ({"weight_share": 1.02}, False),  # the suspension pulls the animal down
+        ({"weight_share": 0.99}, True),
     ],
 )
 def test_dominance(changes, is_better):
