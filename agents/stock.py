@@ -105,15 +105,15 @@ def train(job: Job) -> list[dict[str, Any]]:
     class Curve(BaseCallback):
         """Scores the policy every so many steps."""
 
-        began = time.monotonic()
+        began = time.process_time()
         scored = 0.0  # seconds that scores took
 
         def _on_step(self) -> bool:
             if self.num_timesteps % curves.every == 0 or self.num_timesteps == curves.steps:
-                here = time.monotonic()
+                here = time.process_time()
                 spent = here - self.began - self.scored
                 add(self.model, self.num_timesteps, spent)
-                self.scored += time.monotonic() - here
+                self.scored += time.process_time() - here
             return True
 
     def add(model: Any, steps: int, seconds: float) -> None:

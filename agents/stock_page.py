@@ -167,8 +167,8 @@ PAGE = """# Stock learners
 Learning curves of Stable-Baselines3's PPO, SAC and TD3 and of sb3-contrib's TQC with their library's own
 defaults: one environment, no wrapper. Written by `python -m agents.stock`, which trains what is missing in
 [curves.csv](curves.csv). Returns are those of the policy without its noise on {starts} starts that no
-training meets: the interquartile mean over seeds, and the lowest and highest seed. Seconds are those of
-learning on one thread, with other work on the other core. Trained by the code of {commits}.
+training meets: the interquartile mean over seeds, and the lowest and highest seed. Seconds are processor time
+of learning on one thread; other work on the machine makes them longer. Trained by the code of {commits}.
 
 ![Return against environment steps](stock.png)
 
@@ -183,7 +183,7 @@ Returns after so many steps:
 
 {by_steps}
 
-Returns after so many seconds of learning on one thread:
+Returns after so many seconds of the processor, on one thread:
 
 {by_seconds}
 """

@@ -43,8 +43,8 @@ PLAN = (
 
 
 COLUMNS = ("env_id", "algo", "seed", "steps", "return", "train_seconds", "commit")
-"""Columns of curves.csv: a line for each score. The seconds are those of learning alone so far; the commit is
-that of the code that trained, empty where there is no git."""
+"""Columns of curves.csv: a line for each score. The seconds are those of the processor for learning alone so
+far; the commit is that of the code that trained, empty where there is no git."""
 
 
 def read_curves(folder: Path) -> list[dict[str, Any]]:
