@@ -1,9 +1,9 @@
 """What the trainings of a plan left, and what policies without learning get in the same episodes.
 
-An agent dominates the scripted run where it is faster, its forces, its cost of transport and its loading
-rate are lower by at least what `LOWER` says, and its share of the weight lies between the run's and 1: bearing
-less is a way to be soft, and with more the suspension pulls the animal down. An agent of HorseLegSpeed-v0
-follows its command by the slope of its speed over constant commands.
+An agent dominates the scripted run where it is faster, its forces, its cost of transport and its loading rate
+are lower by at least what `LOWER` says, and it bears between the run's share of the weight and all of it:
+bearing less is a way to be soft, and with more the suspension pulls the animal down. An agent of
+HorseLegSpeed-v0 follows its command by the slope of its speed over constant commands.
 """
 
 from __future__ import annotations
