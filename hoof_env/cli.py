@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from hoof_env._version import __version__
-from hoof_env.errors import HoofEnvError, parse_pairs
+from hoof_env.errors import HoofEnvError
 
 
 def reproduce(out: Path, figures: bool = True, preset: str | None = None) -> None:
@@ -150,6 +150,10 @@ def compare(
     rate_b: float | None = None,
     mass_a: float | None = None,
     mass_b: float | None = None,
+    up_a: str = "auto",
+    up_b: str = "auto",
+    forward_a: str = "auto",
+    forward_b: str = "auto",
     align: str = "stances",
     threshold: float | None = None,
     units: str = "auto",
@@ -162,17 +166,24 @@ def compare(
         b: the one whose errors are told.
         out: the picture; ends in .png, .pdf or .svg.
         map_a: columns of A where they have other names than ours: time=Seconds force_x=-Fx force_y=Fz, or
-            left_fore_force_y=LF_Fz ...; a - turns a column round. left_fore=plate_1 renames a limb.
+            left_fore_force_y=LF_Fz ...; a - turns a column round, a + adds two, as left_force_y=p1_z+p3_z;
+            Fz#2 is the second column Fz, #3 the third of all. left_fore=plate_1 renames a limb,
+            left_fore=plate_1+plate_3 is the sum of two.
         map_b: columns of B.
         units_a: unit of A's forces: N, kN, N/kg, BW or %BW; auto takes what the file says.
         units_b: unit of B's forces.
         reverse_a: components of A that point the other way: none, x, y or xy; auto turns both of each limb
             whose vertical force points into the ground.
         reverse_b: components of B that do.
-        rate_a: samples a second of A, if it has no time.
+        rate_a: samples a second of A, if it has no times, or none that can be read.
         rate_b: samples a second of B.
         mass_a: of A's animal [kg], for body weights, if the file does not say it.
         mass_b: of B's animal [kg].
+        up_a: axis of A's file that points upward: x, y, z, -x, -y or -z; auto is y, and in a .c3d the normal
+            of its plates.
+        up_b: that of B.
+        forward_a: axis of A's file in which the animal travels, likewise; auto is x.
+        forward_b: that of B.
         align: stances lays each pair touchdown on touchdown, shift shifts B as a whole, none takes the times
             of the files.
         threshold: vertical force that makes a stance [N]; 20, or 1 % of the weight in body weights of an
@@ -183,12 +194,13 @@ def compare(
     from hoof_env._output import check_new
     from hoof_env.lab.compare import compare
     from hoof_env.lab.picture import check_picture, draw, report
-    from hoof_env.lab.read import read_record
+    from hoof_env.lab.read import parse_mapping, read_record
 
     made = check_new(out, overwrite)
     check_picture(out)
-    first = read_record(a, parse_pairs("--map-a", map_a), units_a, reverse_a, rate_a, mass_a)
-    second = read_record(b, parse_pairs("--map-b", map_b), units_b, reverse_b, rate_b, mass_b)
+    of_a, of_b = parse_mapping("--map-a", map_a), parse_mapping("--map-b", map_b)
+    first = read_record(a, of_a, units_a, reverse_a, rate_a, mass_a, up_a, forward_a)
+    second = read_record(b, of_b, units_b, reverse_b, rate_b, mass_b, up_b, forward_b)
     found = compare(first, second, align, threshold, units)
     draw(found, out)
     _say(f"{report(found)}\n\n{out}: {_size(out)}{made}")

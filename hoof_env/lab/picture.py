@@ -30,7 +30,10 @@ def report(found: Comparison) -> str:
         "",
         _table(found),
     ]
-    doubts = [f"{limb} is not compared: {why}" for limb, why in found.missing.items()] + found.warnings
+    same = (found.a.name, found.a.notes) == (found.b.name, found.b.notes)
+    records = (found.a,) if same else (found.a, found.b)
+    doubts = [f"{record.name}: {note}" for record in records for note in record.notes]
+    doubts += [f"{limb} is not compared: {why}" for limb, why in found.missing.items()] + found.warnings
     for limb, errors in found.limbs.items():
         if "fore-aft" in errors.forces and errors.forces["fore-aft"].r < -0.5:
             doubts.append(f"{limb}: fore-aft forces point opposite ways; {_remedy(found, limb)}")
@@ -61,7 +64,8 @@ def _about(which: str, record: ForceRecord) -> str:
     level = [limb for limb, force in record.limbs.items() if not np.isfinite(force[:, 0]).any()]
     only = f"; no fore-aft force of {', '.join(level)}" if level else ""
     return (
-        f"{which}  {record.name}: {record.rate:g} Hz, {record.unit}, {', '.join(record.limbs)}{turned}{only}"
+        f"{which}  {record.name}: {record.rate:g} Hz, {record.unit}, {', '.join(record.limbs)}, "
+        f"{record.time[0]:.4g} to {record.time[-1]:.4g} s{turned}{only}"
     )
 
 
