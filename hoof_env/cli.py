@@ -113,7 +113,8 @@ def export(
 
     Args:
         out: the file; ends in .csv, .parquet (needs 'export'), .c3d (needs 'lab'), or OpenSim's .mot or .sto,
-            which has its ExternalLoads beside it, as run_loads.xml. Its folder is made if need be.
+            which has its ExternalLoads beside it, as run_loads.xml (run_sto_loads.xml). Its folder is made if
+            need be.
         policy: as in `hoof-env render`.
         id: the environment.
         args: its arguments: key=value ..., or one JSON object.
@@ -206,6 +207,55 @@ def compare(
     _say(f"{report(found)}\n\n{out}: {_size(out)}{made}")
 
 
+def average(
+    records: tuple[Path, ...],
+    /,
+    out: Path,
+    map: tuple[str, ...] = (),
+    units_in: str = "auto",
+    reverse: str = "auto",
+    rate: float | None = None,
+    mass: float | None = None,
+    up: str = "auto",
+    forward: str = "auto",
+    threshold: float | None = None,
+    units: str = "auto",
+    points: int = 101,
+    overwrite: bool = False,
+) -> None:
+    """Write the mean stance of several trials, and its standard deviation, as a table.
+
+    Args:
+        records: one file or more that `hoof-env compare` reads; the options below hold for all of them.
+        out: the table; ends in .csv.
+        map: columns, as --map-a of `hoof-env compare`.
+        units_in: unit of the files' forces: N, kN, N/kg, BW or %BW; auto takes what each file says.
+        reverse: components that point the other way: none, x, y or xy; auto turns both of each limb whose
+            vertical force points into the ground.
+        rate: samples a second, if the files have no times.
+        mass: of the animal [kg], for body weights, if the files do not say it.
+        up: axis of the files that points upward, as --up-a of `hoof-env compare`.
+        forward: axis of the files in which the animal travels.
+        threshold: vertical force that makes a stance [N]; 20, or 1 % of the weight in body weights of an
+            animal whose weight is not known.
+        units: of the table: N or BW; auto is N where all files can be in N.
+        points: rows of the table, from touchdown to lift-off.
+        overwrite: replace the table if there is one.
+    """
+    from hoof_env._output import check_folder, check_new
+    from hoof_env.lab import average as mean
+    from hoof_env.lab.read import parse_mapping, read_record
+
+    made = check_new(out, overwrite)
+    mean.check_table(out)
+    check_folder(out.parent)
+    mapping = parse_mapping("--map", map)
+    read = [read_record(file, mapping, units_in, reverse, rate, mass, up, forward) for file in records]
+    found = mean.average(read, threshold, units, points)
+    mean.write_table(found, out)
+    _say(f"{mean.report(found)}\n\n{out}: {points} rows, {_size(out)}{made}")
+
+
 def manual(id: str = "hoof_env/HorseLeg-v0", out: Path | None = None, films: bool = False) -> None:
     """Print the manual page of an environment, or write those of all.
 
@@ -240,7 +290,8 @@ def compile() -> None:
 
 
 COMMANDS: dict[str, Callable[..., None]] = {
-    command.__name__: command for command in (reproduce, render, play, export, compare, manual, compile)
+    command.__name__: command
+    for command in (reproduce, render, play, export, compare, average, manual, compile)
 }
 
 

@@ -28,14 +28,20 @@ def limit(size: int) -> None:
         return
     used = sum(resource.getrusage(resource.RUSAGE_SELF)[:2])
     seconds = int(used + SECONDS + SECONDS_A_MEGABYTE * size / 1e6) + 1
-    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    lower(resource, resource.RLIMIT_CPU, seconds)
+    lower(resource, resource.RLIMIT_CORE, 0)
     try:
         pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
     except (OSError, ValueError):  # macOS, which does not enforce it
         return
-    most = pages * resource.getpagesize() + BYTES + TIMES_ITS_SIZE * size
-    resource.setrlimit(resource.RLIMIT_AS, (most, most))
+    lower(resource, resource.RLIMIT_AS, pages * resource.getpagesize() + BYTES + TIMES_ITS_SIZE * size)
+
+
+def lower(resource: Any, which: int, most: int) -> None:
+    """Set a limit, unless there is a lower one already."""
+    if any(0 <= limit < most for limit in resource.getrlimit(which)):  # endless is -1 or a large number
+        return
+    resource.setrlimit(which, (most, most))
 
 
 def plain(value: Any) -> Any:

@@ -152,7 +152,7 @@ def compare(
         (a, b), stances, (forces_a, forces_b), (time_a, time_b), levels, strict=True
     ):
         if not any(found):
-            why = _why_none([force[:, 1] for force in forces], times, level, unit)
+            why = why_none([force[:, 1] for force in forces], times, level, unit)
             raise DataFileError(f"record {record.name!r}: expected a whole stance {why}")
     near = math.ceil(2 * rate / min(a.rate, b.rate))
     shift = 0.0
@@ -207,7 +207,7 @@ def _check_length(a: ForceRecord, b: ForceRecord, rate: float) -> None:
 def _why_missing(sides: tuple[Side, Side], levels: tuple[float, float], unit: str) -> str:
     for name, side, level in zip("AB", sides, levels, strict=True):
         if not side.stances:
-            why = _why_none([side.force[:, 1]], side.time, level, unit)
+            why = why_none([side.force[:, 1]], side.time, level, unit)
             return f"{name} has no whole stance: expected one {why}"
     return "no stance of A has one of B at the same time"
 
@@ -216,7 +216,7 @@ def _span(record: ForceRecord) -> str:
     return f"{record.time[0]:.4g} to {record.time[-1]:.4g} s"
 
 
-def _why_none(verticals: list[Floats], time: Floats, level: float, unit: str) -> str:
+def why_none(verticals: list[Floats], time: Floats, level: float, unit: str) -> str:
     """What to say of vertical forces without a whole stance; the remedy for a plate that is not zeroed."""
     together = np.concatenate(verticals)
     low, high = float(np.percentile(together, 5)), float(together.max())
