@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-SECONDS, SECONDS_A_MEGABYTE = 5.0, 2.0  # of processor time; a healthy file takes some 0.02 s a megabyte
+SECONDS, SECONDS_A_MEGABYTE = 2.0, 0.5  # of processor time; a healthy file takes some 0.05 s a megabyte
 BYTES, TIMES_ITS_SIZE = 1 << 30, 100  # of memory beyond that of the libraries
 GROUPS = ("POINT", "ANALOG", "FORCE_PLATFORM", "HOOF_ENV")
 

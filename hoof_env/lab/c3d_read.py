@@ -15,7 +15,6 @@ import io
 import json
 import os
 import re
-import struct
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -27,14 +26,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.errors import DataFileError, MissingExtraError
+from hoof_env.lab.c3d_header import frames_of
 
 Floats = NDArray[np.float64]
 
-BLOCK, MIPS, KEY = 512, 86, 80  # bytes of a block; the code of high bytes first; the second byte of every c3d
 EIGHT_FORCES, CALIBRATED = 3, 4  # types of plates: eight channels of forces; a matrix calibrates the channels
 SECONDS, BYTES_A_SECOND = 120.0, 1e6  # that reading takes at most where processor time has no limit
 STEADY, IDLE = 0.05, 0.02  # shares of the highest force: of changes, and of pull, that an unloaded plate has
-PLEA = re.compile(r"[\s,.]*\b(please|this is probably due)\b.*", re.IGNORECASE | re.DOTALL)
+LARGE, SMALL = 0.25, 0.1  # shares of the highest force and of the baseline: a load in place of an offset
+PLEA = re.compile(
+    r"[\s,.]*\b(please|this is probably due|if you want to ignore)\b.*", re.IGNORECASE | re.DOTALL
+)
 """What ezc3d asks of people who read its messages, such as to open an issue: it is not for ours."""
 
 
@@ -64,7 +66,7 @@ def read_plates(path: Path) -> Plates:
     that is damaged, without plates or with fewer frames than its header says."""
     if importlib.util.find_spec("ezc3d") is None:
         raise MissingExtraError('c3d needs ezc3d: pip install "hoof-env[lab]"')
-    first, last = _frames_of(path)
+    first, last = frames_of(path)
     found = _in_a_process(path)
     frames = int(found["frames"])
     if frames < last - first + 1:
@@ -81,7 +83,7 @@ def read_plates(path: Path) -> Plates:
             f"record {str(path)!r}: expected force plates (FORCE_PLATFORM), found no force plates"
         )  # fmt: skip
     own = parameters.get("HOOF_ENV", {})
-    limbs = own["LIMBS"] if own else [f"plate_{k}" for k in range(1, len(raw) + 1)]
+    limbs = own["LIMBS"] if "LIMBS" in own else [f"plate_{k}" for k in range(1, len(raw) + 1)]
     rate = float(np.ravel(parameters["ANALOG"]["RATE"])[0])
     camera = float(np.ravel(parameters["POINT"]["RATE"])[0])
     if not rate > 0 or len(limbs) != len(raw):
@@ -93,24 +95,9 @@ def read_plates(path: Path) -> Plates:
     time = start + np.arange(len(raw[0])) / rate
     forces, notes = _without_baseline(raw, limbs, parameters, frames, first)
     units = {limb: _force_unit(parameters, k) for k, limb in enumerate(limbs)}
-    weight = float(np.ravel(own["WEIGHT"])[0]) if own else None
+    weight = float(np.ravel(own["WEIGHT"])[0]) if "WEIGHT" in own else None
     up = _upward(found["corners"], found["middle"])
     return Plates(dict(zip(limbs, forces, strict=True)), units, time, up, weight, notes)
-
-
-def _frames_of(path: Path) -> tuple[int, int]:
-    """The first and the last frame that the header names; `DataFileError` of a file that is no c3d."""
-    with path.open("rb") as file:
-        head = file.read((255 + 1) * BLOCK)
-    begin = (head[0] - 1) * BLOCK if head else 0
-    if len(head) < 2 * BLOCK or head[1] != KEY or not 0 < begin < len(head) - 4:
-        raise DataFileError(
-            f"record {str(path)!r}: cannot read it (expected a c3d, whose second byte is {KEY} and whose "
-            "first is the number of the block where its parameters begin)"
-        )
-    order = ">" if head[begin + 3] == MIPS else "<"
-    first, last = struct.unpack_from(f"{order}2H", head, 6)
-    return int(first), int(last)
 
 
 def _in_a_process(path: Path) -> dict[str, Any]:
@@ -177,7 +164,7 @@ def _without_baseline(
         each = len(force) // frames
         quiet = force[begin * each : (end + 1) * each]
         base = quiet.mean(axis=0)
-        if _unloaded(quiet - base, force - base, highest):
+        if _unloaded(quiet - base, force - base, base, highest):
             forces.append(force - base)
         else:
             forces.append(force)
@@ -190,9 +177,10 @@ def _without_baseline(
     return forces, []
 
 
-def _unloaded(quiet: Floats, force: Floats, highest: float) -> bool:
-    """Whether a plate bore no load in its quiet frames: it is steady there, and later pushed and not pulled,
-    as it would seem to be once a load were subtracted. Forces less their mean in those frames."""
+def _unloaded(quiet: Floats, force: Floats, base: Floats, highest: float) -> bool:
+    """Whether a plate bore no load in its quiet frames: it is steady there, later pushed and not pulled, as
+    it would seem to be once a load were subtracted, and does not rest at zero at other times. Forces less
+    `base`, their mean in those frames."""
     if np.abs(quiet).max() > STEADY * highest:
         return False
     axis = int(np.abs(force).max(axis=0).argmax())
@@ -200,7 +188,9 @@ def _unloaded(quiet: Floats, force: Floats, highest: float) -> bool:
     if along.max() < STEADY * highest:  # never loaded
         return True
     least = IDLE * along.max() + 3 * float(quiet[:, axis].std())
-    return float(np.percentile(along, 10)) > -least
+    shown = np.abs(force[:, axis] + base[axis])
+    rests = abs(base[axis]) > LARGE * along.max() and np.percentile(shown, 10) < SMALL * abs(base[axis])
+    return float(np.percentile(along, 10)) > -least and not rests
 
 
 def _force_unit(parameters: Mapping[str, Any], plate: int) -> str:

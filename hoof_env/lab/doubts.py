@@ -14,7 +14,8 @@ Floats = NDArray[np.float64]
 IDLE = 0.05  # share of the highest force of all limbs up to which a limb is not loaded
 LOADED = 0.2  # share of a limb's highest vertical force from which on its other forces count
 SMALL = 0.01  # share of that up to which a horizontal force is none
-BACKWARD = -0.2  # order of braking and propulsion from which on it is remarked; see `order`
+BACKWARD, ALONE = -0.2, -0.35  # order of braking and propulsion, the mean of all limbs and that of one, from
+# which on it is remarked; see `order`
 BOTH = 0.1  # least share of braking, and of propulsion, in the fore-aft force, for an order to be there
 
 
@@ -84,10 +85,13 @@ def backward(forces: Mapping[str, Floats], time: Floats, ahead: str, by_axis: bo
     round. Forces forward and upward by limb, shape (n, 2); `by_axis` where the options of axes work."""
     rate = (len(time) - 1) / float(time[-1] - time[0])
     highest = max(float(np.abs(force[:, 1]).max()) for force in forces.values())
-    limbs = [
-        limb for limb, force in forces.items()
-        if np.isfinite(force).all() and force[:, 1].max() > IDLE * highest and order(force, rate) < BACKWARD
-    ]  # fmt: skip
+    orders = {
+        limb: order(force, rate) for limb, force in forces.items()
+        if np.isfinite(force).all() and force[:, 1].max() > IDLE * highest
+    }  # fmt: skip
+    known = [one for one in orders.values() if one != 0.0]
+    least = 0.0 if known and float(np.mean(known)) < BACKWARD else ALONE
+    limbs = [limb for limb, one in orders.items() if one < least]
     if not limbs:
         return []
     other = ahead[1:] if ahead.startswith("-") else f"-{ahead}"
