@@ -28,6 +28,7 @@ UNEVEN = 0.01  # most that sampling intervals may differ from each other, of the
 COARSE = 0.9  # of a step, from which on the last digit hides a sample that is left out,
 FEW = 3  # unless as many steps or more differ, as those of rounded times do again and again
 SLOW, FAST = 10.0, 1e5  # rates between which those of force records lie [Hz]
+ROUND = (1000, 100, 50, 10, 5, 1)  # what rates are multiples of, the likeliest first [Hz]
 DIGITS = 9  # most decimals that are looked for
 SAME = 0.1  # share by which a step may differ from what the rate says
 
@@ -145,7 +146,7 @@ def _last_digit(column: Floats) -> float:
 
 def _line(column: Floats, most: float) -> Floats | None:
     """Even times none of which is farther than `most` from those of the column; None if there are none. Their
-    rate is a whole number, if one fits."""
+    rate is a whole number, the roundest that fits, if one does."""
     k = np.arange(len(column))
     most = most * (1 + 1e-6) + 1e-12 * float(np.abs(column).max())
 
@@ -156,9 +157,10 @@ def _line(column: Floats, most: float) -> Floats | None:
     mean = float(column[-1] - column[0]) / (len(column) - 1)
     low, high = mean - 2 * most / (len(column) - 1), mean + 2 * most / (len(column) - 1)
     for scale in (1.0, 1e3):  # of s and of ms
-        whole = round(scale / mean)
-        if whole > 0 and low <= scale / whole <= high and off(scale / whole) <= most:
-            return _through(column, scale / whole, k)
+        for round_to in ROUND:
+            rate = round(scale / mean / round_to) * round_to
+            if rate > 0 and low <= scale / rate <= high and off(scale / rate) <= most:
+                return _through(column, scale / rate, k)
     best = float(np.polyfit(k - k.mean(), column, 1)[0])
     for _ in range(100):  # the farthest of all times is a convex function of the step
         third = (high - low) / 3

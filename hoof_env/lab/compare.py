@@ -223,6 +223,10 @@ def why_none(verticals: list[Floats], time: Floats, level: float, unit: str) -> 
     why = f"above {level:g} {unit}, found none"
     if low > level:
         why += f": it hardly falls below {low:.4g} {unit}; subtract the plate's offset, or raise --threshold"
+        if min(float(force.min()) for force in verticals) > level:
+            why += (
+                f"; or the stance is cut off by both ends of the record ({time[0]:.4g} and {time[-1]:.4g} s)"
+            )
         return why
     if high <= level:
         return f"{why}: the highest force is {high:.4g} {unit}"

@@ -259,10 +259,12 @@ def _points_down(vertical: Floats, least: float) -> bool:
 
 
 def _check_sums(path: Path, table: Table, sources: dict[str, list[Source]]) -> None:
-    """`ParameterError` where columns whose vertical forces point opposite ways are to be added."""
+    """`ParameterError` where columns whose vertical forces point opposite ways are to be added. A mapping with
+    a minus says that they were looked at."""
     for limb, parts in sources.items():
-        for terms in (one.upward for one in parts if len(one.upward) > 1):
-            columns = {term.column: term.sign * table.columns[term.column] for term in terms}
+        sums = [one.upward for one in parts if len(one.upward) > 1]
+        for terms in (terms for terms in sums if all(term.sign > 0 for term in terms)):
+            columns = {term.column: table.columns[term.column] for term in terms}
             least = IDLE * max(float(np.abs(values).max()) for values in columns.values())
             down = [name for name, values in columns.items() if _points_down(values, least)]
             up = [name for name, values in columns.items() if _points_down(-values, least)]
