@@ -259,8 +259,8 @@ def _points_down(vertical: Floats, least: float) -> bool:
 
 
 def _check_sums(path: Path, table: Table, sources: dict[str, list[Source]]) -> None:
-    """`ParameterError` where columns whose vertical forces point opposite ways are to be added. A mapping with
-    a minus says that they were looked at."""
+    """`ParameterError` where columns whose vertical forces point opposite ways are to be added. A mapping
+    with a minus says that they were looked at."""
     for limb, parts in sources.items():
         sums = [one.upward for one in parts if len(one.upward) > 1]
         for terms in (terms for terms in sums if all(term.sign > 0 for term in terms)):

@@ -91,7 +91,7 @@ def _read_opensim(path: Path) -> Table:
                 f"record {str(path)!r}: expected {said[entry]} {what}, as its header says, found {found}: "
                 "is the file cut off?"
             )
-    table = _table(path, Text(titles, rows, line=below[0] + 1))
+    table = _table(path, Text(titles, rows, line=below[0] + 1, decimal_comma=True))
     for name in table.names:
         if "force" in name.lower() and re.search(r"(_v[xyz]|_[xyz])(#\d+)?$", name):
             table.units[name] = "N"
