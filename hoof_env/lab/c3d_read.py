@@ -33,6 +33,7 @@ Floats = NDArray[np.float64]
 EIGHT_FORCES, CALIBRATED = 3, 4  # types of plates: eight channels of forces; a matrix calibrates the channels
 SECONDS, BYTES_A_SECOND = 120.0, 1e6  # that reading takes at most where processor time has no limit
 STEADY, IDLE = 0.05, 0.02  # shares of the highest force: of changes, and of pull, that an unloaded plate has
+ROBUST, NOISY = 1.4826, 6.0  # standard deviations a median deviation; and those that noise reaches
 LARGE, SMALL = 0.25, 0.1  # shares of the highest force and of the baseline: a load in place of an offset
 PLEA = re.compile(
     r"[\s,.]*\b(please|this is probably due|if you want to ignore)\b.*", re.IGNORECASE | re.DOTALL
@@ -64,10 +65,11 @@ class Plates:
 def read_plates(path: Path) -> Plates:
     """The force plates of a file. Limbs are `plate_1` and so on in files of others. `DataFileError` of a file
     that is damaged, without plates or with fewer frames than its header says."""
-    if importlib.util.find_spec("ezc3d") is None:
+    library = importlib.util.find_spec("ezc3d")
+    if library is None or library.origin is None:
         raise MissingExtraError('c3d needs ezc3d: pip install "hoof-env[lab]"')
     first, last = frames_of(path)
-    found = _in_a_process(path)
+    found = _in_a_process(path, [Path(one).parents[1] for one in (library.origin, np.__file__)])
     frames = int(found["frames"])
     if frames < last - first + 1:
         raise DataFileError(
@@ -100,10 +102,11 @@ def read_plates(path: Path) -> Plates:
     return Plates(dict(zip(limbs, forces, strict=True)), units, time, up, weight, notes)
 
 
-def _in_a_process(path: Path) -> dict[str, Any]:
-    """What `c3d_process.py` finds. `DataFileError` if it fails, dies or takes too long."""
+def _in_a_process(path: Path, folders: list[Path]) -> dict[str, Any]:
+    """What `c3d_process.py` finds with the libraries in some folders, and nothing from the current one.
+    `DataFileError` if it fails, dies or takes too long."""
     script = Path(__file__).with_name("c3d_process.py")
-    places = os.pathsep.join(place for place in sys.path if place)  # the same libraries as here
+    places = os.pathsep.join(dict.fromkeys(map(str, folders)))
     try:
         done = subprocess.run(
             [sys.executable, "-P", str(script), str(path.resolve())], capture_output=True, check=False,
@@ -181,7 +184,9 @@ def _unloaded(quiet: Floats, force: Floats, base: Floats, highest: float) -> boo
     """Whether a plate bore no load in its quiet frames: it is steady there, later pushed and not pulled, as
     it would seem to be once a load were subtracted, and does not rest at zero at other times. Forces less
     `base`, their mean in those frames."""
-    if np.abs(quiet).max() > STEADY * highest:
+    off = np.abs(quiet - np.median(quiet, axis=0))
+    noise = ROBUST * np.median(off, axis=0)
+    if (noise > STEADY * highest).any() or (off > np.maximum(STEADY * highest, NOISY * noise)).any():
         return False
     axis = int(np.abs(force).max(axis=0).argmax())
     along = force[:, axis] * np.sign(force[np.abs(force[:, axis]).argmax(), axis])

@@ -42,9 +42,10 @@ that of the limb on the plate does."""
 AXES = ("auto", "x", "y", "z", "-x", "-y", "-z")
 """Of a file, for the upward and the forward direction."""
 
-STRONG, IDLE = 0.2, 0.05
+STRONG, IDLE, ONE_WAY = 0.2, 0.05, 0.5
 """Share of the highest vertical force of a limb from which on samples tell its direction, so that an offset
-does not; and share of that of all limbs up to which a limb has no direction."""
+does not; share of that of all limbs up to which a limb has no direction; and what is left of the forces of
+one that has, where those of both directions are added."""
 
 OPENSIM = re.compile(
     r"(?:(?P<before>.+?)_)??(?:ground_)?(?:reaction_)?force_?(?:(?P<behind>.+)_)?v(?P<axis>[xyz])",
@@ -245,7 +246,7 @@ def _unit(path: Path, table: Table, unit: str, sources: dict[str, list[Source]])
 
 def _downward(forces: dict[str, list[Floats]]) -> dict[str, list[bool]]:
     """Of each limb, which of its parts have a vertical force that points down. Each is looked at alone, as
-    one plate may lie the other way round; what is hardly loaded points nowhere."""
+    one plate may lie the other way round; what is hardly loaded, or noise, points nowhere."""
     highest = {limb: [float(np.abs(part[:, 1]).max()) for part in parts] for limb, parts in forces.items()}
     least = IDLE * max(max(ones) for ones in highest.values())
     return {
@@ -255,7 +256,8 @@ def _downward(forces: dict[str, list[Floats]]) -> dict[str, list[bool]]:
 
 def _points_down(vertical: Floats, least: float) -> bool:
     highest = float(np.abs(vertical).max())
-    return highest > least and bool(vertical[np.abs(vertical) > STRONG * highest].sum() < 0)
+    strong = vertical[np.abs(vertical) > STRONG * highest]
+    return highest > least and bool(strong.sum() < -ONE_WAY * np.abs(strong).sum())
 
 
 def _check_sums(path: Path, table: Table, sources: dict[str, list[Source]]) -> None:

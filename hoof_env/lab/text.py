@@ -146,10 +146,7 @@ def parse(lines: list[str]) -> Text:
         return Text([], [])
     titles, units, groups, line = [], [], [], 0
     if above:
-        split = between if between is None or between in lines[above[-1]] else None
-        if begin == len(lines):  # names alone
-            split = max("\t;,", key=lines[above[-1]].count)
-            split = split if split in lines[above[-1]] else None
+        split = _between_names(lines[above[-1]], between, lines[begin] if begin < len(lines) else "")
         rows = [_titles(lines[k], split) for k in above[-3:]]
         if len(rows) > 1 and _are_units(rows[-1], rows[-2]):
             units = [cell.strip(" []()") for cell in rows.pop()]
@@ -160,6 +157,19 @@ def parse(lines: list[str]) -> Text:
     table, after = _rows(lines, begin, between)
     notes = [f"line {after}: another table begins there, which is not read"] if after else []
     return Text(titles, table, units, groups, line, between != ",", notes)
+
+
+def _between_names(line: str, between: str | None, row: str) -> str | None:
+    """What separates names: what separates the cells of a row, unless that is not among the names; then what
+    makes as many names as there are cells, or else what there is most of."""
+    if between is not None and between in line:
+        return between
+    width = len(cells_of(row, between)) if row else 0
+    fits = [one for one in (between, *SEPARATORS) if len(_titles(line, one)) == width]
+    if fits:
+        return fits[0]
+    most = max("\t;,", key=line.count)
+    return most if not row and most in line else None
 
 
 def _titles(line: str, between: str | None) -> list[str]:

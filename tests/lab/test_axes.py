@@ -25,7 +25,15 @@ AXES = {sign + name: (-1 if sign else 1) * np.eye(3)[k] for sign in ("", "-") fo
 
 
 def plate(
-    path, up="z", forward="x", zero=(0, 0), offsets=((0, 0, 0),), first=1, other_order=False, markers=None
+    path,
+    up="z",
+    forward="x",
+    zero=(0, 0),
+    offsets=((0, 0, 0),),
+    first=1,
+    other_order=False,
+    markers=None,
+    noise=0.0,
 ):
     """A file of one plate or more, whose first one is loaded, in a laboratory with that axis upward, whose
     animal travels along that other. Offsets are forces in the laboratory's axes, of each plate."""
@@ -43,6 +51,7 @@ def plate(
     channels = []
     for k, offset in enumerate(offsets):
         felt = (force if k == 0 else 0 * force) + np.array(offset)
+        felt = felt + np.random.default_rng(k).normal(0, noise, felt.shape)
         channels += [*(felt @ own.T).T, *np.zeros((3, len(TIME)))]
     rows["POINT"]["RATE"]["value"] = rows["ANALOG"]["RATE"]["value"] = [RATE]
     rows["ANALOG"]["UNITS"]["value"] = ["N", "N", "N", "Nmm", "Nmm", "Nmm"] * n
@@ -118,6 +127,14 @@ def test_the_baseline_is_subtracted(tmp_path):
     np.testing.assert_allclose(found.limbs["plate_2"], 0.0, atol=1e-3)
 
 
+@pytest.mark.parametrize("noise", [2.0, 15.0])
+def test_the_baseline_of_noisy_plates_is_subtracted(noise, tmp_path):
+    found = read_record(plate(tmp_path / "x.c3d", zero=(1, 35), offsets=OFFSETS, noise=noise))
+    assert (found.turned, found.notes) == ((), ())
+    for limb, truth in (("plate_1", UP), ("plate_2", 0 * UP)):
+        assert abs((found.limbs[limb][:, 1] - truth).mean()) < 0.5 * noise
+
+
 @pytest.mark.parametrize("zero", [(0, 0), (1, 0)])
 def test_without_frames_for_it_there_is_no_baseline(zero, tmp_path):
     found = read_record(plate(tmp_path / "x.c3d", zero=zero, offsets=OFFSETS))
@@ -129,6 +146,7 @@ def test_without_frames_for_it_there_is_no_baseline(zero, tmp_path):
     ((45, 85), "plate_1 bore a load"),
     ((60, 70), "plate_1 bore a load"),
     ((64, 66), "plate_1 bore a load"),
+    ((1, 43), "plate_1 bore a load"),
     ((1, 400), "the file has 300 frames"),
 ])  # fmt: skip
 def test_a_baseline_of_a_loaded_plate_is_none(zero, words, tmp_path):
@@ -194,3 +212,20 @@ def test_what_ezc3d_asks_its_own_users_is_not_ours(tmp_path):
     file.write(str(path))
     with pytest.raises(DataFileError, match=r"cannot read it \(ezc3d says: Type 6 is not supported yet\)"):
         read_record(path)
+
+
+def test_frames_are_those_of_the_cameras(tmp_path):
+    """Plates are sampled ten times as often: frames 1 to 3 are 30 samples."""
+    path = plate(tmp_path / "x.c3d", zero=(1, 3), offsets=OFFSETS)
+    file = ezc3d.c3d(str(path))
+    file["parameters"]["POINT"]["RATE"]["value"] = [RATE / 10]
+    file["data"]["points"] = file["data"]["points"][:, :, ::10]
+    file["data"]["meta_points"]["residuals"] = file["data"]["meta_points"]["residuals"][:, :, ::10]
+    file["data"]["meta_points"]["camera_masks"] = file["data"]["meta_points"]["camera_masks"][:, :, ::10]
+    file.write(str(path))
+    content = bytearray(path.read_bytes())
+    struct.pack_into("<2H", content, 6, 6, 35)  # the trial's frames from the 6th on
+    path.write_bytes(content)
+    found = read_record(path)
+    assert (found.notes, found.rate, found.time[0]) == ((), pytest.approx(RATE), pytest.approx(0.5))
+    np.testing.assert_allclose(found.limbs["plate_1"], np.column_stack([FORWARD, UP]), atol=1e-3)

@@ -48,6 +48,7 @@ LAYOUTS = {
                    COLUMNS | {"time": "Zeit"}),
     "tabs.txt": (("time\tFx\tFz\ns\tN\tN\n",), {"between": "\t", "comma": True}, COLUMNS),
     "blanks.txt": (("time Fx Fz\ns N N\n",), {"between": "  ", "comma": True}, COLUMNS),
+    "mixed.txt": (("time [s], left_force_x [N], left_force_y [N]\n",), {"between": " "}, {}),
     "words.csv": (("Time (Seconds),left_force_x (Newton),left_force_y (nt)\n",), {}, {}),
     "ms.csv": (("time (msec),left_force_x (N),left_force_y (N)\n", ROWS * [1000, 1, 1]), {}, {}),
     "blank.mot": (("x\nnRows=300\nnColumns=3\nendheader\n\ntime ground_force_vx ground_force_vy\n",),
