@@ -244,13 +244,17 @@ def average(
     """
     from hoof_env._output import check_folder, check_new
     from hoof_env.lab import average as mean
+    from hoof_env.lab.doubts import for_one
     from hoof_env.lab.read import parse_mapping, read_record
 
     made = check_new(out, overwrite)
     mean.check_table(out)
     check_folder(out.parent)
     mapping = parse_mapping("--map", map)
-    read = [read_record(file, mapping, units_in, reverse, rate, mass, up, forward) for file in records]
+    try:
+        read = [read_record(file, mapping, units_in, reverse, rate, mass, up, forward) for file in records]
+    except HoofEnvError as error:  # which names the options of `compare`
+        raise type(error)(for_one(str(error), "").replace("--units", "--units-in")) from None
     found = mean.average(read, threshold, units, points)
     mean.write_table(found, out)
     _say(f"{mean.report(found)}\n\n{out}: {points} rows, {_size(out)}{made}")
@@ -304,9 +308,23 @@ def _size(path: Path) -> str:
     return f"{size / 1e6:.1f} MB" if size >= 1e5 else f"{size / 1e3:.1f} kB"
 
 
+AXIS_OPTIONS = frozenset(f"--{name}{which}" for name in ("up", "forward") for which in ("", "-a", "-b"))
+
+
+def _with_axes(given: list[str]) -> list[str]:
+    """Arguments in which an axis as -x stays with its option: it looks like an option of its own."""
+    found: list[str] = []
+    for item in given:
+        if found and found[-1] in AXIS_OPTIONS and item in ("-x", "-y", "-z"):
+            found[-1] += f"={item}"
+        else:
+            found.append(item)
+    return found
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one sub-command, by default the one on the command line; returns the exit code."""
-    given = sys.argv[1:] if arguments is None else list(arguments)
+    given = _with_axes(sys.argv[1:] if arguments is None else list(arguments))
     if given == ["--version"]:
         _say(f"hoof-env {__version__}")
         return 0

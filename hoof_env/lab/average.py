@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from hoof_env._output import markdown_table, staged
 from hoof_env.errors import DataFileError, ParameterError, check_choice, check_number, count
 from hoof_env.lab.compare import ONE_PERCENT, why_none
+from hoof_env.lab.doubts import for_one
 from hoof_env.lab.forces import THRESHOLD
 from hoof_env.lab.read import ForceRecord
 from hoof_env.lab.stances import whole_stances
@@ -96,7 +97,7 @@ def average(
                 reasons[record.name, limb] = f"{record.name}: {limb}: expected a whole stance {why}"
     if not any(contact.values()):
         raise DataFileError("; ".join(reasons.values()))
-    warnings = [f"{record.name}: {note}" for record in records for note in record.notes]
+    warnings = [f"{record.name}: {for_one(note, '')}" for record in records for note in record.notes]
     warnings += [
         f"{record.name}: has no {limb}"
         for limb in found for record in records if limb not in record.limbs

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 
 import numpy as np
@@ -17,6 +18,15 @@ SMALL = 0.01  # share of that up to which a horizontal force is none
 BACKWARD, ALONE = -0.2, -0.35  # order of braking and propulsion, the mean of all limbs and that of one, from
 # which on it is remarked; see `order`
 BOTH = 0.1  # least share of braking, and of propulsion, in the fore-aft force, for an order to be there
+
+
+OPTION = re.compile(r"--(?P<name>\w+)-a(?P<value>=\S+)?(?: or |, )--(?P=name)-b(?:=\S+)?")
+"""What notes say of options, as a record does not know whether it is A or B."""
+
+
+def for_one(note: str, which: str) -> str:
+    """A note with the option of one record: "-a" or "-b", or "" where options have no such ending."""
+    return OPTION.sub(rf"--\g<name>{which}\g<value>", note)
 
 
 def sideways(
@@ -59,7 +69,7 @@ def sideways(
     }
     return [
         f"{', '.join(limbs)}: the {'' if which == 'up' else 'horizontal '}force along {axis} {said[which]}; "
-        f"--{which}-a or --{which}-b {axis} (or -{axis}) changes that"
+        f"--{which}-a={axis} or --{which}-b={axis} (or =-{axis}) changes that"
         for (which, axis), limbs in wrong.items()
     ]
 
@@ -96,7 +106,9 @@ def backward(forces: Mapping[str, Floats], time: Floats, ahead: str, by_axis: bo
         return []
     other = ahead[1:] if ahead.startswith("-") else f"-{ahead}"
     remedy = (
-        f"--forward-a or --forward-b {other}" if by_axis else "a minus before the column of force_x in --map"
+        f"--forward-a={other} or --forward-b={other}"
+        if by_axis
+        else "a minus before the column of force_x in --map-a or --map-b"
     )
     return [
         f"{', '.join(limbs)}: propulsion before braking; if the animal travels in the direction of {other}, "

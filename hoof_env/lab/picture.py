@@ -12,6 +12,7 @@ from hoof_env._output import check_folder, markdown_table, staged
 from hoof_env._plotting import BLUE, GREY, ORANGE, STYLE
 from hoof_env.errors import MissingExtraError, ParameterError
 from hoof_env.lab.compare import Comparison, Force
+from hoof_env.lab.doubts import for_one
 from hoof_env.lab.read import REVERSED, ForceRecord
 
 SUFFIXES = (".pdf", ".png", ".svg")
@@ -31,8 +32,8 @@ def report(found: Comparison) -> str:
         _table(found),
     ]
     same = (found.a.name, found.a.notes) == (found.b.name, found.b.notes)
-    records = (found.a,) if same else (found.a, found.b)
-    doubts = [f"{record.name}: {note}" for record in records for note in record.notes]
+    doubts = [f"{found.a.name}: {note if same else for_one(note, '-a')}" for note in found.a.notes]
+    doubts += [f"{found.b.name}: {for_one(note, '-b')}" for note in found.b.notes if not same]
     doubts += [f"{limb} is not compared: {why}" for limb, why in found.missing.items()] + found.warnings
     for limb, errors in found.limbs.items():
         if "fore-aft" in errors.forces and errors.forces["fore-aft"].r < -0.5:

@@ -79,5 +79,8 @@ def test_what_is_missing_is_said(tmp_path, capsys):
     with pytest.raises(ParameterError, match="records: expected one file or more, got none"):
         average([])
     file = str(trial(tmp_path / "a.csv", 700, 0.5))
+    (tmp_path / "b.csv").write_text("time,left_force_y\n0,1\n1,2\n")
+    assert cli.main(["average", str(tmp_path / "b.csv"), "--out", str(tmp_path / "x.csv")]) == 2
+    assert "b.csv, which says none; name it by --units-in\n" in capsys.readouterr().err
     assert cli.main(["average", file, "--out", str(tmp_path / "x.txt")]) == 2
     assert "out: expected a file that ends in .csv" in capsys.readouterr().err

@@ -8,7 +8,9 @@ import struct
 import numpy as np
 import pytest
 
+from hoof_env import cli
 from hoof_env.errors import DataFileError, ParameterError
+from hoof_env.lab.average import average
 from hoof_env.lab.compare import compare
 from hoof_env.lab.picture import report
 from hoof_env.lab.read import read_record
@@ -91,11 +93,15 @@ def test_markers_decide_where_corners_have_another_order(tmp_path):
 def test_travel_along_another_axis_and_backward_are_said(tmp_path):
     aside = read_record(plate(tmp_path / "y.c3d", forward="y"))
     assert "plate_1: the horizontal force along y is larger than that along x" in aside.notes[0]
-    assert "--forward-a or --forward-b y (or -y)" in aside.notes[0]
+    assert "--forward-a=y or --forward-b=y (or =-y) changes that" in aside.notes[0]
     assert f"warning: y.c3d: {aside.notes[0]}" in report(compare(aside, aside))
+    right = read_record(tmp_path / "y.c3d", forward="y")
+    assert "; --forward-b=y (or =-y) changes that" in report(compare(right, aside))
+    assert "; --forward-a=y (or =-y) changes that" in report(compare(aside, right))
+    assert "; --forward=y (or =-y) changes that" in average([aside, right]).warnings[0]
     back = read_record(plate(tmp_path / "x.c3d", forward="-x"))
     assert "plate_1: propulsion before braking" in back.notes[0]
-    assert "--forward-a or --forward-b -x" in back.notes[0]
+    assert "--forward-a=-x or --forward-b=-x" in back.notes[0]
     assert read_record(tmp_path / "x.c3d", forward="-x").notes == ()
     wrong = read_record(tmp_path / "x.c3d", up="y")
     assert "the force along z is larger than that along y" not in "".join(wrong.notes)  # what the option says
@@ -109,12 +115,22 @@ def test_a_text_with_z_up_is_said(tmp_path):
     np.savetxt(tmp_path / "x.csv", rows, delimiter=",", header=",".join(names), comments="")
     found = read_record(tmp_path / "x.csv")
     assert "left: the force along z is larger than that along y" in found.notes[0]
-    assert "--up-a or --up-b z" in found.notes[0]
+    assert "--up-a=z or --up-b=z" in found.notes[0]
     found = read_record(tmp_path / "x.csv", up="z")
     assert found.notes == ()
     np.testing.assert_allclose(found.limbs["left"], np.column_stack([FORWARD, UP]))
     with pytest.raises(ParameterError, match=r"up, forward: expected none beside columns of x\.csv"):
         read_record(tmp_path / "x.csv", {"force_y": "left_force_z"}, up="z")
+
+
+def test_an_axis_with_a_minus_is_no_option(tmp_path, capsys):
+    path = str(plate(tmp_path / "x.c3d", forward="-x"))
+    for option in (["--forward", "-x"], ["--forward=-x"]):
+        out = str(tmp_path / "x.csv")
+        assert cli.main(["average", path, "--out", out, "--overwrite", *option]) == 0
+        assert "warning" not in capsys.readouterr().out
+    assert cli.main(["average", path, "--out", out, "--overwrite", "--forward", "w"]) == 2
+    assert "forward: expected one of -x, -y, -z, auto, x, y, z, got 'w'" in capsys.readouterr().err
 
 
 OFFSETS = ((7.0, -3.0, 30.0), (-5.0, 2.0, -46.0))

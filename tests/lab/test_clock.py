@@ -81,7 +81,9 @@ def test_milliseconds_without_a_unit_are_said_with_the_remedy(tmp_path):
         "a rate of 0.1 Hz; if they are in ms, write time [ms] above them, or give the rate" in found.notes[0]
     )
     truth = read_record(written(tmp_path / "y.csv", LATE))
-    assert f"warning: x.csv: {found.notes[0]}" in report(compare(truth, found))
+    said = report(compare(truth, found))
+    assert "warning: x.csv: times of time have no unit and are taken as s, which makes a rate of 0.1" in said
+    assert "or give the rate (--rate-b)" in said
     assert read_record(tmp_path / "x.csv", rate=100).time[0] == pytest.approx(0.5)
 
 

@@ -172,5 +172,5 @@ def test_travel_backward_in_a_text_is_said(tmp_path):
     found = read_record(
         written(tmp_path / "y.csv", head, ROWS * [1, -1, 1]), {"force_x": "a", "force_y": "b"}
     )
-    assert "a minus before the column of force_x in --map says so" in found.notes[0]
+    assert "a minus before the column of force_x in --map-a or --map-b says so" in found.notes[0]
     assert read_record(tmp_path / "y.csv", {"force_x": "-a", "force_y": "b"}).notes == ()
