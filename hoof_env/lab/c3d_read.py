@@ -153,8 +153,9 @@ def _without_baseline(
 ) -> tuple[list[Floats], list[str]]:
     """Forces without what plates show while they are unloaded, and what to say of that."""
     zero = [int(value) for value in np.ravel(parameters["FORCE_PLATFORM"].get("ZERO", []))[:2]]
-    if len(zero) < 2 or zero[0] <= 0 or zero[1] < zero[0]:
+    if len(zero) < 2 or zero[0] < 0 or zero[1] < max(zero[0], 1):
         return raw, []  # the file names none: 0 0, or 1 0
+    zero[0] = max(zero[0], 1)  # there is no frame 0
     begin, end = (value - first for value in zero)
     if begin < 0 or end >= frames:  # numbers that count from the first frame of the file
         begin, end = (value - 1 for value in zero)

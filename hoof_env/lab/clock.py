@@ -29,6 +29,7 @@ COARSE = 0.9  # of a step, from which on the last digit hides a sample that is l
 FEW = 3  # unless as many steps or more differ, as those of rounded times do again and again
 SLOW, FAST = 10.0, 1e5  # rates between which those of force records lie [Hz]
 ROUND = (1000, 100, 50, 10, 5, 1)  # what rates are multiples of, the likeliest first [Hz]
+MANY = 10  # numbers between powers of ten that show how many decimals are written there
 DIGITS = 9  # most decimals that are looked for
 SAME = 0.1  # share by which a step may differ from what the rate says
 
@@ -132,7 +133,8 @@ def _last_digit(column: Floats) -> float:
     digits have fewer decimals of larger numbers; 0 if they are not rounded."""
     size = np.floor(np.log10(np.maximum(np.abs(column), 1.0))).astype(int)
     found = 0.0
-    for power in np.unique(size):
+    powers, counts = np.unique(size, return_counts=True)
+    for power in powers[counts >= min(MANY, counts.max())]:  # a few may be round by chance
         values = column[size == power]
         for decimals in range(DIGITS + 1):
             scaled = values * 10.0**decimals

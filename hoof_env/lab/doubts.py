@@ -12,7 +12,7 @@ from hoof_env.lab.stances import whole_stances
 
 Floats = NDArray[np.float64]
 
-IDLE = 0.05  # share of the highest force of all limbs up to which a limb is not loaded
+IDLE = 0.1  # share of the highest force of all limbs up to which a limb is not loaded
 LOADED = 0.2  # share of a limb's highest vertical force from which on its other forces count
 SMALL = 0.01  # share of that up to which a horizontal force is none
 BACKWARD, ALONE = -0.2, -0.35  # order of braking and propulsion, the mean of all limbs and that of one, from

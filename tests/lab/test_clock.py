@@ -44,6 +44,11 @@ def test_times_with_six_digits_are_even(tmp_path):
     assert found.rate == pytest.approx(600)
 
 
+def test_a_round_time_at_the_end_is_no_coarse_digit(tmp_path):
+    time = np.round(np.arange(601) / 60, 3)  # the last is 10
+    assert read_record(written(tmp_path / "x.csv", time)).rate == pytest.approx(60)
+
+
 @pytest.mark.parametrize(("rate", "decimals"), [(600, 4), (1000, 3), (100, 2), (960, 6)])
 @pytest.mark.parametrize("missing", [1, 200, 450, 898])
 def test_a_sample_that_is_left_out_is_uneven(rate, decimals, missing, tmp_path):
