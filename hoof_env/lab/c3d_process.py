@@ -73,7 +73,6 @@ def main(path: str) -> None:
     np.savez(
         out,
         frames=points.shape[2],
-        first_frame=int(file["header"]["points"]["first_frame"]),
         middle=np.median(seen, axis=1) if seen.size else np.full(3, np.nan),
         corners=np.array(corners, float).reshape(-1, 3, 4),
         parameters=json.dumps(parameters),
