@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from hoof_env._version import __version__
-from hoof_env.errors import HoofEnvError, parse_pairs
+from hoof_env.errors import HoofEnvError
 
 
 def reproduce(out: Path, figures: bool = True, preset: str | None = None) -> None:
@@ -113,7 +113,8 @@ def export(
 
     Args:
         out: the file; ends in .csv, .parquet (needs 'export'), .c3d (needs 'lab'), or OpenSim's .mot or .sto,
-            which has its ExternalLoads beside it, as run_loads.xml. Its folder is made if need be.
+            which has its ExternalLoads beside it, as run_loads.xml (run_sto_loads.xml). Its folder is made if
+            need be.
         policy: as in `hoof-env render`.
         id: the environment.
         args: its arguments: key=value ..., or one JSON object.
@@ -150,6 +151,10 @@ def compare(
     rate_b: float | None = None,
     mass_a: float | None = None,
     mass_b: float | None = None,
+    up_a: str = "auto",
+    up_b: str = "auto",
+    forward_a: str = "auto",
+    forward_b: str = "auto",
     align: str = "stances",
     threshold: float | None = None,
     units: str = "auto",
@@ -162,17 +167,24 @@ def compare(
         b: the one whose errors are told.
         out: the picture; ends in .png, .pdf or .svg.
         map_a: columns of A where they have other names than ours: time=Seconds force_x=-Fx force_y=Fz, or
-            left_fore_force_y=LF_Fz ...; a - turns a column round. left_fore=plate_1 renames a limb.
+            left_fore_force_y=LF_Fz ...; a - turns a column round, a + adds two, as left_force_y=p1_z+p3_z;
+            Fz#2 is the second column Fz, #3 the third of all. left_fore=plate_1 renames a limb,
+            left_fore=plate_1+plate_3 is the sum of two.
         map_b: columns of B.
         units_a: unit of A's forces: N, kN, N/kg, BW or %BW; auto takes what the file says.
         units_b: unit of B's forces.
         reverse_a: components of A that point the other way: none, x, y or xy; auto turns both of each limb
             whose vertical force points into the ground.
         reverse_b: components of B that do.
-        rate_a: samples a second of A, if it has no time.
+        rate_a: samples a second of A, if it has no times, or none that can be read.
         rate_b: samples a second of B.
         mass_a: of A's animal [kg], for body weights, if the file does not say it.
         mass_b: of B's animal [kg].
+        up_a: axis of A's file that points upward: x, y, z, -x, -y or -z; auto is y, and in a .c3d the normal
+            of its plates.
+        up_b: that of B.
+        forward_a: axis of A's file in which the animal travels, likewise; auto is x.
+        forward_b: that of B.
         align: stances lays each pair touchdown on touchdown, shift shifts B as a whole, none takes the times
             of the files.
         threshold: vertical force that makes a stance [N]; 20, or 1 % of the weight in body weights of an
@@ -183,15 +195,69 @@ def compare(
     from hoof_env._output import check_new
     from hoof_env.lab.compare import compare
     from hoof_env.lab.picture import check_picture, draw, report
-    from hoof_env.lab.read import read_record
+    from hoof_env.lab.read import parse_mapping, read_record
 
     made = check_new(out, overwrite)
     check_picture(out)
-    first = read_record(a, parse_pairs("--map-a", map_a), units_a, reverse_a, rate_a, mass_a)
-    second = read_record(b, parse_pairs("--map-b", map_b), units_b, reverse_b, rate_b, mass_b)
+    of_a, of_b = parse_mapping("--map-a", map_a), parse_mapping("--map-b", map_b)
+    first = read_record(a, of_a, units_a, reverse_a, rate_a, mass_a, up_a, forward_a)
+    second = read_record(b, of_b, units_b, reverse_b, rate_b, mass_b, up_b, forward_b)
     found = compare(first, second, align, threshold, units)
     draw(found, out)
     _say(f"{report(found)}\n\n{out}: {_size(out)}{made}")
+
+
+def average(
+    records: tuple[Path, ...],
+    /,
+    out: Path,
+    map: tuple[str, ...] = (),
+    units_in: str = "auto",
+    reverse: str = "auto",
+    rate: float | None = None,
+    mass: float | None = None,
+    up: str = "auto",
+    forward: str = "auto",
+    threshold: float | None = None,
+    units: str = "auto",
+    points: int = 101,
+    overwrite: bool = False,
+) -> None:
+    """Write the mean stance of several trials, and its standard deviation, as a table.
+
+    Args:
+        records: one file or more that `hoof-env compare` reads; the options below hold for all of them.
+        out: the table; ends in .csv.
+        map: columns, as --map-a of `hoof-env compare`.
+        units_in: unit of the files' forces: N, kN, N/kg, BW or %BW; auto takes what each file says.
+        reverse: components that point the other way: none, x, y or xy; auto turns both of each limb whose
+            vertical force points into the ground.
+        rate: samples a second, if the files have no times.
+        mass: of the animal [kg], for body weights, if the files do not say it.
+        up: axis of the files that points upward, as --up-a of `hoof-env compare`.
+        forward: axis of the files in which the animal travels.
+        threshold: vertical force that makes a stance [N]; 20, or 1 % of the weight in body weights of an
+            animal whose weight is not known.
+        units: of the table: N or BW; auto is N where all files can be in N.
+        points: rows of the table, from touchdown to lift-off.
+        overwrite: replace the table if there is one.
+    """
+    from hoof_env._output import check_folder, check_new
+    from hoof_env.lab import average as mean
+    from hoof_env.lab.doubts import for_one
+    from hoof_env.lab.read import parse_mapping, read_record
+
+    made = check_new(out, overwrite)
+    mean.check_table(out)
+    check_folder(out.parent)
+    mapping = parse_mapping("--map", map)
+    try:
+        read = [read_record(file, mapping, units_in, reverse, rate, mass, up, forward) for file in records]
+    except HoofEnvError as error:  # which names the options of `compare`
+        raise type(error)(for_one(str(error), "").replace("--units", "--units-in")) from None
+    found = mean.average(read, threshold, units, points)
+    mean.write_table(found, out)
+    _say(f"{mean.report(found)}\n\n{out}: {points} rows, {_size(out)}{made}")
 
 
 def manual(id: str = "hoof_env/HorseLeg-v0", out: Path | None = None, films: bool = False) -> None:
@@ -228,7 +294,8 @@ def compile() -> None:
 
 
 COMMANDS: dict[str, Callable[..., None]] = {
-    command.__name__: command for command in (reproduce, render, play, export, compare, manual, compile)
+    command.__name__: command
+    for command in (reproduce, render, play, export, compare, average, manual, compile)
 }
 
 
@@ -241,9 +308,23 @@ def _size(path: Path) -> str:
     return f"{size / 1e6:.1f} MB" if size >= 1e5 else f"{size / 1e3:.1f} kB"
 
 
+AXIS_OPTIONS = frozenset(f"--{name}{which}" for name in ("up", "forward") for which in ("", "-a", "-b"))
+
+
+def _with_axes(given: list[str]) -> list[str]:
+    """Arguments in which an axis as -x stays with its option: it looks like an option of its own."""
+    found: list[str] = []
+    for item in given:
+        if found and found[-1] in AXIS_OPTIONS and item in ("-x", "-y", "-z"):
+            found[-1] += f"={item}"
+        else:
+            found.append(item)
+    return found
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one sub-command, by default the one on the command line; returns the exit code."""
-    given = sys.argv[1:] if arguments is None else list(arguments)
+    given = _with_axes(sys.argv[1:] if arguments is None else list(arguments))
     if given == ["--version"]:
         _say(f"hoof-env {__version__}")
         return 0

@@ -15,5 +15,6 @@ is 0. Where a limb bears no load, or less than the threshold, force and CoP are 
 c3d files have the frame of most laboratories instead, in millimetres: x forward, y to the left, z up. Their
 channels are in the frames of the plates, x forward along the plate, y right, z down into it, N and N mm, with
 the same sign (what the limb feels): Fz is negative under load, and readers that turn channels into the
-laboratory's frame, as ezc3d does, find forces that point up.
+laboratory's frame, as ezc3d does, find forces that point up. In files of others the normal of the plates says
+which axis is up, and an option in which the animal travels.
 """

@@ -8,7 +8,6 @@ and the CoP of a reader is where the force's line meets that plane.
 from __future__ import annotations
 
 import math
-import struct
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.errors import DataFileError, MissingExtraError, ParameterError
+from hoof_env.errors import MissingExtraError, ParameterError
 from hoof_env.ground.terrain import Terrain
 from hoof_env.lab.forces import Columns, limb_name, limbs_of, loaded
 
@@ -30,8 +29,6 @@ CHANNELS = {"Fx": "N", "Fy": "N", "Fz": "N", "Mx": "Nmm", "My": "Nmm", "Mz": "Nm
 
 MOST_FRAMES = 65_535  # a c3d header counts in 16 bits
 MM = 1000.0
-BLOCK, MIPS = 512, 86  # bytes of a block of a c3d file; the code of processors that write the high byte first
-EIGHT_FORCES, CALIBRATED = 3, 4  # types of plates: eight channels of forces; a matrix calibrates the channels
 MARGIN, HALF_WIDTH = 0.5, 0.5  # of a plate, beyond the first and last CoP, and to the left and right [m]
 
 
@@ -115,56 +112,3 @@ def _corners(ends: tuple[float, float], middle: complex, along: complex) -> Floa
     at = [middle + side * half * along for side in (1, -1, -1, 1)]
     left = [-HALF_WIDTH, -HALF_WIDTH, HALF_WIDTH, HALF_WIDTH]
     return MM * np.array([[z.real for z in at], left, [z.imag for z in at]])
-
-
-def read_c3d(path: Path) -> tuple[Columns, dict[str, str], dict[str, Any]]:
-    """Forces of every plate: columns `LIMB_x`, `LIMB_y` and `LIMB_z` of the laboratory's axes, as the file
-    has them, and "time"; their units, as ANALOG:UNITS has them; and "weight_n", if a file of this package
-    says it.
-
-    Limbs are `plate_1` and so on in files of others. `DataFileError` of a file without plates or with fewer
-    frames than its header says; other errors are those of ezc3d.
-    """
-    file = ezc3d().c3d(str(path), extract_forceplat_data=True)
-    plates, parameters = file["data"]["platform"], file["parameters"]
-    _check_frames(path, file["data"]["points"].shape[2])
-    if not plates:
-        raise DataFileError(
-            f"record {str(path)!r}: expected force plates (FORCE_PLATFORM), found no force plates"
-        )
-    own = parameters.get("HOOF_ENV", {})
-    limbs = own["LIMBS"]["value"] if own else [f"plate_{k}" for k in range(1, len(plates) + 1)]
-    rate = float(parameters["ANALOG"]["RATE"]["value"][0])
-    columns, units = {}, {"time": "s"}
-    for k, (limb, plate) in enumerate(zip(limbs, plates, strict=True)):
-        unit = _force_unit(parameters, k)
-        for axis, values in zip("xyz", plate["force"], strict=True):
-            columns[f"{limb}_{axis}"], units[f"{limb}_{axis}"] = np.asarray(values), unit
-    columns["time"] = np.arange(len(next(iter(columns.values())))) / rate
-    return columns, units, {"weight_n": float(own["WEIGHT"]["value"][0])} if own else {}
-
-
-def _check_frames(path: Path, found: int) -> None:
-    """`DataFileError` unless there are as many frames as the header says: ezc3d stops silently where a file
-    is cut off."""
-    head = path.read_bytes()[: (255 + 1) * BLOCK]
-    parameters = (head[0] - 1) * BLOCK
-    order = ">" if head[parameters + 3 : parameters + 4] == bytes([MIPS]) else "<"
-    first, last = struct.unpack_from(f"{order}2H", head, 6)
-    if found < last - first + 1:
-        raise DataFileError(
-            f"record {str(path)!r}: expected {last - first + 1} frames, as its header says, found {found}: "
-            "is the file cut off?"
-        )
-
-
-def _force_unit(parameters: Mapping[str, Any], plate: int) -> str:
-    """The unit of a plate's forces: that of its force channels, each named if they differ. N where the file
-    says nothing, as c3d has it, and where a calibration (type 4) makes forces of volts."""
-    of_plates, units = parameters["FORCE_PLATFORM"], parameters["ANALOG"].get("UNITS", {}).get("value", [])
-    kind, channels = int(of_plates["TYPE"]["value"][plate]), of_plates["CHANNEL"]["value"][:, plate]
-    if kind == CALIBRATED:
-        return "N"
-    numbers = [int(channel) - 1 for channel in channels[: 8 if kind == EIGHT_FORCES else 3]]
-    said = {units[number].strip() for number in numbers if 0 <= number < len(units)} - {""}
-    return " and ".join(sorted(said)) or "N"

@@ -3,6 +3,8 @@
 Both are resampled by linear interpolation to the higher of both rates, so that no peak of either is lost.
 `lab.stances` says what a stance is.
 
+Times are those of the files, in results and messages, too.
+
 Three ways to align B with A. "none": the times of the files. "shift": one shift for all limbs. It is a
 difference of the touchdowns of one stance of A and one of B, the one under which the vertical forces of all
 limbs differ least (root mean square over at least half of the shorter record; of shifts within 10 % of the
@@ -24,7 +26,7 @@ from numpy.typing import NDArray
 from hoof_env.errors import DataFileError, ParameterError, check_choice, check_number
 from hoof_env.lab.forces import THRESHOLD
 from hoof_env.lab.read import ForceRecord
-from hoof_env.lab.stances import Pair, Side, best_shift, pairs_of, whole_stances
+from hoof_env.lab.stances import SHORTEST, Pair, Side, best_shift, pairs_of, whole_stances
 
 Floats = NDArray[np.float64]
 
@@ -85,7 +87,7 @@ class Comparison:
         unit: of all forces, "N" or "BW".
         rate: that both are resampled to [Hz].
         levels: vertical force of A and of B that makes a stance [unit].
-        shift: added to the times of B [s].
+        shift: added to the times of B, by the clocks of both files [s].
         limbs: errors by limb, in the order of A.
         curves: by limb, of each pair the time from A's touchdown [s], shape (n,), the forces of A and those
             of B there, forward and upward, shape (n, 2).
@@ -133,19 +135,29 @@ def compare(
     levels = _levels(a, b, threshold, unit)
     rate = max(a.rate, b.rate)
     _check_length(a, b, rate)
-    starts = (a.time[0], b.time[0]) if align == "none" else (0.0, 0.0)
-    time_a, forces_a = _resampled(a, [one for one, _ in names], by_a, rate, starts[0])
-    time_b, forces_b = _resampled(b, [two for _, two in names], by_b, rate, starts[1])
+    start = float(b.time[0])
+    if align == "none":  # on the samples of A
+        start = float(a.time[0]) + math.ceil((start - float(a.time[0])) * rate - 1e-6) / rate
+    if align == "none" and not max(a.time[0], b.time[0]) < min(a.time[-1], b.time[-1]):
+        raise ParameterError(
+            f"align: expected records that overlap, got {_span(a)} of {a.name} and {_span(b)} of {b.name}"
+        )
+    time_a, forces_a = _resampled(a, [one for one, _ in names], by_a, rate, float(a.time[0]))
+    time_b, forces_b = _resampled(b, [two for _, two in names], by_b, rate, start)
     stances = [
         [whole_stances(force[:, 1], level, rate) for force in forces]
         for forces, level in zip((forces_a, forces_b), levels, strict=True)
     ]
-    for record, found, forces, level in zip((a, b), stances, (forces_a, forces_b), levels, strict=True):
+    for record, found, forces, times, level in zip(
+        (a, b), stances, (forces_a, forces_b), (time_a, time_b), levels, strict=True
+    ):
         if not any(found):
-            why = _why_none(np.concatenate([force[:, 1] for force in forces]), level, unit)
+            why = why_none([force[:, 1] for force in forces], times, level, unit)
             raise DataFileError(f"record {record.name!r}: expected a whole stance {why}")
     near = math.ceil(2 * rate / min(a.rate, b.rate))
-    shift = 0.0 if align == "none" else best_shift(forces_a, forces_b, stances, rate, near)
+    shift = 0.0
+    if align != "none":
+        shift = float(time_a[0] - time_b[0]) + best_shift(forces_a, forces_b, stances, rate, near)
     limbs, curves, missing, warnings = {}, {}, _unshared(a, b, names), []
     for k, (name, _) in enumerate(names):
         sides = (
@@ -161,8 +173,8 @@ def compare(
             missing[name] = _why_missing(sides, levels, unit)
     if not limbs:
         raise ParameterError(
-            f"align: expected stances of a limb in {a.name} and {b.name} at the same times, found none with "
-            f"align={align!r}"
+            f"align: expected stances of a limb in {a.name} ({_span(a)}) and {b.name} ({_span(b)}) at the "
+            f"same times, found none with align={align!r}"
         )
     return Comparison(a, b, unit, rate, levels, shift, limbs, curves, missing, warnings)
 
@@ -192,22 +204,43 @@ def _check_length(a: ForceRecord, b: ForceRecord, rate: float) -> None:
         )
 
 
-def _why_none(vertical: Floats, level: float, unit: str) -> str:
-    """What to say of vertical forces without a whole stance; the remedy for a plate that is not zeroed."""
-    low, high = float(np.percentile(vertical, 5)), float(vertical.max())
-    why = f"above {level:g} {unit}, found none"
-    if low > level:
-        why += f": it hardly falls below {low:.4g} {unit}; subtract the plate's offset, or raise --threshold"
-    elif high <= level:
-        why += f": the highest force is {high:.4g} {unit}"
-    return why
-
-
 def _why_missing(sides: tuple[Side, Side], levels: tuple[float, float], unit: str) -> str:
     for name, side, level in zip("AB", sides, levels, strict=True):
         if not side.stances:
-            return f"{name} has no whole stance: expected one {_why_none(side.force[:, 1], level, unit)}"
+            why = why_none([side.force[:, 1]], side.time, level, unit)
+            return f"{name} has no whole stance: expected one {why}"
     return "no stance of A has one of B at the same time"
+
+
+def _span(record: ForceRecord) -> str:
+    return f"{record.time[0]:.4g} to {record.time[-1]:.4g} s"
+
+
+def why_none(verticals: list[Floats], time: Floats, level: float, unit: str) -> str:
+    """What to say of vertical forces without a whole stance; the remedy for a plate that is not zeroed."""
+    together = np.concatenate(verticals)
+    low, high = float(np.percentile(together, 5)), float(together.max())
+    why = f"above {level:g} {unit}, found none"
+    if low > level:
+        why += f": it hardly falls below {low:.4g} {unit}; subtract the plate's offset, or raise --threshold"
+        if min(float(force.min()) for force in verticals) > level:
+            why += (
+                f"; or the stance is cut off by both ends of the record ({time[0]:.4g} and {time[-1]:.4g} s)"
+            )
+        return why
+    if high <= level:
+        return f"{why}: the highest force is {high:.4g} {unit}"
+    ends = {"start": (0, time[0]), "end": (-1, time[-1])}
+    cut = [
+        f"{which} ({at:.4g} s)" for which, (k, at) in ends.items()
+        if any(force[k] > level for force in verticals)
+    ]  # fmt: skip
+    if cut:
+        return (
+            f"{why}: what it has is cut off by the {' and the '.join(cut)} of the record, where the limb "
+            "is still loaded; a longer record has whole stances"
+        )
+    return f"{why}: the force stays above that for less than {1e3 * SHORTEST:.0f} ms at a time"
 
 
 def _unshared(a: ForceRecord, b: ForceRecord, names: list[tuple[str, str]]) -> dict[str, str]:
@@ -267,14 +300,16 @@ def _common_limbs(a: ForceRecord, b: ForceRecord) -> list[tuple[str, str]]:
 def _resampled(
     record: ForceRecord, limbs: list[str], factor: float, rate: float, start: float
 ) -> tuple[Floats, list[Floats]]:
-    """Times from `start` on and forces of limbs, times `factor`, at `rate`."""
-    own = record.time - record.time[0]
-    time = np.arange(int(own[-1] * rate + 1e-6) + 1) / rate
+    """Times by the clock of the file, from `start` on, and forces of limbs, times `factor`, at `rate`."""
+    first = record.time[0]
+    steps = int((record.time[-1] - start) * rate + 1e-6) + 1
+    own = start - first + np.arange(steps) / rate
     forces = [
-        np.column_stack([np.interp(time, own, column) for column in record.limbs[limb].T]) * factor
+        np.column_stack([np.interp(own, record.time - first, column) for column in record.limbs[limb].T])
+        * factor
         for limb in limbs
-    ]
-    return start + time, forces
+    ]  # fmt: skip
+    return first + own, forces
 
 
 PARTS: dict[str, Callable[[Floats], Floats]] = {

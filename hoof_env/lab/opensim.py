@@ -52,8 +52,10 @@ def write_mot(record: Columns, about: Mapping[str, Any], path: Path) -> None:
 
 
 def loads_path(path: Path) -> Path:
-    """The ExternalLoads XML of a motion file: `run.mot` has `run_loads.xml` beside it."""
-    return path.with_name(f"{path.stem}_loads.xml")
+    """The ExternalLoads XML of a motion file: `run.mot` has `run_loads.xml` beside it, and `run.sto`, which
+    may be there, too, `run_sto_loads.xml`."""
+    storage = "_sto" if path.suffix.lower() == ".sto" else ""
+    return path.with_name(f"{path.stem}{storage}_loads.xml")
 
 
 def body_of(limb: str) -> str:

@@ -12,6 +12,7 @@ from hoof_env._output import check_folder, markdown_table, staged
 from hoof_env._plotting import BLUE, GREY, ORANGE, STYLE
 from hoof_env.errors import MissingExtraError, ParameterError
 from hoof_env.lab.compare import Comparison, Force
+from hoof_env.lab.doubts import for_one
 from hoof_env.lab.read import REVERSED, ForceRecord
 
 SUFFIXES = (".pdf", ".png", ".svg")
@@ -30,7 +31,10 @@ def report(found: Comparison) -> str:
         "",
         _table(found),
     ]
-    doubts = [f"{limb} is not compared: {why}" for limb, why in found.missing.items()] + found.warnings
+    same = (found.a.name, found.a.notes) == (found.b.name, found.b.notes)
+    doubts = [f"{found.a.name}: {note if same else for_one(note, '-a')}" for note in found.a.notes]
+    doubts += [f"{found.b.name}: {for_one(note, '-b')}" for note in found.b.notes if not same]
+    doubts += [f"{limb} is not compared: {why}" for limb, why in found.missing.items()] + found.warnings
     for limb, errors in found.limbs.items():
         if "fore-aft" in errors.forces and errors.forces["fore-aft"].r < -0.5:
             doubts.append(f"{limb}: fore-aft forces point opposite ways; {_remedy(found, limb)}")
@@ -61,7 +65,8 @@ def _about(which: str, record: ForceRecord) -> str:
     level = [limb for limb, force in record.limbs.items() if not np.isfinite(force[:, 0]).any()]
     only = f"; no fore-aft force of {', '.join(level)}" if level else ""
     return (
-        f"{which}  {record.name}: {record.rate:g} Hz, {record.unit}, {', '.join(record.limbs)}{turned}{only}"
+        f"{which}  {record.name}: {record.rate:g} Hz, {record.unit}, {', '.join(record.limbs)}, "
+        f"{record.time[0]:.4g} to {record.time[-1]:.4g} s{turned}{only}"
     )
 
 

@@ -1,18 +1,17 @@
 """Files of force records as tables of columns with units; what the columns mean is up to `lab.read`.
 
-Text tables (.csv, .txt, .tsv) have one line of names, with units as in `force_y [N]` or `Fz (kN)` or in a row
-of their own below it, and rows of numbers between tabs, semicolons (then commas may be decimal), commas or
-blanks; Parquet has the unit in a field's metadata; .mot and .sto are OpenSim's, in N and s; of a .c3d the
-force plates are read, see `c3d.read_c3d`.
+Text tables (.csv, .txt, .tsv) have names, with units as in `force_y [N]` or `Fz (kN)` or in a row of their
+own below them, and rows of numbers between tabs, semicolons, commas or blanks, see `lab.text`; commas
+may be decimal, unless they are between the cells. Parquet has the unit in the metadata of a field; .mot and
+.sto are those of OpenSim, in N and s; of a .c3d the force plates are read, see `lab.c3d_read`.
 """
 
 from __future__ import annotations
 
-import csv
 import json
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -20,13 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.errors import DataFileError, MissingExtraError
-from hoof_env.lab.c3d import read_c3d
+from hoof_env.lab.c3d_read import read_plates
+from hoof_env.lab.text import TITLE, Row, Text, cells_of, is_number, lines_of, number, parse
 
 Columns = dict[str, NDArray[np.float64]]
-
-TITLE = re.compile(r"\s*(?P<name>.*?)\s*(?:[\[(]\s*(?P<unit>[^\[\]()]*?)\s*[\])])?\s*")
-WORD = re.compile(r"[^\s\[(]+(?:\s*[\[(][^\])]*[\])])?")
-"""A name between blanks, with its unit."""
 
 ENTRY = re.compile(r"\s*(\w+)\s*=\s*(.*?)\s*")
 COUNTS = {"nrows": "rows", "ncolumns": "columns"}
@@ -35,18 +31,37 @@ COUNTS = {"nrows": "rows", "ncolumns": "columns"}
 
 @dataclass
 class Table:
-    """Columns of shape (n,) and their units, as far as the file says, and the weight [N], if it does;
-    `unread` says of columns that are no numbers what is wrong with them."""
+    """Columns of a file.
+
+    Attributes:
+        columns: arrays of shape (n,) by name. A name that stands several times has "#1" and so on behind it,
+            and one that is empty is "#3" in the third column.
+        units: by name, as far as the file says.
+        weight: of the animal [N], if the file says it.
+        unread: by name, of columns that are no numbers, what is wrong with them.
+        order: names by column.
+        repeated: what to say to one who asks for a name that stands several times, by that name.
+        up: the axis of its forces that points upward; "-" before it is its other end.
+        plates: of a c3d, names of limbs or plates, whose forces are `NAME_x` and so on.
+        line: the number of the line of names, 0 if there is none.
+        notes: what is remarkable about the file.
+    """
 
     columns: Columns
     units: dict[str, str] = field(default_factory=dict)
     weight: float | None = None
     unread: dict[str, str] = field(default_factory=dict)
+    order: list[str] = field(default_factory=list)
+    repeated: dict[str, str] = field(default_factory=dict)
+    up: str = "y"
+    plates: list[str] = field(default_factory=list)
+    line: int = 0
+    notes: list[str] = field(default_factory=list)
 
     @property
     def names(self) -> list[str]:
         """Of all columns."""
-        return [*self.columns, *self.unread]
+        return self.order or [*self.columns, *self.unread]
 
     @property
     def rows(self) -> int:
@@ -54,18 +69,8 @@ class Table:
         return len(next(iter(self.columns.values()), ()))
 
 
-Row = tuple[int, list[str]]
-"""A line's number in its file, and its cells."""
-
-
 def _read_text(path: Path) -> Table:
-    lines = path.read_text(encoding="utf-8-sig").splitlines()
-    if not lines:
-        return Table({})
-    most = max("\t;,", key=lines[0].count)
-    between = most if most in lines[0] else None  # blanks
-    titles = WORD.findall(lines[0]) if between is None else next(csv.reader([lines[0]], delimiter=between))
-    table = _table(path, titles, list(_rows(lines[1:], between, 2)), decimal_comma=between == ";")
+    table = _table(path, parse(lines_of(path)))
     weights = table.columns.get("weight", np.empty(0))
     if weights.size and table.units.get("weight") == "N":  # as our files in body weights have it
         table.weight = float(weights[0])
@@ -73,12 +78,12 @@ def _read_text(path: Path) -> Table:
 
 
 def _read_opensim(path: Path) -> Table:
-    lines = path.read_text(encoding="utf-8-sig").splitlines()
-    ends = [k for k, line in enumerate(lines) if line.strip().lower() == "endheader"]
-    if not ends or len(lines) < ends[0] + 2:
+    lines = lines_of(path)
+    top = next((k + 1 for k, line in enumerate(lines) if line.strip().lower() == "endheader"), len(lines))
+    below = [k for k in range(top, len(lines)) if lines[k].strip()]
+    if not below:
         raise DataFileError(f"record {str(path)!r}: expected a line endheader and names below it")
-    top = ends[0] + 1
-    titles, rows = lines[top].split(), list(_rows(lines[top + 1 :], None, top + 2))
+    titles, rows = lines[below[0]].split(), [(k + 1, cells_of(lines[k], None)) for k in below[1:]]
     said = {match[1].lower(): match[2] for line in lines[:top] if (match := ENTRY.fullmatch(line))}
     for (entry, what), found in zip(COUNTS.items(), (len(rows), len(titles)), strict=True):
         if said.get(entry, "").isdigit() and int(said[entry]) != found:
@@ -86,64 +91,77 @@ def _read_opensim(path: Path) -> Table:
                 f"record {str(path)!r}: expected {said[entry]} {what}, as its header says, found {found}: "
                 "is the file cut off?"
             )
-    table = _table(path, titles, rows)
-    forces = {name: "N" for name in table.names if "force" in name and re.search(r"_(v[xyz]|[xyz])$", name)}
-    weight = float(said["weight_n"]) if "weight_n" in said else None
-    return Table(table.columns, forces | {"time": "s"}, weight, table.unread)
-
-
-def _rows(lines: Iterable[str], between: str | None, first: int) -> Iterator[Row]:
-    """Lines that are not blank; cells between blanks for None. `first` is the number of the first line."""
-    cells = (line.split() for line in lines) if between is None else csv.reader(lines, delimiter=between)
-    return ((k, row) for k, row in enumerate(cells, first) if any(cell.strip() for cell in row))
-
-
-def _table(path: Path, titles: list[str], rows: list[Row], decimal_comma: bool = False) -> Table:
-    """Columns with a name; every one for itself, so that one of words or with gaps harms nobody who does not
-    ask for it. `DataFileError` of a row that lacks cells or has too many."""
-    while titles and not titles[-1].strip():  # behind a separator at the end of the line
-        titles = titles[:-1]
-    parts = [match for title in titles if (match := TITLE.fullmatch(title))]
-    names, width = [part["name"] for part in parts], len(parts)
-    table = Table({}, {part["name"]: part["unit"] for part in parts if part["unit"]})
-    if rows and not any(_is_number(cell) for cell in rows[0][1]):
-        below = [cell.strip(" []()") for cell in rows.pop(0)[1]]
-        table.units = {name: unit for name, unit in zip(names, below, strict=False) if unit} | table.units
-    for k, cells in rows:
-        if len(cells) < width or any(cell.strip() for cell in cells[width:]):
-            raise DataFileError(
-                f"record {str(path)!r}: line {k}: expected numbers, got {len(cells)} cells under "
-                f"{width} names"
-            )
-    times = Counter(names)
-    for at, name in enumerate(names):
-        if not name:
-            continue
-        try:
-            if times[name] > 1:
-                raise ValueError(f"expected names that differ, got {name!r} {times[name]} times")
-            table.columns[name] = _numbers(rows, at, decimal_comma)
-        except ValueError as error:
-            table.unread[name] = str(error)
+    table = _table(path, Text(titles, rows, line=below[0] + 1, decimal_comma=True))
+    for name in table.names:
+        if "force" in name.lower() and re.search(r"(_v[xyz]|_[xyz])(#\d+)?$", name):
+            table.units[name] = "N"
+    table.units["time"] = "s"
+    table.weight = float(said["weight_n"]) if "weight_n" in said else None
     return table
 
 
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell.replace(",", "."))
-    except ValueError:
-        return False
-    return True
+def _table(path: Path, text: Text) -> Table:
+    """Columns, every one for itself, so that one of words or with gaps harms nobody who does not ask for it.
+    `DataFileError` of a row that lacks cells or has too many."""
+    titles, rows = text.titles, text.rows
+    while titles and not titles[-1].strip():  # behind a separator at the end of the line
+        titles = titles[:-1]
+    parts = [match for title in titles if (match := TITLE.fullmatch(title))]
+    width = len(parts) or (len(rows[0][1]) if rows else 0)
+    names = [part["name"] for part in parts] or [""] * width
+    for k, cells in rows:
+        if len(cells) < width or any(cell.strip() for cell in cells[width:]):
+            raise DataFileError(
+                f"record {str(path)!r}: line {k}: expected numbers, got {len(cells)} cells under {width} "
+                "names" + (f" in line {text.line}" if text.line else "")
+            )
+    keys, repeated = _keys(names, text)
+    below = [*text.units[:width], *[""] * (width - len(text.units))]
+    units = {
+        key: unit for key, part, under in zip(keys, parts, below, strict=False)
+        if (unit := part["unit"] or under)
+    }  # fmt: skip
+    table = Table({}, units, order=keys, repeated=repeated, line=text.line, notes=text.notes)
+    points = text.decimal_comma and any(
+        "." in cell and is_number(cell, False) for _, cells in rows for cell in cells[:width]
+    )
+    for at, key in enumerate(keys):
+        try:
+            table.columns[key] = _numbers(rows, at, text.decimal_comma, points)
+        except ValueError as error:
+            table.unread[key] = str(error)
+    return table
 
 
-def _numbers(rows: list[Row], at: int, decimal_comma: bool) -> NDArray[np.float64]:
-    """The numbers of a column; `ValueError` names the first line that has none."""
+def _keys(names: list[str], text: Text) -> tuple[list[str], dict[str, str]]:
+    """A key for each column, and what to say of names that do not tell columns apart."""
+    times, seen = Counter(names), Counter[str]()
+    keys, repeated = [], {}
+    for at, name in enumerate(names):
+        seen[name] += 1
+        keys.append(f"#{at + 1}" if not name else f"{name}#{seen[name]}" if times[name] > 1 else name)
+    for name in (name for name, count in times.items() if name and count > 1):
+        choices = ", ".join(
+            key + (f" ({text.groups[at]})" if at < len(text.groups) and text.groups[at] else "")
+            for at, key in enumerate(keys) if names[at] == name
+        )  # fmt: skip
+        where = f"names in line {text.line}: " if text.line else ""
+        repeated[name] = (
+            f"{where}expected names that differ, got {name!r} {times[name]} times; choose {choices}"
+        )
+    return keys, repeated
+
+
+def _numbers(rows: list[Row], at: int, decimal_comma: bool, points: bool) -> NDArray[np.float64]:
+    """The numbers of a column; `ValueError` names the first line that has none, or a comma in a table that
+    has decimal points."""
     values = np.empty(len(rows))
     for n, (k, cells) in enumerate(rows):
         try:
-            values[n] = float(cells[at].replace(",", ".") if decimal_comma else cells[at])
+            values[n] = number(cells[at], decimal_comma and not points)
         except ValueError:
-            raise ValueError(f"line {k}: expected numbers, got {cells[at]!r}") from None
+            beside = " beside numbers with decimal points" if points and "," in cells[at] else ""
+            raise ValueError(f"line {k}: expected numbers, got {cells[at]!r}{beside}") from None
     return values
 
 
@@ -165,12 +183,16 @@ def _read_parquet(path: Path) -> Table:
 
 
 def _read_c3d(path: Path) -> Table:
-    columns, units, about = read_c3d(path)
-    forward = {name: name.removesuffix("_x") + "_force_x" for name in columns if name.endswith("_x")}
-    upward = {name: name.removesuffix("_z") + "_force_y" for name in columns if name.endswith("_z")}
-    own = {new: old for old, new in (forward | upward).items()}  # the laboratory's z is up
-    columns |= {new: columns[old] for new, old in own.items()}
-    return Table(columns, units | {new: units[old] for new, old in own.items()}, about.get("weight_n"))
+    """Columns `NAME_x` and so on of each plate along the laboratory's axes, and the time."""
+    found = read_plates(path)
+    columns = {
+        f"{limb}_{axis}": force[:, k] for limb, force in found.forces.items() for k, axis in enumerate("xyz")
+    }
+    units = {f"{limb}_{axis}": unit for limb, unit in found.units.items() for axis in "xyz"}
+    return Table(
+        columns | {"time": found.time}, units | {"time": "s"}, found.weight, up=found.up,
+        plates=[*found.forces], notes=found.notes,
+    )  # fmt: skip
 
 
 READERS: dict[str, Callable[[Path], Table]] = {

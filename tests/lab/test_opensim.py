@@ -102,7 +102,16 @@ def test_a_leg_has_plain_names(of_leg, tmp_path):
     loads = loads_path(path).read_text(encoding="utf-8")
     assert "<applied_to_body>hoof<" in loads
     assert "<force_identifier>ground_force_v<" in loads
-    assert loads_path(path).name == "run_loads.xml"
+    assert loads_path(path).name == "run_sto_loads.xml"
+    assert "<datafile>run.sto<" in loads
+
+
+def test_a_storage_file_leaves_the_loads_of_a_motion_file_alone(of_leg, tmp_path):
+    record, about = of_leg
+    motion, storage = (records.write(record, about, tmp_path / name) for name in ("run.mot", "run.sto"))
+    for path in (motion, storage):
+        assert f"<datafile>{path.name}<" in loads_path(path).read_text(encoding="utf-8")
+    assert len(list(tmp_path.iterdir())) == 4
 
 
 @pytest.mark.parametrize("bodies", [{"tail": "x"}, {"leg": ""}, {"leg": 3}])

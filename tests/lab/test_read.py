@@ -91,7 +91,7 @@ BROKEN = {
     "names.csv": ("t,Fx,Fz\n0,1,2\n1,1,2\n", "expected columns of names.csv for time, force_x and force_y"),
     "timeless.csv": ("force_x [N],force_y [N]\n1,2\n1,2\n", "expected a column of timeless.csv for time"),
     "hours.csv": ("time [h],force_x [N],force_y [N]\n0,1,2\n1,1,2\n", "in s or ms, got h"),
-    "rounded.csv": (STEADY + "4e-3,1,2\n9e-3,1,2\n", "give the rate instead (--rate-a, --rate-b)"),
+    "gap.csv": (STEADY + "".join(f"0.0{k},1,2\n" for k in (1, 2, 4, 5)), "of 0.02 behind 0.02 in row 3"),
     "rows.mot": ("x\nnRows=3\nendheader\ntime ground_force_vy\n0 1\n1 1\n", "expected 3 rows, as its"),
     "columns.mot": ("x\nnColumns=3\nendheader\ntime ground_force_vy\n0 1\n1 1\n", "expected 3 columns, as"),
     "row.mot": ("x\nendheader\ntime a ground_force_vy\n0 1 2\n1 1\n", "got 2 cells under 3 names"),
