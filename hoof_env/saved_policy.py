@@ -99,11 +99,60 @@ def settings_of(env: Any) -> dict[str, Any]:
     return plain
 
 
+def environment_of(
+    path: Path | str, record: dict[str, Any], env_id: str | None = None
+) -> tuple[str | None, dict[str, Any]]:
+    """The environment that a file asks for, or the one named `env_id` by its user, and the arguments of it
+    that the file has; None, and no arguments, where nobody names one.
+
+    Nothing is imported because a file says so: its id is looked up among the registered ones, without the
+    module in front of it. `DataFileError` where it is not registered, or an argument asks for a module.
+    """
+    there = record.get("env_id")
+    if there is None or (env_id is not None and not same_id(env_id, there)):
+        return env_id, {}
+    kwargs: dict[str, Any] = record.get("env_kwargs", {})
+    if not isinstance(kwargs, dict):
+        raise DataFileError(f"{path}: env_kwargs: expected arguments by name, got {kwargs!r}")
+    asks = {"env_id": there} if env_id is None else {}
+    asks |= {"task": kwargs["task"]} if ":" in str(kwargs.get("task", "")) else {}
+    for name, given in asks.items():
+        if own_id(given) not in gym.registry:
+            option = f"--env-id {given}" if name == "env_id" else "--env-id, with the task as its argument"
+            raise DataFileError(
+                f"{path}: expected the id of an environment that is registered here, got {name} {given!r}; a "
+                f"file must not import a module. If you trust it, name it yourself: {option}"
+            )
+    if "task" in asks:
+        kwargs = kwargs | {"task": registered_task(asks["task"])}
+    return (own_id(there) if env_id is None else env_id), kwargs
+
+
+def own_id(env_id: Any) -> str:
+    """An id without the module that `gymnasium.make` would import first, "module:id"."""
+    return str(env_id).rpartition(":")[2]
+
+
+def same_id(one: Any, other: Any) -> bool:
+    """Whether two ids name one environment, with or without the module that registers it."""
+    return own_id(one) == own_id(other)
+
+
+def registered_task(task: str) -> str:
+    """What `tasks.task_of` takes for a task of one's own that is registered already, so that it imports
+    nothing."""
+    return str(gym.registry[own_id(task)].kwargs.get("task", own_id(task)))
+
+
 def refuse_misfit(path: Path, there: dict[str, Any], here: dict[str, Any]) -> None:
     """`DataFileError` where a policy was trained for something else than what is `here`."""
     is_old = bool(there) and "actions" in here and "actions" not in there
     asked = {"env_id": here["env_id"]} if is_old else here  # what else is unlike follows from the form
-    unlike = [f"{key} {there[key]}, expected {x}" for key, x in asked.items() if there.get(key, x) != x]
+    unlike = [
+        f"{key} {there[key]}, expected {x}"
+        for key, x in asked.items()
+        if there.get(key, x) != x and not (key == "env_id" and same_id(there[key], x))
+    ]
     if is_old:
         unlike.insert(0, f"actions of an older form (positions in a box), expected {here['actions']}")
     if unlike:
