@@ -35,7 +35,7 @@ from agents.statistics import Interval
 from hoof_env._output import check_folder, markdown_table, staged
 from hoof_env.envs.policies import STANDS_FOR
 from hoof_env.envs.tasks import TASKS
-from hoof_env.errors import DataFileError, OutputError, ParameterError, check_choice
+from hoof_env.errors import DataFileError, OutputError, ParameterError, check_choice, parse_json
 from hoof_env.film import render_episode
 from hoof_env.records import setting
 from hoof_env.saved_policy import ABOUT, FILE, WEIGHTS, OnnxPolicy, environment_of, own_id
@@ -252,8 +252,8 @@ def write_index(folder: Path) -> None:
     """Write README.md, the table of the policies in `folder`."""
     rows, beside = [], ("open-loop", "run", "reference")
     for path in sorted(folder.glob("*/score.json")):
-        score = json.loads(path.read_text(encoding="utf-8"))
-        algo = json.loads(path.with_name(runs.RECORD).read_text(encoding="utf-8"))["algo"]
+        score = parse_json(path.read_text(encoding="utf-8"))
+        algo = parse_json(path.with_name(runs.RECORD).read_text(encoding="utf-8"))["algo"]
         row = [f"`{score['env_id']}`", algo.upper()]
         for name in ("policy", *beside):
             one = score["policies"].get(name)

@@ -26,7 +26,14 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from hoof_env._version import __version__
-from hoof_env.errors import DataFileError, HoofEnvError, MissingExtraError, ParameterError, check_choice
+from hoof_env.errors import (
+    DataFileError,
+    HoofEnvError,
+    MissingExtraError,
+    ParameterError,
+    check_choice,
+    parse_json,
+)
 
 FILE, WEIGHTS, ABOUT, STATISTICS = "policy.onnx", "policy.safetensors", "policy.json", "vecnormalize.pkl"
 CHECKPOINTS = "checkpoints"
@@ -187,7 +194,7 @@ def read_record(folder: Path) -> dict[str, Any]:
     if not path.is_file():
         return {}
     try:
-        record: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        record: dict[str, Any] = parse_json(path.read_text(encoding="utf-8"))
         kinds = {"env_id": str, "algo": str} | {key: kind for key, kind in RECORD.items() if key in record}
         if unlike := [key for key, kind in kinds.items() if not isinstance(record[key], kind)]:
             raise TypeError(f"{unlike[0]}: {record[unlike[0]]!r}")
@@ -233,7 +240,7 @@ class OnnxPolicy:
             content = self.path.read_bytes()
             self._session = onnxruntime.InferenceSession(content, options, ["CPUExecutionProvider"])
             found = self._session.get_modelmeta().custom_metadata_map
-            self.record = {key: json.loads(text) if key in LISTS else text for key, text in found.items()}
+            self.record = {key: parse_json(text) if key in LISTS else text for key, text in found.items()}
             names = [node.name for node in (*self._session.get_inputs(), *self._session.get_outputs())]
             objects = all(isinstance(self.record.get(key, {}), dict) for key in OBJECTS)
             if names != [INPUT, OUTPUT] or "env_id" not in self.record or not objects:
@@ -391,7 +398,7 @@ def read_plain(folder: Path) -> TrainedPolicy:
     """What `save_policy` wrote; the model holds nothing but its policy. Any exception if it is damaged."""
     from safetensors.torch import load_file
 
-    about = json.loads((folder / ABOUT).read_text(encoding="utf-8"))
+    about = parse_json((folder / ABOUT).read_text(encoding="utf-8"))
     if about["format"] != FORMAT:
         raise ValueError(f"format {about['format']!r}, expected {FORMAT}")
     model = algorithm_class(about["algo"])(about["policy"], None, device="cpu", _init_setup_model=False)

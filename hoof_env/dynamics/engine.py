@@ -471,7 +471,7 @@ class TrunkEngine(Scene):
             return
         m = self._memory
         kept, first = self._copy((*memory.STATE, "stride_sums", "result")), np.zeros(self.num_envs)
-        sums, highest = np.zeros_like(m.stride_sums), layout.stride_sums(self.features).index("highest_grf")
+        sums, highest = np.zeros_like(m.stride_sums), layout.stride_sums(self.features).index("highest")
         while left and not broken(first).all():
             now = left % part or part  # the short one first: limits are looked at from the end
             self._go_substeps(now, account)

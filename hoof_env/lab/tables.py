@@ -9,7 +9,6 @@ force plates are read, see `c3d.read_c3d`.
 from __future__ import annotations
 
 import csv
-import json
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
@@ -19,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.errors import DataFileError, MissingExtraError
+from hoof_env.errors import DataFileError, MissingExtraError, parse_json
 from hoof_env.lab.c3d import read_c3d
 
 Columns = dict[str, NDArray[np.float64]]
@@ -154,7 +153,7 @@ def _read_parquet(path: Path) -> Table:
         raise MissingExtraError('Parquet needs pyarrow: pip install "hoof-env[export]"') from None
     found = parquet.read_table(path)
     units = {one.name: (one.metadata or {}).get(b"unit", b"").decode() for one in found.schema}
-    about = json.loads((found.schema.metadata or {}).get(b"hoof_env", b"{}"))
+    about = parse_json((found.schema.metadata or {}).get(b"hoof_env", b"{}"))
     table = Table({}, units, about.get("weight_n"))
     for name in found.column_names:
         try:
