@@ -25,7 +25,7 @@ from functools import lru_cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-OLDEST, NEWEST = (3, 11), (3, 13)
+OLDEST, NEWEST = (3, 11), (3, 14)
 EXTRAS = {"demo": ("train", "render", "video", "plot")}
 EXTRAS["all"] = (*EXTRAS["demo"], "export", "identify", "tune", "onnx", "docs", "dev")
 TOOLS = {

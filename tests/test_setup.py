@@ -130,7 +130,7 @@ def test_make_without_a_suitable_python(checkout):
     assert ended.returncode != 0
     ours = [line for line in ended.stderr.splitlines() if not line.startswith("make")]
     assert len(ours) == 1
-    assert "no Python 3.11 to 3.13" in ours[0]
+    assert "no Python 3.11 to 3.14" in ours[0]
 
 
 def test_makefile_and_script_agree_on_the_pythons(setup):
@@ -227,7 +227,7 @@ def ours(setup, monkeypatch):
 @pytest.mark.parametrize(
     "platform", ["x86_64-manylinux_2_28", "aarch64-manylinux_2_28", "aarch64-apple-darwin"]
 )
-@pytest.mark.parametrize("minor", [11, 12, 13])
+@pytest.mark.parametrize("minor", [11, 12, 13, 14])
 def test_everything_that_is_locked_has_a_wheel(ours, minor, platform):
     assert ours.OLDEST <= (3, minor) <= ours.NEWEST
     place = ("--python-version", f"3.{minor}", "--python-platform", platform)
