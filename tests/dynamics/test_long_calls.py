@@ -1,4 +1,4 @@
-"""Calls of the engine that are cut into parts, of which nothing is seen from outside; columns from outside."""
+"""Calls of the engine that are cut into parts, of which nothing is seen outside; columns that come from there."""
 
 import numpy as np
 import pytest
