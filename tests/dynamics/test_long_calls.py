@@ -1,4 +1,4 @@
-"""Calls of the engine that are cut into parts, of which nothing is seen outside; columns that come from there."""
+"""Calls of the engine that are cut into parts, of which nothing is seen outside; columns from there."""
 
 import numpy as np
 import pytest
