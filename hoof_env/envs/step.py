@@ -203,7 +203,7 @@ def step_kernels(
     leg, or with a horse's four. `ParameterError` where one of their functions reaches what cannot be read."""
     what = terms, entries, contact_law, features, legs
     functions = _functions(terms, entries, contact_law)
-    own = [function for function in functions if not function.__module__.startswith("hoof_env.")]
+    own = [function for function in functions if not str(function.__module__).startswith("hoof_env.")]
     now = fingerprint(*own)  # what a function names may be another's by now, as in a notebook
     found: StepKernels = _KEPT.get((*what, now), lambda: _made(own, *what), bool(own))
     return found

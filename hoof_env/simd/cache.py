@@ -65,15 +65,22 @@ class _FilesInGivenFolder(_caching.CompileResultCacheImpl):
 
 class _Files(_caching.IndexDataCacheFile):
     """The index of a kernel's files and the files themselves. What is damaged counts as not there, and `say`
-    tells so: an index is numba's version, `MAGIC`, a digest of the rest, and the rest, a pickle of the source
-    stamp and, for each signature, the name and the digest of its file."""
+    tells so: an index is a pickled version, a digest of the rest, and the rest, a pickle of the source stamp
+    and, for each signature, the name and the digest of its file."""
 
-    MAGIC = b"hoof-env 1\n"
+    FORMAT = "hoof-env.1"
     _OTHER_VERSION = re.compile(rb"\x80.\x95.{8}\x8c.[\w.+-]+\x94\.", re.DOTALL)
 
     def __init__(self, impl: Any, stamp: Any, say: Callable[[str], None]) -> None:
         super().__init__(impl.locator.get_cache_path(), impl.filename_base, stamp)
-        self.say = say
+        # numba alone, and older versions of this package, take it for one of another numba
+        self._start = pickle.dumps(f"{self._version}+{self.FORMAT}", protocol=-1)
+        self._say, self._told = say, set[str]()
+
+    def _tell(self, path: str, what: str) -> None:
+        if path not in self._told:
+            self._told.add(path)
+            self._say(f"{what} {path} is damaged: compiling it again")
 
     def save(self, key: Any, data: Any) -> None:
         """Write the file first: an index never names what is not there yet."""
@@ -95,7 +102,7 @@ class _Files(_caching.IndexDataCacheFile):
         except FileNotFoundError:
             return None
         if _sha(content) != digest:
-            self.say(f"the compiled kernel {self._data_path(name)} is damaged: compiling it again")
+            self._tell(self._data_path(name), "the compiled kernel")
             return None
         return pickle.loads(content)
 
@@ -104,13 +111,12 @@ class _Files(_caching.IndexDataCacheFile):
             content = trust.read(self._index_path)
         except FileNotFoundError:
             return {}
-        start = pickle.dumps(self._version, protocol=-1)
-        if not content.startswith(start) and self._OTHER_VERSION.match(content):
-            return {}  # of numba
-        head = start + self.MAGIC
-        digest, rest = content[len(head) : len(head) + 32], content[len(head) + 32 :]
-        if not content.startswith(head) or _sha(rest) != digest:
-            self.say(f"the index {self._index_path} is damaged, or of an older version: compiling again")
+        if not content.startswith(self._start) and self._OTHER_VERSION.match(content):
+            return {}  # of numba, or of this format
+        rest = content.removeprefix(self._start)
+        digest, rest = rest[:32], rest[32:]
+        if self._own(rest) != digest:
+            self._tell(self._index_path, "the index of compiled kernels")
             return {}
         stamp, entries = pickle.loads(rest)
         return dict(entries) if stamp == self._source_stamp else {}
@@ -118,7 +124,11 @@ class _Files(_caching.IndexDataCacheFile):
     def _save_index(self, entries: dict[Any, tuple[str, bytes]]) -> None:
         rest = self._dump((self._source_stamp, entries))
         with self._open_for_write(self._index_path) as file:
-            file.write(pickle.dumps(self._version, protocol=-1) + self.MAGIC + _sha(rest) + rest)
+            file.write(self._start + self._own(rest) + rest)
+
+    def _own(self, content: bytes) -> bytes:
+        """Digest of an index of this name: another kernel's in its place would be sound by itself."""
+        return _sha(self._index_name.encode() + content)
 
     @contextmanager
     def _open_for_write(self, path: str) -> Iterator[Any]:
