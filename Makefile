@@ -1,6 +1,7 @@
 # One target per habit. Each makes .venv first if it is missing or out of date.
 #
-#   PYTHON=python3.12   the interpreter to make .venv with; otherwise the first that is found to run
+#   PYTHON=python3.12   the interpreter to make .venv with; otherwise the first that is found to run, or one
+#                       that uv fetches, where uv is there
 #   INSTALLER=pip       set-up by pip where uv does not get on with your index or proxy
 #   TORCH_INDEX=URL     where Linux takes PyTorch from; empty for pip's own index, which has the CUDA build
 
@@ -8,9 +9,9 @@
 .PHONY: help setup setup-demo demo test kernels test-slow test-peers test-oldest test-lab test-ecosystem bench baselines docs test-site test-links lint clean
 
 PY := .venv/bin/python
-PYTHONS := $(or $(PYTHON),$(PY) python3 python3.13 python3.12 python3.11)
+PYTHONS := $(or $(PYTHON),$(PY) python3 python3.14 python3.13 python3.12 python3.11)
 LONG := -o faulthandler_timeout=3600
-IS_SUPPORTED := import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))
+IS_SUPPORTED := import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 14))
 
 help:
 	@echo 'make demo        reproduce the paper, train an agent, write runs/demo/report.html'
@@ -33,7 +34,13 @@ setup setup-demo:
 	@for python in $(PYTHONS); do \
 	  if $$python -c '$(IS_SUPPORTED)' 2>/dev/null; then exec $$python scripts/setup_venv.py $(subst setup-,,$(filter-out setup,$@)); fi; \
 	done; \
-	echo 'set-up stopped: no Python 3.11 to 3.13 here ($(PYTHONS)); name one: make PYTHON=/path/to/python' >&2; \
+	if test -z '$(PYTHON)' && command -v uv >/dev/null; then \
+	  echo 'no Python 3.11 to 3.14 here: uv fetches 3.13'; \
+	  if uv python install --quiet 3.13; then \
+	    exec "$$(uv python find 3.13)" scripts/setup_venv.py $(subst setup-,,$(filter-out setup,$@)); \
+	  fi; \
+	fi; \
+	echo 'set-up stopped: no Python 3.11 to 3.14 here ($(PYTHONS)); name one: make PYTHON=/path/to/python, or install uv, which fetches one' >&2; \
 	exit 1
 
 demo: setup-demo

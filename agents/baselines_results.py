@@ -8,7 +8,6 @@ HorseLegSpeed-v0 follows its command by the slope of its speed over constant com
 
 from __future__ import annotations
 
-import json
 import shlex
 import warnings
 from collections.abc import Mapping, Sequence
@@ -26,7 +25,7 @@ from agents.settings import FOLDER, load_settings
 from agents.statistics import TABLE, Scored, cells, mean_figures, over_episodes, over_seeds
 from hoof_env._output import markdown_table
 from hoof_env.envs.tasks import TASKS
-from hoof_env.errors import DataFileError, HoofEnvError
+from hoof_env.errors import DataFileError, HoofEnvError, parse_json
 from hoof_env.saved_policy import ABOUT
 
 GAITS = ("run", "walk")
@@ -91,7 +90,7 @@ def read_results(plan: Sequence[Entry], folder: Path) -> list[Row]:
 def read_result(entry: Entry, folder: Path) -> Result:
     """One training, checked to have the arguments and hyperparameters that its entry has now."""
     try:
-        result = Result(folder, json.loads((folder / FINAL).read_text(encoding="utf-8")))
+        result = Result(folder, parse_json((folder / FINAL).read_text(encoding="utf-8")))
     except (OSError, ValueError) as error:
         raise DataFileError(f"{folder / FINAL}: expected what agents.baselines_run wrote: {error}") from None
     config = load_settings(folder / runs.CONFIG, entry.env_id)

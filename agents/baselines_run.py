@@ -101,7 +101,7 @@ def load_plan(name: str) -> tuple[Entry, ...]:
     path = PLANS / f"{name}.yml"
     try:
         return tuple(Entry(**entry) for entry in yaml.safe_load(path.read_text(encoding="utf-8")))
-    except (OSError, yaml.YAMLError, TypeError) as error:
+    except (OSError, yaml.YAMLError, TypeError, RecursionError) as error:
         raise DataFileError(f"plan {path}: expected a list of entries: {error}") from None
 
 

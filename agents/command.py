@@ -9,6 +9,7 @@ import warnings
 from collections.abc import Callable
 from typing import NoReturn
 
+from hoof_env._output import bear_any_output, flush_or_drop
 from hoof_env.errors import HoofEnvError, check_number
 from hoof_env.errors import parse_pairs as parse_pairs
 
@@ -23,12 +24,18 @@ def run(command: Callable[[], int | None]) -> NoReturn:
     """Exit with what `command` returns: one line and 2 for an error of ours or of the system, as a full disk,
     one line and 130 for Ctrl-C; a warning is one line, too."""
     hook = threading.excepthook  # TensorBoard's thread fails on a full disk; its caller reports that, too
+    bear_any_output()
     threading.excepthook = lambda args: None if isinstance(args.exc_value, OSError) else hook(args)
     warnings.formatwarning = lambda message, *_, **__: f"warning: {message}\n"
     try:
         code = command() or 0
+        sys.stdout.flush()
     except (HoofEnvError, OSError) as error:
+        flush_or_drop()
         print(f"error: {error}", file=sys.stderr)
+        code = 2
+    except RecursionError:
+        print("error: a file or an argument is nested too deep", file=sys.stderr)
         code = 2
     except KeyboardInterrupt:
         print("\ninterrupted", file=sys.stderr)

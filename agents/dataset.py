@@ -27,6 +27,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 from tyro.conf import Positional
 
@@ -115,9 +116,24 @@ def load(dataset_id: str) -> Any:
     except ImportError:
         raise MissingExtraError('agents.dataset needs Minari: pip install "hoof-env[minari]"') from None
     dataset = minari.load_dataset(dataset_id)
+    check_environment(dataset)
     with dataset.recover_environment() as env:
         check_actions(dataset, env)
     return dataset
+
+
+def check_environment(dataset: Any) -> None:
+    """Refuse a dataset whose environment is not a registered one as it is registered: the name of code in it
+    would be imported. `DataFileError`."""
+    spec = dataset.spec.env_spec
+    known = gym.registry.get(spec.id)
+    task, registered = str(spec.kwargs.get("task", "")), known.kwargs.get("task") if known else None
+    same = known is not None and spec.entry_point == known.entry_point and not spec.additional_wrappers
+    if not same or (":" in task and task != registered):
+        raise DataFileError(
+            f"dataset {dataset.spec.dataset_id}: expected the id of an environment that is registered here, "
+            f"got {spec.id!r} at {spec.entry_point!r}; a dataset must not import a module: import yours first"
+        )
 
 
 def check_actions(dataset: Any, env: Any) -> None:

@@ -151,7 +151,7 @@ def run_trials(args: Trials) -> int:
     )  # fmt: skip
     try:
         if tune.Tuner.can_restore(folder):
-            print(f"going on with {folder}", flush=True)
+            print(f"going on with {folder}, whose files are pickles, which can run any code", flush=True)
             experiment = tune.Tuner.restore(folder, trainable, resume_errored=True)
         else:
             experiment = tune.Tuner(trainable, param_space=space, tune_config=config, run_config=running)

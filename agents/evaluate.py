@@ -27,6 +27,7 @@ from agents.statistics import Interval, estimate
 from hoof_env import records
 from hoof_env._output import check_folder
 from hoof_env.errors import OutputError, ParameterError, check_number
+from hoof_env.saved_policy import environment_of
 
 FPS = 50.0  # of films
 
@@ -146,10 +147,10 @@ def _check(args: Args) -> None:
 def _environment(args: Args) -> tuple[str, dict[str, Any]]:
     """The id and the arguments of the environment: those that are given, else those of the first policy that
     is a file."""
-    record = next(filter(None, [read_policy_record(name) for name in args.policy]), {})
-    env_id = args.env_id or record.get("env_id", runs.DEFAULT_ENV)
-    own = record.get("env_kwargs", {}) if env_id == record.get("env_id") else {}
-    return env_id, parse_pairs("--env-kwargs", args.env_kwargs) or own
+    records_of = {name: read_policy_record(name) for name in args.policy}
+    name, record = next(((name, one) for name, one in records_of.items() if one), ("", {}))
+    env_id, own = environment_of(name, record, args.env_id)
+    return env_id or runs.DEFAULT_ENV, parse_pairs("--env-kwargs", args.env_kwargs) or own
 
 
 def film(env: Any, policy: Any, path: Path, seed: int) -> None:

@@ -30,7 +30,7 @@ from agents.command import run
 from hoof_env._output import staged
 from hoof_env.errors import DataFileError, HoofEnvError, ParameterError
 from hoof_env.records import check_place
-from hoof_env.saved_policy import INPUT, LISTS, OUTPUT, OnnxPolicy, describe, settings_of
+from hoof_env.saved_policy import INPUT, LISTS, OUTPUT, OnnxPolicy, describe, environment_of, settings_of
 
 OPSET = 18  # of the file; onnxruntime reads it from 1.14 on
 TRIED = 1000  # random observations on which file and model must agree
@@ -53,10 +53,9 @@ def export(model: Path, out: Path, env_id: str | None = None) -> float:
     environment known. `DataFileError`: no such model. Others as `write_policy`."""
     check_place(out, [".onnx"])
     saved = runs.SavedModel.find(model)
-    env_id = env_id or saved.record.get("env_id")
+    env_id, kwargs = environment_of(saved.path, saved.record, env_id)
     if env_id is None:
         raise ParameterError(f"env_id: expected one, for there is no run.json beside {saved.path}")
-    kwargs = saved.record.get("env_kwargs", {}) if env_id == saved.record.get("env_id") else {}
     with runs.make_env(env_id, **kwargs) as env:
         trained = saved.load(env, env_id)
         metadata = about(env, env_id, kwargs, saved.record)

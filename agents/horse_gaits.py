@@ -29,7 +29,7 @@ from hoof_env.dynamics.parts import GRAVITY
 from hoof_env.envs.horse import HIP_HEIGHT
 from hoof_env.envs.policies import make_policy
 from hoof_env.envs.reference import LEGS, LIMITS, PAIRS, Stride, bounds
-from hoof_env.errors import HoofEnvError
+from hoof_env.errors import HoofEnvError, parse_json
 
 Floats = NDArray[np.float64]
 
@@ -212,7 +212,7 @@ class Finder:
         self.args = args
         self.content: dict[str, Any] = {"searches": {}}
         if args.out.is_file():
-            self.content = json.loads(args.out.read_text(encoding="utf-8"))
+            self.content = parse_json(args.out.read_text(encoding="utf-8"))
 
     def keep(self, name: str, look: Any) -> list[dict[str, Any]]:
         """What a search found under this name, or finds now."""

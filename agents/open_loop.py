@@ -34,7 +34,7 @@ from agents.statistics import estimate
 from hoof_env._output import check_folder
 from hoof_env.envs.observation import HALF_RANGE, MIDDLE
 from hoof_env.envs.policies import FORM, open_loop, open_loop_record
-from hoof_env.errors import DataFileError, HoofEnvError, ParameterError, check_number
+from hoof_env.errors import DataFileError, HoofEnvError, ParameterError, check_number, parse_json
 from hoof_env.gait import PARAMETERS
 
 Floats = NDArray[np.float64]
@@ -291,7 +291,7 @@ def earlier(path: Path, about: dict[str, Any]) -> list[dict[str, Any]]:
     if not path.is_file():
         return []
     with suppress(OSError, ValueError, KeyError, TypeError, AttributeError):
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = parse_json(path.read_text(encoding="utf-8"))
         if all(content.get(key) == value for key, value in about.items()):
             return [one for one in content["restarts"] if not one.get("interrupted")]
     raise DataFileError(f"{path}: expected searches with {about} to go on with; name another --out")

@@ -38,7 +38,7 @@ from hoof_env._output import check_folder, markdown_table
 from hoof_env.envs.policies import open_loop_record, start_of
 from hoof_env.envs.vector import HorseLegVectorEnv
 from hoof_env.errors import DataFileError, OutputError, ParameterError
-from hoof_env.saved_policy import find_saved
+from hoof_env.saved_policy import environment_of, find_saved
 
 ROWS = 1024  # episodes side by side at most; more are played one batch after the other
 
@@ -245,10 +245,9 @@ def score(args: Args) -> list[tuple[str, list[dict[str, float]]]]:
     for name in filter(is_model, read):
         if not read[name].get("env_id"):
             warnings.warn(f"policy {name}: nothing says what it was trained for", stacklevel=2)
-    record = next(filter(None, read.values()), {})
-    env_id = args.env_id or record.get("env_id", runs.DEFAULT_ENV)
-    own = record.get("env_kwargs", {}) if env_id == record.get("env_id") else {}
-    env_kwargs = parse_pairs("--env-kwargs", args.env_kwargs) or own
+    file, record = next(((name, one) for name, one in read.items() if one), ("", {}))
+    asked, own = environment_of(file, record, args.env_id)
+    env_id, env_kwargs = asked or runs.DEFAULT_ENV, parse_pairs("--env-kwargs", args.env_kwargs) or own
     with runs.make_env(env_id, **env_kwargs) as env:
         policies = {name: find_same(name, env, env_id) for name in args.policy}
     with_what = f" with {env_kwargs}" if env_kwargs else ""

@@ -62,7 +62,7 @@ def load_settings(path: Path, env_id: str) -> dict[str, Any]:
     no such file, not YAML, or neither entry is a mapping with n_envs, n_timesteps and policy."""
     try:
         entries = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+    except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
         raise DataFileError(f"hyperparameter file {path}: expected readable YAML: {error}") from None
     if not isinstance(entries, Mapping):
         raise DataFileError(

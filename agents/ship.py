@@ -35,10 +35,10 @@ from agents.statistics import Interval
 from hoof_env._output import check_folder, markdown_table, staged
 from hoof_env.envs.policies import STANDS_FOR
 from hoof_env.envs.tasks import TASKS
-from hoof_env.errors import DataFileError, OutputError, ParameterError, check_choice
+from hoof_env.errors import DataFileError, OutputError, ParameterError, check_choice, parse_json
 from hoof_env.film import render_episode
 from hoof_env.records import setting
-from hoof_env.saved_policy import ABOUT, FILE, WEIGHTS, OnnxPolicy
+from hoof_env.saved_policy import ABOUT, FILE, WEIGHTS, OnnxPolicy, environment_of, own_id
 
 POLICIES = Path(__file__).with_name("policies")
 SHOWN = ("return", "distance_m", "stance_peak_n", "weight_share", "cost_of_transport", "failed")
@@ -92,7 +92,8 @@ def find_runs(folder: Path) -> dict[str, list[runs.SavedModel]]:
             raise DataFileError(f"run {path}: expected all of a training, found no {missing[-1]}")
         saved = runs.SavedModel.find(path)
         if not saved.record.get("env_kwargs"):
-            models.setdefault(saved.record["env_id"], []).append(saved)
+            env_id, _ = environment_of(saved.path, saved.record)
+            models.setdefault(str(env_id), []).append(saved)
     if not models:
         raise DataFileError(f"runs {folder}: expected a run of agents.train, or a folder with some, got none")
     return models
@@ -115,7 +116,7 @@ def choose(saved: Sequence[runs.SavedModel], env_id: str) -> Choice:
 def ship(choice: Choice, env_id: str, out: Path) -> dict[str, Any]:
     """Write the folder of one policy beneath `out`, for its own id or one that `STANDS_FOR` it; returns its
     score.json. `DataFileError`: the model does not fit. `OutputError`: the folder gets too large."""
-    saved, trained_on = choice.saved, choice.saved.record["env_id"]
+    saved, trained_on = choice.saved, own_id(choice.saved.record["env_id"])
     if not len(runs.read_episodes(saved.path.parent)):
         raise DataFileError(f"run {saved.path.parent}: expected a training in which episodes end, got none")
     record = saved.record | {"command": shown_command(saved.record.get("command", "")), "env_id": env_id}
@@ -251,8 +252,8 @@ def write_index(folder: Path) -> None:
     """Write README.md, the table of the policies in `folder`."""
     rows, beside = [], ("open-loop", "run", "reference")
     for path in sorted(folder.glob("*/score.json")):
-        score = json.loads(path.read_text(encoding="utf-8"))
-        algo = json.loads(path.with_name(runs.RECORD).read_text(encoding="utf-8"))["algo"]
+        score = parse_json(path.read_text(encoding="utf-8"))
+        algo = parse_json(path.with_name(runs.RECORD).read_text(encoding="utf-8"))["algo"]
         row = [f"`{score['env_id']}`", algo.upper()]
         for name in ("policy", *beside):
             one = score["policies"].get(name)

@@ -47,7 +47,8 @@ class Args(TrainingArgs):
     out: Path | None = None
     """run folder; otherwise runs/ALGO-ENV-sSEED-TIME"""
     resume: bool = False
-    """go on with the run in --out, which the same command began; without one there, start it"""
+    """go on with the run in --out, which the same command began; without one there, start it. Its checkpoints
+    are pickles, which can run any code: resume only runs that you trust"""
     checkpoint_every: float = 30.0
     """seconds between two checkpoints, which stand between two rollouts; the last two are kept; 0: none"""
     max_minutes: float | None = None
@@ -123,6 +124,7 @@ def _train(
     try:
         resumed = None
         if start:
+            warnings.warn(f"{start} holds pickles, which can run any code: trusted?", stacklevel=2)
             resumed = checkpoints.Resumed(start, algorithm_class(args.algo), many, args.device)
         model = resumed.model if resumed else make_model(args, settings, many)
         envs = model.env

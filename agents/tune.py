@@ -29,7 +29,7 @@ from agents.settings import FOLDER, TrainingArgs, load_settings
 from agents.train import Args as TrainArgs
 from agents.train import checked, make_model, make_record, train
 from agents.watch import DivergedError, EndedError, Scorer
-from hoof_env.errors import DataFileError, ParameterError, check_number
+from hoof_env.errors import DataFileError, ParameterError, check_number, parse_json
 
 SPACES = Path(__file__).parent / "studies" / "spaces.yml"
 SEEDS = range(1000, 1064)  # scored episodes; trainings start theirs from other seeds
@@ -60,7 +60,9 @@ def load_space(path: Path, algo: str) -> dict[str, Any]:
                 (low, high) = how["log"] if "log" in how else how["uniform"]
                 if not low < high or ("log" in how and low <= 0):
                     raise ValueError(f"{key}: {how}")
-    except (OSError, yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError) as error:
+    except (
+        OSError, yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError, RecursionError
+    ) as error:  # fmt: skip
         raise DataFileError(
             f"search space {path}: expected for {algo} keys with lists, or uniform or log: [low, high]; "
             f"{type(error).__name__}: {error}"
@@ -76,7 +78,7 @@ def draw(trial: Any, space: Mapping[str, Any], base: Mapping[str, Any]) -> dict[
         if isinstance(how, list):
             value = trial.suggest_categorical(key, how)
             if isinstance(value, str) and value.startswith("["):  # Optuna chooses between plain values only
-                value = json.loads(value)
+                value = parse_json(value)
         else:
             low, high = how["log"] if "log" in how else how["uniform"]
             value = float(f"{trial.suggest_float(key, low, high, log='log' in how):.3g}")

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import os
 import shutil
+import sys
 import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -54,6 +56,46 @@ def check_new(path: Path, overwrite: bool) -> str:
     if is_there and not overwrite:
         raise OutputError(f"{str(path)!r} exists already; name another file, or add --overwrite")
     return "" if has_folder else f"; made the folder {path.parent}"
+
+
+def free_memory() -> float:
+    """How much memory this process may still take [bytes]; infinite where the system does not say."""
+    found = [float("inf")]
+    with suppress(OSError, ValueError, IndexError):
+        lines = Path("/proc/meminfo").read_text().splitlines()
+        found += [1024.0 * float(line.split()[1]) for line in lines if line.startswith("MemAvailable:")]
+    with suppress(OSError, ValueError):  # of a container
+        group = Path("/sys/fs/cgroup")
+        most, used = ((group / f"memory.{name}").read_text() for name in ("max", "current"))
+        found.append(float(most) - float(used))
+    if len(found) == 1:
+        with suppress(OSError, ValueError, AttributeError):
+            found.append(float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE"))
+    return max(min(found), 0.0)
+
+
+LEAST_COLUMNS = 40
+"""Width of help at least: in a narrower terminal the tables of tyro and rich never end."""
+
+
+def bear_any_output() -> None:
+    """Have a command replace what the encoding of its output lacks, and lay out help for a terminal of some
+    width at least."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
+    if shutil.get_terminal_size().columns < LEAST_COLUMNS:
+        os.environ["COLUMNS"] = str(LEAST_COLUMNS)
+
+
+def flush_or_drop() -> None:
+    """Write what a command has printed; where that cannot be, as on a full disk, it is dropped, so that
+    Python does not try again at its end."""
+    try:
+        sys.stdout.flush()
+    except (OSError, ValueError):
+        with suppress(OSError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def markdown_table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:

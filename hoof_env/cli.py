@@ -12,6 +12,7 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from hoof_env._output import bear_any_output, flush_or_drop
 from hoof_env._version import __version__
 from hoof_env.errors import HoofEnvError
 
@@ -325,6 +326,7 @@ def _with_axes(given: list[str]) -> list[str]:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one sub-command, by default the one on the command line; returns the exit code."""
     given = _with_axes(sys.argv[1:] if arguments is None else list(arguments))
+    bear_any_output()
     if given == ["--version"]:
         _say(f"hoof-env {__version__}")
         return 0
@@ -337,12 +339,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
             description="A horse's leg on the ground. --version prints the version.",
             args=given,
         )
+        sys.stdout.flush()
     except HoofEnvError as error:
         print(f"hoof-env: error: {error}", file=sys.stderr)
         return 2
     except BrokenPipeError:  # who read our output, as `head`, has left
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # of what is still to be flushed
         return 141
+    except OSError as error:  # a full disk
+        flush_or_drop()
+        print(f"hoof-env: error: cannot write the output: {error.strerror or error}", file=sys.stderr)
+        return 2
+    except RecursionError:
+        print("hoof-env: error: a file or an argument is nested too deep", file=sys.stderr)
+        return 2
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         return 130

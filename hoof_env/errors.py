@@ -49,10 +49,15 @@ class OutputError(HoofEnvError, OSError):
     """An output or compile-cache folder cannot be written."""
 
 
+LEAST = 1e-12
+"""The smallest of positive settings, in whatever unit."""
+
+
 def check_number(
     name: str, value: Any, *, low: float = -np.inf, high: float = np.inf, exclusive_low: bool = False
 ) -> float:
-    """Return `value` as a float, or raise `ParameterError` unless it is finite and within [low, high]."""
+    """Return `value` as a float, or raise `ParameterError` unless it is finite and within [low, high]; what
+    must be more than 0 must be `LEAST` or more, so that quotients are numbers."""
     try:
         number = np.nan if isinstance(value, (bool, np.bool_, str, bytes)) else float(value)
     except (TypeError, ValueError, OverflowError):
@@ -60,6 +65,8 @@ def check_number(
     if not (np.isfinite(number) and low <= number <= high) or (exclusive_low and number == low):
         bounds = f"{'(' if exclusive_low else '['}{low:g}, {high:g}]"
         raise ParameterError(f"{name}: expected a finite number in {bounds}, got {value!r}")
+    if exclusive_low and low == 0 and number < LEAST:
+        raise ParameterError(f"{name}: expected {LEAST:g} or more, got {value!r}")
     return number
 
 
@@ -69,6 +76,14 @@ def check_choice(name: str, value: Any, choices: Iterable[str]) -> str:
     if not isinstance(value, str) or value not in known:
         raise ParameterError(f"{name}: expected one of {', '.join(known)}, got {value!r}")
     return value
+
+
+def parse_json(text: str | bytes) -> Any:
+    """`json.loads`, with a ValueError also for what is nested too deep."""
+    try:
+        return json.loads(text)
+    except RecursionError:
+        raise ValueError("nested too deep") from None
 
 
 def parse_pairs(option: str, items: Sequence[str]) -> dict[str, Any]:
@@ -86,7 +101,7 @@ def parse_pairs(option: str, items: Sequence[str]) -> dict[str, Any]:
         why = ""
         if item.lstrip().startswith("{"):
             try:
-                pairs.update(json.loads(item))
+                pairs.update(parse_json(item))
                 continue
             except ValueError as error:
                 why = f" ({error})"
@@ -95,8 +110,13 @@ def parse_pairs(option: str, items: Sequence[str]) -> dict[str, Any]:
                 pairs[key] = json.loads(text)
             except ValueError:
                 pairs[key] = text
-            continue
-        raise ParameterError(f"{option}: expected a JSON object or key=value, got {item!r}{why}")
+                continue
+            except RecursionError:
+                why = " (nested too deep)"
+            else:
+                continue
+        given = repr(item) if len(item) <= 200 else f"{item[:200]!r}... ({len(item)} characters)"
+        raise ParameterError(f"{option}: expected a JSON object or key=value, got {given}{why}")
     return pairs
 
 

@@ -8,6 +8,8 @@ centre of pressure are those of `hoof_env.lab`.
 from __future__ import annotations
 
 import json
+import sys
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -18,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import hoof_env
-from hoof_env._output import check_folder, staged
+from hoof_env._output import check_folder, free_memory, staged
 from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.envs.policies import constant_gait, load_open_loop, make_policy, policy_names, start_of
 from hoof_env.errors import (
@@ -51,6 +53,13 @@ from hoof_env.saved_policy import find_saved
 RECORD = {name: unit for name, unit in UNITS.items() if name not in PARAMETERS[1:]} | {"free_moment": "N m"}
 """Columns of a record and their units: fields of `Instant` but for the swing's parameters, which are known at
 the end of a control step only. The free moment about the centre of pressure is 0."""
+
+
+TELL_SECONDS = 5.0
+"""Time between two lines about how far an episode is [s]."""
+
+COPIES = 3
+"""Of a record, while it is put together and written."""
 
 
 def setting(env: Any) -> Setting:
@@ -168,6 +177,32 @@ def episode(
             yield here
 
 
+def longest_of(env: gym.Env[Any, Any], seconds: float | None) -> float:
+    """How long an episode that is stopped after some `seconds`, if not before, lasts at most [s]."""
+    own = float(env.unwrapped.settings.episode_seconds)  # type: ignore[attr-defined]
+    return own if seconds is None else min(seconds, own)
+
+
+def check_memory(rows: float, columns: int) -> None:
+    """`ParameterError` where a record of so many rows would not fit into the memory that is free."""
+    needed, free = COPIES * 8.0 * rows * columns, free_memory()
+    if needed > free:
+        raise ParameterError(
+            f"seconds: {rows:.3g} rows of {columns} columns need {needed / 1e9:.3g} GB of memory, and "
+            f"{free / 1e9:.3g} GB are free; expected a shorter episode: --seconds, or episode_seconds"
+        )
+
+
+def _with_progress(played: Iterator[Columns], longest: float) -> Iterator[Columns]:
+    """The same; every `TELL_SECONDS` a line says how far it is."""
+    told = time.monotonic()
+    for part in played:
+        yield part
+        if time.monotonic() - told >= TELL_SECONDS:
+            told = time.monotonic()
+            print(f"{part['time'][-1]:.1f} of at most {longest:g} s", file=sys.stderr, flush=True)
+
+
 def _named(env: gym.Env[Any, Any], reactions: NDArray[np.float64]) -> Columns:
     """Reactions of shape (n, legs, columns) by name."""
     limbs = [f"{leg}_" for leg in setting(env).hips] or [""]
@@ -185,12 +220,17 @@ def record_episode(
     seconds: float | None = None,
     options: Mapping[str, Any] | None = None,
     reactions: bool = False,
+    tell: bool = False,
 ) -> Columns:
     """The record of an episode at every substep: arrays of shape (n,), names and units as `units_of` says.
     Arguments and errors are those of `episode`; `reactions` adds the forces in the joints, see
-    `lab.reactions`."""
+    `lab.reactions`; `tell` says now and then on stderr how far it is. `ParameterError` where the memory of
+    this machine cannot hold it."""
+    units, longest = units_of(env, reactions), longest_of(env, seconds)
+    check_memory(longest / setting(env).sim_dt, len(units))
     joints = JointReactions(env) if reactions else None
-    parts, units = list(episode(env, policy, seed, seconds, options, joints)), units_of(env, reactions)
+    played = episode(env, policy, seed, seconds, options, joints)
+    parts = list(_with_progress(played, longest) if tell else played)
     moments = [name for name in units if name.endswith("free_moment")]
     record = {name: np.concatenate([part[name] for part in parts]) for name in units if name in parts[0]}
     record |= {name: np.zeros(len(record["time"])) for name in moments}
@@ -329,7 +369,7 @@ def export_episode(
         names = units_of(env, reactions)
         on = check_bodies(parse_pairs("--bodies", bodies), limbs_of(names))
         player = find_policy(policy, env, env_id, seed)
-        record = record_episode(env, player, seed, seconds, reactions=reactions)
+        record = record_episode(env, player, seed, seconds, reactions=reactions, tell=True)
         kept = above_threshold(record, threshold, setting(env).terrain)
         about = describe(env, environment=env_id, arguments=given, policy=policy, seed=seed) | {
             "threshold_n": threshold, "bodies": on, "units": names,

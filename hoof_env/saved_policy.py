@@ -26,7 +26,14 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from hoof_env._version import __version__
-from hoof_env.errors import DataFileError, HoofEnvError, MissingExtraError, ParameterError, check_choice
+from hoof_env.errors import (
+    DataFileError,
+    HoofEnvError,
+    MissingExtraError,
+    ParameterError,
+    check_choice,
+    parse_json,
+)
 
 FILE, WEIGHTS, ABOUT, STATISTICS = "policy.onnx", "policy.safetensors", "policy.json", "vecnormalize.pkl"
 CHECKPOINTS = "checkpoints"
@@ -99,11 +106,60 @@ def settings_of(env: Any) -> dict[str, Any]:
     return plain
 
 
+def environment_of(
+    path: Path | str, record: dict[str, Any], env_id: str | None = None
+) -> tuple[str | None, dict[str, Any]]:
+    """The environment that a file asks for, or the one named `env_id` by its user, and the arguments of it
+    that the file has; None, and no arguments, where nobody names one.
+
+    Nothing is imported because a file says so: its id is looked up among the registered ones, without the
+    module in front of it. `DataFileError` where it is not registered, or an argument asks for a module.
+    """
+    there = record.get("env_id")
+    if there is None or (env_id is not None and not same_id(env_id, there)):
+        return env_id, {}
+    kwargs: dict[str, Any] = record.get("env_kwargs", {})
+    if not isinstance(kwargs, dict):
+        raise DataFileError(f"{path}: env_kwargs: expected arguments by name, got {kwargs!r}")
+    asks = {"env_id": there} if env_id is None else {}
+    asks |= {"task": kwargs["task"]} if ":" in str(kwargs.get("task", "")) else {}
+    for name, given in asks.items():
+        if own_id(given) not in gym.registry:
+            option = f"--env-id {given}" if name == "env_id" else "--env-id, with the task as its argument"
+            raise DataFileError(
+                f"{path}: expected the id of an environment that is registered here, got {name} {given!r}; a "
+                f"file must not import a module. If you trust it, name it yourself: {option}"
+            )
+    if "task" in asks:
+        kwargs = kwargs | {"task": registered_task(asks["task"])}
+    return (own_id(there) if env_id is None else env_id), kwargs
+
+
+def own_id(env_id: Any) -> str:
+    """An id without the module that `gymnasium.make` would import first, "module:id"."""
+    return str(env_id).rpartition(":")[2]
+
+
+def same_id(one: Any, other: Any) -> bool:
+    """Whether two ids name one environment, with or without the module that registers it."""
+    return own_id(one) == own_id(other)
+
+
+def registered_task(task: str) -> str:
+    """What `tasks.task_of` takes for a task of one's own that is registered already, so that it imports
+    nothing."""
+    return str(gym.registry[own_id(task)].kwargs.get("task", own_id(task)))
+
+
 def refuse_misfit(path: Path, there: dict[str, Any], here: dict[str, Any]) -> None:
     """`DataFileError` where a policy was trained for something else than what is `here`."""
     is_old = bool(there) and "actions" in here and "actions" not in there
     asked = {"env_id": here["env_id"]} if is_old else here  # what else is unlike follows from the form
-    unlike = [f"{key} {there[key]}, expected {x}" for key, x in asked.items() if there.get(key, x) != x]
+    unlike = [
+        f"{key} {there[key]}, expected {x}"
+        for key, x in asked.items()
+        if there.get(key, x) != x and not (key == "env_id" and same_id(there[key], x))
+    ]
     if is_old:
         unlike.insert(0, f"actions of an older form (positions in a box), expected {here['actions']}")
     if unlike:
@@ -138,7 +194,7 @@ def read_record(folder: Path) -> dict[str, Any]:
     if not path.is_file():
         return {}
     try:
-        record: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        record: dict[str, Any] = parse_json(path.read_text(encoding="utf-8"))
         kinds = {"env_id": str, "algo": str} | {key: kind for key, kind in RECORD.items() if key in record}
         if unlike := [key for key, kind in kinds.items() if not isinstance(record[key], kind)]:
             raise TypeError(f"{unlike[0]}: {record[unlike[0]]!r}")
@@ -184,7 +240,7 @@ class OnnxPolicy:
             content = self.path.read_bytes()
             self._session = onnxruntime.InferenceSession(content, options, ["CPUExecutionProvider"])
             found = self._session.get_modelmeta().custom_metadata_map
-            self.record = {key: json.loads(text) if key in LISTS else text for key, text in found.items()}
+            self.record = {key: parse_json(text) if key in LISTS else text for key, text in found.items()}
             names = [node.name for node in (*self._session.get_inputs(), *self._session.get_outputs())]
             objects = all(isinstance(self.record.get(key, {}), dict) for key in OBJECTS)
             if names != [INPUT, OUTPUT] or "env_id" not in self.record or not objects:
@@ -342,7 +398,7 @@ def read_plain(folder: Path) -> TrainedPolicy:
     """What `save_policy` wrote; the model holds nothing but its policy. Any exception if it is damaged."""
     from safetensors.torch import load_file
 
-    about = json.loads((folder / ABOUT).read_text(encoding="utf-8"))
+    about = parse_json((folder / ABOUT).read_text(encoding="utf-8"))
     if about["format"] != FORMAT:
         raise ValueError(f"format {about['format']!r}, expected {FORMAT}")
     model = algorithm_class(about["algo"])(about["policy"], None, device="cpu", _init_setup_model=False)

@@ -1,7 +1,10 @@
-"""Write constraints.txt anew, by `uv pip compile`: python scripts/lock.py [options of it, such as --upgrade]
+"""Write constraints.txt and hashes.txt anew, by `uv pip compile`: python scripts/lock.py [options of it, such
+as --upgrade]
 
 The versions that stand there stay unless pyproject.toml or an option asks for others. One list serves each
 supported Python and platform. Of PyTorch's CUDA build, which asks for exact versions itself, nothing is kept.
+hashes.txt has the SHA-256 of each file of what set-up installs, but for PyTorch, whose builds for the CPU are
+of another index. uv checks them; pip would refuse an editable install beside hashes: hence a file apart.
 """
 
 from __future__ import annotations
@@ -12,9 +15,12 @@ import tempfile
 import tomllib
 from pathlib import Path
 
-from setup_venv import EXTRAS, OLDEST, ROOT, dotted
+from setup_venv import EXTRAS, HASHES, OLDEST, ROOT, dotted
 
 LOCK = ROOT / "constraints.txt"
+HASHES_HEAD = """\
+# Hashes of the files of constraints.txt, which uv checks in set-up. Made by `python scripts/lock.py`.
+"""
 CUDA = ("nvidia-", "cuda-", "triton")
 HEAD = """\
 # The tested version of every package that set-up and `make test-peers` install: pyproject.toml keeps the wide
@@ -36,6 +42,8 @@ def main(*options: str) -> None:
         line for line in compiled(apart, "--no-deps", *options, more="envpool\n") if name(line) not in known
     ]
     LOCK.write_text(HEAD + "\n".join(lines) + "\n" + APART + "\n".join(others) + "\n", encoding="utf-8")
+    text = hashes(compiled(together, "--generate-hashes"))  # of the versions that now stand there
+    (ROOT / HASHES).write_text(HASHES_HEAD + text, encoding="utf-8")
 
 
 def compiled(extras: list[str], *options: str, more: str = "") -> list[str]:
@@ -60,8 +68,14 @@ def compiled(extras: list[str], *options: str, more: str = "") -> list[str]:
         subprocess.run(
             [*command, *options, "pyproject.toml", "-"], input=more, text=True, check=True, cwd=ROOT
         )
-        lines = out.read_text(encoding="utf-8").splitlines()
+        lines = out.read_text(encoding="utf-8").replace("\\\n", "\\\0").splitlines()  # an entry each
     return [line.replace("+cpu", "") for line in lines if not line.startswith(CUDA)]
+
+
+def hashes(entries: list[str]) -> str:
+    """The text of a lock with hashes, without PyTorch."""
+    kept = [entry for entry in entries if "--hash" in entry and not entry.startswith("torch==")]
+    return "\n".join(kept).replace("\0", "\n") + "\n"
 
 
 def name(line: str) -> str:

@@ -25,13 +25,14 @@ from functools import lru_cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-OLDEST, NEWEST = (3, 11), (3, 13)
+OLDEST, NEWEST = (3, 11), (3, 14)
 EXTRAS = {"demo": ("train", "render", "video", "plot")}
 EXTRAS["all"] = (*EXTRAS["demo"], "export", "identify", "tune", "onnx", "docs", "dev")
 TOOLS = {
     "pip": ("pip", "install", "--disable-pip-version-check", "--no-input"),
     "uv": ("uv", "pip", "install", "--python", ".venv/bin/python"),
 }
+HASHES = "hashes.txt"  # of the files that constraints.txt names; uv checks them, INSTALLER=pip does not
 ONLY_WHEELS = ("--only-binary", ":all:")
 NEEDED_GB = 3.0  # .venv itself takes 1.8 GB on Linux
 
@@ -42,6 +43,7 @@ UNREACHABLE = "the package index cannot be reached; check the network, or name a
 LACKING = "the package index lacks a wheel of a version that constraints.txt names"
 REASONS = {  # a sign in what pip, uv or venv says: what it means. The first sign that is found is told.
     "Failed to initialize cache": "uv cannot write its cache; set UV_CACHE_DIR to a folder, or INSTALLER=pip",
+    "Hash mismatch": "the package index has another file than the one that was locked; see hashes.txt",
     "No space left on device": "the disk is full",
     "Read-only file system": "this folder cannot be written to",
     "Permission denied": "this folder cannot be written to",
@@ -239,6 +241,8 @@ def requirements(purpose: str):
 def packages(tool: str, title: str, *arguments: str, **environment: str) -> None:
     """Install into .venv within constraints.txt. The first import compiles what is used."""
     options = ["--constraint", "constraints.txt"]
+    if tool == "uv" and (ROOT / HASHES).is_file():
+        options += ["--constraint", HASHES]
     if os.environ.get("PYTHONDONTWRITEBYTECODE"):  # then no import will
         options += ["--compile-bytecode"] if tool == "uv" else []
     else:

@@ -160,3 +160,29 @@ def test_a_file_is_replaced_on_demand_only_and_its_folder_is_told(command, name,
     assert cli.main([*command, "--seed", "1", "--overwrite"]) == 0
     assert out.read_bytes() != first
     assert "folder" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("columns", ["1", "5"])
+def test_help_ends_in_a_narrow_terminal(columns):
+    ours = os.environ | {"COLUMNS": columns}
+    done = subprocess.run([*HOOF_ENV, "--help"], env=ours, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0
+    assert "reproduce" in done.stdout
+
+
+def test_what_the_encoding_lacks_is_replaced(tmp_path):
+    ours = os.environ | {"PYTHONIOENCODING": "ascii"}
+    command = [*HOOF_ENV, "manual", "--out", str(tmp_path / "Größe")]
+    done = subprocess.run(command, env=ours, capture_output=True, text=True, timeout=120)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "Gr??e" in done.stdout
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a disk that is always full")
+def test_a_full_disk_is_one_line():
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [*HOOF_ENV, "manual"], stdout=full, stderr=subprocess.PIPE, text=True, timeout=120
+        )
+    assert done.returncode == 2
+    assert done.stderr == "hoof-env: error: cannot write the output: No space left on device\n"

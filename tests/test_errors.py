@@ -15,6 +15,7 @@ from hoof_env.errors import (
     ParameterError,
     check_choice,
     check_number,
+    parse_pairs,
 )
 
 numbers = st.floats(allow_nan=True, allow_infinity=True) | st.integers()
@@ -62,3 +63,20 @@ def test_every_error_is_ours_and_of_a_common_kind():
     for error, also in (kinds | {OutputError: OSError}).items():
         assert issubclass(error, HoofEnvError)
         assert issubclass(error, also)
+
+
+DEEP = "[" * 30000 + "]" * 30000
+
+
+@pytest.mark.parametrize("item", [f"terrain={DEEP}", '{"a":' * 30000 + "1" + "}" * 30000])
+def test_what_is_nested_too_deep_is_refused_in_few_words(item):
+    with pytest.raises(ParameterError, match="nested too deep") as refused:
+        parse_pairs("--args", [item])
+    assert len(str(refused.value)) < 500
+
+
+def test_a_positive_number_is_not_so_small_that_quotients_are_none():
+    with pytest.raises(ParameterError, match="mass: expected 1e-12 or more, got 5e-324"):
+        check_number("mass", 5e-324, low=0, exclusive_low=True)
+    assert check_number("mass", 1e-12, low=0, exclusive_low=True) == 1e-12
+    assert check_number("speed", 5e-324, low=0) == 5e-324

@@ -11,7 +11,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from hoof_env import __version__, cli
+from hoof_env import __version__, cli, records
 from hoof_env.dynamics.layout import TRUNK_STATE
 from hoof_env.dynamics.parts import GRAVITY
 from hoof_env.envs.policies import GAITS, make_policy, open_loop_record
@@ -296,3 +296,18 @@ def test_a_wrapped_environment_is_recorded_alike(episode):
         again = record_episode(wrapped, make_policy("run", wrapped), 3, 0.5, {"gait": "run"})
     for name, column in again.items():
         np.testing.assert_array_equal(column, episode[0][name][: len(column)], err_msg=name)
+
+
+def test_a_record_that_does_not_fit_into_memory_is_refused_at_once(tmp_path):
+    with pytest.raises(
+        ParameterError, match=r"GB of memory, and .* are free; expected a shorter .*--seconds"
+    ):
+        export_episode(tmp_path / "a.csv", "idle", "hoof_env/HorseLeg-v0", ["episode_seconds=1e6"])
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_long_one_says_how_far_it_is(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(records, "TELL_SECONDS", 0.0)
+    export_episode(tmp_path / "a.csv", "idle", "hoof_env/HorseLeg-v0", seconds=0.06)
+    lines = capsys.readouterr().err.splitlines()
+    assert [line for line in lines if "of at most 0.06 s" in line][-1].startswith("0.1 of")

@@ -2,6 +2,7 @@
 
 import importlib.util
 import os
+import re
 import shutil
 import socket
 import subprocess
@@ -130,7 +131,23 @@ def test_make_without_a_suitable_python(checkout):
     assert ended.returncode != 0
     ours = [line for line in ended.stderr.splitlines() if not line.startswith("make")]
     assert len(ours) == 1
-    assert "no Python 3.11 to 3.13" in ours[0]
+    assert "no Python 3.11 to 3.14" in ours[0]
+
+
+@pytest.mark.skipif(shutil.which("make") is None, reason="no make here")
+def test_where_no_python_fits_uv_fetches_one(checkout, tmp_path):
+    tools = {"uv": 'test "$2" = find && echo python-of-uv || true', "python-of-uv": 'echo "set-up by $0 $@"'}
+    for name, text in tools.items():
+        (tmp_path / name).write_text(f"#!/bin/sh\n{text}\n")
+        (tmp_path / name).chmod(0o755)
+    ours = os.environ | {"PATH": f"{tmp_path}{os.pathsep}{os.environ['PATH']}"}
+    command = ["make", "setup", "PYTHONS=no-such-python"]
+    ended = subprocess.run(command, cwd=checkout, env=ours, capture_output=True, text=True, check=False)
+    assert ended.returncode == 0, ended.stderr
+    first, second = ended.stdout.splitlines()
+    assert first == "no Python 3.11 to 3.14 here: uv fetches 3.13"
+    assert second.startswith("set-up by ")
+    assert second.rstrip().endswith("python-of-uv scripts/setup_venv.py")
 
 
 def test_makefile_and_script_agree_on_the_pythons(setup):
@@ -227,7 +244,7 @@ def ours(setup, monkeypatch):
 @pytest.mark.parametrize(
     "platform", ["x86_64-manylinux_2_28", "aarch64-manylinux_2_28", "aarch64-apple-darwin"]
 )
-@pytest.mark.parametrize("minor", [11, 12, 13])
+@pytest.mark.parametrize("minor", [11, 12, 13, 14])
 def test_everything_that_is_locked_has_a_wheel(ours, minor, platform):
     assert ours.OLDEST <= (3, minor) <= ours.NEWEST
     place = ("--python-version", f"3.{minor}", "--python-platform", platform)
@@ -290,3 +307,16 @@ def test_interrupted_setup_is_made_anew(setup, installs, monkeypatch, capsys):
         assert setup.main() == 130
     assert setup.main() == 0
     assert installs == ["all anew"]
+
+
+def test_hashes_are_of_the_versions_that_are_locked(setup):
+    """Without PyTorch, whose builds for the CPU are of another index."""
+    locked = {
+        line.split(" ;")[0] for line in (ROOT / "constraints.txt").read_text().splitlines() if "==" in line
+    }
+    text = (ROOT / setup.HASHES).read_text()
+    hashed = {line.split()[0] for line in text.splitlines() if line[0] not in " #"}
+    assert hashed <= locked
+    assert {name.split("==")[0] for name in hashed} > {"numpy", "numba", "pillow", "stable-baselines3"}
+    assert not [name for name in hashed if name.startswith("torch==")]
+    assert len(re.findall(r"--hash=sha256:[0-9a-f]{64}", text)) == text.count("--hash") > len(hashed)

@@ -13,8 +13,6 @@ kernels of its own.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
-from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,8 +29,9 @@ from hoof_env.dynamics.reactions import LegConstants, Reactions, react
 from hoof_env.dynamics.stepping import begin_step, end_step, next_stage, weigh_stage
 from hoof_env.simd import anywhere, choose, columns, fill, lane_sum, level, nth, rows
 from hoof_env.simd.compile import inlined, kernel, pasted
+from hoof_env.simd.kept import Kept, Kernels
 from hoof_env.simd.memory import address, doubles, offset
-from hoof_env.simd.user_functions import fingerprint
+from hoof_env.simd.reach import fingerprint, refresh
 
 LANES = 8
 """Environments side by side in a batch: one vector of 512 bits."""
@@ -274,15 +273,23 @@ KERNELS = {"leg": (1, 1, False), "four": (1, 4, True), "batch": (0, LANES, False
 number; lanes; whether these are the legs of one trunk."""
 
 
-@cache
-def advance_kernels(
-    contact_law: Callable[..., Any] | None = None, features: Features = PLAIN
-) -> SimpleNamespace:
+_KEPT = Kept()
+
+
+def advance_kernels(contact_law: Callable[..., Any] | None = None, features: Features = PLAIN) -> Any:
     """`advance_leg`, `advance_four` and `advance_batch`; `react_leg` and so on compute joint reactions too.
 
-    The law of contact is as in `hoof.law_of`; None is that of `ground.laws`.
+    The law of contact is as in `hoof.law_of`; None is that of `ground.laws`. `ParameterError` where it
+    reaches what cannot be read.
     """
-    law, identity, form = law_of(contact_law), fingerprint(contact_law), form_of(features)
+    identity = fingerprint(contact_law)
+    key = (contact_law, features, identity)
+    return _KEPT.get(key, lambda: _made(contact_law, features, identity), contact_law is not None)
+
+
+def _made(contact_law: Callable[..., Any] | None, features: Features, identity: str) -> Kernels:
+    refresh(contact_law)
+    law, form = law_of(contact_law), form_of(features)
     if features != PLAIN:
         identity += f" {tuple(features)}"
 
@@ -300,6 +307,6 @@ def advance_kernels(
         return kernel(advance, f"{name} {identity}", threads=not together and lanes > 1)
 
     names = {f"{does}_{which}": which for does in ("advance", "react") for which in KERNELS}
-    return SimpleNamespace(**{
+    return Kernels(**{
         name: made(name, *KERNELS[which], name.startswith("react")) for name, which in names.items()
     })  # fmt: skip

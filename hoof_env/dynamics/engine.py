@@ -20,6 +20,7 @@ from hoof_env.dynamics import layout, memory
 from hoof_env.dynamics.advance import LANES, STARTS, advance_kernels
 from hoof_env.dynamics.form import form_of
 from hoof_env.dynamics.layout import Features
+from hoof_env.dynamics.limits import LOOK
 from hoof_env.dynamics.parts import (
     GRAVITY,
     Drive,
@@ -66,6 +67,10 @@ MOST_LEGS = 32
 
 MOST_STEPS = 10**12
 """Substeps of a call, which are counted in 64 bits."""
+
+PART, LEAST_PART = 2_000_000, 1000
+"""Substeps of all legs in machine code at a time, a second at most, and of each environment at least: between
+two such parts of a long call Ctrl-C is heard. What is added up has other last digits than in one part."""
 
 
 class TrunkEngine(Scene):
@@ -228,12 +233,22 @@ class TrunkEngine(Scene):
         return self._memory.data[:, self._env(env)].copy()
 
     def set_column(self, env: int, column: Floats) -> None:
-        """Put back what `column` gave, of an engine like this one."""
-        whole = self._memory.data
-        given = finite("column", np.nan_to_num(column))  # numbers; those that are none stay so
-        if given.shape != whole.shape[:1]:
-            raise ParameterError(f"column: expected shape {whole.shape[:1]}, got {given.shape}")
-        whole[:, self._env(env)] = column
+        """Put back what `column` gave, of an engine like this one; where its legs' tables are stays its own.
+
+        Raises:
+            ParameterError: another shape, or numbers that are not finite or beyond `layout.FARTHEST` in an
+                environment that was reset.
+        """
+        m, env = self._memory, self._env(env)
+        try:
+            given = np.array(column, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise ParameterError(f"column: expected numbers, got {column!r}") from None
+        if given.shape != m.data.shape[:1]:
+            raise ParameterError(f"column: expected shape {m.data.shape[:1]}, got {given.shape}")
+        parts = memory.memory_of(given[:, None], 1, m.constants, m.reactions[..., :1], m.features)
+        memory.check_column(parts, m.limb_settings[..., env : env + 1])
+        m.data[:, env] = given
 
     def _env(self, env: Any) -> int:
         return count("env", env, low=0, most=self.num_envs - 1)
@@ -377,11 +392,12 @@ class TrunkEngine(Scene):
         Raises:
             ParameterError: the command has a wrong shape or is not finite.
             NotStartedError: no environment was ever reset.
+            KeyboardInterrupt: of a long call, which then ends after a part of the steps.
         """
         steps = count("steps", steps, 0, MOST_STEPS // self.substeps)
         if command is not None:
             self.command(command)
-        self._go(steps, account)
+        self._go_on(steps, account)
         if self._memory.result.any():
             if np.isnan(self._memory.trunk).all():
                 raise NotStartedError("the engine was asked to move before reset(): expected reset() first")
@@ -446,9 +462,36 @@ class TrunkEngine(Scene):
             )
         self._memory.command[:, :, where] = given
 
+    def _go_on(self, steps: int, account: bool) -> None:
+        """As `_go`, with a long call in parts."""
+        left = steps * self.substeps
+        part = max(PART // (self.columns * len(self.limbs)), LEAST_PART) // LOOK * LOOK
+        if left <= part:
+            self._go(steps, account)
+            return
+        m = self._memory
+        kept, first = self._copy((*memory.STATE, "stride_sums", "result")), np.zeros(self.num_envs)
+        sums, highest = np.zeros_like(m.stride_sums), layout.stride_sums(self.features).index("highest")
+        while left and not broken(first).all():
+            now = left % part or part  # the short one first: limits are looked at from the end
+            self._go_substeps(now, account)
+            left -= now
+            first = np.where(broken(first) | ((first != 0) & ~broken(m.result)), first, m.result)
+            peak = np.maximum(sums[:, highest], m.stride_sums[:, highest])
+            sums += m.stride_sums
+            sums[:, highest] = peak
+        lost = broken(first)
+        m.stride_sums[:] = sums
+        for name, values in kept.items():  # as before the call
+            getattr(m, name)[..., lost] = values[..., lost]
+        m.result[:] = first
+
     def _go(self, steps: int, account: bool = False) -> None:
+        self._go_substeps(steps * self.substeps, account)
+
+    def _go_substeps(self, substeps: int, account: bool) -> None:
         try:
-            common = (*self.arrays, self.substep, steps * self.substeps, account)
+            common = (*self.arrays, self.substep, substeps, account)
             calls = [(*common, block.start, block.stop) for block in self.blocks]
             run_together(self._run, calls, self.num_threads)
         except NumbaError as error:

@@ -371,16 +371,30 @@ def read_state(
             raise ParameterError(f"state[{name!r}]: expected numbers, got {state[name]!r}") from None
         if arrays[name].shape != shape:
             raise ParameterError(f"state[{name!r}]: expected shape {shape}, got {arrays[name].shape}")
+    reset = _check_numbers("state", arrays)
+    arrays["limb_settings"][:, _FIRST_ROW] = memory.limb_settings[:, _FIRST_ROW]  # an address
+    return arrays, reset
+
+
+def check_column(column: Memory, settings: Floats) -> None:
+    """Refuse a column that cannot be gone on from, as `read_state` does a state, and put into it where the
+    legs' tables are, which is an address, from an engine's `settings` of legs."""
+    _check_numbers("column", {name: getattr(column, name) for name in STATE})
+    column.limb_settings[:, _FIRST_ROW] = settings[:, _FIRST_ROW]
+
+
+def _check_numbers(title: str, arrays: Mapping[str, Floats]) -> NDArray[np.bool_]:
+    """Which environments were ever reset; `ParameterError` where a number of theirs is not finite, or a place
+    or an angle too far away to be looked up."""
     trunk, limbs = arrays["trunk"], arrays["limbs"]
     reset: NDArray[np.bool_] = np.logical_not(np.isnan(trunk).all(0) & np.isnan(limbs).all((0, 1)))
     for name in STATE:
-        finite(f"state[{name!r}]", arrays[name][..., reset])
+        finite(f"{title}[{name!r}]", arrays[name][..., reset])
     moving = trunk[TrunkState.rows("moving")]
     for name in ("centre", "pitch"):
-        finite("state['trunk'], places and pitch", moving[Moving.rows(name)][:, reset], FARTHEST)
-    finite("state['limbs'], crank angles", limbs[:, LegState.rows("theta")][..., reset], FARTHEST)
-    arrays["limb_settings"][:, _FIRST_ROW] = memory.limb_settings[:, _FIRST_ROW]  # an address
-    return arrays, reset
+        finite(f"{title}['trunk'], places and pitch", moving[Moving.rows(name)][:, reset], FARTHEST)
+    finite(f"{title}['limbs'], crank angles", limbs[:, LegState.rows("theta")][..., reset], FARTHEST)
+    return reset
 
 
 def identity_of(scene: Scene, filters: FilterSettings, **numbers: float) -> dict[str, Any]:

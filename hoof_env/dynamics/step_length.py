@@ -21,7 +21,7 @@ from functools import cached_property
 import numpy as np
 
 from hoof_env.dynamics.parts import GRAVITY, HoofSpring, Limb, Motor, Scene
-from hoof_env.errors import Floats
+from hoof_env.errors import Floats, ParameterError
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.stiffness import LARGEST_ANGLE, SCHEMES, ContactRates, contact_rates, spring_rates
 from hoof_env.leg.profile import LegProfile, by_name
@@ -46,6 +46,9 @@ CAUSES = {
 }
 """Causes that the choice of substeps heeds, for people. "friction" is not one: past its limit a standing hoof
 slides to and fro, but nothing blows up."""
+
+MOST_NEEDED = 10**12
+"""Where more substeps of a step would be needed, the settings are refused."""
 
 MOST_SUBSTEPS = 50
 """So many are chosen at most; where that is not enough, a warning says so."""
@@ -81,7 +84,13 @@ class StepLength(Scene):
         """Into how many parts `sim_dt` [s] is cut: those asked for, or those needed, up to `MOST_SUBSTEPS`;
         warns if these are too few."""
         cause = min(CAUSES, key=self.limits.__getitem__)
-        needed = max(1, math.ceil(sim_dt / self.limits[cause]))
+        limit = self.limits[cause]
+        if not sim_dt / MOST_NEEDED <= limit:
+            raise ParameterError(
+                f"{CAUSES[cause]}: expected settings that steps of {sim_dt / MOST_NEEDED:g} s can follow, "
+                f"got some that ask for {limit:g} s"
+            )
+        needed = max(1, math.ceil(sim_dt / limit))
         chosen = min(needed, MOST_SUBSTEPS) if asked is None else asked
         if chosen < needed:
             step = sim_dt / chosen

@@ -19,7 +19,7 @@ from hoof_env._version import __version__
 from hoof_env.envs.observation import HALF_RANGE, HIGH, LOW, MIDDLE
 from hoof_env.envs.one_leg import action_towards, lead_of
 from hoof_env.envs.start import extreme_posture
-from hoof_env.errors import DataFileError, ParameterError, check_choice
+from hoof_env.errors import DataFileError, ParameterError, check_choice, parse_json
 from hoof_env.gait import LIMITS, GaitParameters, paper_gaits
 from hoof_env.leg.profile import leg_profile
 
@@ -240,7 +240,7 @@ def open_loop_record(path: Path) -> dict[str, Any]:
         DataFileError: it is no such file, or one whose numbers are actions of an older form.
     """
     try:
-        record: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        record: dict[str, Any] = parse_json(path.read_text(encoding="utf-8"))
         given = record["parameters"]
         shapes = {"constant": (4,), "sin": (4,), "cos": (4,), "frequency_hz": ()}
         clocked = "frequency_hz" in given

@@ -9,8 +9,7 @@ arguments costs more than a step."""
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -25,6 +24,7 @@ from hoof_env.envs.reference import ROOM, command_gait, refer_to_target
 from hoof_env.envs.reward import TERMS, Term
 from hoof_env.simd import anywhere, choose, columns, larger, level, read, rows, set_lane, size, smaller, write
 from hoof_env.simd.compile import inlined, kernel, pasted
+from hoof_env.simd.kept import Kept, Kernels
 from hoof_env.simd.math import clip, tanh
 from hoof_env.simd.memory import (
     COLUMNS,
@@ -37,7 +37,8 @@ from hoof_env.simd.memory import (
     record_at,
     singles_at,
 )
-from hoof_env.simd.user_functions import fingerprint, number_of
+from hoof_env.simd.reach import fingerprint, refresh
+from hoof_env.simd.user_functions import number_of
 
 NOT_A_NUMBER, SOME_ENDED, SOME_SWITCHED = -1, 1, 2
 """What a step returns: an action is none, and nothing has happened; else the sum of what happened
@@ -167,7 +168,7 @@ def _with_entry(entry: Entry, slot: int, layouts: Memories, scaled: bool) -> Cal
     return put_one_by_one if entry.scalar else put_entry
 
 
-class StepKernels(NamedTuple):
+class StepKernels(Kernels):
     """Kernels of a task: each takes the array of `ADDRESSES`. What ends in `_one` goes through the
     environments one by one, what ends in `_batch` takes `LANES` at a time.
 
@@ -188,7 +189,9 @@ class StepKernels(NamedTuple):
     measure_one: Any
 
 
-@cache
+_KEPT = Kept()
+
+
 def step_kernels(
     terms: tuple[Term, ...],
     entries: tuple[Entry, ...],
@@ -197,15 +200,40 @@ def step_kernels(
     legs: int = 1,
 ) -> StepKernels:
     """The kernels of tasks with these terms, entries and law of contact, on an engine of this kind with one
-    leg, or with a horse's four."""
+    leg, or with a horse's four. `ParameterError` where one of their functions reaches what cannot be read."""
+    what = terms, entries, contact_law, features, legs
+    functions = _functions(terms, entries, contact_law)
+    own = [function for function in functions if not str(function.__module__).startswith("hoof_env.")]
+    now = fingerprint(*own)  # what a function names may be another's by now, as in a notebook
+    found: StepKernels = _KEPT.get((*what, now), lambda: _made(own, *what), bool(own))
+    return found
+
+
+def _functions(
+    terms: tuple[Term, ...], entries: tuple[Entry, ...], contact_law: Callable[..., Any] | None
+) -> list[Callable[..., Any]]:
+    """All that a task gives to its kernels."""
     parts: list[Any] = [term.compute for term in terms]
     parts += [part for entry in entries for part in (entry.measure, entry.scale.apply) if part]
+    return [*parts, contact_law] if contact_law else parts
+
+
+def _made(
+    own: list[Callable[..., Any]],
+    terms: tuple[Term, ...],
+    entries: tuple[Entry, ...],
+    contact_law: Callable[..., Any] | None,
+    features: Features,
+    legs: int,
+) -> StepKernels:
+    refresh(*own)
     flags = (
         [(term.scalar, not is_own(term)) for term in terms],
         [(entry.scalar, entry.scale.saturates) for entry in entries],
     )
+    parts = _functions(terms, entries, contact_law)
     layouts = memories_of(len(terms), features, legs)
-    identity = fingerprint(*parts, contact_law, flags, layouts.episode.names, (FAILED, TRUNCATED))
+    identity = fingerprint(*parts, flags, layouts.episode.names, (FAILED, TRUNCATED))
     if features != PLAIN:
         identity += f" {tuple(features)}"
     _, vectors, slots = slots_of(entries)
@@ -338,4 +366,6 @@ def step_kernels(
                     write(numbers[slot], address(out), task.places[slot] * out.shape[1] + n, 1)
 
     functions = (step_one, step_batch, apply_one, finish_one, observe_one, observe_batch, measure_one)
-    return StepKernels(*(kernel(function, identity, function is step_batch) for function in functions))
+    return StepKernels(
+        **{function.__name__: kernel(function, identity, function is step_batch) for function in functions}
+    )

@@ -133,7 +133,7 @@ def parse_mapping(option: str, items: Sequence[str]) -> dict[str, Any]:
         name, equals, column = (part.strip() for part in item.partition("="))
         if item.lstrip().startswith("{"):
             try:
-                pairs = json.loads(item)
+                pairs = parse_json(item)
             except ValueError as error:
                 raise ParameterError(f"{option}: expected a JSON object, got {item!r} ({error})") from None
         elif equals and name and column:

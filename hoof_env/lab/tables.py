@@ -8,7 +8,6 @@ may be decimal, unless they are between the cells. Parquet has the unit in the m
 
 from __future__ import annotations
 
-import json
 import re
 from collections import Counter
 from collections.abc import Callable
@@ -18,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.errors import DataFileError, MissingExtraError
+from hoof_env.errors import DataFileError, MissingExtraError, parse_json
 from hoof_env.lab.c3d_read import read_plates
 from hoof_env.lab.text import TITLE, Row, Text, cells_of, is_number, lines_of, number, parse
 
@@ -172,7 +171,7 @@ def _read_parquet(path: Path) -> Table:
         raise MissingExtraError('Parquet needs pyarrow: pip install "hoof-env[export]"') from None
     found = parquet.read_table(path)
     units = {one.name: (one.metadata or {}).get(b"unit", b"").decode() for one in found.schema}
-    about = json.loads((found.schema.metadata or {}).get(b"hoof_env", b"{}"))
+    about = parse_json((found.schema.metadata or {}).get(b"hoof_env", b"{}"))
     table = Table({}, units, about.get("weight_n"))
     for name in found.column_names:
         try:

@@ -3,6 +3,9 @@
 numba keeps what it compiles in files, but processes that begin together, as the workers of a learner do, each
 compile it for themselves. Here one compiles, under a lock beside the kernel's files, and the others wait and
 then load. Everything that leans on numba's private names is in this module.
+
+The files are pickles, which can run any code. They are read only if nobody else could have written them
+(`hoof_env.simd.trust`), and only whole: an index has a digest of itself and of the files that it names.
 """
 
 from __future__ import annotations
@@ -10,9 +13,12 @@ from __future__ import annotations
 import gc
 import hashlib
 import os
+import pickle
+import re
+import sys
 import tempfile
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar
@@ -21,8 +27,10 @@ import numba.core.caching
 import numba.core.config
 from filelock import FileLock, Timeout
 from numba.core.compiler_lock import global_compiler_lock
+from numba.core.utils import _dynamic_module
 
 from hoof_env.errors import OutputError
+from hoof_env.simd import trust
 
 MECHANICS = ("simd", "leg", "ground", "gait", "dynamics")
 """The rooms of this package whose sources end up in kernels, folders or files."""
@@ -55,9 +63,88 @@ class _FilesInGivenFolder(_caching.CompileResultCacheImpl):
     _locator_classes: ClassVar[list[Any]] = [_GivenFolder]
 
 
+class _Files(_caching.IndexDataCacheFile):
+    """The index of a kernel's files and the files themselves. What is damaged counts as not there, and `say`
+    tells so: an index is a pickled version, a digest of the rest, and the rest, a pickle of the source stamp
+    and, for each signature, the name and the digest of its file."""
+
+    FORMAT = "hoof-env.1"
+    _OTHER_VERSION = re.compile(rb"\x80.\x95.{8}\x8c.[\w.+-]+\x94\.", re.DOTALL)
+
+    def __init__(self, impl: Any, stamp: Any, say: Callable[[str], None]) -> None:
+        super().__init__(impl.locator.get_cache_path(), impl.filename_base, stamp)
+        # numba alone, and older versions of this package, take it for one of another numba
+        self._start = pickle.dumps(f"{self._version}+{self.FORMAT}", protocol=-1)
+        self._say, self._told = say, set[str]()
+
+    def _tell(self, path: str, what: str) -> None:
+        if path not in self._told:
+            self._told.add(path)
+            self._say(f"{what} {path} is damaged: compiling it again")
+
+    def save(self, key: Any, data: Any) -> None:
+        """Write the file first: an index never names what is not there yet."""
+        entries, content = self._load_index(), self._dump(data)
+        taken = {name for name, _ in entries.values()}
+        free = (self._data_name(k) for k in range(1, len(taken) + 2))
+        name = entries[key][0] if key in entries else next(name for name in free if name not in taken)
+        with self._open_for_write(self._data_path(name)) as file:
+            file.write(content)
+        entries[key] = name, _sha(content)
+        self._save_index(entries)
+
+    def load(self, key: Any) -> Any:
+        name, digest = self._load_index().get(key, (None, b""))
+        if name is None:
+            return None
+        try:
+            content = trust.read(self._data_path(name))
+        except FileNotFoundError:
+            return None
+        if _sha(content) != digest:
+            self._tell(self._data_path(name), "the compiled kernel")
+            return None
+        return pickle.loads(content)
+
+    def _load_index(self) -> dict[Any, tuple[str, bytes]]:
+        try:
+            content = trust.read(self._index_path)
+        except FileNotFoundError:
+            return {}
+        if not content.startswith(self._start) and self._OTHER_VERSION.match(content):
+            return {}  # of numba, or of this format
+        rest = content.removeprefix(self._start)
+        digest, rest = rest[:32], rest[32:]
+        if self._own(rest) != digest:
+            self._tell(self._index_path, "the index of compiled kernels")
+            return {}
+        stamp, entries = pickle.loads(rest)
+        return dict(entries) if stamp == self._source_stamp else {}
+
+    def _save_index(self, entries: dict[Any, tuple[str, bytes]]) -> None:
+        rest = self._dump((self._source_stamp, entries))
+        with self._open_for_write(self._index_path) as file:
+            file.write(self._start + self._own(rest) + rest)
+
+    def _own(self, content: bytes) -> bytes:
+        """Digest of an index of this name: another kernel's in its place would be sound by itself."""
+        return _sha(self._index_name.encode() + content)
+
+    @contextmanager
+    def _open_for_write(self, path: str) -> Iterator[Any]:
+        """As numba's; the file is for its owner alone to write, whatever the umask says."""
+        with super()._open_for_write(path) as file:
+            trust.close(file.name)
+            yield file
+
+
+def _sha(content: bytes) -> bytes:
+    return hashlib.sha256(content).digest()
+
+
 class KernelCache(_caching.FunctionCache):
     """The files of one kernel; `identity` tells apart kernels of one source that contain different functions.
-    Raises OutputError where no folder is writable."""
+    Raises OutputError where no folder is writable, or others could have written what is there."""
 
     def __init__(self, function: Callable[..., Any], say: Callable[[str], None], identity: str = "") -> None:
         if given_folder():
@@ -68,7 +155,10 @@ class KernelCache(_caching.FunctionCache):
             raise _no_folder(os.path.dirname(function.__code__.co_filename), error) from None
         # numba looks for changes in the file of a kernel alone, but a kernel contains those that it calls
         own = Path(function.__code__.co_filename).parent
-        self._cache_file._source_stamp = (self._cache_file._source_stamp, _sources(), _digest(own))
+        stamp = self._impl.locator.get_source_stamp(), _sources(), _digest(own)
+        self._cache_file = _Files(self._impl, stamp, say)
+        if not given_folder():
+            trust.close_new(self.cache_path)
         self._say, self._kernel, self._identity = say, function.__name__, identity
         self._lock: Any = None
 
@@ -78,18 +168,30 @@ class KernelCache(_caching.FunctionCache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """As numba's; where there is nothing to load, it returns once this process may compile."""
+        for folder in filter(None, (given_folder(), self.cache_path)):
+            trust.check_folder(folder)
         if (overload := self._load(sig, target_context)) is not None:
             return overload
         try:
-            os.makedirs(self.cache_path, exist_ok=True)
+            os.makedirs(given_folder() or self.cache_path, 0o755, exist_ok=True)
+            os.makedirs(self.cache_path, 0o755, exist_ok=True)
             tempfile.TemporaryFile(dir=self.cache_path).close()
         except OSError as error:
             raise _no_folder(given_folder() or self.cache_path, error) from None
         return self._load(sig, target_context) if self._take_lock() else None
 
     def _load(self, sig: Any, target_context: Any) -> Any:
-        with suppress(OSError):  # no such folder
+        sys.modules.setdefault(_dynamic_module.__name__, _dynamic_module)  # of functions without a module
+        try:
             return super().load_overload(sig, target_context)
+        except OutputError:
+            raise
+        except OSError:  # no such folder
+            return None
+        except Exception as error:  # a pickle that asks for what is not there raises anything
+            reason = f"{type(error).__name__}: {error}".splitlines()[0]
+            self._say(f"cannot load {self._kernel} ({reason}): compiling it again")
+            return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
         COMPILED.append(self._kernel)

@@ -1,84 +1,24 @@
-"""Plain functions from outside this package inside kernels: what tells them apart, what they may return, and
-what is said of one that cannot be compiled."""
+"""Plain functions from outside this package inside kernels: what they may return, and what is said of one
+that cannot be compiled. `hoof_env.simd.reach` tells them apart."""
 
 from __future__ import annotations
 
 import ast
-import hashlib
 import linecache
 import os
 import re
-import sys
 from collections.abc import Callable
 from pathlib import Path
-from types import CodeType, FunctionType, ModuleType
+from types import FunctionType
 from typing import Any
 
-import numpy as np
 from numba.core import types
 from numba.core.errors import TypingError
 
 from hoof_env.errors import ParameterError
-from hoof_env.simd.cache import MECHANICS
 from hoof_env.simd.types import Mask, Plane, instruction, is_real
 
 PACKAGE = Path(__file__).parents[1]
-_LIBRARIES = {*sys.stdlib_module_names, "numpy", "numba", "hoof_env"}
-_PLAIN = (bool, int, float, complex, str, bytes, type(None), np.generic)
-
-
-def fingerprint(*values: Any) -> str:
-    """What tells kernels apart that contain different functions: a digest of their code, with the constants
-    and the functions that they name. An edit of any of them changes it; it is the same in every process.
-
-    Functions of the mechanics are named only, for a digest of their sources is in every kernel's stamp.
-    """
-    digest = hashlib.sha256()
-    for value in values:
-        _add(digest, value, set())
-    return digest.hexdigest()
-
-
-def _add(digest: Any, value: Any, known: set[int]) -> None:
-    value = getattr(value, "py_func", value)  # of numba's
-    if isinstance(value, FunctionType):
-        digest.update(f"{value.__module__}.{value.__qualname__}".encode())
-        if id(value) in known:
-            return
-        known.add(id(value))
-        if value.__module__.split(".")[:2] not in [["hoof_env", room] for room in MECHANICS]:
-            _add_code(digest, value.__code__, value.__globals__, known)
-        cells = [cell.cell_contents for cell in value.__closure__ or ()]
-        for part in (*cells, *(value.__defaults__ or ()), *(value.__kwdefaults__ or {}).values()):
-            _add(digest, part, known)
-    elif isinstance(value, np.ndarray):
-        digest.update(f"{value.dtype} {value.shape}".encode() + value.tobytes())
-    elif isinstance(value, _PLAIN):
-        digest.update(f"{type(value).__name__} {value!r};".encode())
-    elif isinstance(value, tuple | list):
-        digest.update(f"{len(value)} of".encode())
-        for part in value:
-            _add(digest, part, known)
-    else:
-        name = getattr(value, "__qualname__", "") or type(value).__qualname__
-        digest.update(f"{name} {getattr(value, '_fields', '')}".encode())
-
-
-def _add_code(digest: Any, code: CodeType, names: dict[str, Any], known: set[int]) -> None:
-    """The code of a function, that of inner ones, and what both name."""
-    digest.update(code.co_code + repr((code.co_names, code.co_varnames, code.co_freevars)).encode())
-    for constant in code.co_consts:
-        if isinstance(constant, CodeType):
-            _add_code(digest, constant, names, known)
-        else:
-            _add(digest, sorted(constant, key=repr) if isinstance(constant, frozenset) else constant, known)
-    for name in code.co_names:
-        value = names.get(name)
-        if not isinstance(value, ModuleType):
-            _add(digest, value, known)
-        elif value.__name__.split(".")[0] not in _LIBRARIES:
-            for part in code.co_names:  # `constants.GRIP`
-                _add(digest, getattr(value, part, None), known)
 
 
 def number_of(what: str) -> Any:

@@ -4,6 +4,7 @@ that scores anybody's policy."""
 import csv
 import json
 import shutil
+import sys
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from agents.runs import make_env
 from agents.score import Args, find_policy, play, score_vector
 from hoof_env.envs.policies import GAITS, Scripted, open_loop
 from hoof_env.errors import DataFileError, HoofEnvError, ParameterError
+from hoof_env.saved_policy import environment_of
 from tests.agents.conftest import ENV_ID, KWARGS, SHORT
 
 SEEDS = [7, 3, 4, 11, 12]
@@ -168,3 +170,43 @@ def test_a_policy_of_another_leg_or_version_is_refused(trained, tmp_path):
         (folder / "run.json").write_text(json.dumps(record))
         with pytest.raises(DataFileError, match=said):
             score.score(Args((str(folder),)))
+
+
+class TestIdsOfFiles:
+    """No file makes a module be imported."""
+
+    @pytest.fixture
+    def gift(self, tmp_path, monkeypatch):
+        monkeypatch.syspath_prepend(str(tmp_path))
+        monkeypatch.delitem(sys.modules, "payload_of_a_gift", raising=False)
+        (tmp_path / "payload_of_a_gift.py").write_text("import pathlib; pathlib.Path('ran').touch()\n")
+        return "payload_of_a_gift"
+
+    @pytest.mark.parametrize(
+        "record",
+        [
+            {"env_id": "{}:strange/Id-v0"},
+            {"env_id": "strange/Id-v0"},
+            {"env_id": ENV_ID, "env_kwargs": {"task": "{}:strange/Id-v0"}},
+            {"env_id": ENV_ID, "env_kwargs": []},
+        ],
+    )
+    def test_one_that_is_not_registered_is_refused(self, gift, record):
+        given = json.loads(json.dumps(record).replace("{}", gift))
+        with pytest.raises(DataFileError, match=r"a\.onnx: .*(--env-id|arguments by name)"):
+            environment_of("a.onnx", given)
+        assert gift not in sys.modules
+
+    def test_a_registered_one_is_found_without_the_module(self, gift):
+        assert environment_of("a", {"env_id": f"{gift}:{ENV_ID}"}) == (ENV_ID, {})
+        kwargs = {"task": f"{gift}:CartPole-v1"}
+        asked = environment_of("a", {"env_id": ENV_ID, "env_kwargs": kwargs})
+        assert asked == (ENV_ID, {"task": "CartPole-v1"})
+        assert gift not in sys.modules
+
+    def test_a_user_may_name_a_module(self):
+        record = {"env_id": "mine:own/A-v0", "env_kwargs": {"dt": 0.02}}
+        assert environment_of("a", record, "mine:own/A-v0") == ("mine:own/A-v0", {"dt": 0.02})
+        assert environment_of("a", record, "own/A-v0") == ("own/A-v0", {"dt": 0.02})
+        assert environment_of("a", record, "own/B-v0") == ("own/B-v0", {})
+        assert environment_of("a", {}, None) == (None, {})

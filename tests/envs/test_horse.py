@@ -258,7 +258,7 @@ def test_commands_are_drawn_as_numbers_between_their_bounds():
 def test_kernels_are_others_where_the_number_of_stored_gaits_is(monkeypatch):
     def name_of_kernel():
         task, features = TASKS["horse"], Features(2, springs=True, animal=True)
-        found = step.step_kernels.__wrapped__(task.terms, task.entries, None, features, 4)
+        found = step._made([], task.terms, task.entries, None, features, 4)
         return found.step_batch.py_func.__qualname__
 
     before, stored = name_of_kernel(), reference._reference()

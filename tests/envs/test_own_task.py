@@ -29,7 +29,8 @@ from hoof_env.envs.manual import page_of
 from hoof_env.envs.observation import Scene
 from hoof_env.envs.reward import Outcome
 from hoof_env.errors import ParameterError
-from hoof_env.simd.user_functions import fingerprint, what_cannot_be_compiled
+from hoof_env.simd.reach import fingerprint
+from hoof_env.simd.user_functions import what_cannot_be_compiled
 
 PAGE = (Path(__file__).parents[2] / "docs" / "own_task.md").read_text(encoding="utf-8")
 PAGE = PAGE.split("## A leg of your own", 1)[0]  # tests/envs/test_own_leg.py has the rest

@@ -384,3 +384,79 @@ def test_kernels_of_one_source_are_told_apart_when_both_are_loaded(tmp_path):
 
     assert [said("1"), said("2")] == ["2.0\n", "4.0\n"]
     assert [said("1", "2"), said("2", "1")] == ["2.0 4.0\n", "4.0 2.0\n"]
+
+
+@pytest.mark.parametrize("kind", ["nbi", "nbc"])
+@pytest.mark.parametrize("damage", ["empty", "cut", "one bit", "another's", "no pickle"])
+def test_a_damaged_file_is_noticed_and_compiled_again(start, tmp_path, kind, damage):
+    (tmp_path / "go").touch()
+    ended(start())
+    files = sorted((tmp_path / "cache").rglob(f"*.{kind}"))
+    (file,) = [path for path in files if "tiny.tiny" in path.name]
+    (other,) = [path for path in files if path != file]
+    whole = file.read_bytes()
+    middle = len(whole) // 2
+    file.write_bytes(
+        {
+            "empty": b"",
+            "cut": whole[:middle],
+            "one bit": whole[:middle] + bytes([whole[middle] ^ 1]) + whole[middle + 1 :],
+            "another's": other.read_bytes(),
+            "no pickle": b"x" * len(whole),
+        }[damage]
+    )
+    out, said = ended(start())
+    assert out.startswith("8.0 [")
+    assert "tiny" in out
+    assert "compiling" in said
+    assert ended(start()) == ("8.0 []", "")
+
+
+def test_a_file_that_asks_for_a_module_that_is_gone_is_compiled_again(start, tmp_path):
+    """As the kernel of a module that was loaded by its path; its digest is right."""
+    (tmp_path / "go").touch()
+    code = """
+        import importlib.util, sys
+        spec = importlib.util.spec_from_file_location("gone_by_now", "tiny.py")
+        module = importlib.util.module_from_spec(spec)
+        if sys.argv[1:]:
+            sys.modules["gone_by_now"] = module
+        spec.loader.exec_module(module)
+        print(module.tiny(3.0))
+    """
+    for first in ("sys.argv.append('x');", "", ""):
+        assert ended(start(f"import sys; {first}\n" + textwrap.dedent(code)))[0] == "8.0"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs modes of files")
+@pytest.mark.parametrize("what", ["folder", "file"])
+@pytest.mark.parametrize("fault", ["mode", "owner"])
+def test_a_folder_or_file_of_somebody_else_is_refused_before_it_is_read(start, tmp_path, what, fault):
+    (tmp_path / "go").touch()
+    ended(start())
+    index = next((tmp_path / "cache").rglob("*tiny.tiny*.nbi"))
+    (tmp_path / "mark.py").write_text("print('ran')")
+    index.write_bytes(b"cmark\n.")  # a pickle that imports
+    victim = index.parent if what == "folder" else index
+    if fault == "mode":
+        victim.chmod(victim.stat().st_mode | 0o002)
+    elif os.geteuid():
+        pytest.skip("needs root")
+    else:
+        os.chown(victim, 65534, 65534)
+    code = CALL_OR_SAY.format(read_only=False)
+    out, _ = ended(start(code))
+    assert "cannot be trusted, for it" in out
+    assert ("writable by everybody" in out) == (fault == "mode")
+    assert str(victim) in out
+    assert "ran" not in out
+    assert "NUMBA_CACHE_DIR" in out
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs modes of files")
+def test_what_is_made_here_is_closed_to_others_whatever_the_umask(start, tmp_path):
+    (tmp_path / "go").touch()
+    ended(start("import os; os.umask(0)\n" + CALL))
+    made = [tmp_path / "cache", *(tmp_path / "cache").rglob("*")]
+    assert not [path for path in made if path.stat().st_mode & 0o022 and path.suffix != ".lock"]
+    assert ended(start())[0] == "8.0 []"

@@ -1,0 +1,100 @@
+"""Whether files that can run code may be read: nobody but their reader could have written them.
+
+Compiled kernels are pickles. Whoever can write to their folder runs code as everybody who reads them, so that
+a folder or file of somebody else's, or one that others can write, is refused before it is read. A system
+without owners and modes, as Windows, is not asked.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+from contextlib import suppress
+from pathlib import Path
+
+from hoof_env.errors import OutputError
+
+PACKAGE = Path(__file__).resolve().parents[1]
+OTHERS = stat.S_IWGRP | stat.S_IWOTH
+
+
+def read(path: str) -> bytes:
+    """The content of a file; `OutputError` if somebody else could have written it."""
+    with open(path, "rb") as file:
+        _check(path, os.fstat(file.fileno()))
+        return file.read()
+
+
+def check_folder(folder: str) -> None:
+    """Raise `OutputError` if there is such a folder and somebody else could write to it."""
+    with suppress(FileNotFoundError, NotADirectoryError, PermissionError):
+        _check(folder, os.stat(folder))
+
+
+def close_new(folder: str) -> None:
+    """Close an empty folder of ours to others: it has just been made, perhaps under a generous umask."""
+    with suppress(OSError):
+        if os.name == "posix" and os.stat(folder).st_uid == os.geteuid() and not os.listdir(folder):
+            close(folder)
+
+
+def close(path: str) -> None:
+    """Let nobody but its owner write to a file or folder of ours."""
+    if os.name == "posix" and (mode := stat.S_IMODE(os.stat(path).st_mode)) & OTHERS:
+        os.chmod(path, mode & ~OTHERS)
+
+
+def _check(path: str, found: os.stat_result) -> None:
+    if os.name != "posix":
+        return
+    package = os.stat(PACKAGE)  # whoever owns or writes this package runs code anyway
+    is_inside = PACKAGE in Path(path).resolve().parents
+    open_to = found.st_mode & OTHERS
+    if is_inside and found.st_gid == package.st_gid:
+        open_to &= ~package.st_mode
+    if is_inside:
+        open_to &= ~(package.st_mode & stat.S_IWOTH)
+    if _is_ours(found.st_gid):
+        open_to &= ~stat.S_IWGRP
+    if found.st_uid not in (os.geteuid(), 0, package.st_uid):
+        why = f"its owner is {_user(found.st_uid)}"
+    elif open_to:
+        why = "it is writable by " + ("everybody" if open_to & stat.S_IWOTH else _group(found.st_gid))
+    else:
+        return
+    raise OutputError(
+        f"compiled kernels in {path!r} cannot be trusted, for {why}: they are pickles, which can run any "
+        "code; expected a folder and files of your own or of root that nobody else can write: chmod -R go-w, "
+        "or set the environment variable NUMBA_CACHE_DIR to a folder of your own"
+    )
+
+
+def _is_ours(group: int) -> bool:
+    """Whether a group has nobody else in it: the one that many systems make for each user, whose umask then
+    lets it write; or root's, for another user."""
+    if os.geteuid() == 0:
+        return False
+    import grp
+    import pwd
+
+    with suppress(KeyError):
+        user, found = pwd.getpwuid(os.geteuid()), grp.getgrgid(group)
+        if user.pw_gid == group and found.gr_name == user.pw_name and set(found.gr_mem) <= {user.pw_name}:
+            return True
+    return group == 0
+
+
+def _user(number: int) -> str:
+    import pwd
+
+    with suppress(KeyError):
+        return pwd.getpwuid(number).pw_name
+    return f"user {number}"
+
+
+def _group(number: int) -> str:
+    import grp
+
+    with suppress(KeyError):
+        return f"group {grp.getgrgid(number).gr_name}"
+    return f"group {number}"
