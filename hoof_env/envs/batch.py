@@ -30,6 +30,7 @@ from hoof_env.envs.observation import MIDDLE, check_groups, groups_of, observed
 from hoof_env.envs.one_leg import OneLeg
 from hoof_env.envs.paper_solver import PaperSolver, check_paper
 from hoof_env.envs.parameters import (
+    check_drift,
     check_parameters,
     draw_parameters,
     extremes,
@@ -92,6 +93,7 @@ class EpisodeBatch:
         if is_paper:
             check_paper(s)
         self.body = Horse(s) if task.is_horse else OneLeg(s)
+        check_drift(self._terrain, s.terrain, s.trunk, self.body.height)
         self.terms = tuple(term.key for term in task.terms)
         self.weights = check_weights(s.reward_weights, task.terms)
         self.substeps = substeps_of(s.dt, s.sim_dt)

@@ -88,6 +88,8 @@ ARGUMENTS = [
     ({"terrain": {"kind": "hills", "stiffness": 2}}, r"terrain\['stiffness'\]: expected two numbers, got 2"),
     ({"terrain": {"kind": "slope", "angle": 2}}, "angle.*: expected.*got 2"),
     ({"terrain": {"bumps": 1}}, "terrain.*"),
+    ({"terrain": {"kind": "slope", "angle": 0.001}}, "terrain: expected ground whose mean height.*suspended"),
+    ({"terrain": {"kind": "hills", "rise": 0.5}}, r"terrain\['rise'\]: expected at most 0.339 m.*got 0.5 m"),
     ({"terrain": np.zeros(2)}, "terrain: expected None or a mapping, got array"),
     ({"randomize": 3}, "randomize: expected a mapping with some of trunk_mass.*got 3"),
     ({"randomize": []}, r"randomize: expected a mapping with some of trunk_mass.*got \[\]"),
