@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any, NamedTuple
@@ -366,19 +367,25 @@ def read_state(
     for name in STATE:
         shape = getattr(memory, name).shape
         try:
-            arrays[name] = np.array(state[name], dtype=np.float64)
+            arrays[name] = np.asarray(state[name], np.float64)
         except (TypeError, ValueError):
             raise ParameterError(f"state[{name!r}]: expected numbers, got {state[name]!r}") from None
         if arrays[name].shape != shape:
             raise ParameterError(f"state[{name!r}]: expected shape {shape}, got {arrays[name].shape}")
     trunk, limbs = arrays["trunk"], arrays["limbs"]
-    reset: NDArray[np.bool_] = np.logical_not(np.isnan(trunk).all(0) & np.isnan(limbs).all((0, 1)))
-    for name in STATE:
-        finite(f"state[{name!r}]", arrays[name][..., reset])
     moving = trunk[TrunkState.rows("moving")]
-    for name in ("centre", "pitch"):
-        finite("state['trunk'], places and pitch", moving[Moving.rows(name)][:, reset], FARTHEST)
-    finite("state['limbs'], crank angles", limbs[:, LegState.rows("theta")][..., reset], FARTHEST)
+    places = [moving[Moving.rows("centre")], moving[Moving.rows("pitch")], limbs[:, LegState.rows("theta")]]
+    reset: NDArray[np.bool_] = np.ones(trunk.shape[-1], bool)
+    squares = sum(float(np.vdot(part, part)) for part in arrays.values())
+    farthest = max(float(np.vdot(part, part)) for part in places)
+    if not (math.isfinite(squares) and farthest <= FARTHEST**2):  # else all is good, found in no time
+        reset = np.logical_not(np.isnan(trunk).all(0) & np.isnan(limbs).all((0, 1)))
+        for name in STATE:
+            finite(f"state[{name!r}]", arrays[name][..., reset])
+        for part in places[:2]:
+            finite("state['trunk'], places and pitch", part[:, reset], FARTHEST)
+        finite("state['limbs'], crank angles", places[2][..., reset], FARTHEST)
+    arrays["limb_settings"] = arrays["limb_settings"].copy()  # the caller's
     arrays["limb_settings"][:, _FIRST_ROW] = memory.limb_settings[:, _FIRST_ROW]  # an address
     return arrays, reset
 
@@ -408,6 +415,8 @@ def identity_of(scene: Scene, filters: FilterSettings, **numbers: float) -> dict
 
 def _differences(expected: dict[str, Any], given: dict[str, Any]) -> str:
     """Where two layouts differ, for people; empty if nowhere."""
+    if expected == given:
+        return ""
     names = [name for name in {**expected, **given} if expected.get(name) != given.get(name)]
     return "; ".join(f"{name}: expected {expected.get(name)!r}, got {given.get(name)!r}" for name in names)
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.envs.batch import EpisodeBatch
-from hoof_env.envs.settings import PER_EPISODE, SETTINGS, Settings, to_json
+from hoof_env.envs.settings import PER_EPISODE, SETTINGS, Settings, json_value, to_json
 from hoof_env.envs.tasks import Task, task_of
 from hoof_env.errors import FixedSettingError, ParameterError, check_choice
 from hoof_env.gait import GaitParameters
@@ -39,9 +39,13 @@ def array_of(given: Any) -> NDArray[Any]:
         return np.empty(0, object)
 
 
+ANY_SEED = np.random.SeedSequence(0)
+"""Of a generator whose state is set at once: to ask the system for entropy takes as long as a step."""
+
+
 def generator_of(state: Any) -> np.random.Generator:
     """A generator in the state that a `PCG64` had; `ParameterError` if it is none."""
-    generator = np.random.Generator(np.random.PCG64())
+    generator = np.random.Generator(np.random.PCG64(ANY_SEED))
     try:
         generator.bit_generator.state = state
     except (TypeError, ValueError, KeyError):
@@ -65,6 +69,7 @@ class LegBase:
     metadata: dict[str, Any]
     render_mode: str | None
     _spec: EnvSpec | None = None
+    _as_json: tuple[Settings | None, dict[str, Any], list[str]] = (None, {}, [])
     _phase = "new"
     """Then "running", and "closed"; a single environment also has "ended" and "warned"."""
 
@@ -235,7 +240,9 @@ class LegBase:
             got = repr(form) if "actions" in state else "one of an older form (positions in a box)"
             raise ParameterError(f"state: expected one whose actions are {self.action_form}, got {got}")
         there = state["settings"] if isinstance(state["settings"], Mapping) else {}
-        here = to_json(self.settings)
+        here = self._settings_as_json()
+        if here == there:
+            return
         unlike = [f"{k}: {v!r} here, {there.get(k)!r} there" for k, v in here.items() if there.get(k) != v]
         if unlike:
             raise ParameterError(f"state: of other settings; {'; '.join(unlike)}")
@@ -243,5 +250,16 @@ class LegBase:
     def _state_of_batch(self) -> dict[str, Any]:
         """What `get_state` gives but for the generators."""
         self._check_started("get_state")
-        about = {"id": self.task.id, "actions": self.action_form, "settings": to_json(self.settings)}
+        values = self._settings_as_json()
+        settings = values | {name: json_value(values[name]) for name in self._as_json[2]}  # nobody else's
+        about = {"id": self.task.id, "actions": self.action_form, "settings": settings}
         return about | self.batch.get_state()
+
+    def _settings_as_json(self) -> dict[str, Any]:
+        """As values that JSON can hold, found once for these settings."""
+        found, values, _ = self._as_json
+        if found is not self.settings:
+            values = to_json(self.settings)
+            changeable = [name for name, value in values.items() if isinstance(value, (dict, list))]
+            self._as_json = self.settings, values, changeable
+        return values

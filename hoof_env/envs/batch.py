@@ -7,6 +7,7 @@ number of its neighbours: starts are drawn from a generator of its own, and the 
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -173,10 +174,9 @@ class EpisodeBatch:
         return len(self.body.start_names) + len(self.body.gait_names)
 
     def _open(self) -> None:
-        """Find the arrays where they are now, and the kernels."""
+        """Find the kernels, and the arrays where they are now."""
         s = self.settings
         self.entries = observed(self.groups, s.trunk, s.drive, self.task.entries)
-        self.now = views(self._episode_layout, self.episode)
         self.measurements = Measurements(self.engine.features, self.body.legs)
         self._kernels = k = kernels.step_kernels(
             self.task.terms, self.task.entries, self.task.contact_law, self.engine.features, self.body.legs
@@ -187,6 +187,11 @@ class EpisodeBatch:
         )
         if self.paper:
             self.kernel = self._step_paper
+        self._find()
+
+    def _find(self) -> None:
+        """Find the arrays where they are now."""
+        self.now = views(self._episode_layout, self.episode)
         arrays = (
             *self.engine.arrays, self.episode, self._task, self.actions, self.observations, self.rewards
         )  # fmt: skip
@@ -460,7 +465,10 @@ class EpisodeBatch:
 
     def _is_possible(self, episode: Floats) -> bool:
         """Whether weights, and the gaits of horses, are numbers that can be."""
-        layout, begun = self._episode_layout, ~np.isnan(self.begun[0])
+        layout = self._episode_layout
+        if self.body.legs == 1 and (episode[layout.rows("weight")] > 0).all():
+            return True
+        begun = ~np.isnan(self.begun[0])
         rows = episode[:, begun]
         gaits = rows[layout.rows("gait")] if self.body.legs > 1 else rows[:0]
         return bool((rows[layout.rows("weight")] > 0).all() and np.isfinite(gaits).all())
@@ -501,3 +509,15 @@ class EpisodeBatch:
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
         self._open()
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> EpisodeBatch:
+        """What never changes is shared: a planner copies at every node of its tree."""
+        made = object.__new__(type(self))
+        vars(made).update(vars(self))
+        for name in ("engine", "_varied", "begun", "episode", "actions", "observations", "rewards", "_task"):
+            setattr(made, name, copy.deepcopy(getattr(self, name), memo))
+        if self.paper:
+            made.paper = copy.deepcopy(self.paper, memo | {id(self.engine): made.engine})
+            made.kernel = made._step_paper
+        made._find()
+        return made

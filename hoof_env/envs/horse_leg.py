@@ -107,12 +107,12 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._check_open("reset")
         checked = self.batch.check_options(options)  # before the generator is touched
         super().reset(seed=None if seed is None else count("seed", seed, low=0))
-        if self._recording is not None:
-            self._recording.start()
         parameters = self.batch.reset([0], [self.np_random], checked)
         self._phase = "running"
         if self._recording is not None:
-            self._show(restart=True)
+            self._recording.begin()
+            if self.render_mode == "human":
+                self.render()
         self._begin()
         info = copy.deepcopy(self._begun[0]()) | {"measured": self._views[-1]()}
         if parameters:
@@ -142,8 +142,6 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             buffer[:] = action  # four float32, the cheapest way
         except (TypeError, ValueError, BufferError):
             self._read_action(action)
-        if self._recording is not None and np.isfinite(buffer).all():  # else nothing will happen
-            self._recording.start()
         happened = kernel(addresses)  # not through the batch: a call costs as much as a substep
         ended = happened != 0 and self.batch.follow(happened, (self.np_random,))
         info, gait = self._begun[0](), self._begun[1]()  # all keys are there, and stay in their places
@@ -165,7 +163,9 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             if broken(self.batch.engine.results)[0]:
                 info["measured"][self.batch.measurements.last_step] = 0.0
         if self._recording is not None:
-            self._show()
+            self._recording.add()
+            if self.render_mode == "human":
+                self.render()
         return observe(), rewards[0], failed, truncated, info
 
     def _warn_ended(self) -> None:
@@ -212,15 +212,6 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self._recording is not None:
             self._recording.close()
 
-    def _show(self, restart: bool = False) -> None:
-        """Keep what happened for the next picture; in a window at once."""
-        if self.render_mode is None:
-            return
-        assert self._recording is not None
-        self._recording.keep(restart)
-        if self.render_mode == "human":
-            self.render()
-
     # State
 
     def get_state(self) -> dict[str, Any]:
@@ -244,7 +235,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._phase = "ended" if self.batch.now.ended[0] else "running"
         self._begin()
         if self._recording is not None:
-            self._recording.forget()
+            self._recording.begin()
         return self.batch.observations[0].copy()
 
     def __getstate__(self) -> dict[str, Any]:

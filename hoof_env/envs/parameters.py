@@ -169,7 +169,7 @@ def check_drift(terrain: Terrain, description: Any, trunk: str, hip_height: floa
     where, mean = farthest_mean(terrain, STRETCH)
     if abs(mean) > (most := DRIFT * hip_height):
         raise ParameterError(
-            f"terrain: expected ground whose mean height over {STRETCH:g} m stays within {most:.3g} m of y = 0"
+            f"terrain: expected ground whose mean height over {STRETCH:g} m stays within {most:.3g} m of 0"
             f" {remedy}; got a mean of {mean:.3g} m around x = {where:.4g} m"
         )
 

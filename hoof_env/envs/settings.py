@@ -67,6 +67,10 @@ class Settings:
     reward_weights: Mapping[str, float] | None = None
     randomize: Mapping[str, Any] | None = None
 
+    def __deepcopy__(self, memo: Any) -> Settings:
+        """Itself, for nothing in it changes."""
+        return self
+
 
 Range = float | Sequence[float]
 """Lowest and highest, or one number for both."""
@@ -186,6 +190,8 @@ def to_json(settings: Settings) -> dict[str, Any]:
 
 def json_value(value: Any) -> Any:
     """Lists for tuples, however deep, as JSON gives them back."""
+    if isinstance(value, (list, tuple)):
+        return [json_value(inner) for inner in value]
     if isinstance(value, Mapping):
         return {key: json_value(inner) for key, inner in value.items()}
-    return [json_value(inner) for inner in value] if isinstance(value, (list, tuple)) else value
+    return value

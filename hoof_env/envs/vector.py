@@ -153,8 +153,6 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
                 "expected reset(options={'reset_mask': ...})"
             )
         batch.actions[:n] = self._check_actions(actions)
-        for recording in self._watched.values():
-            recording.start()
         some_ended = batch.step(self._generators, again)
         how = batch.now.ended[:n]
         terminated, truncated = how == FAILED, how == TRUNCATED
@@ -169,7 +167,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
             infos = self._same_step(infos, done)
             done = np.zeros(n, bool)
         else:
-            self._show()
+            self._remember()
         self._ended = done
         return self._observed(), rewards, terminated, truncated, infos
 
@@ -192,7 +190,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         last = np.full(self.num_envs, None, dtype=object)
         for env in np.flatnonzero(done):
             last[env] = self.batch.observations[env].copy()
-        self._show()
+        self._remember()
         self._start(np.flatnonzero(done), {})
         infos: dict[str, Any] = self.batch.infos()
         infos |= {key: copy.deepcopy(value) for key, value in final.items() if key not in infos}
@@ -346,22 +344,19 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
 
     def _start(self, envs: NDArray[np.int64], options: Mapping[str, Any]) -> dict[str, Any]:
         """Start episodes; the parameters that were set or drawn for them, by name."""
-        watched = [self._watched[env] for env in envs.tolist() if env in self._watched]
-        for recording in watched:
-            recording.start()
         parameters = self.batch.reset(envs, [self._generators[env] for env in envs], options)
         self._started[envs] = True
         if self._phase == "new" and self._started.all():
             self._phase = "running"
-        for recording in watched:
-            if recording.env < self.drawn:
-                recording.keep(True)
+        if self._watched:
+            for env in self._watched.keys() & set(envs.tolist()):
+                self._watched[env].begin()
         return parameters
 
-    def _show(self) -> None:
-        for env in range(self.drawn):
-            if not self._ended[env]:
-                self._watched[env].keep(False)
+    def _remember(self) -> None:
+        for env, recording in self._watched.items():
+            if not self._ended[env]:  # else it has just begun
+                recording.add()
 
     def _observed(self) -> NDArray[np.float32]:
         return self.batch.observations[: self.num_envs].copy()
@@ -414,5 +409,5 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         self._ended, self._started, self._generators = ended, np.ones(n, bool), generators
         self._phase = "running"
         for recording in self._watched.values():
-            recording.forget()
+            recording.begin()
         return self._observed()
