@@ -348,6 +348,11 @@ def start(
 STATE = ("trunk", "limbs", "strides", "command", "account", "trunk_settings", "limb_settings")
 """Arrays that hold what changes."""
 
+_MOVING = TrunkState.rows("moving").start
+_PLACES = [
+    _MOVING + row for name in ("centre", "pitch") for row in range(*Moving.rows(name).indices(Moving.size))
+]
+_ANGLES = LegState.rows("theta")
 _FIRST_ROW = layout.LegSettings.rows("first_row")
 
 
@@ -373,18 +378,16 @@ def read_state(
         if arrays[name].shape != shape:
             raise ParameterError(f"state[{name!r}]: expected shape {shape}, got {arrays[name].shape}")
     trunk, limbs = arrays["trunk"], arrays["limbs"]
-    moving = trunk[TrunkState.rows("moving")]
-    places = [moving[Moving.rows("centre")], moving[Moving.rows("pitch")], limbs[:, LegState.rows("theta")]]
     reset: NDArray[np.bool_] = np.ones(trunk.shape[-1], bool)
+    places = trunk[_PLACES], limbs[:, _ANGLES]
     squares = sum(float(np.vdot(part, part)) for part in arrays.values())
     farthest = max(float(np.vdot(part, part)) for part in places)
     if not (math.isfinite(squares) and farthest <= FARTHEST**2):  # else all is good, found in no time
         reset = np.logical_not(np.isnan(trunk).all(0) & np.isnan(limbs).all((0, 1)))
         for name in STATE:
             finite(f"state[{name!r}]", arrays[name][..., reset])
-        for part in places[:2]:
-            finite("state['trunk'], places and pitch", part[:, reset], FARTHEST)
-        finite("state['limbs'], crank angles", places[2][..., reset], FARTHEST)
+        finite("state['trunk'], places and pitch", places[0][:, reset], FARTHEST)
+        finite("state['limbs'], crank angles", places[1][..., reset], FARTHEST)
     arrays["limb_settings"] = arrays["limb_settings"].copy()  # the caller's
     arrays["limb_settings"][:, _FIRST_ROW] = memory.limb_settings[:, _FIRST_ROW]  # an address
     return arrays, reset

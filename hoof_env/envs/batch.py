@@ -463,6 +463,41 @@ class EpisodeBatch:
         state["begun"] = self.begun.copy()
         return state | ({"paper": self.paper.get_state()} if self.paper else {})
 
+    @property
+    def ended_row(self) -> int:
+        """Of the memory of episodes."""
+        row: int = self._episode_layout.rows("ended").start
+        return row
+
+    def spread(self, state: Mapping[str, Any]) -> dict[str, Any]:
+        """The state of one environment as one of `num_envs` that are where it is.
+
+        Raises:
+            ParameterError: it is no state of one.
+        """
+        n = self.num_envs
+
+        def repeated(values: Any) -> Any:
+            return np.repeat(np.asarray(values, np.float64), n, -1)
+
+        try:
+            engine, layout = state["engine"], state["engine"]["layout"]
+            if layout["num_envs"] != 1 or np.shape(state["episode"])[-1] != 1:
+                raise ValueError
+            parts = {name: repeated(values) for name, values in engine.items() if name != "layout"}
+            found = {**state, "engine": {**parts, "layout": {**layout, "num_envs": n}}}
+            found |= {name: repeated(state[name]) for name in ("episode", "begun") if name in state}
+            if "paper" in state:
+                paper = state["paper"]
+                found["paper"] = {"legs": [*paper["legs"]] * n} | {
+                    name: np.repeat(paper[name], n) for name in ("accounts", "last")
+                }
+        except (KeyError, TypeError, ValueError, IndexError):
+            raise ParameterError(
+                "state: expected what get_state gives of one environment, or of this vector environment"
+            ) from None
+        return found
+
     def _is_possible(self, episode: Floats) -> bool:
         """Whether weights, and the gaits of horses, are numbers that can be."""
         layout = self._episode_layout

@@ -50,6 +50,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self, *, task: str = "leg", render_mode: str | None = None, **settings: Unpack[Keywords]
     ) -> None:
         self.observation_space, self.action_space = self._make(task, settings, 1, render_mode)
+        self._began_with = np.empty(0)
         self._recording: Recording | None = Recording(self.batch) if render_mode else None
         self._attach()
 
@@ -185,7 +186,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self.batch.randomize:
             info["parameters"] = named(row[first:], [*self.batch.randomize])
         info |= {"measured": None, **dict.fromkeys(self.batch.terms, np.float64(0.0))}
-        self._begun = info.copy, gait.copy
+        self._begun, self._began_with = (info.copy, gait.copy), self.batch.begun[:, 0].copy()
 
     def _read_action(self, action: Any) -> None:
         given = array_of(action)
@@ -233,13 +234,14 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.batch.set_state(state)
         self.np_random = generator
         self._phase = "ended" if self.batch.now.ended[0] else "running"
-        self._begin()
+        if not np.array_equal(self.batch.begun[:, 0], self._began_with):  # else its infos say so
+            self._begin()
         if self._recording is not None:
             self._recording.begin()
         return self.batch.observations[0].copy()
 
     def __getstate__(self) -> dict[str, Any]:
-        return {k: v for k, v in vars(self).items() if k not in ("_views", "_begun")}
+        return {k: v for k, v in vars(self).items() if k not in ("_views", "_begun", "_began_with")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)

@@ -1,8 +1,8 @@
 """What happened between two control steps: the substeps are run again, on an engine of their own.
 
 The kernels keep sums of a control step, not its substeps; who wants to see those pays for them. Of a step
-that nobody asks about there is a copy of where it ended, and no more: the substeps have the same bits whenever
-they are run again from there.
+that nobody asks about there is a copy of where it ended, and no more: the substeps have the same bits
+whenever they are run again from there.
 """
 
 from __future__ import annotations

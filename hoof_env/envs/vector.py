@@ -24,15 +24,20 @@ from hoof_env.envs.episode import FAILED, TRUNCATED
 from hoof_env.envs.infos import named
 from hoof_env.envs.recording import Recording
 from hoof_env.envs.settings import Keywords
-from hoof_env.errors import ParameterError, count
+from hoof_env.errors import ParameterError, all_of, count
 
 Floats = NDArray[np.float64]
 
 MOST_ENVS = 1_000_000
 
+UNKNOWN_SEED = -1  # as Gymnasium says it
+
 MOST_DRAWN = 16  # so many are drawn by default; a picture takes as long as some hundred steps
 
-OWN = ("weight", "render", "episode_summary", "raw_observation", "record", "np_random", "action_for")
+OWN = (
+    "weight", "render", "episode_summary", "raw_observation", "record", "np_random", "np_random_seed",
+    "action_for",
+)  # fmt: skip
 """What each environment has of its own; the rest is of all."""
 
 SINGLE = {"action_space": "single_action_space", "observation_space": "single_observation_space"}
@@ -103,6 +108,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         self._watched = {env: Recording(self.batch, env) for env in range(self.drawn)}
         self._marks: dict[str, list[Any]] = {}
         self._generators: list[np.random.Generator] = []
+        self._seeds: list[int] = []
         self._ended = np.zeros(self.num_envs, bool)
         self._started = np.zeros(self.num_envs, bool)
 
@@ -224,6 +230,32 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         """Weight of trunk and leg [N], shape (num_envs,)."""
         return self.batch.now.weight[: self.num_envs].copy()
 
+    @property  # type: ignore[override]
+    def np_random(self) -> tuple[np.random.Generator, ...]:
+        """The generator of each environment. One that is assigned seeds them all; a list has one for each."""
+        if not self._generators:
+            self._new_generators([None] * self.num_envs)
+        return tuple(self._generators)
+
+    @np_random.setter
+    def np_random(self, value: np.random.Generator | Sequence[np.random.Generator]) -> None:
+        given: Any = value
+        if isinstance(given, np.random.Generator):
+            self._new_generators(given.integers(2**63, size=self.num_envs).tolist())
+        elif not isinstance(given, (list, tuple)) or len(given) != self.num_envs:
+            raise ParameterError(
+                f"np_random: expected a generator, or a list of {self.num_envs}, got {value!r:.80}"
+            )
+        else:
+            self._generators = list(all_of("np_random", given, np.random.Generator))
+        self._seeds = [UNKNOWN_SEED] * self.num_envs
+
+    @property
+    def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
+        """What each environment was seeded with, as of Gymnasium's `SyncVectorEnv`; -1 of a generator that was
+        assigned or came with a state."""
+        return (*self._seeds,) if self.np_random else ()
+
     def record(self, env: int = 0) -> dict[str, Floats]:
         """State and report of an environment at every substep of the last control step, see
         `HorseLegEnv.record`. From the first call on its substeps are kept, which takes time in every step.
@@ -266,6 +298,9 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         each = list(values) if isinstance(values, (list, tuple)) else [values] * self.num_envs
         if len(each) != self.num_envs:
             raise ParameterError(f"values: expected one or {self.num_envs}, got {len(each)}")
+        if name == "np_random":
+            self.np_random = each
+            return
         if hasattr(self.batch.settings, name) or hasattr(self, name) or hasattr(self.batch, name):
             raise fixed_setting(name)
         self._marks[name] = each
@@ -279,9 +314,6 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
             raise ParameterError(f"call: {name!r} is of all together; expected envs.{name}(...)")
         if name == "record":
             return [self.record(env) for env in chosen]
-        if name == "np_random":
-            self._check_started(name)
-            return [self._generators[env] for env in chosen]
         name = SINGLE.get(name, name)
         owner: Any = self if hasattr(self, name) else self.batch
         if name.startswith("_") or not hasattr(owner, name):
@@ -370,11 +402,15 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         else:
             seeds = [None if seed is None else count("seed", seed, low=0) + env for env in range(n)]
         if not self._generators:
-            self._generators = [seeding.np_random(value)[0] for value in seeds]
+            self._new_generators(seeds)
             return
         for env in np.flatnonzero(mask):
             if seeds[env] is not None:
-                self._generators[env] = seeding.np_random(seeds[env])[0]
+                self._generators[env], self._seeds[env] = seeding.np_random(seeds[env])
+
+    def _new_generators(self, seeds: Sequence[int | None]) -> None:
+        made = [seeding.np_random(seed) for seed in seeds]
+        self._generators, self._seeds = [one for one, _ in made], [seed for _, seed in made]
 
     # State
 
@@ -388,11 +424,15 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         return {**self._state_of_batch(), "ended": self._ended.copy(), "generator": generators}
 
     def set_state(self, state: Mapping[str, Any]) -> NDArray[np.float32]:
-        """Put back what `get_state` gave; returns the observations there.
+        """Put back what `get_state` gave, here or of a single environment, which then goes on in every row:
+        many actions can be tried from one state. Returns the observations there.
 
         Raises:
             ParameterError: a state of another id, geometry, setting or number of environments.
         """
+        if isinstance(state, Mapping) and isinstance(state.get("generator"), Mapping):
+            self._check_state(state)
+            state = self._in_every_row(state)
         self._check_state(state, "ended")
         n, states = self.num_envs, state["generator"]
         ended = array_of(state["ended"]).copy()
@@ -407,7 +447,13 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         generators = [generator_of(values) for values in states]
         self.batch.set_state(state)
         self._ended, self._started, self._generators = ended, np.ones(n, bool), generators
+        self._seeds = [UNKNOWN_SEED] * n
         self._phase = "running"
         for recording in self._watched.values():
             recording.begin()
         return self._observed()
+
+    def _in_every_row(self, state: Mapping[str, Any]) -> dict[str, Any]:
+        """The state of a single environment as one of this vector environment."""
+        found = {**self.batch.spread(state), "generator": [state["generator"]] * self.num_envs}
+        return found | {"ended": found["episode"][self.batch.ended_row] != 0.0}
