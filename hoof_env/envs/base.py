@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.envs.batch import EpisodeBatch
-from hoof_env.envs.settings import PER_EPISODE, SETTINGS, Settings, json_value, to_json
+from hoof_env.envs.settings import PER_EPISODE, SETTINGS, Settings, as_plain, json_value, to_json
 from hoof_env.envs.tasks import Task, task_of
 from hoof_env.errors import FixedSettingError, ParameterError, check_choice
 from hoof_env.gait import GaitParameters
@@ -107,9 +107,11 @@ class LegBase:
 
     @spec.setter
     def spec(self, spec: EnvSpec | None) -> None:
-        if spec is not None and spec.max_episode_steps is None:
+        if spec is not None:
             spec = copy.copy(spec)  # it may be the registered one
-            spec.max_episode_steps = self.batch.steps_per_episode
+            spec.kwargs = {name: as_plain(name, value) for name, value in spec.kwargs.items()}  # for to_json
+            if spec.max_episode_steps is None:
+                spec.max_episode_steps = self.batch.steps_per_episode
         self._spec = spec
 
     @property

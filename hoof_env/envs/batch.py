@@ -315,7 +315,7 @@ class EpisodeBatch:
         if self.target_speed and self.speed_changes:
             now.target[which] = [generator.uniform(*self.target_speed) for generator in generators]
             self._draw_targets(which, generators)
-        if "target_speed" in options:  # of a horse, and for the whole episode
+        if "target_speed" in options:  # for the whole episode
             now.target[which], now.switch[which] = options["target_speed"], np.inf
         self.body.settle(start, now.target[which], options, self.engine)
         self.engine.reset(start.commands, start.theta, envs=which, **start.trunk)
@@ -404,6 +404,8 @@ class EpisodeBatch:
         infos["gait"] = named(begun[len(names) : first].T, self.body.gait_names)
         if self.randomize:
             infos["parameters"] = named(begun[first:].T, tuple(self.randomize))
+        if self.target_speed:
+            infos["target_speed"] = self.now.target[:n].copy()
         infos["measured"] = measured.T.view(self.measurements.kind)
         infos.update(zip(self.terms, self.now.terms[:, :n].copy(), strict=True))
         return infos

@@ -21,6 +21,7 @@ from hoof_env.envs.infos import named
 from hoof_env.envs.recording import Recording
 from hoof_env.envs.reward import failure
 from hoof_env.envs.settings import Keywords
+from hoof_env.envs.step import SOME_SWITCHED
 from hoof_env.errors import ParameterError, count, flag
 
 
@@ -50,7 +51,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self, *, task: str = "leg", render_mode: str | None = None, **settings: Unpack[Keywords]
     ) -> None:
         self.observation_space, self.action_space = self._make(task, settings, 1, render_mode)
-        self._began_with = np.empty(0)
+        self._began_with = b"", 0.0
         self._recording: Recording | None = Recording(self.batch) if render_mode else None
         self._attach()
 
@@ -73,7 +74,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         return float(self.batch.now.weight[0])
 
     def _each(self, values: Any) -> Any:
-        return values[0]
+        return values[0] if np.ndim(values) > 1 else float(values[0])
 
     def record(self) -> dict[str, NDArray[np.float64]]:
         """State and report of the engine at every substep of the last control step, or at the start, by name,
@@ -96,8 +97,8 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
         Args:
             seed: of the generator, a whole number from 0; None goes on with it.
-            options: "gait", "crank_angle" [rad], "speed" [m/s], "height" [m], "x" [m], "parameters"; see
-                the manual page.
+            options: "gait", "crank_angle" [rad], "speed" [m/s], "height" [m], "x" [m], "target_speed"
+                [m/s] for the whole episode, "parameters"; see the manual page.
 
         Returns:
             The observation, float32, and what was drawn or set.
@@ -144,7 +145,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         except (TypeError, ValueError, BufferError):
             self._read_action(action)
         happened = kernel(addresses)  # not through the batch: a call costs as much as a substep
-        ended = happened != 0 and self.batch.follow(happened, (self.np_random,))
+        ended = happened != 0 and self._follow(happened)
         info, gait = self._begun[0](), self._begun[1]()  # all keys are there, and stay in their places
         info["gait"], info["measured"] = gait, measure()
         if draws:
@@ -169,6 +170,13 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
                 self.render()
         return observe(), rewards[0], failed, truncated, info
 
+    def _follow(self, happened: int) -> bool:
+        """After a step in which something happened; returns whether the episode ended."""
+        ended = self.batch.follow(happened, (self.np_random,))
+        if happened & SOME_SWITCHED:
+            self._begin()
+        return ended
+
     def _warn_ended(self) -> None:
         if self._phase == "ended":
             self._phase = "warned"
@@ -185,8 +193,14 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         info["gait"] = gait = named(row[len(body.start_names) : first], body.gait_names)
         if self.batch.randomize:
             info["parameters"] = named(row[first:], [*self.batch.randomize])
+        if self.batch.target_speed:
+            info["target_speed"] = self.batch.now.target[0]
         info |= {"measured": None, **dict.fromkeys(self.batch.terms, np.float64(0.0))}
-        self._begun, self._began_with = (info.copy, gait.copy), self.batch.begun[:, 0].copy()
+        self._begun, self._began_with = (info.copy, gait.copy), self._start_and_target()
+
+    def _start_and_target(self) -> tuple[bytes, float]:
+        """What infos say that no step measures."""
+        return self.batch.begun.tobytes(), float(self.batch.now.target[0])
 
     def _read_action(self, action: Any) -> None:
         given = array_of(action)
@@ -234,7 +248,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.batch.set_state(state)
         self.np_random = generator
         self._phase = "ended" if self.batch.now.ended[0] else "running"
-        if not np.array_equal(self.batch.begun[:, 0], self._began_with):  # else its infos say so
+        if self._start_and_target() != self._began_with:  # else infos say it
             self._begin()
         if self._recording is not None:
             self._recording.begin()

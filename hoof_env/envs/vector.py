@@ -252,8 +252,8 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
 
     @property
     def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
-        """What each environment was seeded with, as of Gymnasium's `SyncVectorEnv`; -1 of a generator that was
-        assigned or came with a state."""
+        """What each environment was seeded with, as Gymnasium's `SyncVectorEnv` says it; -1 where a generator
+        was assigned or came with a state."""
         return (*self._seeds,) if self.np_random else ()
 
     def record(self, env: int = 0) -> dict[str, Floats]:
