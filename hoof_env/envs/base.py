@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.envs.batch import EpisodeBatch
+from hoof_env.envs.conditions import CHANGEABLE
 from hoof_env.envs.settings import PER_EPISODE, SETTINGS, Settings, as_plain, json_value, to_json
 from hoof_env.envs.tasks import Task, task_of
 from hoof_env.errors import FixedSettingError, ParameterError, check_choice
@@ -28,6 +29,8 @@ def fixed_setting(name: str) -> FixedSettingError:
     how = "gymnasium.make(id, ...)" if name in SETTINGS else "the arguments of gymnasium.make"
     if name in PER_EPISODE:
         how += f", or reset(options={{'parameters': {{{name!r}: ...}}}}) for an episode"
+    if name in CHANGEABLE:
+        how += f", or from the next reset on by change_settings({name}=...)"
     return FixedSettingError(f"{name}: expected no assignment, which would change nothing; set it by {how}")
 
 
@@ -64,7 +67,6 @@ class LegBase:
     """
 
     task: Task
-    settings: Settings
     batch: EpisodeBatch
     metadata: dict[str, Any]
     render_mode: str | None
@@ -80,8 +82,8 @@ class LegBase:
         if render_mode is not None:
             check_choice("render_mode", render_mode, self.metadata["render_modes"])
         self.task, self.render_mode = task_of(task), render_mode
-        self.settings = self.task.settings(given)
-        self.batch = EpisodeBatch(self.task, self.settings, n, num_threads)
+        self._given = dict(given)
+        self.batch = EpisodeBatch(self.task, self.task.settings(given), n, num_threads)
         self.metadata = {**self.metadata, "render_fps": max(1, round(1 / self.batch.dt))}
         sizes = len(self.batch.names), len(self.batch.body.action_names)
         return [spaces.Box(-1.0, 1.0, (size,), np.float32) for size in sizes]
@@ -113,6 +115,35 @@ class LegBase:
             if spec.max_episode_steps is None:
                 spec.max_episode_steps = self.batch.steps_per_episode
         self._spec = spec
+
+    @property
+    def settings(self) -> Settings:
+        """Those of the episode; of many environments those of every episode that starts from now on."""
+        return self.batch.asked
+
+    def change_settings(self, **changes: Any) -> None:
+        """Change settings from the next reset on, as a curriculum does: the episode goes on with the old.
+        Of many environments each takes the new ones when it starts again, by itself or by `reset`.
+
+        Args:
+            changes: some of `target_speed`, `target_seconds`, `terrain`, `reward_weights` and `randomize`, as
+                the arguments of `gymnasium.make`: afterwards all is as if it had been made with them.
+
+        Raises:
+            ParameterError: a value is out of range, or an episode of these settings would lack something;
+                nothing has changed then.
+            FixedSettingError: another setting.
+        """
+        self._check_open("change_settings")
+        for name in changes:
+            if name in SETTINGS and name not in CHANGEABLE:
+                raise FixedSettingError(
+                    f"change_settings: expected some of {', '.join(CHANGEABLE)}, got {name!r}, which stays as"
+                    " it was made"
+                )
+        given = self._given | changes
+        self.batch.change(self.task.settings(given))
+        self._given = given
 
     @property
     def manual(self) -> str:

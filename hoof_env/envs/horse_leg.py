@@ -109,7 +109,10 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._check_open("reset")
         checked = self.batch.check_options(options)  # before the generator is touched
         super().reset(seed=None if seed is None else count("seed", seed, low=0))
+        before = self.batch.addresses
         parameters = self.batch.reset([0], [self.np_random], checked)
+        if self.batch.addresses is not before:  # other settings
+            self._attach()
         self._phase = "running"
         if self._recording is not None:
             self._recording.begin()

@@ -37,6 +37,7 @@ class Recording:
         self._unseen = 0  # of them, which no picture shows yet
         self.renderer: Any = None
         self._engine: TrunkEngine | None = None
+        self._conditions = batch.conditions.of(env)
         self._find()
 
     def _find(self) -> None:
@@ -48,6 +49,10 @@ class Recording:
 
     def begin(self) -> None:
         """After a reset or a jump to another state: what was before did not lead to it."""
+        conditions = self.batch.conditions.of(self.env)
+        if conditions is not self._conditions and (conditions or self._conditions):
+            self.close()  # it may have drawn another ground
+            self._conditions, self._engine = conditions, None
         self._ends.clear()
         self._unseen = 0
         self.add()
@@ -79,7 +84,7 @@ class Recording:
 
     def _run(self, column: NDArray[np.float64], command: Any, steps: int) -> Record:
         if self._engine is None:
-            self._engine = self.batch.engine.alone()
+            self._engine = self.batch.alone(self.env)
         self._engine.set_column(0, column)
         record = self._engine.run(command, steps, beyond=True)
         record.pop("result")
@@ -87,14 +92,15 @@ class Recording:
 
     def frame(self, mode: str, fps: float) -> Any:
         """A picture of what happened since the last one, at most `SHOWN` seconds; None of a window."""
-        engine, hips = self.batch.engine, self.batch.body.hips
+        hips = self.batch.body.hips
+        terrain = self._conditions.get("terrain", self.batch.engine.terrain)
         if self.renderer is None:
             from hoof_env.render.renderer import Renderer
 
             weight = float(self.batch.now.weight[self.env])
             self.renderer = Renderer(
                 self.batch.body.geometry, mode, fps, self.size, self.batch.settings.trunk, weight,
-                LIFT_OFF * weight / self.batch.body.legs, engine.terrain, hips,
+                LIFT_OFF * weight / self.batch.body.legs, terrain, hips,
             )  # fmt: skip
         if not self._ends:
             self.begin()
@@ -107,10 +113,10 @@ class Recording:
             record = self._record(k)
             command = self._commanded(k)
             if hips:
-                columns = columns_of_horse(record, hips, engine.terrain, command=command)
+                columns = columns_of_horse(record, hips, terrain, command=command)
                 self.renderer.add(horse_instants(columns, hips))
             else:
-                columns = columns_of_engine(record, engine.terrain, command=command[0])
+                columns = columns_of_engine(record, terrain, command=command[0])
                 self.renderer.add(instants(columns))
         self._unseen = 0
         return self.renderer.frame()
