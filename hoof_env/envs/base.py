@@ -22,6 +22,7 @@ from hoof_env.errors import FixedSettingError, ParameterError, check_choice
 from hoof_env.gait import GaitParameters
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
+from hoof_env.render.renderer import check_side
 
 
 def fixed_setting(name: str) -> FixedSettingError:
@@ -70,17 +71,25 @@ class LegBase:
     batch: EpisodeBatch
     metadata: dict[str, Any]
     render_mode: str | None
+    _size: tuple[int, int]
     _spec: EnvSpec | None = None
     _as_json: tuple[Settings | None, dict[str, Any], list[str]] = (None, {}, [])
     _phase = "new"
     """Then "running", and "closed"; a single environment also has "ended" and "warned"."""
 
     def _make(
-        self, task: str, given: Mapping[str, Any], n: int, render_mode: str | None, num_threads: int = 1
+        self,
+        task: str,
+        given: Mapping[str, Any],
+        n: int,
+        render_mode: str | None,
+        size: tuple[int, int],
+        num_threads: int = 1,
     ) -> list[Any]:
         """Make `n` environments; returns the space of an observation and of an action."""
         if render_mode is not None:
             check_choice("render_mode", render_mode, self.metadata["render_modes"])
+        self._size = check_side("width", size[0]), check_side("height", size[1])
         self.task, self.render_mode = task_of(task), render_mode
         self._given = dict(given)
         self.batch = EpisodeBatch(self.task, self.task.settings(given), n, num_threads)

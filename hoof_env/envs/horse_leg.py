@@ -23,6 +23,7 @@ from hoof_env.envs.reward import failure
 from hoof_env.envs.settings import Keywords
 from hoof_env.envs.step import SOME_SWITCHED
 from hoof_env.errors import ParameterError, count, flag
+from hoof_env.render.renderer import USUAL_SIZE
 
 
 class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
@@ -31,6 +32,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     Args:
         task: name in `tasks.TASKS`; the registered ids set it.
         render_mode: "rgb_array" or "human".
+        width, height: of a picture [pixels].
         settings: any of `settings.Settings`; the manual page (`manual`) says what they mean.
 
     Attributes:
@@ -48,11 +50,18 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}  # type: ignore[misc]
 
     def __init__(
-        self, *, task: str = "leg", render_mode: str | None = None, **settings: Unpack[Keywords]
+        self,
+        *,
+        task: str = "leg",
+        render_mode: str | None = None,
+        width: int = USUAL_SIZE[0],
+        height: int = USUAL_SIZE[1],
+        **settings: Unpack[Keywords],
     ) -> None:
-        self.observation_space, self.action_space = self._make(task, settings, 1, render_mode)
+        spaces_of = self._make(task, settings, 1, render_mode, (width, height))
+        self.observation_space, self.action_space = spaces_of
         self._began_with = b"", 0.0
-        self._recording: Recording | None = Recording(self.batch) if render_mode else None
+        self._recording: Recording | None = Recording(self.batch, 0, self._size) if render_mode else None
         self._attach()
 
     def _attach(self) -> None:
@@ -341,9 +350,15 @@ class HorseLegMOEnv(HorseLegEnv):
     """
 
     def __init__(
-        self, *, task: str = "leg", render_mode: str | None = None, **settings: Unpack[Keywords]
+        self,
+        *,
+        task: str = "leg",
+        render_mode: str | None = None,
+        width: int = USUAL_SIZE[0],
+        height: int = USUAL_SIZE[1],
+        **settings: Unpack[Keywords],
     ) -> None:
-        super().__init__(task=task, render_mode=render_mode, **settings)
+        super().__init__(task=task, render_mode=render_mode, width=width, height=height, **settings)
         self.reward_space = spaces.Box(
             np.full(3, -np.inf, np.float32), np.array([np.inf, 0.0, 0.0], np.float32), (3,), np.float32
         )

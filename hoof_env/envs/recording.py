@@ -19,11 +19,9 @@ from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.dynamics.parts import broken
 from hoof_env.envs.batch import EpisodeBatch
 from hoof_env.render.instant import columns_of_engine, columns_of_horse, horse_instants, instants
+from hoof_env.render.renderer import USUAL_SIZE, Renderer
 
 SHOWN = 4.0  # seconds before a picture that it can show
-
-PICTURE = 960, 540
-"""Width and height of a picture, if nobody says it [pixels]."""
 
 Record = dict[str, NDArray[np.float64]]
 
@@ -31,7 +29,7 @@ Record = dict[str, NDArray[np.float64]]
 class Recording:
     """Substeps of one environment of a batch, and pictures of them, `size` wide and high [pixels]."""
 
-    def __init__(self, batch: EpisodeBatch, env: int = 0, size: tuple[int, int] = PICTURE) -> None:
+    def __init__(self, batch: EpisodeBatch, env: int = 0, size: tuple[int, int] = USUAL_SIZE) -> None:
         self.batch, self.env, self.size = batch, env, size
         self._ends: deque[Any] = deque(maxlen=round(SHOWN / batch.dt) + 2)  # of control steps; first a start
         self._unseen = 0  # of them, which no picture shows yet
@@ -95,8 +93,6 @@ class Recording:
         hips = self.batch.body.hips
         terrain = self._conditions.get("terrain", self.batch.engine.terrain)
         if self.renderer is None:
-            from hoof_env.render.renderer import Renderer
-
             weight = float(self.batch.now.weight[self.env])
             self.renderer = Renderer(
                 self.batch.body.geometry, mode, fps, self.size, self.batch.settings.trunk, weight,

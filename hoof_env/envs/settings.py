@@ -133,7 +133,9 @@ class VectorKeywords(Keywords, total=False):
     autoreset_mode: AutoresetMode | str
     max_episode_steps: int | None
     render_mode: str | None
-    rendered: int
+    rendered: int | None
+    width: int
+    height: int
 
 
 SETTINGS = tuple(item.name for item in fields(Settings))

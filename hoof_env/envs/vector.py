@@ -25,6 +25,7 @@ from hoof_env.envs.infos import named
 from hoof_env.envs.recording import Recording
 from hoof_env.envs.settings import Keywords
 from hoof_env.errors import ParameterError, all_of, count
+from hoof_env.render.renderer import USUAL_SIZE
 
 Floats = NDArray[np.float64]
 
@@ -66,6 +67,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         render_mode: "rgb_array"; `render` gives a frame of each environment.
         rendered: how many are drawn, the first ones; frames of the others are black. None is all, of at most
             `MOST_DRAWN`.
+        width, height: of each picture [pixels].
 
     Attributes:
         drawn: how many are drawn.
@@ -92,11 +94,13 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         max_episode_steps: int | None = None,
         render_mode: str | None = None,
         rendered: int | None = None,
+        width: int = USUAL_SIZE[0],
+        height: int = USUAL_SIZE[1],
         **settings: Unpack[Keywords],
     ) -> None:
         self.num_envs = count("num_envs", num_envs, most=MOST_ENVS)
         self.autoreset_mode = mode_of(autoreset_mode)
-        one = self._make(task, settings, self.num_envs, render_mode, num_threads)
+        one = self._make(task, settings, self.num_envs, render_mode, (width, height), num_threads)
         if max_episode_steps is not None:
             self.batch.limit(count("max_episode_steps", max_episode_steps))
         self.single_observation_space, self.single_action_space = one
@@ -105,8 +109,8 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         self.metadata["autoreset_mode"] = self.autoreset_mode
         self.spec = None
         self.drawn = self._check_drawn(rendered)
-        self._watched = {env: Recording(self.batch, env) for env in range(self.drawn)}
-        self._marks: dict[str, list[Any]] = {}
+        self._watched = {env: Recording(self.batch, env, self._size) for env in range(self.drawn)}
+        self._marks: dict[str, dict[int, Any]] = {}
         self._generators: list[np.random.Generator] = []
         self._seeds: list[int] = []
         self._ended = np.zeros(self.num_envs, bool)
@@ -290,6 +294,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
 
     def set_attr(self, name: str, values: Any) -> None:
         """Remember something for `get_attr`: a list or tuple has a value for each, anything else is for all.
+        "np_random" gives each its generator.
 
         Raises:
             FixedSettingError: a setting or another attribute that the environments have.
@@ -298,17 +303,27 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         each = list(values) if isinstance(values, (list, tuple)) else [values] * self.num_envs
         if len(each) != self.num_envs:
             raise ParameterError(f"values: expected one or {self.num_envs}, got {len(each)}")
+        self.mark(name, dict(enumerate(each)))
+
+    def mark(self, name: str, values: Mapping[int, Any]) -> None:
+        """`set_attr` of some environments, each with a value."""
         if name == "np_random":
-            self.np_random = each
+            self.np_random = [values.get(env, one) for env, one in enumerate(self.np_random)]
             return
         if hasattr(self.batch.settings, name) or hasattr(self, name) or hasattr(self.batch, name):
             raise fixed_setting(name)
-        self._marks[name] = each
+        self._marks.setdefault(name, {}).update(values)
 
     def ask(self, name: str, envs: Iterable[int], *args: Any, **kwargs: Any) -> list[Any]:
         """`call` of some environments."""
         chosen = list(envs)
+        if name == "get_wrapper_attr":
+            return self.ask(*args, chosen, **kwargs)
+        if name == "has_wrapper_attr":
+            return [self._has(env, *args, **kwargs) for env in chosen]
         if name in self._marks:
+            if lacks := [env for env in chosen if env not in self._marks[name]]:
+                raise AttributeError(f"environments {lacks} have no attribute {name!r}")
             return [self._marks[name][env] for env in chosen]
         if name in ("reset", "step"):
             raise ParameterError(f"call: {name!r} is of all together; expected envs.{name}(...)")
@@ -327,6 +342,13 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         return [value[env] for env in chosen]
 
     # Parts of it
+
+    def _has(self, env: int, name: str) -> bool:
+        try:
+            self.ask(name, [env])
+        except AttributeError:
+            return False
+        return True
 
     def _check_drawn(self, rendered: Any) -> int:
         n = self.num_envs
