@@ -134,7 +134,7 @@ def page(task: str, with_film: bool = False) -> str:
         start=_start(s, what.start),
         options=markdown_table(("Option", "Unit", "Range", "Meaning"), _options(what.is_horse)),
         parameters=", ".join(f"`{name}`" for name in PER_EPISODE if not what.is_horse or _can_be(name, s)),
-        infos=markdown_table(("Key", "Unit", "Meaning"), _rows("horse_info" if what.is_horse else "info")),
+        infos=markdown_table(("Key", "Unit", "Meaning"), _infos(what, s)),
         measured=str(len(measured_names(_features(s, body), body.legs))),
         quantities=markdown_table(("Name", "In", "Unit", "Meaning"), _quantities(what.is_horse)),
         leaves=Template(trunk["leaves"]).substitute(height=f"{body.height:.4g}"),
@@ -311,6 +311,11 @@ def _options(of_horse: bool) -> Iterable[tuple[str, ...]]:
         low, high = ranges.get(name, (0.0, 0.0))
         within = "" if low == high else f"{low:.7g} to {high:.7g}" if math.isfinite(high) else f"from {low:g}"
         yield f"`{name}`", unit, within, meaning
+
+
+def _infos(what: Task, s: Settings) -> list[tuple[str, ...]]:
+    found = _rows("horse_info" if what.is_horse else "info")
+    return [row for row in found if row[0] != "`target_speed`" or s.target_speed is not None]
 
 
 def _vector_arguments() -> list[tuple[str, ...]]:

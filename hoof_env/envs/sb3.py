@@ -133,7 +133,7 @@ class Sb3VecEnv(VecEnv):
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
         """As `HorseLegVectorEnv.set_attr`, of some environments or of all."""
-        self.envs.mark(attr_name, dict.fromkeys(self._get_indices(indices), value))
+        self.envs.set_attr_of(attr_name, dict.fromkeys(self._get_indices(indices), value))
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
         """As `HorseLegVectorEnv.call`; ParameterError where some are meant by a method of all together."""

@@ -303,9 +303,9 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         each = list(values) if isinstance(values, (list, tuple)) else [values] * self.num_envs
         if len(each) != self.num_envs:
             raise ParameterError(f"values: expected one or {self.num_envs}, got {len(each)}")
-        self.mark(name, dict(enumerate(each)))
+        self.set_attr_of(name, dict(enumerate(each)))
 
-    def mark(self, name: str, values: Mapping[int, Any]) -> None:
+    def set_attr_of(self, name: str, values: Mapping[int, Any]) -> None:
         """`set_attr` of some environments, each with a value."""
         if name == "np_random":
             self.np_random = [values.get(env, one) for env, one in enumerate(self.np_random)]

@@ -79,7 +79,7 @@ def test_what_single_environments_are_asked_is_as_of_a_dummy_vec_env():
         assert envs.env_method("has_wrapper_attr", "nothing") == [False] * 3
     before = ours.envs.get_state()
     ours.set_options([{"gait": "run"}, {"gait": "trot"}, {}])
-    with pytest.raises(ParameterError, match="gait.*got 'trot'"):
+    with pytest.raises(ParameterError, match=r"gait.*got 'trot'"):
         ours.reset()
     same(ours.envs.get_state(), before)
 
