@@ -74,7 +74,7 @@ class Renderer:
             hint = 'pygame is not installed, run `pip install "hoof-env[render]"`'
             raise DependencyNotInstalled(hint) from None
         from hoof_env.render.brush import Brush
-        from hoof_env.render.panel import Panel
+        from hoof_env.render.panel import Panel, unit_of
         from hoof_env.render.scene import Scene
 
         self._pygame = pygame
@@ -92,7 +92,9 @@ class Renderer:
             self._scene: Any = HorseScene(brush, geometry, ground, self.size, column + 2 * edge)
             self._panel: Any = HorsePanel(brush, box, tuple(hips), weight_n or 0.0, lift_off_n)
         else:
-            self._scene = Scene(brush, geometry, ground, self.size, column + 2 * edge, trunk)
+            self._scene = Scene(
+                brush, geometry, ground, self.size, column + 2 * edge, trunk, unit_of(lift_off_n)
+            )
             self._panel = Panel(brush, box, weight_n if trunk == "suspended" else None, lift_off_n)
         self._window_open = False
         self._clock = pygame.time.Clock()
