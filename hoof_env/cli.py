@@ -330,6 +330,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if given == ["--version"]:
         _say(f"hoof-env {__version__}")
         return 0
+    if not {"", os.getcwd()} & set(sys.path):  # behind all others, which nothing there may replace
+        sys.path.append(os.getcwd())  # for --id module:..., as python -m hoof_env has it
     try:
         import tyro
 

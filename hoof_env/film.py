@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -54,9 +56,27 @@ def check_film(path: Path, fps: float) -> None:
     ):
         if find_spec(name) is None:
             raise HoofEnvError(f'films need {package}: pip install "hoof-env[{extra}]"')
+    import imageio_ffmpeg
+
+    try:
+        program = imageio_ffmpeg.get_ffmpeg_exe()
+    except RuntimeError:
+        raise no_ffmpeg() from None
+    if shutil.which(program) is None:
+        raise no_ffmpeg()
     hundredths = 100 / fps  # in which a GIF counts; browsers slow down what has less than two
     if path.suffix.lower() == ".gif" and (hundredths < 2 or abs(hundredths - round(hundredths)) > 1e-6):
         raise ParameterError(f"fps: expected 50, 25, 20, 10 ... of a GIF, got {fps:g}")
+
+
+def no_ffmpeg() -> HoofEnvError:
+    """The error where there is no program ffmpeg, or it does not start."""
+    given = os.environ.get("IMAGEIO_FFMPEG_EXE")
+    found = f"IMAGEIO_FFMPEG_EXE={given!r} leads to none" if given else "imageio-ffmpeg has brought none"
+    return HoofEnvError(
+        f"films need the program ffmpeg, and {found}: install it, perhaps by pip install --force-reinstall"
+        " imageio-ffmpeg, and let IMAGEIO_FFMPEG_EXE be its path, or unset"
+    )
 
 
 def frames(
@@ -88,7 +108,8 @@ def frames(
 
 def write_film(pictures: Iterable[NDArray[np.uint8]], path: Path, fps: float) -> int:
     """Write pictures of one shape (height, width, 3) to an .mp4 or a .gif and return how many; an older file
-    is replaced when this is whole. `OutputError` where the folder cannot be written, or the disk is full."""
+    is replaced when this is whole. `OutputError` where the folder cannot be written, or the disk is full, and
+    `HoofEnvError` where there is no ffmpeg."""
     check_film(path, fps)
     with staged(path.parent) as stage:
         writer: Any = None
@@ -126,7 +147,10 @@ def _writer(path: Path, shape: tuple[int, ...], fps: float) -> Any:
     writer = imageio_ffmpeg.write_frames(
         str(path), shape[1::-1], fps=fps, macro_block_size=1, ffmpeg_log_level="error", **options
     )
-    writer.send(None)
+    try:
+        writer.send(None)  # looks for it, and starts it
+    except (RuntimeError, OSError):
+        raise no_ffmpeg() from None
     return writer
 
 

@@ -186,3 +186,20 @@ def test_a_full_disk_is_one_line():
         )
     assert done.returncode == 2
     assert done.stderr == "hoof-env: error: cannot write the output: No space left on device\n"
+
+
+def test_an_id_of_a_module_in_the_current_folder(tmp_path):
+    """The command finds it, as `python -m hoof_env` does; its page says which module registers it."""
+    (tmp_path / "my_task.py").write_text(
+        'import hoof_env\nhoof_env.register("mine/X-v0", base="rail", friction=0.7)\n'
+    )
+    bin = tmp_path / "bin"
+    bin.mkdir()
+    (bin / "hoof-env").write_text("import sys\nfrom hoof_env.cli import main\nsys.exit(main())\n")
+    command = [sys.executable, str(bin / "hoof-env"), "manual", "--id", "my_task:mine/X-v0"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    lines = done.stdout.splitlines()
+    assert lines[0] == "# mine/X-v0"
+    assert "import my_task  # registers the ids" in lines
+    assert 'A worker process that has not imported it takes `"my_task:mine/X-v0"`.' in lines

@@ -8,8 +8,10 @@ this module checks arguments and keeps the state. A number has the same bits alo
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -193,6 +195,10 @@ class TrunkEngine(Scene):
         self.num_threads = limit_threads(self.num_threads)
         self._choose_kernel()
 
+    def __deepcopy__(self, memo: Any) -> TrunkEngine:
+        """What never changes, such as the legs' tables, is shared."""
+        return copy.copy(self)
+
     # What it is like
 
     @property
@@ -353,7 +359,7 @@ class TrunkEngine(Scene):
 
     def get_state(self) -> dict[str, Any]:
         """Everything that changes, as arrays of their own: continuing from it is bit-identical."""
-        return self._copy(memory.STATE) | {"layout": self._layout}
+        return self._copy(memory.STATE) | {"layout": dict(self._layout)}
 
     def set_state(self, state: Mapping[str, Any]) -> None:
         """Put back what `get_state` gave, and evaluate forces and accelerations there.
@@ -363,12 +369,16 @@ class TrunkEngine(Scene):
                 numbers that are not finite or beyond `FARTHEST`, in environments that were reset once.
         """
         arrays, reset = memory.read_state(self._layout, self._memory, state)
+        result = np.where(reset, 0.0, self._memory.result)
         self._put(arrays)
-        self._memory.result[reset], self._memory.stride_sums[:] = 0.0, 0.0
-        self.observe()
+        self._memory.result[:] = result
+        self._go(0)
+        self._put(arrays)
+        self._memory.result[:], self._memory.stride_sums[:] = result, 0.0
 
-    @property
+    @cached_property
     def _layout(self) -> dict[str, Any]:
+        """What a state must share; its digests take as long as ten steps."""
         return memory.identity_of(
             self, self.filters, num_envs=self.num_envs, sim_dt=self.sim_dt, substeps=self.substeps
         )

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any, NamedTuple
@@ -347,6 +348,11 @@ def start(
 STATE = ("trunk", "limbs", "strides", "command", "account", "trunk_settings", "limb_settings")
 """Arrays that hold what changes."""
 
+_MOVING = TrunkState.rows("moving").start
+_PLACES = [
+    _MOVING + row for name in ("centre", "pitch") for row in range(*Moving.rows(name).indices(Moving.size))
+]
+_ANGLES = LegState.rows("theta")
 _FIRST_ROW = layout.LegSettings.rows("first_row")
 
 
@@ -366,12 +372,13 @@ def read_state(
     for name in STATE:
         shape = getattr(memory, name).shape
         try:
-            arrays[name] = np.array(state[name], dtype=np.float64)
+            arrays[name] = np.asarray(state[name], np.float64)
         except (TypeError, ValueError):
             raise ParameterError(f"state[{name!r}]: expected numbers, got {state[name]!r}") from None
         if arrays[name].shape != shape:
             raise ParameterError(f"state[{name!r}]: expected shape {shape}, got {arrays[name].shape}")
     reset = _check_numbers("state", arrays)
+    arrays["limb_settings"] = arrays["limb_settings"].copy()  # the caller's
     arrays["limb_settings"][:, _FIRST_ROW] = memory.limb_settings[:, _FIRST_ROW]  # an address
     return arrays, reset
 
@@ -387,13 +394,16 @@ def _check_numbers(title: str, arrays: Mapping[str, Floats]) -> NDArray[np.bool_
     """Which environments were ever reset; `ParameterError` where a number of theirs is not finite, or a place
     or an angle too far away to be looked up."""
     trunk, limbs = arrays["trunk"], arrays["limbs"]
-    reset: NDArray[np.bool_] = np.logical_not(np.isnan(trunk).all(0) & np.isnan(limbs).all((0, 1)))
-    for name in STATE:
-        finite(f"{title}[{name!r}]", arrays[name][..., reset])
-    moving = trunk[TrunkState.rows("moving")]
-    for name in ("centre", "pitch"):
-        finite(f"{title}['trunk'], places and pitch", moving[Moving.rows(name)][:, reset], FARTHEST)
-    finite(f"{title}['limbs'], crank angles", limbs[:, LegState.rows("theta")][..., reset], FARTHEST)
+    reset: NDArray[np.bool_] = np.ones(trunk.shape[-1], bool)
+    places = trunk[_PLACES], limbs[:, _ANGLES]
+    squares = sum(float(np.vdot(part, part)) for part in arrays.values())
+    farthest = max(float(np.vdot(part, part)) for part in places)
+    if not (math.isfinite(squares) and farthest <= FARTHEST**2):  # else all is good, found in no time
+        reset = np.logical_not(np.isnan(trunk).all(0) & np.isnan(limbs).all((0, 1)))
+        for name in STATE:
+            finite(f"{title}[{name!r}]", arrays[name][..., reset])
+        finite(f"{title}['trunk'], places and pitch", places[0][:, reset], FARTHEST)
+        finite(f"{title}['limbs'], crank angles", places[1][..., reset], FARTHEST)
     return reset
 
 
@@ -422,6 +432,8 @@ def identity_of(scene: Scene, filters: FilterSettings, **numbers: float) -> dict
 
 def _differences(expected: dict[str, Any], given: dict[str, Any]) -> str:
     """Where two layouts differ, for people; empty if nowhere."""
+    if expected == given:
+        return ""
     names = [name for name in {**expected, **given} if expected.get(name) != given.get(name)]
     return "; ".join(f"{name}: expected {expected.get(name)!r}, got {given.get(name)!r}" for name in names)
 

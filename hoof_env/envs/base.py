@@ -15,12 +15,14 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.envs.batch import EpisodeBatch
-from hoof_env.envs.settings import PER_EPISODE, SETTINGS, Settings, to_json
+from hoof_env.envs.conditions import CHANGEABLE
+from hoof_env.envs.settings import PER_EPISODE, SETTINGS, Settings, as_plain, json_value, to_json
 from hoof_env.envs.tasks import Task, task_of
 from hoof_env.errors import FixedSettingError, ParameterError, check_choice
 from hoof_env.gait import GaitParameters
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
+from hoof_env.render.renderer import check_side
 
 
 def fixed_setting(name: str) -> FixedSettingError:
@@ -28,6 +30,8 @@ def fixed_setting(name: str) -> FixedSettingError:
     how = "gymnasium.make(id, ...)" if name in SETTINGS else "the arguments of gymnasium.make"
     if name in PER_EPISODE:
         how += f", or reset(options={{'parameters': {{{name!r}: ...}}}}) for an episode"
+    if name in CHANGEABLE:
+        how += f", or from the next reset on by change_settings({name}=...)"
     return FixedSettingError(f"{name}: expected no assignment, which would change nothing; set it by {how}")
 
 
@@ -39,9 +43,13 @@ def array_of(given: Any) -> NDArray[Any]:
         return np.empty(0, object)
 
 
+ANY_SEED = np.random.SeedSequence(0)
+"""Of a generator whose state is set at once: to ask the system for entropy takes as long as a step."""
+
+
 def generator_of(state: Any) -> np.random.Generator:
     """A generator in the state that a `PCG64` had; `ParameterError` if it is none."""
-    generator = np.random.Generator(np.random.PCG64())
+    generator = np.random.Generator(np.random.PCG64(ANY_SEED))
     try:
         generator.bit_generator.state = state
     except (TypeError, ValueError, KeyError):
@@ -60,23 +68,31 @@ class LegBase:
     """
 
     task: Task
-    settings: Settings
     batch: EpisodeBatch
     metadata: dict[str, Any]
     render_mode: str | None
+    _size: tuple[int, int]
     _spec: EnvSpec | None = None
+    _as_json: tuple[Settings | None, dict[str, Any], list[str]] = (None, {}, [])
     _phase = "new"
     """Then "running", and "closed"; a single environment also has "ended" and "warned"."""
 
     def _make(
-        self, task: str, given: Mapping[str, Any], n: int, render_mode: str | None, num_threads: int = 1
+        self,
+        task: str,
+        given: Mapping[str, Any],
+        n: int,
+        render_mode: str | None,
+        size: tuple[int, int],
+        num_threads: int = 1,
     ) -> list[Any]:
         """Make `n` environments; returns the space of an observation and of an action."""
         if render_mode is not None:
             check_choice("render_mode", render_mode, self.metadata["render_modes"])
+        self._size = check_side("width", size[0]), check_side("height", size[1])
         self.task, self.render_mode = task_of(task), render_mode
-        self.settings = self.task.settings(given)
-        self.batch = EpisodeBatch(self.task, self.settings, n, num_threads)
+        self._given = dict(given)
+        self.batch = EpisodeBatch(self.task, self.task.settings(given), n, num_threads)
         self.metadata = {**self.metadata, "render_fps": max(1, round(1 / self.batch.dt))}
         sizes = len(self.batch.names), len(self.batch.body.action_names)
         return [spaces.Box(-1.0, 1.0, (size,), np.float32) for size in sizes]
@@ -102,10 +118,41 @@ class LegBase:
 
     @spec.setter
     def spec(self, spec: EnvSpec | None) -> None:
-        if spec is not None and spec.max_episode_steps is None:
+        if spec is not None:
             spec = copy.copy(spec)  # it may be the registered one
-            spec.max_episode_steps = self.batch.steps_per_episode
+            spec.kwargs = {name: as_plain(name, value) for name, value in spec.kwargs.items()}  # for to_json
+            if spec.max_episode_steps is None:
+                spec.max_episode_steps = self.batch.steps_per_episode
         self._spec = spec
+
+    @property
+    def settings(self) -> Settings:
+        """Those of the episode; of many environments those of every episode that starts from now on."""
+        return self.batch.asked
+
+    def change_settings(self, **changes: Any) -> None:
+        """Change settings from the next reset on, as a curriculum does: the episode goes on with the old.
+        Of many environments each takes the new ones when it starts again, by itself or by `reset`.
+
+        Args:
+            changes: some of `target_speed`, `target_seconds`, `terrain`, `reward_weights` and `randomize`, as
+                the arguments of `gymnasium.make`: afterwards all is as if it had been made with them.
+
+        Raises:
+            ParameterError: a value is out of range, or an episode of these settings would lack something;
+                nothing has changed then.
+            FixedSettingError: another setting.
+        """
+        self._check_open("change_settings")
+        for name in changes:
+            if name in SETTINGS and name not in CHANGEABLE:
+                raise FixedSettingError(
+                    f"change_settings: expected some of {', '.join(CHANGEABLE)}, got {name!r}, which stays as"
+                    " it was made"
+                )
+        given = self._given | changes
+        self.batch.change(self.task.settings(given))
+        self._given = given
 
     @property
     def manual(self) -> str:
@@ -235,7 +282,9 @@ class LegBase:
             got = repr(form) if "actions" in state else "one of an older form (positions in a box)"
             raise ParameterError(f"state: expected one whose actions are {self.action_form}, got {got}")
         there = state["settings"] if isinstance(state["settings"], Mapping) else {}
-        here = to_json(self.settings)
+        here = self._settings_as_json()
+        if here == there:
+            return
         unlike = [f"{k}: {v!r} here, {there.get(k)!r} there" for k, v in here.items() if there.get(k) != v]
         if unlike:
             raise ParameterError(f"state: of other settings; {'; '.join(unlike)}")
@@ -243,5 +292,16 @@ class LegBase:
     def _state_of_batch(self) -> dict[str, Any]:
         """What `get_state` gives but for the generators."""
         self._check_started("get_state")
-        about = {"id": self.task.id, "actions": self.action_form, "settings": to_json(self.settings)}
+        values = self._settings_as_json()
+        settings = values | {name: json_value(values[name]) for name in self._as_json[2]}  # nobody else's
+        about = {"id": self.task.id, "actions": self.action_form, "settings": settings}
         return about | self.batch.get_state()
+
+    def _settings_as_json(self) -> dict[str, Any]:
+        """As values that JSON can hold, found once for these settings."""
+        found, values, _ = self._as_json
+        if found is not self.settings:
+            values = to_json(self.settings)
+            changeable = [name for name, value in values.items() if isinstance(value, (dict, list))]
+            self._as_json = self.settings, values, changeable
+        return values

@@ -7,6 +7,7 @@ number of its neighbours: starts are drawn from a generator of its own, and the 
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -23,6 +24,13 @@ from hoof_env.dynamics.parts import GRAVITY, LARGEST, Result, broken
 from hoof_env.dynamics.step_length import StepLength
 from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.envs import step as kernels
+from hoof_env.envs.conditions import (
+    RowConditions,
+    conditions_of,
+    enter,
+    keep_others,
+    under_each,
+)
 from hoof_env.envs.episode import ACTIONS, FAILED, SUMS, episode_layout, task_type
 from hoof_env.envs.horse import Horse
 from hoof_env.envs.infos import Measurements, named
@@ -30,6 +38,7 @@ from hoof_env.envs.observation import MIDDLE, check_groups, groups_of, observed
 from hoof_env.envs.one_leg import OneLeg
 from hoof_env.envs.paper_solver import PaperSolver, check_paper
 from hoof_env.envs.parameters import (
+    check_drift,
     check_parameters,
     draw_parameters,
     extremes,
@@ -77,8 +86,12 @@ class EpisodeBatch:
         ParameterError: a setting is out of range or of the wrong type.
     """
 
-    def __init__(self, task: Task, settings: Settings, num_envs: int, num_threads: int = 1) -> None:
-        self.task, self.num_envs = task, num_envs
+    def __init__(
+        self, task: Task, settings: Settings, num_envs: int, num_threads: int = 1, *, runs: bool = True
+    ) -> None:
+        self.task, self.num_envs, self.asked = task, num_envs, settings
+        self.conditions = RowConditions(num_envs)
+        self._next: EpisodeBatch | None = None
         self.settings = s = resolved(settings)
         is_paper = s.solver == "paper"
         check_choice("integrator", s.integrator, INTEGRATORS if is_paper else SCHEMES)
@@ -92,6 +105,7 @@ class EpisodeBatch:
         if is_paper:
             check_paper(s)
         self.body = Horse(s) if task.is_horse else OneLeg(s)
+        check_drift(self._terrain, s.terrain, s.trunk, self.body.height)
         self.terms = tuple(term.key for term in task.terms)
         self.weights = check_weights(s.reward_weights, task.terms)
         self.substeps = substeps_of(s.dt, s.sim_dt)
@@ -136,6 +150,8 @@ class EpisodeBatch:
         self._task = self._task_record()
         self._open()
         self.now.weight[:], self.now.switch[:] = self.engine.weight, np.inf  # idle columns never switch
+        if not runs:
+            return
         try:
             self._compile()
         except NumbaError as error:
@@ -171,10 +187,9 @@ class EpisodeBatch:
         return len(self.body.start_names) + len(self.body.gait_names)
 
     def _open(self) -> None:
-        """Find the arrays where they are now, and the kernels."""
+        """Find the kernels, and the arrays where they are now."""
         s = self.settings
         self.entries = observed(self.groups, s.trunk, s.drive, self.task.entries)
-        self.now = views(self._episode_layout, self.episode)
         self.measurements = Measurements(self.engine.features, self.body.legs)
         self._kernels = k = kernels.step_kernels(
             self.task.terms, self.task.entries, self.task.contact_law, self.engine.features, self.body.legs
@@ -185,6 +200,11 @@ class EpisodeBatch:
         )
         if self.paper:
             self.kernel = self._step_paper
+        self.find()
+
+    def find(self) -> None:
+        """Find the arrays where they are now."""
+        self.now = views(self._episode_layout, self.episode)
         arrays = (
             *self.engine.arrays, self.episode, self._task, self.actions, self.observations, self.rewards
         )  # fmt: skip
@@ -228,8 +248,52 @@ class EpisodeBatch:
     def measured(self) -> dict[str, Floats]:
         """What is observed now, before it is scaled: the entries by name, shape (num_envs,)."""
         out = np.zeros((len(self.names), self.num_envs))
-        self._kernels.measure_one(self.addresses, out)
+        if self.conditions.are_mixed:
+
+            def measure(rows: NDArray[np.int64]) -> None:
+                found = np.zeros_like(out)
+                self._kernels.measure_one(self.addresses, found)
+                out[:, rows] = found[:, rows]
+
+            under_each(self, np.arange(self.num_envs), measure)
+        else:
+            self._kernels.measure_one(self.addresses, out)
         return dict(zip(self.names, out, strict=True))
+
+    # Conditions
+
+    def change(self, settings: Settings) -> None:
+        """Start every episode from now on with other settings, of those that `conditions.CHANGEABLE` names.
+
+        Raises:
+            ParameterError: a setting is out of range; nothing has changed then.
+        """
+        made = EpisodeBatch(self.task, settings, 1, runs=False)
+        made.limit(self.steps_per_episode)
+        made.num_envs = self.num_envs  # for which options are checked
+        self._next = made
+
+    def _adopt(self) -> None:
+        """Work under the conditions that `change` asked for."""
+        assert self._next is not None
+        old, begun = [*self.randomize], self.begun
+        self.conditions.add(conditions_of(self), conditions_of(self._next))
+        enter(self, self.conditions.all[-1])
+        self._next = None
+        first = self.begun_rows
+        self.begun = np.full((first + len(self.randomize), self.num_envs), np.nan)
+        self.begun[:first] = begun[:first]
+        for k, name in enumerate(self.randomize):
+            if name in old:
+                self.begun[first + k] = begun[first + old.index(name)]
+
+    def alone(self, env: int) -> TrunkEngine:
+        """An engine like that of one environment."""
+        if not self.conditions.are_mixed:
+            return self.engine.alone()
+        (engine,) = under_each(self, np.array([env]), lambda rows: self.engine.alone())
+        made: TrunkEngine = engine
+        return made
 
     # Episodes
 
@@ -241,6 +305,8 @@ class EpisodeBatch:
     def check_options(self, options: Any) -> dict[str, Any]:
         """Reset options as `reset` takes them; `ParameterError` of whatever can be wrong with them, so that a
         refused reset changes nothing."""
+        if self._next is not None:
+            return self._next.check_options(options)
         checked = self.body.check_options(options, self.engine.trunk, self.settings)
         if self.paper and checked.get("parameters"):
             raise ParameterError(
@@ -282,7 +348,26 @@ class EpisodeBatch:
 
         Returns the "parameters" that were drawn or set, by name, shape (len(envs),).
         """
-        which, now = np.asarray(envs, np.int64), self.now
+        which = np.asarray(envs, np.int64)
+        if self._next is not None:
+            self._adopt()
+            self._varied[:] = True  # rows of settings are of the old ones
+        if self.conditions.all:
+            self.conditions.start(which)
+        if self.conditions.are_mixed:
+            drawn: dict[str, Floats] = keep_others(
+                self, which, lambda: self._start(which, generators, options)
+            )
+            return drawn
+        return self._start(which, generators, options)
+
+    def _start(
+        self,
+        which: NDArray[np.int64],
+        generators: Sequence[np.random.Generator],
+        options: Mapping[str, Any],
+    ) -> dict[str, Floats]:
+        now = self.now
         options = {**self.task.start, **options}
         parameters = self.randomize | options.get("parameters", {})
         drawn = {name: np.zeros(len(which)) for name in parameters}
@@ -308,7 +393,7 @@ class EpisodeBatch:
         if self.target_speed and self.speed_changes:
             now.target[which] = [generator.uniform(*self.target_speed) for generator in generators]
             self._draw_targets(which, generators)
-        if "target_speed" in options:  # of a horse, and for the whole episode
+        if "target_speed" in options:  # for the whole episode
             now.target[which], now.switch[which] = options["target_speed"], np.inf
         self.body.settle(start, now.target[which], options, self.engine)
         self.engine.reset(start.commands, start.theta, envs=which, **start.trunk)
@@ -334,9 +419,21 @@ class EpisodeBatch:
 
     def _draw_targets(self, envs: NDArray[np.int64], generators: Sequence[np.random.Generator]) -> None:
         """When other speeds are commanded, and which, with a generator for each of `envs`."""
-        assert self.target_speed
+        if self.conditions.are_mixed:
+            each = dict(zip(envs.tolist(), generators, strict=True))
+            for conditions, rows in self.conditions.groups(envs):
+                self._draw_between(rows, [each[env] for env in rows.tolist()], conditions)
+        else:
+            self._draw_between(envs, generators, vars(self))
+
+    def _draw_between(
+        self,
+        envs: NDArray[np.int64],
+        generators: Sequence[np.random.Generator],
+        conditions: Mapping[str, Any],
+    ) -> None:
         when, which = np.array([generator.random(2) for generator in generators]).reshape(-1, 2).T
-        (shortest, longest), (low, high) = self.target_seconds, self.target_speed
+        (shortest, longest), (low, high) = conditions["target_seconds"], conditions["target_speed"]
         steps = np.rint((shortest + (longest - shortest) * when) / self.dt)
         now, step = self.now.target[envs], self.body.command_step
         low, high = np.maximum(low, now - step), np.minimum(high, now + step)
@@ -349,8 +446,16 @@ class EpisodeBatch:
         Nothing is drawn for environments that are `idle`, shape (num_envs,), as their episode is over. Where
         an action is not a number there is a `ParameterError`, and nothing has happened.
         """
-        happened = np.bitwise_or.reduce(run_together(self.kernel, self._blocks, self.engine.num_threads))
+        if self.conditions.are_mixed:
+            all_rows = np.arange(self.num_envs)
+            happened = np.bitwise_or.reduce(under_each(self, all_rows, lambda rows: self._step()))
+        else:
+            happened = self._step()
         return self.follow(int(happened), generators, idle)
+
+    def _step(self) -> int:
+        found: int = np.bitwise_or.reduce(run_together(self.kernel, self._blocks, self.engine.num_threads))
+        return found
 
     def follow(
         self, happened: int, generators: Sequence[np.random.Generator], idle: NDArray[np.bool_] | None = None
@@ -360,7 +465,9 @@ class EpisodeBatch:
             raise ParameterError("action: expected finite numbers, got some that are not")
         if happened & kernels.SOME_ENDED and not self.paper:
             put_back = np.flatnonzero(broken(self.engine.results))
-            if put_back.size:
+            if put_back.size and self.conditions.are_mixed:
+                under_each(self, put_back, self._observe_broken)
+            elif put_back.size:
                 self._observe_broken(put_back)
         if happened & kernels.SOME_SWITCHED:
             due = (self.now.steps >= self.now.switch)[: self.num_envs]
@@ -397,6 +504,8 @@ class EpisodeBatch:
         infos["gait"] = named(begun[len(names) : first].T, self.body.gait_names)
         if self.randomize:
             infos["parameters"] = named(begun[first:].T, tuple(self.randomize))
+        if self.target_speed:
+            infos["target_speed"] = self.now.target[:n].copy()
         infos["measured"] = measured.T.view(self.measurements.kind)
         infos.update(zip(self.terms, self.now.terms[:, :n].copy(), strict=True))
         return infos
@@ -451,14 +560,61 @@ class EpisodeBatch:
     # State
 
     def get_state(self) -> dict[str, Any]:
-        """Everything that changes, but for the generators."""
+        """Everything that changes, but for the generators.
+
+        Raises:
+            ParameterError: some episodes are under older settings than others.
+        """
+        if self.conditions.are_mixed:
+            raise ParameterError(
+                "get_state: expected one set of settings for all, but some episodes began before they were"
+                " changed; reset() starts all anew"
+            )
         state = {"engine": self.engine.get_state(), "episode": self.episode[:, : self.num_envs].copy()}
         state["begun"] = self.begun.copy()
         return state | ({"paper": self.paper.get_state()} if self.paper else {})
 
+    @property
+    def ended_row(self) -> int:
+        """Of the memory of episodes."""
+        row: int = self._episode_layout.rows("ended").start
+        return row
+
+    def spread(self, state: Mapping[str, Any]) -> dict[str, Any]:
+        """The state of one environment as one of `num_envs` that are where it is.
+
+        Raises:
+            ParameterError: it is no state of one.
+        """
+        n = self.num_envs
+
+        def repeated(values: Any) -> Any:
+            return np.repeat(np.asarray(values, np.float64), n, -1)
+
+        try:
+            engine, layout = state["engine"], state["engine"]["layout"]
+            if layout["num_envs"] != 1 or np.shape(state["episode"])[-1] != 1:
+                raise ValueError
+            parts = {name: repeated(values) for name, values in engine.items() if name != "layout"}
+            found = {**state, "engine": {**parts, "layout": {**layout, "num_envs": n}}}
+            found |= {name: repeated(state[name]) for name in ("episode", "begun") if name in state}
+            if "paper" in state:
+                paper = state["paper"]
+                found["paper"] = {"legs": [*paper["legs"]] * n} | {
+                    name: np.repeat(paper[name], n) for name in ("accounts", "last")
+                }
+        except (KeyError, TypeError, ValueError, IndexError):
+            raise ParameterError(
+                "state: expected what get_state gives of one environment, or of this vector environment"
+            ) from None
+        return found
+
     def _is_possible(self, episode: Floats) -> bool:
         """Whether weights, and the gaits of horses, are numbers that can be."""
-        layout, begun = self._episode_layout, ~np.isnan(self.begun[0])
+        layout = self._episode_layout
+        if self.body.legs == 1 and (episode[layout.rows("weight")] > 0).all():
+            return True
+        begun = ~np.isnan(self.begun[0])
         rows = episode[:, begun]
         gaits = rows[layout.rows("gait")] if self.body.legs > 1 else rows[:0]
         return bool((rows[layout.rows("weight")] > 0).all() and np.isfinite(gaits).all())
@@ -488,6 +644,8 @@ class EpisodeBatch:
             self.paper.set_state(*of_paper)
         self.episode[:, : self.num_envs], self.begun[:] = episode, begun
         self._varied[:] = True
+        if self.conditions.all:
+            self.conditions.start(np.arange(self.num_envs))
         self._observe(self.addresses)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -498,4 +656,18 @@ class EpisodeBatch:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
+        self.conditions = self.conditions.copied()
         self._open()
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> EpisodeBatch:
+        """What never changes is shared: a planner copies at every node of its tree."""
+        made = object.__new__(type(self))
+        vars(made).update(vars(self))
+        for name in ("engine", "_varied", "begun", "episode", "actions", "observations", "rewards", "_task"):
+            setattr(made, name, copy.deepcopy(getattr(self, name), memo))
+        if self.paper:
+            made.paper = copy.deepcopy(self.paper, memo | {id(self.engine): made.engine})
+            made.kernel = made._step_paper
+        made.conditions = self.conditions.copied()
+        made.find()
+        return made

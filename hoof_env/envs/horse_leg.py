@@ -21,7 +21,9 @@ from hoof_env.envs.infos import named
 from hoof_env.envs.recording import Recording
 from hoof_env.envs.reward import failure
 from hoof_env.envs.settings import Keywords
+from hoof_env.envs.step import SOME_SWITCHED
 from hoof_env.errors import ParameterError, count, flag
+from hoof_env.render.renderer import USUAL_SIZE
 
 
 class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
@@ -30,6 +32,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     Args:
         task: name in `tasks.TASKS`; the registered ids set it.
         render_mode: "rgb_array" or "human".
+        width, height: of a picture [pixels].
         settings: any of `settings.Settings`; the manual page (`manual`) says what they mean.
 
     Attributes:
@@ -47,10 +50,18 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}  # type: ignore[misc]
 
     def __init__(
-        self, *, task: str = "leg", render_mode: str | None = None, **settings: Unpack[Keywords]
+        self,
+        *,
+        task: str = "leg",
+        render_mode: str | None = None,
+        width: int = USUAL_SIZE[0],
+        height: int = USUAL_SIZE[1],
+        **settings: Unpack[Keywords],
     ) -> None:
-        self.observation_space, self.action_space = self._make(task, settings, 1, render_mode)
-        self._recording: Recording | None = Recording(self.batch) if render_mode else None
+        spaces_of = self._make(task, settings, 1, render_mode, (width, height))
+        self.observation_space, self.action_space = spaces_of
+        self._began_with = b"", 0.0
+        self._recording: Recording | None = Recording(self.batch, 0, self._size) if render_mode else None
         self._attach()
 
     def _attach(self) -> None:
@@ -72,7 +83,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         return float(self.batch.now.weight[0])
 
     def _each(self, values: Any) -> Any:
-        return values[0]
+        return values[0] if np.ndim(values) > 1 else float(values[0])
 
     def record(self) -> dict[str, NDArray[np.float64]]:
         """State and report of the engine at every substep of the last control step, or at the start, by name,
@@ -95,8 +106,8 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
         Args:
             seed: of the generator, a whole number from 0; None goes on with it.
-            options: "gait", "crank_angle" [rad], "speed" [m/s], "height" [m], "x" [m], "parameters"; see
-                the manual page.
+            options: "gait", "crank_angle" [rad], "speed" [m/s], "height" [m], "x" [m], "target_speed"
+                [m/s] for the whole episode, "parameters"; see the manual page.
 
         Returns:
             The observation, float32, and what was drawn or set.
@@ -107,12 +118,15 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._check_open("reset")
         checked = self.batch.check_options(options)  # before the generator is touched
         super().reset(seed=None if seed is None else count("seed", seed, low=0))
-        if self._recording is not None:
-            self._recording.start()
+        before = self.batch.addresses
         parameters = self.batch.reset([0], [self.np_random], checked)
+        if self.batch.addresses is not before:  # other settings
+            self._attach()
         self._phase = "running"
         if self._recording is not None:
-            self._show(restart=True)
+            self._recording.begin()
+            if self.render_mode == "human":
+                self.render()
         self._begin()
         info = copy.deepcopy(self._begun[0]()) | {"measured": self._views[-1]()}
         if parameters:
@@ -142,10 +156,8 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             buffer[:] = action  # four float32, the cheapest way
         except (TypeError, ValueError, BufferError):
             self._read_action(action)
-        if self._recording is not None and np.isfinite(buffer).all():  # else nothing will happen
-            self._recording.start()
         happened = kernel(addresses)  # not through the batch: a call costs as much as a substep
-        ended = happened != 0 and self.batch.follow(happened, (self.np_random,))
+        ended = happened != 0 and self._follow(happened)
         info, gait = self._begun[0](), self._begun[1]()  # all keys are there, and stay in their places
         info["gait"], info["measured"] = gait, measure()
         if draws:
@@ -165,8 +177,17 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             if broken(self.batch.engine.results)[0]:
                 info["measured"][self.batch.measurements.last_step] = 0.0
         if self._recording is not None:
-            self._show()
+            self._recording.add()
+            if self.render_mode == "human":
+                self.render()
         return observe(), rewards[0], failed, truncated, info
+
+    def _follow(self, happened: int) -> bool:
+        """After a step in which something happened; returns whether the episode ended."""
+        ended = self.batch.follow(happened, (self.np_random,))
+        if happened & SOME_SWITCHED:
+            self._begin()
+        return ended
 
     def _warn_ended(self) -> None:
         if self._phase == "ended":
@@ -184,8 +205,14 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         info["gait"] = gait = named(row[len(body.start_names) : first], body.gait_names)
         if self.batch.randomize:
             info["parameters"] = named(row[first:], [*self.batch.randomize])
+        if self.batch.target_speed:
+            info["target_speed"] = self.batch.now.target[0]
         info |= {"measured": None, **dict.fromkeys(self.batch.terms, np.float64(0.0))}
-        self._begun = info.copy, gait.copy
+        self._begun, self._began_with = (info.copy, gait.copy), self._start_and_target()
+
+    def _start_and_target(self) -> tuple[bytes, float]:
+        """What infos say that no step measures."""
+        return self.batch.begun.tobytes(), float(self.batch.now.target[0])
 
     def _read_action(self, action: Any) -> None:
         given = array_of(action)
@@ -212,15 +239,6 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self._recording is not None:
             self._recording.close()
 
-    def _show(self, restart: bool = False) -> None:
-        """Keep what happened for the next picture; in a window at once."""
-        if self.render_mode is None:
-            return
-        assert self._recording is not None
-        self._recording.keep(restart)
-        if self.render_mode == "human":
-            self.render()
-
     # State
 
     def get_state(self) -> dict[str, Any]:
@@ -242,13 +260,14 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.batch.set_state(state)
         self.np_random = generator
         self._phase = "ended" if self.batch.now.ended[0] else "running"
-        self._begin()
+        if self._start_and_target() != self._began_with:  # else infos say it
+            self._begin()
         if self._recording is not None:
-            self._recording.forget()
+            self._recording.begin()
         return self.batch.observations[0].copy()
 
     def __getstate__(self) -> dict[str, Any]:
-        return {k: v for k, v in vars(self).items() if k not in ("_views", "_begun")}
+        return {k: v for k, v in vars(self).items() if k not in ("_views", "_begun", "_began_with")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
@@ -331,9 +350,15 @@ class HorseLegMOEnv(HorseLegEnv):
     """
 
     def __init__(
-        self, *, task: str = "leg", render_mode: str | None = None, **settings: Unpack[Keywords]
+        self,
+        *,
+        task: str = "leg",
+        render_mode: str | None = None,
+        width: int = USUAL_SIZE[0],
+        height: int = USUAL_SIZE[1],
+        **settings: Unpack[Keywords],
     ) -> None:
-        super().__init__(task=task, render_mode=render_mode, **settings)
+        super().__init__(task=task, render_mode=render_mode, width=width, height=height, **settings)
         self.reward_space = spaces.Box(
             np.full(3, -np.inf, np.float32), np.array([np.inf, 0.0, 0.0], np.float32), (3,), np.float32
         )

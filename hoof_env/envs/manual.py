@@ -37,6 +37,7 @@ from hoof_env.errors import OutputError, ParameterError, check_choice
 from hoof_env.gait import LIMITS, QUICK, WIDEST, FilterSettings
 from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS
 from hoof_env.leg.geometry import preset_names
+from hoof_env.render.renderer import USUAL_SIZE
 
 HERE = Path(__file__).parent
 PAGE, MO_PAGE = (
@@ -104,9 +105,12 @@ def page(task: str, with_film: bool = False) -> str:
     defaults |= {name: f"**{defaults[name]}**" for name in what.defaults}
     hills = {name: literal(value) for name, value in HILLS.items()}
     head = ("Name", "Default", "Unit", "Meaning")
+    module = what.module or ("hoof_env" if what.id.startswith("hoof_env/") else "my_module")
     text = Template(PAGE).substitute(
         name=what.name,
         id=what.id,
+        module=module,
+        module_words="the package" if module == "hoof_env" else "it",
         summary=what.summary,
         film=film,
         about=what.about,
@@ -130,7 +134,7 @@ def page(task: str, with_film: bool = False) -> str:
         start=_start(s, what.start),
         options=markdown_table(("Option", "Unit", "Range", "Meaning"), _options(what.is_horse)),
         parameters=", ".join(f"`{name}`" for name in PER_EPISODE if not what.is_horse or _can_be(name, s)),
-        infos=markdown_table(("Key", "Unit", "Meaning"), _rows("horse_info" if what.is_horse else "info")),
+        infos=markdown_table(("Key", "Unit", "Meaning"), _infos(what, s)),
         measured=str(len(measured_names(_features(s, body), body.legs))),
         quantities=markdown_table(("Name", "In", "Unit", "Meaning"), _quantities(what.is_horse)),
         leaves=Template(trunk["leaves"]).substitute(height=f"{body.height:.4g}"),
@@ -138,7 +142,7 @@ def page(task: str, with_film: bool = False) -> str:
         figures=markdown_table(("Figure", "Unit", "Meaning"), _rows("summary")),
         vector_arguments=markdown_table(("Argument", "Default", "Meaning"), _vector_arguments()),
         bold=WORDS["bold"] if what.defaults else "",
-        settings=markdown_table(head, [*_settings(what, defaults), RENDER_MODE]),
+        settings=markdown_table(head, [*_settings(what, defaults), *PICTURES]),
         terrain=WORDS["terrain"] + markdown_table(head, _rows("hills", hills)) if s.terrain else "",
     )
     return _tidy(text)
@@ -190,7 +194,16 @@ def write_pages(out: Path, with_films: bool = False) -> list[Path]:
 
 # Parts of a page
 
-RENDER_MODE = ("`render_mode`", "None", "", '"rgb_array" or "human"')
+PICTURES = (
+    (
+        "`render_mode`",
+        "None",
+        "",
+        '"rgb_array" or "human"; a step costs more only where a picture is asked for',
+    ),
+    ("`width`", str(USUAL_SIZE[0]), "pixels", "of a picture, from 480"),
+    ("`height`", str(USUAL_SIZE[1]), "pixels", "of a picture, from 270"),
+)
 
 
 def _tidy(text: str) -> str:
@@ -298,6 +311,11 @@ def _options(of_horse: bool) -> Iterable[tuple[str, ...]]:
         low, high = ranges.get(name, (0.0, 0.0))
         within = "" if low == high else f"{low:.7g} to {high:.7g}" if math.isfinite(high) else f"from {low:g}"
         yield f"`{name}`", unit, within, meaning
+
+
+def _infos(what: Task, s: Settings) -> list[tuple[str, ...]]:
+    found = _rows("horse_info" if what.is_horse else "info")
+    return [row for row in found if row[0] != "`target_speed`" or s.target_speed is not None]
 
 
 def _vector_arguments() -> list[tuple[str, ...]]:

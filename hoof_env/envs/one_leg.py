@@ -87,6 +87,20 @@ def reach_per_rate(dt: float, substep: float) -> float:
     return reach
 
 
+def check_reachable(name: str, gaits: Floats) -> None:
+    """`ParameterError` where gait parameters, shape (..., 4), are beyond what can be commanded: commands are
+    clipped there, and another gait would be played without a word."""
+    for k, parameter in enumerate(PARAMETERS):
+        values = gaits[..., k]
+        slack = 1e-9 * HALF_RANGE[k]  # of sums like MIDDLE + HALF_RANGE
+        if ((values < LOW[k] - slack) | (values > HIGH[k] + slack)).any():
+            beyond = float(values.flat[np.argmax(np.abs(values - MIDDLE[k]))])
+            raise ParameterError(
+                f"{name}: expected {parameter} from {LOW[k]:.6g} to {HIGH[k]:.6g}, beyond which commands are"
+                f" clipped, got {beyond:.6g}"
+            )
+
+
 AT_REST = 1e-6
 """Differences from a gait that are as good as none [rad/s, rad]: observations are rounded to float32."""
 
@@ -201,4 +215,5 @@ class OneLeg:
                 f"gait: expected one of {', '.join(self.gaits)}, GaitParameters or an array of shape (4,) or "
                 f"({engine.num_envs}, 4), got {gaits!r}"
             )
+        check_reachable("gait", values)
         return action_towards(values, heading_now(engine, dt), self.reach(engine, dt))

@@ -144,6 +144,56 @@ def draw_parameters(
     }
 
 
+STRETCH, DRIFT, HIGHEST_HILLS = 10.0, 0.03, 0.2
+"""Over so long a stretch of ground [m] its mean height must stay within so large a part of the hip height of
+y = 0 where the trunk does not follow the ground. The springs of `HorseLeg-v0` take 1.1 times the weight off
+the leg, or put it on, at that height. Hills rise and fall about y = 0, so they may be so much higher."""
+
+HELD = ("suspended", "rail")
+"""Trunks that move along and keep their height in the world."""
+
+
+def check_drift(terrain: Terrain, description: Any, trunk: str, hip_height: float) -> None:
+    """Raise `ParameterError` where a trunk that keeps its height would leave the ground, or press on it."""
+    if trunk not in HELD or terrain == Terrain.flat():
+        return
+    remedy = (
+        f"under a {trunk} trunk, which keeps its height in the world: the leg would climb into a wall or lose"
+        " the ground; slopes are for hoof_env/Horse-v0, whose trunk follows them"
+    )
+    if isinstance(description, Mapping) and description.get("kind") == "hills":
+        rise, most = float({**HILLS, **description}["rise"]), HIGHEST_HILLS * hip_height
+        if rise > most:
+            raise ParameterError(f"terrain['rise']: expected at most {most:.3g} m {remedy}; got {rise:.3g} m")
+        return
+    where, mean = farthest_mean(terrain, STRETCH)
+    if abs(mean) > (most := DRIFT * hip_height):
+        raise ParameterError(
+            f"terrain: expected ground whose mean height over {STRETCH:g} m stays within {most:.3g} m of 0"
+            f" {remedy}; got a mean of {mean:.3g} m around x = {where:.4g} m"
+        )
+
+
+def farthest_mean(terrain: Terrain, stretch: float) -> tuple[float, float]:
+    """The mean height over a stretch [m] of the ground that is farthest from 0 [m], of those that begin, end
+    or have their middle at a knot or between two, and where the middle is [m]."""
+    x, height = terrain.x, np.array(terrain.height)
+    areas = np.concatenate([[0.0], np.cumsum((height[1:] + height[:-1]) / 2 * terrain.spacing)])
+
+    def area_to(to: Any) -> Any:
+        """Integral of the height from the first knot on."""
+        inside = np.clip(to, x[0], x[-1])
+        k = np.minimum(((inside - x[0]) / terrain.spacing).astype(int), len(x) - 1)
+        level = np.minimum(to - x[0], 0.0) * height[0] + np.maximum(to - x[-1], 0.0) * height[-1]
+        return areas[k] + (height[k] + terrain.height_at(inside)) / 2 * (inside - x[k]) + level
+
+    middles = np.concatenate([x, x[0] + terrain.spacing * np.arange(0.5, len(x) - 1)])
+    middles = np.concatenate([middles, middles - stretch / 2, middles + stretch / 2])
+    means = (area_to(middles + stretch / 2) - area_to(middles - stretch / 2)) / stretch
+    farthest = int(np.argmax(np.abs(means)))
+    return float(middles[farthest]), float(means[farthest])
+
+
 KINDS = ("hills", "slope")
 SPACING = 0.1  # between knots of hills [m]
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from hoof_env._version import __version__
 from hoof_env.envs.observation import HALF_RANGE, HIGH, LOW, MIDDLE
-from hoof_env.envs.one_leg import action_towards, lead_of
+from hoof_env.envs.one_leg import action_towards, check_reachable, lead_of
 from hoof_env.envs.start import extreme_posture
 from hoof_env.errors import DataFileError, ParameterError, check_choice, parse_json
 from hoof_env.gait import LIMITS, GaitParameters, paper_gaits
@@ -209,10 +209,14 @@ def open_loop(parameters: Mapping[str, Any], env: Any) -> Scripted:
             clock, "sin" and "cos" of the same shape and "frequency_hz", a number or shape (n,). The sum is
             kept within `gait.LIMITS`.
         env: environment of one leg.
+
+    Raises:
+        ParameterError: a constant gait beyond `gait.LIMITS`.
     """
     constant = np.asarray(parameters["constant"], float)
     dt = env.unwrapped.dt
     if "frequency_hz" not in parameters:
+        check_reachable("constant", constant)
         return Scripted(towards(env, lambda observation, time: constant), dt)
     sine, cosine = (np.asarray(parameters[name], float) for name in ("sin", "cos"))
     rate = 2 * np.pi * np.asarray(parameters["frequency_hz"], float)

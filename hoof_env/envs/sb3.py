@@ -72,11 +72,23 @@ class Sb3VecEnv(VecEnv):
     def reset(self) -> NDArray[np.float32]:
         """Observations at the start of all episodes."""
         seeds = list(self._seeds)
-        options = self._options[0] or None
-        if any((other or None) != options for other in self._options):
-            raise ParameterError(f"options: expected the same for all environments, got {self._options!r}")
-        observations, infos = self.envs.reset(seed=None if None in seeds else seeds, options=options)
-        self.reset_infos = [row_of(infos, env) for env in range(self.num_envs)]
+        groups: list[tuple[Any, list[int]]] = []  # options, and the environments that have them
+        for env, options in enumerate(self._options):
+            rows = next((rows for known, rows in groups if known == (options or None)), None)
+            if rows is None:
+                groups.append((options or None, [env]))
+            else:
+                rows.append(env)
+        for options, _ in groups:  # what is refused changes nothing
+            self.envs.batch.check_options(options)
+        self.reset_infos = [{} for _ in range(self.num_envs)]
+        for options, rows in groups:
+            mask = np.zeros(self.num_envs, bool)
+            mask[rows] = True
+            some = {**(options or {}), "reset_mask": mask}
+            observations, infos = self.envs.reset(seed=seeds, options=some)
+            for env in rows:
+                self.reset_infos[env] = row_of(infos, env)
         self.measured = infos["measured"]
         self._reset_seeds()
         self._reset_options()
@@ -120,13 +132,12 @@ class Sb3VecEnv(VecEnv):
         return self.envs.ask(attr_name, self._get_indices(indices))
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """As `HorseLegVectorEnv.set_attr`, of all environments."""
-        self._whole("set_attr", indices)
-        self.envs.set_attr(attr_name, [value] * self.num_envs)
+        """As `HorseLegVectorEnv.set_attr`, of some environments or of all."""
+        self.envs.set_attr_of(attr_name, dict.fromkeys(self._get_indices(indices), value))
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
         """As `HorseLegVectorEnv.call`; ParameterError where some are meant by a method of all together."""
-        if method_name not in OWN:
+        if method_name not in (*OWN, "get_wrapper_attr", "has_wrapper_attr"):
             self._whole("env_method", indices)
         return self.envs.ask(method_name, self._get_indices(indices), *args, **kwargs)
 

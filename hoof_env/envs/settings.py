@@ -5,9 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
+from enum import Enum
+from pathlib import PurePath
 from types import MappingProxyType
 from typing import Any, TypedDict
 
+import numpy as np
 from gymnasium.vector import AutoresetMode
 
 from hoof_env.errors import ParameterError
@@ -66,6 +69,10 @@ class Settings:
     observation: tuple[str, ...] = ("crank", "gait", "trunk", "hoof")
     reward_weights: Mapping[str, float] | None = None
     randomize: Mapping[str, Any] | None = None
+
+    def __deepcopy__(self, memo: Any) -> Settings:
+        """Itself, for nothing in it changes."""
+        return self
 
 
 Range = float | Sequence[float]
@@ -126,7 +133,9 @@ class VectorKeywords(Keywords, total=False):
     autoreset_mode: AutoresetMode | str
     max_episode_steps: int | None
     render_mode: str | None
-    rendered: int
+    rendered: int | None
+    width: int
+    height: int
 
 
 SETTINGS = tuple(item.name for item in fields(Settings))
@@ -184,8 +193,38 @@ def to_json(settings: Settings) -> dict[str, Any]:
     return {key: json_value(value) for key, value in asdict(settings).items()}
 
 
+def as_plain(name: str, value: Any) -> Any:
+    """A value as Python and JSON know it: numbers of NumPy and pandas as numbers, arrays as lists, paths as
+    text, enumerations by their value.
+
+    Raises:
+        ParameterError: another kind of number, such as a tensor.
+    """
+    if value is None or type(value) in (bool, int, float, str):
+        return value
+    if isinstance(value, (np.generic, np.ndarray)) and value.dtype != object:
+        return as_plain(name, value.tolist())
+    if isinstance(value, Enum):
+        return as_plain(name, value.value)
+    if isinstance(value, PurePath):
+        return str(value)
+    if isinstance(value, Mapping):
+        return {str(key): as_plain(f"{name}[{key!r}]", inner) for key, inner in value.items()}
+    if isinstance(value, (list, tuple)):
+        return type(value)(as_plain(f"{name}[{k}]", inner) for k, inner in enumerate(value))
+    if isinstance(value, (int, float, str)):
+        return next(kind(value) for kind in (int, float, str) if isinstance(value, kind))
+    if hasattr(type(value), "__float__"):
+        raise ParameterError(
+            f"{name}: expected a number of Python or NumPy, which JSON can hold, got {value!r}"
+        )
+    return value  # what takes it says what is wrong
+
+
 def json_value(value: Any) -> Any:
     """Lists for tuples, however deep, as JSON gives them back."""
+    if isinstance(value, (list, tuple)):
+        return [json_value(inner) for inner in value]
     if isinstance(value, Mapping):
         return {key: json_value(inner) for key, inner in value.items()}
-    return [json_value(inner) for inner in value] if isinstance(value, (list, tuple)) else value
+    return value

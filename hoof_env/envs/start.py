@@ -28,8 +28,9 @@ START_SPEED = 1.0
 
 OPTIONS = {
     "crank_angle": (-1e6, 1e6), "speed": (-20.0, 20.0), "height": (0.0, np.inf), "x": (-1e5, 1e5),
+    "target_speed": (-20.0, 20.0),
 }  # fmt: skip
-"""Numeric reset options and their ranges [rad, m/s, m, m]; "gait" and "parameters" are the others."""
+"""Numeric reset options and their ranges [rad, m/s, m, m, m/s]; "gait" and "parameters" are the others."""
 
 HANDED_ON = ("minari_autoseed",)
 """Options that others put there for themselves: Minari hands its own on to the environment."""
@@ -145,6 +146,11 @@ def check_options(
     """Reset options with their values checked and the gait as `GaitParameters`; ParameterError of others."""
     checked = checked_options(options, OPTIONS)
     _check_trunk(checked, trunk)
+    if "target_speed" in checked and settings.target_speed is None:
+        raise ParameterError(
+            "options['target_speed']: expected none where no speed is commanded; with target_speed=2.5 among"
+            f" the arguments of gymnasium.make one is, got {checked['target_speed']:g}"
+        )
     if checked.get("gait") is not None:
         checked["gait"] = _gait(checked["gait"], gaits)
     return with_parameters(checked, settings)

@@ -13,7 +13,6 @@ import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from importlib import import_module
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeVar
 
@@ -24,7 +23,7 @@ from hoof_env.envs.horse_rows import HORSE_ENTRIES, HORSE_TERMS
 from hoof_env.envs.observation import ENTRIES, Entry, check_groups, groups_of
 from hoof_env.envs.reference import checked_size
 from hoof_env.envs.reward import TERMS, Term, check_weights
-from hoof_env.envs.settings import SETTINGS, Settings, check_effect, json_value
+from hoof_env.envs.settings import SETTINGS, Settings, as_plain, check_effect, json_value
 from hoof_env.errors import ParameterError, UnknownArgumentError, check_choice
 from hoof_env.simd.user_functions import check_function, named
 
@@ -109,9 +108,7 @@ class Task:
         weights, own = changes.get("reward_weights"), self.defaults.get("reward_weights", {})
         if own and (weights is None or isinstance(weights, Mapping)):
             changes = {**changes, "reward_weights": {**own, **(weights or {})}}
-        for name, value in changes.items():  # as JSON holds it, and a copy
-            if isinstance(value, (Path, Mapping)):
-                changes = {**changes, name: str(value) if isinstance(value, Path) else json_value(value)}
+        changes = {name: as_plain(name, value) for name, value in changes.items()}  # a copy, too
         if unknown := sorted(set(self.defaults) - set(SETTINGS)):
             raise UnknownArgumentError(f"{self.id}: unknown settings {', '.join(unknown)}")
         plain = replace(Settings(), **self.defaults)

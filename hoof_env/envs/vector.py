@@ -24,15 +24,21 @@ from hoof_env.envs.episode import FAILED, TRUNCATED
 from hoof_env.envs.infos import named
 from hoof_env.envs.recording import Recording
 from hoof_env.envs.settings import Keywords
-from hoof_env.errors import ParameterError, count
+from hoof_env.errors import ParameterError, all_of, count
+from hoof_env.render.renderer import USUAL_SIZE
 
 Floats = NDArray[np.float64]
 
 MOST_ENVS = 1_000_000
 
+UNKNOWN_SEED = -1  # as Gymnasium says it
+
 MOST_DRAWN = 16  # so many are drawn by default; a picture takes as long as some hundred steps
 
-OWN = ("weight", "render", "episode_summary", "raw_observation", "record", "np_random", "action_for")
+OWN = (
+    "weight", "render", "episode_summary", "raw_observation", "record", "np_random", "np_random_seed",
+    "action_for",
+)  # fmt: skip
 """What each environment has of its own; the rest is of all."""
 
 SINGLE = {"action_space": "single_action_space", "observation_space": "single_observation_space"}
@@ -61,6 +67,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         render_mode: "rgb_array"; `render` gives a frame of each environment.
         rendered: how many are drawn, the first ones; frames of the others are black. None is all, of at most
             `MOST_DRAWN`.
+        width, height: of each picture [pixels].
 
     Attributes:
         drawn: how many are drawn.
@@ -87,11 +94,13 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         max_episode_steps: int | None = None,
         render_mode: str | None = None,
         rendered: int | None = None,
+        width: int = USUAL_SIZE[0],
+        height: int = USUAL_SIZE[1],
         **settings: Unpack[Keywords],
     ) -> None:
         self.num_envs = count("num_envs", num_envs, most=MOST_ENVS)
         self.autoreset_mode = mode_of(autoreset_mode)
-        one = self._make(task, settings, self.num_envs, render_mode, num_threads)
+        one = self._make(task, settings, self.num_envs, render_mode, (width, height), num_threads)
         if max_episode_steps is not None:
             self.batch.limit(count("max_episode_steps", max_episode_steps))
         self.single_observation_space, self.single_action_space = one
@@ -100,9 +109,10 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         self.metadata["autoreset_mode"] = self.autoreset_mode
         self.spec = None
         self.drawn = self._check_drawn(rendered)
-        self._watched = {env: Recording(self.batch, env) for env in range(self.drawn)}
-        self._marks: dict[str, list[Any]] = {}
+        self._watched = {env: Recording(self.batch, env, self._size) for env in range(self.drawn)}
+        self._marks: dict[str, dict[int, Any]] = {}
         self._generators: list[np.random.Generator] = []
+        self._seeds: list[int] = []
         self._ended = np.zeros(self.num_envs, bool)
         self._started = np.zeros(self.num_envs, bool)
 
@@ -153,8 +163,6 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
                 "expected reset(options={'reset_mask': ...})"
             )
         batch.actions[:n] = self._check_actions(actions)
-        for recording in self._watched.values():
-            recording.start()
         some_ended = batch.step(self._generators, again)
         how = batch.now.ended[:n]
         terminated, truncated = how == FAILED, how == TRUNCATED
@@ -169,7 +177,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
             infos = self._same_step(infos, done)
             done = np.zeros(n, bool)
         else:
-            self._show()
+            self._remember()
         self._ended = done
         return self._observed(), rewards, terminated, truncated, infos
 
@@ -192,7 +200,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         last = np.full(self.num_envs, None, dtype=object)
         for env in np.flatnonzero(done):
             last[env] = self.batch.observations[env].copy()
-        self._show()
+        self._remember()
         self._start(np.flatnonzero(done), {})
         infos: dict[str, Any] = self.batch.infos()
         infos |= {key: copy.deepcopy(value) for key, value in final.items() if key not in infos}
@@ -225,6 +233,32 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
     def weight(self) -> Floats:
         """Weight of trunk and leg [N], shape (num_envs,)."""
         return self.batch.now.weight[: self.num_envs].copy()
+
+    @property  # type: ignore[override]
+    def np_random(self) -> tuple[np.random.Generator, ...]:
+        """The generator of each environment. One that is assigned seeds them all; a list has one for each."""
+        if not self._generators:
+            self._new_generators([None] * self.num_envs)
+        return tuple(self._generators)
+
+    @np_random.setter
+    def np_random(self, value: np.random.Generator | Sequence[np.random.Generator]) -> None:
+        given: Any = value
+        if isinstance(given, np.random.Generator):
+            self._new_generators(given.integers(2**63, size=self.num_envs).tolist())
+        elif not isinstance(given, (list, tuple)) or len(given) != self.num_envs:
+            raise ParameterError(
+                f"np_random: expected a generator, or a list of {self.num_envs}, got {value!r:.80}"
+            )
+        else:
+            self._generators = list(all_of("np_random", given, np.random.Generator))
+        self._seeds = [UNKNOWN_SEED] * self.num_envs
+
+    @property
+    def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
+        """What each environment was seeded with, as Gymnasium's `SyncVectorEnv` says it; -1 where a generator
+        was assigned or came with a state."""
+        return (*self._seeds,) if self.np_random else ()
 
     def record(self, env: int = 0) -> dict[str, Floats]:
         """State and report of an environment at every substep of the last control step, see
@@ -260,6 +294,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
 
     def set_attr(self, name: str, values: Any) -> None:
         """Remember something for `get_attr`: a list or tuple has a value for each, anything else is for all.
+        "np_random" gives each its generator.
 
         Raises:
             FixedSettingError: a setting or another attribute that the environments have.
@@ -268,22 +303,32 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         each = list(values) if isinstance(values, (list, tuple)) else [values] * self.num_envs
         if len(each) != self.num_envs:
             raise ParameterError(f"values: expected one or {self.num_envs}, got {len(each)}")
+        self.set_attr_of(name, dict(enumerate(each)))
+
+    def set_attr_of(self, name: str, values: Mapping[int, Any]) -> None:
+        """`set_attr` of some environments, each with a value."""
+        if name == "np_random":
+            self.np_random = [values.get(env, one) for env, one in enumerate(self.np_random)]
+            return
         if hasattr(self.batch.settings, name) or hasattr(self, name) or hasattr(self.batch, name):
             raise fixed_setting(name)
-        self._marks[name] = each
+        self._marks.setdefault(name, {}).update(values)
 
     def ask(self, name: str, envs: Iterable[int], *args: Any, **kwargs: Any) -> list[Any]:
         """`call` of some environments."""
         chosen = list(envs)
+        if name == "get_wrapper_attr":
+            return self.ask(*args, chosen, **kwargs)
+        if name == "has_wrapper_attr":
+            return [self._has(env, *args, **kwargs) for env in chosen]
         if name in self._marks:
+            if lacks := [env for env in chosen if env not in self._marks[name]]:
+                raise AttributeError(f"environments {lacks} have no attribute {name!r}")
             return [self._marks[name][env] for env in chosen]
         if name in ("reset", "step"):
             raise ParameterError(f"call: {name!r} is of all together; expected envs.{name}(...)")
         if name == "record":
             return [self.record(env) for env in chosen]
-        if name == "np_random":
-            self._check_started(name)
-            return [self._generators[env] for env in chosen]
         name = SINGLE.get(name, name)
         owner: Any = self if hasattr(self, name) else self.batch
         if name.startswith("_") or not hasattr(owner, name):
@@ -297,6 +342,13 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         return [value[env] for env in chosen]
 
     # Parts of it
+
+    def _has(self, env: int, name: str) -> bool:
+        try:
+            self.ask(name, [env])
+        except AttributeError:
+            return False
+        return True
 
     def _check_drawn(self, rendered: Any) -> int:
         n = self.num_envs
@@ -346,22 +398,19 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
 
     def _start(self, envs: NDArray[np.int64], options: Mapping[str, Any]) -> dict[str, Any]:
         """Start episodes; the parameters that were set or drawn for them, by name."""
-        watched = [self._watched[env] for env in envs.tolist() if env in self._watched]
-        for recording in watched:
-            recording.start()
         parameters = self.batch.reset(envs, [self._generators[env] for env in envs], options)
         self._started[envs] = True
         if self._phase == "new" and self._started.all():
             self._phase = "running"
-        for recording in watched:
-            if recording.env < self.drawn:
-                recording.keep(True)
+        if self._watched:
+            for env in self._watched.keys() & set(envs.tolist()):
+                self._watched[env].begin()
         return parameters
 
-    def _show(self) -> None:
-        for env in range(self.drawn):
-            if not self._ended[env]:
-                self._watched[env].keep(False)
+    def _remember(self) -> None:
+        for env, recording in self._watched.items():
+            if not self._ended[env]:  # else it has just begun
+                recording.add()
 
     def _observed(self) -> NDArray[np.float32]:
         return self.batch.observations[: self.num_envs].copy()
@@ -375,11 +424,15 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         else:
             seeds = [None if seed is None else count("seed", seed, low=0) + env for env in range(n)]
         if not self._generators:
-            self._generators = [seeding.np_random(value)[0] for value in seeds]
+            self._new_generators(seeds)
             return
         for env in np.flatnonzero(mask):
             if seeds[env] is not None:
-                self._generators[env] = seeding.np_random(seeds[env])[0]
+                self._generators[env], self._seeds[env] = seeding.np_random(seeds[env])
+
+    def _new_generators(self, seeds: Sequence[int | None]) -> None:
+        made = [seeding.np_random(seed) for seed in seeds]
+        self._generators, self._seeds = [one for one, _ in made], [seed for _, seed in made]
 
     # State
 
@@ -393,11 +446,15 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         return {**self._state_of_batch(), "ended": self._ended.copy(), "generator": generators}
 
     def set_state(self, state: Mapping[str, Any]) -> NDArray[np.float32]:
-        """Put back what `get_state` gave; returns the observations there.
+        """Put back what `get_state` gave, here or of a single environment, which then goes on in every row:
+        many actions can be tried from one state. Returns the observations there.
 
         Raises:
             ParameterError: a state of another id, geometry, setting or number of environments.
         """
+        if isinstance(state, Mapping) and isinstance(state.get("generator"), Mapping):
+            self._check_state(state)
+            state = self._in_every_row(state)
         self._check_state(state, "ended")
         n, states = self.num_envs, state["generator"]
         ended = array_of(state["ended"]).copy()
@@ -412,7 +469,13 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         generators = [generator_of(values) for values in states]
         self.batch.set_state(state)
         self._ended, self._started, self._generators = ended, np.ones(n, bool), generators
+        self._seeds = [UNKNOWN_SEED] * n
         self._phase = "running"
         for recording in self._watched.values():
-            recording.forget()
+            recording.begin()
         return self._observed()
+
+    def _in_every_row(self, state: Mapping[str, Any]) -> dict[str, Any]:
+        """The state of a single environment as one of this vector environment."""
+        found = {**self.batch.spread(state), "generator": [state["generator"]] * self.num_envs}
+        return found | {"ended": found["episode"][self.batch.ended_row] != 0.0}

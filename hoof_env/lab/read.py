@@ -6,7 +6,6 @@ their names; others are named by a mapping. Columns that nobody asks for may hol
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,7 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.parts import GRAVITY
-from hoof_env.errors import DataFileError, HoofEnvError, ParameterError, check_choice, check_number
+from hoof_env.errors import (
+    DataFileError,
+    HoofEnvError,
+    ParameterError,
+    check_choice,
+    check_number,
+    parse_json,
+)
 from hoof_env.lab.clock import times_of
 from hoof_env.lab.doubts import backward, sideways
 from hoof_env.lab.forces import limb_name

@@ -24,10 +24,30 @@ UNDER_CURVE = (252, 230, 214)
 NUMBERS = (
     ("time", "s", INK),
     ("forward speed", "m/s", INK),
-    ("ground force", "kN", FORCE),
-    ("peak of this stance", "kN", FORCE),
-    ("highest so far", "kN", FORCE),
+    ("ground force", "", FORCE),
+    ("peak of this stance", "", FORCE),
+    ("highest so far", "", FORCE),
 )
+"""Title, unit and colour; no unit is that of forces."""
+
+
+class Unit(NamedTuple):
+    """Of forces: name, size [N] and how many digits are written behind the point."""
+
+    name: str
+    newtons: float
+    digits: int
+
+
+KILONEWTONS, NEWTONS = Unit("kN", 1000.0, 2), Unit("N", 1.0, 0)
+LIGHT = 10.0  # lift-off force of a leg whose forces are written in newtons [N]; it goes with the weight
+SMALLEST_OF_LIGHT = 10.0  # least full scale of its curve [N]
+
+
+def unit_of(lift_off_n: float) -> Unit:
+    """In which forces on such a leg are written; one that does not say its weight is a heavy one."""
+    return NEWTONS if 0.0 < lift_off_n < LIGHT else KILONEWTONS
+
 
 GAIT = (
     ("crank speed", "crank_speed", "rad/s"),
@@ -90,7 +110,8 @@ class Panel:
     ) -> None:
         unit = brush.unit
         self._brush, self._box, self._weight = brush, pygame.Rect(box), weight_n
-        self._lift_off = lift_off_n
+        self._lift_off, self._force = lift_off_n, unit_of(lift_off_n)
+        self._least = SMALLEST_OF_LIGHT if self._force is NEWTONS else SMALLEST_SCALE
         self._inside = self._box.inflate(-36 * unit, -32 * unit)
         self._plot = pygame.Rect(0, 0, self._inside.width - 40 * unit, 150 * unit)
         self._plot.bottomright = self._inside.right - round(6 * unit), self._inside.bottom - round(36 * unit)
@@ -101,7 +122,7 @@ class Panel:
     def reset(self) -> None:
         self.stances = Stances(self._lift_off)
         self._curve: deque[tuple[float, float]] = deque()  # time [s], force [N]
-        self.full_scale = nice(max(4 * (self._weight or 0.0), SMALLEST_SCALE))
+        self.full_scale = nice(max(4 * (self._weight or 0.0), self._least))
 
     def add(self, instants: Sequence[Instant]) -> None:
         curve = self._curve
@@ -111,16 +132,17 @@ class Panel:
                 curve.append((now.time, now.grf))
             elif now.grf > curve[-1][1]:
                 curve[-1] = now.time, now.grf
-        self.full_scale = max(self.full_scale, nice(max(self.stances.highest, SMALLEST_SCALE)))
+        self.full_scale = max(self.full_scale, nice(max(self.stances.highest, self._least)))
         while curve[0][0] < instants[-1].time - SECONDS:
             curve.popleft()
 
     def draw(self, canvas: Any, now: Instant) -> None:
         canvas.blit(self._card(self.full_scale), self._box, special_flags=pygame.BLEND_PREMULTIPLIED)
         stances = self.stances
-        values = now.time, now.trunk_vx, now.grf / 1000, stances.running_peak / 1000, stances.highest / 1000
-        for k, (value, (_, _, colour)) in enumerate(zip(values, NUMBERS, strict=True)):
-            text = f"{round(value, 2) + 0.0:.2f}"  # + 0.0 takes the sign off a zero
+        values = now.time, now.trunk_vx, now.grf, stances.running_peak, stances.highest
+        for k, (value, (_, own, colour)) in enumerate(zip(values, NUMBERS, strict=True)):
+            shown, digits = (value, 2) if own else (value / self._force.newtons, self._force.digits)
+            text = f"{round(shown, digits) + 0.0:.{digits}f}"  # + 0.0 takes the sign off a zero
             self._brush.write(canvas, text, self._line(k, 210), 24, colour, "midright")
         self._draw_gait(canvas, now)
         self._draw_curve(canvas, now.time)
@@ -145,7 +167,7 @@ class Panel:
         self._brush.smooth(whole, [complex(*self._box.topleft), complex(*self._box.bottomright)], 0, paint)
         for k, (name, unit_name, _) in enumerate(NUMBERS):
             write(name, *self._line(k, 0), 20)
-            write(unit_name, *self._line(k, 217), 20)
+            write(unit_name or self._force.name, *self._line(k, 217), 20)
         first = len(NUMBERS) + 0.4
         write("gait", *self._line(first, 0), 20)
         _, y = self._line(first, 0)
@@ -163,11 +185,11 @@ class Panel:
                 whole.fill(GREY, (round(left + (right - left) * -low / (high - low)), round(y - 4 * unit), 1,
                                   round(9 * unit)))  # fmt: skip
         head = plot.top - 20 * unit
-        write("ground reaction force, kN", inside.left, head, 20)
+        write(f"ground reaction force, {self._force.name}", inside.left, head, 20)
         for part in (0.0, 0.5, 1.0):
             y = plot.bottom - part * plot.height
             whole.fill(FAINT, (plot.left, round(y), plot.width, 1))
-            write(f"{part * full_scale / 1000:g}", plot.left - 7 * unit, y, 18, "midright")
+            write(f"{part * full_scale / self._force.newtons:g}", plot.left - 7 * unit, y, 18, "midright")
         for second in range(SECONDS + 1):
             x = plot.right - second / SECONDS * plot.width
             whole.fill(FAINT, (round(x), plot.bottom, 1, round(5 * unit)))
@@ -233,7 +255,8 @@ class Panel:
                 FORCE, (round(start), round(y), max(round(plot.right - start), 1), max(1, round(unit)))
             )
         above = min(x, plot.right - 10 * unit), y - 6 * unit
-        self._brush.write(canvas, f"{seen[-1].force / 1000:.2f}", above, 20, FORCE, "midbottom")
+        peak_now = f"{seen[-1].force / self._force.newtons:.{self._force.digits}f}"
+        self._brush.write(canvas, peak_now, above, 20, FORCE, "midbottom")
 
 
 def interval_of(time: float) -> int:

@@ -17,7 +17,7 @@ from gymnasium.error import DependencyNotInstalled, ResetNeeded
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.parts import ONE_LEG, TRUNKS
-from hoof_env.errors import HoofEnvError, ParameterError, check_choice, check_number
+from hoof_env.errors import HoofEnvError, ParameterError, check_choice, check_number, count
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
 from hoof_env.render.instant import HorseInstant, Instant, Setting
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 MODES = ("rgb_array", "human")
 SMALLEST_SIZE = (480, 270)  # below this the lettering is not readable [pixels]
+USUAL_SIZE = 960, 540  # [pixels]
 LARGEST_SIDE = 8192  # largest width and height [pixels]; a canvas of both takes 270 MB
 
 
@@ -54,7 +55,7 @@ class Renderer:
         geometry: Geometry,
         mode: str,
         fps: float,
-        size: tuple[int, int] = (960, 540),
+        size: tuple[int, int] = USUAL_SIZE,
         trunk: str = "suspended",
         weight_n: float | None = None,
         lift_off_n: float = 0.0,
@@ -73,7 +74,7 @@ class Renderer:
             hint = 'pygame is not installed, run `pip install "hoof-env[render]"`'
             raise DependencyNotInstalled(hint) from None
         from hoof_env.render.brush import Brush
-        from hoof_env.render.panel import Panel
+        from hoof_env.render.panel import Panel, unit_of
         from hoof_env.render.scene import Scene
 
         self._pygame = pygame
@@ -91,7 +92,9 @@ class Renderer:
             self._scene: Any = HorseScene(brush, geometry, ground, self.size, column + 2 * edge)
             self._panel: Any = HorsePanel(brush, box, tuple(hips), weight_n or 0.0, lift_off_n)
         else:
-            self._scene = Scene(brush, geometry, ground, self.size, column + 2 * edge, trunk)
+            self._scene = Scene(
+                brush, geometry, ground, self.size, column + 2 * edge, trunk, unit_of(lift_off_n)
+            )
             self._panel = Panel(brush, box, weight_n if trunk == "suspended" else None, lift_off_n)
         self._window_open = False
         self._clock = pygame.time.Clock()
@@ -211,6 +214,11 @@ def new_renderer(here: Setting, fps: float, size: tuple[int, int] = (960, 540)) 
     return Renderer(
         here.geometry, "rgb_array", fps, size, here.trunk, **force, terrain=here.terrain, hips=here.hips
     )
+
+
+def check_side(name: str, pixels: Any) -> int:
+    """The "width" or "height" of a picture [pixels]."""
+    return count(name, pixels, SMALLEST_SIZE[name == "height"], LARGEST_SIDE)
 
 
 def _check_size(size: Any) -> tuple[int, int]:

@@ -25,6 +25,7 @@ from hoof_env.leg.linkage import CRANK as CRANK_BODY
 from hoof_env.render.brush import CRANK, FINE, FORCE, GREY, HEEL, INK, PAPER, TOE, Brush, arrow, bar, mix
 from hoof_env.render.ground import SOIL_LINE, GroundPainter
 from hoof_env.render.instant import Instant
+from hoof_env.render.panel import KILONEWTONS, Unit
 
 SKY_TOP, SKY_BOTTOM = (219, 231, 242), (249, 250, 252)
 COAT, COAT_EDGE, PASTERN, HOOF = (226, 210, 194), (186, 163, 141), (196, 170, 146), (104, 74, 54)
@@ -43,11 +44,22 @@ PATH_SECONDS = 1.0  # length of the paths of toe and heel [s]
 PATH_STEP = 0.01  # time between two places of a path [s]
 ARROW_M = 1.3  # length in the scene of an arrow for the panel's full scale [m]
 LEAST_FORCE = 0.004  # part of the full scale below which a force is not drawn [-]
+USUAL_HIP_M = 1.5
+"""What is drawn around a leg suits hips so high or higher; around lower ones it is smaller in proportion
+[m]."""
+
 AROUND_M = np.linspace(-1.5, 1.5, 31)  # where, from O, the ground is looked at for the camera's level [m]
 
 
 class Scene:
-    """Draws one instant into a picture of `size`, whose `right` pixels the leg leaves free."""
+    """Draws one instant into a picture of `size`, whose `right` pixels the leg leaves free.
+
+    Attributes:
+        small: size of what is drawn around the leg, at most 1.
+    """
+
+    small = 1.0
+    _unit, _newtons, _digits = KILONEWTONS
 
     def __init__(
         self,
@@ -57,23 +69,31 @@ class Scene:
         size: tuple[int, int],
         right: int,
         trunk: str,
+        forces: Unit = KILONEWTONS,
     ) -> None:
+        self._unit, self._newtons, self._digits = forces
         self._brush, self._geometry, self._size = brush, geometry, size
+        self.small = min(1.0, geometry.hip_height / USUAL_HIP_M)
         out, up = _reach(geometry)
-        spare = HEIGHT_SLACK_M + MARGIN_M
-        soil = max(out + spare - geometry.hip_height, SOIL_M)
+        spare = (HEIGHT_SLACK_M + MARGIN_M) * self.small
+        soil = max(out + spare - geometry.hip_height, SOIL_M * self.small)
         sky = geometry.hip_height + up + spare
         self._centre = (size[0] - right) / 2
-        self._scale = min(size[1] / (soil + sky), self._centre / (out + MARGIN_M))
+        self._scale = min(size[1] / (soil + sky), self._centre / (out + MARGIN_M * self.small))
         self._level = size[1] - soil * self._scale  # of the ground [pixels] while the camera keeps its height
         self._camera = 0j
         self._paths: deque[tuple[float, complex, complex]] = deque()  # time [s], heel, toe [m]
         self._ground = GroundPainter(brush, terrain, size, self._scale, 2 * self._centre)
         self._leg = tables(geometry)
-        self._kind, self._girth = trunk, 1.0
+        self._kind, self._girth = trunk, self.small
         self._trunk = self._paint_trunk()
         self._sky = self._paint_sky()
         self._key = lru_cache(maxsize=8)(self._paint_key)
+
+    @property
+    def _metre(self) -> float:
+        """Of what is drawn around the leg [pixels]."""
+        return self._scale * self.small
 
     def reset(self) -> None:
         self._paths.clear()
@@ -108,9 +128,9 @@ class Scene:
         """Point the camera at an instant; returns where each named point of the leg lies [pixels]."""
         usual = self._geometry.hip_height
         hip = complex(now.trunk_x, now.trunk_y)
-        level = float(self._ground.height(hip.real + AROUND_M).mean())
-        high = hip.imag - level
-        rise = high - min(max(high, usual - HEIGHT_SLACK_M), usual + HEIGHT_SLACK_M)
+        level = float(self._ground.height(hip.real + self.small * AROUND_M).mean())
+        high, slack = hip.imag - level, HEIGHT_SLACK_M * self.small
+        rise = high - min(max(high, usual - slack), usual + slack)
         self._camera = complex(hip.real, level + rise)
         return self.points_of(now)
 
@@ -136,12 +156,12 @@ class Scene:
         return pygame.transform.smoothscale(ramp, self._size)
 
     def _paint_trunk(self) -> Any:
-        half, above, below = (self._scale * length for length in TRUNK_M)
+        half, above, below = (self._metre * length for length in TRUNK_M)
         image = pygame.Surface((round(2 * half), round(above + below)), pygame.SRCALPHA, 32)
 
         def paint(fine: Any, place: Any) -> None:
             for colour, inset in ((COAT_EDGE, 0), (COAT, round(1.5 * FINE))):
-                radius = round(0.25 * self._scale * FINE) - inset
+                radius = round(0.25 * self._metre * FINE) - inset
                 barrel = fine.get_rect().inflate(-2 * inset, -2 * inset)
                 pygame.draw.rect(fine, colour, barrel, border_radius=radius)
 
@@ -150,10 +170,10 @@ class Scene:
 
     def _draw_support(self, canvas: Any, hip: complex) -> None:
         """The spring, the rail with wheels or the plate that holds the trunk around O at pixel `hip`."""
-        half, top, hold = TRUNK_M[0] * self._scale, hip - 1j * TRUNK_M[1] * self._scale, HOLD_M * self._scale
+        half, top, hold = TRUNK_M[0] * self._metre, hip - 1j * TRUNK_M[1] * self._metre, HOLD_M * self._metre
         if self._kind == "suspended":
             coil = np.linspace(complex(hip.real, 0), top, 17)
-            coil[2:-2] += 0.06 * self._scale * np.resize([1, -1], 13)
+            coil[2:-2] += 0.06 * self._metre * np.resize([1, -1], 13)
 
             def paint(fine: Any, place: Any) -> None:
                 width = round(2 * self._brush.unit * FINE)
@@ -177,7 +197,7 @@ class Scene:
 
     def _draw_trunk(self, canvas: Any, hip: complex, pitch: float) -> None:
         """The trunk around O at pixel `hip`, turned by `pitch` [rad]."""
-        half, above, below = (self._scale * length for length in TRUNK_M)
+        half, above, below = (self._metre * length for length in TRUNK_M)
         image, corner = self._trunk, hip - complex(half, above)
         if pitch:
             image = pygame.transform.rotozoom(image, float(np.degrees(pitch)), 1.0)
@@ -216,7 +236,7 @@ class Scene:
         box = [*pixels.values(), pixels["O"] - turn, pixels["O"] + turn]
         self._brush.smooth(canvas, box, 0.16 * self._girth * self._scale + 2, paint)
         for pivot, side, shift in (("O", "midbottom", -0.05j), ("C", "midleft", 0.06)) if lettered else ():
-            letter = pixels[pivot] + shift * self._scale
+            letter = pixels[pivot] + shift * self._metre
             self._brush.write(canvas, pivot, (letter.real, letter.imag), 18, INK, side)
 
     def _draw_paths(self, canvas: Any, pixels: dict[str, complex]) -> None:
@@ -246,7 +266,7 @@ class Scene:
         ]
         ends = [
             (colour, width * self._brush.unit * FINE, self._pixels(foot),
-             self._pixels(foot + force * share * ARROW_M / full_scale))
+             self._pixels(foot + force * share * self.small * ARROW_M / full_scale))
             for colour, width, foot, force in reversed(forces) if force
         ]  # fmt: skip
 
@@ -261,15 +281,20 @@ class Scene:
         if not is_told:
             return
         tip = ends[0][3]
-        text = f"{now.grf / 1000:.2f} kN"
+        text = f"{now.grf / self._newtons:.{self._digits}f} {self._unit}"
         self._brush.write(canvas, text, (tip.real + 12 * self._brush.unit, tip.imag), 21, FORCE)
 
     def _paint_key(self, full_scale: float) -> Any:
         unit = self._brush.unit
         force = full_scale / 5
-        length = force / full_scale * ARROW_M * self._scale
+        length = force / full_scale * ARROW_M * self._metre
         kinds = self._ground.kinds()
-        words = f"{force / 1000:g} kN on the hoof", "toe: force and path", "heel: force and path", "crank"
+        words = (
+            f"{force / self._newtons:g} {self._unit} on the hoof",
+            "toe: force and path",
+            "heel: force and path",
+            "crank",
+        )
         rows = [20 + (20 + 20 * k) * 1j for k in range(4)]
         places = [row * unit for row in rows] + [row * unit + self._centre for row in rows[: len(kinds)]]
         image = pygame.Surface((round(2 * self._centre), round(100 * unit)), pygame.SRCALPHA, 32)

@@ -68,16 +68,17 @@ class _Announcer(event.Listener):
     long ones took. numba tells when it compiles; it costs nothing when it does not."""
 
     depth, started, is_told = 0, 0.0, False
+    long = ("step_", "advance_", "react_")  # names of kernels that take long begin so
 
     def on_start(self, event: Any) -> None:
-        function = getattr(event.data["dispatcher"], "py_func", None)
+        function: Any = getattr(event.data["dispatcher"], "py_func", None)
         if self.depth or str(getattr(function, "__module__", "")).startswith("hoof_env."):
             self.depth += 1  # a kernel compiles those that it calls
         if self.depth == 1:
             self.started = time.monotonic()
-            if not self.is_told:
+            if not self.is_told and function.__name__.startswith(self.long):
                 _say("compiling kernels for this machine, once (about half a minute) ...")
-            self.is_told = True
+                self.is_told = True
 
     def on_end(self, event: Any) -> None:
         if not self.depth:

@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 from family import LEGS, actions, running_peak_charge, same, together
 
-import hoof_env  # noqa: F401
+from hoof_env.envs.policies import make_policy
 from hoof_env.envs.settings import Settings
 from hoof_env.errors import DataFileError, ParameterError
+from hoof_env.gait import PARAMETERS
 from hoof_env.ground.contact import Ground, load_ground
 from hoof_env.leg.geometry import preset_names, read_preset
+from hoof_env.records import record_episode
 
 FIXED, LEG = "hoof_env/HorseLegFixed-v0", "hoof_env/HorseLeg-v0"
 
@@ -92,6 +94,19 @@ def test_bad_values_are_refused(soft, tmp_path):
     path.write_text(json.dumps({**read_preset(soft), "ground": {"n": 1.4}}), encoding="utf-8")
     with pytest.raises(DataFileError, match=r"bad\.json.*'n'"):
         gym.make(FIXED, preset=str(path))
+
+
+@pytest.mark.parametrize("arguments", [{}, {"gait": "run"}])
+def test_the_policy_run_is_the_papers_run(arguments):
+    """Also where episodes start in the walk: the reset takes the policy's gait. The paper prints a peak of
+    5719 N; in its walk, or in a run that a box of actions cuts off, it is another number."""
+    env = gym.make(FIXED, **arguments)
+    record = record_episode(env, make_policy("run", env))
+    normal = record["toe_normal"] + record["heel_normal"]
+    assert normal.max() == pytest.approx(5719, rel=0.01)
+    run = env.unwrapped.gaits["run"]
+    for name in PARAMETERS:
+        np.testing.assert_allclose(record[f"command_{name}"], getattr(run, name), atol=1e-6)
 
 
 PAPER = {"solver": "paper", "gait": "run", "autoreset_mode": "DISABLED"}

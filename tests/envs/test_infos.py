@@ -30,8 +30,11 @@ def test_reset_and_step_have_the_same_keys_of_numpys_numbers(env_id, settings):
     _, first = env.reset(seed=0)
     infos = [first, *(env.step(taken)[4] for taken in actions(0, 2, env_id=env_id))]
     start, terms = env.unwrapped.batch.body.start_names, env.unwrapped.batch.terms
+    more = {"parameters"} if settings else set()
+    if env.unwrapped.settings.target_speed is not None:
+        more.add("target_speed")
     for info in infos:
-        assert set(info) == {*start, "gait", "measured", *terms} | ({"parameters"} if settings else set())
+        assert set(info) == {*start, "gait", "measured", *terms, *more}
         for key, value in info.items():
             assert isinstance(value, np.float64 | np.ndarray), key
             assert value.dtype == np.float64

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import warnings
 from dataclasses import replace
 
@@ -10,13 +11,14 @@ import numpy as np
 import pytest
 from family import IDS, OTHER, actions, effective, roll, same, substeps
 
+import hoof_env
 from hoof_env import RandomizeParameters
 from hoof_env.dynamics.parts import GRAVITY
 from hoof_env.dynamics.step_length import StepWarning
 from hoof_env.envs.settings import PER_EPISODE
 from hoof_env.errors import ParameterError
 
-LEG = "hoof_env/HorseLeg-v0"
+LEG, SPEED = "hoof_env/HorseLeg-v0", "hoof_env/HorseLegSpeed-v0"
 PARAMETERS = {name: OTHER[name] for name in PER_EPISODE}
 
 
@@ -173,3 +175,49 @@ def test_substeps_suit_all_that_can_be_drawn():
         plain.reset(seed=0, options={"parameters": {"motor_gain": 50.0}})
     with pytest.warns(StepWarning, match="speed gain of a motor.*substeps=5 of"):
         plain.reset(seed=0, options={"parameters": STIFF})
+
+
+def test_numbers_of_a_sweep_and_paths_are_plain_in_settings_and_in_the_saved_spec(tmp_path):
+    """They were taken, and then the specification could not be saved."""
+    preset = tmp_path / "leg.json"
+    gaits = {gait: hoof_env.load_gait(gait, "identified") for gait in ("walk", "run")}
+    hoof_env.load_geometry("identified").save(str(preset), gaits=gaits, ground={})
+    given = {
+        "trunk_mass": np.int64(60), "friction": np.float32(0.5), "episode_seconds": np.int32(4),
+        "preset": preset, "target_speed": np.array([1.0, 2.0]), "restitution": np.float64(0.25),
+        "observation": np.array(["crank", "gait"]), "reward_weights": {"peak": np.float64(2.0)},
+        "randomize": {"trunk_drag": (np.float32(1.0), np.int8(3))},
+    }  # fmt: skip
+    for make, more in ((gym.make, {}), (gym.make_vec, {"num_envs": 2, "autoreset_mode": "SAME_STEP"})):
+        env = make(LEG, **given, **more)
+        plain = {**env.unwrapped.spec.kwargs}
+        json.dumps(plain)
+        assert plain["preset"] == str(preset)
+        assert plain["randomize"] == {"trunk_drag": (1.0, 3)}
+        assert env.unwrapped.settings.friction == 0.5
+        assert type(env.unwrapped.settings.trunk_mass) is int
+    again = gym.make(gym.envs.registration.EnvSpec.from_json(gym.make(LEG, **given).spec.to_json()))
+    assert again.unwrapped.settings.target_speed == [1.0, 2.0]
+
+
+def test_a_speed_is_commanded_at_a_reset_and_told_in_infos():
+    """For the whole episode, also where it would change; the next one draws again."""
+    env, envs = gym.make(SPEED, target_seconds=(0.1, 0.2)), gym.make_vec(SPEED, 3, target_seconds=(0.1, 0.2))
+    other = gym.make(SPEED, target_seconds=(0.1, 0.2))
+    for one in (env, envs):
+        _, info = one.reset(seed=0, options={"target_speed": 2.0})
+        assert np.all(info["target_speed"] == 2.0)
+        for _ in range(30):
+            info = one.step(np.zeros(one.action_space.shape, np.float32))[4]
+            assert np.all(info["target_speed"] == 2.0)
+    assert env.unwrapped.raw_observation()["commanded speed"] == 2.0
+    other.reset(seed=0)
+    same(env.reset()[0], other.reset()[0])  # the same numbers were drawn
+    told = set()
+    for _ in range(40):
+        info = env.step(np.zeros(4, np.float32))[4]
+        assert info["target_speed"] == env.unwrapped.raw_observation()["commanded speed"]
+        told.add(float(info["target_speed"]))
+    assert len(told) > 3
+    with pytest.raises(ParameterError, match=r"options\['target_speed'\]: expected none where no speed"):
+        gym.make("hoof_env/HorseLegRail-v0").reset(options={"target_speed": 2.0})

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hoof_env.envs.observation import HIGH, LOW, MIDDLE
+from hoof_env.envs.policies import open_loop
 from hoof_env.errors import ParameterError
 from hoof_env.gait import PARAMETERS, FilterSettings, GaitParameters, HarmonicGait, load_gait
 
@@ -189,6 +190,17 @@ def test_action_for_refuses_what_is_no_gait_and_asks_for_an_episode():
     for gait in (*wrong, np.zeros((2, 4))):
         with pytest.raises(ParameterError, match=r"gait: expected one of carrying_walk, run, walk.*got"):
             one.action_for(gait)
+
+
+def test_a_gait_beyond_what_can_be_commanded_is_refused_by_its_parameter():
+    """It used to be clipped without a word: another gait was played."""
+    one, beyond = gym.make(LEG), load_gait("run").to_array()
+    one.reset(seed=0)
+    beyond[0] = HIGH[0] + 1.0
+    with pytest.raises(ParameterError, match=r"gait: expected crank_speed from 0 to 12.5664.*got 13.5664"):
+        one.unwrapped.action_for(beyond)
+    with pytest.raises(ParameterError, match=r"constant: expected swing_cos from -0.9 to 0.9.*got -2"):
+        open_loop({"constant": [5.0, 0.4, 0.0, -2.0]}, one)
 
 
 def test_actions_say_what_they_are():

@@ -57,6 +57,33 @@ def test_it_says_what_theirs_says(env_id, settings):
     assert not any(ends) if settings is FALLS else all(ends) or env_id == HORSE
 
 
+def test_what_single_environments_are_asked_is_as_of_a_dummy_vec_env():
+    """Options one each, an attribute of some, methods of Gymnasium."""
+    ours, theirs = Sb3VecEnv(IDS[0], 3), DummyVecEnv([lambda: gym.make(IDS[0])] * 3)
+    for envs in (ours, theirs):
+        envs.seed(5)
+        envs.set_options([{"gait": "run"}, {"gait": "walk"}, {"gait": "run"}])
+    same(ours.reset(), theirs.reset())
+    same(ours.reset_infos, theirs.reset_infos)
+    same(ours.measured, np.array([info["measured"] for info in theirs.reset_infos]))
+    same(ours.reset(), theirs.reset())
+    for envs in (ours, theirs):
+        envs.set_attr("level", 1, indices=[0, 2])
+        assert envs.get_attr("level", [2]) == [1]
+        with pytest.raises(AttributeError, match="level"):
+            envs.get_attr("level")
+        envs.set_attr("level", 2, indices=1)
+        assert envs.get_attr("level") == [1, 2, 1]
+        assert envs.env_method("get_wrapper_attr", "dt", indices=[0]) == [0.02]
+        assert envs.env_method("has_wrapper_attr", "level") == [True] * 3
+        assert envs.env_method("has_wrapper_attr", "nothing") == [False] * 3
+    before = ours.envs.get_state()
+    ours.set_options([{"gait": "run"}, {"gait": "trot"}, {}])
+    with pytest.raises(ParameterError, match=r"gait.*got 'trot'"):
+        ours.reset()
+    same(ours.envs.get_state(), before)
+
+
 def test_methods_of_a_vec_env():
     env = Sb3VecEnv(IDS[0], 3)
     assert env.get_attr("render_mode") == [None] * 3

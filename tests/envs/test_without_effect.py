@@ -151,7 +151,10 @@ def test_settings_and_what_follows_from_them_are_not_assigned(kind):
             "trunk_mass",
             r"set it by gymnasium.make\(id, \.\.\.\), or reset\(options={'parameters': {'trunk_mass'",
         ),
-        ("reward_weights", r"set it by gymnasium.make\(id, \.\.\.\)$"),
+        (
+            "reward_weights",
+            r"gymnasium.make\(id, \.\.\.\), or .* by change_settings\(reward_weights=\.\.\.\)$",
+        ),
         *(
             ((("terrain", "")), ("weight", "set it by the arguments of gymnasium.make$"))
             if kind == "single"

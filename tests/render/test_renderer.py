@@ -456,3 +456,29 @@ def test_without_pygame_the_error_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "pygame", None)
     with pytest.raises(DependencyNotInstalled, match=r'pip install "hoof-env\[render\]"'):
         renderer()
+
+
+def test_what_is_around_a_small_leg_is_as_small():
+    """The trunk of a robot at 0.2 was as long as that of the whole leg, over key and panel. Up to the scale
+    all is the same picture, so that the same leg, made smaller, is drawn as large."""
+    from hoof_env.render.brush import Brush
+    from hoof_env.render.scene import USUAL_HIP_M, Scene
+
+    size, right = (960, 540), 336
+    usual = GEOMETRY.scaled(USUAL_HIP_M / GEOMETRY.hip_height)
+    large, small = (
+        Scene(Brush(size), usual.scaled(factor), Terrain.flat(), size, right, "rail") for factor in (1.0, 0.2)
+    )
+    assert small._scale == pytest.approx(5 * large._scale)
+    assert small._trunk.get_size() == large._trunk.get_size()
+    assert small._level == pytest.approx(large._level)
+    assert large._trunk.get_width() < size[0] - right
+
+
+@pytest.mark.parametrize(("lift_off", "unit"), [(0.0, "kN"), (28.0, "kN"), (2.0, "N")])
+def test_forces_on_a_light_leg_are_in_newtons(lift_off, unit):
+    """40 N were 0.04 kN, with the two decimals of an animal of 500 kg."""
+    shown = renderer(weight_n=20 * lift_off, lift_off_n=lift_off)
+    assert shown._panel._force.name == shown._scene._unit == unit
+    least = 10.0 if unit == "N" else 200.0
+    assert least <= shown._panel.full_scale <= max(least, 10 * 20 * lift_off)

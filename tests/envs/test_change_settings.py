@@ -1,0 +1,155 @@
+"""Settings that change from the next reset on: as if made with them, alone, in a batch and under SB3."""
+
+import copy
+import pickle
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from family import HORSE, actions, same
+
+from hoof_env import Sb3VecEnv
+from hoof_env.errors import FixedSettingError, ParameterError, UnknownArgumentError
+
+LEG, SPEED, TERRAIN = (f"hoof_env/HorseLeg{name}-v0" for name in ("", "Speed", "Terrain"))
+
+CHANGES = [
+    (LEG, {"target_speed": [0.5, 1.5], "target_seconds": [0.1, 0.2]}),
+    (LEG, {"reward_weights": {"peak": 3.0, "energy": 0.7}}),
+    (LEG, {"randomize": {"friction": (0.2, 0.8), "trunk_mass": (40.0, 60.0)}}),
+    (LEG, {"terrain": {"kind": "hills", "seed": 5, "stiffness": [0.5, 2.0]}}),
+    (TERRAIN, {"terrain": {"kind": "hills", "seed": 9, "rise": 0.1}}),
+    (SPEED, {"target_speed": [1.0, 1.2], "reward_weights": {"overspeed": 2.0}}),
+    (HORSE, {"terrain": {"kind": "slope", "angle": 0.05}, "target_speed": [1.5, 2.0]}),
+]
+SHORT = {"episode_seconds": 0.2}
+"""Ten control steps."""
+
+
+def played(env, taken):
+    """What steps of an environment give, which starts again by itself; with the reset of the next step."""
+    found, over = [], False
+    for action in taken:
+        if over:
+            found.append(env.reset())
+            over = False
+            continue
+        found.append(env.step(action))
+        over = found[-1][2] or found[-1][3]
+    return found
+
+
+@pytest.mark.parametrize(("env_id", "changes"), CHANGES, ids=str)
+def test_the_next_episode_is_that_of_an_environment_made_with_them(env_id, changes):
+    """To the bit, infos included; the episode before goes on as if nothing had been asked."""
+    env, old, made = (gym.make(env_id, **SHORT, **given) for given in ({}, {}, changes))
+    taken = actions(1, 25, env_id=env_id)
+    for one in (env, old):
+        one.reset(seed=3)
+    same(played(env, taken[:4]), played(old, taken[:4]))
+    env.unwrapped.change_settings(**changes)
+    same(played(env, taken[4:10]), played(old, taken[4:10]))
+    same(env.reset(seed=8), made.reset(seed=8))
+    assert env.unwrapped.settings == made.unwrapped.settings
+    same(played(env, taken), played(made, taken))
+    one, other = env.unwrapped.get_state(), made.unwrapped.get_state()
+    assert one["settings"] == other["settings"]
+    same(env.unwrapped.set_state(other), made.unwrapped.set_state(one))
+    same(played(env, taken), played(made, taken))
+
+
+@pytest.mark.parametrize("n", [3, 17])
+@pytest.mark.parametrize(("env_id", "changes"), CHANGES, ids=str)
+def test_a_row_takes_them_when_it_starts_again_and_has_the_bits_of_one(env_id, changes, n):
+    """Rows end at different times: so long they are under different settings, more than two at once."""
+    envs = gym.make_vec(env_id, num_envs=n, **SHORT).unwrapped
+    singles = [gym.make(env_id, **SHORT).unwrapped for _ in range(n)]
+    same(envs.reset(seed=4)[0], np.array([one.reset(seed=4 + k)[0] for k, one in enumerate(singles)]))
+    taken, over = actions(2, 40, n, env_id=env_id), np.zeros(n, bool)
+    original = gym.make(env_id).unwrapped.settings
+    back = {name: getattr(original, name) for name in changes}
+    for step, action in enumerate(taken):
+        if step == 3:  # rows end apart
+            mask = np.arange(n) % 3 == 1
+            envs.reset(options={"reset_mask": mask})
+            for k in np.flatnonzero(mask):
+                singles[k].reset()
+        for at, asked in ((5, changes), (14, back)):
+            if step == at:
+                envs.change_settings(**asked)
+                for one in singles:
+                    one.change_settings(**asked)
+        if step == 22:
+            envs = copy.deepcopy(envs)
+        rows = envs.step(action)
+        for k, one in enumerate(singles):
+            if over[k]:
+                observation, reward, ended = one.reset()[0], 0.0, (False, False)
+            else:
+                observation, reward, *ended, info = one.step(action[k])
+                same(rows[4]["measured"][k], info["measured"])
+            same(rows[0][k], observation)
+            assert (rows[1][k], rows[2][k], rows[3][k]) == (reward, *ended), (step, k)
+            over[k] = any(ended)
+
+
+@pytest.mark.parametrize(("name", "value"), [("target_speed", "fast"), ("terrain", {"kind": "moon"}),
+    ("terrain", {"kind": "slope", "angle": 0.1}), ("reward_weights", {"speed": 1.0}),
+    ("randomize", {"friction": (0.3, 0.1)})])  # fmt: skip
+@pytest.mark.parametrize("many", [False, True])
+def test_what_is_refused_changes_nothing(name, value, many):
+    env, other = (gym.make_vec(LEG, 3, **SHORT) if many else gym.make(LEG, **SHORT) for _ in range(2))
+    env.reset(seed=0), other.reset(seed=0)
+    with pytest.raises(ParameterError, match=name):
+        env.unwrapped.change_settings(**{name: value})
+    assert env.unwrapped.settings == other.unwrapped.settings
+    same(env.reset()[0], other.reset()[0])
+
+
+def test_other_settings_stay_as_they_were_made():
+    env = gym.make(LEG).unwrapped
+    with pytest.raises(FixedSettingError, match=r"change_settings: expected some of target_speed.*got 'dt'"):
+        env.change_settings(dt=0.01)
+    with pytest.raises(UnknownArgumentError, match="did you mean target_speed"):
+        env.change_settings(target_sped=1.0)
+    with pytest.raises(FixedSettingError, match=r"from the next reset on by change_settings\(terrain=...\)"):
+        env.terrain = None
+    with pytest.raises(ParameterError, match="'ground' is constant without terrain"):
+        gym.make(TERRAIN).unwrapped.change_settings(terrain=None)
+
+
+def test_a_refused_reset_keeps_the_episode():
+    """Also its settings: options are checked for those that come."""
+    env = gym.make(LEG, **SHORT).unwrapped
+    env.reset(seed=0)
+    env.change_settings(target_speed=None)
+    with pytest.raises(ParameterError, match=r"target_speed.*expected none where no speed is commanded"):
+        env.reset(options={"target_speed": 1.0})
+    assert env.settings.target_speed == (2.5, 2.5)
+    assert "target_speed" in env.step(np.zeros(4, np.float32))[4]
+    assert "target_speed" not in env.reset()[1]
+
+
+def test_states_are_of_one_set_of_settings():
+    envs = gym.make_vec(LEG, 4, **SHORT).unwrapped
+    envs.reset(seed=0)
+    envs.change_settings(reward_weights={"peak": 1.0})
+    envs.get_state()
+    envs.reset(options={"reset_mask": np.array([True, False, False, False])})
+    with pytest.raises(ParameterError, match="get_state: expected one set of settings for all"):
+        envs.get_state()
+    envs.reset()
+    envs.set_state(pickle.loads(pickle.dumps(envs)).get_state())
+
+
+def test_sb3_asks_all_at_once():
+    """As a callback does by `training_env.env_method`."""
+    envs = Sb3VecEnv(SPEED, num_envs=4, **SHORT)
+    envs.seed(0)
+    envs.reset()
+    envs.env_method("change_settings", target_speed=[1.0, 1.25])
+    for _ in range(12):
+        envs.step(np.zeros((4, 4), np.float32))
+    assert all(1.0 <= info["target_speed"] <= 1.25 for info in envs.reset_infos)
+    assert envs.get_attr("settings")[0].target_speed == [1.0, 1.25]
+    assert all(1.0 <= one["commanded speed"] <= 1.25 for one in envs.env_method("raw_observation"))

@@ -1,0 +1,82 @@
+"""Ground under a trunk that keeps its height in the world: it may rise and fall, and must not drift away."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from hoof_env.envs.parameters import DRIFT, STRETCH, farthest_mean, make_terrain
+from hoof_env.errors import ParameterError
+from hoof_env.ground.terrain import Terrain
+
+HELD = {"suspended": "hoof_env/HorseLeg-v0", "rail": "hoof_env/HorseLegRail-v0"}
+HIP = gym.make(HELD["rail"]).unwrapped.geometry.hip_height
+
+
+def step_up(height, length=30.0):
+    """Level, then a ramp to another level, which goes on."""
+    return Terrain.ramp(height / length, 5.0, length).to_dict()
+
+
+@pytest.mark.parametrize("trunk", HELD)
+@pytest.mark.parametrize(
+    "terrain",
+    [
+        {"kind": "slope", "angle": 0.02}, {"kind": "slope", "angle": -1e-3}, step_up(0.3), step_up(-0.3),
+        {"height": [0.1]}, Terrain.slope(0.01).to_dict(), Terrain.through([0, 400], [0, 4]).to_dict(),
+        {"kind": "hills", "rise": 1.0},
+    ],
+    ids=repr,
+)  # fmt: skip
+def test_a_drift_is_refused_where_the_trunk_keeps_its_height(trunk, terrain):
+    """On a slope of 0.02 rad the run used to go farther uphill than on the level, with a weight share of 4.5,
+    and of 37 under a rail."""
+    for make in (gym.make, gym.make_vec):
+        with pytest.raises(ParameterError, match=rf"terrain.*under a {trunk} trunk.*hoof_env/Horse-v0.*got"):
+            make(HELD[trunk], terrain=terrain)
+
+
+@pytest.mark.parametrize("trunk", HELD)
+@pytest.mark.parametrize(
+    "terrain",
+    [
+        None, {"kind": "slope"}, {"kind": "hills"}, {"kind": "hills", "seed": 3, "rise": 0.3}, step_up(0.04),
+        Terrain.through([0, 1, 2, 400], [0, 0.2, 0, 0]).to_dict(), {"height": [0.0], "stiffness": 0.5},
+        Terrain.patches([(5, 9, 0.3, 0.5)]).to_dict(),
+    ],
+    ids=repr,
+)  # fmt: skip
+def test_ground_that_stays_is_taken(trunk, terrain):
+    gym.make(HELD[trunk], terrain=terrain).reset(seed=0)
+
+
+@pytest.mark.parametrize("env_id", ["hoof_env/HorseLegFixed-v0", "hoof_env/Horse-v0"])
+def test_slopes_are_for_trunks_that_follow_them_or_stay(env_id):
+    gym.make(env_id, terrain={"kind": "slope", "angle": 0.02}).reset(seed=0)
+
+
+def test_the_bound_is_a_part_of_the_hip_height():
+    one = gym.make(HELD["suspended"], terrain={"height": [0.99 * DRIFT * HIP]})
+    assert one.unwrapped.terrain.height == (0.99 * DRIFT * HIP,)
+    with pytest.raises(ParameterError, match="terrain: expected ground whose mean"):
+        gym.make(HELD["suspended"], terrain={"height": [1.01 * DRIFT * HIP]})
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_farthest_mean_is_that_of_many_sums(seed):
+    """Against a sum over every centimetre."""
+    rng = np.random.default_rng(seed)
+    terrain = Terrain(tuple(rng.uniform(-1, 1, 40)), start=rng.uniform(-5, 5), spacing=rng.uniform(0.2, 3))
+    fine = np.arange(terrain.x[0] - 15, terrain.x[-1] + 15, 0.01)
+    width = round(STRETCH / 0.01)
+    means = np.convolve(terrain.height_at(fine), np.full(width, 1 / width), "valid")
+    where, mean = farthest_mean(terrain, STRETCH)
+    inside = np.abs(fine - where) < STRETCH / 2
+    assert mean == pytest.approx(terrain.height_at(fine)[inside].mean(), abs=2e-3)
+    assert abs(mean) == pytest.approx(np.abs(means).max(), abs=0.05)
+
+
+def test_hills_do_not_drift():
+    """Of twenty seeds: their mean over a stretch is within their rise, and over all is near none."""
+    for seed in range(20):
+        terrain = make_terrain({"kind": "hills", "seed": seed, "rise": 0.15})
+        assert abs(np.mean(terrain.height)) < 0.03
