@@ -48,7 +48,7 @@ def dimensionless(env, measured):
 def test_in_a_similar_world_all_sizes_move_alike(size, drive):
     """Filters, the cap on a crank's speed, springs, dampers, motors and the approach floor are scaled: else
     this differs in the first digits. The commanded speed is so high that commands meet their cap."""
-    worlds = [similar_world(each) | {"target_speed": 6.0 * each**0.5} for each in (1.0, size)]
+    worlds = [similar_world(each) | {"target_speed": 8.0 * each**0.5} for each in (1.0, size)]
     envs = [make(HORSE, drive=drive, **world) for world in worlds]
     for env in envs:
         env.reset(seed=3)

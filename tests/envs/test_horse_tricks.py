@@ -8,9 +8,9 @@ from horses import SEEDS, SPEEDS, die, played
 
 from hoof_env.envs.policies import make_policy
 
-MARGIN = 5.0
+MARGIN = 10.0
 """Return over ten seconds by which the reference gait is ahead, at least: offsets are small and fade, so that
-no trick is far from a gait."""
+to hop in step loses 12; others lose 90 and more."""
 
 
 def assert_below(reference, found):
@@ -84,9 +84,9 @@ def own_terms():
 @pytest.mark.parametrize(
     ("name", "term", "factor"),
     [
-        ("hop", "pitch", 2), ("skate", "slip", 1.4), ("brake", "slip", 1.7), ("brake", "peak", 1.2),
-        ("bang-bang 3", "slip", 1.4), ("bang-bang 12", "peak", 1.25), ("bang-bang 25", "pitch", 4),
-        ("die", "slip", 4),
+        ("hop", "slip", 1.3), ("skate", "slip", 4), ("brake", "slip", 3), ("brake", "peak", 1.8),
+        ("bang-bang 3", "slip", 6), ("bang-bang 12", "peak", 2), ("bang-bang 25", "pitch", 7),
+        ("die", "pitch", 10),
     ],
 )  # fmt: skip
 def test_a_trick_is_charged_for_what_it_does(own_terms, name, term, factor):
