@@ -117,7 +117,9 @@ def __dir__() -> list[str]:
 
 def _register(name: str, **spec: Any) -> None:
     if f"hoof_env/{name}" not in _gym.registry:
-        _gym.register(id=f"hoof_env/{name}", **spec)
+        # the environments check what they are given; Gymnasium's passive checker takes a first reset that was
+        # refused for one that has happened, and expects a number for the reward of HorseLegMO
+        _gym.register(id=f"hoof_env/{name}", disable_env_checker=True, **spec)
 
 
 for _name, _task in _TASKS.items():
@@ -131,5 +133,4 @@ _register(
     "HorseLegMO-v0",
     entry_point="hoof_env.envs.horse_leg:HorseLegMOEnv",
     vector_entry_point="hoof_env.envs.horse_leg:refuse_many",
-    disable_env_checker=True,  # it expects a number for a reward
 )

@@ -339,5 +339,6 @@ def register(
         entry_point="hoof_env.envs.horse_leg:HorseLegEnv",
         vector_entry_point="hoof_env.envs.vector:HorseLegVectorEnv",
         kwargs={"task": task.key},
+        disable_env_checker=True,  # as of the package's own ids
     )
     _OWN[env_id] = task
