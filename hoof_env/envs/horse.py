@@ -70,7 +70,7 @@ SAG = MASS * GRAVITY / (4 * TASKS["horse"].defaults["hoof_stiffness"])  # of two
 UNKNOWN: dict[str, Any] = {"vx": 1.0, "vy": 0.0, "pitch": 0.0, "pitch_rate": 0.0}
 """How a trunk starts in a gait that is not a reference gait."""
 
-SPANS = (0.03, 0.08, 0.08, 0.08)
+SPANS = (0.03, 0.04, 0.04, 0.04)
 """What actions of 1 change after a while: of the crank's speed [-], of the swing's offset, sine and cosine
 [rad]."""
 
