@@ -8,15 +8,15 @@ from horses import SEEDS, SPEEDS, die, played
 
 from hoof_env.envs.policies import make_policy
 
-MARGIN = 10.0
-"""Return over ten seconds by which the reference gait is ahead, at least: offsets are small and fade, so that
-to hop in step loses 12; others lose 90 and more."""
+MARGIN, IN_STEP = 15.0, 2.0
+"""Return over ten seconds by which the reference gait is ahead, at least; less of legs that swing in step,
+which the small offsets hardly change."""
 
 
-def assert_below(reference, found):
+def assert_below(reference, found, margin=MARGIN):
     """From the same starts, and by four standard errors of the differences."""
     lost = reference - found
-    assert lost.mean() > max(MARGIN, 4 * lost.std() / np.sqrt(SEEDS))
+    assert lost.mean() > max(margin, 4 * lost.std() / np.sqrt(SEEDS))
 
 
 def bang_bang(pace):
@@ -58,7 +58,7 @@ def reference():
 
 @pytest.mark.parametrize("name", TRICKS)
 def test_tricks_stay_below_the_reference(reference, name):
-    assert_below(reference, played(TRICKS[name])[0])
+    assert_below(reference, played(TRICKS[name])[0], IN_STEP if name == "hop" else MARGIN)
 
 
 def terms_of(act):
@@ -84,9 +84,9 @@ def own_terms():
 @pytest.mark.parametrize(
     ("name", "term", "factor"),
     [
-        ("hop", "slip", 1.3), ("skate", "slip", 4), ("brake", "slip", 3), ("brake", "peak", 1.8),
-        ("bang-bang 3", "slip", 6), ("bang-bang 12", "peak", 2), ("bang-bang 25", "pitch", 7),
-        ("die", "pitch", 10),
+        ("hop", "slip", 1.03), ("skate", "slip", 2.2), ("brake", "slip", 2.2), ("brake", "peak", 1.4),
+        ("bang-bang 3", "slip", 2), ("bang-bang 12", "peak", 1.5), ("bang-bang 25", "pitch", 4),
+        ("die", "slip", 2.2),
     ],
 )  # fmt: skip
 def test_a_trick_is_charged_for_what_it_does(own_terms, name, term, factor):
@@ -98,4 +98,4 @@ def test_a_trick_is_charged_for_what_it_does(own_terms, name, term, factor):
 @pytest.mark.parametrize("name", ["random", "bang-bang"])
 def test_simple_policies_stay_below_the_reference(reference, name):
     policy = make_policy(name, gym.make(HORSE))
-    assert_below(reference, played(lambda seen, time: policy.predict(seen)[0])[0])
+    assert_below(reference, played(lambda seen, time: policy.predict(seen)[0])[0], 5.0)
