@@ -94,7 +94,7 @@ def test_types_and_infos_of_a_step(env_id, settings):
         _, reward, terminated, truncated, info = env.step(env.action_space.sample())
         assert (type(reward), type(terminated), type(truncated)) == (float, bool, bool)
         assert reward == sum(value for key, value in info.items() if key.startswith("reward_"))
-        assert len(info) <= 8 + len(env.unwrapped.task.terms)
+        assert len(info) <= 9 + len(env.unwrapped.task.terms)
         done = terminated or truncated
         assert set(started) <= set(info)
         assert set(info) - set(started) == (

@@ -30,11 +30,11 @@ def slow():
 
 
 def test_terms_are_what_the_measurements_say():
-    envs = make(target_speed=SPEEDS[1])
+    envs = make(target_speed=1.0)
     _, infos = envs.reset(seed=0)
     take, before, weight = noise(0.3), infos["measured"]["x"], envs.unwrapped.weight
     slide = np.tile(die(None, 0.0), (MANY, 1)).astype(np.float32)
-    asked = DT * SPEEDS[1]
+    asked, farthest = DT * 1.0, 0.0
     for _ in range(60):
         _, rewards, failed, _, infos = envs.step(slide + take())
         m, paid = infos["measured"], {name: infos[f"reward_{name}"] / WEIGHTS[name] for name in WEIGHTS}
@@ -54,10 +54,10 @@ def test_terms_are_what_the_measurements_say():
         for name, value in expected.items():
             np.testing.assert_allclose(paid[name], value, rtol=1e-9, atol=1e-12, err_msg=name)
         np.testing.assert_allclose(rewards, sum(infos[f"reward_{name}"] for name in WEIGHTS), rtol=1e-12)
-        before = m["x"]
+        before, farthest = m["x"], max(farthest, (total["slip"] / asked).max())
         if failed.any():
             break
-    assert (total["slip"] / asked > 1).any()
+    assert farthest > 1  # so that the bound of the term is met
 
 
 @pytest.mark.parametrize("speed", SPEEDS)

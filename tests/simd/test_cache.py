@@ -287,11 +287,12 @@ def test_compiling_is_said_once_and_only_when_it_happens(start, tmp_path):
     assert ended(start(code, **new))[1] == "---\n"
 
 
-def test_half_a_minute_is_told_of_kernels_that_take_as_long(capsys):
+def test_half_a_minute_is_told_of_kernels_that_take_as_long(capsys, monkeypatch):
     """It was told of one that took half a second, and then nothing."""
     from hoof_env.simd import compile
 
     said = "hoof-env: compiling kernels for this machine, once (about half a minute) ...\n"
+    monkeypatch.delenv(compile.QUIET, raising=False)
     announcer = compile._Announcer()
     for name, expected in (("touch", ""), ("step_one", said), ("advance_leg", "")):
         function = SimpleNamespace(__name__=name, __module__="hoof_env.envs.step")
