@@ -105,8 +105,11 @@ def train(job: Job) -> list[dict[str, Any]]:
     class Curve(BaseCallback):
         """Scores the policy every so many steps."""
 
-        began = time.process_time()
+        began = 0.0
         scored = 0.0  # seconds that scores took
+
+        def _on_training_start(self) -> None:
+            self.began = time.process_time()
 
         def _on_step(self) -> bool:
             if self.num_timesteps % curves.every == 0 or self.num_timesteps == curves.steps:

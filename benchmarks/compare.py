@@ -20,6 +20,7 @@ import sys
 import tarfile
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -50,7 +51,8 @@ def checkout(commit: str) -> Path:
         archive = ["git", "archive", done.stdout.strip(), "hoof_env"]
         packed = subprocess.run(archive, cwd=ROOT, capture_output=True, check=True).stdout
         with tarfile.open(fileobj=io.BytesIO(packed)) as files:
-            files.extractall(part := tree.with_suffix(".part"), filter="data")
+            safely: dict[str, Any] = {"filter": "data"} if hasattr(tarfile, "data_filter") else {}
+            files.extractall(part := tree.with_suffix(".part"), **safely)  # Python 3.11.2 has no filters
         part.rename(tree)
     return tree
 

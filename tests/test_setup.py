@@ -141,7 +141,7 @@ def test_where_no_python_fits_uv_fetches_one(checkout, tmp_path):
         (tmp_path / name).write_text(f"#!/bin/sh\n{text}\n")
         (tmp_path / name).chmod(0o755)
     ours = os.environ | {"PATH": f"{tmp_path}{os.pathsep}{os.environ['PATH']}"}
-    command = ["make", "setup", "PYTHONS=no-such-python"]
+    command = ["make", "--no-print-directory", "setup", "PYTHONS=no-such-python"]
     ended = subprocess.run(command, cwd=checkout, env=ours, capture_output=True, text=True, check=False)
     assert ended.returncode == 0, ended.stderr
     first, second = ended.stdout.splitlines()

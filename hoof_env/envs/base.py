@@ -91,7 +91,7 @@ class LegBase:
             check_choice("render_mode", render_mode, self.metadata["render_modes"])
         self._size = check_side("width", size[0]), check_side("height", size[1])
         self.task, self.render_mode = task_of(task), render_mode
-        self._given = dict(given)
+        self._given = {name: as_plain(name, value) for name, value in given.items()}
         self.batch = EpisodeBatch(self.task, self.task.settings(given), n, num_threads)
         self.metadata = {**self.metadata, "render_fps": max(1, round(1 / self.batch.dt))}
         sizes = len(self.batch.names), len(self.batch.body.action_names)
@@ -150,7 +150,7 @@ class LegBase:
                     f"change_settings: expected some of {', '.join(CHANGEABLE)}, got {name!r}, which stays as"
                     " it was made"
                 )
-        given = self._given | changes
+        given = self._given | {name: as_plain(name, value) for name, value in changes.items()}
         self.batch.change(self.task.settings(given))
         self._given = given
 

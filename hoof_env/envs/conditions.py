@@ -106,12 +106,13 @@ def keep_others(batch: Any, rows: NDArray[np.int64], act: Callable[[], Any]) -> 
     others = np.setdiff1d(np.arange(batch.num_envs), rows)
     by_column, by_row = _arrays(batch)
     kept = [array[..., others] for array in by_column], [array[others] for array in by_row]
-    found = act()
-    for array, values in zip(by_column, kept[0], strict=True):
-        array[..., others] = values
-    for array, values in zip(by_row, kept[1], strict=True):
-        array[others] = values
-    return found
+    try:
+        return act()
+    finally:  # also where Ctrl-C ends it
+        for array, values in zip(by_column, kept[0], strict=True):
+            array[..., others] = values
+        for array, values in zip(by_row, kept[1], strict=True):
+            array[others] = values
 
 
 def under_each(batch: Any, rows: NDArray[np.int64], act: Callable[[NDArray[np.int64]], Any]) -> list[Any]:
@@ -119,10 +120,12 @@ def under_each(batch: Any, rows: NDArray[np.int64], act: Callable[[NDArray[np.in
     it changes anything."""
     newest = batch.conditions.all[-1]
     found = []
-    for conditions, those in batch.conditions.groups(rows):
-        enter(batch, conditions)
-        found.append(keep_others(batch, those, lambda those=those: act(those)))  # type: ignore[misc]
-    enter(batch, newest)
+    try:
+        for conditions, those in batch.conditions.groups(rows):
+            enter(batch, conditions)
+            found.append(keep_others(batch, those, lambda those=those: act(those)))  # type: ignore[misc]
+    finally:
+        enter(batch, newest)
     return found
 
 

@@ -91,7 +91,7 @@ class Recording:
     def frame(self, mode: str, fps: float) -> Any:
         """A picture of what happened since the last one, at most `SHOWN` seconds; None of a window."""
         hips = self.batch.body.hips
-        terrain = self._conditions.get("terrain", self.batch.engine.terrain)
+        terrain = self.batch.conditions.of(self.env).get("terrain", self.batch.engine.terrain)
         if self.renderer is None:
             weight = float(self.batch.now.weight[self.env])
             self.renderer = Renderer(

@@ -211,7 +211,8 @@ def as_plain(name: str, value: Any) -> Any:
     if isinstance(value, Mapping):
         return {str(key): as_plain(f"{name}[{key!r}]", inner) for key, inner in value.items()}
     if isinstance(value, (list, tuple)):
-        return type(value)(as_plain(f"{name}[{k}]", inner) for k, inner in enumerate(value))
+        plain = (as_plain(f"{name}[{k}]", inner) for k, inner in enumerate(value))
+        return tuple(plain) if isinstance(value, tuple) else list(plain)
     if isinstance(value, (int, float, str)):
         return next(kind(value) for kind in (int, float, str) if isinstance(value, kind))
     if hasattr(type(value), "__float__"):

@@ -165,6 +165,11 @@ class _Digest:
                 return
             with suppress(ParameterError):  # the version stands for what cannot be read
                 self._add_code(function.__code__, function.__globals__, cells)
+            # a factory of one version makes many functions, which differ in what they enclose
+            for name, value in cells.items():
+                self._add_leniently(value, name)
+            for value in (*(function.__defaults__ or ()), *(function.__kwdefaults__ or {}).values()):
+                self._add_leniently(value, function.__qualname__)
             return
         if not _is_ours(function):
             self._add_code(function.__code__, function.__globals__, cells)

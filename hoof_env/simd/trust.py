@@ -41,7 +41,8 @@ def close_new(folder: str) -> None:
 def close(path: str) -> None:
     """Let nobody but its owner write to a file or folder of ours."""
     if os.name == "posix" and (mode := stat.S_IMODE(os.stat(path).st_mode)) & OTHERS:
-        os.chmod(path, mode & ~OTHERS)
+        with suppress(PermissionError):  # a file system without modes; whoever reads decides
+            os.chmod(path, mode & ~OTHERS)
 
 
 def _check(path: str, found: os.stat_result) -> None:
@@ -54,9 +55,12 @@ def _check(path: str, found: os.stat_result) -> None:
         open_to &= ~package.st_mode
     if is_inside:
         open_to &= ~(package.st_mode & stat.S_IWOTH)
-    if _is_ours(found.st_gid):
+    if found.st_mode & stat.S_ISVTX and stat.S_ISDIR(found.st_mode):
+        open_to = 0  # as /tmp: others can add to it, but not replace the folder in it that is looked at next
+    if open_to & stat.S_IWGRP and _is_ours(found.st_gid):
         open_to &= ~stat.S_IWGRP
-    if found.st_uid not in (os.geteuid(), 0, package.st_uid):
+    is_shared = is_inside and found.st_gid == package.st_gid and package.st_mode & stat.S_IWGRP
+    if found.st_uid not in (os.geteuid(), 0, package.st_uid) and not is_shared:
         why = f"its owner is {_user(found.st_uid)}"
     elif open_to:
         why = "it is writable by " + ("everybody" if open_to & stat.S_IWOTH else _group(found.st_gid))
@@ -64,8 +68,9 @@ def _check(path: str, found: os.stat_result) -> None:
         return
     raise OutputError(
         f"compiled kernels in {path!r} cannot be trusted, for {why}: they are pickles, which can run any "
-        "code; expected a folder and files of your own or of root that nobody else can write: chmod -R go-w, "
-        "or set the environment variable NUMBA_CACHE_DIR to a folder of your own"
+        "code; expected a folder and files of your own or of root that nobody else can write: delete these "
+        "files, chmod -R go-w the folder, or set the environment variable NUMBA_CACHE_DIR to a folder of "
+        "your own"
     )
 
 

@@ -92,7 +92,7 @@ def test_spawned_workers(env_id):
 
 def test_record_video(env_id, tmp_path):
     """`RecordVideo` of an episode: its frames, not all alike."""
-    pytest.importorskip("imageio")
+    pytest.importorskip("moviepy", reason='pip install "hoof-env[record]"')
     env = gym.make(env_id, render_mode="rgb_array", episode_seconds=SHORT)
     env = RecordVideo(env, str(tmp_path / "videos"))
     env.reset(seed=0)

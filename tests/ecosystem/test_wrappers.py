@@ -329,7 +329,7 @@ def test_dict_info_to_list(env_id):
 
 def test_record_video_vector(env_id, tmp_path):
     """`RecordVideo` of the native vector environment: frames of all, not all alike."""
-    pytest.importorskip("imageio")
+    pytest.importorskip("moviepy", reason='pip install "hoof-env[record]"')
     envs = native(env_id, render_mode="rgb_array", **SHORT)
     films = vector.RecordVideo(envs, str(tmp_path / "videos"), episode_trigger=lambda number: number == 0)
     films.reset(seed=0)

@@ -9,6 +9,7 @@ import pytest
 from family import HORSE, actions, same
 
 from hoof_env import Sb3VecEnv
+from hoof_env.envs import conditions
 from hoof_env.errors import FixedSettingError, ParameterError, UnknownArgumentError
 
 LEG, SPEED, TERRAIN = (f"hoof_env/HorseLeg{name}-v0" for name in ("", "Speed", "Terrain"))
@@ -153,3 +154,31 @@ def test_sb3_asks_all_at_once():
     assert all(1.0 <= info["target_speed"] <= 1.25 for info in envs.reset_infos)
     assert envs.get_attr("settings")[0].target_speed == [1.0, 1.25]
     assert all(1.0 <= one["commanded speed"] <= 1.25 for one in envs.env_method("raw_observation"))
+
+
+def test_what_the_caller_keeps_is_no_setting():
+    """A mapping that is edited in place changes nothing until it is given again."""
+    weights = {"peak": 1.0}
+    env = gym.make("hoof_env/HorseLegSpeed-v0", reward_weights=weights)
+    weights["peak"] = 9.0
+    env.unwrapped.change_settings(target_speed=1.0)
+    assert env.unwrapped.settings.reward_weights["peak"] == 1.0
+
+
+def test_an_interrupted_call_leaves_the_newest_settings_and_the_other_rows(monkeypatch):
+    envs = gym.make_vec("hoof_env/HorseLegSpeed-v0", num_envs=4, autoreset_mode="DISABLED").unwrapped
+    envs.reset(seed=0)
+    envs.change_settings(target_speed=2.0)
+    envs.reset(seed=[None, 5, None, None], options={"reset_mask": np.array([False, True, False, False])})
+    batch = envs.batch
+    assert batch.conditions.are_mixed
+    newest, before = batch.conditions.all[-1], batch.rewards.copy()
+
+    def interrupted(rows):
+        batch.rewards += 1.0
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        conditions.under_each(batch, np.arange(4), interrupted)
+    assert batch.asked is newest["asked"]
+    assert (batch.rewards[[1]] == before[[1]]).all()

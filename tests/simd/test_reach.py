@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from hoof_env.errors import ParameterError
+from hoof_env.simd import reach
 from hoof_env.simd.compile import inlined
 from hoof_env.simd.reach import fingerprint, is_library, refresh, version_of
 
@@ -170,3 +171,25 @@ def test_a_helper_is_compiled_again_once_what_it_reaches_has_changed():
         refresh(term)
         refresh(term)
         assert helper(1.0) == factor
+
+
+def made_by_a_factory(k):
+    def law(x):
+        return k * x
+
+    return law
+
+
+def with_a_default(x, k=2.0):
+    return k * x
+
+
+def test_functions_of_an_installed_factory_differ_in_what_they_enclose(monkeypatch):
+    """Their version is the same, and so is their code."""
+    monkeypatch.setattr(reach, "is_library", lambda value: True)
+    monkeypatch.setattr(reach, "version_of", lambda name: "1.0")
+    assert reach.fingerprint(made_by_a_factory(2.0)) != reach.fingerprint(made_by_a_factory(3.0))
+    assert reach.fingerprint(made_by_a_factory(2.0)) == reach.fingerprint(made_by_a_factory(2.0))
+    before = reach.fingerprint(with_a_default)
+    monkeypatch.setattr(with_a_default, "__defaults__", (3.0,))
+    assert reach.fingerprint(with_a_default) != before
