@@ -10,6 +10,7 @@ from family import HORSE, actions, same
 
 from hoof_env import Sb3VecEnv
 from hoof_env.envs import conditions
+from hoof_env.envs.horse_leg import HorseLegEnv
 from hoof_env.errors import FixedSettingError, ParameterError, UnknownArgumentError
 
 LEG, SPEED, TERRAIN = (f"hoof_env/HorseLeg{name}-v0" for name in ("", "Speed", "Terrain"))
@@ -159,10 +160,16 @@ def test_sb3_asks_all_at_once():
 def test_what_the_caller_keeps_is_no_setting():
     """A mapping that is edited in place changes nothing until it is given again."""
     weights = {"peak": 1.0}
-    env = gym.make("hoof_env/HorseLegSpeed-v0", reward_weights=weights)
+    env = HorseLegEnv(task="speed", reward_weights=weights)
     weights["peak"] = 9.0
-    env.unwrapped.change_settings(target_speed=1.0)
-    assert env.unwrapped.settings.reward_weights["peak"] == 1.0
+    env.change_settings(target_speed=1.0)
+    env.reset(seed=0)
+    assert env.settings.reward_weights["peak"] == 1.0
+    env.change_settings(reward_weights=weights)
+    weights["peak"] = 3.0
+    env.change_settings(target_speed=2.0)
+    env.reset(seed=0)
+    assert env.settings.reward_weights["peak"] == 9.0
 
 
 def test_an_interrupted_call_leaves_the_newest_settings_and_the_other_rows(monkeypatch):
