@@ -185,14 +185,14 @@ def settled_speed(policy: str, command: float) -> float:
     return float(distance / (with_start[0]["seconds"] - SETTLED))
 
 
-def meets(figures: Mapping[str, float], run: Mapping[str, float]) -> bool:
+def dominates(figures: Mapping[str, float], run: Mapping[str, float]) -> bool:
     """Whether some means dominate those of the run."""
     lower = all(figures[key] <= part * run[key] for key, part in LOWER.items())
     bears = run["weight_share"] <= figures["weight_share"] <= 1.0
     return lower and bears and figures["speed_m_s"] > run["speed_m_s"]
 
 
-def apart(agent: Scored, run: Scored) -> bool:
+def dominates_with_confidence(agent: Scored, run: Scored) -> bool:
     """Whether the intervals lie apart, too; that of the weight share must lie neither below the run's nor
     above 1."""
     ours, theirs = agent.intervals, run.intervals
@@ -208,8 +208,8 @@ def compare(agents: Sequence[Scored], run: Scored) -> str:
     for one in agents:
         mine = {key: interval.mean for key, interval in one.intervals.items()}
         parts = [f"{mine[key] / means[key]:.2f}" for key in LOWER]
-        verdict = "yes" if meets(mine, means) and apart(one, run) else "no"
-        count = sum(meets(seed, means) for seed in one.seeds)
+        verdict = "yes" if dominates(mine, means) and dominates_with_confidence(one, run) else "no"
+        count = sum(dominates(seed, means) for seed in one.seeds)
         seeds = f"{count}/{len(one.seeds)}" if one.seeds else ""
         lines.append([one.name, *cells(one), *parts, verdict, seeds])
     of_run = [f"{TABLE[key][0].rpartition(' ')[0] or key} / run's" for key in LOWER]

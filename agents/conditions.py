@@ -12,7 +12,7 @@ MOST_SLIP, TURNS = 0.10, (0.95, 1.05)  # a stance [m], stances a turn
 NEAR = 0.1  # between Froude numbers, of the speed reached and of the horse
 
 
-def objection(figures: dict[str, Any], pairs: Sequence[str]) -> str:
+def rejection_reason(figures: dict[str, Any], pairs: Sequence[str]) -> str:
     """Why the figures of these pairs of legs do not count at any speed; empty where they do."""
     found = []
     if figures["fell"] > MOST_FALLS:

@@ -158,7 +158,7 @@ def film(env: Any, policy: Any, path: Path, seed: int) -> None:
     from hoof_env.film import frames, write_film
     from hoof_env.render.renderer import new_renderer
 
-    renderer = new_renderer(records.setting(env), FPS, (960, 540))
+    renderer = new_renderer(records.surroundings(env), FPS, (960, 540))
     write_film(frames(renderer, records.episode(env, policy, seed), FPS), path, FPS)
 
 

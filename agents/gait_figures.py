@@ -179,7 +179,7 @@ def _from_sums(played: Played, kilograms: float, height: float) -> dict[str, flo
         for name in ("duty", "slip", "stances_per_turn"):
             result[f"{name}_{pair}"] = float(pairs[name][k])
         result[f"peak_over_mean_{pair}"] = result[f"peak_{pair}"] / result[f"mean_{pair}"]
-    impulse = played.sums["load_impulse"][:, upright].reshape(2, -1).sum(1)
+    impulse = played.sums["normal_impulse"][:, upright].reshape(2, -1).sum(1)
     work = played.sums["positive_work"][:, upright].sum(0)
     reached = float(travelled.mean() / played.seconds)
     return result | {

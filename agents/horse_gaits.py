@@ -78,7 +78,7 @@ def encode(gaits: Floats) -> Floats:
     return np.clip(2 * (gaits - low) / (high - low) - 1, -1, 1)
 
 
-class Course:
+class BatchRollout:
     """Many horses that are asked for one speed [m/s], on ground of a stiffness [N/m^1.5] perhaps. Terms of
     the reward that `weights` lacks have the task's."""
 
@@ -164,7 +164,7 @@ class Search:
 
     def run(self, speed: float, generations: int, tick: Any) -> dict[str, Any]:
         """Search on at a commanded speed [m/s]; what the mean of the distribution is worth there."""
-        course = Course(speed, POPULATION * STARTS, TROT_WEIGHTS if self.lag else WEIGHTS)
+        course = BatchRollout(speed, POPULATION * STARTS, TROT_WEIGHTS if self.lag else WEIGHTS)
         for _ in range(generations):
             points = self.strategy.ask()
             gaits = np.repeat(self.gaits(points), STARTS, axis=0)
@@ -275,7 +275,7 @@ def trunk_series(gait: list[float], speed: float) -> list[list[float]]:
     """How the trunk moves in a gait that keeps a speed [m/s]: height over that of the hips [-], speed over
     its mean [-] and pitch [rad], of each the mean, and cosine and sine coefficients of `HARMONICS` harmonics
     of half a stride; what `reference.trunk_motion` reads."""
-    course = Course(speed, 64, episode_seconds=2 * SECONDS)
+    course = BatchRollout(speed, 64, episode_seconds=2 * SECONDS)
     envs, numbers = course.envs, np.array(gait)
     body, stride = envs.unwrapped.batch.body, Stride(*numbers[-len(LIMITS) :][:2])
     envs.reset(seed=1, options={"gait": numbers})

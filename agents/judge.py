@@ -29,7 +29,7 @@ from tyro.conf import Positional
 
 from agents import runs
 from agents.command import run
-from agents.conditions import NEAR, distance, objection
+from agents.conditions import NEAR, distance, rejection_reason
 from agents.gait_figures import SECONDS, mean_lag, play
 from agents.horse_gaits import speed_of
 from agents.judge_pictures import draw
@@ -99,7 +99,7 @@ def judged(
     """A row of the table, of a figure by its name; without bars its distance is reported."""
     ours = float((gait.figures or {}).get(name, "nan"))
     known = bool(np.isfinite(ours))
-    flaws = [gait.flaw, objection(gait.figures, pairs_of(name)) if gait.figures else ""]
+    flaws = [gait.flaw, rejection_reason(gait.figures, pairs_of(name)) if gait.figures else ""]
     why = ", ".join(filter(None, flaws))
     if not known:
         verdict = why or "not measured"
@@ -154,7 +154,7 @@ def _reported(judges: dict[str, Any], standing: list[dict[str, Any]]) -> Iterato
         if "froude" in judge:
             yield judged(name, at_speed(judge["froude"], standing), name, judge, [])
         else:
-            counting = [one for one in trots_of(standing) if not objection(one, PAIRS)]
+            counting = [one for one in trots_of(standing) if not rejection_reason(one, PAIRS)]
             first = min(counting, key=lambda one: float(one["froude_reached"]), default=None)
             gait = Gait(first, "" if first else "there is no trot-like gait that counts")
             yield judged(name, gait, "froude_reached", judge, [])
@@ -170,7 +170,7 @@ SHOWN = (
 )  # fmt: skip
 
 
-def of_all(each: list[list[dict[str, Any]]]) -> list[dict[str, Any]]:
+def pool(each: list[list[dict[str, Any]]]) -> list[dict[str, Any]]:
     """Figures of several policies at each speed as one: means, and under "intervals" their 95 % intervals as
     text. Policies that do not stand at a speed are left out there, but for "fell"."""
     found = []
@@ -240,7 +240,7 @@ def main(argv: list[str] | None = None) -> None:
             text.append(table_of(name, figures[name]))
             print(text[-1])
     if len(figures) > 1:
-        text.append(table_of(f"All {len(figures)}", of_all(list(figures.values()))))
+        text.append(table_of(f"All {len(figures)}", pool(list(figures.values()))))
         print(text[-1])
     about = {"command": runs.command(), "versions": runs.versions(), "figures": figures}
     runs.write_text(args.out / "figures.json", json.dumps(about, indent=1) + "\n")

@@ -33,7 +33,7 @@ from torch import nn
 from torch.nn.utils import parameters_to_vector, vector_to_parameters
 
 from hoof_env.errors import ParameterError
-from hoof_env.simd.compile import inlined, kernel
+from hoof_env.simd.compile import inline_llvm, kernel
 from hoof_env.simd.threads import check_threads, limit_threads, run_together
 
 Floats = NDArray[np.float32]
@@ -60,7 +60,7 @@ B1, B2, B3, B4 = (np.float32(number) for number in (16216200, 945945, 13860, 45)
 # Networks, perceptrons with tanh: matrices, shape (outputs, inputs) each, and biases
 
 
-@inlined
+@inline_llvm
 def tanh(x):  # type: ignore[no-untyped-def]
     """Lambert's continued fraction, the first nine terms, within 8e-6: without a call, so that the compiler
     does many at once."""
@@ -71,7 +71,7 @@ def tanh(x):  # type: ignore[no-untyped-def]
     return min(max(y, -ONE), ONE)
 
 
-@inlined
+@inline_llvm
 def forward(x, matrices, biases, outputs):  # type: ignore[no-untyped-def]
     """What each layer gives for rows of inputs, the hidden ones behind a tanh."""
     for k in range(len(matrices)):
@@ -87,7 +87,7 @@ def forward(x, matrices, biases, outputs):  # type: ignore[no-untyped-def]
                     y[i, j] += bias[j]
 
 
-@inlined
+@inline_llvm
 def backward(x, matrices, outputs, slopes, by_matrices, by_biases):  # type: ignore[no-untyped-def]
     """The derivatives by matrices and biases from those by the last outputs, in the last of `slopes`; the
     others are room for those by the hidden layers."""
@@ -106,7 +106,7 @@ def backward(x, matrices, outputs, slopes, by_matrices, by_biases):  # type: ign
         np.dot(slope.T, x if k == 0 else outputs[k - 1], by_matrices[k])
 
 
-@inlined
+@inline_llvm
 def loss_of(  # type: ignore[no-untyped-def]
     means, values, log_std, steps, clip_range, vf_coef, ent_coef, count,
     by_means, by_values, by_log_std, losses,

@@ -37,7 +37,7 @@ from hoof_env.envs.policies import STANDS_FOR
 from hoof_env.envs.tasks import TASKS
 from hoof_env.errors import DataFileError, OutputError, ParameterError, check_choice, parse_json
 from hoof_env.film import render_episode
-from hoof_env.records import setting
+from hoof_env.records import surroundings
 from hoof_env.saved_policy import ABOUT, FILE, WEIGHTS, OnnxPolicy, environment_of, own_id
 
 POLICIES = Path(__file__).with_name("policies")
@@ -184,7 +184,7 @@ def score_record(policy: Any, scores: Sequence[Score], env_id: str, played_on: s
     }
 
 
-class Trembling:
+class NoisyPolicy:
     """A policy whose actions are off by a millionth: another machine's arithmetic, exaggerated."""
 
     def __init__(self, policy: Any) -> None:
@@ -197,8 +197,8 @@ class Trembling:
 
 def tolerance(policy: Any, env_id: str, returns: Sequence[float]) -> float:
     """By how much the mean return of the first `CHECKED` episodes may differ on another machine: four
-    standard errors of what a `Trembling` policy changes, and 1 % of the mean."""
-    again = score_vector(Trembling(policy), env_id, SCORE_SEEDS[:CHECKED])
+    standard errors of what a `NoisyPolicy` policy changes, and 1 % of the mean."""
+    again = score_vector(NoisyPolicy(policy), env_id, SCORE_SEEDS[:CHECKED])
     off = np.array([episode["return"] for episode in again]) - returns[: len(again)]
     return float(4 * np.sqrt(np.mean(off**2) / len(off)) + 0.01 * abs(np.mean(returns)))
 
@@ -222,7 +222,7 @@ def write_card(
 ) -> None:
     keys = [key for key in SHOWN if key in scores[0].estimates]
     with runs.make_env(env_id) as env:
-        is_suspended = setting(env).trunk == "suspended"
+        is_suspended = surroundings(env).trunk == "suspended"
         summaries = {task.id: task.summary for task in TASKS.values()}
         summary = summaries.get(env_id) or (type(env.unwrapped).__doc__ or "").partition("\n")[0]
     steps, seconds = training_length(choice.saved.path.parent)

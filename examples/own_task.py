@@ -10,7 +10,7 @@ import gymnasium as gym
 import numpy as np
 
 import hoof_env
-from hoof_env.simd import choose, larger
+from hoof_env.simd import maximum, where
 from hoof_env.simd.math import root_power
 
 
@@ -34,8 +34,8 @@ def vertical_acceleration(scene):
 def turf(penetration, rate, inverse_approach_speed, ground):
     """Grows stiffer with depth, and loses more energy on the way out than Eq. 14."""
     spring = ground.stiffness * root_power(penetration, 12) * (1.0 + penetration / 0.05)
-    damping = ground.chi * choose(rate < 0.0, 2.0 * rate, rate) * inverse_approach_speed
-    return spring * larger(1.0 + damping, 0.0)
+    damping = ground.chi * where(rate < 0.0, 2.0 * rate, rate) * inverse_approach_speed
+    return spring * maximum(1.0 + damping, 0.0)
 
 
 hoof_env.register(

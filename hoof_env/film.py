@@ -176,7 +176,7 @@ def render_episode(
     check_number("seconds", seconds, low=0, exclusive_low=True)
     with records.make_env(env_id, parse_pairs("--args", arguments)) as env:
         player = records.find_policy(policy, env, env_id, seed)
-        renderer = new_renderer(records.setting(env), fps, size)
+        renderer = new_renderer(records.surroundings(env), fps, size)
         played = records.episode(env, player, seed, seconds)
         pictures = frames(renderer, played, fps, slow, partial(records.instants_of, env))
         count = write_film(_with_progress(pictures, round(seconds * slow * fps) + 1), path, fps)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.errors import ParameterError, check_choice, check_number
-from hoof_env.leg.geometry import DEFAULT_PRESET, Preset, named, read_preset, wrong
+from hoof_env.leg.geometry import DEFAULT_PRESET, Preset, preset_error_type, preset_label, read_preset
 from hoof_env.simd.compile import kernel
 from hoof_env.simd.math import clip
 
@@ -179,8 +179,9 @@ def load_gait(name: str, preset: Preset = DEFAULT_PRESET) -> GaitParameters:
     try:
         return (HarmonicGait if "higher" in gaits[name] else GaitParameters)(**gaits[name])
     except TypeError as error:
-        raise wrong(preset)(
-            f"{named(preset)}, gait {name!r}: expected {', '.join(PARAMETERS)}, perhaps higher: {error}"
+        raise preset_error_type(preset)(
+            f"{preset_label(preset)}, gait {name!r}: expected {', '.join(PARAMETERS)}, perhaps higher:"
+            f" {error}"
         ) from None
 
 
@@ -196,11 +197,13 @@ def paper_gaits(gaits: Mapping[str, Gait]) -> dict[str, Gait]:
 def _read_gaits(preset: Preset) -> dict[str, Any]:
     gaits = read_preset(preset).get("gaits")
     if not isinstance(gaits, Mapping) or not gaits:
-        raise wrong(preset)(
-            f"{named(preset)}: expected an object 'gaits' with at least one gait, got {gaits!r}"
+        raise preset_error_type(preset)(
+            f"{preset_label(preset)}: expected an object 'gaits' with at least one gait, got {gaits!r}"
         )
     if not all(isinstance(name, str) for name in gaits):
-        raise wrong(preset)(f"{named(preset)}: gaits: expected names that are texts, got {[*gaits]!r}")
+        raise preset_error_type(preset)(
+            f"{preset_label(preset)}: gaits: expected names that are texts, got {[*gaits]!r}"
+        )
     return dict(gaits)
 
 

@@ -49,9 +49,9 @@ class Game:
     def __init__(self, env: Any, seed: int = 0) -> None:
         self._env, self._seed = env, seed
         self._leg: Any = env.unwrapped
-        self.dt = records.setting(env).dt
+        self.dt = records.surroundings(env).dt
         self.gaits: list[str] = sorted(self._leg.gaits)
-        self._of_horse, self._gait = bool(records.setting(env).hips), ""
+        self._of_horse, self._gait = bool(records.surroundings(env).hips), ""
         self.paused = self.quit = False
         self.restart()
 
@@ -64,7 +64,7 @@ class Game:
         self._wanted: Any = None
         self.news = self._happened()
         self.score = 0.0
-        self.distance_from = way_of(self.news[0])
+        self.distance_from = trunk_x(self.news[0])
         self.ended, self.why = False, ""
         self.begun = True
 
@@ -123,7 +123,7 @@ class Game:
         return records.instants_of(self._env, records.substeps(self._env))
 
 
-def way_of(now: Any) -> float:
+def trunk_x(now: Any) -> float:
     """Where the trunk is [m]."""
     return float(now.x if isinstance(now, HorseInstant) else now.trunk_x)
 
@@ -149,7 +149,7 @@ def play(
 
     with records.make_env(env_id, parse_pairs("--args", arguments)) as env:
         game = Game(env, seed)
-        renderer = new_renderer(records.setting(env), 1 / game.dt, size)
+        renderer = new_renderer(records.surroundings(env), 1 / game.dt, size)
         window = open_window((size[0], size[1] + _strip(size)), f"hoof-env play: {env_id}")
         try:
             clock = pygame.time.Clock()
@@ -190,7 +190,7 @@ def _draw_strip(window: Any, renderer: Any, game: Game, size: tuple[int, int]) -
     unit, top = brush.unit, size[1]
     window.fill(PAPER, (0, top, size[0], _strip(size)))
     rows = [top + y * unit for y in (20, 48, 76)]
-    ahead = way_of(renderer.latest) - game.distance_from
+    ahead = trunk_x(renderer.latest) - game.distance_from
     for y, (text, colour) in zip(
         rows,
         (

@@ -1,8 +1,8 @@
 """Episodes of any policy on any environment of the package, substep by substep: for pictures, and for files.
 
-`setting` and `substeps` are all that is read from behind an environment; the rest is written against them.
-The files are CSV, Parquet, OpenSim's .mot and .sto, and .c3d; `write` chooses by the suffix. Frame, signs and
-centre of pressure are those of `hoof_env.lab`.
+`surroundings` and `substeps` are all that is read from behind an environment; the rest is written against
+them. The files are CSV, Parquet, OpenSim's .mot and .sto, and .c3d; `write` chooses by the suffix. Frame,
+signs and centre of pressure are those of `hoof_env.lab`.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ from hoof_env.render.instant import (
     OF_TRUNK,
     UNITS,
     Columns,
-    Setting,
+    Surroundings,
     columns_of_engine,
     columns_of_horse,
     horse_instants,
@@ -62,12 +62,12 @@ COPIES = 3
 """Of a record, while it is put together and written."""
 
 
-def setting(env: Any) -> Setting:
+def surroundings(env: Any) -> Surroundings:
     """The setting of an environment of this package, wrapped or not; `ParameterError` of another."""
     leg = env.unwrapped
     try:
         hips = leg.batch.body.hips
-        return Setting(
+        return Surroundings(
             leg.geometry,
             getattr(leg, "terrain", None) or Terrain.flat(),
             leg.weight,
@@ -110,7 +110,7 @@ def make_env(env_id: str, arguments: Mapping[str, Any] | None = None) -> gym.Env
         raise
     except (gym.error.Error, ModuleNotFoundError, TypeError) as error:
         raise ParameterError(f"environment {env_id!r} with {arguments or 'no arguments'}: {error}") from None
-    setting(env)
+    surroundings(env)
     return env
 
 
@@ -205,7 +205,7 @@ def _with_progress(played: Iterator[Columns], longest: float) -> Iterator[Column
 
 def _named(env: gym.Env[Any, Any], reactions: NDArray[np.float64]) -> Columns:
     """Reactions of shape (n, legs, columns) by name."""
-    limbs = [f"{leg}_" for leg in setting(env).hips] or [""]
+    limbs = [f"{leg}_" for leg in surroundings(env).hips] or [""]
     return {
         f"{limb}{name}": reactions[:, i, k]
         for i, limb in enumerate(limbs)
@@ -227,20 +227,20 @@ def record_episode(
     `lab.reactions`; `tell` says now and then on stderr how far it is. `ParameterError` where the memory of
     this machine cannot hold it."""
     units, longest = units_of(env, reactions), longest_of(env, seconds)
-    check_memory(longest / setting(env).sim_dt, len(units))
+    check_memory(longest / surroundings(env).sim_dt, len(units))
     joints = JointReactions(env) if reactions else None
     played = episode(env, policy, seed, seconds, options, joints)
     parts = list(_with_progress(played, longest) if tell else played)
     moments = [name for name in units if name.endswith("free_moment")]
     record = {name: np.concatenate([part[name] for part in parts]) for name in units if name in parts[0]}
     record |= {name: np.zeros(len(record["time"])) for name in moments}
-    return onto_surface(record, setting(env).terrain)
+    return onto_surface(record, surroundings(env).terrain)
 
 
 def units_of(env: gym.Env[Any, Any], reactions: bool = False) -> dict[str, str]:
     """Columns of a record and their units: `RECORD`, with `reactions` also `REACTION_UNITS`; of a horse those
     of the trunk, and each leg's under its name, `left_fore_force_y`."""
-    hips, of_leg = setting(env).hips, RECORD | (REACTION_UNITS if reactions else {})
+    hips, of_leg = surroundings(env).hips, RECORD | (REACTION_UNITS if reactions else {})
     if not hips:
         return of_leg
     found = {name: UNITS[name if name in UNITS else f"trunk_{name}"] for name in OF_TRUNK}
@@ -251,7 +251,7 @@ def units_of(env: gym.Env[Any, Any], reactions: bool = False) -> dict[str, str]:
 
 def describe(env: gym.Env[Any, Any], **about: Any) -> dict[str, Any]:
     """What a file says about its record, JSON-serialisable: version, units, leg, ground and `about`."""
-    here = setting(env)
+    here = surroundings(env)
     ground = asdict(env.unwrapped.engine.ground).items()  # type: ignore[attr-defined]
     return {
         "hoof_env": hoof_env.__version__,
@@ -370,7 +370,7 @@ def export_episode(
         on = check_bodies(parse_pairs("--bodies", bodies), limbs_of(names))
         player = find_policy(policy, env, env_id, seed)
         record = record_episode(env, player, seed, seconds, reactions=reactions, tell=True)
-        kept = above_threshold(record, threshold, setting(env).terrain)
+        kept = above_threshold(record, threshold, surroundings(env).terrain)
         about = describe(env, environment=env_id, arguments=given, policy=policy, seed=seed) | {
             "threshold_n": threshold, "bodies": on, "units": names,
             "reactions": [name for name in names if reactions and name.endswith(tuple(REACTION_UNITS))],

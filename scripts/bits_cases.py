@@ -29,7 +29,7 @@ LEG, FIXED, HORSE = "hoof_env/HorseLeg-v0", "hoof_env/HorseLegFixed-v0", "hoof_e
 
 OWN_TASK = """
 import hoof_env
-from hoof_env.simd import choose, larger, root, size
+from hoof_env.simd import absolute, maximum, sqrt, where
 from hoof_env.simd.math import root_power
 
 def friction(step, weight):
@@ -37,7 +37,7 @@ def friction(step, weight):
     return 0.001 * weight * (toe.friction * toe.slide + heel.friction * heel.slide)
 
 def roughness(step, weight):
-    return -weight * root(size(step.trunk.report.acceleration.imag))
+    return -weight * sqrt(absolute(step.trunk.report.acceleration.imag))
 
 def sway(step, weight):
     if step.failed:
@@ -46,8 +46,8 @@ def sway(step, weight):
 
 def turf(penetration, rate, inverse_approach_speed, ground):
     spring = ground.stiffness * root_power(penetration, 12) * (1.0 + penetration / 0.05)
-    damping = ground.chi * choose(rate < 0.0, 2.0 * rate, rate) * inverse_approach_speed
-    return spring * larger(1.0 + damping, 0.0)
+    damping = ground.chi * where(rate < 0.0, 2.0 * rate, rate) * inverse_approach_speed
+    return spring * maximum(1.0 + damping, 0.0)
 
 hoof_env.register(
     "bits/Own-v0",
@@ -203,11 +203,11 @@ def environments() -> Cases:
                 digests = Digests()
                 play_many(envs, digests, 29 if mode == "DISABLED" else 80)
                 yield f"{env_id} x 7, {mode}", digests
-        envs = make_many(env_id, 1024, num_threads=4)
+        envs = make_many(env_id, 1024, num_threads=2)
         if envs is not None:
             digests = Digests()
             play_many(envs, digests, 20)
-            yield f"{env_id} x 1024, 4 threads", digests
+            yield f"{env_id} x 1024, 2 threads", digests
 
 
 def settings() -> Cases:
@@ -537,7 +537,7 @@ def files() -> Cases:
         digests.add("page", cli("manual", "--id", env_id))
         yield f"manual {env_id}", digests
         digests = Digests()
-        env = gym.make(env_id, render_mode="rgb_array", width=320, height=180)
+        env = gym.make(env_id, render_mode="rgb_array", width=480, height=270)
         env.reset(seed=1)
         for _ in range(3):
             digests.add("frame", env.render())

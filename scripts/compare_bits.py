@@ -70,8 +70,15 @@ class Renamed:
         """The name that a digest of the base has now."""
         part, _, rest = name.partition(": ")
         case, _, path = rest.rpartition(" | ")
-        parts = [self.keys.get(word, word) for word in path.split(".")]
+        parts = [self._part(word) for word in path.split(".")]
         return f"{part}: {case} | {'.'.join(parts)}"
+
+    def _part(self, word: str) -> str:
+        """One part of a dotted name, perhaps with a horse's leg before it."""
+        leg = re.match(r"((left|right)_(fore|hind)_)?", word)
+        before = leg[0] if leg else ""
+        rest = word.removeprefix(before)
+        return before + self.keys.get(rest, rest)
 
     def text(self, words: str) -> str:
         """A message of the base in the words of now."""

@@ -18,7 +18,7 @@ from numba import njit
 
 from benchmarks.machine import vector_bits
 from benchmarks.scenes import engine, scenes
-from hoof_env.simd import anywhere, choose, floor, read, rows, write
+from hoof_env.simd import any_lane, floor, read, rows, where, write
 from hoof_env.simd import math as exact_math
 from hoof_env.simd.memory import address, doubles
 
@@ -34,8 +34,8 @@ def work(given, found):
         x = read(row, address(given), n, 1)
         c, s = exact_math.cos_sin(x)
         tall, low = exact_math.root_power(x, 12), exact_math.exp_of_negative(-x * x)
-        chosen = choose((x > 0.0) & (c < s), x / c, floor(x))
-        large = 1.0 if anywhere(x > 90.0) else 0.0
+        chosen = where((x > 0.0) & (c < s), x / c, floor(x))
+        large = 1.0 if any_lane(x > 90.0) else 0.0
         many = (c, s, tall, low, chosen, exact_math.tanh(x), x * c + s * 1.7, large * x)
         for k in range(OUTPUTS):
             write(many[k], address(found), k * NUMBERS + n, 1)

@@ -18,17 +18,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import carray  # type: ignore[attr-defined]
 
-from hoof_env.dynamics.form import Form, form_of
+from hoof_env.dynamics.form import EngineLayout, engine_layout
 from hoof_env.dynamics.hoof import law_of, level_ground, remember_contacts
 from hoof_env.dynamics.layout import PLAIN, Features
-from hoof_env.dynamics.limits import LOOK, clear_limits, heed_joints, heed_trunk
-from hoof_env.dynamics.mechanics import evaluate, keep_still, settle
+from hoof_env.dynamics.limits import CHECK_EVERY, check_joints, check_trunk, clear_limits
+from hoof_env.dynamics.mechanics import evaluate, keep_still, velocities_to_momenta
 from hoof_env.dynamics.observables import count_stride, keep_account, report_leg, report_trunk
 from hoof_env.dynamics.parts import FIXED, Result
 from hoof_env.dynamics.reactions import LegConstants, Reactions, react
 from hoof_env.dynamics.stepping import begin_step, end_step, next_stage, weigh_stage
-from hoof_env.simd import anywhere, choose, columns, fill, lane_sum, level, nth, rows
-from hoof_env.simd.compile import inlined, kernel, pasted
+from hoof_env.simd import any_lane, block_at, columns, full_like, lane_sum, load_rows, rows, where
+from hoof_env.simd.compile import inline_llvm, inline_source, kernel
 from hoof_env.simd.kept import Kept, Kernels
 from hoof_env.simd.memory import address, doubles, offset
 from hoof_env.simd.reach import fingerprint, refresh
@@ -40,7 +40,7 @@ OK, NOT_FINITE = float(Result.OK), float(Result.NOT_FINITE)
 DEAD_POINT, FALLEN = float(Result.DEAD_POINT), float(Result.FALLEN)
 FIRST_LIMIT = float(Result.PITCH)
 
-STARTS = -1.0
+RESET_REQUESTED = -1.0
 """Stands in the place of a result where an environment is to start."""
 
 CONSTANTS_SIZE, REACTIONS_SIZE = LegConstants.size, Reactions.size
@@ -71,8 +71,8 @@ class Model(NamedTuple):
     new_rates: bool
     strides: bool
     motors: bool
-    together: bool  # the lanes are the legs of one trunk
-    form: Form
+    lanes_are_legs: bool  # the lanes are the legs of one trunk
+    form: EngineLayout
     cells: float
     tables: Any  # pointer to the tables of all legs, one after the other
     settings: Any  # pointer to memory on the stack, as are fractions and weights
@@ -86,8 +86,8 @@ class Model(NamedTuple):
     law: Any  # of contact, see `hoof.law_of`
 
 
-@inlined
-def inner(model, tables, ground, small, together, law, form):  # type: ignore[no-untyped-def]
+@inline_llvm
+def unpack_model(model, tables, ground, small, lanes_are_legs, law, form):  # type: ignore[no-untyped-def]
     """The model from its record and arrays; `small` points to room for 8 + 3 form.gait doubles."""
     given = model[0]
     for k in range(4):
@@ -99,65 +99,65 @@ def inner(model, tables, ground, small, together, law, form):  # type: ignore[no
         settings[k] = given.settings[k % 3 + 9]
     return Model(
         given.kind, given.eighths, given.friction_law, given.interpolated, given.is_terrain, given.new_rates,
-        given.strides, given.motors, together, form, given.cells, address(tables),
+        given.strides, given.motors, lanes_are_legs, form, given.cells, address(tables),
         settings, given.averages, given.stages, small, offset(small, 4),
         carray(address(ground), ground.shape), given.ground_origin, given.ground_per_metre, law,
     )  # fmt: skip
 
 
-@inlined
+@inline_llvm
 def read_trunk(trunk, memory):  # type: ignore[no-untyped-def]
     """State and settings from a `TrunkMemory`."""
-    fill(trunk.state, memory.state)
-    fill(trunk.settings, memory.settings)
+    load_rows(trunk.state, memory.state)
+    load_rows(trunk.settings, memory.settings)
     keep_still(trunk)
 
 
-@inlined
+@inline_llvm
 def read_leg(leg, memory, form):  # type: ignore[no-untyped-def]
     """State, command and settings from a `LegMemory`; sums begin anew."""
-    fill(leg.state, memory.state)
-    fill(leg.strides, memory.strides)
+    load_rows(leg.state, memory.state)
+    load_rows(leg.strides, memory.strides)
     for k in range(form.sums):
         leg.sums[k] = 0.0
     for k in range(form.gait):
         leg.command[k] = memory.command[k]
-    fill(leg.settings, memory.settings)
+    load_rows(leg.settings, memory.settings)
     leg.hip = leg.settings.hip_on_trunk  # stays so unless the trunk pitches
     for k in range(form.springs):
-        leg.hoof_yield[k] = 1.0 / leg.settings.hoof_damping[k]
+        leg.inverse_damping[k] = 1.0 / leg.settings.hoof_damping[k]
     level_ground(leg)
 
 
-@inlined
-def find_result(trunk, legs, leg_count, together, form):  # type: ignore[no-untyped-def]
+@inline_llvm
+def find_result(trunk, legs, leg_count, lanes_are_legs, form):  # type: ignore[no-untyped-def]
     """How the environments ended, numbers of `parts.Result`. A number whose square is none counts as none."""
-    total, stuck = level(trunk, 0.0), trunk.at_dead_point
+    total, stuck = full_like(trunk, 0.0), trunk.at_dead_point
     for k in range(form.trunk_state):
         total = total + trunk.state[k] * trunk.state[k]
     for i in range(leg_count):
-        leg = nth(legs, i)
+        leg = block_at(legs, i)
         own = leg.theta_acceleration * leg.theta_acceleration  # a sum for each leg: long chains of sums wait
         for k in range(form.leg_state):
             own = own + leg.state[k] * leg.state[k]
         total = total + own
-    if together:
-        total, stuck = lane_sum(level(trunk, 0.0), total), lane_sum(level(trunk, 0.0), stuck)
-    lost = choose(stuck > 0.0, DEAD_POINT, NOT_FINITE)
-    fell = choose(trunk.fallen > 0.0, FALLEN, OK)
-    if form.animal:
-        fell = choose(trunk.fallen > 0.0, FALLEN, trunk.beyond[0])
-    return choose((total - total != 0.0) | (stuck > 0.0), lost, fell)
+    if lanes_are_legs:
+        total, stuck = lane_sum(full_like(trunk, 0.0), total), lane_sum(full_like(trunk, 0.0), stuck)
+    lost = where(stuck > 0.0, DEAD_POINT, NOT_FINITE)
+    fell = where(trunk.fallen > 0.0, FALLEN, OK)
+    if form.has_limits:
+        fell = where(trunk.fallen > 0.0, FALLEN, trunk.violated_limit[0])
+    return where((total - total != 0.0) | (stuck > 0.0), lost, fell)
 
 
-@inlined
+@inline_llvm
 def store(memory, rows, count, good):  # type: ignore[no-untyped-def]
     """Put `count` rows into memory where they are good."""
     for k in range(count):
-        memory[k] = choose(good, rows[k], memory[k])
+        memory[k] = where(good, rows[k], memory[k])
 
 
-@pasted
+@inline_source
 def run_steps(  # type: ignore[no-untyped-def]
     trunk, legs, leg_count, model, account, constants, reactions, h, steps, keeps_account, reacts
 ):
@@ -168,18 +168,18 @@ def run_steps(  # type: ignore[no-untyped-def]
         evaluate(trunk, legs, leg_count, model, elapsed)
         if stage == 0:
             left = steps * model.stages - turn
-            looks = turn > 0 and left % (LOOK * model.stages) == 0
+            looks = turn > 0 and left % (CHECK_EVERY * model.stages) == 0
             for i in range(leg_count):
-                leg = nth(legs, i)
+                leg = block_at(legs, i)
                 remember_contacts(leg)
                 if model.strides and turn > 0:
                     count_stride(trunk, leg, model.form, h)
                 if reacts and (turn > 0 or steps == 0):
-                    react(trunk, leg, nth(constants, i), nth(reactions, i))
-                if model.form.animal and looks:
-                    heed_joints(trunk, leg, nth(constants, i), model)
-            if model.form.animal and looks:
-                heed_trunk(trunk, model)
+                    react(trunk, leg, block_at(constants, i), block_at(reactions, i))
+                if model.form.has_limits and looks:
+                    check_joints(trunk, leg, block_at(constants, i), model)
+            if model.form.has_limits and looks:
+                check_trunk(trunk, model)
         if turn < steps * model.stages:
             weight = model.weights[stage]
             if keeps_account:
@@ -195,57 +195,57 @@ def run_steps(  # type: ignore[no-untyped-def]
                 stage, elapsed = 0, 0.0
 
 
-@pasted
+@inline_source
 def run(  # type: ignore[no-untyped-def]
     data, model, tables, ground, constants, reactions, h, steps, keeps_account, begin, end,
-    leg_count, lanes, together, reacts, law, form,
+    leg_count, lanes, lanes_are_legs, reacts, law, form,
 ):  # fmt: skip
     """Advance environments `begin` to `end`: `lanes` at a time, or one whose legs the lanes are. With `steps`
-    below 0 those start whose result is `STARTS`. Unless `reacts`, a constant, there is no code for
+    below 0 those start whose result is `RESET_REQUESTED`. Unless `reacts`, a constant, there is no code for
     reactions."""
     trunk = rows(doubles(form.trunk_size * lanes), lanes, form.trunk)
     legs = rows(doubles(leg_count * form.leg_size * lanes), lanes, form.leg)
     account = rows(doubles(form.account_size * lanes), lanes, form.account)
     shapes = rows(doubles(leg_count * CONSTANTS_SIZE * lanes), lanes, LegConstants)
     forces = rows(doubles(leg_count * REACTIONS_SIZE * lanes), lanes, Reactions)
-    inside = inner(model, tables, ground, doubles(8 + 3 * form.gait), together, law, form)
+    inside = unpack_model(model, tables, ground, doubles(8 + 3 * form.gait), lanes_are_legs, law, form)
     at, row = address(data), data.shape[1]
     # lanes are neighbours, but where they are legs, as far apart as legs are
     envs, near, far = lanes, 1, 1
-    if together:
+    if lanes_are_legs:
         envs, near, far = 1, 0, form.leg_rows * row
-    if reacts or form.animal:
-        own = columns(address(constants), lanes, None, 0, 1, CONSTANTS_SIZE if together else 0)
+    if reacts or form.has_limits:
+        own = columns(address(constants), lanes, None, 0, 1, CONSTANTS_SIZE if lanes_are_legs else 0)
         for k in range(leg_count * CONSTANTS_SIZE):
             shapes[k] = own[k]
     for n in range(begin, end, envs):
         memory = columns(at, lanes, form.trunk_memory, n, row, near)
         before = memory.result
-        starts = before == STARTS
-        if steps < 0 and not anywhere(starts):
+        starts = before == RESET_REQUESTED
+        if steps < 0 and not any_lane(starts):
             continue
         read_trunk(trunk, memory)
-        if form.animal:
+        if form.has_limits:
             clear_limits(trunk)
         for k in range(form.account_size):
             account[k] = 0.0
         for i in range(leg_count):
             first = (form.trunk_rows + i * form.leg_rows) * row + n
-            read_leg(nth(legs, i), columns(at, lanes, form.leg_memory, first, row, far), form)
+            read_leg(block_at(legs, i), columns(at, lanes, form.leg_memory, first, row, far), form)
         if steps < 0:
             begin_step(trunk, legs, leg_count, inside)
             if inside.kind != FIXED:
-                settle(trunk, legs, leg_count, inside, starts)
+                velocities_to_momenta(trunk, legs, leg_count, inside, starts)
         run_steps(
             trunk, legs, leg_count, inside, account, shapes, forces, h, max(steps, 0), keeps_account, reacts
         )
         report_trunk(trunk, memory.report)
-        result = find_result(trunk, legs, leg_count, together, form)
+        result = find_result(trunk, legs, leg_count, lanes_are_legs, form)
         good = result == OK
-        if form.animal:
+        if form.has_limits:
             good = good | (result >= FIRST_LIMIT)  # a motion beyond a limit is a motion
         if steps < 0:  # the others are as they were; a start that cannot be is kept as it is
-            result, good = choose(starts, result, before), starts
+            result, good = where(starts, result, before), starts
         memory.result = result
         store(memory.state, trunk.state, form.trunk_state, good)
         if keeps_account:
@@ -253,7 +253,7 @@ def run(  # type: ignore[no-untyped-def]
                 account[k] = account[k] + memory.account[k]
             store(memory.account, account, form.account_size, good)
         for i in range(leg_count):
-            leg = nth(legs, i)
+            leg = block_at(legs, i)
             first = (form.trunk_rows + i * form.leg_rows) * row + n
             own = columns(at, lanes, form.leg_memory, first, row, far)
             report_leg(trunk, leg, own.report)
@@ -261,8 +261,8 @@ def run(  # type: ignore[no-untyped-def]
             store(own.strides, leg.strides, form.strides, good)
             store(own.sums, leg.sums, form.sums, good)
             if reacts:
-                kept = nth(forces, i)
-                first, stride = i * REACTIONS_SIZE * row + n, REACTIONS_SIZE * row if together else 1
+                kept = block_at(forces, i)
+                first, stride = i * REACTIONS_SIZE * row + n, REACTIONS_SIZE * row if lanes_are_legs else 1
                 out = columns(address(reactions), lanes, Reactions, first, row, stride)
                 for k in range(REACTIONS_SIZE):
                     out[k] = kept[k]
@@ -289,22 +289,22 @@ def advance_kernels(contact_law: Callable[..., Any] | None = None, features: Fea
 
 def _made(contact_law: Callable[..., Any] | None, features: Features, identity: str) -> Kernels:
     refresh(contact_law)
-    law, form = law_of(contact_law), form_of(features)
+    law, form = law_of(contact_law), engine_layout(features)
     if features != PLAIN:
         identity += f" {tuple(features)}"
 
-    def made(name: str, legs: int, lanes: int, together: bool, reacts: bool) -> Any:
+    def made(name: str, legs: int, lanes: int, lanes_are_legs: bool, reacts: bool) -> Any:
         def advance(  # type: ignore[no-untyped-def]
             data, model, tables, ground, constants, reactions, h, steps, keeps_account, begin, end
         ):
             count = legs if legs else model[0].legs
             run(
                 data, model, tables, ground, constants, reactions, h, steps, keeps_account, begin, end,
-                count, lanes, together, reacts, law, form,
+                count, lanes, lanes_are_legs, reacts, law, form,
             )  # fmt: skip
 
         advance.__name__ = name
-        return kernel(advance, f"{name} {identity}", threads=not together and lanes > 1)
+        return kernel(advance, f"{name} {identity}", threads=not lanes_are_legs and lanes > 1)
 
     names = {f"{does}_{which}": which for does in ("advance", "react") for which in KERNELS}
     return Kernels(**{

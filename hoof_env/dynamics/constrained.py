@@ -353,10 +353,13 @@ class ConstrainedLeg:
         row["crank_torque"], row["crank_power"] = crank, crank * motion["theta_rate"]
         row["hip_torque"], row["hip_power"] = hip, hip * motion["phi_rate"]
         for point, contact in zip(("toe", "heel"), self.state.contacts, strict=True):
-            for name in ("x", "penetration", "rate", "normal", "friction"):
+            for name in ("x", "penetration", "normal", "friction"):
                 row[f"{point}_{name}"] = contact[name]
+            row[f"{point}_penetration_rate"] = contact["rate"]
             row[f"{point}_y"], row[f"{point}_slide"] = -contact["penetration"], contact["vx"]
-            row[f"{point}_slowness"] = 1 / contact["approach"] if contact["approach"] > 0 else 0.0
+            row[f"{point}_inverse_approach_speed"] = (
+                1 / contact["approach"] if contact["approach"] > 0 else 0.0
+            )
 
     def _corner_arms(self) -> NDArray[np.complex128]:
         """Toe and heel relative to the centre of the sole link, in the frame of q [m]."""

@@ -19,18 +19,18 @@ from numba.core.errors import NumbaError
 from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.dynamics import layout, memory
-from hoof_env.dynamics.advance import LANES, STARTS, advance_kernels
-from hoof_env.dynamics.form import form_of
+from hoof_env.dynamics.advance import LANES, RESET_REQUESTED, advance_kernels
+from hoof_env.dynamics.form import engine_layout
 from hoof_env.dynamics.layout import Features
-from hoof_env.dynamics.limits import LOOK
+from hoof_env.dynamics.limits import CHECK_EVERY
 from hoof_env.dynamics.parts import (
     GRAVITY,
     Drive,
     Limb,
     Limits,
+    Mechanics,
     Reactions,
     Result,
-    Scene,
     Tally,
     Trunk,
     broken,
@@ -61,7 +61,7 @@ from hoof_env.simd.user_functions import check_function, what_cannot_be_compiled
 HEIGHT = layout.TrunkSettings.fields["height"].start
 """Row of a trunk's height at rest among its settings."""
 
-FEW = 6
+MAX_SCALAR_ENVS = 6
 """Up to so many environments of one leg or four are run one by one: eight lanes would be mostly empty."""
 
 MOST_LEGS = 32
@@ -75,7 +75,7 @@ PART, LEAST_PART = 2_000_000, 1000
 two such parts of a long call Ctrl-C is heard. What is added up has other last digits than in one part."""
 
 
-class TrunkEngine(Scene):
+class TrunkEngine(Mechanics):
     """Legs on a trunk over the ground; see the module docstring.
 
     Args:
@@ -100,7 +100,7 @@ class TrunkEngine(Scene):
         contact_law: instead of the ground's normal law, see `hoof.law_of`.
 
     Attributes:
-        is_few: environments are run one by one, not side by side, and by one thread.
+        runs_scalar: environments are run one by one, not side by side, and by one thread.
         blocks: columns of the memory that each thread works on.
         step_limits: longest step [s] for each cause, see `step_length`. Friction is not heeded, for nothing
             blows up: on the ground of `HorseLeg-v0` it asks a horse of 349 kg for 0.14 ms. There forces at
@@ -146,7 +146,7 @@ class TrunkEngine(Scene):
         self.trunk = one_of("trunk", trunk, Trunk)
         self.motion_limits = None if limits is None else one_of("limits", limits, Limits)
         springs, order = self.limbs[0].spring is not None, count("harmonics", harmonics, most=MOST_HARMONICS)
-        self.features = Features(order, springs, animal=limits is not None)
+        self.features = Features(order, springs, has_limits=limits is not None)
         memory.check_limbs(self.trunk, self.limbs, self.features.springs)
         if contact_law is not None and self.features.springs:
             raise ParameterError(
@@ -169,15 +169,15 @@ class TrunkEngine(Scene):
         asked = None if substeps is None else count("substeps", substeps, most=MOST_STEPS)
         self.substeps = length.choose(self.sim_dt, asked)
         self.reacts, self.counts_strides = flag("reactions", reactions), flag("strides", strides)
-        self.is_few = len(self.limbs) in (1, 4) and self.num_envs <= FEW
+        self.runs_scalar = len(self.limbs) in (1, 4) and self.num_envs <= MAX_SCALAR_ENVS
         self._choose_kernel()
-        columns = self.num_envs if self.is_few else memory.columns_for(self.num_envs)
-        self.blocks = [range(columns)] if self.is_few else blocks(columns, LANES, self.num_threads)
+        columns = self.num_envs if self.runs_scalar else memory.columns_for(self.num_envs)
+        self.blocks = [range(columns)] if self.runs_scalar else blocks(columns, LANES, self.num_threads)
         self._memory = memory.new_memory(self, self.num_envs, columns, self.reacts)
         self._model = memory.new_model(self, self.filters, self.counts_strides)
 
     def _choose_kernel(self) -> None:
-        which = ("leg" if len(self.limbs) == 1 else "four") if self.is_few else "batch"
+        which = ("leg" if len(self.limbs) == 1 else "four") if self.runs_scalar else "batch"
         does = "react" if self.reacts else "advance"
         self._run = getattr(advance_kernels(self.contact_law, self.features), f"{does}_{which}")
 
@@ -242,7 +242,7 @@ class TrunkEngine(Scene):
         """Put back what `column` gave, of an engine like this one; where its legs' tables are stays its own.
 
         Raises:
-            ParameterError: another shape, or numbers that are not finite or beyond `layout.FARTHEST` in an
+            ParameterError: another shape, or numbers that are not finite or beyond `layout.MAX_STATE` in an
                 environment that was reset.
         """
         m, env = self._memory, self._env(env)
@@ -261,7 +261,7 @@ class TrunkEngine(Scene):
 
     def command_in(self, column: Floats) -> Floats:
         """The command in such a column, shape (legs, 2 + 2 harmonics)."""
-        form = form_of(self.features)
+        form = engine_layout(self.features)
         legs = column[form.trunk_rows :].reshape(len(self.limbs), form.leg_rows)
         return legs[:, form.leg_memory.rows("command")].copy()
 
@@ -305,7 +305,7 @@ class TrunkEngine(Scene):
 
         Raises:
             ParameterError: a value is not finite, of the wrong shape or forbidden by the trunk's kind, an
-                angle, place or rate is beyond `layout.FARTHEST`, or a leg's links have no place there.
+                angle, place or rate is beyond `layout.MAX_STATE`, or a leg's links have no place there.
         """
         where, m = memory.which(envs, self.num_envs), self._memory
         n = where.size
@@ -318,7 +318,7 @@ class TrunkEngine(Scene):
         )
         m.command[:, :, where] = values
         m.account[:, where], m.strides[:, :, where] = 0.0, 0.0
-        m.result[where] = STARTS
+        m.result[where] = RESET_REQUESTED
         self._go(-1)
 
     def vary(
@@ -366,7 +366,8 @@ class TrunkEngine(Scene):
 
         Raises:
             ParameterError: the state belongs to an engine that would go on differently, lacks a part, or has
-                numbers that are not finite or beyond `FARTHEST`, in environments that were reset once.
+                numbers that are not finite or beyond `layout.MAX_STATE`, in environments that were reset
+                once.
         """
         arrays, reset = memory.read_state(self._layout, self._memory, state)
         result = np.where(reset, 0.0, self._memory.result)
@@ -416,14 +417,19 @@ class TrunkEngine(Scene):
         return self._memory.result.astype(np.int64)
 
     def run(
-        self, command: ArrayLike | None = None, steps: int = 1, every: int = 1, *, beyond: bool = False
+        self,
+        command: ArrayLike | None = None,
+        steps: int = 1,
+        every: int = 1,
+        *,
+        continue_past_limits: bool = False,
     ) -> dict[str, NDArray[Any]]:
         """Advance and record `state` and `report` at the start and after each `every` steps, for plots.
 
         Args:
             command, steps: as of `advance`.
             every: steps from one instant of the record to the next.
-            beyond: whether to go on beyond a limit, as `advance` does.
+            continue_past_limits: whether to go on beyond a limit, as `advance` does.
 
         Returns:
             Arrays by name, time on the first axis, and "result", how each environment ended, shape
@@ -443,7 +449,7 @@ class TrunkEngine(Scene):
             if lost := broken(m.result).any():
                 self.observe()
             whole[..., k] = m.data
-            if lost or (m.result.any() and not beyond):
+            if lost or (m.result.any() and not continue_past_limits):
                 times = k if lost else k + 1
                 break
         kept = memory.memory_of(whole[..., :times], self.num_envs, m.constants, m.reactions, m.features)
@@ -475,13 +481,13 @@ class TrunkEngine(Scene):
     def _go_on(self, steps: int, account: bool) -> None:
         """As `_go`, with a long call in parts."""
         left = steps * self.substeps
-        part = max(PART // (self.columns * len(self.limbs)), LEAST_PART) // LOOK * LOOK
+        part = max(PART // (self.columns * len(self.limbs)), LEAST_PART) // CHECK_EVERY * CHECK_EVERY
         if left <= part:
             self._go(steps, account)
             return
         m = self._memory
         kept, first = self._copy((*memory.STATE, "stride_sums", "result")), np.zeros(self.num_envs)
-        sums, highest = np.zeros_like(m.stride_sums), layout.stride_sums(self.features).index("highest")
+        sums, highest = np.zeros_like(m.stride_sums), layout.stride_sums(self.features).index("highest_grf")
         while left and not broken(first).all():
             now = left % part or part  # the short one first: limits are looked at from the end
             self._go_substeps(now, account)

@@ -21,7 +21,7 @@ from hoof_env.dynamics.layout import (
 from hoof_env.simd.layout import Constants
 
 
-class _Form(NamedTuple):
+class _EngineLayout(NamedTuple):
     trunk: Any
     leg: Any
     account: Any
@@ -39,10 +39,10 @@ class _Form(NamedTuple):
     gait: int
     harmonics: int
     springs: int
-    animal: bool
+    has_limits: bool
 
 
-class Form(Constants, _Form):
+class EngineLayout(Constants, _EngineLayout):
     """The layouts of engines with the same `Features`, and what else the compiler must know of these.
 
     Attributes:
@@ -55,9 +55,9 @@ class Form(Constants, _Form):
 
 
 @cache
-def form_of(features: Features = PLAIN) -> Form:
-    """The `Form` of engines with these features."""
+def engine_layout(features: Features = PLAIN) -> EngineLayout:
+    """The `EngineLayout` of engines with these features."""
     rows = [features.of(layout) for layout in (TrunkRows, LegRows, Account, TrunkMemory, LegMemory)]
     inner = [features.of(layout).size for layout in (TrunkState, LegState, Strides, StrideSums)]
     sizes = [*(layout.size for layout in rows), *inner, features.gait_size]
-    return Form._make([*rows, *sizes, features.harmonics, 2 * features.springs, features.animal])
+    return EngineLayout._make([*rows, *sizes, features.harmonics, 2 * features.springs, features.has_limits])

@@ -7,27 +7,27 @@ from typing import Any, NamedTuple
 
 from hoof_env.ground.laws import friction_part, normal_force
 from hoof_env.ground.terrain import surface
-from hoof_env.simd import across, anywhere, choose, cross, dot, larger, level, plane, size
-from hoof_env.simd.compile import inlined
+from hoof_env.simd import absolute, any_lane, cross, dot, full_like, maximum, perpendicular, vector, where
+from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.math import clip, root_power
-from hoof_env.simd.user_functions import named, number_of
+from hoof_env.simd.user_functions import function_name, number_of
 
 
-@inlined
+@inline_llvm
 def level_ground(leg):  # type: ignore[no-untyped-def]
     """What never changes where the ground is the same everywhere."""
-    upward = plane(level(leg, 0.0), 1.0)
+    upward = vector(full_like(leg, 0.0), 1.0)
     leg.toe.ground_normal, leg.toe.stiffness_scale, leg.toe.friction_scale = upward, 1.0, 1.0
     leg.heel.ground_normal, leg.heel.stiffness_scale, leg.heel.friction_scale = upward, 1.0, 1.0
 
 
-@inlined
+@inline_llvm
 def meet_ground(trunk, leg, model):  # type: ignore[no-untyped-def]
     """Forces of the ground on toe and heel, and their generalised forces on crank and frame."""
     hip, pitch_rate, w = leg.hip, trunk.rates.pitch_rate, leg.theta_rate
     leg.beta_rate = pitch_rate + leg.beta_by_theta * w + leg.swing_rate
     place = trunk.place + hip
-    velocity = trunk.velocity + pitch_rate * across(hip)
+    velocity = trunk.velocity + pitch_rate * perpendicular(hip)
     toe_force, toe_theta, toe_beta = meet_point(
         trunk, leg, leg.toe, leg.state.toe, leg.functions.toe, leg.slopes.toe, place, velocity, model
     )
@@ -38,19 +38,19 @@ def meet_ground(trunk, leg, model):  # type: ignore[no-untyped-def]
     leg.ground_moment_theta, leg.ground_moment_beta = toe_theta + theta, toe_beta + beta
 
 
-@inlined
+@inline_llvm
 def meet_point(trunk, leg, point, memory, arm, arm_by_theta, hip, hip_velocity, model):  # type: ignore[no-untyped-def]
     """The motion of a hoof point, the force of the ground on it and that force's part along theta and beta;
     `arm` goes to it from O in the leg's frame, `hip` is O's place [m]."""
     arm, by_theta = leg.turn * arm, leg.turn * arm_by_theta
     place = hip + arm
-    velocity = hip_velocity + (leg.theta_rate * by_theta + leg.beta_rate * across(arm))
+    velocity = hip_velocity + (leg.theta_rate * by_theta + leg.beta_rate * perpendicular(arm))
     penetration, rate, sliding_speed = -place.imag, -velocity.imag, velocity.real  # Eqs. 10, 12, 13
     if model.is_terrain:
         height, normal_x, normal_y, stiffness_scale, friction_scale = surface(
             place.real, model.ground_cells, model.ground_origin, model.ground_per_metre
         )
-        normal = plane(normal_x, normal_y)
+        normal = vector(normal_x, normal_y)
         penetration, rate = (height - place.imag) * normal_y, -dot(normal, velocity)
         sliding_speed = -cross(normal, velocity)
         point.ground_normal = normal
@@ -61,41 +61,45 @@ def meet_point(trunk, leg, point, memory, arm, arm_by_theta, hip, hip_velocity, 
         press_through_spring(trunk, leg, point, memory, model)
     else:
         press_rigidly(trunk, point, memory, penetration, rate, sliding_speed, model)
-    force = plane(point.friction_force, point.normal_force)  # on level ground
+    force = vector(point.friction_force, point.normal_force)  # on level ground
     if model.is_terrain:
         force = force_of(point)
     return force, dot(force, by_theta), cross(arm, force)
 
 
-@inlined
+@inline_llvm
 def force_of(point):  # type: ignore[no-untyped-def]
     """Of the ground on a hoof point, in the world [N]."""
-    return point.normal_force * point.ground_normal - point.friction_force * across(point.ground_normal)
+    return point.normal_force * point.ground_normal - point.friction_force * perpendicular(
+        point.ground_normal
+    )
 
 
-@inlined
+@inline_llvm
 def press_rigidly(trunk, point, memory, penetration, rate, sliding_speed, model):  # type: ignore[no-untyped-def]
     """Forces on a point that is the sole itself."""
-    nothing = 0.0 * size(penetration)  # what is not a number stays so
+    nothing = 0.0 * absolute(penetration)  # what is not a number stays so
     force, spring, friction = nothing, nothing, nothing
     inverse_speed, inside = memory.inverse_approach_speed, penetration > 0.0
-    if anywhere(inside):
-        if anywhere(inside & (inverse_speed == 0.0)):
+    if any_lane(inside):
+        if any_lane(inside & (inverse_speed == 0.0)):
             entering = inverse_entry_speed(trunk, memory, penetration, rate, model)
-            inverse_speed = choose(inverse_speed > 0.0, inverse_speed, entering)
+            inverse_speed = where(inverse_speed > 0.0, inverse_speed, entering)
         pushed, stored = model.law(
             trunk.settings, point.stiffness_scale, penetration, rate, inverse_speed, model.eighths
         )
         laws = trunk.settings
-        part = friction_part(size(sliding_speed), model.friction_law, laws.friction_slow, laws.friction_fast)
+        part = friction_part(
+            absolute(sliding_speed), model.friction_law, laws.friction_slow, laws.friction_fast
+        )
         grip = laws.friction * point.friction_scale * part * pushed  # Eq. 15
-        friction = choose(inside, choose(sliding_speed > 0.0, -grip, grip), nothing)
-        force, spring = choose(inside, pushed, nothing), choose(inside, stored, nothing)
+        friction = where(inside, where(sliding_speed > 0.0, -grip, grip), nothing)
+        force, spring = where(inside, pushed, nothing), where(inside, stored, nothing)
     point.spring_force, point.inverse_approach_speed = spring, inverse_speed
     point.normal_force, point.friction_force = force, friction
 
 
-@inlined
+@inline_llvm
 def press_through_spring(trunk, leg, point, memory, model):  # type: ignore[no-untyped-def]
     """Forces on a point whose sole has no mass: what spring and damper carry is what the ground gives.
 
@@ -105,48 +109,49 @@ def press_through_spring(trunk, leg, point, memory, model):  # type: ignore[no-u
     speed while the sole stands.
     """
     laws, stiffness, damping = trunk.settings, leg.settings.hoof_stiffness, leg.settings.hoof_damping
-    give, along, speed = point.give[0], point.give[1], point.sliding_speed
-    depth_rate, elastic = point.penetration_rate, stiffness[0] * give
-    penetration, alone = point.penetration - give, -elastic * leg.hoof_yield[0]
-    nothing = 0.0 * size(penetration)
+    deflection, along, speed = point.deflection[0], point.deflection[1], point.sliding_speed
+    depth_rate, elastic = point.penetration_rate, stiffness[0] * deflection
+    penetration = point.penetration - deflection
+    free_return_rate = -elastic * leg.inverse_damping[0]  # of a spring that nothing presses
+    nothing = 0.0 * absolute(penetration)
     spring, resistance = nothing, nothing
     inverse_speed, inside = memory.inverse_approach_speed, penetration > 0.0
-    if anywhere(inside):
-        if anywhere(inside & (inverse_speed == 0.0)):
-            entering = inverse_entry_speed(trunk, memory, penetration, depth_rate - alone, model)
-            inverse_speed = choose(inverse_speed > 0.0, inverse_speed, entering)
-        pushed = ground_spring(laws, point.stiffness_scale, larger(penetration, 0.0), model.eighths)
-        spring = choose(inside, pushed, nothing)
-        resistance = choose(inside, laws.chi * spring * inverse_speed + laws.dashpot, nothing)
+    if any_lane(inside):
+        if any_lane(inside & (inverse_speed == 0.0)):
+            entering = inverse_entry_speed(trunk, memory, penetration, depth_rate - free_return_rate, model)
+            inverse_speed = where(inverse_speed > 0.0, inverse_speed, entering)
+        pushed = ground_spring(laws, point.stiffness_scale, maximum(penetration, 0.0), model.eighths)
+        spring = where(inside, pushed, nothing)
+        resistance = where(inside, laws.chi * spring * inverse_speed + laws.dashpot, nothing)
     rate = (spring + resistance * depth_rate - elastic) / (damping[0] + resistance)
-    pushes = inside & (rate > alone)
-    rate = larger(rate, alone)
-    force = choose(pushes, larger(elastic + damping[0] * rate, 0.0), nothing)
+    pushes = inside & (rate > free_return_rate)
+    rate = maximum(rate, free_return_rate)
+    force = where(pushes, maximum(elastic + damping[0] * rate, 0.0), nothing)
     sticking = stiffness[1] * along + damping[1] * speed
     grip = laws.friction * point.friction_scale * force
     held = clip(sticking, grip)
-    shear = choose(size(sticking) <= grip, speed, (held - stiffness[1] * along) * leg.hoof_yield[1])
-    point.give_rate[0], point.give_rate[1] = rate, shear
+    shear = where(absolute(sticking) <= grip, speed, (held - stiffness[1] * along) * leg.inverse_damping[1])
+    point.deflection_rate[0], point.deflection_rate[1] = rate, shear
     point.penetration, point.penetration_rate = penetration, depth_rate - rate
     point.sliding_speed = speed - shear
     point.spring_force, point.inverse_approach_speed = spring, inverse_speed
     point.normal_force, point.friction_force = force, -held
 
 
-@inlined
+@inline_llvm
 def inverse_entry_speed(trunk, memory, penetration, rate, model):  # type: ignore[no-untyped-def]
     """1 / v0 with v0 the approach speed at the crossing of the surface, interpolated between the last whole
     step and now."""
-    before, rate_before, floor = memory.penetration, memory.rate, trunk.settings.approach_floor
-    span, entry = level(memory, 1.0), rate
+    before, rate_before, floor = memory.penetration, memory.penetration_rate, trunk.settings.approach_floor
+    span, entry = full_like(memory, 1.0), rate
     if model.interpolated:
         crossed = before < 0.0
-        span = choose(crossed, penetration - before, span)
-        entry = choose(crossed, rate_before * span - before * (rate - rate_before), rate)
-    return span / larger(entry, floor * span)
+        span = where(crossed, penetration - before, span)
+        entry = where(crossed, rate_before * span - before * (rate - rate_before), rate)
+    return span / maximum(entry, floor * span)
 
 
-@inlined
+@inline_llvm
 def ground_spring(ground, stiffness_scale, penetration, eighths):  # type: ignore[no-untyped-def]
     """K d^n of Eq. 14 [N]."""
     if eighths == 12:  # the usual exponent, 3/2
@@ -156,7 +161,7 @@ def ground_spring(ground, stiffness_scale, penetration, eighths):  # type: ignor
     return ground.stiffness * stiffness_scale * power
 
 
-@inlined
+@inline_llvm
 def contact_force(ground, stiffness_scale, penetration, rate, inverse_speed, eighths):  # type: ignore[no-untyped-def]
     """Normal force on a point inside the ground (Eq. 14), and its spring's part [N]."""
     spring = ground_spring(ground, stiffness_scale, penetration, eighths)
@@ -182,71 +187,75 @@ def law_of(contact_law: Callable[..., Any] | None) -> Any:
     """
     if contact_law is None:
         return contact_force
-    force, number = inlined(contact_law), number_of(f"the contact law {named(contact_law)}")
+    force, number = inline_llvm(contact_law), number_of(f"the contact law {function_name(contact_law)}")
 
-    @inlined
+    @inline_llvm
     def push(ground, stiffness_scale, penetration, rate, inverse_speed, eighths):  # type: ignore[no-untyped-def]
         here = GroundHere(ground.stiffness * stiffness_scale, eighths, ground.chi, ground.dashpot)
-        pushed = larger(number(force(penetration, rate, inverse_speed, here)), 0.0)
+        pushed = maximum(number(force(penetration, rate, inverse_speed, here)), 0.0)
         return pushed, 0.0 * pushed
 
     return push
 
 
-@inlined
+@inline_llvm
 def remember_contacts(leg):  # type: ignore[no-untyped-def]
     """At a whole step: keep penetration and rate, and the inverse approach speed of a point in the ground."""
     remember_point(leg.toe, leg.state.toe)
     remember_point(leg.heel, leg.state.heel)
 
 
-@inlined
+@inline_llvm
 def remember_point(point, memory):  # type: ignore[no-untyped-def]
     """`remember_contacts` for one point."""
-    memory.penetration, memory.rate = point.penetration, point.penetration_rate
-    kept = choose(point.penetration > 0.0, point.inverse_approach_speed, 0.0)
+    memory.penetration, memory.penetration_rate = point.penetration, point.penetration_rate
+    kept = where(point.penetration > 0.0, point.inverse_approach_speed, 0.0)
     memory.inverse_approach_speed = kept
 
 
 # The springs' states, step by step as `stepping` has it; `count` rows a point, 0 of rigid hoofs
 
 
-@inlined
+@inline_llvm
 def begin_springs(leg, count):  # type: ignore[no-untyped-def]
     """The first stage is at the state itself."""
     for k in range(count):
-        leg.toe.give[k], leg.heel.give[k] = leg.state.toe.give[k], leg.state.heel.give[k]
+        leg.toe.deflection[k] = leg.state.toe.deflection[k]
+        leg.heel.deflection[k] = leg.state.heel.deflection[k]
 
 
-@inlined
+@inline_llvm
 def clear_springs(leg, count):  # type: ignore[no-untyped-def]
     """Before the first stage is weighed."""
     for k in range(count):
-        leg.toe.mean_give_rate[k], leg.heel.mean_give_rate[k] = 0.0, 0.0
+        leg.toe.mean_deflection_rate[k] = 0.0
+        leg.heel.mean_deflection_rate[k] = 0.0
 
 
-@inlined
+@inline_llvm
 def weigh_springs(leg, count, weight):  # type: ignore[no-untyped-def]
     """Add the rates at the present stage to their means."""
+    toe = leg.toe.mean_deflection_rate
+    heel = leg.heel.mean_deflection_rate
     for k in range(count):
-        leg.toe.mean_give_rate[k] = leg.toe.mean_give_rate[k] + weight * leg.toe.give_rate[k]
-        leg.heel.mean_give_rate[k] = leg.heel.mean_give_rate[k] + weight * leg.heel.give_rate[k]
+        toe[k] = toe[k] + weight * leg.toe.deflection_rate[k]
+        heel[k] = heel[k] + weight * leg.heel.deflection_rate[k]
 
 
-@inlined
+@inline_llvm
 def move_springs(leg, count, elapsed):  # type: ignore[no-untyped-def]
     """Go `elapsed` [s] from the step's start with the rates of the present stage."""
     for k in range(count):
-        leg.toe.give[k] = leg.state.toe.give[k] + elapsed * leg.toe.give_rate[k]
-        leg.heel.give[k] = leg.state.heel.give[k] + elapsed * leg.heel.give_rate[k]
+        leg.toe.deflection[k] = leg.state.toe.deflection[k] + elapsed * leg.toe.deflection_rate[k]
+        leg.heel.deflection[k] = leg.state.heel.deflection[k] + elapsed * leg.heel.deflection_rate[k]
 
 
-@inlined
+@inline_llvm
 def end_springs(leg, count, averages, h):  # type: ignore[no-untyped-def]
     """The state a step of `h` [s] later."""
     for k in range(count):
-        toe, heel = leg.toe.give_rate[k], leg.heel.give_rate[k]
+        toe, heel = leg.toe.deflection_rate[k], leg.heel.deflection_rate[k]
         if averages:
-            toe, heel = leg.toe.mean_give_rate[k], leg.heel.mean_give_rate[k]
-        leg.state.toe.give[k] = leg.state.toe.give[k] + h * toe
-        leg.state.heel.give[k] = leg.state.heel.give[k] + h * heel
+            toe, heel = leg.toe.mean_deflection_rate[k], leg.heel.mean_deflection_rate[k]
+        leg.state.toe.deflection[k] = leg.state.toe.deflection[k] + h * toe
+        leg.state.heel.deflection[k] = leg.state.heel.deflection[k] + h * heel

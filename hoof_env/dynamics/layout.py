@@ -16,11 +16,11 @@ from hoof_env.gait import parameter_names
 from hoof_env.leg.profile import Functions, Slopes
 from hoof_env.simd.layout import Block, Layout, Row, Size, Vector
 
-FARTHEST = 1e9
+MAX_STATE = 1e9
 """Largest angles [rad] and places [m] of a state, which are as good as numbers are fine there: to 6e-10 at
 1e6, to 6e-7 at 1e9; also the largest rates of a start, whose squares are then numbers still."""
 
-GAIT, SPRING, ANIMAL, LIMITS = Size("gait", 4), Size("spring", 0), Size("animal", 0), Size("limits", 0)
+GAIT, SPRING, LIMITED, LIMITS = Size("gait", 4), Size("spring", 0), Size("limited", 0), Size("limits", 0)
 
 
 class Features(NamedTuple):
@@ -35,7 +35,7 @@ class Features(NamedTuple):
 
     harmonics: int = 1
     springs: bool = False
-    animal: bool = False
+    has_limits: bool = False
 
     @property
     def gait_size(self) -> int:
@@ -45,7 +45,10 @@ class Features(NamedTuple):
     def of(self, layout: Any) -> Any:
         """A layout of this module as engines of this kind have it."""
         return layout.sized(
-            gait=self.gait_size, spring=2 * self.springs, animal=int(self.animal), limits=5 * self.animal
+            gait=self.gait_size,
+            spring=2 * self.springs,
+            limited=int(self.has_limits),
+            limits=5 * self.has_limits,
         )
 
 
@@ -130,7 +133,7 @@ class TrunkRows(Layout):
     mass_pp: Row
     at_dead_point: Row  # 1 once a crank was where its linkage does not close
     fallen: Row  # 1 once the trunk was below `bottom`
-    beyond: Annotated[Block, ANIMAL]  # which of the limits was passed first, a number of `parts.Result`
+    violated_limit: Annotated[Block, LIMITED]  # the one passed first, a number of `parts.Result`
     settings: TrunkSettings
 
 
@@ -175,9 +178,9 @@ class ContactMemory(Layout):
     """What a hoof point remembers of the last whole step."""
 
     penetration: Row  # [m]
-    rate: Row  # [m/s]
+    penetration_rate: Row  # [m/s]
     inverse_approach_speed: Row  # 1 / approach speed while it is in the ground, else 0 [s/m]
-    give: Annotated[Block, SPRING]  # of the hoof's spring, along normal and tangent of the ground [m]
+    deflection: Annotated[Block, SPRING]  # of the hoof's spring, along normal and tangent of the ground [m]
 
 
 class LegState(Layout):
@@ -215,8 +218,8 @@ class StrideSums(Layout):
     stances: Row  # that began
     travel: Row  # backward, of the hoof along the ground, weighted with the load [m]
     slip: Row  # in stance, the same without sign, so that to and fro adds up [m]
-    braking: Annotated[Block, ANIMAL]  # impulse of the ground backward [N s]
-    propulsion: Annotated[Block, ANIMAL]  # forward [N s]
+    braking: Annotated[Block, LIMITED]  # impulse of the ground backward [N s]
+    propulsion: Annotated[Block, LIMITED]  # forward [N s]
 
 
 class LegSettings(Layout):
@@ -235,8 +238,8 @@ class LegSettings(Layout):
     lift_off: Row  # normal force that tells stance from swing [N]
     hoof_stiffness: Annotated[Block, SPRING]  # of the hoof's springs, normal and tangential [N/m]
     hoof_damping: Annotated[Block, SPRING]  # [N s/m]
-    length_scale: Annotated[Block, ANIMAL]  # of this leg over that of the table [-]
-    mass_scale: Annotated[Block, ANIMAL]  # [-]
+    length_scale: Annotated[Block, LIMITED]  # of this leg over that of the table [-]
+    mass_scale: Annotated[Block, LIMITED]  # [-]
 
 
 class Contact(Layout):
@@ -244,9 +247,9 @@ class Contact(Layout):
 
     penetration: Row  # of the ground; with a spring less than that of the leg's point [m]
     penetration_rate: Row  # [m/s]
-    give: Annotated[Block, SPRING]  # of the spring at the present stage [m]
-    give_rate: Annotated[Block, SPRING]  # [m/s]
-    mean_give_rate: Annotated[Block, SPRING]  # weighted mean over the stages so far
+    deflection: Annotated[Block, SPRING]  # of the spring at the present stage [m]
+    deflection_rate: Annotated[Block, SPRING]  # [m/s]
+    mean_deflection_rate: Annotated[Block, SPRING]  # weighted mean over the stages so far
     ground_normal: Vector  # [-]
     stiffness_scale: Row  # factor of K there [-]
     friction_scale: Row  # factor of mu there [-]
@@ -301,7 +304,7 @@ class LegRows(Layout):
     frame_torque: Row  # along beta
     crank_power: Row
     swing_power: Row
-    hoof_yield: Annotated[Block, SPRING]  # 1 / damping of the hoof's springs [m/(N s)]
+    inverse_damping: Annotated[Block, SPRING]  # 1 / damping of the hoof's springs [m/(N s)]
     toe: Contact
     heel: Contact
     settings: LegSettings
@@ -355,7 +358,12 @@ STRIDES = Strides.names
 def leg_state(features: Features = PLAIN) -> tuple[str, ...]:
     """Names of the rows of a `LegState`."""
     gait = parameter_names(features.harmonics)
-    contact = ("penetration", "rate", "slowness", *("give_normal", "give_tangential")[: 2 * features.springs])
+    contact = (
+        "penetration",
+        "penetration_rate",
+        "inverse_approach_speed",
+        *("deflection_normal", "deflection_tangential")[: 2 * features.springs],
+    )
     points = (f"{point}_{name}" for point in ("toe", "heel") for name in contact)
     return ("theta", "theta_rate", *gait, *(f"{name}_rate" for name in gait), *points)
 
@@ -363,9 +371,9 @@ def leg_state(features: Features = PLAIN) -> tuple[str, ...]:
 def stride_sums(features: Features = PLAIN) -> tuple[str, ...]:
     """Names of the rows of `StrideSums`."""
     return (
-        "peak_increase", "running_peak_increase", "loading_rate_increase", "highest", "positive_work",
-        "load_impulse", "loaded_time", "stances", "travel", "slip",
-        *("braking", "propulsion")[: 2 * features.animal],
+        "peak_grf_increase", "running_peak_increase", "loading_rate_increase", "highest_grf", "positive_work",
+        "normal_impulse", "loaded_time", "stances", "travel", "slip",
+        *("braking", "propulsion")[: 2 * features.has_limits],
     )  # fmt: skip
 
 

@@ -1,18 +1,18 @@
 """Whether a motion goes on where it should end: pitch and height of the trunk, joints near the ground.
 
-What is checked after every `LOOK` whole steps, and after the last, is kept until the call of the engine ends,
-so that a joint that dips between two calls is not missed. Beyond a limit the motion goes on, and its state is
-as good as any other.
+What is checked after every `CHECK_EVERY` whole steps, and after the last, is kept until the call of the
+engine ends, so that a joint that dips between two calls is not missed. Beyond a limit the motion goes
+on, and its state is as good as any other.
 """
 
 from __future__ import annotations
 
 from hoof_env.dynamics.parts import Result
 from hoof_env.ground.terrain import surface
-from hoof_env.simd import anywhere, choose, lane_sum, level, plane, root, smaller
-from hoof_env.simd.compile import inlined
+from hoof_env.simd import any_lane, full_like, lane_sum, minimum, sqrt, vector, where
+from hoof_env.simd.compile import inline_llvm
 
-LOOK = 5
+CHECK_EVERY = 5
 """Whole steps from one look to the next: to find all joints takes square roots and quotients."""
 
 ROUNDING = 1e-6  # [m], more than G's places differ by rounding
@@ -20,26 +20,26 @@ ROUNDING = 1e-6  # [m], more than G's places differ by rounding
 PITCH, HEIGHT, LOW_JOINT = float(Result.PITCH), float(Result.HEIGHT), float(Result.LOW_JOINT)
 
 
-@inlined
+@inline_llvm
 def has_moved(result):  # type: ignore[no-untyped-def]
     """Whether what a call of the engine asked for happened, be it beyond a limit."""
     return (result == 0.0) | (result >= PITCH)
 
 
-@inlined
+@inline_llvm
 def clear_limits(trunk):  # type: ignore[no-untyped-def]
     """Before a call: nothing was passed."""
-    trunk.beyond[0] = 0.0
+    trunk.violated_limit[0] = 0.0
 
 
-@inlined
-def note(trunk, is_beyond, result):  # type: ignore[no-untyped-def]
+@inline_llvm
+def record_violation(trunk, is_beyond, result):  # type: ignore[no-untyped-def]
     """Keep the first of the limits that were passed."""
-    before = trunk.beyond[0]
-    trunk.beyond[0] = choose((before == 0.0) & is_beyond, result, before)
+    before = trunk.violated_limit[0]
+    trunk.violated_limit[0] = where((before == 0.0) & is_beyond, result, before)
 
 
-@inlined
+@inline_llvm
 def ground_height(place, model):  # type: ignore[no-untyped-def]
     """Of the ground below a point [m]."""
     height = 0.0 * place.real
@@ -50,21 +50,21 @@ def ground_height(place, model):  # type: ignore[no-untyped-def]
     return height
 
 
-@inlined
-def heed_trunk(trunk, model):  # type: ignore[no-untyped-def]
+@inline_llvm
+def check_trunk(trunk, model):  # type: ignore[no-untyped-def]
     """Pitch, and height above the ground."""
     limits, pitch = trunk.settings.limits, trunk.stage.pitch
     height = trunk.place.imag - ground_height(trunk.place, model)
-    note(trunk, (pitch < limits[0]) | (pitch > limits[1]), PITCH)
-    note(trunk, (height < limits[2]) | (height > limits[3]), HEIGHT)
+    record_violation(trunk, (pitch < limits[0]) | (pitch > limits[1]), PITCH)
+    record_violation(trunk, (height < limits[2]) | (height > limits[3]), HEIGHT)
 
 
-@inlined
-def heed_joints(trunk, leg, shape, model):  # type: ignore[no-untyped-def]
+@inline_llvm
+def check_joints(trunk, leg, shape, model):  # type: ignore[no-untyped-def]
     """Whether a joint other than the hoof's corners is too near the ground; `shape` are `LegConstants`."""
-    if not (model.is_terrain or anywhere(may_be_low(trunk, leg, shape))):
+    if not (model.is_terrain or any_lane(may_be_low(trunk, leg, shape))):
         return
-    crank = shape.crank * plane(shape.travel * leg.cosine, -leg.sine)
+    crank = shape.crank * vector(shape.travel * leg.cosine, -leg.sine)
     b = meeting(shape.B, shape.pivot, crank)
     d = shape.pivot + (b - shape.pivot) * shape.D.place
     f = meeting(shape.F, shape.pivot, crank)
@@ -72,14 +72,14 @@ def heed_joints(trunk, leg, shape, model):  # type: ignore[no-untyped-def]
     a, g = shape.pivot + shape.rocker * (f - shape.pivot), f + shape.shank * (f - e)
     lowest = clearance(trunk, leg, 0.0 * crank, model)  # O
     for joint in (crank, shape.pivot, b, d, f, e, a, g):
-        lowest = smaller(lowest, clearance(trunk, leg, joint, model))
-    is_low = choose(lowest < trunk.settings.limits[4], 1.0, 0.0)
-    if model.together:
-        is_low = lane_sum(level(trunk, 0.0), is_low)
-    note(trunk, is_low > 0.0, LOW_JOINT)
+        lowest = minimum(lowest, clearance(trunk, leg, joint, model))
+    is_low = where(lowest < trunk.settings.limits[4], 1.0, 0.0)
+    if model.lanes_are_legs:
+        is_low = lane_sum(full_like(trunk, 0.0), is_low)
+    record_violation(trunk, is_low > 0.0, LOW_JOINT)
 
 
-@inlined
+@inline_llvm
 def may_be_low(trunk, leg, shape):  # type: ignore[no-untyped-def]
     """Whether level ground is too near G, which the hoof's corners tell, or another joint, were it as far
     from O as any comes: where not, the joints need not be found."""
@@ -89,16 +89,16 @@ def may_be_low(trunk, leg, shape):  # type: ignore[no-untyped-def]
     return (fetlock < low) | (origin - leg.settings.length_scale[0] * shape.reach < low)
 
 
-@inlined
+@inline_llvm
 def meeting(dyad, first, second):  # type: ignore[no-untyped-def]
     """Where two links meet whose far ends are `first` and `second`; see `reactions.hinge_point`."""
     span = second - first
     d2 = span.real * span.real + span.imag * span.imag
     k = 0.5 * d2 + dyad.half
-    return first + span * (1.0 / d2) * plane(k, dyad.side * root(dyad.one2 * d2 - k * k))
+    return first + span * (1.0 / d2) * vector(k, dyad.side * sqrt(dyad.one2 * d2 - k * k))
 
 
-@inlined
+@inline_llvm
 def clearance(trunk, leg, joint, model):  # type: ignore[no-untyped-def]
     """Of a joint of the leg's frame above the ground [m]."""
     place = trunk.place + leg.hip + leg.settings.length_scale[0] * (leg.turn * joint)

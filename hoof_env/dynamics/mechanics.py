@@ -19,71 +19,73 @@ and angular, of all bodies together: in flight it is kept to round-off, whatever
 from __future__ import annotations
 
 from hoof_env.dynamics.hoof import meet_ground
-from hoof_env.dynamics.layout import FARTHEST, Moving
+from hoof_env.dynamics.layout import MAX_STATE, Moving
 from hoof_env.dynamics.parts import FIXED, FREE, RAIL, SUSPENDED
 from hoof_env.gait import COS, OFFSET, SIN, SPEED
 from hoof_env.leg.profile import locate, look_up
-from hoof_env.simd import across, choose, cross, dot, lane_sum, level, nth, plane, size
-from hoof_env.simd.compile import inlined, pasted
+from hoof_env.simd import absolute, block_at, cross, dot, full_like, lane_sum, perpendicular, vector, where
+from hoof_env.simd.compile import inline_llvm, inline_source
 from hoof_env.simd.math import clip, cos_sin
 
 MOVING = Moving.size
 
 
-@inlined
-def add(total, x, together):  # type: ignore[no-untyped-def]
+@inline_llvm
+def add(total, x, lanes_are_legs):  # type: ignore[no-untyped-def]
     """total + x, lane by lane; or, where the lanes are the legs of one trunk, all of them one after the
     other, as in a loop over legs."""
-    if together:
+    if lanes_are_legs:
         return lane_sum(total, x)
     return total + x
 
 
-@pasted
+@inline_source
 def evaluate(trunk, legs, leg_count, model, elapsed):  # type: ignore[no-untyped-def]
     """All forces and accelerations at the present stage, `elapsed` [s] after the step's start."""
     if model.kind != FIXED:
         clear_trunk(trunk, model.kind)
     for i in range(leg_count):
-        find_crank(nth(legs, i), model)
+        find_crank(block_at(legs, i), model)
     for i in range(leg_count):
-        leg = nth(legs, i)
+        leg = block_at(legs, i)
         look_up_functions(trunk, leg, model)
         place_frame(trunk, leg, model.form.harmonics, elapsed)
         if model.kind != FIXED:
-            gather_leg(trunk, leg, model.kind, model.together)
+            gather_leg(trunk, leg, model.kind, model.lanes_are_legs)
     if model.kind != FIXED:
         move_trunk(trunk, model.kind)
     for i in range(leg_count):
-        leg = nth(legs, i)
+        leg = block_at(legs, i)
         meet_ground(trunk, leg, model)
         set_up_crank(trunk, leg, model.motors, elapsed)
         if model.kind != FIXED:
-            load_trunk(trunk, leg, model.kind, model.motors, model.together)
+            load_trunk(trunk, leg, model.kind, model.motors, model.lanes_are_legs)
     if model.kind != FIXED:
         accelerate_trunk(trunk, model.kind)
     for i in range(leg_count):
-        accelerate_crank(trunk, nth(legs, i), model.motors)
+        accelerate_crank(trunk, block_at(legs, i), model.motors)
 
 
-@inlined
+@inline_llvm
 def find_crank(leg, model):  # type: ignore[no-untyped-def]
     """What the crank angle itself tells, of all legs before their look-ups, which wait for it."""
     locate(leg, model.cells)
     leg.cosine, leg.sine = cos_sin(leg.theta)
 
 
-@inlined
+@inline_llvm
 def look_up_functions(trunk, leg, model):  # type: ignore[no-untyped-def]
     """The functions of the crank angle and their derivatives."""
     look_up(leg, model.tables)
-    if model.form.animal:
+    if model.form.has_limits:
         scale_functions(leg.functions, leg.slopes, leg.settings.length_scale[0], leg.settings.mass_scale[0])
     value = leg.functions[0]
-    trunk.at_dead_point = choose((size(leg.theta) <= FARTHEST) & (value != value), 1.0, trunk.at_dead_point)
+    trunk.at_dead_point = where(
+        (absolute(leg.theta) <= MAX_STATE) & (value != value), 1.0, trunk.at_dead_point
+    )
 
 
-@inlined
+@inline_llvm
 def scale_functions(value, slope, length, mass):  # type: ignore[no-untyped-def]
     """Functions of a similar leg, `length` times as large with `mass` times the mass."""
     moment, inertia = mass * length, mass * length * length
@@ -97,14 +99,14 @@ def scale_functions(value, slope, length, mass):  # type: ignore[no-untyped-def]
     value.frame_inertia_slope = inertia * value.frame_inertia_slope
 
 
-@inlined
+@inline_llvm
 def place_frame(trunk, leg, harmonics, elapsed):  # type: ignore[no-untyped-def]
     """The leg's frame (E1), its first moment and inertia in the world. The swing is phi = offset +
     A sin(theta) + B cos(theta), perhaps with higher harmonics, each parameter moving as its filter does."""
     sine, cosine, w = leg.sine, leg.cosine, leg.theta_rate
-    offset, rate, bend = filtered(leg, OFFSET, elapsed)
-    part_a, rate_a, bend_a = filtered(leg, SIN, elapsed)
-    part_b, rate_b, bend_b = filtered(leg, COS, elapsed)
+    offset, rate, bend = gait_parameter_at(leg, OFFSET, elapsed)
+    part_a, rate_a, bend_a = gait_parameter_at(leg, SIN, elapsed)
+    part_b, rate_b, bend_b = gait_parameter_at(leg, COS, elapsed)
     side, swing = leg.settings.side, part_a * sine + part_b * cosine
     slope = part_a * cosine - part_b * sine
     bent = bend + bend_a * sine + bend_b * cosine + (2.0 * (rate_a * cosine - rate_b * sine) - swing * w) * w
@@ -112,8 +114,8 @@ def place_frame(trunk, leg, harmonics, elapsed):  # type: ignore[no-untyped-def]
     sine_n, cosine_n = sine, cosine
     for n in range(2, harmonics + 1):
         sine_n, cosine_n = sine_n * cosine + cosine_n * sine, cosine_n * cosine - sine_n * sine
-        part_a, rate_a, bend_a = filtered(leg, 2 * n, elapsed)
-        part_b, rate_b, bend_b = filtered(leg, 2 * n + 1, elapsed)
+        part_a, rate_a, bend_a = gait_parameter_at(leg, 2 * n, elapsed)
+        part_b, rate_b, bend_b = gait_parameter_at(leg, 2 * n + 1, elapsed)
         part, turned = part_a * sine_n + part_b * cosine_n, n * w
         swing, slope = swing + part, slope + n * (part_a * cosine_n - part_b * sine_n)
         drift = drift + rate_a * sine_n + rate_b * cosine_n
@@ -124,12 +126,12 @@ def place_frame(trunk, leg, harmonics, elapsed):  # type: ignore[no-untyped-def]
     leg.swing_rate, leg.swing_acceleration = side * drift, side * bent
 
     cos_beta, sin_beta = cos_sin(trunk.stage.pitch + side * (offset + swing))
-    turn = plane(cos_beta, sin_beta)
+    turn = vector(cos_beta, sin_beta)
     s, ds = turn * leg.functions.first_moment, turn * leg.functions.moment_slope
     leg.turn = turn
     leg.first_moment = s
     leg.moment_by_theta = ds
-    leg.moment_by_crank = ds + k * across(s)
+    leg.moment_by_crank = ds + k * perpendicular(s)
     frame = leg.functions.frame_inertia + leg.settings.rotor_frame
     coupling = leg.functions.coupling + leg.settings.rotor_coupling
     leg.frame_inertia, leg.crank_coupling = frame, coupling + k * frame
@@ -138,8 +140,8 @@ def place_frame(trunk, leg, harmonics, elapsed):  # type: ignore[no-untyped-def]
     )
 
 
-@inlined
-def filtered(leg, k, elapsed):  # type: ignore[no-untyped-def]
+@inline_llvm
+def gait_parameter_at(leg, k, elapsed):  # type: ignore[no-untyped-def]
     """Parameter k of the gait, its rate and acceleration, `elapsed` [s] after the step's start."""
     value, rate, bend = leg.state.gait[k], leg.state.gait_rate[k], leg.gait_acceleration[k]
     if elapsed != 0.0:
@@ -147,53 +149,53 @@ def filtered(leg, k, elapsed):  # type: ignore[no-untyped-def]
     return value, rate, bend
 
 
-@inlined
+@inline_llvm
 def keep_still(trunk):  # type: ignore[no-untyped-def]
     """What never changes in a trunk that cannot move, or not pitch."""
     for k in range(MOVING):
         trunk.stage[k] = trunk.state.moving[k]
         trunk.rates[k] = 0.0
-    nothing = plane(level(trunk, 0.0), 0.0)
+    nothing = vector(full_like(trunk, 0.0), 0.0)
     trunk.place = trunk.state.moving.centre
     trunk.velocity = nothing
     trunk.acceleration = nothing
     trunk.pitch_acceleration, trunk.at_dead_point, trunk.fallen = 0.0, 0.0, 0.0
-    trunk.turn = plane(level(trunk, 1.0), 0.0)
+    trunk.turn = vector(full_like(trunk, 1.0), 0.0)
 
 
-@inlined
+@inline_llvm
 def clear_trunk(trunk, kind):  # type: ignore[no-untyped-def]
     """Before the legs are gathered."""
     if kind == FREE:
         cosine, sine = cos_sin(trunk.stage.pitch)
-        trunk.turn = plane(cosine, sine)
-    nothing = plane(level(trunk, 0.0), 0.0)
+        trunk.turn = vector(cosine, sine)
+    nothing = vector(full_like(trunk, 0.0), 0.0)
     trunk.first_moment = nothing
     trunk.relative_momentum = nothing
     trunk.composite_inertia, trunk.relative_angular_momentum = trunk.settings.pitch_inertia, 0.0
 
 
-@inlined
-def gather_leg(trunk, leg, kind, together):  # type: ignore[no-untyped-def]
+@inline_llvm
+def gather_leg(trunk, leg, kind, lanes_are_legs):  # type: ignore[no-untyped-def]
     """Add a leg to first moment, momentum, inertia and spin about the trunk's centre of mass (E6)."""
     s, w, sway = leg.first_moment, leg.theta_rate, leg.swing_rate
-    drift = w * leg.moment_by_crank + sway * across(s)
+    drift = w * leg.moment_by_crank + sway * perpendicular(s)
     if kind == FREE:
         leg.hip = trunk.turn * leg.settings.hip_on_trunk
         hip, frame = leg.hip, leg.frame_inertia
         trunk.composite_inertia = add(
-            trunk.composite_inertia, dot(hip, leg.settings.mass * hip + 2.0 * s) + frame, together
+            trunk.composite_inertia, dot(hip, leg.settings.mass * hip + 2.0 * s) + frame, lanes_are_legs
         )
         trunk.relative_angular_momentum = add(
             trunk.relative_angular_momentum,
             cross(hip, drift) + leg.crank_coupling * w + frame * sway,
-            together,
+            lanes_are_legs,
         )
-    trunk.first_moment = add(trunk.first_moment, leg.settings.mass * leg.hip + s, together)
-    trunk.relative_momentum = add(trunk.relative_momentum, drift, together)
+    trunk.first_moment = add(trunk.first_moment, leg.settings.mass * leg.hip + s, lanes_are_legs)
+    trunk.relative_momentum = add(trunk.relative_momentum, drift, lanes_are_legs)
 
 
-@inlined
+@inline_llvm
 def move_trunk(trunk, kind):  # type: ignore[no-untyped-def]
     """Place and velocity of the trunk from centre of mass and momentum of all (E7), on a rail along x only;
     what acts on it besides its legs."""
@@ -201,13 +203,13 @@ def move_trunk(trunk, kind):  # type: ignore[no-untyped-def]
     drift, per_mass = trunk.relative_momentum, trunk.settings.inverse_mass
     place = centre - per_mass * moment
     velocity = per_mass * (momentum - drift)
-    rate = level(trunk, 0.0)
+    rate = full_like(trunk, 0.0)
     if kind == RAIL:
-        place, velocity = plane(place.real, centre.imag), plane(velocity.real, 0.0)
+        place, velocity = vector(place.real, centre.imag), vector(velocity.real, 0.0)
     if kind == FREE:
         spin = trunk.stage.spin - trunk.relative_angular_momentum + cross(moment, drift) * per_mass
         rate = spin / (trunk.composite_inertia - dot(moment, moment) * per_mass)
-        velocity = velocity - rate * per_mass * across(moment)
+        velocity = velocity - rate * per_mass * perpendicular(moment)
     trunk.place = place
     trunk.velocity = velocity
     trunk.rates.pitch_rate = rate
@@ -219,43 +221,43 @@ def move_trunk(trunk, kind):  # type: ignore[no-untyped-def]
         - trunk.settings.spring * (place.imag - trunk.settings.height)
         - trunk.settings.damper * velocity.imag
     )
-    trunk.rates.force = plane(drag, lift)
+    trunk.rates.force = vector(drag, lift)
     trunk.rates.moment = -drag * (place.imag - centre.imag)  # the drag acts on the trunk
-    trunk.load = plane(level(trunk, 0.0), 0.0)
+    trunk.load = vector(full_like(trunk, 0.0), 0.0)
     trunk.load_moment = 0.0
     trunk.mass_xx, trunk.mass_xy, trunk.mass_yy = total, 0.0, total
     trunk.mass_xp, trunk.mass_yp, trunk.mass_pp = -moment.imag, moment.real, trunk.composite_inertia
-    trunk.fallen = choose(place.imag < trunk.settings.bottom, 1.0, trunk.fallen)
+    trunk.fallen = where(place.imag < trunk.settings.bottom, 1.0, trunk.fallen)
 
 
-@pasted
-def settle(trunk, legs, leg_count, model, starts):  # type: ignore[no-untyped-def]
+@inline_source
+def velocities_to_momenta(trunk, legs, leg_count, model, starts):  # type: ignore[no-untyped-def]
     """Centre of mass, momentum and spin of all where an environment starts, from what stands in their place
     then: place and velocity of the trunk and rate of its pitch. The inverse of `move_trunk`."""
     clear_trunk(trunk, model.kind)
     for i in range(leg_count):
-        leg = nth(legs, i)
+        leg = block_at(legs, i)
         find_crank(leg, model)
         look_up_functions(trunk, leg, model)
         place_frame(trunk, leg, model.form.harmonics, 0.0)
-        gather_leg(trunk, leg, model.kind, model.together)
+        gather_leg(trunk, leg, model.kind, model.lanes_are_legs)
     place, velocity, rate = trunk.state.moving.centre, trunk.state.moving.momentum, trunk.state.moving.spin
     moment, drift, per_mass = trunk.first_moment, trunk.relative_momentum, trunk.settings.inverse_mass
     centre = place + per_mass * moment
     momentum = trunk.settings.total_mass * velocity + drift
-    spin = level(trunk, 0.0)
+    spin = full_like(trunk, 0.0)
     if model.kind == RAIL:
-        centre, momentum = plane(centre.real, place.imag), plane(momentum.real, 0.0)
+        centre, momentum = vector(centre.real, place.imag), vector(momentum.real, 0.0)
     if model.kind == FREE:
-        momentum = momentum + rate * across(moment)
+        momentum = momentum + rate * perpendicular(moment)
         about = trunk.composite_inertia - dot(moment, moment) * per_mass
         spin = rate * about + trunk.relative_angular_momentum - cross(moment, drift) * per_mass
-    trunk.state.moving.centre = choose(starts, centre, place)
-    trunk.state.moving.momentum = choose(starts, momentum, velocity)
-    trunk.state.moving.spin = choose(starts, spin, rate)
+    trunk.state.moving.centre = where(starts, centre, place)
+    trunk.state.moving.momentum = where(starts, momentum, velocity)
+    trunk.state.moving.spin = where(starts, spin, rate)
 
 
-@inlined
+@inline_llvm
 def set_up_crank(trunk, leg, motors, elapsed):  # type: ignore[no-untyped-def]
     """A crank's equation of motion (E5), with the trunk's acceleration a,
 
@@ -267,18 +269,22 @@ def set_up_crank(trunk, leg, motors, elapsed):  # type: ignore[no-untyped-def]
     hip, frame, coupling = leg.hip, leg.frame_inertia, leg.crank_coupling
     pitch_rate, swing_acceleration = trunk.rates.pitch_rate, leg.swing_acceleration
     da, db, dc = leg.slopes.crank_inertia, leg.slopes.coupling, leg.functions.frame_inertia_slope
-    weight = plane(level(trunk, 0.0), trunk.settings.gravity) - pitch_rate * pitch_rate * hip  # a + g of O
+    weight = (
+        vector(full_like(trunk, 0.0), trunk.settings.gravity) - pitch_rate * pitch_rate * hip
+    )  # a + g of O
     rest_theta = (
         (coupling - k * frame) * swing_acceleration
         + 0.5 * (da * (w * w) - dc * (frame_rate * frame_rate))
         + dot(weight, leg.moment_by_theta)
     )
     rest_beta = (
-        frame * swing_acceleration + (db * w + dc * frame_rate) * w + dot(weight, across(leg.first_moment))
+        frame * swing_acceleration
+        + (db * w + dc * frame_rate) * w
+        + dot(weight, perpendicular(leg.first_moment))
     )
     leg.rest_moment_theta, leg.rest_moment_beta = rest_theta, rest_beta
     leg.crank_pitch_coupling = coupling + cross(hip, leg.moment_by_crank)
-    wanted, wanted_rate, _ = filtered(leg, SPEED, elapsed)
+    wanted, wanted_rate, _ = gait_parameter_at(leg, SPEED, elapsed)
     leg.free_theta_acceleration = wanted_rate
     if motors:
         torque = clip(leg.settings.speed_gain * (wanted - w), leg.settings.torque_limit)
@@ -287,66 +293,66 @@ def set_up_crank(trunk, leg, motors, elapsed):  # type: ignore[no-untyped-def]
             torque + leg.ground_moment_theta - rest_theta + k * (leg.ground_moment_beta - rest_beta)
         )
         leg.crank_torque = torque
-        leg.crank_mobility = choose(is_motor, mobility, 0.0)
-        leg.free_theta_acceleration = choose(is_motor, free, wanted_rate)
+        leg.crank_mobility = where(is_motor, mobility, 0.0)
+        leg.free_theta_acceleration = where(is_motor, free, wanted_rate)
 
 
-@inlined
-def load_trunk(trunk, leg, kind, motors, together):  # type: ignore[no-untyped-def]
+@inline_llvm
+def load_trunk(trunk, leg, kind, motors, lanes_are_legs):  # type: ignore[no-untyped-def]
     """A leg's part in the trunk's equations, its crank eliminated (E8), and in outer force and moment."""
     w, frame_rate, pitch_rate = leg.theta_rate, leg.beta_rate, trunk.rates.pitch_rate
     s, hip, u, ground_force = leg.first_moment, leg.hip, leg.moment_by_crank, leg.ground_force
     mass, coupling, free = leg.settings.mass, leg.crank_pitch_coupling, leg.free_theta_acceleration
     slope = leg.turn * leg.slopes.moment_slope
     moment_acceleration = (  # of the first moment, where theta_tt, pitch_tt and a are 0
-        leg.swing_acceleration * across(s)
+        leg.swing_acceleration * perpendicular(s)
         + w * w * slope
-        + frame_rate * (2.0 * w * across(leg.moment_by_theta) - frame_rate * s)
+        + frame_rate * (2.0 * w * perpendicular(leg.moment_by_theta) - frame_rate * s)
     )
     centripetal = pitch_rate * pitch_rate * hip  # minus O's acceleration there
-    trunk.load = add(trunk.load, mass * centripetal - moment_acceleration - free * u, together)
+    trunk.load = add(trunk.load, mass * centripetal - moment_acceleration - free * u, lanes_are_legs)
     if motors:
         mobile_u = leg.crank_mobility * u
-        trunk.mass_xx = add(trunk.mass_xx, -mobile_u.real * u.real, together)
-        trunk.mass_xy = add(trunk.mass_xy, -mobile_u.real * u.imag, together)
-        trunk.mass_yy = add(trunk.mass_yy, -mobile_u.imag * u.imag, together)
+        trunk.mass_xx = add(trunk.mass_xx, -mobile_u.real * u.real, lanes_are_legs)
+        trunk.mass_xy = add(trunk.mass_xy, -mobile_u.real * u.imag, lanes_are_legs)
+        trunk.mass_yy = add(trunk.mass_yy, -mobile_u.imag * u.imag, lanes_are_legs)
         if kind == FREE:
-            trunk.mass_xp = add(trunk.mass_xp, -mobile_u.real * coupling, together)
-            trunk.mass_yp = add(trunk.mass_yp, -mobile_u.imag * coupling, together)
-            trunk.mass_pp = add(trunk.mass_pp, -leg.crank_mobility * coupling * coupling, together)
-    trunk.rates.force = add(trunk.rates.force, ground_force, together)
+            trunk.mass_xp = add(trunk.mass_xp, -mobile_u.real * coupling, lanes_are_legs)
+            trunk.mass_yp = add(trunk.mass_yp, -mobile_u.imag * coupling, lanes_are_legs)
+            trunk.mass_pp = add(trunk.mass_pp, -leg.crank_mobility * coupling * coupling, lanes_are_legs)
+    trunk.rates.force = add(trunk.rates.force, ground_force, lanes_are_legs)
     if kind == FREE:
-        rest_force = mass * (plane(level(trunk, 0.0), trunk.settings.gravity) - centripetal)
+        rest_force = mass * (vector(full_like(trunk, 0.0), trunk.settings.gravity) - centripetal)
         by_frame = leg.ground_moment_beta - leg.rest_moment_beta
         trunk.load_moment = add(
             trunk.load_moment,
             by_frame + cross(hip, ground_force - rest_force - moment_acceleration) - coupling * free,
-            together,
+            lanes_are_legs,
         )
         off = hip + trunk.place - trunk.stage.centre
         trunk.rates.moment = add(
-            trunk.rates.moment, leg.ground_moment_beta + cross(off, ground_force), together
+            trunk.rates.moment, leg.ground_moment_beta + cross(off, ground_force), lanes_are_legs
         )
 
 
-@inlined
+@inline_llvm
 def accelerate_trunk(trunk, kind):  # type: ignore[no-untyped-def]
     """Solve the trunk's equations (E8) for its accelerations, by Cramer's rule."""
     load = trunk.rates.force + trunk.load
     xx, xy, yy = trunk.mass_xx, trunk.mass_xy, trunk.mass_yy
-    pitch_acc = level(trunk, 0.0)
+    pitch_acc = full_like(trunk, 0.0)
     if kind == RAIL:
-        acc = plane(load.real / xx, 0.0)
-        trunk.rates.force = plane(trunk.rates.force.real, 0.0)  # the rail takes the rest
+        acc = vector(load.real / xx, 0.0)
+        trunk.rates.force = vector(trunk.rates.force.real, 0.0)  # the rail takes the rest
     elif kind == SUSPENDED:
         per = 1.0 / (xx * yy - xy * xy)
-        acc = per * plane(yy * load.real - xy * load.imag, xx * load.imag - xy * load.real)
+        acc = per * vector(yy * load.real - xy * load.imag, xx * load.imag - xy * load.real)
     else:
         xp, yp, pp, turning = trunk.mass_xp, trunk.mass_yp, trunk.mass_pp, trunk.load_moment
         c_xx, c_xy, c_xp = yy * pp - yp * yp, xp * yp - xy * pp, xy * yp - yy * xp
         c_yy, c_yp, c_pp = xx * pp - xp * xp, xy * xp - xx * yp, xx * yy - xy * xy
         per = 1.0 / (xx * c_xx + xy * c_xy + xp * c_xp)
-        acc = per * plane(
+        acc = per * vector(
             c_xx * load.real + c_xy * load.imag + c_xp * turning,
             c_xy * load.real + c_yy * load.imag + c_yp * turning,
         )
@@ -357,7 +363,7 @@ def accelerate_trunk(trunk, kind):  # type: ignore[no-untyped-def]
     trunk.pitch_acceleration = pitch_acc
 
 
-@inlined
+@inline_llvm
 def accelerate_crank(trunk, leg, motors):  # type: ignore[no-untyped-def]
     """The crank's acceleration: a motor's gives way to the trunk's (E9)."""
     leg.theta_acceleration = leg.free_theta_acceleration

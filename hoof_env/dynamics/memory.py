@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.dynamics import layout
 from hoof_env.dynamics.advance import LANES, MODEL
-from hoof_env.dynamics.form import form_of
+from hoof_env.dynamics.form import engine_layout
 from hoof_env.dynamics.layout import (
-    FARTHEST,
+    MAX_STATE,
     Features,
     LegSettings,
     LegState,
@@ -33,8 +33,8 @@ from hoof_env.dynamics.parts import (
     TRUNKS,
     Limb,
     Limits,
+    Mechanics,
     Motor,
-    Scene,
     Trunk,
 )
 from hoof_env.dynamics.reactions import Reactions, leg_constants
@@ -82,7 +82,7 @@ def memory_of(
     data: Floats, num_envs: int, constants: Floats, reactions: Floats, features: Features
 ) -> Memory:
     """`Memory` with the parts of `data`, whose last columns may be idle; more axes may follow."""
-    form = form_of(features)
+    form = engine_layout(features)
     trunk = data[: form.trunk_rows, :num_envs]
     limbs = data[form.trunk_rows :].reshape(len(constants), form.leg_rows, *data.shape[1:])[:, :, :num_envs]
     t_parts = {name: trunk[form.trunk_memory.rows(name)] for name in form.trunk_memory.fields}
@@ -115,12 +115,12 @@ def copy_of(data: Floats) -> Floats:
     return copy
 
 
-def new_memory(scene: Scene, num_envs: int, columns: int, reacts: bool) -> Memory:
+def new_memory(scene: Mechanics, num_envs: int, columns: int, reacts: bool) -> Memory:
     """Memory of an engine whose environments are nowhere, that is not a number, until they are reset."""
     legs = len(scene.limbs)
     constants = np.array([leg_constants(limb.geometry) for limb in scene.limbs])
     reactions = np.zeros((legs, Reactions.size, columns if reacts else 0))
-    form = form_of(scene.features)
+    form = engine_layout(scene.features)
     data = copy_of(np.zeros((form.trunk_rows + legs * form.leg_rows, columns)))
     whole = memory_of(data, columns, constants, reactions, scene.features)
     whole.trunk[:], whole.limbs[:] = np.nan, np.nan
@@ -129,7 +129,9 @@ def new_memory(scene: Scene, num_envs: int, columns: int, reacts: bool) -> Memor
     return memory_of(data, num_envs, constants, reactions, scene.features)
 
 
-def new_model(scene: Scene, filters: FilterSettings, strides: bool) -> tuple[NDArray[Any], Floats, Floats]:
+def new_model(
+    scene: Mechanics, filters: FilterSettings, strides: bool
+) -> tuple[NDArray[Any], Floats, Floats]:
     """What does not change while it runs: a record `MODEL`, the legs' tables, the terrain's cells."""
     ground, terrain = scene.ground, scene.terrain
     cells = max(profile.cells for profile in scene.profiles)
@@ -154,7 +156,7 @@ def new_model(scene: Scene, filters: FilterSettings, strides: bool) -> tuple[NDA
     return model, np.concatenate(tables, out=whole), grid.cells
 
 
-def check_shared(scene: Scene, trunk: Trunk, ground: Ground, limbs: Sequence[Limb]) -> None:
+def check_shared(scene: Mechanics, trunk: Trunk, ground: Ground, limbs: Sequence[Limb]) -> None:
     """Raise where one environment's trunk, ground or legs differ in what the kernels take once for all."""
     for name, given, own in (
         ("trunk.kind", trunk.kind, scene.trunk.kind),
@@ -169,7 +171,7 @@ def check_shared(scene: Scene, trunk: Trunk, ground: Ground, limbs: Sequence[Lim
     for k, (limb, own_limb) in enumerate(zip(limbs, scene.limbs, strict=True)):
         if type(limb.drive) is not type(own_limb.drive):
             raise ParameterError(f"drive: expected a {type(own_limb.drive).__name__}, got {limb.drive!r}")
-        if scales_of(f"limbs[{k}]", limb, own_limb) != (1.0, 1.0) and not scene.features.animal:
+        if scales_of(f"limbs[{k}]", limb, own_limb) != (1.0, 1.0) and not scene.features.has_limits:
             raise ParameterError(
                 f"limbs[{k}].geometry: expected that of the engine, which was made without limits; with "
                 f"limits, if only Limits(), legs may have sizes of their own"
@@ -217,7 +219,9 @@ def scales_of(name: str, limb: Limb, own: Limb) -> tuple[float, float]:
     return length, mass
 
 
-def settings_of(scene: Scene, trunk: Trunk, ground: Ground, limbs: Sequence[Limb]) -> tuple[Floats, Floats]:
+def settings_of(
+    scene: Mechanics, trunk: Trunk, ground: Ground, limbs: Sequence[Limb]
+) -> tuple[Floats, Floats]:
     """Rows of `TrunkSettings` and of `LegSettings`, (legs, rows), of an environment under a trunk of the same
     kind, on a ground with the same laws."""
     mass = trunk.mass + sum(limb.geometry.mass for limb in limbs)
@@ -288,7 +292,7 @@ def which(envs: ArrayLike | None, num_envs: int) -> NDArray[np.int64]:
 def gaits_of(gaits: Any, legs: int, n: int, harmonics: int) -> Floats:
     """`gaits` of `TrunkEngine.reset` as numbers of shape (legs, 2 + 2 harmonics, n)."""
     if isinstance(gaits, np.ndarray):
-        given, size = finite("gaits", gaits, FARTHEST), 2 + 2 * harmonics
+        given, size = finite("gaits", gaits, MAX_STATE), 2 + 2 * harmonics
         if given.shape != (legs, size, n):
             raise ParameterError(f"gaits: expected shape {(legs, size, n)}, got {given.shape}")
         return given
@@ -299,7 +303,7 @@ def gaits_of(gaits: Any, legs: int, n: int, harmonics: int) -> Floats:
 
 
 def start(
-    scene: Scene,
+    scene: Mechanics,
     gaits: Floats,
     theta: ArrayLike,
     theta_rate: ArrayLike | None,
@@ -310,12 +314,12 @@ def start(
     bear nothing: of the trunk, shape (7, n), and legs, (legs, rows of a `LegState`, n).
 
     In the place of centre of mass, momentum and spin of all are the trunk's place, velocity and rate of
-    pitch: the kernels make the one of the other (`mechanics.settle`). `TrunkEngine.reset` says what `trunk`
-    holds and what is refused.
+    pitch: the kernels make the one of the other (`mechanics.velocities_to_momenta`). `TrunkEngine.reset` says
+    what `trunk` holds and what is refused.
     """
     legs, n = len(scene.limbs), len(heights)
-    angle = spread("theta", theta, (legs, n), FARTHEST)
-    spin = spread("theta_rate", gaits[:, 0] if theta_rate is None else theta_rate, (legs, n), FARTHEST)
+    angle = spread("theta", theta, (legs, n), MAX_STATE)
+    spin = spread("theta_rate", gaits[:, 0] if theta_rate is None else theta_rate, (legs, n), MAX_STATE)
     for i, limb in enumerate(scene.limbs):
         if not isinstance(limb.drive, Motor) and (spin[i] != gaits[i, 0]).any():
             raise ParameterError(
@@ -324,7 +328,7 @@ def start(
         turns = limb.geometry.full_turn  # then its links have a place everywhere
         if not turns and not np.isfinite(scene.profiles[i](angle[i])[0]).all():
             raise ParameterError(f"theta: the links of leg {i} have no place at some of {angle[i]} rad")
-    at = {name: spread(name, value, (n,), FARTHEST) for name, value in trunk.items()}
+    at = {name: spread(name, value, (n,), MAX_STATE) for name, value in trunk.items()}
     kind = TRUNKS.index(scene.trunk.kind)
     for name, kinds in (
         ("vx", (RAIL, SUSPENDED, FREE)), ("vy", (SUSPENDED, FREE)), ("pitch", (FREE,)),
@@ -398,16 +402,16 @@ def _check_numbers(title: str, arrays: Mapping[str, Floats]) -> NDArray[np.bool_
     places = trunk[_PLACES], limbs[:, _ANGLES]
     squares = sum(float(np.vdot(part, part)) for part in arrays.values())
     farthest = max(float(np.vdot(part, part)) for part in places)
-    if not (math.isfinite(squares) and farthest <= FARTHEST**2):  # else all is good, found in no time
+    if not (math.isfinite(squares) and farthest <= MAX_STATE**2):  # else all is good, found in no time
         reset = np.logical_not(np.isnan(trunk).all(0) & np.isnan(limbs).all((0, 1)))
         for name in STATE:
             finite(f"{title}[{name!r}]", arrays[name][..., reset])
-        finite(f"{title}['trunk'], places and pitch", places[0][:, reset], FARTHEST)
-        finite(f"{title}['limbs'], crank angles", places[1][..., reset], FARTHEST)
+        finite(f"{title}['trunk'], places and pitch", places[0][:, reset], MAX_STATE)
+        finite(f"{title}['limbs'], crank angles", places[1][..., reset], MAX_STATE)
     return reset
 
 
-def identity_of(scene: Scene, filters: FilterSettings, **numbers: float) -> dict[str, Any]:
+def identity_of(scene: Mechanics, filters: FilterSettings, **numbers: float) -> dict[str, Any]:
     """Everything on which the bits of a run depend, by name, as values that JSON can hold."""
     identity: dict[str, Any] = {**numbers, "integrator": scene.integrator}
     for name, part in (("trunk", scene.trunk), ("ground", scene.ground), ("filters", filters)):

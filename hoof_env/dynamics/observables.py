@@ -22,25 +22,25 @@ from numpy.typing import ArrayLike
 
 from hoof_env.dynamics.mechanics import add
 from hoof_env.errors import Floats
-from hoof_env.simd import across, choose, dot, larger, nth, root, size, smaller
-from hoof_env.simd.compile import inlined
+from hoof_env.simd import absolute, block_at, dot, maximum, minimum, perpendicular, sqrt, where
+from hoof_env.simd.compile import inline_llvm
 
 REVOLUTION = 2 * math.pi
 
 
-@inlined
+@inline_llvm
 def find_drives(trunk, leg):  # type: ignore[no-untyped-def]
     """Torques and powers of crank and swing from the accelerations (E2 to E4 in docs/engine.md)."""
     w, acc, k, sway = leg.theta_rate, leg.theta_acceleration, leg.beta_by_theta, leg.swing_rate
     frame, pitch_acc = leg.frame_inertia, trunk.pitch_acceleration
     coupling = leg.crank_coupling - k * frame
     turning = pitch_acc + k * acc
-    lift = trunk.acceleration + pitch_acc * across(leg.hip)
+    lift = trunk.acceleration + pitch_acc * perpendicular(leg.hip)
     by_frame = (
         coupling * acc
         + frame * turning
         + leg.rest_moment_beta
-        + dot(lift, across(leg.first_moment))
+        + dot(lift, perpendicular(leg.first_moment))
         - leg.ground_moment_beta
     )
     needed = (
@@ -51,21 +51,21 @@ def find_drives(trunk, leg):  # type: ignore[no-untyped-def]
         - leg.ground_moment_theta
     )
     is_motor = leg.settings.is_motor > 0.0
-    torque = choose(is_motor, leg.crank_torque, needed)
+    torque = where(is_motor, leg.crank_torque, needed)
     leg.frame_torque, leg.crank_torque, leg.crank_power = by_frame, torque, torque * w
-    leg.swing_power = by_frame * choose(is_motor, sway, k * w + sway)
+    leg.swing_power = by_frame * where(is_motor, sway, k * w + sway)
 
 
-@inlined
+@inline_llvm
 def keep_account(trunk, legs, leg_count, model, account, weight):  # type: ignore[no-untyped-def]
     """Add the present stage's powers and forces, times `weight` [s], to an `Account`."""
-    velocity, together = trunk.velocity, model.together
+    velocity, lanes_are_legs = trunk.velocity, model.lanes_are_legs
     drag = trunk.settings.drag * (velocity.real * velocity.real)
     damper = trunk.settings.damper * (velocity.imag * velocity.imag)
     account.drag_loss = account.drag_loss + weight * drag
     account.damper_loss = account.damper_loss + weight * damper
     for i in range(leg_count):
-        leg = nth(legs, i)
+        leg = block_at(legs, i)
         find_drives(trunk, leg)
         toe, heel = leg.toe.penetration_rate, leg.heel.penetration_rate
         stored = leg.toe.spring_force * toe + leg.heel.spring_force * heel
@@ -73,31 +73,32 @@ def keep_account(trunk, legs, leg_count, model, account, weight):  # type: ignor
         rubbed = (
             leg.toe.friction_force * leg.toe.sliding_speed + leg.heel.friction_force * leg.heel.sliding_speed
         )
-        account.crank_work = add(account.crank_work, weight * leg.crank_power, together)
-        account.swing_work = add(account.swing_work, weight * leg.swing_power, together)
-        account.ground_stored = add(account.ground_stored, weight * stored, together)
-        account.ground_loss = add(account.ground_loss, weight * spent, together)
-        account.friction_loss = add(account.friction_loss, -weight * rubbed, together)
-        account.impulse = add(account.impulse, weight * leg.ground_force, together)
+        account.crank_work = add(account.crank_work, weight * leg.crank_power, lanes_are_legs)
+        account.swing_work = add(account.swing_work, weight * leg.swing_power, lanes_are_legs)
+        account.ground_stored = add(account.ground_stored, weight * stored, lanes_are_legs)
+        account.ground_loss = add(account.ground_loss, weight * spent, lanes_are_legs)
+        account.friction_loss = add(account.friction_loss, -weight * rubbed, lanes_are_legs)
+        account.impulse = add(account.impulse, weight * leg.ground_force, lanes_are_legs)
         if model.form.springs:
             bent, lost = 0.0 * stored, 0.0 * stored
             for k in range(model.form.springs):
                 stiffness, damping = leg.settings.hoof_stiffness[k], leg.settings.hoof_damping[k]
-                toe, heel = leg.toe.give_rate[k], leg.heel.give_rate[k]
-                bent = bent + stiffness * (leg.toe.give[k] * toe + leg.heel.give[k] * heel)
+                toe, heel = leg.toe.deflection_rate[k], leg.heel.deflection_rate[k]
+                bent = bent + stiffness * (leg.toe.deflection[k] * toe + leg.heel.deflection[k] * heel)
                 lost = lost + damping * (toe * toe + heel * heel)
-            account.hoof[0] = add(account.hoof[0], weight * bent, together)  # once a leg: one order of legs
-            account.hoof[1] = add(account.hoof[1], weight * lost, together)
+            # once a leg, so that legs are added in one order
+            account.hoof[0] = add(account.hoof[0], weight * bent, lanes_are_legs)
+            account.hoof[1] = add(account.hoof[1], weight * lost, lanes_are_legs)
 
 
-@inlined
+@inline_llvm
 def report_trunk(trunk, report):  # type: ignore[no-untyped-def]
     """Fill a `TrunkReport`."""
     report.place, report.velocity, report.acceleration = trunk.place, trunk.velocity, trunk.acceleration
     report.pitch_rate, report.pitch_acceleration = trunk.rates.pitch_rate, trunk.pitch_acceleration
 
 
-@inlined
+@inline_llvm
 def report_leg(trunk, leg, report):  # type: ignore[no-untyped-def]
     """Fill a `LegReport`."""
     find_drives(trunk, leg)
@@ -113,53 +114,53 @@ def report_leg(trunk, leg, report):  # type: ignore[no-untyped-def]
     report_point(leg.heel, hip + leg.turn * leg.functions.heel, report.heel)
 
 
-@inlined
+@inline_llvm
 def report_point(point, place, report):  # type: ignore[no-untyped-def]
     """Fill a `PointReport`."""
     report.x, report.y, report.slide = place.real, place.imag, point.sliding_speed
     report.normal, report.friction = point.normal_force, point.friction_force
 
 
-@inlined
+@inline_llvm
 def count_stride(trunk, leg, form, h):  # type: ignore[no-untyped-def]
     """Add a whole step of `h` [s] that ends here."""
     find_drives(trunk, leg)
     push, load = leg.ground_force, leg.toe.normal_force + leg.heel.normal_force
-    force, loaded = root(dot(push, push)), load > leg.settings.lift_off
+    force, loaded = sqrt(dot(push, push)), load > leg.settings.lift_off
     was_open = (leg.strides.stance_open > 0.0) & (leg.state.theta - leg.strides.stance_began < REVOLUTION)
     goes_on = loaded & was_open
-    begins = choose(loaded, 1.0, 0.0) - choose(goes_on, 1.0, 0.0)
-    peak = choose(goes_on, leg.strides.stance_peak, 0.0)
-    higher = choose(loaded, larger(peak, force), 0.0)
-    leg.strides.stance_open = choose(loaded, 1.0, 0.0)
-    leg.strides.stance_began = choose(begins > 0.0, leg.state.theta, leg.strides.stance_began)
+    begins = where(loaded, 1.0, 0.0) - where(goes_on, 1.0, 0.0)
+    peak = where(goes_on, leg.strides.stance_peak, 0.0)
+    higher = where(loaded, maximum(peak, force), 0.0)
+    leg.strides.stance_open = where(loaded, 1.0, 0.0)
+    leg.strides.stance_began = where(begins > 0.0, leg.state.theta, leg.strides.stance_began)
     leg.strides.stance_peak = higher
-    rise = choose(higher > peak, (load - leg.strides.load) * (1.0 / h), 0.0)
-    steepest = choose(goes_on, leg.strides.steepest_rise, 0.0)
-    steeper = choose(loaded, larger(steepest, rise), 0.0)
+    rise = where(higher > peak, (load - leg.strides.load) * (1.0 / h), 0.0)
+    steepest = where(goes_on, leg.strides.steepest_rise, 0.0)
+    steeper = where(loaded, maximum(steepest, rise), 0.0)
     leg.strides.steepest_rise, leg.strides.load = steeper, load
     leg.sums.loading_rate_increase = leg.sums.loading_rate_increase + (steeper - steepest)
     leg.sums.stances = leg.sums.stances + begins
     leg.sums.peak_grf_increase = leg.sums.peak_grf_increase + (higher - peak)
-    running = smaller(leg.strides.running_peak, 2.0 * force)
-    leg.strides.running_peak = larger(running, force)
-    leg.sums.running_peak_increase = leg.sums.running_peak_increase + larger(force - running, 0.0)
-    leg.sums.highest_grf = larger(leg.sums.highest_grf, force)
-    work = larger(leg.crank_power, 0.0) + larger(leg.swing_power, 0.0)
+    running = minimum(leg.strides.running_peak, 2.0 * force)
+    leg.strides.running_peak = maximum(running, force)
+    leg.sums.running_peak_increase = leg.sums.running_peak_increase + maximum(force - running, 0.0)
+    leg.sums.highest_grf = maximum(leg.sums.highest_grf, force)
+    work = maximum(leg.crank_power, 0.0) + maximum(leg.swing_power, 0.0)
     leg.sums.positive_work = leg.sums.positive_work + h * work
     leg.sums.normal_impulse = leg.sums.normal_impulse + h * load
     down = load > 0.0
-    leg.sums.loaded_time = leg.sums.loaded_time + choose(down, h, 0.0)
-    per_load = h / choose(down, load, 1.0)
+    leg.sums.loaded_time = leg.sums.loaded_time + where(down, h, 0.0)
+    per_load = h / where(down, load, 1.0)
     slid = leg.toe.normal_force * leg.toe.sliding_speed + leg.heel.normal_force * leg.heel.sliding_speed
-    leg.sums.travel = leg.sums.travel - choose(down, slid * per_load, 0.0)
-    rubbed = leg.toe.normal_force * size(leg.toe.sliding_speed)
-    rubbed = rubbed + leg.heel.normal_force * size(leg.heel.sliding_speed)
+    leg.sums.travel = leg.sums.travel - where(down, slid * per_load, 0.0)
+    rubbed = leg.toe.normal_force * absolute(leg.toe.sliding_speed)
+    rubbed = rubbed + leg.heel.normal_force * absolute(leg.heel.sliding_speed)
     # in stance alone: a sole without mass flies back as it is unloaded, which is no slip of the hoof
-    leg.sums.slip = leg.sums.slip + choose(loaded, rubbed * per_load, 0.0)
-    if form.animal:
-        leg.sums.braking[0] = leg.sums.braking[0] + h * larger(-push.real, 0.0)
-        leg.sums.propulsion[0] = leg.sums.propulsion[0] + h * larger(push.real, 0.0)
+    leg.sums.slip = leg.sums.slip + where(loaded, rubbed * per_load, 0.0)
+    if form.has_limits:
+        leg.sums.braking[0] = leg.sums.braking[0] + h * maximum(-push.real, 0.0)
+        leg.sums.propulsion[0] = leg.sums.propulsion[0] + h * maximum(push.real, 0.0)
 
 
 @dataclass
@@ -209,8 +210,8 @@ def stance_figures(sums: Mapping[str, Floats], seconds: ArrayLike, turns: ArrayL
     with np.errstate(divide="ignore", invalid="ignore"):
         stances, loaded = sums["stances"] / (sums["stances"] > 0), sums["loaded_time"]
         found = {
-            "peak": sums["peak_increase"] / stances,
-            "mean": sums["load_impulse"] / loaded,
+            "peak": sums["peak_grf_increase"] / stances,
+            "mean": sums["normal_impulse"] / loaded,
             "duty": loaded / np.asarray(seconds),
             "stances_per_turn": sums["stances"] / np.asarray(turns),
             "slip": sums["slip"] / stances,

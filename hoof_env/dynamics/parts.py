@@ -196,7 +196,7 @@ class Limits:
             raise ParameterError(f"limits.clearance: expected a number, got {least!r}")
 
 
-FARTHEST = 1e3
+MAX_HIP_OFFSET = 1e3
 """Of O from the trunk's centre of mass [m]."""
 
 
@@ -211,7 +211,7 @@ class Limb:
         spring: of the hoof; None is a rigid one.
 
     Raises:
-        ParameterError: a part is of the wrong type, not finite, or the hip beyond `FARTHEST`.
+        ParameterError: a part is of the wrong type, not finite, or the hip beyond `MAX_HIP_OFFSET`.
     """
 
     geometry: Geometry
@@ -233,12 +233,12 @@ class Limb:
                 f"limb.hip: expected two numbers (x, y) in metres, got {self.hip!r}"
             ) from None
         for k, value in enumerate((x, y)):
-            check_number(f"limb.hip[{k}]", value, low=-FARTHEST, high=FARTHEST)
+            check_number(f"limb.hip[{k}]", value, low=-MAX_HIP_OFFSET, high=MAX_HIP_OFFSET)
         object.__setattr__(self, "hip", (float(x), float(y)))
 
 
 @dataclass(eq=False, repr=False)
-class Scene:
+class Mechanics:
     """Legs on a trunk over the ground, and the scheme that moves them."""
 
     limbs: Sequence[Limb]

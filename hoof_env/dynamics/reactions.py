@@ -22,8 +22,8 @@ from hoof_env.dynamics.hoof import force_of
 from hoof_env.leg.geometry import Geometry
 from hoof_env.leg.linkage import CONSTRUCTION, JOINTS, NUMBER, Dyad
 from hoof_env.leg.profile import places
-from hoof_env.simd import across, choose, cross, dot, level, plane, root, store_vectors
-from hoof_env.simd.compile import inlined
+from hoof_env.simd import cross, dot, full_like, perpendicular, sqrt, store_vectors, vector, where
+from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.layout import Block, Layout, Row, Vector
 
 
@@ -146,13 +146,13 @@ class Hinge(NamedTuple):
     inverse: Any
 
 
-@inlined
+@inline_llvm
 def turning(p, rate, acc, lift):  # type: ignore[no-untyped-def]
     """A point at p of a body that turns about O."""
-    return Point(p, plane(-rate * p.imag, rate * p.real), plane(-rate * rate, acc) * p + lift)
+    return Point(p, vector(-rate * p.imag, rate * p.real), vector(-rate * rate, acc) * p + lift)
 
 
-@inlined
+@inline_llvm
 def swing(hinge, first, second):  # type: ignore[no-untyped-def]
     """Motion of a hinge from that of the far ends of its links, by the links' rates and accelerations."""
     one, two, inverse = hinge
@@ -162,25 +162,25 @@ def swing(hinge, first, second):  # type: ignore[no-untyped-def]
     acc = inverse * (
         dot(two, second.a - first.a) + rate2 * dot(one, two) - rate_two * rate_two * dot(two, two)
     )
-    v = plane(-rate * one.imag, rate * one.real)
-    return Point(first.at + one, first.v + v, first.a + plane(-rate2, acc) * one)
+    v = vector(-rate * one.imag, rate * one.real)
+    return Point(first.at + one, first.v + v, first.a + vector(-rate2, acc) * one)
 
 
-@inlined
+@inline_llvm
 def hinge_point(dyad, first, second):  # type: ignore[no-untyped-def]
     """The hinge of two links of given lengths whose far ends are `first` and `second`."""
     span = second.at - first.at
     d2 = dot(span, span)
     k = 0.5 * d2 + dyad.half
-    area = dyad.side * root(dyad.one2 * d2 - k * k)  # cross(one, two)
+    area = dyad.side * sqrt(dyad.one2 * d2 - k * k)  # cross(one, two)
     inverse = 1.0 / (d2 * area)
     over_d2 = area * inverse
-    one = span * plane(k * over_d2, area * over_d2)
+    one = span * vector(k * over_d2, area * over_d2)
     hinge = Hinge(one, one - span, d2 * inverse)
     return hinge, swing(hinge, first, second)
 
 
-@inlined
+@inline_llvm
 def triangle_point(dyad, first, second):  # type: ignore[no-untyped-def]
     """The same where `first` and `second` are the ends of a third link."""
     place = dyad.place
@@ -192,8 +192,8 @@ def triangle_point(dyad, first, second):  # type: ignore[no-untyped-def]
     )
 
 
-@inlined
-def beyond(first, second, origin, ratio):  # type: ignore[no-untyped-def]
+@inline_llvm
+def extended_point(first, second, origin, ratio):  # type: ignore[no-untyped-def]
     """The point at origin + ratio (second - first) of a link."""
     return Point(
         origin.at + ratio * (second.at - first.at),
@@ -202,14 +202,14 @@ def beyond(first, second, origin, ratio):  # type: ignore[no-untyped-def]
     )
 
 
-@inlined
+@inline_llvm
 def link_loads(link, tail, head):  # type: ignore[no-untyped-def]
     """Forces at tail and head that move a link as it moves, against its weight."""
     near, far = link.near, link.far
     return near * tail.a + far * head.a, near * head.a + far * tail.a
 
 
-@inlined
+@inline_llvm
 def hinge_force(hinge, by_one, by_two):  # type: ignore[no-untyped-def]
     """The force that turns link one about its far end like `by_one`, and link two like `by_two`."""
     one, two, inverse = hinge
@@ -219,7 +219,7 @@ def hinge_force(hinge, by_one, by_two):  # type: ignore[no-untyped-def]
 # -- one leg -----------------------------------------------------------------------------------
 
 
-@inlined
+@inline_llvm
 def leg_reactions(  # type: ignore[no-untyped-def]
     g, crank_turn, theta_rate, theta_acc, frame_turn, beta_rate, beta_acc, lift, toe_force, heel_force
 ):
@@ -230,8 +230,8 @@ def leg_reactions(  # type: ignore[no-untyped-def]
     """
     # The crank turns clockwise before the mirror.
     travel = g.travel
-    arm = g.crank * plane(travel * crank_turn.real, -crank_turn.imag)
-    still = plane(level(g, 0.0), 0.0)
+    arm = g.crank * vector(travel * crank_turn.real, -crank_turn.imag)
+    still = vector(full_like(g, 0.0), 0.0)
     O = Point(still, still, lift)  # noqa: E741
     C = turning(g.pivot * frame_turn, beta_rate, beta_acc, lift)
     P = turning(arm * frame_turn, beta_rate - travel * theta_rate, beta_acc - travel * theta_acc, lift)
@@ -241,8 +241,8 @@ def leg_reactions(  # type: ignore[no-untyped-def]
     hinge_d, D = triangle_point(g.D, C, B)
     hinge_f, F = hinge_point(g.F, C, P)
     hinge_e, E = hinge_point(g.E, D, F)
-    G = beyond(E, F, F, g.shank)
-    A = beyond(C, F, C, g.rocker)
+    G = extended_point(E, F, F, g.shank)
+    A = extended_point(C, F, C, g.rocker)
     hinge_j, J = hinge_point(g.J, G, A)
     hinge_i, I = triangle_point(g.I, G, J)  # noqa: E741
 
@@ -252,8 +252,8 @@ def leg_reactions(  # type: ignore[no-untyped-def]
     ig_i, ig_g = link_loads(g.GI, I, G)
     ij_i, ij_j = link_loads(g.IJ, I, J)
     toe_at_i = g.toe_is_i > 0.5
-    ij_i = ij_i - choose(toe_at_i, toe_force, heel_force)
-    ij_j = ij_j - choose(toe_at_i, heel_force, toe_force)
+    ij_i = ij_i - where(toe_at_i, toe_force, heel_force)
+    ij_j = ij_j - where(toe_at_i, heel_force, toe_force)
     ij_ig = hinge_force(hinge_i, -ig_i, ij_i)
     ij_ja = ij_i + ij_j - ij_ig
     ig_gf = ig_i + ig_g + ij_ig
@@ -302,15 +302,15 @@ def leg_reactions(  # type: ignore[no-untyped-def]
     return joints, lock, driver, hip
 
 
-@inlined
+@inline_llvm
 def react(trunk, leg, constants, reactions):  # type: ignore[no-untyped-def]
     """Keep the `Reactions` of one leg with these `LegConstants`."""
     hip, pitch_rate, pitch_acc = leg.hip, trunk.rates.pitch_rate, trunk.pitch_acceleration
-    weight = plane(level(trunk, 0.0), trunk.settings.gravity)
-    lift = trunk.acceleration + weight + pitch_acc * across(hip) - pitch_rate * pitch_rate * hip
+    weight = vector(full_like(trunk, 0.0), trunk.settings.gravity)
+    lift = trunk.acceleration + weight + pitch_acc * perpendicular(hip) - pitch_rate * pitch_rate * hip
     joints, lock, driver, by_trunk = leg_reactions(
         constants,
-        plane(leg.cosine, leg.sine), leg.theta_rate, leg.theta_acceleration,
+        vector(leg.cosine, leg.sine), leg.theta_rate, leg.theta_acceleration,
         leg.turn, leg.beta_rate,
         pitch_acc + leg.beta_by_theta * leg.theta_acceleration + leg.swing_acceleration,
         lift, force_of(leg.toe), force_of(leg.heel),

@@ -20,7 +20,7 @@ from functools import cached_property
 
 import numpy as np
 
-from hoof_env.dynamics.parts import GRAVITY, HoofSpring, Limb, Motor, Scene
+from hoof_env.dynamics.parts import GRAVITY, HoofSpring, Limb, Mechanics, Motor
 from hoof_env.errors import Floats, ParameterError
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.stiffness import LARGEST_ANGLE, SCHEMES, ContactRates, contact_rates, spring_rates
@@ -61,7 +61,7 @@ class StepWarning(UserWarning):
     """The time step is too long for the ground, the motors or what holds the trunk."""
 
 
-class StepLength(Scene):
+class StepLength(Mechanics):
     """What decides on the step."""
 
     @cached_property

@@ -17,12 +17,12 @@ from hoof_env.dynamics.hoof import begin_springs, clear_springs, end_springs, mo
 from hoof_env.dynamics.mechanics import MOVING
 from hoof_env.dynamics.parts import FIXED, FREE
 from hoof_env.gait import INNER, SPEED
-from hoof_env.simd import choose, nth
-from hoof_env.simd.compile import inlined
+from hoof_env.simd import block_at, where
+from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.math import clip
 
 
-@inlined
+@inline_llvm
 def filter_accelerations(leg, count, settings):  # type: ignore[no-untyped-def]
     """Accelerations of the command filters: bounded, towards a bounded rate, towards the command."""
     for k in range(count):
@@ -31,8 +31,8 @@ def filter_accelerations(leg, count, settings):  # type: ignore[no-untyped-def]
         leg.gait_acceleration[k] = clip(INNER * gain * (wanted - leg.state.gait_rate[k]), acc_bound)
 
 
-@inlined
-def go_on(kind, to, start, factor, slope):  # type: ignore[no-untyped-def]
+@inline_llvm
+def advance_rows(kind, to, start, factor, slope):  # type: ignore[no-untyped-def]
     """to = start + factor slope for all rows that move; two are of the pitch."""
     for k in range(MOVING - 2):
         to[k] = start[k] + factor * slope[k]
@@ -41,7 +41,7 @@ def go_on(kind, to, start, factor, slope):  # type: ignore[no-untyped-def]
             to[k] = start[k] + factor * slope[k]
 
 
-@inlined
+@inline_llvm
 def begin_step(trunk, legs, leg_count, model):  # type: ignore[no-untyped-def]
     """The first stage is at the state itself."""
     if model.kind != FIXED:
@@ -51,7 +51,7 @@ def begin_step(trunk, legs, leg_count, model):  # type: ignore[no-untyped-def]
             for k in range(MOVING):
                 trunk.mean_rates[k] = 0.0
     for i in range(leg_count):
-        leg = nth(legs, i)
+        leg = block_at(legs, i)
         filter_accelerations(leg, model.form.gait, model.settings)
         leg.theta, leg.theta_rate = leg.state.theta, leg.state.theta_rate
         begin_springs(leg, model.form.springs)
@@ -60,22 +60,22 @@ def begin_step(trunk, legs, leg_count, model):  # type: ignore[no-untyped-def]
             clear_springs(leg, model.form.springs)
 
 
-@inlined
+@inline_llvm
 def weigh_stage(trunk, legs, leg_count, model, weight):  # type: ignore[no-untyped-def]
     """Add the derivatives at the present stage to their means; where the last stage's are those of the step
     there is nothing to do."""
     if not model.averages or weight == 0.0:
         return
     if model.kind != FIXED:
-        go_on(model.kind, trunk.mean_rates, trunk.mean_rates, weight, trunk.rates)
+        advance_rows(model.kind, trunk.mean_rates, trunk.mean_rates, weight, trunk.rates)
     for i in range(leg_count):
-        leg = nth(legs, i)
+        leg = block_at(legs, i)
         leg.mean_theta_rate = leg.mean_theta_rate + weight * leg.theta_rate
         leg.mean_theta_acceleration = leg.mean_theta_acceleration + weight * leg.theta_acceleration
         weigh_springs(leg, model.form.springs, weight)
 
 
-@inlined
+@inline_llvm
 def prescribed(leg, elapsed):  # type: ignore[no-untyped-def]
     """Angle and rate of a prescribed crank `elapsed` [s] into the step, exactly as the filter moves them."""
     value, rate, bend = leg.state.gait[SPEED], leg.state.gait_rate[SPEED], leg.gait_acceleration[SPEED]
@@ -83,21 +83,21 @@ def prescribed(leg, elapsed):  # type: ignore[no-untyped-def]
     return theta, value + elapsed * (rate + 0.5 * elapsed * bend)
 
 
-@inlined
+@inline_llvm
 def next_stage(trunk, legs, leg_count, model, elapsed):  # type: ignore[no-untyped-def]
     """Go `elapsed` [s] from the step's start with the derivatives of the present stage."""
     if model.kind != FIXED:
-        go_on(model.kind, trunk.stage, trunk.state.moving, elapsed, trunk.rates)
+        advance_rows(model.kind, trunk.stage, trunk.state.moving, elapsed, trunk.rates)
     for i in range(leg_count):
-        leg = nth(legs, i)
+        leg = block_at(legs, i)
         is_motor = leg.settings.is_motor > 0.0
         angle, spin = prescribed(leg, elapsed)
-        leg.theta = choose(is_motor, leg.state.theta + elapsed * leg.theta_rate, angle)
-        leg.theta_rate = choose(is_motor, leg.state.theta_rate + elapsed * leg.theta_acceleration, spin)
+        leg.theta = where(is_motor, leg.state.theta + elapsed * leg.theta_rate, angle)
+        leg.theta_rate = where(is_motor, leg.state.theta_rate + elapsed * leg.theta_acceleration, spin)
         move_springs(leg, model.form.springs, elapsed)
 
 
-@inlined
+@inline_llvm
 def use_new_rates(trunk, h):  # type: ignore[no-untyped-def]
     """Semi-implicit Euler: centre and pitch go with the velocities that the step ends with."""
     rates = trunk.rates
@@ -105,17 +105,17 @@ def use_new_rates(trunk, h):  # type: ignore[no-untyped-def]
     rates.pitch_rate = rates.pitch_rate + h * trunk.pitch_acceleration
 
 
-@inlined
+@inline_llvm
 def end_step(trunk, legs, leg_count, model, h):  # type: ignore[no-untyped-def]
     """The state a step later; the filters advance exactly."""
     if model.kind != FIXED:
         if model.new_rates:
             use_new_rates(trunk, h)
         rates = trunk.mean_rates if model.averages else trunk.rates
-        go_on(model.kind, trunk.state.moving, trunk.state.moving, h, rates)
+        advance_rows(model.kind, trunk.state.moving, trunk.state.moving, h, rates)
     trunk.state.time = trunk.state.time + h
     for i in range(leg_count):
-        leg = nth(legs, i)
+        leg = block_at(legs, i)
         is_motor = leg.settings.is_motor > 0.0
         angle, spin = prescribed(leg, h)
         rate, acceleration = leg.theta_rate, leg.theta_acceleration
@@ -124,8 +124,8 @@ def end_step(trunk, legs, leg_count, model, h):  # type: ignore[no-untyped-def]
         omega = leg.state.theta_rate + h * acceleration
         if model.new_rates:
             rate = omega
-        leg.state.theta = choose(is_motor, leg.state.theta + h * rate, angle)
-        leg.state.theta_rate = choose(is_motor, omega, spin)
+        leg.state.theta = where(is_motor, leg.state.theta + h * rate, angle)
+        leg.state.theta_rate = where(is_motor, omega, spin)
         end_springs(leg, model.form.springs, model.averages, h)
         for k in range(model.form.gait):
             rate, bend = leg.state.gait_rate[k], leg.gait_acceleration[k]

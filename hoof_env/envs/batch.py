@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from hoof_env.dynamics.advance import LANES
 from hoof_env.dynamics.constrained import INTEGRATORS
 from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.dynamics.form import form_of
+from hoof_env.dynamics.form import engine_layout
 from hoof_env.dynamics.parts import GRAVITY, LARGEST, Result, broken
 from hoof_env.dynamics.step_length import StepLength
 from hoof_env.dynamics.stepping import SCHEMES
@@ -33,17 +33,17 @@ from hoof_env.envs.conditions import (
 )
 from hoof_env.envs.episode import ACTIONS, FAILED, SUMS, episode_layout, task_type
 from hoof_env.envs.horse import Horse
-from hoof_env.envs.infos import Measurements, named
+from hoof_env.envs.infos import InfoLayout, name_columns
 from hoof_env.envs.observation import MIDDLE, check_groups, groups_of, observed
 from hoof_env.envs.one_leg import OneLeg
 from hoof_env.envs.paper_solver import PaperSolver, check_paper
 from hoof_env.envs.parameters import (
     check_drift,
     check_parameters,
+    check_range,
     draw_parameters,
     extremes,
     make_terrain,
-    pair,
     resolved,
     substeps_of,
 )
@@ -79,7 +79,7 @@ class EpisodeBatch:
             (columns,).
         body: the leg, or the horse, that they are about.
         measurements: what infos measure.
-        begun: what they started with: the body's `start_names`, the gait and what `randomize` drew, a column
+        start_values: the body's `start_names`, the gait and what `randomize` drew for them, a column
             an environment; not a number where a state does not say.
 
     Raises:
@@ -101,7 +101,7 @@ class EpisodeBatch:
         for name in ("motor_gain", "motor_torque", "motor_inertia"):
             check_number(name, getattr(s, name), low=0.0, high=LARGEST)
         self.randomize = {} if s.randomize is None else check_parameters("randomize", s.randomize, s)
-        self._terrain, self._found_good = make_terrain(s.terrain), ""
+        self._terrain, self._validated = make_terrain(s.terrain), ""
         if is_paper:
             check_paper(s)
         self.body = Horse(s) if task.is_horse else OneLeg(s)
@@ -118,7 +118,9 @@ class EpisodeBatch:
         self.groups = check_groups(s.observation, groups_of(task.entries))
         self.target_speed = self.body.commanded_speeds(s)
         self.speed_changes = self.target_speed is not None and self.target_speed[0] < self.target_speed[1]
-        self.target_seconds = pair("target_seconds", s.target_seconds, self.dt if self.speed_changes else 0.0)
+        self.target_seconds = check_range(
+            "target_seconds", s.target_seconds, self.dt if self.speed_changes else 0.0
+        )
         for group, needed in (("target", "target_speed"), ("ground", "terrain")):
             given = getattr(s, needed)
             if group in self.groups and given in (None, {}):
@@ -137,8 +139,8 @@ class EpisodeBatch:
             limits=self.body.limits,
         )  # fmt: skip
         self.paper = PaperSolver(s, self.engine, self.substeps) if is_paper else None
-        self._varied = np.zeros(num_envs, bool)
-        self.begun = np.full((self.begun_rows + len(self.randomize), num_envs), np.nan)
+        self._has_overrides = np.zeros(num_envs, bool)
+        self.start_values = np.full((self.start_row_count + len(self.randomize), num_envs), np.nan)
         self.names = [entry.name for entry in observed(self.groups, s.trunk, s.drive, task.entries)]
         if not self.names:
             raise ParameterError(f"observation: nothing of {s.observation!r} is observed on a fixed trunk")
@@ -149,7 +151,8 @@ class EpisodeBatch:
         self.rewards = np.zeros(columns)
         self._task = self._task_record()
         self._open()
-        self.now.weight[:], self.now.switch[:] = self.engine.weight, np.inf  # idle columns never switch
+        self.episode_rows.weight[:] = self.engine.weight
+        self.episode_rows.switch[:] = np.inf  # idle columns never switch
         if not runs:
             return
         try:
@@ -171,10 +174,11 @@ class EpisodeBatch:
         task["h"], task["substeps"] = self.engine.substep, self.substeps * self.engine.substeps
         task["dt"], task["episode_steps"] = self.dt, self.steps_per_episode
         task["stays"] = self.settings.trunk == "fixed"
-        task["count"], task["places"] = len(self.names), -1
+        task["observation_size"] = len(self.names)
+        task["observation_columns"] = -1
         for entry, slot in zip(self.task.entries, slots, strict=True):
             if entry.name in self.names:
-                task["places"][slot] = self.names.index(entry.name)
+                task["observation_columns"][slot] = self.names.index(entry.name)
         return constants
 
     @property
@@ -182,7 +186,7 @@ class EpisodeBatch:
         return episode_layout(len(self.task.terms), self.body.legs)
 
     @property
-    def begun_rows(self) -> int:
+    def start_row_count(self) -> int:
         """How many numbers an episode starts with, besides those drawn."""
         return len(self.body.start_names) + len(self.body.gait_names)
 
@@ -190,13 +194,13 @@ class EpisodeBatch:
         """Find the kernels, and the arrays where they are now."""
         s = self.settings
         self.entries = observed(self.groups, s.trunk, s.drive, self.task.entries)
-        self.measurements = Measurements(self.engine.features, self.body.legs)
+        self.measurements = InfoLayout(self.engine.features, self.body.legs)
         self._kernels = k = kernels.step_kernels(
             self.task.terms, self.task.entries, self.task.contact_law, self.engine.features, self.body.legs
         )
-        is_few = self.engine.is_few or self.paper
+        runs_scalar = self.engine.runs_scalar or self.paper
         self.kernel, self._observe = (
-            (k.step_one, k.observe_one) if is_few else (k.step_batch, k.observe_batch)
+            (k.step_one, k.observe_one) if runs_scalar else (k.step_batch, k.observe_batch)
         )
         if self.paper:
             self.kernel = self._step_paper
@@ -204,7 +208,7 @@ class EpisodeBatch:
 
     def find(self) -> None:
         """Find the arrays where they are now."""
-        self.now = views(self._episode_layout, self.episode)
+        self.episode_rows = views(self._episode_layout, self.episode)
         arrays = (
             *self.engine.arrays, self.episode, self._task, self.actions, self.observations, self.rewards
         )  # fmt: skip
@@ -276,16 +280,16 @@ class EpisodeBatch:
     def _adopt(self) -> None:
         """Work under the conditions that `change` asked for."""
         assert self._next is not None
-        old, begun = [*self.randomize], self.begun
+        old, begun = [*self.randomize], self.start_values
         self.conditions.add(conditions_of(self), conditions_of(self._next))
         enter(self, self.conditions.all[-1])
         self._next = None
-        first = self.begun_rows
-        self.begun = np.full((first + len(self.randomize), self.num_envs), np.nan)
-        self.begun[:first] = begun[:first]
+        first = self.start_row_count
+        self.start_values = np.full((first + len(self.randomize), self.num_envs), np.nan)
+        self.start_values[:first] = begun[:first]
         for k, name in enumerate(self.randomize):
             if name in old:
-                self.begun[first + k] = begun[first + old.index(name)]
+                self.start_values[first + k] = begun[first + old.index(name)]
 
     def alone(self, env: int) -> TrunkEngine:
         """An engine like that of one environment."""
@@ -323,10 +327,10 @@ class EpisodeBatch:
 
     def _check_extremes(self, parameters: Mapping[str, float | tuple[float, float]]) -> None:
         """Raise where something that can be drawn is out of range, warn where it needs shorter substeps."""
-        if parameters and self._found_good != (words := repr(parameters)):
+        if parameters and self._validated != (words := repr(parameters)):
             for corner in extremes(parameters):
                 self._parts(corner, self.engine.substeps)
-            self._found_good = words
+            self._validated = words
 
     def _parts(self, changes: Mapping[str, float], asked: int | None) -> int:
         """Into how many parts `sim_dt` is cut with some settings changed, see `StepLength.choose`."""
@@ -351,7 +355,7 @@ class EpisodeBatch:
         which = np.asarray(envs, np.int64)
         if self._next is not None:
             self._adopt()
-            self._varied[:] = True  # rows of settings are of the old ones
+            self._has_overrides[:] = True  # rows of settings are of the old ones
         if self.conditions.all:
             self.conditions.start(which)
         if self.conditions.are_mixed:
@@ -367,17 +371,17 @@ class EpisodeBatch:
         generators: Sequence[np.random.Generator],
         options: Mapping[str, Any],
     ) -> dict[str, Floats]:
-        now = self.now
+        now = self.episode_rows
         options = {**self.task.start, **options}
         parameters = self.randomize | options.get("parameters", {})
         drawn = {name: np.zeros(len(which)) for name in parameters}
-        if parameters or self._varied[which].any():  # what was set for one episode is not for the next
+        if parameters or self._has_overrides[which].any():  # what was set for one episode is not for the next
             for k, (env, generator) in enumerate(zip(which, generators, strict=True)):
                 values = draw_parameters(parameters, generator)
                 for name, value in values.items():
                     drawn[name][k] = value
                 self._vary(int(env), values)
-            self._varied[which] = bool(parameters)
+            self._has_overrides[which] = bool(parameters)
         gaits: Any = options.get("gait")
         if np.ndim(gaits) == 2:  # one for each environment
             options = {**options, "gait": gaits[which]}
@@ -395,16 +399,16 @@ class EpisodeBatch:
             self._draw_targets(which, generators)
         if "target_speed" in options:  # for the whole episode
             now.target[which], now.switch[which] = options["target_speed"], np.inf
-        self.body.settle(start, now.target[which], options, self.engine)
+        self.body.complete_start(start, now.target[which], options, self.engine)
         self.engine.reset(start.commands, start.theta, envs=which, **start.trunk)
-        begun = [*(start.begun[name] for name in self.body.start_names), *start.gaits.T]
-        self.begun[:, which] = [*begun, *(drawn[name] for name in self.randomize)]
+        begun = [*(start.values[name] for name in self.body.start_names), *start.gaits.T]
+        self.start_values[:, which] = [*begun, *(drawn[name] for name in self.randomize)]
         now.x_before[which], now.ended[which] = start.trunk["x"], 0.0
         if self.body.legs > 1:
             now.gait[:, which] = start.gaits.T
             now.offset[:, which] = 0.0
         if self.paper:
-            self.paper.start(which.tolist(), start.gaits, start.begun["crank_angle"], start.begun["x"])
+            self.paper.start(which.tolist(), start.gaits, start.values["crank_angle"], start.values["x"])
         near = self.addresses.copy()  # the groups of lanes from the first of them to the last
         near[kernels.BEGIN] = which.min() // LANES * LANES
         near[kernels.END] = min(self.engine.columns, (which.max() // LANES + 1) * LANES)
@@ -415,7 +419,7 @@ class EpisodeBatch:
         """Give one environment settings of its own."""
         trunk, ground, limbs = self.body.parts(replace(self.settings, **dict(values)))  # type: ignore[arg-type]
         self.engine.vary(env, trunk, ground, limbs=limbs)
-        self.now.weight[env] = (trunk.mass + sum(limb.geometry.mass for limb in limbs)) * GRAVITY
+        self.episode_rows.weight[env] = (trunk.mass + sum(limb.geometry.mass for limb in limbs)) * GRAVITY
 
     def _draw_targets(self, envs: NDArray[np.int64], generators: Sequence[np.random.Generator]) -> None:
         """When other speeds are commanded, and which, with a generator for each of `envs`."""
@@ -435,10 +439,10 @@ class EpisodeBatch:
         when, which = np.array([generator.random(2) for generator in generators]).reshape(-1, 2).T
         (shortest, longest), (low, high) = conditions["target_seconds"], conditions["target_speed"]
         steps = np.rint((shortest + (longest - shortest) * when) / self.dt)
-        now, step = self.now.target[envs], self.body.command_step
+        now, step = self.episode_rows.target[envs], self.body.command_step
         low, high = np.maximum(low, now - step), np.minimum(high, now + step)
-        self.now.switch[envs] = self.now.steps[envs] + steps
-        self.now.next_target[envs] = low + (high - low) * which
+        self.episode_rows.switch[envs] = self.episode_rows.steps[envs] + steps
+        self.episode_rows.next_target[envs] = low + (high - low) * which
 
     def step(self, generators: Sequence[np.random.Generator], idle: NDArray[np.bool_] | None = None) -> bool:
         """One control step under `actions`; returns whether any episode ended.
@@ -451,13 +455,13 @@ class EpisodeBatch:
             happened = np.bitwise_or.reduce(under_each(self, all_rows, lambda rows: self._step()))
         else:
             happened = self._step()
-        return self.follow(int(happened), generators, idle)
+        return self.finish_step(int(happened), generators, idle)
 
     def _step(self) -> int:
         found: int = np.bitwise_or.reduce(run_together(self.kernel, self._blocks, self.engine.num_threads))
         return found
 
-    def follow(
+    def finish_step(
         self, happened: int, generators: Sequence[np.random.Generator], idle: NDArray[np.bool_] | None = None
     ) -> bool:
         """`step` after its kernel, which returned what happened."""
@@ -470,14 +474,14 @@ class EpisodeBatch:
             elif put_back.size:
                 self._observe_broken(put_back)
         if happened & kernels.SOME_SWITCHED:
-            due = (self.now.steps >= self.now.switch)[: self.num_envs]
+            due = (self.episode_rows.steps >= self.episode_rows.switch)[: self.num_envs]
             due = np.flatnonzero(due if idle is None else due & ~idle)
             self._draw_targets(due, [generators[env] for env in due.tolist()])
         return bool(happened & kernels.SOME_ENDED)
 
     def _observe_broken(self, envs: NDArray[np.int64]) -> None:
         """Observe the last good state of what could not be simulated, whose report is of where it broke."""
-        data, form = self.engine.arrays[0], form_of(self.engine.features)
+        data, form = self.engine.arrays[0], engine_layout(self.engine.features)
         kept = data.copy()
         leg = form.leg_memory.rows("report")
         self.engine.advance(None, 0)
@@ -492,22 +496,22 @@ class EpisodeBatch:
 
     def infos(self, ended: bool = True) -> dict[str, NDArray[Any]]:
         """What all started with, what is measured of them, and the terms of the last reward, by name: shape
-        (num_envs,), but for "gait", "measured" and "parameters", which are `Named`. `ended` says whether
+        (num_envs,), but for "gait", "measured" and "parameters", which are `NamedArray`. `ended` says whether
         there may be environments that could not be simulated."""
-        n, begun, memory = self.num_envs, self.begun.copy(), self.engine.arrays[0]
+        n, begun, memory = self.num_envs, self.start_values.copy(), self.engine.arrays[0]
         measured = self.measurements.read(memory[:, :n])
         if ended:
             nothing = broken(self.engine.results)
             measured[np.ix_(self.measurements.last_step, nothing)] = 0.0
-        first, names = self.begun_rows, self.body.start_names
+        first, names = self.start_row_count, self.body.start_names
         infos: dict[str, NDArray[Any]] = dict(zip(names, begun, strict=False))
-        infos["gait"] = named(begun[len(names) : first].T, self.body.gait_names)
+        infos["gait"] = name_columns(begun[len(names) : first].T, self.body.gait_names)
         if self.randomize:
-            infos["parameters"] = named(begun[first:].T, tuple(self.randomize))
+            infos["parameters"] = name_columns(begun[first:].T, tuple(self.randomize))
         if self.target_speed:
-            infos["target_speed"] = self.now.target[:n].copy()
+            infos["target_speed"] = self.episode_rows.target[:n].copy()
         infos["measured"] = measured.T.view(self.measurements.kind)
-        infos.update(zip(self.terms, self.now.terms[:, :n].copy(), strict=True))
+        infos.update(zip(self.terms, self.episode_rows.terms[:, :n].copy(), strict=True))
         return infos
 
     def summary(self, env: int) -> dict[str, float]:
@@ -525,9 +529,9 @@ class EpisodeBatch:
         (0 or 1); of a horse mean, sum and duty factor are of all its legs.
         """
         seconds, distance, work, impulse, loaded, stances, peaks, rates, highest, slip = (
-            getattr(self.now, name)[envs] for name in SUMS
+            getattr(self.episode_rows, name)[envs] for name in SUMS
         )
-        weight, time = self.now.weight[envs], np.maximum(seconds, 1e-12)
+        weight, time = self.episode_rows.weight[envs], np.maximum(seconds, 1e-12)
         mean, each = impulse / time, np.maximum(stances, 1.0)
         steps = np.rint(seconds / self.dt)
         cost = np.full(len(work), np.inf)
@@ -547,7 +551,7 @@ class EpisodeBatch:
             "cost_of_transport": cost,
             "weight_share": mean / weight,
             "support_share": 1 - mean / weight,
-            "failed": (self.now.ended[envs] == FAILED).astype(np.float64),
+            "failed": (self.episode_rows.ended[envs] == FAILED).astype(np.float64),
         }
 
     def failure(self, env: int) -> str:
@@ -571,7 +575,7 @@ class EpisodeBatch:
                 " changed; reset() starts all anew"
             )
         state = {"engine": self.engine.get_state(), "episode": self.episode[:, : self.num_envs].copy()}
-        state["begun"] = self.begun.copy()
+        state["start_values"] = self.start_values.copy()
         return state | ({"paper": self.paper.get_state()} if self.paper else {})
 
     @property
@@ -597,7 +601,7 @@ class EpisodeBatch:
                 raise ValueError
             parts = {name: repeated(values) for name, values in engine.items() if name != "layout"}
             found = {**state, "engine": {**parts, "layout": {**layout, "num_envs": n}}}
-            found |= {name: repeated(state[name]) for name in ("episode", "begun") if name in state}
+            found |= {name: repeated(state[name]) for name in ("episode", "start_values") if name in state}
             if "paper" in state:
                 paper = state["paper"]
                 found["paper"] = {"legs": [*paper["legs"]] * n} | {
@@ -614,7 +618,7 @@ class EpisodeBatch:
         layout = self._episode_layout
         if self.body.legs == 1 and (episode[layout.rows("weight")] > 0).all():
             return True
-        begun = ~np.isnan(self.begun[0])
+        begun = ~np.isnan(self.start_values[0])
         rows = episode[:, begun]
         gaits = rows[layout.rows("gait")] if self.body.legs > 1 else rows[:0]
         return bool((rows[layout.rows("weight")] > 0).all() and np.isfinite(gaits).all())
@@ -633,25 +637,33 @@ class EpisodeBatch:
                 f"state['episode']: expected shape {expected} for {self.num_envs} environments, "
                 f"got {episode.shape}"
             )
-        begun = np.asarray(state.get("begun", np.nan))  # older states do not say
-        if begun.dtype.kind != "f" or begun.shape not in ((), self.begun.shape):
+        begun = np.asarray(state.get("start_values", np.nan))  # older states do not say
+        if begun.dtype.kind != "f" or begun.shape not in ((), self.start_values.shape):
             raise ParameterError(
-                f"state['begun']: expected numbers, shape {self.begun.shape}, got {state['begun']!r:.60}"
+                f"state['start_values']: expected numbers, shape {self.start_values.shape}, got"
+                f" {state['start_values']!r:.60}"
             )
         of_paper = self.paper.read_state(state.get("paper")) if self.paper else None
         self.engine.set_state(state["engine"])
         if self.paper and of_paper:
             self.paper.set_state(*of_paper)
-        self.episode[:, : self.num_envs], self.begun[:] = episode, begun
-        self._varied[:] = True
+        self.episode[:, : self.num_envs], self.start_values[:] = episode, begun
+        self._has_overrides[:] = True
         if self.conditions.all:
             self.conditions.start(np.arange(self.num_envs))
         self._observe(self.addresses)
 
     def __getstate__(self) -> dict[str, Any]:
         found_again = (
-            "addresses", "_blocks", "entries", "kernel", "measurements", "now", "_kernels", "_observe"
-        )  # fmt: skip
+            "addresses",
+            "_blocks",
+            "entries",
+            "kernel",
+            "measurements",
+            "episode_rows",
+            "_kernels",
+            "_observe",
+        )
         return {key: value for key, value in vars(self).items() if key not in found_again}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -663,7 +675,16 @@ class EpisodeBatch:
         """What never changes is shared: a planner copies at every node of its tree."""
         made = object.__new__(type(self))
         vars(made).update(vars(self))
-        for name in ("engine", "_varied", "begun", "episode", "actions", "observations", "rewards", "_task"):
+        for name in (
+            "engine",
+            "_has_overrides",
+            "start_values",
+            "episode",
+            "actions",
+            "observations",
+            "rewards",
+            "_task",
+        ):
             setattr(made, name, copy.deepcopy(getattr(self, name), memo))
         if self.paper:
             made.paper = copy.deepcopy(self.paper, memo | {id(self.engine): made.engine})

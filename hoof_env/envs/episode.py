@@ -8,7 +8,7 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from hoof_env.dynamics.form import form_of
+from hoof_env.dynamics.form import engine_layout
 from hoof_env.dynamics.layout import Features
 from hoof_env.envs.reference import GaitRows, reference_type
 from hoof_env.envs.reward import TERMS
@@ -76,7 +76,7 @@ class _Memories(NamedTuple):
     trunk_rows: int
     legs: int
     gait: int
-    animal: bool
+    has_limits: bool
 
 
 class Memories(Constants, _Memories):
@@ -87,10 +87,10 @@ class Memories(Constants, _Memories):
 @cache
 def memories_of(terms: int, features: Features, legs: int = 1) -> Memories:
     """The layouts with so many terms, of an engine of this kind."""
-    form = form_of(features)
+    form = engine_layout(features)
     return Memories(
         episode_layout(terms, legs), form.trunk_memory, form.leg_memory, form.trunk_rows, legs, form.gait,
-        form.animal,
+        form.has_limits,
     )  # fmt: skip
 
 
@@ -106,7 +106,8 @@ def task_type(terms: int, entries: int, gait: int = ACTIONS, legs: int = 1) -> n
             ("h", "f8"), ("substeps", "i8"), ("dt", "f8"), ("episode_steps", "i8"),
             ("height", "f8"), ("lowest", "f8"), ("highest", "f8"),  # of the trunk: nominal and extreme [m]
             ("stays", "?"),  # a fixed trunk
-            ("count", "i8"), ("places", "i8", (entries,)),  # of the observation; -1: not observed
+            ("observation_size", "i8"),
+            ("observation_columns", "i8", (entries,)),  # of the observation; -1: not observed
             *(reference_type() if legs > 1 else ()),
         ],
         align=True,

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import FREE, GRAVITY, TRUNKS, Drive, HoofSpring, Limb, Limits, Motor, Trunk
-from hoof_env.envs.parameters import drive_of, ground_of, pair
+from hoof_env.envs.parameters import check_range, drive_of, ground_of
 from hoof_env.envs.reference import (
     ACTED,
     COUNT,
@@ -45,9 +45,9 @@ from hoof_env.envs.settings import Settings
 from hoof_env.envs.start import (
     FLAT,
     Start,
-    anywhere,
     checked_options,
     hoof_points,
+    start_anywhere,
     with_parameters,
 )
 from hoof_env.envs.tasks import TASKS
@@ -67,7 +67,7 @@ PITCH, HEIGHT, CLEARANCE = 0.5, (0.75, 1.8), 0.02
 """Where it has fallen: +-pitch [rad], heights of the trunk [m], of a joint over the ground [m]."""
 GAP = 0.005  # between the lowest rigid hoof and the ground at a start [m]
 SAG = MASS * GRAVITY / (4 * TASKS["horse"].defaults["hoof_stiffness"])  # of two legs that bear the weight [m]
-UNKNOWN: dict[str, Any] = {"vx": 1.0, "vy": 0.0, "pitch": 0.0, "pitch_rate": 0.0}
+DEFAULT_MOTION: dict[str, Any] = {"vx": 1.0, "vy": 0.0, "pitch": 0.0, "pitch_rate": 0.0}
 """How a trunk starts in a gait that is not a reference gait."""
 
 SPANS = (0.03, 0.04, 0.04, 0.04)
@@ -80,7 +80,7 @@ the reference gaits are the same to a hundredth."""
 
 FILTERS = {"quick": QUICK, "slow": FilterSettings()}  # of commands, by the setting `filters`
 
-REFUSED = "trunk", "hip_height", "solver"
+LEG_ONLY_SETTINGS = "trunk", "hip_height", "solver"
 """Settings of which a horse takes nothing but the default."""
 
 OPTIONS = {
@@ -102,7 +102,7 @@ class Horse:
     """Four legs on a free trunk.
 
     Attributes:
-        size, pace: its length over that of a horse of 475 kg, and its speed likewise [-].
+        size, speed_scale: its length over that of a horse of 475 kg, and its speed likewise [-].
         gaits: that were found, as an animal of this size has them, by name.
         gait: around which actions lie whatever speed is commanded; None for those of `reference_gaits`.
         hips: places of the crank centres on the trunk [m], by leg.
@@ -120,7 +120,7 @@ class Horse:
     def __init__(self, settings: Settings) -> None:
         s = settings
         self.size = checked_size(s.size)
-        self.pace = math.sqrt(self.size)
+        self.speed_scale = math.sqrt(self.size)
         if s.trunk != TRUNKS[FREE]:
             raise ParameterError(f'trunk: expected "free" of a horse, got {s.trunk!r}')
         self.geometry = load_geometry(s.preset)
@@ -131,12 +131,12 @@ class Horse:
         self.gait = None if s.gait is None else self.gaits[check_choice("gait", s.gait, self.gaits)]
         self.harmonics = 2 if s.harmonics is None else count("harmonics", s.harmonics, most=2)
         filters = "quick" if s.filters is None else check_choice("filters", s.filters, FILTERS)
-        self.filters = FILTERS[filters].sped_up(1 / self.pace)
+        self.filters = FILTERS[filters].sped_up(1 / self.speed_scale)
         if s.hip_height is not None:
             raise ParameterError(
                 f"hip_height: expected none of a horse, whose `size` it is, got {s.hip_height!r}"
             )
-        self.command_step = COMMAND_STEP * self.pace
+        self.command_step = COMMAND_STEP * self.speed_scale
         self.lowest, self.highest = (self.size * height for height in HEIGHT)
         spring, stored = self._spring(s), TASKS["horse"].defaults["hoof_stiffness"]
         self._softness = 0.0 if spring is None else stored * self.size**2 / spring.stiffness
@@ -168,7 +168,7 @@ class Horse:
         """The world's ground; only the speeds below which its laws are softened are the animal's."""
         ground = ground_of(s, mass)
         names = "approach_floor", "friction_slow", "friction_fast"
-        return replace(ground, **{name: self.pace * getattr(ground, name) for name in names})
+        return replace(ground, **{name: self.speed_scale * getattr(ground, name) for name in names})
 
     def _spring(self, s: Settings) -> HoofSpring | None:
         if s.hoof_stiffness is None:
@@ -186,7 +186,7 @@ class Horse:
 
     def commanded_speeds(self, s: Settings) -> tuple[float, float]:
         """Lowest and highest commanded speed [m/s]."""
-        return pair("target_speed", s.target_speed, 0.1)
+        return check_range("target_speed", s.target_speed, 0.1)
 
     def constants(self, engine: TrunkEngine, dt: float) -> dict[str, Any]:
         """Of the task's record: spans of actions and bounds of commands."""
@@ -198,7 +198,7 @@ class Horse:
         return {
             "half": half, "low": low, "high": high, "height": self.height,
             "lowest": -np.inf, "highest": np.inf,  # the engine's own limits end episodes
-            **reference_constants(self.pace, follows=self.gait is None),
+            **reference_constants(self.speed_scale, follows=self.gait is None),
         }  # fmt: skip
 
     # Starts
@@ -214,7 +214,7 @@ class Horse:
         self, options: Mapping[str, Any], generators: Sequence[np.random.Generator], engine: TrunkEngine
     ) -> Start:
         """Starts of episodes, one for each generator, but for what the options fix: in the stride of the gait
-        that `settle` takes, each crank, speed and pitch a little off."""
+        that `complete_start` takes, each crank, speed and pitch a little off."""
         n = len(generators)
         drawn = np.array([generator.random(3 + COUNT) for generator in generators])
         off = 2 * drawn - 1
@@ -223,22 +223,24 @@ class Horse:
             "x": np.zeros(n),
         }  # fmt: skip
         if engine.terrain != FLAT:
-            begun["x"] = anywhere(engine.terrain, begun["x"], options, generators)
+            begun["x"] = start_anywhere(engine.terrain, begun["x"], options, generators)
         begun |= {name: np.full(n, options[name]) for name in begun if name in options}
         commands = np.zeros((self.legs, 2 + 2 * self.harmonics, n))
         theta = PHASE_SPREAD * off[:, 3:].T
         return Start(begun, np.empty(0), commands, theta, {})
 
-    def settle(self, start: Start, targets: Floats, options: Mapping[str, Any], engine: TrunkEngine) -> None:
+    def complete_start(
+        self, start: Start, targets: Floats, options: Mapping[str, Any], engine: TrunkEngine
+    ) -> None:
         """Complete starts with the gaits of the commanded speeds [m/s]. In a reference gait the trunk moves
         as it does in that, along the ground between its feet; in others it is as low as the springs of two
         legs give under the weight."""
-        begun, own = start.begun, options.get("gait")
+        begun, own = start.values, options.get("gait")
         start.gaits = self.reference(targets, own)
         start.theta[:] = crank_angles(start.gaits, begun["phase"], start.theta)
         start.commands[:] = commands_of(start.gaits, start.theta, start.commands.shape[1])
         is_known = own is None and self.gait is None
-        motion = trunk_motion(targets / self.pace, begun["phase"]) if is_known else UNKNOWN
+        motion = trunk_motion(targets / self.speed_scale, begun["phase"]) if is_known else DEFAULT_MOTION
         slope = self._slope(engine.terrain, begun["x"])
         if "speed" not in options:
             begun["speed"] = begun["speed"] * targets * motion["vx"]
@@ -282,8 +284,8 @@ class Horse:
         if own is not None:
             numbers = gait_numbers("gait", own, self.gaits, self.size)
             return np.array(np.broadcast_to(numbers, (len(targets), len(NAMES))))
-        found = reference_gaits(np.asarray(targets) / self.pace)
-        found[:, 0] /= self.pace
+        found = reference_gaits(np.asarray(targets) / self.speed_scale)
+        found[:, 0] /= self.speed_scale
         return found
 
     def action_for(self, gait: Any, engine: TrunkEngine, dt: float) -> NoReturn:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from hoof_env.dynamics.parts import broken
 from hoof_env.envs.base import LegBase, array_of, generator_of
 from hoof_env.envs.episode import FAILED
-from hoof_env.envs.infos import named
+from hoof_env.envs.infos import name_columns
 from hoof_env.envs.recording import Recording
 from hoof_env.envs.reward import failure
 from hoof_env.envs.settings import Keywords
@@ -71,7 +71,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         paid = [(term.key, k) for k, term in weighed if term.compute is not failure]  # 0 before the end
         self._views: tuple[Any, ...] = (
             batch.actions[0].data, batch.direct_kernel(), batch.addresses, bool(batch.randomize), paid,
-            batch.now.terms[:, 0], batch.rewards.data, batch.observations[0].copy,
+            batch.episode_rows.terms[:, 0], batch.rewards.data, batch.observations[0].copy,
             batch.measurements.reader(batch.engine.arrays[0][:, 0]),
         )  # fmt: skip
 
@@ -80,7 +80,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     @property
     def weight(self) -> float:
         """Weight of trunk and leg [N]."""
-        return float(self.batch.now.weight[0])
+        return float(self.batch.episode_rows.weight[0])
 
     def _each(self, values: Any) -> Any:
         return values[0] if np.ndim(values) > 1 else float(values[0])
@@ -130,7 +130,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._begin()
         info = copy.deepcopy(self._begun[0]()) | {"measured": self._views[-1]()}
         if parameters:
-            info["parameters"] = named([values[0] for values in parameters.values()], [*parameters])
+            info["parameters"] = name_columns([values[0] for values in parameters.values()], [*parameters])
         return self.batch.observations[0].copy(), info
 
     def step(
@@ -167,7 +167,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         failed = truncated = False
         if ended:
             info.update(zip(self.batch.terms, terms, strict=True))
-            failed = bool(self.batch.now.ended[0] == FAILED)
+            failed = bool(self.batch.episode_rows.ended[0] == FAILED)
             truncated = not failed
             if self._phase == "running":
                 self._phase = "ended"
@@ -184,7 +184,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def _follow(self, happened: int) -> bool:
         """After a step in which something happened; returns whether the episode ended."""
-        ended = self.batch.follow(happened, (self.np_random,))
+        ended = self.batch.finish_step(happened, (self.np_random,))
         if happened & SOME_SWITCHED:
             self._begin()
         return ended
@@ -200,19 +200,19 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def _begin(self) -> None:
         """What each info of this episode says of its start, and the keys of what a step fills in."""
-        row, body, first = self.batch.begun[:, 0].copy(), self.batch.body, self.batch.begun_rows
+        row, body, first = self.batch.start_values[:, 0].copy(), self.batch.body, self.batch.start_row_count
         info = dict[str, Any](zip(body.start_names, row, strict=False))
-        info["gait"] = gait = named(row[len(body.start_names) : first], body.gait_names)
+        info["gait"] = gait = name_columns(row[len(body.start_names) : first], body.gait_names)
         if self.batch.randomize:
-            info["parameters"] = named(row[first:], [*self.batch.randomize])
+            info["parameters"] = name_columns(row[first:], [*self.batch.randomize])
         if self.batch.target_speed:
-            info["target_speed"] = self.batch.now.target[0]
+            info["target_speed"] = self.batch.episode_rows.target[0]
         info |= {"measured": None, **dict.fromkeys(self.batch.terms, np.float64(0.0))}
         self._begun, self._began_with = (info.copy, gait.copy), self._start_and_target()
 
     def _start_and_target(self) -> tuple[bytes, float]:
         """What infos say that no step measures."""
-        return self.batch.begun.tobytes(), float(self.batch.now.target[0])
+        return self.batch.start_values.tobytes(), float(self.batch.episode_rows.target[0])
 
     def _read_action(self, action: Any) -> None:
         given = array_of(action)
@@ -259,7 +259,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         generator = generator_of(state["generator"])
         self.batch.set_state(state)
         self.np_random = generator
-        self._phase = "ended" if self.batch.now.ended[0] else "running"
+        self._phase = "ended" if self.batch.episode_rows.ended[0] else "running"
         if self._start_and_target() != self._began_with:  # else infos say it
             self._begin()
         if self._recording is not None:

@@ -11,8 +11,8 @@ from hoof_env.envs.reference import LEGS
 from hoof_env.envs.reward import Term
 from hoof_env.gait import PARAMETERS, WIDEST
 from hoof_env.ground.terrain import surface
-from hoof_env.simd import choose, larger, nth, size, smaller
-from hoof_env.simd.compile import inlined
+from hoof_env.simd import absolute, block_at, maximum, minimum, where
+from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.math import cos_sin
 
 # The observation
@@ -37,8 +37,8 @@ def _in_bounds(k: int) -> Scale:
 
 
 def _of_leg(i: int, measure: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    compiled = inlined(measure)
-    return lambda scene: compiled(nth(scene.leg, i))
+    compiled = inline_llvm(measure)
+    return lambda scene: compiled(block_at(scene.leg, i))
 
 
 def _sine(leg):  # type: ignore[no-untyped-def]
@@ -124,9 +124,9 @@ def alive(step, weight):  # type: ignore[no-untyped-def]
 
 def tracking(step, weight):  # type: ignore[no-untyped-def]
     """1 at the commanded speed, less twice the relative error: else it pays to slide less and be late."""
-    asked = larger(step.commanded_progress, 1e-9)
-    error = size(step.progress - asked) / asked
-    return choose(step.seconds > 0.0, weight * step.seconds * larger(1.0 - 2.0 * error, -1.0), 0.0)
+    asked = maximum(step.commanded_progress, 1e-9)
+    error = absolute(step.progress - asked) / asked
+    return where(step.seconds > 0.0, weight * step.seconds * maximum(1.0 - 2.0 * error, -1.0), 0.0)
 
 
 def peak(step, weight):  # type: ignore[no-untyped-def]
@@ -136,8 +136,8 @@ def peak(step, weight):  # type: ignore[no-untyped-def]
 
 def slip(step, weight):  # type: ignore[no-untyped-def]
     """Over the commanded distance, at most all of it, for every second."""
-    asked = larger(step.commanded_progress, 1e-9)
-    return -weight * step.seconds * smaller(step.slip / asked, 1.0)
+    asked = maximum(step.commanded_progress, 1e-9)
+    return -weight * step.seconds * minimum(step.slip / asked, 1.0)
 
 
 def landing(step, weight):  # type: ignore[no-untyped-def]
@@ -147,7 +147,7 @@ def landing(step, weight):  # type: ignore[no-untyped-def]
 
 def work(step, weight):  # type: ignore[no-untyped-def]
     """Over the weight and the commanded distance, for every second."""
-    asked = larger(step.commanded_progress, 1e-9)
+    asked = maximum(step.commanded_progress, 1e-9)
     return -weight * step.seconds * step.positive_work / (step.weight * asked)
 
 
@@ -159,7 +159,7 @@ def pitch(step, weight):  # type: ignore[no-untyped-def]
 
 def fall(step, weight):  # type: ignore[no-untyped-def]
     """Charged once."""
-    return choose(step.failed > 0.0, -weight, 0.0)
+    return where(step.failed > 0.0, -weight, 0.0)
 
 
 HORSE_TERMS = (

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hoof_env.dynamics.form import form_of
+from hoof_env.dynamics.form import engine_layout
 from hoof_env.dynamics.layout import (
     LEG_REPORT,
     PLAIN,
@@ -42,19 +42,19 @@ MEASURED = measured_names()
 """Of a leg with a rigid hoof."""
 
 
-class Measurements:
+class InfoLayout:
     """Where what is measured lies in the memory of engines of a kind.
 
     Attributes:
         names: of it.
-        kind: of `Named`, to view arrays as.
+        kind: of `NamedArray`, to view arrays as.
         last_step: which of it is of the last control step, not of its end.
     """
 
     def __init__(self, features: Features, legs: int) -> None:
         self.names = measured_names(features, legs)
         self.kind = _kind(self.names)
-        form = form_of(features)
+        form = engine_layout(features)
         trunk, leg, first = form.trunk_memory.rows, form.leg_memory.rows, form.trunk_rows
         self._rows: Any = slice(trunk("report").start, first + leg("sums").stop)
         if legs > 1:
@@ -78,17 +78,17 @@ class Measurements:
     def reader(self, column: NDArray[np.float64]) -> Callable[[], Any]:
         """A function that reads a column that stays where it is, with names."""
         if isinstance(self._rows, slice):
-            copied: Callable[[], Any] = named(column[self._rows], self.names).copy
+            copied: Callable[[], Any] = name_columns(column[self._rows], self.names).copy
             return copied
         rows, kind = self._rows, self.kind
         return lambda: column[rows].view(kind)
 
 
-class Named(np.ndarray[Any, np.dtype[np.float64]]):
+class NamedArray(np.ndarray[Any, np.dtype[np.float64]]):
     """Numbers that have names along the last axis: `row["crank_speed"]` is `row[..., 0]`.
 
-    An array to libraries, and to people also a mapping; made by `named`. Equality is that of mappings where
-    the other one has names, too.
+    A float array whose last axis can also be indexed by name, and a mapping of its names; made by
+    `name_columns`. Equality is that of mappings where the other one has names, too.
     """
 
     __slots__ = ()  # no dictionary, which would take as long to make as the array
@@ -127,28 +127,28 @@ class Named(np.ndarray[Any, np.dtype[np.float64]]):
         return bool(self.names)
 
     def __eq__(self, other: Any) -> Any:
-        if isinstance(other, Named | Mapping):
+        if isinstance(other, NamedArray | Mapping):
             return self.keys() == other.keys() and all(
                 np.array_equal(self[name], other[name]) for name in self.names
             )
         return super().__eq__(other)
 
     def __ne__(self, other: Any) -> Any:
-        return not self == other if isinstance(other, Named | Mapping) else super().__ne__(other)
+        return not self == other if isinstance(other, NamedArray | Mapping) else super().__ne__(other)
 
     __hash__ = None
 
     def __reduce__(self) -> Any:
-        return named, (np.array(self), self.names)
+        return name_columns, (np.array(self), self.names)
 
 
 @cache
-def _kind(names: tuple[str, ...]) -> type[Named]:
+def _kind(names: tuple[str, ...]) -> type[NamedArray]:
     """A class for each set of names: views and copies of a row have them without another thought."""
-    return type("Named", (Named,), {"names": names, "__slots__": (), "__doc__": Named.__doc__})
+    return type("Named", (NamedArray,), {"names": names, "__slots__": (), "__doc__": NamedArray.__doc__})
 
 
-def named(values: ArrayLike, names: Sequence[str]) -> Named:
+def name_columns(values: ArrayLike, names: Sequence[str]) -> NamedArray:
     """A view of some numbers, shape (..., len(names)), that has names."""
     return np.asarray(values, np.float64).view(_kind(tuple(names)))
 
@@ -158,6 +158,6 @@ def row_of(infos: Mapping[str, Any], env: int) -> dict[str, Any]:
     row = {}
     for key, values in infos.items():
         if not key.startswith("_") and infos.get(f"_{key}", np.ones(env + 1, bool))[env]:
-            is_named = isinstance(values, Named)
-            row[key] = named(values[env].copy(), values.names) if is_named else values[env]
+            is_named = isinstance(values, NamedArray)
+            row[key] = name_columns(values[env].copy(), values.names) if is_named else values[env]
     return row

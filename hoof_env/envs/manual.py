@@ -225,7 +225,7 @@ def _settings(what: Task, defaults: Mapping[str, str]) -> list[tuple[str, ...]]:
     return [
         (f"`{name}`", defaults[name], *own.get(name, cells))
         for name, cells in TABLES["settings"].items()
-        if name not in horse.REFUSED and any(_can_be(name, context) for context in contexts)
+        if name not in horse.LEG_ONLY_SETTINGS and any(_can_be(name, context) for context in contexts)
     ]
 
 

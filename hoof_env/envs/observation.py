@@ -12,8 +12,8 @@ import numpy as np
 from hoof_env.errors import ParameterError
 from hoof_env.gait import LIMITS
 from hoof_env.ground.terrain import surface
-from hoof_env.simd import choose
-from hoof_env.simd.compile import inlined
+from hoof_env.simd import where
+from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.math import cos_sin
 from hoof_env.simd.user_functions import check_function
 
@@ -24,7 +24,7 @@ MIDDLE, HALF_RANGE = (LOW + HIGH) / 2, (HIGH - LOW) / 2
 AHEAD = (0.25, 0.5, 0.75, 1.0)  # where the height of the ground is seen, from O forward [m]
 
 
-class Scene(NamedTuple):
+class ObservationInputs(NamedTuple):
     """What can be observed.
 
     Attributes:
@@ -49,7 +49,7 @@ class Scale:
 
     Attributes:
         text: of the formula, for the manual page.
-        apply: function of the number and the `Scene`; None leaves it.
+        apply: function of the number and the `ObservationInputs`; None leaves it.
         saturates: the hyperbolic tangent of that is taken.
 
     Raises:
@@ -73,7 +73,7 @@ class Entry:
         name: what is observed.
         group: by which it is chosen.
         unit: of the number before it is scaled.
-        measure: function of a `Scene`: that number. Compiled as `reward.Term.compute` is.
+        measure: function of a `ObservationInputs`: that number. Compiled as `reward.Term.compute` is.
         scale: how it is scaled.
         scalar: `measure` and the scale are functions of ordinary numbers, see `reward.Term`.
 
@@ -147,15 +147,15 @@ def _cosine(scene):  # type: ignore[no-untyped-def]
     return cos_sin(scene.leg.state.theta)[0]
 
 
-@inlined
+@inline_llvm
 def in_contact(memory):  # type: ignore[no-untyped-def]
-    return choose(memory.penetration > 0.0, 1.0, 0.0)
+    return where(memory.penetration > 0.0, 1.0, 0.0)
 
 
-@inlined
+@inline_llvm
 def _approach_speed(memory):  # type: ignore[no-untyped-def]
     inverse = memory.inverse_approach_speed
-    return choose(inverse > 0.0, 1.0 / choose(inverse > 0.0, inverse, 1.0), 0.0)
+    return where(inverse > 0.0, 1.0 / where(inverse > 0.0, inverse, 1.0), 0.0)
 
 
 def _ahead(distance: float) -> Callable[[Any], Any]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import ONE_LEG, Limb, Trunk
 from hoof_env.envs.observation import HALF_RANGE, HIGH, LOW, MIDDLE
-from hoof_env.envs.parameters import drive_of, ground_of, hoof_spring, pair
+from hoof_env.envs.parameters import check_range, drive_of, ground_of, hoof_spring
 from hoof_env.envs.settings import Settings
 from hoof_env.envs.start import HIGHEST, LOWEST, Start, check_options, draw_starts
 from hoof_env.errors import ParameterError, check_choice, check_number
@@ -27,7 +27,7 @@ from hoof_env.gait import (
     load_gait,
 )
 from hoof_env.ground.contact import Ground, load_ground
-from hoof_env.leg.geometry import load_geometry, named, wrong
+from hoof_env.leg.geometry import load_geometry, preset_error_type, preset_label
 
 Floats = NDArray[np.float64]
 
@@ -148,8 +148,8 @@ class OneLeg:
         self.gaits = {name: load_gait(name, s.preset) for name in gait_names(s.preset)}
         for name, gait in self.gaits.items():
             if isinstance(gait, HarmonicGait):
-                raise wrong(s.preset)(
-                    f"{named(s.preset)}, gait {name!r}: expected the four parameters of one harmonic, "
+                raise preset_error_type(s.preset)(
+                    f"{preset_label(s.preset)}, gait {name!r}: expected the four parameters of one harmonic, "
                     f"which environments of one leg take, got {gait!r}"
                 )
         self.gait = None if s.gait is None else self.gaits[check_choice("gait", s.gait, self.gaits)]
@@ -170,7 +170,7 @@ class OneLeg:
 
     def commanded_speeds(self, s: Settings) -> tuple[float, float] | None:
         """Lowest and highest commanded speed [m/s], None for no command."""
-        return None if s.target_speed is None else pair("target_speed", s.target_speed, -20.0)
+        return None if s.target_speed is None else check_range("target_speed", s.target_speed, -20.0)
 
     def reach(self, engine: TrunkEngine, dt: float) -> Floats:
         """How far an action of 1 puts the command from where the gait is heading, shape (4,) [rad/s, and rad
@@ -197,7 +197,7 @@ class OneLeg:
             options, generators, engine.profiles[0], engine.trunk, self.gaits, engine.terrain, self.gait
         )
 
-    def settle(self, start: Start, targets: Floats, options: Any, engine: TrunkEngine) -> None:
+    def complete_start(self, start: Start, targets: Floats, options: Any, engine: TrunkEngine) -> None:
         """Nothing depends on the commanded speeds."""
 
     def action_for(

@@ -5,21 +5,21 @@ from __future__ import annotations
 from hoof_env.dynamics.limits import has_moved
 from hoof_env.envs.episode import FAILED, TRUNCATED
 from hoof_env.envs.reward import BEARING, LONGEST_STRIDE, Outcome
-from hoof_env.simd import choose, lane_of, larger, nth, smaller
-from hoof_env.simd.compile import inlined
+from hoof_env.simd import block_at, lane_of, maximum, minimum, where
+from hoof_env.simd.compile import inline_llvm
 
 
-@inlined
+@inline_llvm
 def bear(episode, impulse, seconds):  # type: ignore[no-untyped-def]
     """What of an impulse over the weight [s] bearing is paid for: all within the allowance, and what goes
     beyond it is taken off again. The allowance grows with time and is used up by the impulse."""
-    allowance = smaller(episode.allowance + BEARING * seconds, BEARING * LONGEST_STRIDE)
-    borne = smaller(impulse, allowance)
+    allowance = minimum(episode.allowance + BEARING * seconds, BEARING * LONGEST_STRIDE)
+    borne = minimum(impulse, allowance)
     episode.allowance = allowance - borne
     return borne - (impulse - borne)
 
 
-@inlined
+@inline_llvm
 def sum_up(first_leg, layouts):  # type: ignore[no-untyped-def]
     """What all legs did in the step, and the highest of their forces."""
     sums, slip = first_leg.sums, first_leg.sums.slip
@@ -28,11 +28,11 @@ def sum_up(first_leg, layouts):  # type: ignore[no-untyped-def]
     positive_work, normal_impulse = sums.positive_work, sums.normal_impulse
     loaded_time, stances = sums.loaded_time, sums.stances
     for i in range(1, layouts.legs):
-        sums = nth(first_leg, i).sums
+        sums = block_at(first_leg, i).sums
         running_peak_increase = running_peak_increase + sums.running_peak_increase
         peak_grf_increase = peak_grf_increase + sums.peak_grf_increase
         loading_rate_increase = loading_rate_increase + sums.loading_rate_increase
-        highest_grf = larger(highest_grf, sums.highest_grf)
+        highest_grf = maximum(highest_grf, sums.highest_grf)
         positive_work = positive_work + sums.positive_work
         normal_impulse = normal_impulse + sums.normal_impulse
         loaded_time = loaded_time + sums.loaded_time
@@ -44,7 +44,7 @@ def sum_up(first_leg, layouts):  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@inlined
+@inline_llvm
 def find_outcome(task, trunk, leg, episode, layouts):  # type: ignore[no-untyped-def]
     """What the step brought."""
     works = has_moved(trunk.result)  # else the state is of before: nothing is paid
@@ -54,24 +54,24 @@ def find_outcome(task, trunk, leg, episode, layouts):  # type: ignore[no-untyped
     if task.stays:
         progress = leg.sums.travel
     episode.x_before = x
-    seconds = choose(works, task.dt, 0.0)
-    impulse = choose(works, impulse, 0.0)
+    seconds = where(works, task.dt, 0.0)
+    impulse = where(works, impulse, 0.0)
     borne = bear(episode, impulse / episode.weight, seconds)
     return Outcome(
         seconds=seconds,
-        progress=choose(works, progress, 0.0),
+        progress=where(works, progress, 0.0),
         commanded_progress=task.dt * episode.target,
-        running_peak_increase=choose(works, running, 0.0),
-        peak_grf_increase=choose(works, peak, 0.0),
-        loading_rate_increase=choose(works, loading, 0.0),
-        highest_grf=choose(works, highest, 0.0),
-        positive_work=choose(works, work, 0.0),
+        running_peak_increase=where(works, running, 0.0),
+        peak_grf_increase=where(works, peak, 0.0),
+        loading_rate_increase=where(works, loading, 0.0),
+        highest_grf=where(works, highest, 0.0),
+        positive_work=where(works, work, 0.0),
         normal_impulse=impulse,
         borne=borne,
-        loaded_time=choose(works, loaded, 0.0),
-        stances=choose(works, stances, 0.0),
-        slip=choose(works, slip, 0.0),
-        failed=choose((trunk.result == 0.0) & (y > task.lowest) & (y < task.highest), 0.0, 1.0),
+        loaded_time=where(works, loaded, 0.0),
+        stances=where(works, stances, 0.0),
+        slip=where(works, slip, 0.0),
+        failed=where((trunk.result == 0.0) & (y > task.lowest) & (y < task.highest), 0.0, 1.0),
         episode_seconds=task.episode_seconds,
         weight=episode.weight,
         trunk=trunk,
@@ -80,7 +80,7 @@ def find_outcome(task, trunk, leg, episode, layouts):  # type: ignore[no-untyped
     )
 
 
-@inlined
+@inline_llvm
 def add_up(outcome, episode):  # type: ignore[no-untyped-def]
     """The sums of the episode."""
     episode.time = episode.time + outcome.seconds
@@ -91,23 +91,23 @@ def add_up(outcome, episode):  # type: ignore[no-untyped-def]
     episode.stances = episode.stances + outcome.stances
     episode.peak_sum = episode.peak_sum + outcome.peak_grf_increase
     episode.loading_rate_sum = episode.loading_rate_sum + outcome.loading_rate_increase
-    episode.highest = larger(episode.highest, outcome.highest_grf)
+    episode.highest = maximum(episode.highest, outcome.highest_grf)
     episode.slip = episode.slip + outcome.slip
 
 
-@inlined
+@inline_llvm
 def decide(task, outcome, episode):  # type: ignore[no-untyped-def]
     """Whether the episode ends, and whether another speed is commanded from the next step on."""
     steps = episode.steps + 1.0
-    late = choose(steps >= task.episode_steps, float(TRUNCATED), 0.0)
-    ended = choose(outcome.failed > 0.0, float(FAILED), late)
+    late = where(steps >= task.episode_steps, float(TRUNCATED), 0.0)
+    ended = where(outcome.failed > 0.0, float(FAILED), late)
     switched = steps >= episode.switch
     episode.steps, episode.ended = steps, ended
-    episode.target = choose(switched, episode.next_target, episode.target)
+    episode.target = where(switched, episode.next_target, episode.target)
     return ended > 0.0, switched
 
 
-@inlined
+@inline_llvm
 def outcome_of_one(outcome, lane, trunk, leg, episode):  # type: ignore[no-untyped-def]
     """One lane of an `Outcome`, ordinary numbers."""
     return Outcome(

@@ -14,7 +14,7 @@ from hoof_env.envs.settings import PER_EPISODE, SOLVERS, Settings, check_effect
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.ground.contact import Ground, load_ground
 from hoof_env.ground.terrain import Terrain
-from hoof_env.leg.geometry import named, read_preset, wrong
+from hoof_env.leg.geometry import preset_error_type, preset_label, read_preset
 
 MOST_SUBSTEPS = 100_000  # of a control step
 
@@ -25,9 +25,9 @@ def resolved(settings: Settings) -> Settings:
     s: Any = settings
     if s.stiffness is None or s.exponent is None:
         if "ground" not in read_preset(s.preset):
-            raise wrong(s.preset)(
-                f"{named(s.preset)}: expected an entry 'ground' with the stiffness and the exponent that its"
-                " gaits are for, {} for those of hoof_env.Ground, or both as arguments; got"
+            raise preset_error_type(s.preset)(
+                f"{preset_label(s.preset)}: expected an entry 'ground' with the stiffness and the exponent"
+                " that its gaits are for, {} for those of hoof_env.Ground, or both as arguments; got"
                 f" stiffness={s.stiffness!r}, exponent={s.exponent!r}"
             )
         ground = load_ground(s.preset, stiffness=s.stiffness, exponent=s.exponent)
@@ -40,7 +40,9 @@ def resolved(settings: Settings) -> Settings:
     return done
 
 
-def pair(name: str, value: Any, low: float, high: float = 1e6, *, or_one: bool = True) -> tuple[float, float]:
+def check_range(
+    name: str, value: Any, low: float, high: float = 1e6, *, or_one: bool = True
+) -> tuple[float, float]:
     """A range from `low` to `high`, with `or_one` also one number as one; ParameterError of anything else."""
     if or_one and not isinstance(value, (list, tuple)):
         value = value, value
@@ -247,7 +249,7 @@ def _hills(given: dict[str, Any]) -> Terrain:
         height, k = there, k + many
     factors = {}
     for name in ("stiffness", "friction"):
-        low, high = np.log(pair(f"terrain[{name!r}]", given[name], 1e-3, 1e3, or_one=False))
+        low, high = np.log(check_range(f"terrain[{name!r}]", given[name], 1e-3, 1e3, or_one=False))
         factor, k = np.empty(knots), 0
         while k < knots:
             many = max(round(generator.exponential(patch) / SPACING), 5)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.dynamics.form import form_of
+from hoof_env.dynamics.form import engine_layout
 from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.dynamics.parts import broken
 from hoof_env.envs.batch import EpisodeBatch
@@ -73,7 +73,7 @@ class Recording:
         if self.batch.paper:
             found: Record = end
             return found
-        form = form_of(self.batch.engine.features)
+        form = engine_layout(self.batch.engine.features)
         if k == -len(self._ends) or broken(end[form.trunk_memory.rows("result")])[0]:
             return self._run(end, None, 0)
         command = self.batch.engine.command_in(end)
@@ -84,7 +84,7 @@ class Recording:
         if self._engine is None:
             self._engine = self.batch.alone(self.env)
         self._engine.set_column(0, column)
-        record = self._engine.run(command, steps, beyond=True)
+        record = self._engine.run(command, steps, continue_past_limits=True)
         record.pop("result")
         return record
 
@@ -93,7 +93,7 @@ class Recording:
         hips = self.batch.body.hips
         terrain = self.batch.conditions.of(self.env).get("terrain", self.batch.engine.terrain)
         if self.renderer is None:
-            weight = float(self.batch.now.weight[self.env])
+            weight = float(self.batch.episode_rows.weight[self.env])
             self.renderer = Renderer(
                 self.batch.body.geometry, mode, fps, self.size, self.batch.settings.trunk, weight,
                 LIFT_OFF * weight / self.batch.body.legs, terrain, hips,

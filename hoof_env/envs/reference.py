@@ -22,8 +22,20 @@ from numpy.typing import NDArray
 
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait import WIDEST
-from hoof_env.simd import anywhere, choose, cross, dot, larger, level, nth, plane, read, root, smaller
-from hoof_env.simd.compile import inlined
+from hoof_env.simd import (
+    any_lane,
+    block_at,
+    cross,
+    dot,
+    full_like,
+    maximum,
+    minimum,
+    read,
+    sqrt,
+    vector,
+    where,
+)
+from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.layout import Block, Layout, Row, Vector
 from hoof_env.simd.math import clip, cos_sin
 
@@ -44,7 +56,7 @@ and two harmonics of the swing [rad]."""
 PAIR = tuple(LIMITS)
 SWING = 5  # of these are the swing's
 COUNT, ACTED = len(LEGS), 4  # legs, and actions of each
-ROOM = 3 * COUNT  # numbers that `command_gait` needs room for
+SCRATCH_SIZE = 3 * COUNT  # numbers that `command_gait` needs room for
 NAMES = ("rate", "lead", *(f"{pair}_{name}" for pair in PAIRS for name in PAIR))
 """Of the numbers of a gait, in their order."""
 
@@ -174,16 +186,16 @@ def _reference() -> tuple[Floats, Floats, Floats]:
 
 
 def reference_type() -> list[Any]:
-    """What `refer_to_target` reads of a task's record: whether it is to, the animal's pace, and the stored
+    """What `refer_to_target` reads of a task's record: whether it is to, its speed scale, and the stored
     speeds and gaits."""
     n = len(_reference()[0])
-    return [("follows", "?"), ("pace", "f8"), ("speeds", "f8", (n,)), ("gaits", "f8", (n, len(NAMES)))]
+    return [("follows", "?"), ("speed_scale", "f8"), ("speeds", "f8", (n,)), ("gaits", "f8", (n, len(NAMES)))]
 
 
-def reference_constants(pace: float, follows: bool) -> dict[str, Any]:
-    """Their values for a horse whose speed is `pace` times that of one of 475 kg."""
+def reference_constants(speed_scale: float, follows: bool) -> dict[str, Any]:
+    """Their values for a horse whose speed is `speed_scale` times that of one of 475 kg."""
     speeds, gaits, _ = _reference()
-    return {"follows": follows, "pace": pace, "speeds": speeds, "gaits": gaits}
+    return {"follows": follows, "speed_scale": speed_scale, "speeds": speeds, "gaits": gaits}
 
 
 def _mixed(speeds: Floats, values: Floats) -> Floats:
@@ -314,31 +326,32 @@ FOLLOWED = 0.1
 actions, and zero actions let it fade."""
 
 
-@inlined
-def command_gait(task, actions, episode, first_leg, parameters, n, room):  # type: ignore[no-untyped-def]
-    """Command the gait of the episode, and what actions change of it; `room` is for `ROOM` numbers.
+@inline_llvm
+def command_gait(task, actions, episode, first_leg, parameters, n, scratch):  # type: ignore[no-untyped-def]
+    """Command the gait of the episode, and what actions change of it; `scratch` is for `SCRATCH_SIZE`
+    numbers.
 
     The first action of a leg scales its crank's speed, the others are added to the swing's first three
     coefficients."""
-    gait, together = episode.gait, plane(level(episode, 0.0), 0.0)
+    gait, together = episode.gait, vector(full_like(episode, 0.0), 0.0)
     for p in range(len(PAIRS)):
-        wave = nth(gait.fore, p).wave
-        r = root(1.0 - dot(wave, wave))
+        wave = block_at(gait.fore, p).wave
+        r = sqrt(1.0 - dot(wave, wave))
         half, fold, speed = 0.5 * (1.0 + r), (1.0 / (2.0 + 2.0 * r)) * (wave * wave), gait.rate / r
         cosine, sine = cos_sin(2.0 * math.pi * gait.lead * (1.0 - p))
-        begin = plane(cosine, sine) * phase_of(wave, half, fold, plane(level(episode, 1.0), 0.0))
+        begin = vector(cosine, sine) * phase_of(wave, half, fold, vector(full_like(episode, 1.0), 0.0))
         for side in range(2):
             i, sign = 2 * p + side, 1.0 - 2.0 * side
-            cosine, sine = cos_sin(nth(first_leg, i).state.theta)
-            crank = plane(cosine, sine)
+            cosine, sine = cos_sin(block_at(first_leg, i).state.theta)
+            crank = vector(cosine, sine)
             phase = sign * (conjugate(begin) * phase_of(wave, half, fold, crank))
-            room[3 * i] = speed * (1.0 + dot(wave, crank))
-            room[3 * i + 1], room[3 * i + 2] = phase.real, phase.imag
+            scratch[3 * i] = speed * (1.0 + dot(wave, crank))
+            scratch[3 * i + 1], scratch[3 * i + 2] = phase.real, phase.imag
             together = together + phase
     for i in range(COUNT):
-        leg, pair = nth(first_leg, i), nth(gait.fore, i // 2)
-        behind = cross(plane(room[3 * i + 1], room[3 * i + 2]), together)
-        speed = room[3 * i] * (1.0 + (COUPLING / COUNT) * behind)
+        leg, pair = block_at(first_leg, i), block_at(gait.fore, i // 2)
+        behind = cross(vector(scratch[3 * i + 1], scratch[3 * i + 2]), together)
+        speed = scratch[3 * i] * (1.0 + (COUPLING / COUNT) * behind)
         for k in range(parameters):
             offset = 0.0 * speed
             if k < ACTED:
@@ -351,33 +364,33 @@ def command_gait(task, actions, episode, first_leg, parameters, n, room):  # typ
             wanted = speed * (1.0 + offset)
             if k > 0:
                 wanted = pair.swing[k - 1] + offset
-            leg.command[k] = smaller(larger(wanted, task.low[k]), task.high[k])
+            leg.command[k] = minimum(maximum(wanted, task.low[k]), task.high[k])
 
 
-@inlined
+@inline_llvm
 def phase_of(wave, half, fold, crank):  # type: ignore[no-untyped-def]
     """e^(i phase) of a pair where e^(i theta) is `crank`; see `Stride`."""
     return (1.0 / (1.0 + dot(wave, crank))) * (half * crank + fold * conjugate(crank) + wave)
 
 
-@inlined
+@inline_llvm
 def conjugate(z):  # type: ignore[no-untyped-def]
-    return plane(z.real, -z.imag)
+    return vector(z.real, -z.imag)
 
 
-@inlined
+@inline_llvm
 def refer_to_target(task, episode, switched):  # type: ignore[no-untyped-def]
     """Where another speed is commanded its reference gait is the episode's, see `reference_gaits`."""
-    if not (task.follows and anywhere(switched)):
+    if not (task.follows and any_lane(switched)):
         return
     speeds, gaits, last = task.speeds, task.gaits, len(task.speeds) - 1
-    speed = episode.target * (1.0 / task.pace)
-    within = smaller(larger(speed, speeds[0]), speeds[last])
+    speed = episode.target * (1.0 / task.speed_scale)
+    within = minimum(maximum(speed, speeds[0]), speeds[last])
     for k in range(len(NAMES)):
-        mixed = level(episode, gaits[0, k])
+        mixed = full_like(episode, gaits[0, k])
         for j in range(last):
             part = (within - speeds[j]) * (1.0 / (speeds[j + 1] - speeds[j]))
-            mixed = mixed + (gaits[j + 1, k] - gaits[j, k]) * smaller(larger(part, 0.0), 1.0)
+            mixed = mixed + (gaits[j + 1, k] - gaits[j, k]) * minimum(maximum(part, 0.0), 1.0)
         if k == 0:
-            mixed = mixed * speed / (within * task.pace)
-        episode.gait[k] = choose(switched, mixed, episode.gait[k])
+            mixed = mixed * speed / (within * task.speed_scale)
+        episode.gait[k] = where(switched, mixed, episode.gait[k])

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hoof_env.errors import ParameterError, check_number
-from hoof_env.simd import choose, larger, size, smaller
+from hoof_env.simd import absolute, maximum, minimum, where
 from hoof_env.simd.user_functions import check_function
 
 
@@ -38,7 +38,8 @@ class Outcome(NamedTuple):
         episode_seconds: of a whole episode [s].
         weight: of trunk and legs [N].
         trunk, leg, episode: all that the engine and the episode have in memory after the step, fields as in
-            `dynamics.layout.TrunkMemory` and `LegMemory` and `step.Episode`; `nth(leg, i)` is a horse's i-th.
+            `dynamics.layout.TrunkMemory` and `LegMemory` and `episode.Episode`; `block_at(leg, i)` is a
+            horse's i-th.
     """
 
     seconds: Any
@@ -76,12 +77,12 @@ agents slow the crank down in a stance, and a leg whose crank stands still can o
 
 def progress(step, weight):  # type: ignore[no-untyped-def]
     """Paid up to the commanded speed."""
-    return weight * smaller(step.progress, step.commanded_progress)
+    return weight * minimum(step.progress, step.commanded_progress)
 
 
 def overspeed(step, weight):  # type: ignore[no-untyped-def]
     """What goes beyond the commanded speed."""
-    return -weight * larger(step.progress - step.commanded_progress, 0.0)
+    return -weight * maximum(step.progress - step.commanded_progress, 0.0)
 
 
 def peak(step, weight):  # type: ignore[no-untyped-def]
@@ -106,18 +107,18 @@ def slip(step, weight):  # type: ignore[no-untyped-def]
 
 def failure(step, weight):  # type: ignore[no-untyped-def]
     """Charged once, for the rest of the episode."""
-    return choose(step.failed > 0.0, -weight * (step.episode_seconds - step.episode.time), 0.0)
+    return where(step.failed > 0.0, -weight * (step.episode_seconds - step.episode.time), 0.0)
 
 
 def support(step, weight):  # type: ignore[no-untyped-def]
     """What was borne, in proportion to the speed, up to the commanded one, and to the crank's rate, up to
     `STEPPING`: standing and pressing, or trembling with the swing, is not paid, and rubbing to and fro earns
     nothing."""
-    commanded = larger(step.commanded_progress, 1e-9)
-    pace = smaller(larger(step.progress / commanded, -1.0), 1.0)
-    pace = smaller(choose(commanded < np.inf, pace, 1.0), step.leg.state.theta_rate * (1.0 / STEPPING))
+    commanded = maximum(step.commanded_progress, 1e-9)
+    pace = minimum(maximum(step.progress / commanded, -1.0), 1.0)
+    pace = minimum(where(commanded < np.inf, pace, 1.0), step.leg.state.theta_rate * (1.0 / STEPPING))
     # What was borne too much is charged backward, too, where both factors are negative
-    return weight * smaller(pace * step.borne, size(pace) * step.borne)
+    return weight * minimum(pace * step.borne, absolute(pace) * step.borne)
 
 
 @dataclass(frozen=True)
@@ -130,7 +131,7 @@ class Term:
         unit: of the weight.
         meaning: what is weighed, for the manual page.
         compute: function of an `Outcome` and the weight, compiled for one environment and for eight side by
-            side: + - * /, comparisons, and the functions of `hoof_env.simd`; `choose` in the place of `if`.
+            side: + - * /, comparisons, and the functions of `hoof_env.simd`; `where` in the place of `if`.
         scalar: `compute` is a function of ordinary numbers, which may use `if` and `math`; it is called for
             one environment after the other, which takes longer.
 

@@ -14,7 +14,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from hoof_env.envs.base import fixed_setting
 from hoof_env.envs.infos import row_of
 from hoof_env.envs.settings import SETTINGS, VectorKeywords
-from hoof_env.envs.vector import OWN, HorseLegVectorEnv
+from hoof_env.envs.vector import PER_ENV, HorseLegVectorEnv
 from hoof_env.errors import ParameterError
 
 
@@ -129,7 +129,7 @@ class Sb3VecEnv(VecEnv):
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         """As `HorseLegVectorEnv.get_attr`."""
-        return self.envs.ask(attr_name, self._get_indices(indices))
+        return self.envs.call_on(attr_name, self._get_indices(indices))
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
         """As `HorseLegVectorEnv.set_attr`, of some environments or of all."""
@@ -137,9 +137,9 @@ class Sb3VecEnv(VecEnv):
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
         """As `HorseLegVectorEnv.call`; ParameterError where some are meant by a method of all together."""
-        if method_name not in (*OWN, "get_wrapper_attr", "has_wrapper_attr"):
+        if method_name not in (*PER_ENV, "get_wrapper_attr", "has_wrapper_attr"):
             self._whole("env_method", indices)
-        return self.envs.ask(method_name, self._get_indices(indices), *args, **kwargs)
+        return self.envs.call_on(method_name, self._get_indices(indices), *args, **kwargs)
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
         """Nothing is wrapped."""

@@ -32,7 +32,7 @@ OPTIONS = {
 }  # fmt: skip
 """Numeric reset options and their ranges [rad, m/s, m, m, m/s]; "gait" and "parameters" are the others."""
 
-HANDED_ON = ("minari_autoseed",)
+FOREIGN_OPTIONS = ("minari_autoseed",)
 """Options that others put there for themselves: Minari hands its own on to the environment."""
 
 FLAT, MARGIN, REACH = Terrain.flat(), 50.0, 1.0
@@ -47,14 +47,14 @@ class Start:
     """Starts of n episodes.
 
     Attributes:
-        begun: what infos say of them, by name, shape (n,).
+        values: what infos say of them, by name, shape (n,).
         gaits: what they say of the gait, shape (n, numbers).
         commands: of the engine, shape (legs, gait parameters, n).
         theta: crank angles [rad], shape (legs, n).
         trunk: arguments of `TrunkEngine.reset` by name, shape (n,).
     """
 
-    begun: dict[str, Floats]
+    values: dict[str, Floats]
     gaits: Floats
     commands: Floats
     theta: Floats
@@ -114,7 +114,7 @@ def draw_starts(
     height, x = np.full(n, options.get("height", trunk.height)), np.full(n, options.get("x", 0.0))
     ground = np.zeros(n)
     if terrain != FLAT:
-        x = anywhere(terrain, x, options, generators)
+        x = start_anywhere(terrain, x, options, generators)
         ground = highest(terrain, x, REACH)
     if trunk.kind == "suspended":
         if "height" not in options:
@@ -130,7 +130,7 @@ def draw_starts(
     return Start(begun, chosen, chosen.T[None], theta[None], trunk_at)
 
 
-def anywhere(
+def start_anywhere(
     terrain: Terrain, x: Floats, options: Mapping[str, Any], generators: Sequence[np.random.Generator]
 ) -> Floats:
     """Where episodes on a terrain begin: at `x` if it is short or one slope, or if the options say so."""
@@ -162,7 +162,7 @@ def checked_options(options: Any, numbers: Mapping[str, tuple[float, float]]) ->
     if options is None:
         return {}
     if isinstance(options, Mapping):
-        options = {key: value for key, value in options.items() if key not in HANDED_ON}
+        options = {key: value for key, value in options.items() if key not in FOREIGN_OPTIONS}
     if not isinstance(options, Mapping) or not set(options) <= set(known):
         raise ParameterError(f"options: expected a mapping with some of {', '.join(known)}, got {options!r}")
     checked = dict(options)

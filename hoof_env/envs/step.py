@@ -18,12 +18,24 @@ from hoof_env.dynamics.layout import PLAIN, Features
 from hoof_env.dynamics.limits import has_moved
 from hoof_env.envs.episode import ACTIONS, FAILED, TRUNCATED, Memories, memories_of, task_type
 from hoof_env.envs.horse_rows import HORSE_TERMS
-from hoof_env.envs.observation import Entry, Scene
+from hoof_env.envs.observation import Entry, ObservationInputs
 from hoof_env.envs.outcome import add_up, decide, find_outcome, outcome_of_one
-from hoof_env.envs.reference import ROOM, command_gait, refer_to_target
+from hoof_env.envs.reference import SCRATCH_SIZE, command_gait, refer_to_target
 from hoof_env.envs.reward import TERMS, Term
-from hoof_env.simd import anywhere, choose, columns, larger, level, read, rows, set_lane, size, smaller, write
-from hoof_env.simd.compile import inlined, kernel, pasted
+from hoof_env.simd import (
+    absolute,
+    any_lane,
+    columns,
+    full_like,
+    maximum,
+    minimum,
+    read,
+    rows,
+    set_lane,
+    where,
+    write,
+)
+from hoof_env.simd.compile import inline_llvm, inline_source, kernel
 from hoof_env.simd.kept import Kept, Kernels
 from hoof_env.simd.math import clip, tanh
 from hoof_env.simd.memory import (
@@ -51,25 +63,25 @@ ADDRESSES = Addresses(
 """The arrays of a step, those of the engine first."""
 
 AT, BEGIN, END = ADDRESSES.slots, ADDRESSES.begin, ADDRESSES.end
-SHIPPED = tuple(term.name for term in TERMS)
+BUILT_IN_TERMS = tuple(term.name for term in TERMS)
 
 
-def is_own(term: Term) -> bool:
+def is_user_term(term: Term) -> bool:
     """Whether a term is from outside the package, so that nobody knows what it does with broken reports."""
-    return term.name not in SHIPPED and term not in HORSE_TERMS
+    return term.name not in BUILT_IN_TERMS and term not in HORSE_TERMS
 
 
-@inlined
+@inline_llvm
 def apply_action(task, actions, leg, n):  # type: ignore[no-untyped-def]
     """Command the rates that an action asks for, from where the gait is heading and within the limits."""
     for k in range(ACTIONS):
         action = clip(read(leg, actions, n * ACTIONS + k, ACTIONS), 1.0)
         heading = leg.state.gait[k] + task.lead * leg.state.gait_rate[k]
         command = heading + task.reach[k] * action
-        leg.command[k] = smaller(larger(command, task.low[k]), task.high[k])
+        leg.command[k] = minimum(maximum(command, task.low[k]), task.high[k])
 
 
-@inlined
+@inline_llvm
 def memories(addresses, lanes, layouts, n):  # type: ignore[no-untyped-def]
     """Trunk, leg and episode of environments n, n + 1, ..., as `lanes` columns, see `simd.columns`."""
     row = addresses[AT.data + COLUMNS]
@@ -85,24 +97,24 @@ def _with_terms(terms: tuple[Term, ...], layouts: Memories, k: int = 0) -> Calla
     """A function that computes the terms from the k-th on, keeps them in `episode.terms` and returns the sum
     of all. numba has no loop over functions, so each calls the next."""
     if k == len(terms):
-        return inlined(lambda addresses, lanes, task, outcome, episode, n, total: total)
-    compute, rest, is_first = inlined(terms[k].compute), _with_terms(terms, layouts, k + 1), k == 0
-    from_outside, number = is_own(terms[k]), number_of(terms[k].title)
+        return inline_llvm(lambda addresses, lanes, task, outcome, episode, n, total: total)
+    compute, rest, is_first = inline_llvm(terms[k].compute), _with_terms(terms, layouts, k + 1), k == 0
+    from_outside, number = is_user_term(terms[k]), number_of(terms[k].title)
 
-    @inlined
+    @inline_llvm
     def add_term(addresses, lanes, task, outcome, episode, n, total):  # type: ignore[no-untyped-def]
         if from_outside:
             works = has_moved(outcome.trunk.result)  # else the reports that it may read are of where it broke
-            episode.terms[k] = choose(works, episode.terms[k], 0.0)
+            episode.terms[k] = where(works, episode.terms[k], 0.0)
         total = episode.terms[k] if is_first else total + episode.terms[k]
         return rest(addresses, lanes, task, outcome, episode, n, total)
 
-    @inlined
+    @inline_llvm
     def compute_term(addresses, lanes, task, outcome, episode, n, total):  # type: ignore[no-untyped-def]
         episode.terms[k] = number(compute(outcome, task.weights[k])) + 0.0  # no -0 where it weighs nothing
         return add_term(addresses, lanes, task, outcome, episode, n, total)
 
-    @inlined
+    @inline_llvm
     def compute_one_by_one(addresses, lanes, task, outcome, episode, n, total):  # type: ignore[no-untyped-def]
         for lane in range(lanes):
             trunk, leg, own = memories(addresses, 0, layouts, n + lane)
@@ -135,7 +147,7 @@ def _with_entries(entries: tuple[Entry, ...], layouts: Memories, scaled: bool) -
         middle = (first + last) // 2
         one, other = put_from(first, middle), put_from(middle, last)
 
-        @inlined
+        @inline_llvm
         def put_both(addresses, lanes, scene, numbers, n):  # type: ignore[no-untyped-def]
             one(addresses, lanes, scene, numbers, n)
             other(addresses, lanes, scene, numbers, n)
@@ -146,21 +158,21 @@ def _with_entries(entries: tuple[Entry, ...], layouts: Memories, scaled: bool) -
 
 
 def _with_entry(entry: Entry, slot: int, layouts: Memories, scaled: bool) -> Callable[..., Any]:
-    measure, apply = inlined(entry.measure), entry.scale.apply
-    scale = inlined(apply) if scaled and apply is not None else inlined(lambda x, scene: x)
+    measure, apply = inline_llvm(entry.measure), entry.scale.apply
+    scale = inline_llvm(apply) if scaled and apply is not None else inline_llvm(lambda x, scene: x)
     number, scaled_number = number_of(entry.title), number_of(f"the scale of {entry.title}")
 
-    @inlined
+    @inline_llvm
     def put_entry(addresses, lanes, scene, numbers, n):  # type: ignore[no-untyped-def]
-        if scene.task.places[slot] >= 0:
+        if scene.task.observation_columns[slot] >= 0:
             numbers[slot] = scaled_number(scale(number(measure(scene)), scene))
 
-    @inlined
+    @inline_llvm
     def put_one_by_one(addresses, lanes, scene, numbers, n):  # type: ignore[no-untyped-def]
-        if scene.task.places[slot] >= 0:
+        if scene.task.observation_columns[slot] >= 0:
             for lane in range(lanes):
                 trunk, leg, episode = memories(addresses, 0, layouts, n + lane)
-                own = Scene(
+                own = ObservationInputs(
                     trunk, leg, episode, scene.task, scene.ground, scene.ground_origin, scene.ground_per_metre
                 )
                 set_lane(numbers, slot, lane, scaled_number(scale(number(measure(own)), own)))
@@ -228,7 +240,7 @@ def _made(
 ) -> StepKernels:
     refresh(*own)
     flags = (
-        [(term.scalar, not is_own(term)) for term in terms],
+        [(term.scalar, not is_user_term(term)) for term in terms],
         [(entry.scalar, entry.scale.saturates) for entry in entries],
     )
     parts = _functions(terms, entries, contact_law)
@@ -247,30 +259,32 @@ def _made(
     advance_batch = advance.advance_batch
     task_at, model_at = record_at(task_record), record_at(MODEL)
 
-    @pasted
+    @inline_source
     def scene_of(addresses, lanes, task, n):  # type: ignore[no-untyped-def]
         trunk, leg, episode = memories(addresses, lanes, layouts, n)
         model, ground = model_at(addresses[AT.model])[0], matrix_at(addresses, AT.ground)
-        return Scene(trunk, leg, episode, task, ground, model.ground_origin, model.ground_per_metre)
+        return ObservationInputs(
+            trunk, leg, episode, task, ground, model.ground_origin, model.ground_per_metre
+        )
 
-    @pasted
+    @inline_source
     def are_numbers(addresses):  # type: ignore[no-untyped-def]
         """Whether all actions are, those of other blocks, too."""
         actions, count, good = singles_at(addresses[AT.actions]), addresses[AT.data + COLUMNS], True
         for k in range(count * (legs * ACTIONS)):
-            good &= size(float(actions[k])) < np.inf
+            good &= absolute(float(actions[k])) < np.inf
         return good
 
-    @pasted
-    def apply_actions(addresses, lanes, task, n, room):  # type: ignore[no-untyped-def]
+    @inline_source
+    def apply_actions(addresses, lanes, task, n, scratch):  # type: ignore[no-untyped-def]
         _, leg, episode = memories(addresses, lanes, layouts, n)
         actions = singles_at(addresses[AT.actions])
         if legs == 1:
             apply_action(task, actions, leg, n)
         else:
-            command_gait(task, actions, episode, leg, layouts.gait, n, rows(room, lanes, None))
+            command_gait(task, actions, episode, leg, layouts.gait, n, rows(scratch, lanes, None))
 
-    @pasted
+    @inline_source
     def observe(addresses, lanes, task, n, memory):  # type: ignore[no-untyped-def]
         numbers = rows(memory, lanes, None)
         for slot in range(slots):
@@ -285,11 +299,16 @@ def _made(
                 numbers[k] = tanh(numbers[k])
         observations = singles_at(addresses[AT.observations])
         for slot in range(slots):
-            place = task.places[slot]
+            place = task.observation_columns[slot]
             if place >= 0:
-                write(clip(numbers[slot], 1.0), observations, n * task.count + place, task.count)
+                write(
+                    clip(numbers[slot], 1.0),
+                    observations,
+                    n * task.observation_size + place,
+                    task.observation_size,
+                )
 
-    @pasted
+    @inline_source
     def finish(addresses, lanes, task, n, memory):  # type: ignore[no-untyped-def]
         """What follows the engine: reward, end and observation."""
         happened = 0
@@ -299,25 +318,25 @@ def _made(
         ended, switched = decide(task, outcome, episode)
         if legs > 1:
             refer_to_target(task, episode, switched)
-        nothing = level(episode, 0.0)
+        nothing = full_like(episode, 0.0)
         reward = compute_reward(addresses, lanes, task, outcome, episode, n, nothing)
         write(reward, doubles_at(addresses[AT.rewards]), n, 1)
-        if anywhere(ended):
+        if any_lane(ended):
             happened |= SOME_ENDED
-        if anywhere(switched):
+        if any_lane(switched):
             happened |= SOME_SWITCHED
         observe(addresses, lanes, task, n, memory)
         return happened
 
-    @pasted
+    @inline_source
     def step(addresses, lanes, advance):  # type: ignore[no-untyped-def]
         """One group of lanes after the other, whose memory stays in the cache from action to observation."""
         if not are_numbers(addresses):
             return NOT_A_NUMBER
         task, happened = task_at(addresses[AT.task])[0], 0
-        room, memory = doubles(ROOM * lanes), doubles(slots * lanes)
+        scratch, memory = doubles(SCRATCH_SIZE * lanes), doubles(slots * lanes)
         for n in range(addresses[BEGIN], addresses[END], lanes):
-            apply_actions(addresses, lanes, task, n, room)
+            apply_actions(addresses, lanes, task, n, scratch)
             advance(
                 matrix_at(addresses, AT.data), model_at(addresses[AT.model]), matrix_at(addresses, AT.tables),
                 matrix_at(addresses, AT.ground), matrix_at(addresses, AT.constants),
@@ -326,7 +345,7 @@ def _made(
             happened |= finish(addresses, lanes, task, n, memory)
         return happened
 
-    @pasted
+    @inline_source
     def observe_all(addresses, lanes):  # type: ignore[no-untyped-def]
         task, memory = task_at(addresses[AT.task])[0], doubles(slots * lanes)
         for n in range(addresses[BEGIN], addresses[END], lanes):
@@ -339,10 +358,10 @@ def _made(
         return step(addresses, LANES, advance_batch)
 
     def apply_one(addresses):  # type: ignore[no-untyped-def]
-        task, room, good = task_at(addresses[AT.task])[0], doubles(ROOM), are_numbers(addresses)
+        task, scratch, good = task_at(addresses[AT.task])[0], doubles(SCRATCH_SIZE), are_numbers(addresses)
         if good:
             for n in range(addresses[BEGIN], addresses[END]):
-                apply_actions(addresses, 1, task, n, room)
+                apply_actions(addresses, 1, task, n, scratch)
         return good
 
     def finish_one(addresses):  # type: ignore[no-untyped-def]
@@ -362,8 +381,8 @@ def _made(
         for n in range(out.shape[1]):
             put_measured(addresses, 1, scene_of(addresses, 1, task, n), numbers, n)
             for slot in range(slots):
-                if task.places[slot] >= 0:
-                    write(numbers[slot], address(out), task.places[slot] * out.shape[1] + n, 1)
+                if task.observation_columns[slot] >= 0:
+                    write(numbers[slot], address(out), task.observation_columns[slot] * out.shape[1] + n, 1)
 
     functions = (step_one, step_batch, apply_one, finish_one, observe_one, observe_batch, measure_one)
     return StepKernels(

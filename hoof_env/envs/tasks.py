@@ -25,7 +25,7 @@ from hoof_env.envs.reference import checked_size
 from hoof_env.envs.reward import TERMS, Term, check_weights
 from hoof_env.envs.settings import SETTINGS, Settings, as_plain, check_effect, json_value
 from hoof_env.errors import ParameterError, UnknownArgumentError, check_choice
-from hoof_env.simd.user_functions import check_function, named
+from hoof_env.simd.user_functions import check_function, function_name
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class Task:
 
     def names(self) -> tuple[list[str], ...]:
         """Of what it is made of."""
-        law = [named(self.contact_law)] if self.contact_law else []
+        law = [function_name(self.contact_law)] if self.contact_law else []
         return [term.name for term in self.terms], [entry.name for entry in self.entries], law
 
     def __reduce__(self) -> Any:
@@ -95,8 +95,8 @@ class Task:
         settings = self.chosen(changes)
         if self.speeds is None or settings.target_speed is not None:
             return settings
-        pace = math.sqrt(checked_size(settings.size))
-        return replace(settings, target_speed=(pace * self.speeds[0], pace * self.speeds[1]))
+        speed_scale = math.sqrt(checked_size(settings.size))
+        return replace(settings, target_speed=(speed_scale * self.speeds[0], speed_scale * self.speeds[1]))
 
     def chosen(self, changes: Mapping[str, Any]) -> Settings:
         """The same where a target speed that nobody names is None still."""
@@ -323,7 +323,8 @@ def register(
         name=env_id,
         module="" if caller in ("__main__", "__mp_main__") else caller,
         summary=f"{old.summary} With terms, entries or laws from outside this package.",
-        about=old.about + (f" The normal force is that of `{named(contact_law)}`." if contact_law else ""),
+        about=old.about
+        + (f" The normal force is that of `{function_name(contact_law)}`." if contact_law else ""),
         terms=(*kept, *mine.values()),
         entries=(*old.entries, *more),
         contact_law=law,

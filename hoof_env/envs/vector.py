@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from hoof_env.envs.base import LegBase, array_of, fixed_setting, generator_of
 from hoof_env.envs.episode import FAILED, TRUNCATED
-from hoof_env.envs.infos import named
+from hoof_env.envs.infos import name_columns
 from hoof_env.envs.recording import Recording
 from hoof_env.envs.settings import Keywords
 from hoof_env.errors import ParameterError, all_of, count
@@ -35,13 +35,13 @@ UNKNOWN_SEED = -1  # as Gymnasium says it
 
 MOST_DRAWN = 16  # so many are drawn by default; a picture takes as long as some hundred steps
 
-OWN = (
+PER_ENV = (
     "weight", "render", "episode_summary", "raw_observation", "record", "np_random", "np_random_seed",
     "action_for",
 )  # fmt: skip
 """What each environment has of its own; the rest is of all."""
 
-SINGLE = {"action_space": "single_action_space", "observation_space": "single_observation_space"}
+SINGLE_SPACES = {"action_space": "single_action_space", "observation_space": "single_observation_space"}
 
 
 def mode_of(value: Any) -> AutoresetMode:
@@ -110,7 +110,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         self.spec = None
         self.drawn = self._check_drawn(rendered)
         self._watched = {env: Recording(self.batch, env, self._size) for env in range(self.drawn)}
-        self._marks: dict[str, dict[int, Any]] = {}
+        self._attributes: dict[str, dict[int, Any]] = {}
         self._generators: list[np.random.Generator] = []
         self._seeds: list[int] = []
         self._ended = np.zeros(self.num_envs, bool)
@@ -141,7 +141,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         observations[~self._started] = 0.0
         infos: dict[str, Any] = self.batch.infos()
         if parameters:
-            infos["parameters"] = named(np.zeros((self.num_envs, len(parameters))), [*parameters])
+            infos["parameters"] = name_columns(np.zeros((self.num_envs, len(parameters))), [*parameters])
             infos["parameters"][mask] = np.transpose([*parameters.values()])
         return observations, infos | {f"_{key}": mask.copy() for key in infos}
 
@@ -164,7 +164,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
             )
         batch.actions[:n] = self._check_actions(actions)
         some_ended = batch.step(self._generators, again)
-        how = batch.now.ended[:n]
+        how = batch.episode_rows.ended[:n]
         terminated, truncated = how == FAILED, how == TRUNCATED
         if again is not None:  # NEXT_STEP: these were not stepped, they start
             terminated[again], truncated[again] = False, False
@@ -232,7 +232,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
     @property
     def weight(self) -> Floats:
         """Weight of trunk and leg [N], shape (num_envs,)."""
-        return self.batch.now.weight[: self.num_envs].copy()
+        return self.batch.episode_rows.weight[: self.num_envs].copy()
 
     @property  # type: ignore[override]
     def np_random(self) -> tuple[np.random.Generator, ...]:
@@ -286,7 +286,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
             AttributeError: there is none of that name.
             ParameterError: "reset" or "step", which take arrays of all.
         """
-        return tuple(self.ask(name, range(self.num_envs), *args, **kwargs))
+        return tuple(self.call_on(name, range(self.num_envs), *args, **kwargs))
 
     def get_attr(self, name: str) -> tuple[Any, ...]:
         """An attribute of each environment; as `call`."""
@@ -312,30 +312,30 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
             return
         if hasattr(self.batch.settings, name) or hasattr(self, name) or hasattr(self.batch, name):
             raise fixed_setting(name)
-        self._marks.setdefault(name, {}).update(values)
+        self._attributes.setdefault(name, {}).update(values)
 
-    def ask(self, name: str, envs: Iterable[int], *args: Any, **kwargs: Any) -> list[Any]:
+    def call_on(self, name: str, envs: Iterable[int], *args: Any, **kwargs: Any) -> list[Any]:
         """`call` of some environments."""
         chosen = list(envs)
         if name == "get_wrapper_attr":
-            return self.ask(*args, chosen, **kwargs)
+            return self.call_on(*args, chosen, **kwargs)
         if name == "has_wrapper_attr":
             return [self._has(env, *args, **kwargs) for env in chosen]
-        if name in self._marks:
-            if lacks := [env for env in chosen if env not in self._marks[name]]:
+        if name in self._attributes:
+            if lacks := [env for env in chosen if env not in self._attributes[name]]:
                 raise AttributeError(f"environments {lacks} have no attribute {name!r}")
-            return [self._marks[name][env] for env in chosen]
+            return [self._attributes[name][env] for env in chosen]
         if name in ("reset", "step"):
             raise ParameterError(f"call: {name!r} is of all together; expected envs.{name}(...)")
         if name == "record":
             return [self.record(env) for env in chosen]
-        name = SINGLE.get(name, name)
+        name = SINGLE_SPACES.get(name, name)
         owner: Any = self if hasattr(self, name) else self.batch
         if name.startswith("_") or not hasattr(owner, name):
             raise AttributeError(f"{type(self).__name__}: the environments have no attribute {name!r}")
         value = getattr(owner, name)
         value = value(*args, **kwargs) if callable(value) else value
-        if name not in OWN or value is None:
+        if name not in PER_ENV or value is None:
             return [value] * len(chosen)
         if isinstance(value, dict):
             return [{key: values[env] for key, values in value.items()} for env in chosen]
@@ -345,7 +345,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
 
     def _has(self, env: int, name: str) -> bool:
         try:
-            self.ask(name, [env])
+            self.call_on(name, [env])
         except AttributeError:
             return False
         return True

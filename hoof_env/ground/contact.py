@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS, damping, friction_part, normal_force
-from hoof_env.leg.geometry import DEFAULT_PRESET, Preset, named, read_preset, wrong
+from hoof_env.leg.geometry import DEFAULT_PRESET, Preset, preset_error_type, preset_label, read_preset
 from hoof_env.simd.compile import kernel
 from hoof_env.simd.math import EXPONENT_UNIT
 
@@ -174,14 +174,14 @@ def load_ground(preset: Preset = DEFAULT_PRESET, **overrides: Any) -> Ground:
     """
     section = read_preset(preset).get("ground", {})
     if not isinstance(section, Mapping) or set(section) - set(SETTINGS):
-        raise wrong(preset)(
-            f"{named(preset)}: ground: expected an object with no other entries than {', '.join(SETTINGS)}, "
-            f"got {section!r}"
+        raise preset_error_type(preset)(
+            f"{preset_label(preset)}: ground: expected an object with no other entries than "
+            f"{', '.join(SETTINGS)}, got {section!r}"
         )
     try:
         ground = Ground(**section)
     except ParameterError as error:
-        raise wrong(preset)(f"{named(preset)}: ground: {error}") from None
+        raise preset_error_type(preset)(f"{preset_label(preset)}: ground: {error}") from None
     return replace(ground, **{name: value for name, value in overrides.items() if value is not None})
 
 

@@ -26,8 +26,8 @@ import math
 from collections.abc import Callable
 
 from hoof_env.errors import ParameterError, check_choice, check_number
-from hoof_env.simd import larger, smaller
-from hoof_env.simd.compile import inlined
+from hoof_env.simd import maximum, minimum
+from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.math import exp_of_negative
 
 
@@ -113,11 +113,11 @@ def _bisect(f: Callable[[float], float], low: float, high: float) -> float:
             high = middle
 
 
-@inlined
+@inline_llvm
 def normal_force(spring, chi, dashpot, rate, inverse_speed):  # type: ignore[no-untyped-def]
     """Normal force [N] on a point inside the ground (Eq. 14) from K d^n [N], chi [-], c [N s/m], v [m/s] and
     1 / v0 [s/m]. The ground does not pull."""
-    return larger(spring * (1.0 + chi * rate * inverse_speed) + dashpot * rate, 0.0)
+    return maximum(spring * (1.0 + chi * rate * inverse_speed) + dashpot * rate, 0.0)
 
 
 FRICTION_LAWS = ("ambrosio", "threlfall", "tanh")
@@ -126,7 +126,7 @@ FRICTION_LAWS = ("ambrosio", "threlfall", "tanh")
 AMBROSIO, THRELFALL, TANH = range(3)
 
 
-@inlined
+@inline_llvm
 def friction_part(speed, law, slow, fast):  # type: ignore[no-untyped-def]
     """Friction coefficient over its kinetic value, mu(|v|) / mu_k [-], 0 to 1; 0 at rest.
 
@@ -137,8 +137,8 @@ def friction_part(speed, law, slow, fast):  # type: ignore[no-untyped-def]
     if law == AMBROSIO:
         part = (speed - slow) / (fast - slow)
     elif law == THRELFALL:
-        part = 1.0 - exp_of_negative(-3.0 * smaller(speed / fast, 1.0))
+        part = 1.0 - exp_of_negative(-3.0 * minimum(speed / fast, 1.0))
     else:
         e = exp_of_negative(-2.0 * (speed / fast))
         part = (1.0 - e) / (1.0 + e)
-    return smaller(larger(part, 0.0), 1.0)
+    return minimum(maximum(part, 0.0), 1.0)

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.errors import ParameterError, check_number
-from hoof_env.simd import floor, gather_eight, larger, smaller
-from hoof_env.simd.compile import inlined
+from hoof_env.simd import floor, gather_eight, maximum, minimum
+from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.memory import address
 
 MOST_KNOTS = 1_000_000
@@ -235,12 +235,12 @@ class TerrainGrid(NamedTuple):
     per_metre: float  # cells in a metre [1/m]
 
 
-@inlined
+@inline_llvm
 def surface(x, cells, origin, per_metre):  # type: ignore[no-untyped-def]
     """The ground at `x` [m], which may be lanes: height [m], normal x and y [-], factors of stiffness and
     friction [-]. An x that is not finite gives heights and factors that are none."""
     place = (x - origin) * per_metre
-    cell = floor(smaller(larger(0.0, place), cells.shape[0] - 1.0))  # this order sends NaN to cell 0
+    cell = floor(minimum(maximum(0.0, place), cells.shape[0] - 1.0))  # this order sends NaN to cell 0
     part = place - cell  # the level cells at the ends have no rises: any part will do
     height, rise, normal_x, normal_y, stiffness, firmer, friction, rougher = gather_eight(
         address(cells), 8.0 * cell

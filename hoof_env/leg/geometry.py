@@ -331,12 +331,12 @@ def preset_names() -> list[str]:
     return sorted(f.name.removesuffix(".json") for f in files if f.name.endswith(".json"))
 
 
-def named(preset: Preset) -> str:
+def preset_label(preset: Preset) -> str:
     """How an error calls a preset."""
     return "preset" if isinstance(preset, Mapping) else f"preset {preset}"
 
 
-def wrong(preset: Preset) -> type[ParameterError] | type[DataFileError]:
+def preset_error_type(preset: Preset) -> type[ParameterError] | type[DataFileError]:
     """Of which kind an error in a preset is: an argument's, or a file's."""
     return ParameterError if isinstance(preset, Mapping) else DataFileError
 
@@ -346,7 +346,7 @@ def read_preset(source: Preset) -> dict[str, Any]:
     data = source if isinstance(source, Mapping) else _read_file(source)
     if unknown := sorted(str(name) for name in data if name not in PARTS):
         said = f"unknown entries {', '.join(unknown)}; expected some of {', '.join(PARTS)}"
-        raise wrong(source)(f"{named(source)}: {said}")
+        raise preset_error_type(source)(f"{preset_label(source)}: {said}")
     return dict(data)
 
 
@@ -380,8 +380,8 @@ def load_geometry(source: Preset = DEFAULT_PRESET) -> Geometry:
     for part, kind, what in (("provenance", str, from_where), ("geometry", Mapping, "an object")):
         if not isinstance(data.get(part), kind):
             got = f"got {data[part]!r:.60}" if part in data else f"found {', '.join(data) or 'nothing'}"
-            raise wrong(source)(
-                f"{named(source)}: expected an entry {part!r} beside the others, {what}; {got}"
+            raise preset_error_type(source)(
+                f"{preset_label(source)}: expected an entry {part!r} beside the others, {what}; {got}"
             )
     values = {"provenance": data["provenance"], **data["geometry"]}
     if not isinstance(source, Mapping):
@@ -389,7 +389,7 @@ def load_geometry(source: Preset = DEFAULT_PRESET) -> Geometry:
     try:
         _check_entries(values)
     except ParameterError as error:
-        raise wrong(source)(f"{named(source)}: {error}") from None
+        raise preset_error_type(source)(f"{preset_label(source)}: {error}") from None
     return Geometry(**values)
 
 

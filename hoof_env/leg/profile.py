@@ -25,8 +25,8 @@ from hoof_env.errors import GeometryError
 from hoof_env.leg.geometry import Geometry, tables
 from hoof_env.leg.kinematics import solve_points
 from hoof_env.leg.linkage import HEADS, NUMBER, POINTS, TAILS
-from hoof_env.simd import floor, larger, smaller
-from hoof_env.simd.compile import inlined, kernel
+from hoof_env.simd import floor, maximum, minimum
+from hoof_env.simd.compile import inline_llvm, kernel
 from hoof_env.simd.functions import transposed
 from hoof_env.simd.layout import Layout, Row, Vector
 from hoof_env.simd.math import ROUNDER
@@ -257,7 +257,7 @@ def _polynomials(builder: Any, rows: list[Any], angles: list[Any], first: int, l
     return values, slopes
 
 
-@inlined
+@inline_llvm
 def locate(leg, cells):  # type: ignore[no-untyped-def]
     """In which of `cells` of its table the crank angle of a leg is, and how far from its middle.
 
@@ -266,7 +266,7 @@ def locate(leg, cells):  # type: ignore[no-untyped-def]
     angle = leg.theta
     cell = (angle * (cells / TURN) + ROUNDER) - ROUNDER
     # Cell 0 begins before its turn does: its row is there again at the end of the table.
-    row = smaller(cells, larger(0.0, cell - cells * floor(angle * (1 / TURN))))
+    row = minimum(cells, maximum(0.0, cell - cells * floor(angle * (1 / TURN))))
     leg.row_begin = (row + leg.settings.first_row) * ROW + WHOLE
     leg.cell_angle = angle - cell * (TURN / cells)
 

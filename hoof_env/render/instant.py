@@ -25,7 +25,7 @@ RadianPerSecond = Annotated[float, "rad/s"]
 Newton = Annotated[float, "N"]
 
 
-class Setting(NamedTuple):
+class Surroundings(NamedTuple):
     """What pictures and files say of an environment beside its motion.
 
     Attributes:

@@ -20,7 +20,7 @@ from hoof_env.dynamics.parts import ONE_LEG, TRUNKS
 from hoof_env.errors import HoofEnvError, ParameterError, check_choice, check_number, count
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
-from hoof_env.render.instant import HorseInstant, Instant, Setting
+from hoof_env.render.instant import HorseInstant, Instant, Surroundings
 
 if TYPE_CHECKING:
     from hoof_env.render.panel import Stances
@@ -208,7 +208,7 @@ def _is_finite(now: Instant | HorseInstant) -> bool:
     return math.isfinite(sum(now[:9]) + now.force_x + now.force_y)
 
 
-def new_renderer(here: Setting, fps: float, size: tuple[int, int] = (960, 540)) -> Renderer:
+def new_renderer(here: Surroundings, fps: float, size: tuple[int, int] = (960, 540)) -> Renderer:
     """An off-screen renderer for an environment with this setting; errors are those of `Renderer`."""
     force = {"weight_n": here.weight_n, "lift_off_n": here.lift_off_n}
     return Renderer(

@@ -40,7 +40,7 @@ def kernel(function: F, identity: str = "", threads: bool = False) -> F:
     return cast(F, compiled)
 
 
-def inlined(function: F) -> F:
+def inline_llvm(function: F) -> F:
     """A part of a kernel that is compiled into whatever calls it, so that the shapes of the caller's arrays
     are known there."""
     options: Any = {"error_model": "numpy", "forceinline": True}
@@ -48,11 +48,11 @@ def inlined(function: F) -> F:
     return cast(F, numba.njit(**options)(function))
 
 
-def pasted(function: F) -> F:
+def inline_source(function: F) -> F:
     """A part of a kernel whose text is put in the place of each call, before types are known.
 
-    For the large parts that call `inlined` ones: those would be optimised by themselves first, which takes
-    seconds, and then again inside the kernel.
+    For the large parts that call `inline_llvm` ones: those would be optimised by themselves first, which
+    takes seconds, and then again inside the kernel.
     """
     return cast(F, numba.njit(error_model="numpy", inline="always")(function))
 

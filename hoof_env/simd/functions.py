@@ -38,13 +38,13 @@ def _like_the_first(*kinds: Any) -> Any:
 
 
 @instruction(lambda x, y: Plane(count_of(x, y))(x, y))
-def plane(code: Code, x: Any, y: Any) -> Any:
+def vector(code: Code, x: Any, y: Any) -> Any:
     """The planar vector (x, y)."""
     return code.join(*code.reals(x, y))
 
 
 @instruction(_like_the_first)
-def across(code: Code, z: Any) -> Any:
+def perpendicular(code: Code, z: Any) -> Any:
     """A planar vector turned left by a right angle."""
     ((x, y),) = code.planes(z)
     return code.join(code.builder.fneg(y), x)
@@ -65,7 +65,7 @@ def cross(code: Code, z: Any, w: Any) -> Any:
 
 
 @instruction(lambda *kinds: kinds[1](*kinds) if isinstance(kinds[1], Plane) else _real(*kinds))
-def choose(code: Code, condition: Any, yes: Any, no: Any) -> Any:
+def where(code: Code, condition: Any, yes: Any, no: Any) -> Any:
     """`yes` where the condition holds, else `no`, lane by lane; both real, or both planar vectors."""
     select, both = code.builder.select, code._replace(args=code.args[1:])
     if isinstance(code.result, Plane):
@@ -75,27 +75,27 @@ def choose(code: Code, condition: Any, yes: Any, no: Any) -> Any:
 
 
 @instruction(_real)
-def larger(code: Code, x: Any, y: Any) -> Any:
+def maximum(code: Code, x: Any, y: Any) -> Any:
     """y if it is larger, else x: what is not a number stays so if it comes first."""
     x, y = code.reals(x, y)
     return code.builder.select(code.builder.fcmp_ordered(">", y, x), y, x)
 
 
 @instruction(_real)
-def smaller(code: Code, x: Any, y: Any) -> Any:
+def minimum(code: Code, x: Any, y: Any) -> Any:
     """y if it is smaller, else x: what is not a number stays so if it comes first."""
     x, y = code.reals(x, y)
     return code.builder.select(code.builder.fcmp_ordered("<", y, x), y, x)
 
 
 @instruction(_real)
-def root(code: Code, x: Any) -> Any:
+def sqrt(code: Code, x: Any) -> Any:
     """The square root, rounded correctly."""
     return call(code.builder, "sqrt", code.reals(x))
 
 
 @instruction(_real)
-def size(code: Code, x: Any) -> Any:
+def absolute(code: Code, x: Any) -> Any:
     """The absolute value."""
     return call(code.builder, "fabs", code.reals(x))
 
@@ -145,7 +145,7 @@ def lane_sum(code: Code, start: Any, x: Any) -> Any:
 
 
 @instruction(types.boolean)
-def anywhere(code: Code, condition: Any) -> Any:
+def any_lane(code: Code, condition: Any) -> Any:
     """Whether a condition holds in any lane."""
     count = code.args[0].count
     if count == 1:

@@ -125,7 +125,7 @@ def _names(key: str, field: Field) -> list[str]:
 
 
 class LayoutConstant(types.Opaque):
-    """numba's type of a layout, which a kernel hands to `rows`, `columns` and `nth`."""
+    """numba's type of a layout, which a kernel hands to `rows`, `columns` and `block_at`."""
 
     def __init__(self, layout: Any) -> None:
         self.layout = layout

@@ -14,8 +14,8 @@ from __future__ import annotations
 
 import math
 
-from hoof_env.simd import choose, larger, quarter_turns, root, size, smaller
-from hoof_env.simd.compile import inlined
+from hoof_env.simd import absolute, maximum, minimum, quarter_turns, sqrt, where
+from hoof_env.simd.compile import inline_llvm
 
 EXPONENT_UNIT = 8
 """`root_power` takes the exponents that are whole multiples of 1 / EXPONENT_UNIT."""
@@ -29,11 +29,11 @@ HALF_PI_LOW = float.fromhex("0x1.0b4611a626331p-34")  # the rest
 ROUNDER = 1.5 * 2.0**52  # adding and subtracting it rounds to the nearest whole number
 
 
-@inlined
+@inline_llvm
 def root_power(d, eighths):  # type: ignore[no-untyped-def]
     """d^(eighths / 8) by square roots; 0 for negative d, relative error below 1e-15. `eighths` is a whole
     number from 8 to 24, the same in all lanes."""
-    base = larger(d, 0.0)
+    base = maximum(d, 0.0)
     power = base
     if eighths >= 16:
         power = power * base
@@ -41,23 +41,23 @@ def root_power(d, eighths):  # type: ignore[no-untyped-def]
         power = power * base
     rest = eighths & 7
     if rest != 0:
-        half = root(base)
+        half = sqrt(base)
         if rest & 4:
             power = power * half
         if rest & 3:
-            quarter = root(half)
+            quarter = sqrt(half)
             if rest & 2:
                 power = power * quarter
             if rest & 1:
-                power = power * root(quarter)
+                power = power * sqrt(quarter)
     return power
 
 
-@inlined
+@inline_llvm
 def exp_of_negative(x):  # type: ignore[no-untyped-def]
     """exp(x) for x <= 0, relative error below 1e-13; exp(-40) below -40. The series of exp(x / 256), squared
     eight times."""
-    y = larger(x, LOWEST_EXPONENT) * (1 / 256)
+    y = maximum(x, LOWEST_EXPONENT) * (1 / 256)
     e = 1 / 3628800
     e = e * y + 1 / 362880
     e = e * y + 1 / 40320
@@ -79,15 +79,15 @@ def exp_of_negative(x):  # type: ignore[no-untyped-def]
     return e * e
 
 
-@inlined
+@inline_llvm
 def tanh(x):  # type: ignore[no-untyped-def]
     """Hyperbolic tangent, error below 1e-13."""
-    e = exp_of_negative(-2.0 * size(x))
+    e = exp_of_negative(-2.0 * absolute(x))
     part = (1.0 - e) / (1.0 + e)
-    return choose(x < 0.0, -part, part)
+    return where(x < 0.0, -part, part)
 
 
-@inlined
+@inline_llvm
 def cos_sin(angle):  # type: ignore[no-untyped-def]
     """Cosine and sine of `angle` [rad], error below 2e-16 for |angle| < 1e4."""
     shifted = angle * TWO_OVER_PI + ROUNDER
@@ -108,7 +108,7 @@ def cos_sin(angle):  # type: ignore[no-untyped-def]
     return quarter_turns(cosine, sine, shifted)
 
 
-@inlined
+@inline_llvm
 def clip(x, bound):  # type: ignore[no-untyped-def]
     """`x` limited to [-bound, bound]."""
-    return smaller(larger(x, -bound), bound)
+    return minimum(maximum(x, -bound), bound)

@@ -20,7 +20,7 @@ from numba.core.extending import lower_builtin, lower_cast
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numpy.typing import NDArray
 
-from hoof_env.simd.compile import inlined
+from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.types import (
     DOUBLE,
     INDEX,
@@ -115,13 +115,13 @@ class Addresses:
         return np.array([*np.ravel(rows), columns.start, columns.stop], np.int64)
 
 
-@inlined
+@inline_llvm
 def matrix_at(addresses, slot):  # type: ignore[no-untyped-def]
     """The array of doubles, of two axes, whose slot in an array of `Addresses` is given."""
     return carray(doubles_at(addresses[slot]), (addresses[slot + 1], addresses[slot + 2]))
 
 
-@inlined
+@inline_llvm
 def cube_at(addresses, slot):  # type: ignore[no-untyped-def]
     """The same of three axes."""
     shape = (addresses[slot + 1], addresses[slot + 2], addresses[slot + 3])
@@ -131,7 +131,7 @@ def cube_at(addresses, slot):  # type: ignore[no-untyped-def]
 def record_at(kind: np.dtype[Any]) -> Any:
     """For kernels: the array of one record of a type at an address."""
     pointer = _pointer_to(from_dtype(kind))
-    return inlined(lambda number: carray(pointer(number), (1,)))
+    return inline_llvm(lambda number: carray(pointer(number), (1,)))
 
 
 # Rows of lanes: on the stack, and in columns of an array
@@ -163,7 +163,7 @@ def columns(code: Code, pointer: Any, count: Any, layout: Any, start: Any, row: 
 
 
 @instruction(lambda rows, number: rows(rows, types.intp))
-def nth(code: Code, rows: Any, number: Any) -> Any:
+def block_at(code: Code, rows: Any, number: Any) -> Any:
     """The rows of the `number`-th of several layouts one after the other; rows with the names of a layout are
     those of the first."""
     return part_of(code, code.args[0], rows, code.builder.mul(number, INDEX(code.args[0].layout.size)))
@@ -263,7 +263,7 @@ def _same_layout(rows: Any, columns: Any) -> Any:
 
 
 @instruction(_same_layout)
-def fill(code: Code, rows: Any, columns: Any) -> None:
+def load_rows(code: Code, rows: Any, columns: Any) -> None:
     """Read columns into rows of the same layout."""
     to, start = code.args
     for k in range(to.layout.size):
@@ -271,7 +271,7 @@ def fill(code: Code, rows: Any, columns: Any) -> None:
 
 
 @instruction(lambda rows, value: Lanes(rows.count)(rows, value))
-def level(code: Code, rows: Any, value: Any) -> Any:
+def full_like(code: Code, rows: Any, value: Any) -> Any:
     """The same value in every lane of what these rows hold."""
     return code.number(code.args[1], value, code.result.count)
 

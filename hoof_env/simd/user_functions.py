@@ -54,7 +54,7 @@ def what_cannot_be_compiled(error: Exception) -> str:
     where = next((place for place in map(_place, re.findall(r'File "(.*?)", line (\d+)', text)) if place), "")
     return (
         f"cannot compile {_operation(text)}{where}; expected + - * /, comparisons and the functions of "
-        "hoof_env.simd (`choose` in the place of `if`), or of a term or entry scalar=True"
+        "hoof_env.simd (`where` in the place of `if`), or of a term or entry scalar=True"
     )
 
 
@@ -66,7 +66,7 @@ def _operation(text: str) -> str:
     if found := re.search(r"Unknown attribute '(\w+)' of type (\w+)", text):
         return f".{found[1]}, which {found[2]} has not,"
     if found := re.search(r"Untyped global name '(\w+)'", text):
-        return f"{found[1]}, a function without @hoof_env.simd.compile.inlined, or no number"
+        return f"{found[1]}, a function without @hoof_env.simd.compile.inline_llvm, or no number"
     causes = re.findall(r"Failed in nopython mode pipeline.*\n\s*(\S.*)", text) or [text.strip()]
     return causes[-1].splitlines()[0][:200]
 
@@ -83,6 +83,6 @@ def _place(found: tuple[str, str]) -> str:
     return f" in {inside[-1]} ({path}, line {line})" if inside else f" in {path}, line {line}"
 
 
-def named(function: Callable[..., Any]) -> str:
+def function_name(function: Callable[..., Any]) -> str:
     """Module and name of a function, for people."""
     return f"{function.__module__}.{function.__qualname__}"

@@ -18,11 +18,11 @@ import hoof_env  # noqa: F401  registers the ids
 from agents import baselines, baselines_report, baselines_results, baselines_run, statistics
 from agents.baselines_results import (
     LOWER,
-    apart,
     compare,
+    dominates,
+    dominates_with_confidence,
     expected_settings,
     following,
-    meets,
     read_results,
     seconds_to,
     settled_speeds,
@@ -303,14 +303,14 @@ def scored(figures, width=0.01, seeds=()):
 )
 def test_dominance(changes, is_better):
     agent = BETTER | changes
-    assert meets(agent, RUN) == is_better
+    assert dominates(agent, RUN) == is_better
     lines = compare([scored(agent, seeds=(BETTER, RUN, BETTER | changes))], scored(RUN)).splitlines()
     assert lines[-1].endswith(f"| {'yes' if is_better else 'no'} | {1 + is_better}/3 |")
 
 
 def test_intervals_must_lie_apart():
-    assert apart(scored(BETTER), scored(RUN))
-    assert not apart(scored(BETTER, 2.0), scored(RUN))
+    assert dominates_with_confidence(scored(BETTER), scored(RUN))
+    assert not dominates_with_confidence(scored(BETTER, 2.0), scored(RUN))
     assert "| no |" in compare([scored(BETTER, 2.0)], scored(RUN))
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from agents import horse_gaits
-from agents.horse_gaits import Course, Search, decode, encode, landings, shipped, slip_at, speed_of
+from agents.horse_gaits import BatchRollout, Search, decode, encode, landings, shipped, slip_at, speed_of
 from hoof_env.envs.reference import FASTEST, HorseGait, bounds, crank_angles, reference_gaits
 from hoof_env.envs.reference import horse_gaits as gaits_of_the_package
 
@@ -36,7 +36,9 @@ def test_speeds_are_those_of_their_froude_numbers():
 
 def test_the_same_gait_has_the_same_return_in_every_row():
     gait = reference_gaits(np.array([1.85]))
-    returns, figures, lags = Course(1.85, 8, episode_seconds=0.5).play(np.tile(gait, (8, 1)), 3, starts=4)
+    returns, figures, lags = BatchRollout(1.85, 8, episode_seconds=0.5).play(
+        np.tile(gait, (8, 1)), 3, starts=4
+    )
     assert (lags[:4] == lags[4:]).all()
     assert (returns[:4] == returns[4:]).all()
     assert len(set(returns[:4])) == 4
@@ -52,17 +54,17 @@ def test_the_lag_is_the_time_from_a_hind_hoof_s_landing_to_a_fore_hoof_s(lag):
 
 
 def test_a_search_goes_on_and_charges_the_lag(monkeypatch):
-    asked, play = [], Course.play
+    asked, play = [], BatchRollout.play
 
     def played(self, gaits, seed, starts=horse_gaits.STARTS):
         returns, figures, lags = play(self, gaits, seed, starts)
         return returns, figures, np.full_like(lags, 0.1)
 
-    given, begin = [], Course.__init__
-    monkeypatch.setattr(Course, "__init__", lambda *args: (given.append(args[3]), begin(*args))[1])
+    given, begin = [], BatchRollout.__init__
+    monkeypatch.setattr(BatchRollout, "__init__", lambda *args: (given.append(args[3]), begin(*args))[1])
     search = Search(1, reference_gaits(np.array([1.85]))[0], lag=1e6)
     tell = search.strategy.tell
-    monkeypatch.setattr(Course, "play", played)
+    monkeypatch.setattr(BatchRollout, "play", played)
     monkeypatch.setattr(
         search.strategy, "tell", lambda points, costs: (asked.extend(costs), tell(points, costs))
     )
@@ -110,7 +112,7 @@ def test_the_slip_of_a_gait_is_that_of_its_hooves_at_its_speed(name, speed, slid
     """Half of the summary's mean of all hooves to twice that, for it is of the pair that slides more."""
     gait = gaits_of_the_package()[name].to_array()
     slip = slip_at(gait.tolist(), speed)
-    _, summaries, _ = Course(speed, 32, episode_seconds=10.0).play(np.tile(gait, (32, 1)), 0, starts=32)
+    _, summaries, _ = BatchRollout(speed, 32, episode_seconds=10.0).play(np.tile(gait, (32, 1)), 0, starts=32)
     mean = np.mean([one["slip_m"] for one in summaries])
     assert mean < slip < 2.5 * mean
     assert (slip > horse_gaits.SLIP) == slides

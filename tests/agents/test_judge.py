@@ -189,7 +189,7 @@ def test_of_all_policies_there_are_means_and_intervals():
         [figures(**{**base, "lag": lag, "duty_fore": duty, "two_peaked": float("nan")})]
         for lag, duty in ((0.01, 0.6), (0.49, 0.64))
     ]
-    (one,) = judge.of_all([*each, [{"speed": 1.85, "froude": 0.25, "fell": 1.0}]])
+    (one,) = judge.pool([*each, [{"speed": 1.85, "froude": 0.25, "fell": 1.0}]])
     assert min(one["lag"], 0.5 - one["lag"]) < 1e-9  # between just before and just after, not a quarter
     assert one["duty_fore"] == pytest.approx(0.62)
     assert one["fell"] == pytest.approx((0.5 + 0.5 + 1.0) / 3)
@@ -329,7 +329,7 @@ def test_figures_are_of_the_steps_that_count():
             of["propulsion"][k] / loaded / KILOGRAMS, **exactly
         )
         assert one[f"peak_{pair}"] == pytest.approx(
-            of["peak_increase"][k] / of["stances"][k] / KILOGRAMS, **exactly
+            of["peak_grf_increase"][k] / of["stances"][k] / KILOGRAMS, **exactly
         )
         assert one[f"duty_{pair}"] == pytest.approx(loaded / DT, **exactly)
         assert one[f"stances_per_turn_{pair}"] == pytest.approx(of["stances"][k] / DT * 0.8, **exactly)
@@ -368,7 +368,7 @@ def test_the_forces_that_are_watched_are_those_of_the_sums():
     h = np.diff(time).mean()
     assert len(time) * h == pytest.approx(played.seconds)
     for name, forces in (
-        ("load_impulse", normal), ("braking", np.maximum(-push, 0)), ("propulsion", np.maximum(push, 0)),
+        ("normal_impulse", normal), ("braking", np.maximum(-push, 0)), ("propulsion", np.maximum(push, 0)),
     ):  # fmt: skip
         np.testing.assert_allclose(h * forces.sum(0), played.sums[name][:, 0], rtol=1e-6)
 

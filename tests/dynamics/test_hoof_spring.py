@@ -45,7 +45,7 @@ def peak(stiffness, ground_stiffness, speed):
     engine = leg_over(ground, spring_of(stiffness), strides=True)
     drop(engine, speed)
     assert not engine.advance(steps=400).any()
-    return engine.strides["highest"][0, 0] / (MASS * GRAVITY)
+    return engine.strides["highest_grf"][0, 0] / (MASS * GRAVITY)
 
 
 @pytest.mark.parametrize("speed", [0.3, 0.6, 1.0])
@@ -60,7 +60,7 @@ def test_the_peak_of_a_drop_is_the_springs_and_not_the_grounds(speed):
 def soles(engine):
     """Places of the soles along the ground [m], as if it were level."""
     report, state = engine.report, engine.state
-    given = (state.get(f"{point}_give_tangential", 0.0) for point in ("toe", "heel"))
+    given = (state.get(f"{point}_deflection_tangential", 0.0) for point in ("toe", "heel"))
     return np.array([report[f"{point}_x"] - give for point, give in zip(("toe", "heel"), given, strict=True)])
 
 

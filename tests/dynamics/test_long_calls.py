@@ -64,5 +64,5 @@ def test_no_number_of_a_column_is_taken_for_an_address(value):
         except ParameterError:
             refused.append(row)
         engine.set_column(0, good)
-    assert bool(refused) == (value == 1e300)  # places and angles beyond `FARTHEST`
+    assert bool(refused) == (value == 1e300)  # places and angles beyond `MAX_STATE`
     assert np.array_equal(engine.column(0), good)

@@ -190,7 +190,7 @@ def dropped(ratio, stiffness, restitution, step=None):
     low = min(engine.report["toe_y"][0, 0], engine.report["heel_y"][0, 0])
     engine.reset(pose, 4.1, y=3.0 - low + 1e-3, vy=-1.0)
     engine.advance(steps=round(0.25 / engine.sim_dt))
-    peak = engine.strides["highest"][0, 0] / (mass * GRAVITY) if not engine.results.any() else np.inf
+    peak = engine.strides["highest_grf"][0, 0] / (mass * GRAVITY) if not engine.results.any() else np.inf
     return peak, engine
 
 

@@ -96,10 +96,10 @@ def put_somewhere(engine, rng, depth):
     rows["theta_rate"][:] = np.where(motors, rng.normal(5, 4, (legs, n)), rows["crank_speed"])
     for point in ("toe", "heel"):
         rows[f"{point}_penetration"][:] = 1.0
-        rows[f"{point}_slowness"][:] = 1 / rng.uniform(0.1, 1.5, (legs, n))
+        rows[f"{point}_inverse_approach_speed"][:] = 1 / rng.uniform(0.1, 1.5, (legs, n))
         if engine.features.springs:
-            rows[f"{point}_give_normal"][:] = rng.uniform(-0.02, 0.04, (legs, n))
-            rows[f"{point}_give_tangential"][:] = rng.uniform(-0.03, 0.03, (legs, n))
+            rows[f"{point}_deflection_normal"][:] = rng.uniform(-0.02, 0.04, (legs, n))
+            rows[f"{point}_deflection_tangential"][:] = rng.uniform(-0.03, 0.03, (legs, n))
     engine.set_state(state)
     fallen = Result.FALLEN  # a state put together at random may have the trunk in the ground: it is reported
     assert np.isin(engine.advance(command, 0), (Result.OK, fallen)).all()
@@ -115,14 +115,18 @@ def oracle(engine, horse, e):
     for i, row in enumerate(filters):
         command_filters(row, command[i, :, e], bounds)
     steady = np.stack([filters["value"], filters["rate"], filters["acc"]], axis=-1)
-    slowness = np.stack([s["toe_slowness"][:, e], s["heel_slowness"][:, e]], axis=1)
+    slowness = np.stack(
+        [s["toe_inverse_approach_speed"][:, e], s["heel_inverse_approach_speed"][:, e]], axis=1
+    )
     approach = np.where(slowness > 0, 1 / np.where(slowness > 0, slowness, 1), np.nan)
     place = r["x"][e], r["y"][e], s["pitch"][e]
     velocity = r["vx"][e], r["vy"][e], r["pitch_rate"][e]
     give = None
     if engine.features.springs:
         axes = ("normal", "tangential")
-        give = np.array([[s[f"{point}_give_{axis}"][:, e] for axis in axes] for point in ("toe", "heel")])
+        give = np.array(
+            [[s[f"{point}_deflection_{axis}"][:, e] for axis in axes] for point in ("toe", "heel")]
+        )
         give = give.transpose(2, 0, 1)
         for leg, point in np.ndindex(approach.shape):  # the ground is where the sole is
             name = ("toe", "heel")[point]

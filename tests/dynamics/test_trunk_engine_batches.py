@@ -6,7 +6,7 @@ import pickle
 import numpy as np
 import pytest
 
-from hoof_env.dynamics.engine import FEW, TrunkEngine
+from hoof_env.dynamics.engine import MAX_SCALAR_ENVS, TrunkEngine
 from hoof_env.dynamics.parts import TRUNKS, Limb, Motor, Prescribed, Trunk
 from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.ground.contact import Ground
@@ -71,7 +71,7 @@ def test_alone_and_in_any_batch(kind, legs):
     assert touched.mean() > 0.4
     assert len(np.unique(expected[1])) == ALL or kind in ("fixed", "rail")
     rng = np.random.default_rng(3)
-    for size in (1, 2, FEW, FEW + 1, 31, 33, 128):  # the last has idle columns
+    for size in (1, 2, MAX_SCALAR_ENVS, MAX_SCALAR_ENVS + 1, 31, 33, 128):  # the last has idle columns
         which = rng.permutation(ALL)[:size]
         np.testing.assert_array_equal(bits(run(kind, which, legs)), expected[:, which], err_msg=str(size))
 

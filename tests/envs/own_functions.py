@@ -6,15 +6,15 @@ Its law is Eq. 14 again, so that what it adds can be compared with the id it beg
 import math
 
 from hoof_env import Entry, Scale, Term, register
-from hoof_env.simd import choose, larger
-from hoof_env.simd.compile import inlined
+from hoof_env.simd import maximum, where
+from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.math import root_power
 
 ID = "own/Everything-v0"
 MODULE_ID = f"own_functions:{ID}"
 
 
-@inlined
+@inline_llvm
 def friction_power(point):
     return point.friction * point.slide
 
@@ -31,7 +31,7 @@ def comfort(step, weight):
 
 
 def rising(scene):
-    return choose(scene.trunk.report.velocity.imag > 0.0, scene.trunk.report.acceleration.imag, 0.0)
+    return where(scene.trunk.report.velocity.imag > 0.0, scene.trunk.report.acceleration.imag, 0.0)
 
 
 def load_angle(scene):
@@ -44,7 +44,7 @@ def load_angle(scene):
 def equation_14(penetration, rate, inverse_approach_speed, ground):
     spring = ground.stiffness * root_power(penetration, ground.eighths)
     damping = ground.chi * rate * inverse_approach_speed
-    return larger(spring * (1.0 + damping) + ground.dashpot * rate, 0.0)
+    return maximum(spring * (1.0 + damping) + ground.dashpot * rate, 0.0)
 
 
 TERMS = (

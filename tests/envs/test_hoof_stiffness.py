@@ -60,7 +60,7 @@ def test_states_pickles_and_infos_know_the_spring(soft):
     play(soft, 30)
     state, kept = soft.unwrapped.get_state(), pickle.loads(pickle.dumps(soft.unwrapped))
     measured = play(soft, 30)[1]["measured"]
-    assert {"toe_give_normal", "heel_give_tangential"} <= set(measured.names)
+    assert {"toe_deflection_normal", "heel_deflection_tangential"} <= set(measured.names)
     soft.unwrapped.set_state(state)
     action = soft.unwrapped.action_for("walk")
     assert np.array_equal(soft.step(action)[0], kept.step(action)[0])
@@ -68,7 +68,7 @@ def test_states_pickles_and_infos_know_the_spring(soft):
         gym.make(LEG).unwrapped.set_state(state)
     soft.unwrapped.record()  # from here on steps are recorded
     soft.step(action)
-    assert len(soft.unwrapped.record()["toe_give_normal"]) == 20
+    assert len(soft.unwrapped.record()["toe_deflection_normal"]) == 20
 
 
 def test_the_default_damping_is_that_of_the_settings_whatever_is_drawn():
@@ -117,7 +117,7 @@ def test_a_sole_whose_spring_goes_back_by_itself_bears_nothing():
         envs.step(np.zeros((64, 16), np.float32))
         engine = envs.unwrapped.batch.engine
         forces.append([engine.report[f"{point}_normal"] for point in ("toe", "heel")])
-        gives.append([engine.state[f"{point}_give_normal"] for point in ("toe", "heel")])
+        gives.append([engine.state[f"{point}_deflection_normal"] for point in ("toe", "heel")])
     force, goes_back = np.array(forces), np.array(gives) > 1e-4
     assert ((force == 0.0) & goes_back).sum() > 1000
     assert force[force > 0.0].min() > 1e-6

@@ -78,13 +78,13 @@ def test_offsets_follow_actions_and_fade_under_zeros():
     for k, action in enumerate(taken):
         seen, *_ = env.step(action.astype(np.float32))
         expected += FOLLOWED * (np.clip(action, -1.0, 1.0) - expected)
-        np.testing.assert_allclose(env.batch.now.offset[:, 0], expected, rtol=1e-6, atol=1e-9)
+        np.testing.assert_allclose(env.batch.episode_rows.offset[:, 0], expected, rtol=1e-6, atol=1e-9)
         np.testing.assert_allclose(seen[places], expected, atol=1e-6)
         if k == 19:
             assert 0.3 < expected.min() < expected.max() < 1.0
     assert 0.0 < np.abs(expected).max() < 0.05
     env.reset(seed=0)
-    assert not env.batch.now.offset.any()
+    assert not env.batch.episode_rows.offset.any()
 
 
 def test_zeros_from_the_start_are_the_reference_gait():
@@ -150,7 +150,7 @@ def test_cranks_that_are_out_of_step_come_back():
 
     def ahead():
         """Of the other legs' mean phase [rad], by the gait that the kernels follow."""
-        theta, gait = env.engine.state["theta"][:, 0], env.batch.now.gait[:, 0]
+        theta, gait = env.engine.state["theta"][:, 0], env.batch.episode_rows.gait[:, 0]
         found = []
         for i in range(4):
             first = 2 + 7 * (i // 2)
@@ -210,10 +210,10 @@ def test_zeros_travel_and_stay_upright(speed):
 def test_commands_change_a_little_at_a_time(size):
     env = make(HORSE, target_speed=(0.9, 2.6), target_seconds=(0.1, 0.1), size=size, episode_seconds=20.0)
     env.reset(seed=1)
-    seen = [float(env.batch.now.target[0])]
+    seen = [float(env.batch.episode_rows.target[0])]
     for _ in range(500):
         *_, failed, _, _ = env.step(np.zeros(16, np.float32))
-        seen.append(float(env.batch.now.target[0]))
+        seen.append(float(env.batch.episode_rows.target[0]))
         if failed:
             break
     steps = np.abs(np.diff(seen))
@@ -228,7 +228,7 @@ def test_the_reference_follows_the_command(size):
     envs = Sb3VecEnv(HORSE, 16, size=size, target_speed=(0.5, 4.0), target_seconds=(0.2, 0.5))
     envs.seed(1)
     envs.reset()
-    now, seen = envs.unwrapped.envs.batch.now, set()
+    now, seen = envs.unwrapped.envs.batch.episode_rows, set()
     for _ in range(60):
         envs.step(np.zeros((16, 16), np.float32))
         expected = reference_gaits(now.target[:16] / size**0.5)
@@ -243,7 +243,7 @@ def test_commands_are_drawn_as_numbers_between_their_bounds():
     """One draw for the time and one for the speed, as `Generator.uniform` makes them."""
     env = make(HORSE, target_speed=(1.3, 2.6), target_seconds=(0.5, 1.0))
     env.reset(seed=3)
-    now, twin = env.batch.now, copy.deepcopy(env.np_random)
+    now, twin = env.batch.episode_rows, copy.deepcopy(env.np_random)
     for _ in range(50):
         if now.steps[0] + 1 == now.switch[0]:
             break
@@ -273,8 +273,8 @@ def test_a_gait_that_is_given_lasts_while_commands_change():
     seen = set()
     for _ in range(40):
         env.step(np.zeros(16, np.float32))
-        same(env.batch.now.gait[:, 0], horse_gaits()["walk"].to_array())
-        seen.add(float(env.batch.now.target[0]))
+        same(env.batch.episode_rows.gait[:, 0], horse_gaits()["walk"].to_array())
+        seen.add(float(env.batch.episode_rows.target[0]))
     assert len(seen) >= 4
 
 
@@ -346,10 +346,10 @@ def test_gaits_by_name_class_and_numbers_are_the_same():
 def test_a_gait_for_each_environment_is_that_of_those_that_start():
     envs, gaits = gym.make_vec(HORSE, num_envs=3), random_gaits(3, seed=5)
     envs.reset(seed=0, options={"gait": gaits})
-    same(envs.unwrapped.batch.begun[-len(NAMES) :, :], gaits.T)
+    same(envs.unwrapped.batch.start_values[-len(NAMES) :, :], gaits.T)
     changed = gaits[::-1].copy()
     envs.reset(options={"gait": changed, "reset_mask": np.array([False, False, True])})
-    same(envs.unwrapped.batch.begun[-len(NAMES) :, :], np.array([gaits[0], gaits[1], changed[2]]).T)
+    same(envs.unwrapped.batch.start_values[-len(NAMES) :, :], np.array([gaits[0], gaits[1], changed[2]]).T)
 
 
 def test_commands_are_clipped_to_what_the_page_says():

@@ -11,7 +11,7 @@ import pytest
 from family import FALLS, IDS, actions, same, together
 from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 
-from hoof_env.envs.infos import MEASURED, Named, named, row_of
+from hoof_env.envs.infos import MEASURED, NamedArray, name_columns, row_of
 from hoof_env.envs.one_leg import OneLeg
 from hoof_env.envs.reward import TERMS as TABLE
 from hoof_env.errors import ParameterError
@@ -66,11 +66,11 @@ def test_what_is_measured_is_what_the_record_says():
         last, trace = {name: values[-1].item() for name, values in record.items()}, together([record])
         for name in set(last) & set(MEASURED):
             assert measured[name] == last[name], name
-        assert measured["highest"] == pytest.approx(trace["grf"].max(), rel=1e-12)
-        assert measured["load_impulse"] == pytest.approx(env.sim_dt * trace["normal"].sum(), rel=1e-9)
+        assert measured["highest_grf"] == pytest.approx(trace["grf"].max(), rel=1e-12)
+        assert measured["normal_impulse"] == pytest.approx(env.sim_dt * trace["normal"].sum(), rel=1e-9)
         assert measured["loaded_time"] == pytest.approx(env.sim_dt * (trace["normal"] > 0).sum(), abs=1e-12)
         assert measured["result"] == 0
-        loaded += measured["highest"] > 100
+        loaded += measured["highest_grf"] > 100
     assert loaded > 5
 
 
@@ -87,7 +87,7 @@ def test_nothing_is_measured_of_a_step_that_did_not_happen():
         infos, info = env.step(np.zeros((n, 4), np.float32))[4], single.step(np.zeros(4, np.float32))[4]
         same(np.asarray(infos["measured"][0]), np.asarray(info["measured"]))
         assert info["measured"]["result"] == 1
-        assert info["measured"]["highest"] == info["measured"]["load_impulse"] == 0.0
+        assert info["measured"]["highest_grf"] == info["measured"]["normal_impulse"] == 0.0
         assert np.isfinite(info["measured"]).all()
 
 
@@ -131,25 +131,25 @@ def test_a_state_says_what_the_episode_started_with(n):
     other.set_state(state)
     info = env.step(taken)[4]
     same(info, other.step(taken)[4])
-    del state["begun"]  # as those of older versions
+    del state["start_values"]  # as those of older versions
     other.set_state(state)
     old = other.step(taken)[4]
     assert np.isnan(old["crank_angle"]).all()
     assert np.isnan(old["gait"]).all()
     same(np.asarray(old["measured"]), np.asarray(info["measured"]))
     for wrong in ("fast", np.zeros((2, 2))):
-        with pytest.raises(ParameterError, match=r"state\['begun'\]: expected numbers, shape \(10, "):
-            other.set_state(state | {"begun": wrong})
+        with pytest.raises(ParameterError, match=r"state\['start_values'\]: expected numbers, shape \(10, "):
+            other.set_state(state | {"start_values": wrong})
 
 
 def test_named_rows():
-    row = named([1.0, 2.0, 3.0, 4.0], PARAMETERS)
-    many = named(np.arange(8.0).reshape(2, 4), PARAMETERS)
+    row = name_columns([1.0, 2.0, 3.0, 4.0], PARAMETERS)
+    many = name_columns(np.arange(8.0).reshape(2, 4), PARAMETERS)
     assert (row["swing_cos"], row[3], type(row["swing_cos"])) == (4.0, 4.0, np.float64)
     same(many["swing_offset"], np.array([1.0, 5.0]))
     assert row == dict(row) == {"crank_speed": 1, "swing_offset": 2, "swing_sin": 3, "swing_cos": 4}
     assert row != {**row, "swing_cos": 0}
-    assert row != named([1.0, 2.0, 3.0, 5.0], PARAMETERS)
+    assert row != name_columns([1.0, 2.0, 3.0, 5.0], PARAMETERS)
     assert ((row == np.array([1, 0, 3, 4])) == [True, False, True, True]).all()
     assert ((row != np.array([1, 0, 3, 4])) == [False, True, False, False]).all()
     assert list(row.values()) == [*row]
@@ -157,12 +157,12 @@ def test_named_rows():
     assert "fast" not in row
     assert bool(row)
     for twin in (copy.copy(row), copy.deepcopy(row), row.copy(), pickle.loads(pickle.dumps(row))):
-        assert isinstance(twin, Named)
+        assert isinstance(twin, NamedArray)
         assert twin == row
         assert not np.shares_memory(twin, row)
     with pytest.raises(KeyError, match="fast"):
         row["fast"]
-    gait = named([5.0, 0.5, -0.1, 0.1], PARAMETERS)
+    gait = name_columns([5.0, 0.5, -0.1, 0.1], PARAMETERS)
     assert gym.make(LEG).reset(seed=0, options={"gait": gait})[1]["gait"] == gait
 
 

@@ -161,7 +161,7 @@ def test_observations_are_scaled_as_the_table_says(page):
         observation, *_, info = env.step(leg.action_for(load_gait("run", leg.settings.preset)))
         measured = info["measured"]
         allowance = min(allowance + BEARING * leg.dt, BEARING * LONGEST_STRIDE)
-        allowance -= min(allowance, measured["load_impulse"] / leg.weight)
+        allowance -= min(allowance, measured["normal_impulse"] / leg.weight)
         now = {name: float(values[-1].ravel()[0]) for name, values in leg.record().items()}
         there = {
             "forward speed": now["vx"], "vertical speed": now["vy"], "height": now["y"],
@@ -177,7 +177,7 @@ def test_observations_are_scaled_as_the_table_says(page):
             "steepest rise of the force": measured["steepest_rise"],
         }  # fmt: skip
         for point in ("toe", "heel"):
-            slowness = now[f"{point}_slowness"]
+            slowness = now[f"{point}_inverse_approach_speed"]
             there[f"{point} approach speed"] = 1 / slowness if slowness > 0 else 0.0
         ground = leg.terrain.height_at(now["x"])
         for name in table:

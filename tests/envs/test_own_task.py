@@ -26,7 +26,7 @@ from hoof_env.dynamics.layout import TRUNK_STATE, LegMemory, TrunkMemory
 from hoof_env.envs import tasks
 from hoof_env.envs.episode import Episode
 from hoof_env.envs.manual import page_of
-from hoof_env.envs.observation import Scene
+from hoof_env.envs.observation import ObservationInputs
 from hoof_env.envs.reward import Outcome
 from hoof_env.errors import ParameterError
 from hoof_env.simd.reach import fingerprint
@@ -348,7 +348,7 @@ def test_a_step_that_could_not_be_simulated_pays_for_nothing_but_the_failure(own
     assert terminated
     assert info["reward_friction"] == info["reward_comfort"] == 0.0
     assert reward == info["reward_failure"]
-    rest = env.settings.episode_seconds - env.batch.now.time[0]
+    rest = env.settings.episode_seconds - env.batch.episode_rows.time[0]
     assert reward == -env.batch.weights["failure"] * rest < -1.0
     assert np.isfinite(observation).all()
 
@@ -404,11 +404,11 @@ def test_what_a_function_encloses_is_in_the_fingerprint():
 USER = """
     import math
     import hoof_env
-    from hoof_env.simd.compile import inlined
+    from hoof_env.simd.compile import inline_llvm
 
     PAY = 1.0
 
-    @inlined
+    @inline_llvm
     def helper(x):
         return 2.0 * x
 
@@ -471,7 +471,7 @@ def rows_under(heading):
 def test_the_page_has_every_name_that_functions_reach():
     """What environments keep no account of, and what is the engine's own, is left out."""
     assert rows_under("## What `step` has") == list(Outcome._fields)
-    assert rows_under("## What `scene` has") == list(Scene._fields)
+    assert rows_under("## What `scene` has") == list(ObservationInputs._fields)
     assert rows_under("## What `ground` has") == list(GroundHere._fields)
     reached = set(rows_under("## What the memory has"))
     expected = set()

@@ -170,7 +170,7 @@ def test_who_bears_too_much_has_the_excess_taken_off():
     while not done:
         _, _, terminated, truncated, info = env.step(np.zeros(4, np.float32))
         paid.append(info["reward_support"] / WEIGHTS["support"])
-        impulses.append(info["measured"]["load_impulse"] / env.weight)
+        impulses.append(info["measured"]["normal_impulse"] / env.weight)
         allowances.append(env.raw_observation()["bearing allowance"])
         done = terminated or truncated
     assert truncated

@@ -13,7 +13,7 @@ def played(env_id, policy, seconds, **arguments):
         record = records.record_episode(env, make_policy(policy, env), 1, seconds)
         about = records.describe(env, environment=env_id, policy=policy, seed=1)
         about["threshold_n"] = THRESHOLD
-        return above_threshold(record, THRESHOLD, records.setting(env).terrain), about
+        return above_threshold(record, THRESHOLD, records.surroundings(env).terrain), about
 
 
 @pytest.fixture(scope="session")

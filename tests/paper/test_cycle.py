@@ -28,9 +28,9 @@ def test_what_is_outside_bears_nothing_and_has_no_approach_speed(trace):
         outside = trace[f"{point}_penetration"] <= 0
         assert outside.any()
         assert not outside.all()
-        for name in ("normal", "friction", "slowness"):
+        for name in ("normal", "friction", "inverse_approach_speed"):
             assert (trace[f"{point}_{name}"][outside] == 0).all()
-        assert (trace[f"{point}_slowness"][~outside] > 0).all()
+        assert (trace[f"{point}_inverse_approach_speed"][~outside] > 0).all()
 
 
 def test_the_centre_of_pressure_lies_between_the_points_that_bear(trace):

@@ -213,7 +213,7 @@ def test_the_zero_action_is_the_gait(reproduction, gait):
         for name, expected in (("x", x), ("slide", slide), ("penetration", -y), ("rate", -rise)):
             np.testing.assert_allclose(trace[f"{point}_{name}"], expected, atol=1e-9, err_msg=name)
         spring = ground.stiffness * np.maximum(-y, 0) ** ground.exponent
-        normal = np.maximum(spring * (1 - 0.75 * rise * trace[f"{point}_slowness"]), 0)
+        normal = np.maximum(spring * (1 - 0.75 * rise * trace[f"{point}_inverse_approach_speed"]), 0)
         slow, fast = ground.friction_slow, ground.friction_fast
         rubbed = np.sign(slide) * np.clip((np.abs(slide) - slow) / (fast - slow), 0, 1)
         np.testing.assert_allclose(trace[f"{point}_normal"], normal, rtol=1e-6, atol=1e-6)

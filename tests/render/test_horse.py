@@ -54,7 +54,7 @@ def test_hips_stand_where_they_are_on_the_trunk(played):
 
 def test_the_panel_counts_the_stances_that_the_forces_show(played):
     env, parts = played
-    here = records.setting(env)
+    here = records.surroundings(env)
     renderer = new_renderer(here, 50.0)
     for part in parts:
         renderer.add(records.instants_of(env, part))
@@ -74,7 +74,10 @@ def test_films_show_a_horse_that_goes(played):
     env, parts = played
     pictures = list(
         frames(
-            new_renderer(records.setting(env), 25.0), parts, 25.0, read=lambda c: records.instants_of(env, c)
+            new_renderer(records.surroundings(env), 25.0),
+            parts,
+            25.0,
+            read=lambda c: records.instants_of(env, c),
         )
     )
     assert len(pictures) == 51
@@ -85,7 +88,9 @@ def test_films_show_a_horse_that_goes(played):
 @pytest.mark.parametrize("size", [0.5, 2.0])
 def test_arrows_are_as_long_for_animals_of_all_sizes(size):
     """In the key, and of a force on a hoof that is the same part of the full scale."""
-    scenes = [new_renderer(records.setting(gym.make(HORSE, size=each)), 25.0)._scene for each in (1.0, size)]
+    scenes = [
+        new_renderer(records.surroundings(gym.make(HORSE, size=each)), 25.0)._scene for each in (1.0, size)
+    ]
     keys = [pygame.surfarray.array_alpha(scene._key(1000.0)) for scene in scenes]
     np.testing.assert_array_equal(*keys)
     assert scenes[1]._share * scenes[1]._scale == pytest.approx(scenes[0]._share * scenes[0]._scale)
@@ -94,7 +99,7 @@ def test_arrows_are_as_long_for_animals_of_all_sizes(size):
 def test_curves_leave_the_names_of_the_legs_alone(played):
     """Also those of hoofs that bear the full scale from the first instant to the last."""
     env, parts = played
-    renderer = new_renderer(records.setting(env), 25.0)
+    renderer = new_renderer(records.surroundings(env), 25.0)
     panel, instants = renderer._panel, records.instants_of(env, parts[0])
     panel.add(instants)
     for curve in panel._curves:

@@ -260,7 +260,7 @@ def test_an_edit_of_the_mechanics_makes_kernels_anew(start, tmp_path):
     law = (package / "ground" / "laws.py").read_text()
     for factor, is_compiled in ((1.0, True), (1.0, False), (2.0, True)):
         changed = (
-            law if factor == 1 else law.replace("return larger(spring *", "return larger(2.0 * spring *")
+            law if factor == 1 else law.replace("return maximum(spring *", "return maximum(2.0 * spring *")
         )
         (package / "ground" / "laws.py").write_text(changed)
         where, force, found = ended(start(code))[0].split()

@@ -10,25 +10,25 @@ from numba import njit
 from numba.core.errors import TypingError
 
 from hoof_env.simd import (
-    across,
-    anywhere,
-    choose,
+    absolute,
+    any_lane,
     columns,
     cross,
     dot,
-    fill,
     floor,
+    full_like,
     gather_eight,
     lane_sum,
-    larger,
-    level,
-    plane,
+    load_rows,
+    maximum,
+    minimum,
+    perpendicular,
     quarter_turns,
     read,
-    root,
     rows,
-    size,
-    smaller,
+    sqrt,
+    vector,
+    where,
     write,
 )
 from hoof_env.simd.layout import Block, Layout
@@ -49,7 +49,7 @@ def on_lanes(count, operations):
         mine, out = rows(doubles(INPUTS * count), count, Inputs), rows(doubles(OUTPUTS * count), count, None)
         row = given.shape[1]
         for n in range(0, row, count):
-            fill(mine, columns(address(given), count, Inputs, n, row, 1))
+            load_rows(mine, columns(address(given), count, Inputs, n, row, 1))
             operations(mine, out)
             for k in range(OUTPUTS):
                 write(out[k], address(found), k * row + n, 1)
@@ -58,20 +58,20 @@ def on_lanes(count, operations):
 
 
 def arithmetic(x, out):
-    a, b, z, w = x[0], x[1], plane(x[2], x[3]), plane(x[4], x[5])
+    a, b, z, w = x[0], x[1], vector(x[2], x[3]), vector(x[4], x[5])
     out[0], out[1], out[2], out[3], out[4] = a + b, a - 2.5, 3.0 * b, a / b, -a
-    out[5], out[6], out[7] = root(size(a)), floor(a), size(b)
-    out[8], out[9] = larger(a, b), smaller(a, 0.25)
-    out[10] = choose((a < b) & (b >= 0.1) | (a == 1.0), a, 7.0)
-    out[11] = choose((a > 0.5) | (a != a), b, choose(a <= -0.5, 1.0, a))
-    product, turned = z * w, across(z)
+    out[5], out[6], out[7] = sqrt(absolute(a)), floor(a), absolute(b)
+    out[8], out[9] = maximum(a, b), minimum(a, 0.25)
+    out[10] = where((a < b) & (b >= 0.1) | (a == 1.0), a, 7.0)
+    out[11] = where((a > 0.5) | (a != a), b, where(a <= -0.5, 1.0, a))
+    product, turned = z * w, perpendicular(z)
     out[12], out[13] = product.real, product.imag
     out[14], out[15] = turned.real, turned.imag
     out[16], out[17] = dot(z, w), cross(z, w)
-    mixed = a * z - w * 2.0 + choose(a > b, z, -w)
+    mixed = a * z - w * 2.0 + where(a > b, z, -w)
     out[18], out[19] = mixed.real, mixed.imag
-    out[20], out[21] = level(out, 4.0) * a, a
-    out[22] = 1.0 if anywhere(a > 1e9) else 0.0
+    out[20], out[21] = full_like(out, 4.0) * a, a
+    out[22] = 1.0 if any_lane(a > 1e9) else 0.0
 
 
 def expected(x):
@@ -134,9 +134,9 @@ def test_a_product_that_enters_a_sum_is_not_rounded():
 
 def test_what_is_not_a_number_stays_so_where_it_comes_first():
     def operations(x, out):
-        out[0], out[1] = larger(x[0], x[1]), smaller(x[0], x[1])
-        out[2], out[3] = larger(x[1], x[0]), smaller(x[1], x[0])
-        out[4] = choose(x[0] == x[0], 1.0, 2.0)
+        out[0], out[1] = maximum(x[0], x[1]), minimum(x[0], x[1])
+        out[2], out[3] = maximum(x[1], x[0]), minimum(x[1], x[0])
+        out[4] = where(x[0] == x[0], 1.0, 2.0)
 
     given, result = np.ones((INPUTS, 8)), np.zeros((OUTPUTS, 8))
     given[0] = np.nan
@@ -159,8 +159,8 @@ def test_quarter_turns():
 
 def test_the_sum_over_lanes_is_in_their_order():
     def operations(x, out):
-        out[0] = lane_sum(level(x, 0.5), x[0])
-        out[1] = 1.0 if anywhere(x[0] > 0.9) else 0.0
+        out[0] = lane_sum(full_like(x, 0.5), x[0])
+        out[1] = 1.0 if any_lane(x[0] > 0.9) else 0.0
 
     given, result = np.zeros((INPUTS, 8)), np.zeros((OUTPUTS, 8))
     given[0] = [0.1, 0.2, 0.3, 1e16, 0.7, -1e16, 0.5, 0.95]

@@ -9,7 +9,7 @@ import pytest
 from numba import njit
 from numba.core.errors import TypingError
 
-from hoof_env.simd import columns, fill, nth, rows
+from hoof_env.simd import block_at, columns, load_rows, rows
 from hoof_env.simd.layout import Block, Layout, Row, Vector, views
 from hoof_env.simd.memory import address, doubles
 
@@ -73,9 +73,9 @@ def swap(data):
     both = rows(doubles(2 * SIZE * 8), 8, Thing)
     for n in range(0, data.shape[1], 8):
         given = columns(address(data), 8, Thing, n, data.shape[1], 1)
-        first, second = nth(both, 0), nth(both, 1)
-        fill(first, given)
-        fill(second, given)
+        first, second = block_at(both, 0), block_at(both, 1)
+        load_rows(first, given)
+        load_rows(second, given)
         first.toe.place = second.heel.place
         first.heel.place = second.toe.place
         given.toe.place, given.heel.place = first.toe.place, first.heel.place
@@ -101,7 +101,7 @@ def test_an_unknown_field_is_refused():
 def test_memory_of_another_layout_does_not_fill_rows():
     @njit
     def wrong(data):
-        fill(rows(doubles(10), 1, Thing), columns(address(data), 1, Point, 0, 1, 1))
+        load_rows(rows(doubles(10), 1, Thing), columns(address(data), 1, Point, 0, 1, 1))
 
     with pytest.raises(TypeError, match="fill: expected one layout"):
         wrong(np.zeros((10, 1)))

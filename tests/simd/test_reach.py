@@ -13,7 +13,7 @@ import pytest
 
 from hoof_env.errors import ParameterError
 from hoof_env.simd import reach
-from hoof_env.simd.compile import inlined
+from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.reach import fingerprint, is_library, refresh, version_of
 
 TASK = """
@@ -59,7 +59,8 @@ TASK = """
 FILES = {
     "__init__": "",
     "numbers": "GRIP = 1.0\nOTHER = 1.0\n",
-    "tools": "from hoof_env.simd.compile import inlined\n@inlined\ndef scaled(x):\n    return 1.0 * x\n",
+    "tools": "from hoof_env.simd.compile import inline_llvm\n@inline_llvm\ndef scaled(x):\n"
+    "    return 1.0 * x\n",
     "deep": "from lab import tools, numbers\ndef twice(x):\n    return tools.scaled(numbers.GRIP * x)\n",
     "kinds": "import enum, typing\nclass Gait(enum.Enum):\n    RUN = 1.0\nclass Legs:\n    count = 1.0\n"
     "class L(typing.NamedTuple):\n    high: float\nLIMITS = L(1.0)\n",
@@ -123,7 +124,7 @@ def test_the_options_of_a_helper_count():
 def test_what_is_installed_counts_by_its_version():
     assert is_library(np.linalg.norm)
     assert is_library(textwrap.dedent)
-    assert not is_library(inlined)
+    assert not is_library(inline_llvm)
     assert version_of("numpy.linalg") == f"numpy {np.__version__}"
     assert version_of("textwrap") == sys.version.split()[0]
 
