@@ -556,7 +556,9 @@ def cli(*arguments: str) -> str:
             code: Any = main(list(arguments))
         except SystemExit as left:
             code = left.code
-    return f"{said.getvalue()}\nexit {code}"
+    # how far a long export is depends on the clock
+    lines = [line for line in said.getvalue().splitlines() if " of at most " not in line]
+    return "\n".join([*lines, f"exit {code}"])
 
 
 def reproduction() -> Cases:

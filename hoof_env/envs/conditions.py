@@ -21,7 +21,7 @@ CHANGEABLE = ("target_speed", "target_seconds", "terrain", "reward_weights", "ra
 """Settings that may change: none changes what is observed, an action, or how long an episode is."""
 
 OF_BATCH = (
-    "asked", "settings", "randomize", "_terrain", "_found_good", "weights", "target_speed", "speed_changes",
+    "asked", "settings", "randomize", "_terrain", "_validated", "weights", "target_speed", "speed_changes",
     "target_seconds", "_task",
 )  # fmt: skip
 OF_ENGINE = ("terrain", "substeps", "step_limits", "_model")
