@@ -23,7 +23,7 @@ import numpy as np
 from hoof_env.dynamics.parts import GRAVITY, HoofSpring, Limb, Mechanics, Motor
 from hoof_env.errors import Floats, ParameterError
 from hoof_env.ground.contact import Ground
-from hoof_env.ground.stiffness import LARGEST_ANGLE, SCHEMES, ContactRates, contact_rates, spring_rates
+from hoof_env.ground.stiffness import LARGEST_ANGLE, SCHEME_LIMITS, ContactRates, contact_rates, spring_rates
 from hoof_env.leg.profile import LegProfile, by_name
 
 ANGLES = 48
@@ -69,7 +69,7 @@ class StepLength(Mechanics):
         """Longest step [s] for each cause, infinite where there is none: "elastic", "damping" and "friction"
         of the ground (`ground.stiffness`), "hoof" of its springs, "servo" of the motors, "support" of
         what holds or drags the trunk."""
-        trunk, decay = self.trunk, SCHEMES[self.integrator].decay
+        trunk, decay = self.trunk, SCHEME_LIMITS[self.integrator].decay
         mass, is_held = trunk.mass + sum(limb.geometry.mass for limb in self.limbs), trunk.kind == "suspended"
         damper, spring = (trunk.damping, trunk.stiffness) if is_held else (0.0, 0.0)
         drag = trunk.drag if trunk.kind != "fixed" else 0.0
@@ -148,7 +148,7 @@ class StepLength(Mechanics):
             soles.append(sole)
         steps = [rates.longest_steps(self.integrator, self.step_error) for rates in found]
         limits = {name: min(step[name] for step in steps) for name in ("elastic", "damping")}
-        return limits | {"hoof": SCHEMES[self.integrator].decay / max(soles)}
+        return limits | {"hoof": SCHEME_LIMITS[self.integrator].decay / max(soles)}
 
     @cached_property
     def _masses(self) -> list[tuple[float, float]]:

@@ -72,7 +72,7 @@ class EpisodeBatch:
         entries, names: of the observation.
         terms: keys of the reward's terms in infos.
         kernel, addresses: one control step of all is `kernel(addresses)`; then comes `follow`.
-        episode: memory of the episodes, rows as in `step.Episode`, shape (rows, columns).
+        episode: memory of the episodes, rows as in `episode.Episode`, shape (rows, columns).
         now: the same by name, shape (columns,) or (rows, columns) each.
         actions, observations, rewards: what a step takes and gives, shapes (columns, actions), (columns,
             entries),

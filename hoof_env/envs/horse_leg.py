@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import Any, ClassVar, NoReturn, Unpack
 
 import gymnasium as gym
@@ -19,7 +18,7 @@ from hoof_env.envs.base import LegBase, array_of, generator_of
 from hoof_env.envs.episode import FAILED
 from hoof_env.envs.infos import name_columns
 from hoof_env.envs.recording import Recording
-from hoof_env.envs.reward import failure
+from hoof_env.envs.reward import OBJECTIVES, TERMS, Term, failure
 from hoof_env.envs.settings import Keywords
 from hoof_env.envs.step import SOME_SWITCHED
 from hoof_env.errors import ParameterError, count, flag
@@ -309,26 +308,18 @@ class RandomizeParameters(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         return self.env.reset(seed=seed, options=options)
 
 
-OBJECTIVES = MappingProxyType(
-    {
-        "progress": ("progress", "support", "overspeed"),
-        "peak force": ("peak", "loading"),
-        "energy": ("energy", "slip"),
-    }
-)
-"""What the entries of the vector reward stand for, with the terms of each; more is better in each."""
-
-
-def vector_reward(terms: Mapping[str, Any]) -> NDArray[np.float32]:
-    """The reward of each objective, shape (3,), from the terms that `info` holds.
+def vector_reward(info: Mapping[str, Any], terms: tuple[Term, ...] = TERMS) -> NDArray[np.float32]:
+    """Return the reward of each objective, shape (3,), from the terms that `info` holds.
 
     Energy takes the charge for sliding, which is lost to friction, the peak force that for its rate, and
-    progress what is paid for bearing weight and charged for speed beyond the commanded one. A failure is
-    charged to all three in equal parts: under preference weights that sum to 1 a fall costs the same,
-    whatever the weights, so that falling early to save force or energy pays under none.
+    progress what is paid for bearing weight and charged for speed beyond the commanded one. A term without an
+    objective, as the charge for a failure, goes to all three in equal parts: under preference weights that
+    sum to 1 a fall costs the same, whatever the weights, so that falling early to save force or energy pays
+    under none.
     """
-    sums = [sum(terms[f"reward_{name}"] for name in names) for names in OBJECTIVES.values()]
-    return np.array(sums, np.float32) + np.float32(terms["reward_failure"] / len(sums))
+    sums = [sum(info[term.key] for term in terms if term.objective == name) for name in OBJECTIVES]
+    shared = sum(info[term.key] for term in terms if term.objective is None)
+    return np.array(sums, np.float32) + np.float32(shared / len(OBJECTIVES))
 
 
 def refuse_many(**kwargs: Any) -> NoReturn:
@@ -369,4 +360,4 @@ class HorseLegMOEnv(HorseLegEnv):
     ) -> tuple[NDArray[np.float32], NDArray[np.float32], bool, bool, dict[str, Any]]:
         """As in `HorseLegEnv`, with the vector reward, shape (3,)."""
         observation, _, terminated, truncated, info = super().step(action)
-        return observation, vector_reward(info), terminated, truncated, info
+        return observation, vector_reward(info, self.task.terms), terminated, truncated, info

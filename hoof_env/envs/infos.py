@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, ItemsView, KeysView, Mapping, Sequence, ValuesView
 from functools import cache
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -84,6 +85,20 @@ class InfoLayout:
         return lambda: column[rows].view(kind)
 
 
+RENAMED = MappingProxyType(
+    {
+        "peak_increase": "peak_grf_increase",
+        "highest": "highest_grf",
+        "load_impulse": "normal_impulse",
+        "toe_rate": "toe_penetration_rate",
+        "heel_rate": "heel_penetration_rate",
+        "toe_slowness": "toe_inverse_approach_speed",
+        "heel_slowness": "heel_inverse_approach_speed",
+    }
+)
+"""New names of what is measured, by the old ones."""
+
+
 class NamedArray(np.ndarray[Any, np.dtype[np.float64]]):
     """Numbers that have names along the last axis: `row["crank_speed"]` is `row[..., 0]`.
 
@@ -97,7 +112,8 @@ class NamedArray(np.ndarray[Any, np.dtype[np.float64]]):
     def __getitem__(self, key: Any) -> Any:
         if isinstance(key, str):
             if key not in self.names:
-                raise KeyError(key)
+                new = RENAMED.get(key)
+                raise KeyError(f"{key!r} is called {new!r} now" if new in self.names else key)
             key = (..., self.names.index(key))
         return np.asarray(self)[key][()]
 

@@ -25,12 +25,12 @@ from hoof_env.dynamics.parts import ONE_LEG
 from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.envs import horse, observation, start
 from hoof_env.envs.horse import Horse
-from hoof_env.envs.horse_leg import OBJECTIVES, HorseLegMOEnv
+from hoof_env.envs.horse_leg import HorseLegMOEnv
 from hoof_env.envs.infos import measured_names
 from hoof_env.envs.one_leg import CARRIED, OneLeg
 from hoof_env.envs.parameters import HILLS, SPACING
 from hoof_env.envs.reference import ACTED, COUNT, FASTEST, FOLLOWED, SIZES, horse_gaits
-from hoof_env.envs.reward import BEARING, LONGEST_STRIDE, check_weights
+from hoof_env.envs.reward import BEARING, LONGEST_STRIDE, OBJECTIVES, check_weights
 from hoof_env.envs.settings import PER_EPISODE, Settings, check_effect, to_json
 from hoof_env.envs.tasks import TASKS, Task, task_of
 from hoof_env.errors import OutputError, ParameterError, check_choice
@@ -276,11 +276,11 @@ def _actions(settings: Settings) -> str:
 
 def _objectives(weights: Mapping[str, float]) -> str:
     """The three rewards of `HorseLegMO-v0`: the terms of each, and the weights of those that are not 0."""
-    units, rows = {term.name: term.unit for term in TASKS["leg"].terms}, []
-    for number, (objective, names) in enumerate(OBJECTIVES.items()):
-        each = ", ".join(f"{weights[name]:g} {units[name]}" for name in names if weights[name])
-        terms = " + ".join(f"`reward_{name}`" for name in names)
-        rows.append((str(number), objective, terms, each))
+    rows = []
+    for number, objective in enumerate(OBJECTIVES):
+        own = [term for term in TASKS["leg"].terms if term.objective == objective]
+        each = ", ".join(f"{weights[term.name]:g} {term.unit}" for term in own if weights[term.name])
+        rows.append((str(number), objective, " + ".join(f"`{term.key}`" for term in own), each))
     return markdown_table(("Num", "Objective", "Terms", "Weights by default"), rows)
 
 

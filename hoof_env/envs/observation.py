@@ -29,8 +29,8 @@ class ObservationInputs(NamedTuple):
 
     Attributes:
         trunk, leg, episode: memory of engine and episode, fields as in `dynamics.layout.TrunkMemory` and
-            `LegMemory` and `step.Episode`.
-        task: record of the task's constants, see `step.task_type`.
+            `LegMemory` and `episode.Episode`.
+        task: record of the task's constants, see `episode.task_type`.
         ground, ground_origin, ground_per_metre: the terrain, the arguments of `surface` after x.
     """
 

@@ -87,7 +87,7 @@ class PaperSolver:
         leg.advance(gait.to_array(), trace)
 
     def start(self, envs: Sequence[int], gaits: Floats, crank_angle: Floats, x: Floats) -> None:
-        """Start some environments; arguments as of `Starts`."""
+        """Start some environments; with gaits, crank angles and places as in `start.Start`."""
         for k, env in enumerate(envs):
             gait = GaitParameters.from_array(gaits[k])
             self.traces[env] = self.legs[env].reset(gait, float(crank_angle[k]), x=float(x[k]))

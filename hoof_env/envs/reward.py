@@ -1,4 +1,5 @@
-"""The reward: one table of terms. A term is a row here, and nothing else has to be touched.
+"""The reward: one table of terms. A term is a row here, its objective in `HorseLegMO-v0` included, and
+nothing else has to be touched.
 
 The sum of all terms is the reward, `info["reward_<name>"]` has each. `docs/task.md` gives the reasons
 for the weights and what they lead to."""
@@ -11,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hoof_env.errors import ParameterError, check_number
+from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.simd import absolute, maximum, minimum, where
 from hoof_env.simd.user_functions import check_function
 
@@ -121,6 +122,12 @@ def support(step, weight):  # type: ignore[no-untyped-def]
     return weight * minimum(pace * step.borne, absolute(pace) * step.borne)
 
 
+OBJECTIVES = ("progress", "peak force", "energy")
+"""Objectives of `HorseLegMO-v0`, in the order of its vector reward; more is better in each."""
+
+PROGRESS, PEAK_FORCE, ENERGY = OBJECTIVES
+
+
 @dataclass(frozen=True)
 class Term:
     """A term of the reward.
@@ -134,11 +141,13 @@ class Term:
             side: + - * /, comparisons, and the functions of `hoof_env.simd`; `where` in the place of `if`.
         scalar: `compute` is a function of ordinary numbers, which may use `if` and `math`; it is called for
             one environment after the other, which takes longer.
+        objective: one of `OBJECTIVES`, to which `HorseLegMO-v0` adds the term; None shares it among all in
+            equal parts.
 
     Where the engine fails, a term that is not in `TERMS` by its name counts 0.
 
     Raises:
-        ParameterError: no name, a weight out of range, or no function of two arguments.
+        ParameterError: no name, a weight out of range, no function of two arguments, or an unknown objective.
     """
 
     name: str
@@ -147,11 +156,14 @@ class Term:
     meaning: str
     compute: Callable[[Any, Any], Any]
     scalar: bool = False
+    objective: str | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
             raise ParameterError(f"name: expected a text, got {self.name!r}")
         check_number(f"{self.title}: weight", self.weight, low=0, high=1e6)
+        if self.objective is not None:
+            check_choice(f"{self.title}: objective", self.objective, OBJECTIVES)
         check_function(f"{self.title}: compute", self.compute, 2)
 
     @property
@@ -166,29 +178,42 @@ class Term:
 
 
 TERMS = (
-    Term("progress", 2.5, "1/m", "forward travel of the trunk, up to the commanded speed", progress),
+    Term(
+        "progress", 2.5, "1/m", "forward travel of the trunk, up to the commanded speed", progress,
+        objective=PROGRESS,
+    ),
     Term(
         "peak", 0.5, "1/kN",
         "minus the increase of the running peak GRF, the highest of all substeps but at most twice the"
         " present one; it adds up to a stance's peak, and to each further one behind a fall by half", peak,
+        objective=PEAK_FORCE,
     ),
     Term(
         "energy", 1.0, "1/kJ",
         "minus the positive work of crank and swing drive; braking is not recovered", energy,
+        objective=ENERGY,
     ),
-    Term("slip", 1.0, "1/m", "minus the way that the hoof slides in stance, to and fro", slip),
+    Term(
+        "slip", 1.0, "1/m", "minus the way that the hoof slides in stance, to and fro", slip,
+        objective=ENERGY,
+    ),
     Term("failure", 25.0, "1/s", "once, minus the rest of `episode_seconds`, if the episode fails", failure),
     Term(
         "support", 17.0, "1/s",
         "impulse of the normal force over the weight of trunk and leg, less twice what goes beyond a mean of"
         f" {BEARING:g}; times the speed over the commanded one, within +-1, and no more than the crank's rate"
         f" over {STEPPING:g} rad/s", support,
+        objective=PROGRESS,
     ),
-    Term("overspeed", 0.0, "1/m", "minus the forward travel beyond the commanded speed", overspeed),
+    Term(
+        "overspeed", 0.0, "1/m", "minus the forward travel beyond the commanded speed", overspeed,
+        objective=PROGRESS,
+    ),
     Term(
         "loading", 75.0, "s/MN",
         "minus the increase of the stance's running loading rate, the steepest rise of the normal force from"
         " one substep to the next while the peak grows", loading,
+        objective=PEAK_FORCE,
     ),
 )  # fmt: skip
 """The terms of all ids, in the order in which they are added up."""

@@ -13,7 +13,7 @@ places of the touch-down within a step, all of one law:
 
     e < C (h w)^p,   p = min(order, n + 1),
 
-for d^n has a kink at touch-down that limits the order. `SCHEMES` holds the largest C, which n = 1 has,
+for d^n has a kink at touch-down that limits the order. `SCHEME_LIMITS` holds the largest C, which n = 1 has,
 rounded up; at n = 1.5 less than 0.7 of it is enough for semi-implicit Euler and the midpoint rule, less than
 0.4 for the others.
 
@@ -50,7 +50,7 @@ class SchemeLimits(NamedTuple):
     decay: float  # longest step times the rate of a damped motion [-]
 
 
-SCHEMES: Mapping[str, SchemeLimits] = MappingProxyType(
+SCHEME_LIMITS: Mapping[str, SchemeLimits] = MappingProxyType(
     {
         "semi_implicit_euler": SchemeLimits(1, 0.8, 1.0),
         "midpoint": SchemeLimits(2, 0.65, 1.0),
@@ -79,7 +79,7 @@ class ContactRates:
     def longest_steps(self, scheme: str, tolerance: float = 1e-2) -> dict[str, float]:
         """Longest step [s] that each of the three allows; infinite for a rate of zero. `tolerance` is the
         error of the state after a contact [-], see the module's text."""
-        limits = SCHEMES[check_choice("scheme", scheme, SCHEMES)]
+        limits = SCHEME_LIMITS[check_choice("scheme", scheme, SCHEME_LIMITS)]
         tolerance = check_number("tolerance", tolerance, low=0, high=1, exclusive_low=True)
         order = min(limits.order, self.exponent + 1)
         angle = min((tolerance / limits.error) ** (1 / order), LARGEST_ANGLE)

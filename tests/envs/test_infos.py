@@ -162,6 +162,8 @@ def test_named_rows():
         assert not np.shares_memory(twin, row)
     with pytest.raises(KeyError, match="fast"):
         row["fast"]
+    with pytest.raises(KeyError, match=r"'highest' is called 'highest_grf' now"):
+        gym.make(LEG).reset(seed=0)[1]["measured"]["highest"]
     gait = name_columns([5.0, 0.5, -0.1, 0.1], PARAMETERS)
     assert gym.make(LEG).reset(seed=0, options={"gait": gait})[1]["gait"] == gait
 

@@ -5,7 +5,10 @@ import numpy as np
 import pytest
 from family import FALLS
 
-from hoof_env.envs.horse_leg import OBJECTIVES, HorseLegEnv, HorseLegMOEnv, vector_reward
+from hoof_env.envs.horse_leg import HorseLegEnv, HorseLegMOEnv, vector_reward
+from hoof_env.envs.reward import OBJECTIVES, Term
+from hoof_env.envs.reward import TERMS as REWARD
+from hoof_env.errors import ParameterError
 
 TERMS = {
     "reward_progress": 0.5,
@@ -22,6 +25,15 @@ def test_each_objective_has_its_terms():
     np.testing.assert_allclose(
         vector_reward({**TERMS, "reward_failure": 0.0}), [0.76, -0.25, -0.12], rtol=1e-6
     )
+
+
+def test_a_new_term_goes_to_its_objective_and_one_without_to_all():
+    own = Term("own", 1.0, "1", "own", lambda step, weight: weight, objective="energy")
+    shared = Term("shared", 1.0, "1", "shared", lambda step, weight: weight)
+    info = {**TERMS, "reward_failure": 0.0, "reward_own": 0.7, "reward_shared": 0.3}
+    np.testing.assert_allclose(vector_reward(info, (*REWARD, own, shared)), [0.86, -0.15, 0.68], rtol=1e-6)
+    with pytest.raises(ParameterError, match=r"objective: expected one of progress, .*, got 'joy'"):
+        Term("own", 1.0, "1", "own", lambda step, weight: weight, objective="joy")
 
 
 @pytest.mark.parametrize("weights", [(1, 0, 0), (0, 1, 0), (0, 0, 1), (0.2, 0.3, 0.5)])

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 from hoof_env.errors import ParameterError
 from hoof_env.ground.contact import Ground
-from hoof_env.ground.stiffness import SCHEMES, ContactRates, contact_rates
+from hoof_env.ground.stiffness import SCHEME_LIMITS, ContactRates, contact_rates
 from hoof_env.ground.terrain import Terrain
 from tests.ground.compiled_laws import friction_force, normal_force
 
@@ -92,13 +92,13 @@ def error(scheme, h, bounce, speed, law, phases=16):
 
 @pytest.mark.parametrize("n", [1.0, 1.375, 1.5, 2.0, 3.0])
 def test_the_error_of_a_bounce_is_within_the_rule_and_near_it(n):
-    share = {scheme: [] for scheme in SCHEMES}
+    share = {scheme: [] for scheme in SCHEME_LIMITS}
     for chi, weight in ((0.0, 0.0), (0.0, 0.3), (0.75, 0.1), (3.0, 0.0)):
         depth = ((n + 1) / 2) ** (1 / (n + 1))
         law = (1.0, 1.0, n, chi, weight * depth**n)
         bounce = exact_bounce(1.0, depth, *law)
         rates = contact_rates(Ground(stiffness=1.0, exponent=n), 1.0, law[4], speed=1.0)
-        for scheme, limits in SCHEMES.items():
+        for scheme, limits in SCHEME_LIMITS.items():
             for angle in (0.4, 0.1, 0.025):
                 bound = limits.error * angle ** min(limits.order, n + 1)
                 h = rates.longest_steps(scheme, bound)["elastic"]
@@ -112,7 +112,7 @@ def test_the_error_of_a_bounce_is_within_the_rule_and_near_it(n):
             assert max(shares) < (0.7 if scheme in ("semi_implicit_euler", "midpoint") else 0.4), scheme
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("scheme", SCHEME_LIMITS)
 @pytest.mark.parametrize("mass", [3.0, 125.0])
 def test_a_quarter_of_a_horse_on_stiff_ground(scheme, mass):
     """125 kg, and 3 kg, at 1 m/s on 1e6 N/m^1.5."""
