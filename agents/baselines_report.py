@@ -77,7 +77,8 @@ def results_table(rows: Sequence[Row], gaits: References) -> str:
 
 
 def row_cells(row: Row, known: Mapping[str, Scored]) -> list[str]:
-    count, returns = len(row.results), np.array([one.figures["return"] for one in row.results])
+    count = len(row.results)
+    returns = np.array([one.figures["return"] for one in row.results])
     steps, wall, cpu = (
         np.median([one.final[key] for one in row.results]) for key in ("steps", "wall_s", "cpu_s")
     )
@@ -107,8 +108,10 @@ def figures_table(rows: Sequence[Row], gaits: References) -> str:
 def pace_table(rows: Sequence[Row], known: Mapping[str, Scored]) -> str:
     """Steps a second, return, and seconds until the open-loop gait's return; beside the first row, seed by
     seed. Only seeds that reach that return in both are compared."""
-    level, first = known[OPEN_LOOP].intervals["return"].mean, rows[0]
-    rates, times = [], []
+    level = known[OPEN_LOOP].intervals["return"].mean
+    first = rows[0]
+    rates = []
+    times = []
     for row in rows:
         ends = [one.final for one in row.results]
         rates.append({end["seed"]: end["steps"] / end["wall_s"] for end in ends})
@@ -118,7 +121,8 @@ def pace_table(rows: Sequence[Row], known: Mapping[str, Scored]) -> str:
         both = [seed for seed in rate if seed in rates[0]]
         faster = [rate[seed] / rates[0][seed] for seed in both]
         parts = [time[seed] / times[0][seed] for seed in both if np.isfinite(time[seed] + times[0][seed])]
-        ours, theirs = row.scored.intervals["return"], first.scored.intervals["return"]
+        ours = row.scored.intervals["return"]
+        theirs = first.scored.intervals["return"]
         lines.append(
             [row.title, str(len(rate)), span(rate.values(), 0), span(faster, 2), ours.text(),
              "no" if ours.mean < theirs.low else "yes", span(time.values(), 0),
@@ -195,7 +199,9 @@ def made_text(rows: Sequence[Row]) -> str:
 def write_data(rows: Sequence[Row], folder: Path) -> None:
     """curves.csv, the learning curves of all, runs.csv, a line for each training, and episodes.csv, a line
     for each episode of the final scores."""
-    curves, ends, episodes = [], [], []
+    curves = []
+    ends = []
+    episodes = []
     for row in rows:
         for one in row.results:
             about = {"policy": row.title, "env_id": row.entry.env_id, "seed": one.final["seed"]}
@@ -325,7 +331,8 @@ def report(args: Args) -> Path:
     read."""
     folder = args.runs or FOLDERS[args.subset]
     rows = read_results(load_plan(args.subset), folder)
-    page, beside = folder / "report.md", folder / "report"
+    page = folder / "report.md"
+    beside = folder / "report"
     beside.mkdir(parents=True, exist_ok=True)
     gaits = {row.entry.env_id: references(row.entry.env_id) for row in rows}
     parts = [f"# Baselines: the {args.subset} plan", "## Returns", results_table(rows, gaits)]

@@ -195,7 +195,8 @@ def dominates(figures: Mapping[str, float], run: Mapping[str, float]) -> bool:
 def dominates_with_confidence(agent: Scored, run: Scored) -> bool:
     """Whether the intervals lie apart, too; that of the weight share must lie neither below the run's nor
     above 1."""
-    ours, theirs = agent.intervals, run.intervals
+    ours = agent.intervals
+    theirs = run.intervals
     lower = all(theirs[key].above(ours[key]) for key in LOWER)
     bears = not theirs["weight_share"].above(ours["weight_share"]) and ours["weight_share"].low <= 1.0
     return lower and bears and ours["speed_m_s"].above(theirs["speed_m_s"])

@@ -48,7 +48,8 @@ LEG = "hoof_env/HorseLeg-v0"
 COLUMNS = ("steps", "wall_s", "cpu_s", *FIGURES)
 """Of curve.csv; a figure that the id does not have stays empty."""
 
-CURVE, FINAL = "curve.csv", "final.json"
+CURVE = "curve.csv"
+FINAL = "final.json"
 
 
 @dataclass(frozen=True)

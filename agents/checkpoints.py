@@ -31,7 +31,8 @@ from agents import runs
 from hoof_env.errors import DataFileError, OutputError
 
 KEPT = 2
-REPLAY, STATE = "replay.pkl", "state.pkl"
+REPLAY = "replay.pkl"
+STATE = "state.pkl"
 COUNTED = ("episode_returns", "episode_lengths", "episode_count")  # by a `VecMonitor`
 EXPLORATION = ("exploration_mat", "exploration_matrices")
 """What gSDE drew for a rollout, before its first callback."""
@@ -147,7 +148,8 @@ class Resumed:
         self._noise = copy.deepcopy(getattr(self.model, "action_noise", None))
 
     def _put_back(self, monitor: Any, many: Any) -> None:
-        states, model = self._state["environments"], self.model
+        states = self._state["environments"]
+        model = self.model
         if states is None:
             model._last_obs = None  # the training resets them
             many.seed((model.seed or 0) + model.num_timesteps)

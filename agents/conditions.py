@@ -8,7 +8,8 @@ from typing import Any
 
 MOST_FALLS = 0.10  # share of episodes; what is left of more of them is luck
 MOST_OFF = 0.15  # from the commanded speed, over that [-]
-MOST_SLIP, TURNS = 0.10, (0.95, 1.05)  # a stance [m], stances a turn
+MOST_SLIP = 0.10  # a stance [m]
+TURNS = (0.95, 1.05)  # stances a turn
 NEAR = 0.1  # between Froude numbers, of the speed reached and of the horse
 
 
@@ -21,7 +22,8 @@ def rejection_reason(figures: dict[str, Any], pairs: Sequence[str]) -> str:
     if not abs(kept - 1) <= MOST_OFF:
         found.append(f"{kept:.2f} of the commanded speed")
     for pair in pairs:
-        slip, stances = figures[f"slip_{pair}"], figures[f"stances_per_turn_{pair}"]
+        slip = figures[f"slip_{pair}"]
+        stances = figures[f"stances_per_turn_{pair}"]
         if not slip < MOST_SLIP:
             found.append(f"{pair} hooves slip {slip:.2f} m")
         if not TURNS[0] <= stances <= TURNS[1]:

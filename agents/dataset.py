@@ -127,7 +127,8 @@ def check_environment(dataset: Any) -> None:
     would be imported. `DataFileError`."""
     spec = dataset.spec.env_spec
     known = gym.registry.get(spec.id)
-    task, registered = str(spec.kwargs.get("task", "")), known.kwargs.get("task") if known else None
+    task = str(spec.kwargs.get("task", ""))
+    registered = known.kwargs.get("task") if known else None
     same = known is not None and spec.entry_point == known.entry_point and not spec.additional_wrappers
     if not same or (":" in task and task != registered):
         raise DataFileError(
@@ -201,20 +202,26 @@ def _collect(minari: Any, env: Any, args: Args, episodes: int, dataset_id: str) 
 
     policies = {name: find_policy(name, env, args.env_id) for name in args.policies}
     files = {name: {file.name: _sha256(file) for file in policy_files(name)} for name in policies}
-    collector, returns = minari.DataCollector(env), {}
+    collector = minari.DataCollector(env)
+    returns = {}
     with tqdm(total=len(policies) * episodes, unit=" episodes", leave=False, disable=None) as bar:
         for name, policy in policies.items():
-            totals, options = [], plain_start(policy)
+            totals = []
+            options = plain_start(policy)
             for k in range(episodes):
                 observation, _ = collector.reset(seed=args.seed + k, options=options)
-                total, start, state, ended = 0.0, np.ones(1, bool), None, False
+                total = 0.0
+                start = np.ones(1, bool)
+                state = None
+                ended = False
                 while not ended:
                     action, state = policy.predict(
                         observation, state, episode_start=start, deterministic=True
                     )
                     observation, reward, terminated, truncated, _ = collector.step(action)
                     total += float(np.asarray(reward).sum())
-                    start, ended = np.zeros(1, bool), terminated or truncated
+                    start = np.zeros(1, bool)
+                    ended = terminated or truncated
                 totals.append(total)
                 bar.update()
             returns[name] = {

@@ -31,8 +31,10 @@ from hoof_env.paper.report import format_error, format_number
 from hoof_env.paper.reproduce import GAITS, SOLVERS, reproduce, write_reproduction
 from hoof_env.paper.rows import Reproduction, counted
 
-ENV_ID, FIXED_ID = "hoof_env/HorseLeg-v0", "hoof_env/HorseLegFixed-v0"
-TRAINED, OPEN_LOOP = "trained agent", "open-loop"
+ENV_ID = "hoof_env/HorseLeg-v0"
+FIXED_ID = "hoof_env/HorseLegFixed-v0"
+TRAINED = "trained agent"
+OPEN_LOOP = "open-loop"
 SCRIPTED = ("walk", "run", OPEN_LOOP, "idle", "random", "bang-bang")
 FIRST_SEED = 1000  # of the scored episodes; training starts its own from another seed
 SLOW = 4  # how many times slower than life the films of the fixed trunk play
@@ -137,7 +139,8 @@ def train_agent(args: Args, budget: Budget, stage: Path) -> train.Trained:
 def film_all(scores: Sequence[evaluate.Score], budget: Budget, stage: Path) -> list[dict[str, str]]:
     """Film gaits and agent on their own trunk, and the gaits, slowly, on a fixed one; returns a title, a
     caption and the film itself of each."""
-    clips, size = [], (640, 360)
+    clips = []
+    size = (640, 360)
     first_episodes = {score.policy: score.episodes[0] for score in scores}
     for name in (TRAINED, *GAITS):
         policy = str(stage / runs.MODEL) if name == TRAINED else name

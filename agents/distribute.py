@@ -141,7 +141,8 @@ def run_trials(args: Trials) -> int:
         trial_dirname_creator=lambda trial: _folder_name(trial, varied),
     )  # fmt: skip
     trainable = tune.with_resources(train_trial, {"cpu": args.cpus_per_trial})
-    name, storage = experiment_name(args), args.out
+    name = experiment_name(args)
+    storage = args.out
     storage = storage if "://" in storage else str(Path(storage).absolute())
     folder = f"{storage}/{name}"
     running = tune.RunConfig(

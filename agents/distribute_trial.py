@@ -62,7 +62,8 @@ class Reporter(Scorer):
         self, folder: Path, config: dict[str, Any], env_kwargs: dict[str, Any], last: dict[str, float]
     ) -> None:
         super().__init__(config["train"]["env_id"], env_kwargs, CURVE_SEEDS, config["report_every"])
-        self.folder, self.last = folder, dict(last)
+        self.folder = folder
+        self.last = dict(last)
         self.wall_s = self.last.get("train_s", 0.0)
 
     def keep(self, episodes: list[dict[str, float]]) -> None:
@@ -133,11 +134,13 @@ def reason(error: str) -> str:
 def write_table(results: Any, folder: str, varied: list[str]) -> int:
     """Write `folder`/trials.csv where that is a path, print what came of the trials; returns the exit code:
     0, 1 where a trial failed for good, 130 where one has not ended."""
-    rows, reasons = [], []
+    rows = []
+    reasons = []
     # Whether a trial is done stands in its status alone; but after Ctrl-C all look as if they were
     pairs = zip(results, results._experiment_analysis.trials, strict=True)
     for result, trial in sorted(pairs, key=lambda pair: Path(pair[0].path).name):
-        report, config = result.metrics or {}, result.config or {}
+        report = result.metrics or {}
+        config = result.config or {}
         kept = result.checkpoint.path if result.checkpoint else ""
         why = reason(str(result.error)) if result.error else report.get("failed")
         is_done = trial.status == "TERMINATED" and trial.trial_id not in Progress.going

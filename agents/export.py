@@ -136,7 +136,8 @@ class Deterministic(torch.nn.Module):
 def module_of(trained: runs.TrainedPolicy) -> Any:
     """The policy as a torch module that is ready to be traced; `ParameterError` for a recurrent one, or
     actions that are not vectors."""
-    policy, space = trained.model.policy, trained.model.action_space
+    policy = trained.model.policy
+    space = trained.model.action_space
     if not isinstance(space, gym.spaces.Box) or len(space.shape) != 1 or hasattr(policy, "lstm_actor"):
         raise ParameterError(f"model: expected a memoryless policy with vectors for actions, got {space}")
     policy.set_training_mode(False)
@@ -160,7 +161,8 @@ def _quietly() -> Iterator[None]:
     from torch.distributions import Distribution
 
     logger = logging.getLogger("torch.onnx")
-    level, checked = logger.level, Distribution._validate_args
+    level = logger.level
+    checked = Distribution._validate_args
     logger.setLevel(logging.ERROR)
     Distribution.set_default_validate_args(False)
     try:

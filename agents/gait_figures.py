@@ -26,9 +26,11 @@ from hoof_env.envs.reference import LEGS, PAIRS
 
 Floats = NDArray[np.float64]
 
-SETTLED, SECONDS = 2.0, 10.0  # from where on figures count, and the length of an episode [s]
+SETTLED = 2.0  # time from which on figures count [s]
+SECONDS = 10.0  # length of an episode [s]
 WATCHED = 8  # episodes whose forces are kept at every substep
-SHORTEST, DIP = 0.05, 0.05  # of a stance [s]; beside a peak, over the highest one [-]
+SHORTEST = 0.05  # stance [s]
+DIP = 0.05  # least dip next to a peak, over the highest one [-]
 FORCES = ("toe_normal", "heel_normal", "toe_friction", "heel_friction")  # that are kept
 HORIZONTAL = ("braking", "propulsion")  # forces backward and forward
 
@@ -91,10 +93,8 @@ def stances_of(time: Floats, forces: Floats, pushes: Floats, lift_off: float) ->
     found = []
     for leg in range(forces.shape[1]):
         loaded = np.concatenate([[False], forces[:, leg] > lift_off, [False]])
-        begins, ends = (
-            np.flatnonzero(np.diff(loaded.astype(int)) == 1),
-            np.flatnonzero(np.diff(loaded.astype(int)) == -1),
-        )
+        begins = np.flatnonzero(np.diff(loaded.astype(int)) == 1)
+        ends = np.flatnonzero(np.diff(loaded.astype(int)) == -1)
         for begin, end in zip(begins, ends, strict=True):
             if begin > 0 and end < len(time) and time[end - 1] - time[begin] > SHORTEST:
                 when = slice(begin, end)
@@ -117,16 +117,21 @@ def watch(envs: Any, policy: Any, speed: float, gait: Floats | None = None) -> P
     seeds = [3_000_000 + k for k in range(envs.num_envs)]
     around = {} if gait is None else {"gait": gait}
     seen, _ = envs.reset(seed=seeds, options={**start_of(policy), "target_speed": speed, **around})
-    n, dt = envs.num_envs, envs.dt
+    n = envs.num_envs
+    dt = envs.dt
     features = Features(envs.batch.body.harmonics, envs.settings.hoof_stiffness is not None, True)
     sums = {name: np.zeros((4, n)) for name in stride_sums(features)}
-    start, upright, state = np.ones(n, bool), np.ones(n, bool), None
+    start = np.ones(n, bool)
+    upright = np.ones(n, bool)
+    state = None
     watched: list[list[dict[str, Floats]]] = [[] for _ in range(min(WATCHED, n))]
-    settled, steps = round(SETTLED / dt), round(SECONDS / dt)
+    settled = round(SETTLED / dt)
+    steps = round(SECONDS / dt)
     for k in range(steps):
         actions, state = policy.predict(seen, state, episode_start=start, deterministic=True)
         seen, _, failed, _, infos = envs.step(np.asarray(actions, np.float32))
-        start, upright = np.zeros(n, bool), upright & ~failed
+        start = np.zeros(n, bool)
+        upright = upright & ~failed
         measured = infos["measured"]
         if k == settled - 1:  # where the first step that counts begins
             began = _place(measured)
@@ -149,7 +154,8 @@ def _place(measured: Any) -> Floats:
 def play(envs: Any, policy: Any, speed: float, gait: Floats | None = None) -> dict[str, Any]:
     """Episodes at one commanded speed [m/s]: figures of each pair of legs, means over the episodes that did
     not end early; and stances of those that are watched."""
-    played, height = watch(envs, policy, speed, gait), envs.batch.body.height
+    played = watch(envs, policy, speed, gait)
+    height = envs.batch.body.height
     kilograms = float(envs.weight[0]) / GRAVITY
     result: dict[str, Any] = {
         "speed": speed, "froude": froude_of(speed, height), "fell": float(1 - played.upright.mean()),
@@ -166,7 +172,8 @@ def froude_of(speed: float, height: float) -> float:
 
 def _from_sums(played: Played, kilograms: float, height: float) -> dict[str, float]:
     """Figures that the engine's sums have, of upright episodes of an animal with its hips at a height [m]."""
-    upright, travelled = played.upright, played.travelled[played.upright]
+    upright = played.upright
+    travelled = played.travelled[played.upright]
     found = stance_figures(played.sums, played.seconds, played.turns)
     pairs = {
         name: np.nanmean(values.reshape(2, 2, -1)[..., upright], axis=(1, 2))
@@ -195,7 +202,8 @@ def _from_stances(played: Played, kilograms: float) -> dict[str, Any]:
     """Figures that need the forces at every substep, of watched episodes that are upright; NaN if none is."""
     period = played.seconds / float(played.turns.mean(0)[played.upright].mean())
     lift_off = LIFT_OFF * kilograms * GRAVITY / len(LEGS)
-    stances, lags = [], []
+    stances = []
+    lags = []
     footfall: list[list[float]] = []
     for kept in (kept for env, kept in enumerate(played.watched) if played.upright[env]):
         time, forces, pushes = forces_of(kept)

@@ -33,21 +33,29 @@ from hoof_env.errors import HoofEnvError, parse_json
 
 Floats = NDArray[np.float64]
 
-POPULATION, STARTS, SECONDS = 32, 8, 5.0
+POPULATION = 32
+STARTS = 8
+SECONDS = 5.0
 """Candidates of a generation, episodes of each, and their length [s]."""
 
-FIRST, NEXT = 0.4, 0.05  # spread of a search from nothing, and at least where the speed changes
+FIRST = 0.4  # spread of a search from nothing
+NEXT = 0.05  # least spread where the speed changes
 STEP = 1.03  # ratio of one speed to the next
 FROUDE = 0.25  # where the search begins
-LOWEST, HIGHEST = 0.1, 1.0  # Froude numbers that the task commands; the slower gaits end at the first
+# Froude numbers that the task commands; the slower gaits end at the first
+LOWEST = 0.1
+HIGHEST = 1.0
 KNOTS = (1.2, 1.5, 1.85, 2.2, 2.6, 3.0, 3.4)  # speeds that the reference gaits have, about [m/s]
 MOST = 40  # steps of speed at most
-STABLE, NEAR = 0.1, 0.05  # most falls, and distance of speeds, of what is shipped [-]
+# most falls, and distance of speeds, of what is shipped [-]
+STABLE = 0.1
+NEAR = 0.05
 HARMONICS = 3  # of the trunk's motion
 FALLEN = 0.1  # share of falls at which the speed is raised no more
 TROT_FROUDE = 0.5  # where the trot-like family begins
 LAG = 600.0  # what a stride between the landings of hind and fore hooves costs a trot-like gait
-TROT, SLIP = 0.05, 0.1
+TROT = 0.05
+SLIP = 0.1
 """Largest lag [strides] and slip of a stance [m] of what is shipped as trot-like: as for agents."""
 
 WEIGHTS = {
@@ -62,7 +70,9 @@ TROT_WEIGHTS = {"landing": 2.0}
 
 CENTRE = (1.05, 0.45, -0.7, 0.0, 0.0)  # swing about which a search from nothing begins [rad]
 SPANS = (0.5, 0.4, 0.4, 0.3, 0.3)
-RATE, PART = (2.5, 12.5), 0.6  # crank rate [rad/s]; harmonic of the crank's speed [-]
+# crank rate [rad/s]; harmonic of the crank's speed [-]
+RATE = (2.5, 12.5)
+PART = 0.6
 
 
 def decode(x: Floats) -> Floats:
@@ -74,7 +84,8 @@ def decode(x: Floats) -> Floats:
 
 def encode(gaits: Floats) -> Floats:
     """Inverse of `decode`, within the box."""
-    low, high = decode(-np.ones((1, gaits.shape[-1]))), decode(np.ones((1, gaits.shape[-1])))
+    low = decode(-np.ones((1, gaits.shape[-1])))
+    high = decode(np.ones((1, gaits.shape[-1])))
     return np.clip(2 * (gaits - low) / (high - low) - 1, -1, 1)
 
 
@@ -90,18 +101,22 @@ class BatchRollout:
             autoreset_mode=AutoresetMode.SAME_STEP, reward_weights=weights,
             **{"episode_seconds": SECONDS, **settings},
         )  # fmt: skip
-        self.envs, self.steps = envs, int(envs.unwrapped.batch.steps_per_episode)
+        self.envs = envs
+        self.steps = int(envs.unwrapped.batch.steps_per_episode)
 
     def play(
         self, gaits: Floats, seed: int, starts: int = STARTS
     ) -> tuple[Floats, list[dict[str, float]], Floats]:
         """Returns of the first episodes of some gaits, shape (n, 16), their figures and lags [strides]. So
         many after each other meet different starts, the same as the next ones."""
-        envs, n = self.envs, len(gaits)
+        envs = self.envs
+        n = len(gaits)
         envs.reset(seed=[seed + k % starts for k in range(n)], options={"gait": gaits})
-        returns, ended = np.zeros(n), np.zeros(n, bool)
+        returns = np.zeros(n)
+        ended = np.zeros(n, bool)
         summaries: list[dict[str, float]] = [{} for _ in range(n)]
-        idle, lags = np.zeros((n, 16), np.float32), np.zeros(n, complex)
+        idle = np.zeros((n, 16), np.float32)
+        lags = np.zeros(n, complex)
         for step in range(self.steps):
             _, rewards, terminated, truncated, infos = envs.step(idle)
             returns += np.where(ended, 0.0, rewards)
@@ -125,7 +140,8 @@ def landings(gaits: Floats, theta: Floats) -> NDArray[np.complex128]:
     and right are half a stride apart, so half a stride is a whole turn of it."""
     at = []
     for k, numbers in enumerate(gaits[:, 2:].reshape(len(gaits), len(PAIRS), -1).transpose(1, 2, 0)):
-        stride, lead = Stride(numbers[0], numbers[1]), gaits[:, 1] * (k == 0)
+        stride = Stride(numbers[0], numbers[1])
+        lead = gaits[:, 1] * (k == 0)
         begin = _complex(stride.phase(np.ones(len(gaits)), np.zeros(len(gaits))))
         phases = [_complex(stride.phase(np.cos(each), np.sin(each))) for each in theta[2 * k : 2 * k + 2]]
         at.append((np.array(phases) / (begin * np.exp(2j * np.pi * lead))) ** 2)
@@ -153,7 +169,9 @@ class Search:
             raise HoofEnvError(
                 'agents.horse_gaits needs cma: pip install "hoof-env[train,identify]"'
             ) from None
-        self.lag, self.seed, self.count = lag, seed, 0
+        self.lag = lag
+        self.seed = seed
+        self.count = 0
         start = np.zeros(2 + len(PAIRS) * len(LIMITS)) if first is None else encode(first[None])[0]
         options = {"bounds": [-1, 1], "popsize": POPULATION, "seed": seed + 1, "verbose": -9, "verb_log": 0}
         self.strategy = cma.CMAEvolutionStrategy(start, FIRST if first is None else NEXT, options)
@@ -241,7 +259,8 @@ class Finder:
         self, search: Search, first: float, ratio: float, last: float, tick: Any
     ) -> list[dict[str, Any]]:
         """Change the speed by a ratio until it is `last`, or the horse falls."""
-        steps, speed = [], first
+        steps = []
+        speed = first
         for _ in range(MOST):
             speed = speed * ratio
             if (speed - last) * (ratio - 1) > 0:
@@ -253,7 +272,8 @@ class Finder:
 
     def family(self, name: str, froude: float = FROUDE, lag: float = 0.0) -> None:
         """A gait from nothing, and where more and less speed lead from there."""
-        args, speed = self.args, speed_of(froude)
+        args = self.args
+        speed = speed_of(froude)
         begins = [
             self.keep(
                 f"{name} {seed}",
@@ -276,8 +296,10 @@ def trunk_series(gait: list[float], speed: float) -> list[list[float]]:
     its mean [-] and pitch [rad], of each the mean, and cosine and sine coefficients of `HARMONICS` harmonics
     of half a stride; what `reference.trunk_motion` reads."""
     course = BatchRollout(speed, 64, episode_seconds=2 * SECONDS)
-    envs, numbers = course.envs, np.array(gait)
-    body, stride = envs.unwrapped.batch.body, Stride(*numbers[-len(LIMITS) :][:2])
+    envs = course.envs
+    numbers = np.array(gait)
+    body = envs.unwrapped.batch.body
+    stride = Stride(*numbers[-len(LIMITS) :][:2])
     envs.reset(seed=1, options={"gait": numbers})
     rows: list[list[Floats]] = []
     upright = np.ones(envs.num_envs, bool)
@@ -288,8 +310,10 @@ def trunk_series(gait: list[float], speed: float) -> list[list[float]]:
             m = infos["measured"]
             rows.append([m[name].copy() for name in ("left_hind_theta", "y", "vx", "pitch")])
     theta, y, vx, pitch = np.moveaxis(np.array(rows), 1, 0)[..., upright].reshape(4, -1)
-    one, zero = np.ones(1), np.zeros(1)
-    begin, now = stride.phase(one, zero), stride.phase(np.cos(theta), np.sin(theta))
+    one = np.ones(1)
+    zero = np.zeros(1)
+    begin = stride.phase(one, zero)
+    now = stride.phase(np.cos(theta), np.sin(theta))
     phase = np.arctan2(now[1], now[0]) - np.arctan2(begin[1], begin[0])
     order = 2 * np.arange(1, HARMONICS + 1)
     waves = [wave(n * phase) for n in order for wave in (np.cos, np.sin)]

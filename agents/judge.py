@@ -118,7 +118,8 @@ def judged(
 def verdicts(figures: list[dict[str, Any]]) -> list[tuple[str, ...]]:
     """Rows of the table: what is judged, at which Froude number, the horse's figure, the bar, ours, the
     verdict or why there is none, and the source. Empty where the policy falls at every speed."""
-    judges, standing = read_judges(), [one for one in figures if "lag" in one]
+    judges = read_judges()
+    standing = [one for one in figures if "lag" in one]
     if not standing:
         return []
     return [*_walk(judges, standing), *_trot(judges, standing), *_reported(judges, standing)]

@@ -74,14 +74,16 @@ def speeds(figures: Figures) -> Any:
     picture = Figure((10, 3.2), layout="constrained")
     lag, duty, cost = picture.subplots(1, 3)
     for name, some in figures.items():
-        good, label = [one for one in some if "lag" in one], Path(name).name
+        good = [one for one in some if "lag" in one]
+        label = Path(name).name
         froude = [one["froude_reached"] for one in good]
         lag.plot(froude, [min(one["lag"], 0.5 - one["lag"]) for one in good], "o-", ms=3, label=label)
         for pair, style in zip(PAIRS, ("o-", "s--"), strict=True):
             duty.plot(froude, [one[f"duty_{pair}"] for one in good], style, ms=3, label=f"{label}, {pair}")
         cost.plot(froude, [one["transport"] for one in good], "o-", ms=3)
     judges = read_judges()
-    walk, trots = judges["walk"], of_speeds(judges["duty"])
+    walk = judges["walk"]
+    trots = of_speeds(judges["duty"])
     duty.plot([at for at, _ in trots], [one["horse"][0] for _, one in trots], "k*", label="horses, trot")
     lag.plot([walk["froude"]], [walk["lag"]["horse"]], "k*", label="horses, walk")
     duty.plot([walk["froude"]], [walk["duty"]["horse"]], "k^", label="horses, walk")

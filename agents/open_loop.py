@@ -41,15 +41,21 @@ Floats = NDArray[np.float64]
 Episodes = list[dict[str, float]]
 
 SIZES = {"constant": 4, "clocked": 13}  # numbers of a gait, by family
-SLOWEST, FASTEST = 0.2, 4.0  # of the clock [Hz]; the crank turns at 2 Hz at most
-POPULATION, STARTS = 16, 16  # candidates of a generation and random starts that each meets
+# of the clock [Hz]; the crank turns at 2 Hz at most
+SLOWEST = 0.2
+FASTEST = 4.0
+# candidates of a generation and random starts that each meets
+POPULATION = 16
+STARTS = 16
 ROWS = POPULATION * STARTS
 FINALISTS = 4  # candidates of a search that meet more starts at its end
 
-STEP, HARMONIC = 0.3, 0.3
+STEP = 0.3
+HARMONIC = 0.3
 """First standard deviation and largest first harmonic; the box of every number is 2 wide."""
 
-TEST_SEED, SEARCH_SEED = 1000, 10_000_000
+TEST_SEED = 1000
+SEARCH_SEED = 10_000_000
 """First seeds of the final score, `agents.evaluate`'s, and of the searches."""
 
 OPTIONS = {
@@ -94,7 +100,8 @@ def decode(family: str, x: Floats) -> dict[str, Floats]:
     if family == "constant":
         return {"constant": constant}
     frequency = SLOWEST * (FASTEST / SLOWEST) ** ((x[..., 12] + 1) / 2)
-    sine, cosine = HALF_RANGE * x[..., 4:8], HALF_RANGE * x[..., 8:12]
+    sine = HALF_RANGE * x[..., 4:8]
+    cosine = HALF_RANGE * x[..., 8:12]
     return {"constant": constant, "sin": sine, "cos": cosine, "frequency_hz": frequency}
 
 
@@ -115,7 +122,9 @@ class Objective:
             raise ParameterError(f"env_id: expected an id of this package with many at once, got {env_id!r}")
         if envs.action_form != "rates":
             raise ParameterError(f"env_id: expected an id of one leg, got {env_id!r}")
-        self.envs, self.spent, self.family = envs, 0, family
+        self.envs = envs
+        self.spent = 0
+        self.family = family
 
     def costs(self, x: Floats, seeds: Sequence[int]) -> list[float]:
         """Minus the mean returns of candidates, shape (n, size), that meet the same starts; n * len(seeds) is
@@ -153,7 +162,8 @@ def search(
     """
     import cma
 
-    generator, fresh = np.random.default_rng([seed, 6]), SEARCH_SEED * (seed + 1)
+    generator = np.random.default_rng([seed, 6])
+    fresh = SEARCH_SEED * (seed + 1)
 
     def costs(x: Any, starts: int) -> list[float]:
         nonlocal fresh
@@ -162,15 +172,19 @@ def search(
         tick(ROWS, min(values))
         return values
 
-    size, step = SIZES[objective.family], STEP
+    size = SIZES[objective.family]
+    step = STEP
     if start is not None:
-        first, step = np.array([*encode(start), *[0.0] * (size - len(start))]), STEP / 3
+        first = np.array([*encode(start), *[0.0] * (size - len(start))])
+        step = STEP / 3
     else:
         screened = generator.uniform(-1, 1, (ROWS // 4, size))
         screened[:, 4:12] *= HARMONIC
         first = screened[np.argmin(costs(screened, 4))]
     options = OPTIONS | {"popsize": POPULATION, "seed": int(generator.integers(1, 2**31))}
-    strategy, best, interrupted = cma.CMAEvolutionStrategy(first, step, options), [first], False
+    strategy = cma.CMAEvolutionStrategy(first, step, options)
+    best = [first]
+    interrupted = False
     try:
         for _ in range(episodes // ROWS - 2):
             if strategy.stop():
@@ -233,7 +247,9 @@ def check(args: Args) -> int:
 
 
 def search_once(objective: Objective, seed: int, about: dict[str, Any], bar: Any) -> dict[str, Any]:
-    began, used, objective.spent = time.monotonic(), time.process_time(), 0
+    began = time.monotonic()
+    used = time.process_time()
+    objective.spent = 0
 
     def tick(count: int, lowest: float) -> None:
         bar.update(count)

@@ -42,14 +42,20 @@ CHUNK = 1000
 """Most steps of a batch whose gradient is computed at once, by one thread: their numbers stay in the cache.
 The gradients are added up in order, so any number of threads gives the same bits."""
 
-BETA1, BETA2, EPSILON = 0.9, 0.999, 1e-5  # of Adam
+# of Adam
+BETA1 = 0.9
+BETA2 = 0.999
+EPSILON = 1e-5
 
 LARGEST = np.float32(10.0)
 """Reward after `Scale`, as in Stable-Baselines3: one failure in a rollout is not to hide all else."""
 
 POLICY_KWARGS = {"net_arch", "activation_fn", "log_std_init", "ortho_init"}
 
-LOG_PROB, ADVANTAGE, TARGET, ACTIONS = 0, 1, 2, 3
+LOG_PROB = 0
+ADVANTAGE = 1
+TARGET = 2
+ACTIONS = 3
 """Columns of what is learnt from, with the actions from the last one on."""
 
 ZERO, HALF, ONE, FAR = (np.float32(number) for number in (0.0, 0.5, 1.0, 100.0))
@@ -75,7 +81,8 @@ def tanh(x):  # type: ignore[no-untyped-def]
 def forward(x, matrices, biases, outputs):  # type: ignore[no-untyped-def]
     """What each layer gives for rows of inputs, the hidden ones behind a tanh."""
     for k in range(len(matrices)):
-        y, bias = outputs[k], biases[k]
+        y = outputs[k]
+        bias = biases[k]
         np.dot(x if k == 0 else outputs[k - 1], matrices[k].T, y)
         if k < len(matrices) - 1:
             for i in range(y.shape[0]):
@@ -92,7 +99,8 @@ def backward(x, matrices, outputs, slopes, by_matrices, by_biases):  # type: ign
     """The derivatives by matrices and biases from those by the last outputs, in the last of `slopes`; the
     others are room for those by the hidden layers."""
     for k in range(len(matrices) - 1, -1, -1):
-        slope, by_bias = slopes[k], by_biases[k]
+        slope = slopes[k]
+        by_bias = by_biases[k]
         if k < len(matrices) - 1:
             np.dot(slopes[k + 1], matrices[k + 1], slope)
             y = outputs[k]
@@ -113,13 +121,15 @@ def loss_of(  # type: ignore[no-untyped-def]
 ):  # fmt: skip
     """The loss of Schulman et al. 2017 (Eq. 9) of some of `count` steps, and its derivatives. The columns of
     `steps` are as `LOG_PROB` and so on say. The entropy is the sum of `log_std`, but for a constant."""
-    by_log_std[:], losses[:] = -ent_coef * np.float32(len(steps)) / count, ZERO
+    by_log_std[:] = -ent_coef * np.float32(len(steps)) / count
+    losses[:] = ZERO
     for i in range(len(steps)):
         log_prob = ZERO
         for k in range(ACTIONS, steps.shape[1]):
             z = (steps[i, k] - means[i, k - ACTIONS]) * np.exp(-log_std[k - ACTIONS])
             log_prob -= HALF * z * z + log_std[k - ACTIONS]
-        ratio, advantage = np.exp(log_prob - steps[i, LOG_PROB]), steps[i, ADVANTAGE]
+        ratio = np.exp(log_prob - steps[i, LOG_PROB])
+        advantage = steps[i, ADVANTAGE]
         held = min(max(ratio, ONE - clip_range), ONE + clip_range)
         losses[0] -= min(ratio * advantage, held * advantage) / count
         weight = -ratio * advantage / count if ratio * advantage <= held * advantage else ZERO
@@ -175,7 +185,8 @@ class Network:
 
     def __call__(self, x: Floats) -> Floats:
         """Outputs for rows of inputs, shape (..., inputs)."""
-        rows, outputs = x.reshape(-1, x.shape[-1]), []
+        rows = x.reshape(-1, x.shape[-1])
+        outputs = []
         for begin in range(0, len(rows), CHUNK):
             part = rows[begin : begin + CHUNK]
             room = self.room(len(part))
@@ -225,7 +236,9 @@ class Scale:
 
     def __init__(self, gamma: float) -> None:
         self.gamma = gamma
-        self.count, self.mean, self.square = 1e-4, 0.0, 1.0
+        self.count = 1e-4
+        self.mean = 0.0
+        self.square = 1.0
         self.restart()
 
     def restart(self) -> None:
@@ -234,15 +247,19 @@ class Scale:
 
     def after(self, rewards: Floats, ended: NDArray[np.bool_]) -> np.float32:
         """The scale when these steps are counted, too, shape (T, n) both."""
-        returns, goes_on = np.empty_like(rewards), np.float32(self.gamma) * ~ended
+        returns = np.empty_like(rewards)
+        goes_on = np.float32(self.gamma) * ~ended
         for t in range(len(rewards)):
             returns[t] = self.returns + rewards[t]
             self.returns = goes_on[t] * returns[t]
-        count, mean = self.count + returns.size, float(returns.mean(dtype=np.float64))
-        gap, own = mean - self.mean, float(returns.var(dtype=np.float64))
+        count = self.count + returns.size
+        mean = float(returns.mean(dtype=np.float64))
+        gap = mean - self.mean
+        own = float(returns.var(dtype=np.float64))
         between = gap**2 * self.count * returns.size / count
         self.square = (self.square * self.count + own * returns.size + between) / count
-        self.mean, self.count = self.mean + gap * returns.size / count, count
+        self.mean = self.mean + gap * returns.size / count
+        self.count = count
         return np.float32(np.sqrt(self.square + 1e-8))
 
 
@@ -322,10 +339,13 @@ class FlatPPO(OnPolicyAlgorithm):
             raise ParameterError(f"batch_size: expected 2 or more, for its advantages, got {batch_size!r}")
         if norm_reward and isinstance(env, VecNormalize) and env.norm_reward:
             raise ParameterError("norm_reward: expected False where `normalize` does it, got both")
-        self.batch_size, self.n_epochs, self.clip_range = batch_size, n_epochs, clip_range
+        self.batch_size = batch_size
+        self.n_epochs = n_epochs
+        self.clip_range = clip_range
         self.norm_reward = norm_reward
         self.num_threads = None if num_threads is None else check_threads(num_threads)
-        self.random, self.scale = np.random.default_rng(seed), Scale(gamma)
+        self.random = np.random.default_rng(seed)
+        self.scale = Scale(gamma)
         self.moments: Floats | None = None  # of the gradient, for Adam
         super().__init__(
             policy, env, learning_rate, n_steps, gamma, gae_lambda, ent_coef, vf_coef, max_grad_norm,
@@ -364,7 +384,9 @@ class FlatPPO(OnPolicyAlgorithm):
     ) -> bool:
         """Go on from the last observation for so many steps and fill the buffer; False where the callback
         ends the training."""
-        box, weights, buffer = self.action_space, self.weights, rollout_buffer
+        box = self.action_space
+        weights = self.weights
+        buffer = rollout_buffer
         assert isinstance(box, spaces.Box)
         buffer.reset()
         callback.on_rollout_start()
@@ -380,8 +402,10 @@ class FlatPPO(OnPolicyAlgorithm):
             # A sample outside the box is played at its edge, but learnt from as it was drawn
             clipped_actions = np.clip(buffer.actions[t].reshape(-1, *box.shape), box.low, box.high)
             new_obs, rewards, dones, infos = env.step(clipped_actions)
-            self._last_obs, self._last_episode_starts = new_obs, dones
-            buffer.rewards[t], ended[t] = rewards, dones
+            self._last_obs = new_obs
+            self._last_episode_starts = dones
+            buffer.rewards[t] = rewards
+            ended[t] = dones
             self.num_timesteps += env.num_envs
             callback.update_locals(locals())
             if not callback.on_step():
@@ -407,14 +431,16 @@ class FlatPPO(OnPolicyAlgorithm):
 
     def train(self) -> None:
         """Steps of Adam on shuffled batches."""
-        buffer, progress = self.rollout_buffer, self._current_progress_remaining
+        buffer = self.rollout_buffer
+        progress = self._current_progress_remaining
         columns = (buffer.log_probs, buffer.advantages, buffer.returns)
         steps = np.concatenate([*(one[..., None] for one in columns), buffer.actions], 2)
         steps = steps.reshape(-1, steps.shape[-1])
         observations = buffer.observations.reshape(len(steps), -1)
         rate = self.lr_schedule(progress)
         clip_range = self.clip_range(progress) if callable(self.clip_range) else self.clip_range
-        gradient, losses = Gradient(self, clip_range), []
+        gradient = Gradient(self, clip_range)
+        losses = []
         for _ in range(self.n_epochs):
             for chosen in self.batches(len(steps)):
                 losses.append(gradient.compute(observations, steps, chosen))
@@ -449,12 +475,14 @@ class Gradient:
     """The gradient of the loss over a batch, `vector`."""
 
     def __init__(self, model: FlatPPO, clip_range: float) -> None:
-        self.model, self.clip_range = model, clip_range
+        self.model = model
+        self.clip_range = clip_range
         self.parts: dict[tuple[int, int], tuple[Any, ...]] = {}  # rooms, by chunk and its size
 
     def compute(self, observations: Floats, steps: Floats, chosen: NDArray[np.int64]) -> Floats:
         """Compute it for the chosen rows; returns the losses of policy and value."""
-        model, log_std = self.model, self.model.weights.log_std
+        model = self.model
+        log_std = self.model.weights.log_std
         advantages = steps[chosen, ADVANTAGE]
         scale = np.array([advantages.mean(), advantages.std(ddof=1) + 1e-8], np.float32)
         numbers = (self.clip_range, model.vf_coef, model.ent_coef, len(chosen))
@@ -473,7 +501,8 @@ class Gradient:
     def part(self, number: int, rows: int) -> tuple[Any, ...]:
         """Room for a chunk of a batch: derivatives, what is between, losses."""
         if (number, rows) not in self.parts:
-            model, own = self.model, Weights.of(copy.deepcopy(self.model.policy))
+            model = self.model
+            own = Weights.of(copy.deepcopy(self.model.policy))
             widths = model.weights.actor.matrices[0].shape[1], ACTIONS + model.weights.log_std.size
             room: list[Any] = [np.zeros((rows, width), np.float32) for width in widths]
             room += [

@@ -40,7 +40,10 @@ from hoof_env.saved_policy import TrainedPolicy as TrainedPolicy
 from hoof_env.saved_policy import describe_env as describe_env
 from hoof_env.saved_policy import read_record as read_record
 
-MODEL, CONFIG, RECORD, MONITOR = "model.zip", "config.yml", "run.json", "monitor.csv"
+MODEL = "model.zip"
+CONFIG = "config.yml"
+RECORD = "run.json"
+MONITOR = "monitor.csv"
 FILES = (MODEL, WEIGHTS, ABOUT, CONFIG, RECORD, MONITOR)
 """What a run without normalisation leaves, TensorBoard's files aside."""
 

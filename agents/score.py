@@ -60,12 +60,15 @@ def play(
     episodes = []
     for seed in seeds:
         observation, info = env.reset(seed=seed, options=start_of(policy))
-        total, start, done = 0.0, np.ones(1, bool), False
+        total = 0.0
+        start = np.ones(1, bool)
+        done = False
         while not done:
             action, _ = policy.predict(observation, episode_start=start, deterministic=True)
             observation, reward, terminated, truncated, info = env.step(action)
             total += float(np.asarray(reward).sum())  # of a vector, all objectives
-            start, done = np.zeros(1, bool), terminated or truncated
+            start = np.zeros(1, bool)
+            done = terminated or truncated
         episodes.append({"return": total, **_with_stance_peak(info.get("episode_summary", {}))})
         tick()
     return episodes
@@ -104,8 +107,10 @@ def make_rows(env_id: str, num_envs: int, **env_kwargs: Any) -> HorseLegVectorEn
 def play_rows(envs: HorseLegVectorEnv, policy: Any, seeds: Sequence[int]) -> list[dict[str, float]]:
     """`score_vector` with an environment that is there already, one row for each seed."""
     observation, _ = envs.reset(seed=list(seeds), options=start_of(policy))
-    start, going = np.ones(envs.num_envs, bool), np.ones(envs.num_envs, bool)
-    total, state = np.zeros(envs.num_envs), None
+    start = np.ones(envs.num_envs, bool)
+    going = np.ones(envs.num_envs, bool)
+    total = np.zeros(envs.num_envs)
+    state = None
     episodes: list[dict[str, float]] = [{} for _ in seeds]
     while going.any():
         actions, state = policy.predict(observation, state, episode_start=start, deterministic=True)
@@ -247,7 +252,8 @@ def score(args: Args) -> list[tuple[str, list[dict[str, float]]]]:
             warnings.warn(f"policy {name}: nothing says what it was trained for", stacklevel=2)
     file, record = next(((name, one) for name, one in read.items() if one), ("", {}))
     asked, own = environment_of(file, record, args.env_id)
-    env_id, env_kwargs = asked or runs.DEFAULT_ENV, parse_pairs("--env-kwargs", args.env_kwargs) or own
+    env_id = asked or runs.DEFAULT_ENV
+    env_kwargs = parse_pairs("--env-kwargs", args.env_kwargs) or own
     with runs.make_env(env_id, **env_kwargs) as env:
         policies = {name: find_same(name, env, env_id) for name in args.policy}
     with_what = f" with {env_kwargs}" if env_kwargs else ""

@@ -91,7 +91,8 @@ def model_arguments(settings: Mapping[str, Any], actions: int = 1) -> dict[str, 
             raise DataFileError(f"hyperparameter {key}: expected a whole number of 1 or more, got {value!r}")
     if isinstance(arguments.get("train_freq"), list):  # [1, episode]: YAML knows no tuple
         arguments["train_freq"] = tuple(arguments["train_freq"])
-    kind, spread = arguments.pop("noise_type", None), arguments.pop("noise_std", 0.1)
+    kind = arguments.pop("noise_type", None)
+    spread = arguments.pop("noise_std", 0.1)
     if kind is not None:
         arguments["action_noise"] = _action_noise(kind, spread, actions)
     for key in SCHEDULED:

@@ -52,7 +52,8 @@ CHECKED = 20
 
 GAITS = ("run", "walk", "carrying_walk", "reference", "open-loop")  # scored beside it, where an id has them
 
-LIMIT, FILM_LIMIT = 1_000_000, 750_000
+LIMIT = 1_000_000
+FILM_LIMIT = 750_000
 """Bytes of a folder and of the film in it, which is made shorter where it is larger."""
 
 FILM_SECONDS = 4.0
@@ -116,7 +117,8 @@ def choose(saved: Sequence[runs.SavedModel], env_id: str) -> Choice:
 def ship(choice: Choice, env_id: str, out: Path) -> dict[str, Any]:
     """Write the folder of one policy beneath `out`, for its own id or one that `STANDS_FOR` it; returns its
     score.json. `DataFileError`: the model does not fit. `OutputError`: the folder gets too large."""
-    saved, trained_on = choice.saved, own_id(choice.saved.record["env_id"])
+    saved = choice.saved
+    trained_on = own_id(choice.saved.record["env_id"])
     if not len(runs.read_episodes(saved.path.parent)):
         raise DataFileError(f"run {saved.path.parent}: expected a training in which episodes end, got none")
     record = saved.record | {"command": shown_command(saved.record.get("command", "")), "env_id": env_id}
@@ -151,7 +153,9 @@ def ship(choice: Choice, env_id: str, out: Path) -> dict[str, Any]:
 
 def film(folder: Path, env_id: str) -> None:
     """Write film.gif of the policy in `folder`, shorter where it would be larger than `FILM_LIMIT`."""
-    path, policy, seconds = folder / "film.gif", str(folder / FILE), FILM_SECONDS
+    path = folder / "film.gif"
+    policy = str(folder / FILE)
+    seconds = FILM_SECONDS
     while not path.is_file() or path.stat().st_size > FILM_LIMIT:
         render_episode(path, policy, env_id, seed=SCORE_SEEDS[0], seconds=seconds, fps=20, size=(480, 270))
         seconds *= 0.75
@@ -188,7 +192,8 @@ class NoisyPolicy:
     """A policy whose actions are off by a millionth: another machine's arithmetic, exaggerated."""
 
     def __init__(self, policy: Any) -> None:
-        self._policy, self._generator = policy, np.random.default_rng(0)
+        self._policy = policy
+        self._generator = np.random.default_rng(0)
 
     def predict(self, observation: Any, *args: Any, **kwargs: Any) -> tuple[Any, Any]:
         actions, state = self._policy.predict(observation, *args, **kwargs)
@@ -250,7 +255,8 @@ def write_card(
 
 def write_index(folder: Path) -> None:
     """Write README.md, the table of the policies in `folder`."""
-    rows, beside = [], ("open-loop", "run", "reference")
+    rows = []
+    beside = ("open-loop", "run", "reference")
     for path in sorted(folder.glob("*/score.json")):
         score = parse_json(path.read_text(encoding="utf-8"))
         algo = parse_json(path.with_name(runs.RECORD).read_text(encoding="utf-8"))["algo"]

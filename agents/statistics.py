@@ -118,7 +118,8 @@ def over_episodes(episodes: Sequence[Mapping[str, float]]) -> dict[str, Interval
                 with np.errstate(divide="ignore", invalid="ignore"):  # of a draw that gets nowhere
                     return work * share / (force * distance)
 
-            rng, rows = np.random.default_rng(0), np.arange(len(episodes))
+            rng = np.random.default_rng(0)
+            rows = np.arange(len(episodes))
             bounds = bootstrap((rows,), cost, vectorized=True, rng=rng).confidence_interval
             intervals["cost_of_transport"] = Interval(mean, float(bounds.low), float(bounds.high))
     return intervals

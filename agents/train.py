@@ -153,7 +153,8 @@ def learn(
     from agents.watch import EndedError, Watch, check_divergence, diverged, stop_on_signals
 
     watch = Watch(folder, steps, args.checkpoint_every, args.max_minutes, resumed)
-    callbacks, is_through = CallbackList([watch, *also]), False
+    callbacks = CallbackList([watch, *also])
+    is_through = False
     with closing(watch), stop_on_signals(watch):
         try:
             model.learn(steps - model.num_timesteps, callbacks, reset_num_timesteps=not resumed)

@@ -100,7 +100,8 @@ class TrialScorer(Scorer):
         report: Callable[[int, float], bool] = lambda steps, score: False,
     ) -> None:
         super().__init__(env_id, env_kwargs, SEEDS, every)
-        self.report, self.is_pruned = report, False
+        self.report = report
+        self.is_pruned = False
         self.curve: list[tuple[int, float]] = []
 
     def keep(self, episodes: list[dict[str, float]]) -> None:
@@ -121,7 +122,8 @@ def tune(args: Args) -> Any:
     `KeyboardInterrupt`: Ctrl-C; finished trials stay."""
     check_number("trials", args.trials, low=1)
     check_number("scores", args.scores, low=1)
-    kwargs, held = parse_pairs("--env-kwargs", args.env_kwargs), parse_pairs("--params", args.params)
+    kwargs = parse_pairs("--env-kwargs", args.env_kwargs)
+    held = parse_pairs("--params", args.params)
     base = load_settings(FOLDER / f"{args.algo}.yml", args.env_id) | held
     base["n_timesteps"] = int(check_number("steps", args.steps or base["n_timesteps"], low=1))
     space = {

@@ -70,7 +70,9 @@ class Watch(BaseCallback):
         resumed: checkpoints.Resumed | None,
     ) -> None:
         super().__init__()
-        self.folder, self.steps, self.resumed = folder, steps, resumed
+        self.folder = folder
+        self.steps = steps
+        self.resumed = resumed
         self.checkpoint_every = checkpoint_every
         self.max_seconds = math.inf if max_minutes is None else 60 * max_minutes
         self.stopped_by: int | None = None
@@ -155,7 +157,10 @@ class Scorer(BaseCallback):
 
     def __init__(self, env_id: str, env_kwargs: Mapping[str, Any], seeds: Sequence[int], every: int) -> None:
         super().__init__()
-        self.env_id, self.env_kwargs, self.seeds, self.every = env_id, env_kwargs, seeds, every
+        self.env_id = env_id
+        self.env_kwargs = env_kwargs
+        self.seeds = seeds
+        self.every = every
         self.wall_s = self.cpu_s = 0.0
 
     @abstractmethod

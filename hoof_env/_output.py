@@ -19,7 +19,8 @@ def staged(folder: Path) -> Iterator[Path]:
     """A temporary folder inside `folder`, which is made if need be; if the block succeeds, its files replace
     those of `folder`. Folders that were made and have stayed empty go again. `OutputError` if it cannot
     be."""
-    stage, made = None, []
+    stage = None
+    made = []
     try:
         made = [path for path in (folder, *folder.parents) if not path.exists()]
         folder.mkdir(parents=True, exist_ok=True)
@@ -50,7 +51,8 @@ def check_new(path: Path, overwrite: bool) -> str:
     """What to add to a report of a new file: the folder that is made for it, or nothing. `OutputError` where
     there is a file already and `overwrite` is False, or there cannot be one."""
     try:
-        is_there, has_folder = path.is_file(), path.parent.exists()
+        is_there = path.is_file()
+        has_folder = path.parent.exists()
     except OSError as error:
         raise OutputError(f"cannot write to {str(path)!r}: {error.strerror}") from None
     if is_there and not overwrite:

@@ -200,7 +200,8 @@ def compare(
 
     made = check_new(out, overwrite)
     check_picture(out)
-    of_a, of_b = parse_mapping("--map-a", map_a), parse_mapping("--map-b", map_b)
+    of_a = parse_mapping("--map-a", map_a)
+    of_b = parse_mapping("--map-b", map_b)
     first = read_record(a, of_a, units_a, reverse_a, rate_a, mass_a, up_a, forward_a)
     second = read_record(b, of_b, units_b, reverse_b, rate_b, mass_b, up_b, forward_b)
     found = compare(first, second, align, threshold, units)

@@ -247,7 +247,8 @@ class FilterSettings:
         for name in ("gain", "crank_rate", "crank_acc", "swing_rate", "swing_acc"):
             check_number(f"filters.{name}", getattr(self, name), low=0, exclusive_low=True)
         for part in ("crank", "swing"):
-            rate, acc = getattr(self, f"{part}_rate"), getattr(self, f"{part}_acc")
+            rate = getattr(self, f"{part}_rate")
+            acc = getattr(self, f"{part}_acc")
             if self.gain * rate > acc * (1 + 1e-12):
                 raise ParameterError(
                     f"filters: expected gain * {part}_rate <= {part}_acc so that a command is not overshot, "
@@ -282,7 +283,9 @@ def command_filters(filters, command, settings):  # type: ignore[no-untyped-def]
     """Set each filter's acceleration: bounded, towards a bounded rate, towards the command."""
     for k in range(filters.shape[0]):
         row = min(k, 3)  # higher harmonics swing like the first
-        gain, rate_bound, acc_bound = settings[row, 0], settings[row, 1], settings[row, 2]
+        gain = settings[row, 0]
+        rate_bound = settings[row, 1]
+        acc_bound = settings[row, 2]
         wanted_rate = clip(gain * (command[k] - filters[k].value), rate_bound)
         filters[k].acc = clip(INNER * gain * (wanted_rate - filters[k].rate), acc_bound)
 
@@ -303,9 +306,13 @@ def evaluate_motion(motion, filters):  # type: ignore[no-untyped-def]
 
     phi = phi0 + A sin(theta) + B cos(theta), differentiated twice with phi0, A, B and theta all moving.
     """
-    s, c = np.sin(motion.theta), np.cos(motion.theta)
-    offset, a, b = filters[OFFSET], filters[SIN], filters[COS]
-    w, w_rate = filters[SPEED].value, filters[SPEED].rate
+    s = np.sin(motion.theta)
+    c = np.cos(motion.theta)
+    offset = filters[OFFSET]
+    a = filters[SIN]
+    b = filters[COS]
+    w = filters[SPEED].value
+    w_rate = filters[SPEED].rate
     motion.theta_rate = w
     motion.theta_acc = w_rate
     motion.phi = offset.value + a.value * s + b.value * c

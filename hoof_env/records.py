@@ -163,12 +163,14 @@ def episode(
     observation, _ = env.reset(seed=seed, options=start_of(policy) | dict(options or {}))
     here = substeps(env)
     yield here | (_named(env, joints.now()) if joints else {})
-    start, ended = np.ones(1, bool), False
+    start = np.ones(1, bool)
+    ended = False
     while not ended and (seconds is None or here["time"][-1] < seconds - 1e-9):
         action, _ = policy.predict(observation, episode_start=start, deterministic=True)
         began = joints.before() if joints else None
         observation, _, failed, truncated, _ = env.step(action)
-        start, ended = np.zeros(1, bool), failed or truncated
+        start = np.zeros(1, bool)
+        ended = failed or truncated
         before = here["time"][-1]
         here = substeps(env)
         if here["time"][-1] > before:  # else the simulation failed and nothing happened
@@ -185,7 +187,8 @@ def longest_of(env: gym.Env[Any, Any], seconds: float | None) -> float:
 
 def check_memory(rows: float, columns: int) -> None:
     """`ParameterError` where a record of so many rows would not fit into the memory that is free."""
-    needed, free = COPIES * 8.0 * rows * columns, free_memory()
+    needed = COPIES * 8.0 * rows * columns
+    free = free_memory()
     if needed > free:
         raise ParameterError(
             f"seconds: {rows:.3g} rows of {columns} columns need {needed / 1e9:.3g} GB of memory, and "
@@ -226,7 +229,8 @@ def record_episode(
     Arguments and errors are those of `episode`; `reactions` adds the forces in the joints, see
     `lab.reactions`; `tell` says now and then on stderr how far it is. `ParameterError` where the memory of
     this machine cannot hold it."""
-    units, longest = units_of(env, reactions), longest_of(env, seconds)
+    units = units_of(env, reactions)
+    longest = longest_of(env, seconds)
     check_memory(longest / surroundings(env).sim_dt, len(units))
     joints = JointReactions(env) if reactions else None
     played = episode(env, policy, seed, seconds, options, joints)
@@ -240,7 +244,8 @@ def record_episode(
 def units_of(env: gym.Env[Any, Any], reactions: bool = False) -> dict[str, str]:
     """Columns of a record and their units: `RECORD`, with `reactions` also `REACTION_UNITS`; of a horse those
     of the trunk, and each leg's under its name, `left_fore_force_y`."""
-    hips, of_leg = surroundings(env).hips, RECORD | (REACTION_UNITS if reactions else {})
+    hips = surroundings(env).hips
+    of_leg = RECORD | (REACTION_UNITS if reactions else {})
     if not hips:
         return of_leg
     found = {name: UNITS[name if name in UNITS else f"trunk_{name}"] for name in OF_TRUNK}
@@ -281,7 +286,8 @@ def write_csv(record: Columns, about: Mapping[str, Any], path: Path) -> None:
     body weights stands the column `weight`, the same in all rows: there is no other place for it."""
     units = dict(about["units"])
     if "BW" in units.values():
-        record, units["weight"] = record | {"weight": np.full(len(record["time"]), about["weight_n"])}, "N"
+        record = record | {"weight": np.full(len(record["time"]), about["weight_n"])}
+        units["weight"] = "N"
     header = ",".join(f"{name} [{units[name]}]" for name in record)
     table = np.column_stack([*record.values()])
     np.savetxt(path, table, "%.17g", delimiter=",", header=header, comments="", encoding="utf-8")

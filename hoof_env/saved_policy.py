@@ -35,11 +35,15 @@ from hoof_env.errors import (
     parse_json,
 )
 
-FILE, WEIGHTS, ABOUT, STATISTICS = "policy.onnx", "policy.safetensors", "policy.json", "vecnormalize.pkl"
+FILE = "policy.onnx"
+WEIGHTS = "policy.safetensors"
+ABOUT = "policy.json"
+STATISTICS = "vecnormalize.pkl"
 CHECKPOINTS = "checkpoints"
 FORMAT = 1  # of policy.json
 
-INPUT, OUTPUT = "observation", "action"
+INPUT = "observation"
+OUTPUT = "action"
 """Names of the graph's input, shape (batch, k), and output, shape (batch, n), float32 both."""
 
 OBJECTS = ("env_kwargs", "settings")
@@ -199,7 +203,8 @@ def read_record(folder: Path) -> dict[str, Any]:
         if unlike := [key for key, kind in kinds.items() if not isinstance(record[key], kind)]:
             raise TypeError(f"{unlike[0]}: {record[unlike[0]]!r}")
         if "finished" in record:
-            steps, seconds = record["finished"]["steps"], record["finished"]["seconds"]
+            steps = record["finished"]["steps"]
+            seconds = record["finished"]["seconds"]
             record["finished"] |= {"steps": int(steps), "seconds": float(seconds)}
         return record
     except (OSError, ValueError, TypeError, KeyError) as error:
@@ -332,10 +337,12 @@ class SavedModel:
             raise MissingExtraError(
                 f'policy {self.path}: reading it needs pip install "hoof-env[train]" ({error})'
             ) from None
-        file, origin = self.path.with_name(ABOUT), "a policy written by agents.train"
+        file = self.path.with_name(ABOUT)
+        origin = "a policy written by agents.train"
         if not self.is_plain:
             warnings.warn(f"{self.path} is a pickle, which can run any code: trusted?", stacklevel=2)
-            file, origin = self.path, "a model saved by Stable-Baselines3"
+            file = self.path
+            origin = "a model saved by Stable-Baselines3"
         try:
             policy = read_plain(self.path.parent) if self.is_plain else self._unpickle(env)
         except Exception as error:  # what is damaged may raise anything
@@ -423,8 +430,10 @@ class _Normalizer:
     def __init__(
         self, shape: tuple[int, ...], mean: list[float], var: list[float], epsilon: float, clip: float
     ) -> None:
-        self.mean, self.var = np.array(mean, np.float64), np.array(var, np.float64)
-        self.epsilon, self.clip = float(epsilon), float(clip)
+        self.mean = np.array(mean, np.float64)
+        self.var = np.array(var, np.float64)
+        self.epsilon = float(epsilon)
+        self.clip = float(clip)
         sound = all(one.shape == shape and np.isfinite(one).all() for one in (self.mean, self.var))
         if not sound or not (self.var + self.epsilon > 0).all() or not self.clip > 0:
             raise ValueError(f"expected statistics of observations of shape {shape}")

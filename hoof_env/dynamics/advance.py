@@ -36,14 +36,17 @@ from hoof_env.simd.reach import fingerprint, refresh
 LANES = 8
 """Environments side by side in a batch: one vector of 512 bits."""
 
-OK, NOT_FINITE = float(Result.OK), float(Result.NOT_FINITE)
-DEAD_POINT, FALLEN = float(Result.DEAD_POINT), float(Result.FALLEN)
+OK = float(Result.OK)
+NOT_FINITE = float(Result.NOT_FINITE)
+DEAD_POINT = float(Result.DEAD_POINT)
+FALLEN = float(Result.FALLEN)
 FIRST_LIMIT = float(Result.PITCH)
 
 RESET_REQUESTED = -1.0
 """Stands in the place of a result where an environment is to start."""
 
-CONSTANTS_SIZE, REACTIONS_SIZE = LegConstants.size, Reactions.size
+CONSTANTS_SIZE = LegConstants.size
+REACTIONS_SIZE = Reactions.size
 
 MODEL = np.dtype(
     [
@@ -91,7 +94,8 @@ def unpack_model(model, tables, ground, small, lanes_are_legs, law, form):  # ty
     """The model from its record and arrays; `small` points to room for 8 + 3 form.gait doubles."""
     given = model[0]
     for k in range(4):
-        small[k], small[4 + k] = given.fractions[k], given.weights[k]
+        small[k] = given.fractions[k]
+        small[4 + k] = given.weights[k]
     settings = offset(small, 8)
     for k in range(12):
         settings[k] = given.settings[k]
@@ -132,7 +136,8 @@ def read_leg(leg, memory, form):  # type: ignore[no-untyped-def]
 @inline_llvm
 def find_result(trunk, legs, leg_count, lanes_are_legs, form):  # type: ignore[no-untyped-def]
     """How the environments ended, numbers of `parts.Result`. A number whose square is none counts as none."""
-    total, stuck = full_like(trunk, 0.0), trunk.at_dead_point
+    total = full_like(trunk, 0.0)
+    stuck = trunk.at_dead_point
     for k in range(form.trunk_state):
         total = total + trunk.state[k] * trunk.state[k]
     for i in range(leg_count):
@@ -142,7 +147,8 @@ def find_result(trunk, legs, leg_count, lanes_are_legs, form):  # type: ignore[n
             own = own + leg.state[k] * leg.state[k]
         total = total + own
     if lanes_are_legs:
-        total, stuck = lane_sum(full_like(trunk, 0.0), total), lane_sum(full_like(trunk, 0.0), stuck)
+        total = lane_sum(full_like(trunk, 0.0), total)
+        stuck = lane_sum(full_like(trunk, 0.0), stuck)
     lost = where(stuck > 0.0, DEAD_POINT, NOT_FINITE)
     fell = where(trunk.fallen > 0.0, FALLEN, OK)
     if form.has_limits:
@@ -162,7 +168,8 @@ def run_steps(  # type: ignore[no-untyped-def]
     trunk, legs, leg_count, model, account, constants, reactions, h, steps, keeps_account, reacts
 ):
     """Advance by `steps` of `h` [s] and evaluate there."""
-    stage, elapsed = 0, 0.0
+    stage = 0
+    elapsed = 0.0
     begin_step(trunk, legs, leg_count, model)
     for turn in range(steps * model.stages + 1):
         evaluate(trunk, legs, leg_count, model, elapsed)
@@ -192,7 +199,8 @@ def run_steps(  # type: ignore[no-untyped-def]
             else:
                 end_step(trunk, legs, leg_count, model, h)
                 begin_step(trunk, legs, leg_count, model)
-                stage, elapsed = 0, 0.0
+                stage = 0
+                elapsed = 0.0
 
 
 @inline_source
@@ -209,11 +217,16 @@ def run(  # type: ignore[no-untyped-def]
     shapes = rows(doubles(leg_count * CONSTANTS_SIZE * lanes), lanes, LegConstants)
     forces = rows(doubles(leg_count * REACTIONS_SIZE * lanes), lanes, Reactions)
     inside = unpack_model(model, tables, ground, doubles(8 + 3 * form.gait), lanes_are_legs, law, form)
-    at, row = address(data), data.shape[1]
+    at = address(data)
+    row = data.shape[1]
     # lanes are neighbours, but where they are legs, as far apart as legs are
-    envs, near, far = lanes, 1, 1
+    envs = lanes
+    near = 1
+    far = 1
     if lanes_are_legs:
-        envs, near, far = 1, 0, form.leg_rows * row
+        envs = 1
+        near = 0
+        far = form.leg_rows * row
     if reacts or form.has_limits:
         own = columns(address(constants), lanes, None, 0, 1, CONSTANTS_SIZE if lanes_are_legs else 0)
         for k in range(leg_count * CONSTANTS_SIZE):
@@ -245,7 +258,8 @@ def run(  # type: ignore[no-untyped-def]
         if form.has_limits:
             good = good | (result >= FIRST_LIMIT)  # a motion beyond a limit is a motion
         if steps < 0:  # the others are as they were; a start that cannot be is kept as it is
-            result, good = where(starts, result, before), starts
+            result = where(starts, result, before)
+            good = starts
         memory.result = result
         store(memory.state, trunk.state, form.trunk_state, good)
         if keeps_account:
@@ -262,7 +276,8 @@ def run(  # type: ignore[no-untyped-def]
             store(own.sums, leg.sums, form.sums, good)
             if reacts:
                 kept = block_at(forces, i)
-                first, stride = i * REACTIONS_SIZE * row + n, REACTIONS_SIZE * row if lanes_are_legs else 1
+                first = i * REACTIONS_SIZE * row + n
+                stride = REACTIONS_SIZE * row if lanes_are_legs else 1
                 out = columns(address(reactions), lanes, Reactions, first, row, stride)
                 for k in range(REACTIONS_SIZE):
                     out[k] = kept[k]
@@ -289,7 +304,8 @@ def advance_kernels(contact_law: Callable[..., Any] | None = None, features: Fea
 
 def _made(contact_law: Callable[..., Any] | None, features: Features, identity: str) -> Kernels:
     refresh(contact_law)
-    law, form = law_of(contact_law), engine_layout(features)
+    law = law_of(contact_law)
+    form = engine_layout(features)
     if features != PLAIN:
         identity += f" {tuple(features)}"
 

@@ -70,7 +70,8 @@ MOST_LEGS = 32
 MOST_STEPS = 10**12
 """Substeps of a call, which are counted in 64 bits."""
 
-PART, LEAST_PART = 2_000_000, 1000
+PART = 2_000_000
+LEAST_PART = 1000
 """Substeps of all legs in machine code at a time, a second at most, and of each environment at least: between
 two such parts of a long call Ctrl-C is heard. What is added up has other last digits than in one part."""
 
@@ -145,7 +146,8 @@ class TrunkEngine(Mechanics):
             raise ParameterError(f"limbs: expected at most {MOST_LEGS}, got {len(self.limbs)}")
         self.trunk = one_of("trunk", trunk, Trunk)
         self.motion_limits = None if limits is None else one_of("limits", limits, Limits)
-        springs, order = self.limbs[0].spring is not None, count("harmonics", harmonics, most=MOST_HARMONICS)
+        springs = self.limbs[0].spring is not None
+        order = count("harmonics", harmonics, most=MOST_HARMONICS)
         self.features = Features(order, springs, has_limits=limits is not None)
         memory.check_limbs(self.trunk, self.limbs, self.features.springs)
         if contact_law is not None and self.features.springs:
@@ -158,7 +160,8 @@ class TrunkEngine(Mechanics):
         self.filters = FilterSettings() if filters is None else one_of("filters", filters, FilterSettings)
         self.integrator = check_choice("integrator", integrator, SCHEMES)
         self.sim_dt = check_number("sim_dt", sim_dt, low=1e-7, high=self.filters.longest_step)
-        self.num_envs, self.num_threads = count("num_envs", num_envs), check_threads(num_threads)
+        self.num_envs = count("num_envs", num_envs)
+        self.num_threads = check_threads(num_threads)
         self.profiles = [leg_profile(limb.geometry) for limb in self.limbs]
         self.step_error = check_number("step_error", step_error, low=0, high=1, exclusive_low=True)
         length = StepLength(
@@ -168,7 +171,8 @@ class TrunkEngine(Mechanics):
         self.step_limits = length.limits
         asked = None if substeps is None else count("substeps", substeps, most=MOST_STEPS)
         self.substeps = length.choose(self.sim_dt, asked)
-        self.reacts, self.counts_strides = flag("reactions", reactions), flag("strides", strides)
+        self.reacts = flag("reactions", reactions)
+        self.counts_strides = flag("strides", strides)
         self.runs_scalar = len(self.limbs) in (1, 4) and self.num_envs <= MAX_SCALAR_ENVS
         self._choose_kernel()
         columns = self.num_envs if self.runs_scalar else memory.columns_for(self.num_envs)
@@ -183,7 +187,8 @@ class TrunkEngine(Mechanics):
 
     def __getstate__(self) -> dict[str, Any]:
         """A copy has memory of its own, also a shallow one."""
-        m, parts = self._memory, {name: part for name, part in vars(self).items() if name != "_run"}
+        m = self._memory
+        parts = {name: part for name, part in vars(self).items() if name != "_run"}
         return {
             **parts,
             "_memory": (m.data, self.num_envs, m.constants, m.reactions.copy(), m.features),
@@ -245,7 +250,8 @@ class TrunkEngine(Mechanics):
             ParameterError: another shape, or numbers that are not finite or beyond `layout.MAX_STATE` in an
                 environment that was reset.
         """
-        m, env = self._memory, self._env(env)
+        m = self._memory
+        env = self._env(env)
         try:
             given = np.array(column, dtype=np.float64)
         except (TypeError, ValueError):
@@ -307,7 +313,8 @@ class TrunkEngine(Mechanics):
             ParameterError: a value is not finite, of the wrong shape or forbidden by the trunk's kind, an
                 angle, place or rate is beyond `layout.MAX_STATE`, or a leg's links have no place there.
         """
-        where, m = memory.which(envs, self.num_envs), self._memory
+        where = memory.which(envs, self.num_envs)
+        m = self._memory
         n = where.size
         values = memory.gaits_of(gaits, len(self.limbs), n, self.features.harmonics)
         heights = m.trunk_settings[HEIGHT, where]
@@ -317,7 +324,8 @@ class TrunkEngine(Mechanics):
             self, values, theta, theta_rate, trunk, heights
         )
         m.command[:, :, where] = values
-        m.account[:, where], m.strides[:, :, where] = 0.0, 0.0
+        m.account[:, where] = 0.0
+        m.strides[:, :, where] = 0.0
         m.result[where] = RESET_REQUESTED
         self._go(-1)
 
@@ -375,7 +383,8 @@ class TrunkEngine(Mechanics):
         self._memory.result[:] = result
         self._go(0)
         self._put(arrays)
-        self._memory.result[:], self._memory.stride_sums[:] = result, 0.0
+        self._memory.result[:] = result
+        self._memory.stride_sums[:] = 0.0
 
     @cached_property
     def _layout(self) -> dict[str, Any]:
@@ -439,9 +448,11 @@ class TrunkEngine(Mechanics):
         Raises:
             ParameterError, NotStartedError: as `advance`.
         """
-        steps, every = count("steps", steps, low=0), count("every", every)
+        steps = count("steps", steps, low=0)
+        every = count("every", every)
         self.advance(command, 0)
-        m, times = self._memory, 1 + -(-steps // every)
+        m = self._memory
+        times = 1 + -(-steps // every)
         whole = np.empty((*m.data.shape, times))
         whole[..., 0] = m.data
         for k in range(1, times):
@@ -467,8 +478,10 @@ class TrunkEngine(Mechanics):
         Raises:
             ParameterError: the command has a wrong shape or is not finite, or there are no such environments.
         """
-        given, where = finite("command", command), memory.which(envs, self.num_envs)
-        legs, size = len(self.limbs), self.features.gait_size
+        given = finite("command", command)
+        where = memory.which(envs, self.num_envs)
+        legs = len(self.limbs)
+        size = self.features.gait_size
         if given.shape == (size,) or given.shape == (legs, size):
             given = given[..., None]
         elif given.shape != (legs, size, where.size):
@@ -486,8 +499,10 @@ class TrunkEngine(Mechanics):
             self._go(steps, account)
             return
         m = self._memory
-        kept, first = self._copy((*memory.STATE, "stride_sums", "result")), np.zeros(self.num_envs)
-        sums, highest = np.zeros_like(m.stride_sums), layout.stride_sums(self.features).index("highest_grf")
+        kept = self._copy((*memory.STATE, "stride_sums", "result"))
+        first = np.zeros(self.num_envs)
+        sums = np.zeros_like(m.stride_sums)
+        highest = layout.stride_sums(self.features).index("highest_grf")
         while left and not broken(first).all():
             now = left % part or part  # the short one first: limits are looked at from the end
             self._go_substeps(now, account)

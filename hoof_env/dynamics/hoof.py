@@ -17,14 +17,20 @@ from hoof_env.simd.user_functions import function_name, number_of
 def level_ground(leg):  # type: ignore[no-untyped-def]
     """What never changes where the ground is the same everywhere."""
     upward = vector(full_like(leg, 0.0), 1.0)
-    leg.toe.ground_normal, leg.toe.stiffness_scale, leg.toe.friction_scale = upward, 1.0, 1.0
-    leg.heel.ground_normal, leg.heel.stiffness_scale, leg.heel.friction_scale = upward, 1.0, 1.0
+    leg.toe.ground_normal = upward
+    leg.toe.stiffness_scale = 1.0
+    leg.toe.friction_scale = 1.0
+    leg.heel.ground_normal = upward
+    leg.heel.stiffness_scale = 1.0
+    leg.heel.friction_scale = 1.0
 
 
 @inline_llvm
 def meet_ground(trunk, leg, model):  # type: ignore[no-untyped-def]
     """Forces of the ground on toe and heel, and their generalised forces on crank and frame."""
-    hip, pitch_rate, w = leg.hip, trunk.rates.pitch_rate, leg.theta_rate
+    hip = leg.hip
+    pitch_rate = trunk.rates.pitch_rate
+    w = leg.theta_rate
     leg.beta_rate = pitch_rate + leg.beta_by_theta * w + leg.swing_rate
     place = trunk.place + hip
     velocity = trunk.velocity + pitch_rate * perpendicular(hip)
@@ -35,27 +41,35 @@ def meet_ground(trunk, leg, model):  # type: ignore[no-untyped-def]
         trunk, leg, leg.heel, leg.state.heel, leg.functions.heel, leg.slopes.heel, place, velocity, model
     )
     leg.ground_force = toe_force + force
-    leg.ground_moment_theta, leg.ground_moment_beta = toe_theta + theta, toe_beta + beta
+    leg.ground_moment_theta = toe_theta + theta
+    leg.ground_moment_beta = toe_beta + beta
 
 
 @inline_llvm
 def meet_point(trunk, leg, point, memory, arm, arm_by_theta, hip, hip_velocity, model):  # type: ignore[no-untyped-def]
     """The motion of a hoof point, the force of the ground on it and that force's part along theta and beta;
     `arm` goes to it from O in the leg's frame, `hip` is O's place [m]."""
-    arm, by_theta = leg.turn * arm, leg.turn * arm_by_theta
+    arm = leg.turn * arm
+    by_theta = leg.turn * arm_by_theta
     place = hip + arm
     velocity = hip_velocity + (leg.theta_rate * by_theta + leg.beta_rate * perpendicular(arm))
-    penetration, rate, sliding_speed = -place.imag, -velocity.imag, velocity.real  # Eqs. 10, 12, 13
+    penetration = -place.imag  # Eqs. 10
+    rate = -velocity.imag  # 12
+    sliding_speed = velocity.real  # 13
     if model.is_terrain:
         height, normal_x, normal_y, stiffness_scale, friction_scale = surface(
             place.real, model.ground_cells, model.ground_origin, model.ground_per_metre
         )
         normal = vector(normal_x, normal_y)
-        penetration, rate = (height - place.imag) * normal_y, -dot(normal, velocity)
+        penetration = (height - place.imag) * normal_y
+        rate = -dot(normal, velocity)
         sliding_speed = -cross(normal, velocity)
         point.ground_normal = normal
-        point.stiffness_scale, point.friction_scale = stiffness_scale, friction_scale
-    point.penetration, point.penetration_rate, point.sliding_speed = penetration, rate, sliding_speed
+        point.stiffness_scale = stiffness_scale
+        point.friction_scale = friction_scale
+    point.penetration = penetration
+    point.penetration_rate = rate
+    point.sliding_speed = sliding_speed
 
     if model.form.springs:
         press_through_spring(trunk, leg, point, memory, model)
@@ -79,8 +93,11 @@ def force_of(point):  # type: ignore[no-untyped-def]
 def press_rigidly(trunk, point, memory, penetration, rate, sliding_speed, model):  # type: ignore[no-untyped-def]
     """Forces on a point that is the sole itself."""
     nothing = 0.0 * absolute(penetration)  # what is not a number stays so
-    force, spring, friction = nothing, nothing, nothing
-    inverse_speed, inside = memory.inverse_approach_speed, penetration > 0.0
+    force = nothing
+    spring = nothing
+    friction = nothing
+    inverse_speed = memory.inverse_approach_speed
+    inside = penetration > 0.0
     if any_lane(inside):
         if any_lane(inside & (inverse_speed == 0.0)):
             entering = inverse_entry_speed(trunk, memory, penetration, rate, model)
@@ -94,9 +111,12 @@ def press_rigidly(trunk, point, memory, penetration, rate, sliding_speed, model)
         )
         grip = laws.friction * point.friction_scale * part * pushed  # Eq. 15
         friction = where(inside, where(sliding_speed > 0.0, -grip, grip), nothing)
-        force, spring = where(inside, pushed, nothing), where(inside, stored, nothing)
-    point.spring_force, point.inverse_approach_speed = spring, inverse_speed
-    point.normal_force, point.friction_force = force, friction
+        force = where(inside, pushed, nothing)
+        spring = where(inside, stored, nothing)
+    point.spring_force = spring
+    point.inverse_approach_speed = inverse_speed
+    point.normal_force = force
+    point.friction_force = friction
 
 
 @inline_llvm
@@ -108,14 +128,21 @@ def press_through_spring(trunk, leg, point, memory, model):  # type: ignore[no-u
     Along the ground u is how far the leg is ahead of the sole: k u + d u' is friction, and u' is the leg's
     speed while the sole stands.
     """
-    laws, stiffness, damping = trunk.settings, leg.settings.hoof_stiffness, leg.settings.hoof_damping
-    deflection, along, speed = point.deflection[0], point.deflection[1], point.sliding_speed
-    depth_rate, elastic = point.penetration_rate, stiffness[0] * deflection
+    laws = trunk.settings
+    stiffness = leg.settings.hoof_stiffness
+    damping = leg.settings.hoof_damping
+    deflection = point.deflection[0]
+    along = point.deflection[1]
+    speed = point.sliding_speed
+    depth_rate = point.penetration_rate
+    elastic = stiffness[0] * deflection
     penetration = point.penetration - deflection
     free_return_rate = -elastic * leg.inverse_damping[0]  # of a spring that nothing presses
     nothing = 0.0 * absolute(penetration)
-    spring, resistance = nothing, nothing
-    inverse_speed, inside = memory.inverse_approach_speed, penetration > 0.0
+    spring = nothing
+    resistance = nothing
+    inverse_speed = memory.inverse_approach_speed
+    inside = penetration > 0.0
     if any_lane(inside):
         if any_lane(inside & (inverse_speed == 0.0)):
             entering = inverse_entry_speed(trunk, memory, penetration, depth_rate - free_return_rate, model)
@@ -131,19 +158,26 @@ def press_through_spring(trunk, leg, point, memory, model):  # type: ignore[no-u
     grip = laws.friction * point.friction_scale * force
     held = clip(sticking, grip)
     shear = where(absolute(sticking) <= grip, speed, (held - stiffness[1] * along) * leg.inverse_damping[1])
-    point.deflection_rate[0], point.deflection_rate[1] = rate, shear
-    point.penetration, point.penetration_rate = penetration, depth_rate - rate
+    point.deflection_rate[0] = rate
+    point.deflection_rate[1] = shear
+    point.penetration = penetration
+    point.penetration_rate = depth_rate - rate
     point.sliding_speed = speed - shear
-    point.spring_force, point.inverse_approach_speed = spring, inverse_speed
-    point.normal_force, point.friction_force = force, -held
+    point.spring_force = spring
+    point.inverse_approach_speed = inverse_speed
+    point.normal_force = force
+    point.friction_force = -held
 
 
 @inline_llvm
 def inverse_entry_speed(trunk, memory, penetration, rate, model):  # type: ignore[no-untyped-def]
     """1 / v0 with v0 the approach speed at the crossing of the surface, interpolated between the last whole
     step and now."""
-    before, rate_before, floor = memory.penetration, memory.penetration_rate, trunk.settings.approach_floor
-    span, entry = full_like(memory, 1.0), rate
+    before = memory.penetration
+    rate_before = memory.penetration_rate
+    floor = trunk.settings.approach_floor
+    span = full_like(memory, 1.0)
+    entry = rate
     if model.interpolated:
         crossed = before < 0.0
         span = where(crossed, penetration - before, span)
@@ -187,7 +221,8 @@ def law_of(contact_law: Callable[..., Any] | None) -> Any:
     """
     if contact_law is None:
         return contact_force
-    force, number = inline_llvm(contact_law), number_of(f"the contact law {function_name(contact_law)}")
+    force = inline_llvm(contact_law)
+    number = number_of(f"the contact law {function_name(contact_law)}")
 
     @inline_llvm
     def push(ground, stiffness_scale, penetration, rate, inverse_speed, eighths):  # type: ignore[no-untyped-def]
@@ -208,7 +243,8 @@ def remember_contacts(leg):  # type: ignore[no-untyped-def]
 @inline_llvm
 def remember_point(point, memory):  # type: ignore[no-untyped-def]
     """`remember_contacts` for one point."""
-    memory.penetration, memory.penetration_rate = point.penetration, point.penetration_rate
+    memory.penetration = point.penetration
+    memory.penetration_rate = point.penetration_rate
     kept = where(point.penetration > 0.0, point.inverse_approach_speed, 0.0)
     memory.inverse_approach_speed = kept
 
@@ -254,8 +290,10 @@ def move_springs(leg, count, elapsed):  # type: ignore[no-untyped-def]
 def end_springs(leg, count, averages, h):  # type: ignore[no-untyped-def]
     """The state a step of `h` [s] later."""
     for k in range(count):
-        toe, heel = leg.toe.deflection_rate[k], leg.heel.deflection_rate[k]
+        toe = leg.toe.deflection_rate[k]
+        heel = leg.heel.deflection_rate[k]
         if averages:
-            toe, heel = leg.toe.mean_deflection_rate[k], leg.heel.mean_deflection_rate[k]
+            toe = leg.toe.mean_deflection_rate[k]
+            heel = leg.heel.mean_deflection_rate[k]
         leg.state.toe.deflection[k] = leg.state.toe.deflection[k] + h * toe
         leg.state.heel.deflection[k] = leg.state.heel.deflection[k] + h * heel

@@ -20,7 +20,10 @@ MAX_STATE = 1e9
 """Largest angles [rad] and places [m] of a state, which are as good as numbers are fine there: to 6e-10 at
 1e6, to 6e-7 at 1e9; also the largest rates of a start, whose squares are then numbers still."""
 
-GAIT, SPRING, LIMITED, LIMITS = Size("gait", 4), Size("spring", 0), Size("limited", 0), Size("limits", 0)
+GAIT = Size("gait", 4)
+SPRING = Size("spring", 0)
+LIMITED = Size("limited", 0)
+LIMITS = Size("limits", 0)
 
 
 class Features(NamedTuple):
@@ -382,4 +385,5 @@ def account(features: Features = PLAIN) -> tuple[str, ...]:
     return (*Account.names, *("hoof_stored", "hoof_loss")[: 2 * features.springs])
 
 
-LEG_STATE, ACCOUNT = leg_state(), account()
+LEG_STATE = leg_state()
+ACCOUNT = account()

@@ -88,13 +88,19 @@ def look_up_functions(trunk, leg, model):  # type: ignore[no-untyped-def]
 @inline_llvm
 def scale_functions(value, slope, length, mass):  # type: ignore[no-untyped-def]
     """Functions of a similar leg, `length` times as large with `mass` times the mass."""
-    moment, inertia = mass * length, mass * length * length
-    value.toe, value.heel = length * value.toe, length * value.heel
-    slope.toe, slope.heel = length * slope.toe, length * slope.heel
-    value.first_moment, value.moment_slope = moment * value.first_moment, moment * value.moment_slope
+    moment = mass * length
+    inertia = mass * length * length
+    value.toe = length * value.toe
+    value.heel = length * value.heel
+    slope.toe = length * slope.toe
+    slope.heel = length * slope.heel
+    value.first_moment = moment * value.first_moment
+    value.moment_slope = moment * value.moment_slope
     slope.moment_slope = moment * slope.moment_slope
-    value.crank_inertia, value.coupling = inertia * value.crank_inertia, inertia * value.coupling
-    slope.crank_inertia, slope.coupling = inertia * slope.crank_inertia, inertia * slope.coupling
+    value.crank_inertia = inertia * value.crank_inertia
+    value.coupling = inertia * value.coupling
+    slope.crank_inertia = inertia * slope.crank_inertia
+    slope.coupling = inertia * slope.coupling
     value.frame_inertia = inertia * value.frame_inertia
     value.frame_inertia_slope = inertia * value.frame_inertia_slope
 
@@ -103,38 +109,48 @@ def scale_functions(value, slope, length, mass):  # type: ignore[no-untyped-def]
 def place_frame(trunk, leg, harmonics, elapsed):  # type: ignore[no-untyped-def]
     """The leg's frame (E1), its first moment and inertia in the world. The swing is phi = offset +
     A sin(theta) + B cos(theta), perhaps with higher harmonics, each parameter moving as its filter does."""
-    sine, cosine, w = leg.sine, leg.cosine, leg.theta_rate
+    sine = leg.sine
+    cosine = leg.cosine
+    w = leg.theta_rate
     offset, rate, bend = gait_parameter_at(leg, OFFSET, elapsed)
     part_a, rate_a, bend_a = gait_parameter_at(leg, SIN, elapsed)
     part_b, rate_b, bend_b = gait_parameter_at(leg, COS, elapsed)
-    side, swing = leg.settings.side, part_a * sine + part_b * cosine
+    side = leg.settings.side
+    swing = part_a * sine + part_b * cosine
     slope = part_a * cosine - part_b * sine
     bent = bend + bend_a * sine + bend_b * cosine + (2.0 * (rate_a * cosine - rate_b * sine) - swing * w) * w
     drift = rate + rate_a * sine + rate_b * cosine
-    sine_n, cosine_n = sine, cosine
+    sine_n = sine
+    cosine_n = cosine
     for n in range(2, harmonics + 1):
         sine_n, cosine_n = sine_n * cosine + cosine_n * sine, cosine_n * cosine - sine_n * sine
         part_a, rate_a, bend_a = gait_parameter_at(leg, 2 * n, elapsed)
         part_b, rate_b, bend_b = gait_parameter_at(leg, 2 * n + 1, elapsed)
-        part, turned = part_a * sine_n + part_b * cosine_n, n * w
-        swing, slope = swing + part, slope + n * (part_a * cosine_n - part_b * sine_n)
+        part = part_a * sine_n + part_b * cosine_n
+        turned = n * w
+        swing = swing + part
+        slope = slope + n * (part_a * cosine_n - part_b * sine_n)
         drift = drift + rate_a * sine_n + rate_b * cosine_n
         twist = 2.0 * (rate_a * cosine_n - rate_b * sine_n) - part * turned
         bent = bent + bend_a * sine_n + bend_b * cosine_n + twist * turned
     k = side * slope
-    leg.phi, leg.beta_by_theta = offset + swing, k
-    leg.swing_rate, leg.swing_acceleration = side * drift, side * bent
+    leg.phi = offset + swing
+    leg.beta_by_theta = k
+    leg.swing_rate = side * drift
+    leg.swing_acceleration = side * bent
 
     cos_beta, sin_beta = cos_sin(trunk.stage.pitch + side * (offset + swing))
     turn = vector(cos_beta, sin_beta)
-    s, ds = turn * leg.functions.first_moment, turn * leg.functions.moment_slope
+    s = turn * leg.functions.first_moment
+    ds = turn * leg.functions.moment_slope
     leg.turn = turn
     leg.first_moment = s
     leg.moment_by_theta = ds
     leg.moment_by_crank = ds + k * perpendicular(s)
     frame = leg.functions.frame_inertia + leg.settings.rotor_frame
     coupling = leg.functions.coupling + leg.settings.rotor_coupling
-    leg.frame_inertia, leg.crank_coupling = frame, coupling + k * frame
+    leg.frame_inertia = frame
+    leg.crank_coupling = coupling + k * frame
     leg.crank_inertia = (
         leg.functions.crank_inertia + leg.settings.rotor_crank + k * (2.0 * coupling + k * frame)
     )
@@ -143,9 +159,12 @@ def place_frame(trunk, leg, harmonics, elapsed):  # type: ignore[no-untyped-def]
 @inline_llvm
 def gait_parameter_at(leg, k, elapsed):  # type: ignore[no-untyped-def]
     """Parameter k of the gait, its rate and acceleration, `elapsed` [s] after the step's start."""
-    value, rate, bend = leg.state.gait[k], leg.state.gait_rate[k], leg.gait_acceleration[k]
+    value = leg.state.gait[k]
+    rate = leg.state.gait_rate[k]
+    bend = leg.gait_acceleration[k]
     if elapsed != 0.0:
-        value, rate = value + elapsed * (rate + 0.5 * elapsed * bend), rate + elapsed * bend
+        value = value + elapsed * (rate + 0.5 * elapsed * bend)
+        rate = rate + elapsed * bend
     return value, rate, bend
 
 
@@ -159,7 +178,9 @@ def keep_still(trunk):  # type: ignore[no-untyped-def]
     trunk.place = trunk.state.moving.centre
     trunk.velocity = nothing
     trunk.acceleration = nothing
-    trunk.pitch_acceleration, trunk.at_dead_point, trunk.fallen = 0.0, 0.0, 0.0
+    trunk.pitch_acceleration = 0.0
+    trunk.at_dead_point = 0.0
+    trunk.fallen = 0.0
     trunk.turn = vector(full_like(trunk, 1.0), 0.0)
 
 
@@ -172,17 +193,21 @@ def clear_trunk(trunk, kind):  # type: ignore[no-untyped-def]
     nothing = vector(full_like(trunk, 0.0), 0.0)
     trunk.first_moment = nothing
     trunk.relative_momentum = nothing
-    trunk.composite_inertia, trunk.relative_angular_momentum = trunk.settings.pitch_inertia, 0.0
+    trunk.composite_inertia = trunk.settings.pitch_inertia
+    trunk.relative_angular_momentum = 0.0
 
 
 @inline_llvm
 def gather_leg(trunk, leg, kind, lanes_are_legs):  # type: ignore[no-untyped-def]
     """Add a leg to first moment, momentum, inertia and spin about the trunk's centre of mass (E6)."""
-    s, w, sway = leg.first_moment, leg.theta_rate, leg.swing_rate
+    s = leg.first_moment
+    w = leg.theta_rate
+    sway = leg.swing_rate
     drift = w * leg.moment_by_crank + sway * perpendicular(s)
     if kind == FREE:
         leg.hip = trunk.turn * leg.settings.hip_on_trunk
-        hip, frame = leg.hip, leg.frame_inertia
+        hip = leg.hip
+        frame = leg.frame_inertia
         trunk.composite_inertia = add(
             trunk.composite_inertia, dot(hip, leg.settings.mass * hip + 2.0 * s) + frame, lanes_are_legs
         )
@@ -199,13 +224,17 @@ def gather_leg(trunk, leg, kind, lanes_are_legs):  # type: ignore[no-untyped-def
 def move_trunk(trunk, kind):  # type: ignore[no-untyped-def]
     """Place and velocity of the trunk from centre of mass and momentum of all (E7), on a rail along x only;
     what acts on it besides its legs."""
-    centre, moment, momentum = trunk.stage.centre, trunk.first_moment, trunk.stage.momentum
-    drift, per_mass = trunk.relative_momentum, trunk.settings.inverse_mass
+    centre = trunk.stage.centre
+    moment = trunk.first_moment
+    momentum = trunk.stage.momentum
+    drift = trunk.relative_momentum
+    per_mass = trunk.settings.inverse_mass
     place = centre - per_mass * moment
     velocity = per_mass * (momentum - drift)
     rate = full_like(trunk, 0.0)
     if kind == RAIL:
-        place, velocity = vector(place.real, centre.imag), vector(velocity.real, 0.0)
+        place = vector(place.real, centre.imag)
+        velocity = vector(velocity.real, 0.0)
     if kind == FREE:
         spin = trunk.stage.spin - trunk.relative_angular_momentum + cross(moment, drift) * per_mass
         rate = spin / (trunk.composite_inertia - dot(moment, moment) * per_mass)
@@ -214,7 +243,8 @@ def move_trunk(trunk, kind):  # type: ignore[no-untyped-def]
     trunk.velocity = velocity
     trunk.rates.pitch_rate = rate
     trunk.rates.velocity = per_mass * momentum
-    drag, total = -trunk.settings.drag * velocity.real, trunk.settings.total_mass
+    drag = -trunk.settings.drag * velocity.real
+    total = trunk.settings.total_mass
     lift = (
         trunk.settings.support
         - total * trunk.settings.gravity
@@ -225,8 +255,12 @@ def move_trunk(trunk, kind):  # type: ignore[no-untyped-def]
     trunk.rates.moment = -drag * (place.imag - centre.imag)  # the drag acts on the trunk
     trunk.load = vector(full_like(trunk, 0.0), 0.0)
     trunk.load_moment = 0.0
-    trunk.mass_xx, trunk.mass_xy, trunk.mass_yy = total, 0.0, total
-    trunk.mass_xp, trunk.mass_yp, trunk.mass_pp = -moment.imag, moment.real, trunk.composite_inertia
+    trunk.mass_xx = total
+    trunk.mass_xy = 0.0
+    trunk.mass_yy = total
+    trunk.mass_xp = -moment.imag
+    trunk.mass_yp = moment.real
+    trunk.mass_pp = trunk.composite_inertia
     trunk.fallen = where(place.imag < trunk.settings.bottom, 1.0, trunk.fallen)
 
 
@@ -241,13 +275,18 @@ def velocities_to_momenta(trunk, legs, leg_count, model, starts):  # type: ignor
         look_up_functions(trunk, leg, model)
         place_frame(trunk, leg, model.form.harmonics, 0.0)
         gather_leg(trunk, leg, model.kind, model.lanes_are_legs)
-    place, velocity, rate = trunk.state.moving.centre, trunk.state.moving.momentum, trunk.state.moving.spin
-    moment, drift, per_mass = trunk.first_moment, trunk.relative_momentum, trunk.settings.inverse_mass
+    place = trunk.state.moving.centre
+    velocity = trunk.state.moving.momentum
+    rate = trunk.state.moving.spin
+    moment = trunk.first_moment
+    drift = trunk.relative_momentum
+    per_mass = trunk.settings.inverse_mass
     centre = place + per_mass * moment
     momentum = trunk.settings.total_mass * velocity + drift
     spin = full_like(trunk, 0.0)
     if model.kind == RAIL:
-        centre, momentum = vector(centre.real, place.imag), vector(momentum.real, 0.0)
+        centre = vector(centre.real, place.imag)
+        momentum = vector(momentum.real, 0.0)
     if model.kind == FREE:
         momentum = momentum + rate * perpendicular(moment)
         about = trunk.composite_inertia - dot(moment, moment) * per_mass
@@ -265,10 +304,17 @@ def set_up_crank(trunk, leg, motors, elapsed):  # type: ignore[no-untyped-def]
 
     Here a motor's crank is solved for theta_tt as if the trunk kept still; a prescribed one's is given.
     """
-    w, frame_rate, k = leg.theta_rate, leg.beta_rate, leg.beta_by_theta
-    hip, frame, coupling = leg.hip, leg.frame_inertia, leg.crank_coupling
-    pitch_rate, swing_acceleration = trunk.rates.pitch_rate, leg.swing_acceleration
-    da, db, dc = leg.slopes.crank_inertia, leg.slopes.coupling, leg.functions.frame_inertia_slope
+    w = leg.theta_rate
+    frame_rate = leg.beta_rate
+    k = leg.beta_by_theta
+    hip = leg.hip
+    frame = leg.frame_inertia
+    coupling = leg.crank_coupling
+    pitch_rate = trunk.rates.pitch_rate
+    swing_acceleration = leg.swing_acceleration
+    da = leg.slopes.crank_inertia
+    db = leg.slopes.coupling
+    dc = leg.functions.frame_inertia_slope
     weight = (
         vector(full_like(trunk, 0.0), trunk.settings.gravity) - pitch_rate * pitch_rate * hip
     )  # a + g of O
@@ -282,13 +328,15 @@ def set_up_crank(trunk, leg, motors, elapsed):  # type: ignore[no-untyped-def]
         + (db * w + dc * frame_rate) * w
         + dot(weight, perpendicular(leg.first_moment))
     )
-    leg.rest_moment_theta, leg.rest_moment_beta = rest_theta, rest_beta
+    leg.rest_moment_theta = rest_theta
+    leg.rest_moment_beta = rest_beta
     leg.crank_pitch_coupling = coupling + cross(hip, leg.moment_by_crank)
     wanted, wanted_rate, _ = gait_parameter_at(leg, SPEED, elapsed)
     leg.free_theta_acceleration = wanted_rate
     if motors:
         torque = clip(leg.settings.speed_gain * (wanted - w), leg.settings.torque_limit)
-        mobility, is_motor = 1.0 / leg.crank_inertia, leg.settings.is_motor > 0.0
+        mobility = 1.0 / leg.crank_inertia
+        is_motor = leg.settings.is_motor > 0.0
         free = mobility * (
             torque + leg.ground_moment_theta - rest_theta + k * (leg.ground_moment_beta - rest_beta)
         )
@@ -300,9 +348,16 @@ def set_up_crank(trunk, leg, motors, elapsed):  # type: ignore[no-untyped-def]
 @inline_llvm
 def load_trunk(trunk, leg, kind, motors, lanes_are_legs):  # type: ignore[no-untyped-def]
     """A leg's part in the trunk's equations, its crank eliminated (E8), and in outer force and moment."""
-    w, frame_rate, pitch_rate = leg.theta_rate, leg.beta_rate, trunk.rates.pitch_rate
-    s, hip, u, ground_force = leg.first_moment, leg.hip, leg.moment_by_crank, leg.ground_force
-    mass, coupling, free = leg.settings.mass, leg.crank_pitch_coupling, leg.free_theta_acceleration
+    w = leg.theta_rate
+    frame_rate = leg.beta_rate
+    pitch_rate = trunk.rates.pitch_rate
+    s = leg.first_moment
+    hip = leg.hip
+    u = leg.moment_by_crank
+    ground_force = leg.ground_force
+    mass = leg.settings.mass
+    coupling = leg.crank_pitch_coupling
+    free = leg.free_theta_acceleration
     slope = leg.turn * leg.slopes.moment_slope
     moment_acceleration = (  # of the first moment, where theta_tt, pitch_tt and a are 0
         leg.swing_acceleration * perpendicular(s)
@@ -339,7 +394,9 @@ def load_trunk(trunk, leg, kind, motors, lanes_are_legs):  # type: ignore[no-unt
 def accelerate_trunk(trunk, kind):  # type: ignore[no-untyped-def]
     """Solve the trunk's equations (E8) for its accelerations, by Cramer's rule."""
     load = trunk.rates.force + trunk.load
-    xx, xy, yy = trunk.mass_xx, trunk.mass_xy, trunk.mass_yy
+    xx = trunk.mass_xx
+    xy = trunk.mass_xy
+    yy = trunk.mass_yy
     pitch_acc = full_like(trunk, 0.0)
     if kind == RAIL:
         acc = vector(load.real / xx, 0.0)
@@ -348,9 +405,16 @@ def accelerate_trunk(trunk, kind):  # type: ignore[no-untyped-def]
         per = 1.0 / (xx * yy - xy * xy)
         acc = per * vector(yy * load.real - xy * load.imag, xx * load.imag - xy * load.real)
     else:
-        xp, yp, pp, turning = trunk.mass_xp, trunk.mass_yp, trunk.mass_pp, trunk.load_moment
-        c_xx, c_xy, c_xp = yy * pp - yp * yp, xp * yp - xy * pp, xy * yp - yy * xp
-        c_yy, c_yp, c_pp = xx * pp - xp * xp, xy * xp - xx * yp, xx * yy - xy * xy
+        xp = trunk.mass_xp
+        yp = trunk.mass_yp
+        pp = trunk.mass_pp
+        turning = trunk.load_moment
+        c_xx = yy * pp - yp * yp
+        c_xy = xp * yp - xy * pp
+        c_xp = xy * yp - yy * xp
+        c_yy = xx * pp - xp * xp
+        c_yp = xy * xp - xx * yp
+        c_pp = xx * yy - xy * xy
         per = 1.0 / (xx * c_xx + xy * c_xy + xp * c_xp)
         acc = per * vector(
             c_xx * load.real + c_xy * load.imag + c_xp * turning,
@@ -368,6 +432,7 @@ def accelerate_crank(trunk, leg, motors):  # type: ignore[no-untyped-def]
     """The crank's acceleration: a motor's gives way to the trunk's (E9)."""
     leg.theta_acceleration = leg.free_theta_acceleration
     if motors:
-        u, coupling = leg.moment_by_crank, leg.crank_pitch_coupling
+        u = leg.moment_by_crank
+        coupling = leg.crank_pitch_coupling
         pull = dot(u, trunk.acceleration) + coupling * trunk.pitch_acceleration
         leg.theta_acceleration = leg.free_theta_acceleration - leg.crank_mobility * pull

@@ -123,9 +123,11 @@ def new_memory(scene: Mechanics, num_envs: int, columns: int, reacts: bool) -> M
     form = engine_layout(scene.features)
     data = copy_of(np.zeros((form.trunk_rows + legs * form.leg_rows, columns)))
     whole = memory_of(data, columns, constants, reactions, scene.features)
-    whole.trunk[:], whole.limbs[:] = np.nan, np.nan
+    whole.trunk[:] = np.nan
+    whole.limbs[:] = np.nan
     trunk, limbs = settings_of(scene, scene.trunk, scene.ground, scene.limbs)
-    whole.trunk_settings[:], whole.limb_settings[:] = trunk[:, None], limbs[:, :, None]
+    whole.trunk_settings[:] = trunk[:, None]
+    whole.limb_settings[:] = limbs[:, :, None]
     return memory_of(data, num_envs, constants, reactions, scene.features)
 
 
@@ -133,25 +135,32 @@ def new_model(
     scene: Mechanics, filters: FilterSettings, strides: bool
 ) -> tuple[NDArray[Any], Floats, Floats]:
     """What does not change while it runs: a record `MODEL`, the legs' tables, the terrain's cells."""
-    ground, terrain = scene.ground, scene.terrain
+    ground = scene.ground
+    terrain = scene.terrain
     cells = max(profile.cells for profile in scene.profiles)
     tables = [profile.with_cells(cells).table for profile in dict.fromkeys(scene.profiles)]
     tables = [np.concatenate([table, table[:1]]) for table in tables]
-    scheme, grid = SCHEMES[scene.integrator], terrain.to_grid()
+    scheme = SCHEMES[scene.integrator]
+    grid = terrain.to_grid()
     model = np.zeros(1, MODEL)
     record = model[0]
-    record["legs"], record["cells"] = len(scene.limbs), cells
-    record["kind"], record["eighths"] = TRUNKS.index(scene.trunk.kind), round(ground.exponent * EXPONENT_UNIT)
+    record["legs"] = len(scene.limbs)
+    record["cells"] = cells
+    record["kind"] = TRUNKS.index(scene.trunk.kind)
+    record["eighths"] = round(ground.exponent * EXPONENT_UNIT)
     record["friction_law"] = FRICTION_LAWS.index(ground.friction_law)
     record["interpolated"] = ground.approach == "interpolated"
-    record["is_terrain"], record["new_rates"] = terrain != Terrain.flat(), scheme.new_rates
+    record["is_terrain"] = terrain != Terrain.flat()
+    record["new_rates"] = scheme.new_rates
     record["strides"] = strides
     record["motors"] = any(isinstance(limb.drive, Motor) for limb in scene.limbs)
-    record["averages"], record["stages"] = scheme.averages, len(scheme.weights)
+    record["averages"] = scheme.averages
+    record["stages"] = len(scheme.weights)
     record["fractions"][: len(scheme.fractions)] = scheme.fractions
     record["weights"][: len(scheme.weights)] = scheme.weights
     record["settings"] = filters.to_array().ravel()
-    record["ground_origin"], record["ground_per_metre"] = grid.origin, grid.per_metre
+    record["ground_origin"] = grid.origin
+    record["ground_per_metre"] = grid.per_metre
     whole = aligned(sum(map(len, tables)), tables[0].shape[1])
     return model, np.concatenate(tables, out=whole), grid.cells
 
@@ -197,7 +206,8 @@ def scales_of(name: str, limb: Limb, own: Limb) -> tuple[float, float]:
     """Length and mass of a leg over those of the engine's, to which it must be similar."""
     if limb.geometry == own.geometry:
         return 1.0, 1.0
-    one, other = limb.geometry.to_dict(), own.geometry.to_dict()
+    one = limb.geometry.to_dict()
+    other = own.geometry.to_dict()
     length = one["hip_height"] / other["hip_height"]
     mass = limb.geometry.mass / own.geometry.mass
     pairs = [
@@ -225,7 +235,8 @@ def settings_of(
     """Rows of `TrunkSettings` and of `LegSettings`, (legs, rows), of an environment under a trunk of the same
     kind, on a ground with the same laws."""
     mass = trunk.mass + sum(limb.geometry.mass for limb in limbs)
-    record, hangs = ground.to_record(), trunk.kind == "suspended"
+    record = ground.to_record()
+    hangs = trunk.kind == "suspended"
     limits = scene.motion_limits or Limits()
     values = {
         "total_mass": mass, "inverse_mass": 1 / mass, "pitch_inertia": trunk.pitch_inertia,
@@ -239,9 +250,11 @@ def settings_of(
     bounds = np.clip((*limits.pitch, *limits.height, limits.clearance), -NOWHERE, NOWHERE)
     values |= _numbered("limits", bounds.tolist())
     lift_off = LIFT_OFF * mass * GRAVITY / len(limbs)
-    unique, cells = list(dict.fromkeys(scene.profiles)), max(profile.cells for profile in scene.profiles)
+    unique = list(dict.fromkeys(scene.profiles))
+    cells = max(profile.cells for profile in scene.profiles)
     firsts = [unique.index(profile) * (cells + 1) for profile in scene.profiles]  # where a leg's table begins
-    names, each = scene.features.of(LegSettings).names, []
+    names = scene.features.of(LegSettings).names
+    each = []
     for k, (limb, own, first) in enumerate(zip(limbs, scene.limbs, firsts, strict=True)):
         rows = _limb_settings(limb, first, lift_off, scales_of(f"limbs[{k}]", limb, own))
         each.append([rows[name] for name in names])
@@ -252,7 +265,9 @@ def _limb_settings(
     limb: Limb, first_row: int, lift_off: float, scales: tuple[float, float]
 ) -> dict[str, float]:
     motor = limb.drive if isinstance(limb.drive, Motor) else Motor(0.0, 0.0, 0.0, 0.0)
-    side, rotor, spring = float(limb.geometry.travel), motor.rotor_inertia, limb.spring
+    side = float(limb.geometry.travel)
+    rotor = motor.rotor_inertia
+    spring = limb.spring
     values = {
         "hip_on_trunk_x": limb.hip[0], "hip_on_trunk_y": limb.hip[1], "mass": limb.geometry.mass,
         "side": side, "first_row": first_row, "is_motor": float(isinstance(limb.drive, Motor)),
@@ -292,7 +307,8 @@ def which(envs: ArrayLike | None, num_envs: int) -> NDArray[np.int64]:
 def gaits_of(gaits: Any, legs: int, n: int, harmonics: int) -> Floats:
     """`gaits` of `TrunkEngine.reset` as numbers of shape (legs, 2 + 2 harmonics, n)."""
     if isinstance(gaits, np.ndarray):
-        given, size = finite("gaits", gaits, MAX_STATE), 2 + 2 * harmonics
+        given = finite("gaits", gaits, MAX_STATE)
+        size = 2 + 2 * harmonics
         if given.shape != (legs, size, n):
             raise ParameterError(f"gaits: expected shape {(legs, size, n)}, got {given.shape}")
         return given
@@ -317,7 +333,8 @@ def start(
     pitch: the kernels make the one of the other (`mechanics.velocities_to_momenta`). `TrunkEngine.reset` says
     what `trunk` holds and what is refused.
     """
-    legs, n = len(scene.limbs), len(heights)
+    legs = len(scene.limbs)
+    n = len(heights)
     angle = spread("theta", theta, (legs, n), MAX_STATE)
     spin = spread("theta_rate", gaits[:, 0] if theta_rate is None else theta_rate, (legs, n), MAX_STATE)
     for i, limb in enumerate(scene.limbs):
@@ -340,11 +357,14 @@ def start(
         raise ParameterError(f"y: a {scene.trunk.kind} trunk is at {heights[off][0]:g} m, got {at['y']}")
     state = np.zeros((TrunkState.size, n))
     moving = state[TrunkState.rows("moving")]  # the kernels make of these what they integrate
-    moving[Moving.rows("centre")], moving[Moving.rows("momentum")] = (at["x"], at["y"]), (at["vx"], at["vy"])
-    moving[Moving.rows("pitch")], moving[Moving.rows("spin")] = at["pitch"], at["pitch_rate"]
+    moving[Moving.rows("centre")] = (at["x"], at["y"])
+    moving[Moving.rows("momentum")] = (at["vx"], at["vy"])
+    moving[Moving.rows("pitch")] = at["pitch"]
+    moving[Moving.rows("spin")] = at["pitch_rate"]
     rows = scene.features.of(LegState)
     leg = np.zeros((legs, rows.size, n))
-    leg[:, rows.rows("theta")], leg[:, rows.rows("theta_rate")] = angle[:, None], spin[:, None]
+    leg[:, rows.rows("theta")] = angle[:, None]
+    leg[:, rows.rows("theta_rate")] = spin[:, None]
     leg[:, rows.rows("gait")] = gaits
     return state, leg
 
@@ -397,7 +417,8 @@ def check_column(column: Memory, settings: Floats) -> None:
 def _check_numbers(title: str, arrays: Mapping[str, Floats]) -> NDArray[np.bool_]:
     """Which environments were ever reset; `ParameterError` where a number of theirs is not finite, or a place
     or an angle too far away to be looked up."""
-    trunk, limbs = arrays["trunk"], arrays["limbs"]
+    trunk = arrays["trunk"]
+    limbs = arrays["limbs"]
     reset: NDArray[np.bool_] = np.ones(trunk.shape[-1], bool)
     places = trunk[_PLACES], limbs[:, _ANGLES]
     squares = sum(float(np.vdot(part, part)) for part in arrays.values())

@@ -31,8 +31,12 @@ REVOLUTION = 2 * math.pi
 @inline_llvm
 def find_drives(trunk, leg):  # type: ignore[no-untyped-def]
     """Torques and powers of crank and swing from the accelerations (E2 to E4 in docs/engine.md)."""
-    w, acc, k, sway = leg.theta_rate, leg.theta_acceleration, leg.beta_by_theta, leg.swing_rate
-    frame, pitch_acc = leg.frame_inertia, trunk.pitch_acceleration
+    w = leg.theta_rate
+    acc = leg.theta_acceleration
+    k = leg.beta_by_theta
+    sway = leg.swing_rate
+    frame = leg.frame_inertia
+    pitch_acc = trunk.pitch_acceleration
     coupling = leg.crank_coupling - k * frame
     turning = pitch_acc + k * acc
     lift = trunk.acceleration + pitch_acc * perpendicular(leg.hip)
@@ -52,14 +56,17 @@ def find_drives(trunk, leg):  # type: ignore[no-untyped-def]
     )
     is_motor = leg.settings.is_motor > 0.0
     torque = where(is_motor, leg.crank_torque, needed)
-    leg.frame_torque, leg.crank_torque, leg.crank_power = by_frame, torque, torque * w
+    leg.frame_torque = by_frame
+    leg.crank_torque = torque
+    leg.crank_power = torque * w
     leg.swing_power = by_frame * where(is_motor, sway, k * w + sway)
 
 
 @inline_llvm
 def keep_account(trunk, legs, leg_count, model, account, weight):  # type: ignore[no-untyped-def]
     """Add the present stage's powers and forces, times `weight` [s], to an `Account`."""
-    velocity, lanes_are_legs = trunk.velocity, model.lanes_are_legs
+    velocity = trunk.velocity
+    lanes_are_legs = model.lanes_are_legs
     drag = trunk.settings.drag * (velocity.real * velocity.real)
     damper = trunk.settings.damper * (velocity.imag * velocity.imag)
     account.drag_loss = account.drag_loss + weight * drag
@@ -67,7 +74,8 @@ def keep_account(trunk, legs, leg_count, model, account, weight):  # type: ignor
     for i in range(leg_count):
         leg = block_at(legs, i)
         find_drives(trunk, leg)
-        toe, heel = leg.toe.penetration_rate, leg.heel.penetration_rate
+        toe = leg.toe.penetration_rate
+        heel = leg.heel.penetration_rate
         stored = leg.toe.spring_force * toe + leg.heel.spring_force * heel
         spent = leg.toe.normal_force * toe + leg.heel.normal_force * heel - stored
         rubbed = (
@@ -80,10 +88,13 @@ def keep_account(trunk, legs, leg_count, model, account, weight):  # type: ignor
         account.friction_loss = add(account.friction_loss, -weight * rubbed, lanes_are_legs)
         account.impulse = add(account.impulse, weight * leg.ground_force, lanes_are_legs)
         if model.form.springs:
-            bent, lost = 0.0 * stored, 0.0 * stored
+            bent = 0.0 * stored
+            lost = 0.0 * stored
             for k in range(model.form.springs):
-                stiffness, damping = leg.settings.hoof_stiffness[k], leg.settings.hoof_damping[k]
-                toe, heel = leg.toe.deflection_rate[k], leg.heel.deflection_rate[k]
+                stiffness = leg.settings.hoof_stiffness[k]
+                damping = leg.settings.hoof_damping[k]
+                toe = leg.toe.deflection_rate[k]
+                heel = leg.heel.deflection_rate[k]
                 bent = bent + stiffness * (leg.toe.deflection[k] * toe + leg.heel.deflection[k] * heel)
                 lost = lost + damping * (toe * toe + heel * heel)
             # once a leg, so that legs are added in one order
@@ -94,21 +105,29 @@ def keep_account(trunk, legs, leg_count, model, account, weight):  # type: ignor
 @inline_llvm
 def report_trunk(trunk, report):  # type: ignore[no-untyped-def]
     """Fill a `TrunkReport`."""
-    report.place, report.velocity, report.acceleration = trunk.place, trunk.velocity, trunk.acceleration
-    report.pitch_rate, report.pitch_acceleration = trunk.rates.pitch_rate, trunk.pitch_acceleration
+    report.place = trunk.place
+    report.velocity = trunk.velocity
+    report.acceleration = trunk.acceleration
+    report.pitch_rate = trunk.rates.pitch_rate
+    report.pitch_acceleration = trunk.pitch_acceleration
 
 
 @inline_llvm
 def report_leg(trunk, leg, report):  # type: ignore[no-untyped-def]
     """Fill a `LegReport`."""
     find_drives(trunk, leg)
-    side, k, w, acc = leg.settings.side, leg.beta_by_theta, leg.theta_rate, leg.theta_acceleration
+    side = leg.settings.side
+    k = leg.beta_by_theta
+    w = leg.theta_rate
+    acc = leg.theta_acceleration
     report.theta_acc = acc
     report.phi = leg.phi
     report.phi_rate = side * (k * w + leg.swing_rate)
     report.phi_acc = side * (k * acc + leg.swing_acceleration)
-    report.crank_torque, report.hip_torque = leg.crank_torque, side * leg.frame_torque
-    report.crank_power, report.hip_power = leg.crank_power, leg.swing_power
+    report.crank_torque = leg.crank_torque
+    report.hip_torque = side * leg.frame_torque
+    report.crank_power = leg.crank_power
+    report.hip_power = leg.swing_power
     hip = trunk.place + leg.hip
     report_point(leg.toe, hip + leg.turn * leg.functions.toe, report.toe)
     report_point(leg.heel, hip + leg.turn * leg.functions.heel, report.heel)
@@ -117,16 +136,21 @@ def report_leg(trunk, leg, report):  # type: ignore[no-untyped-def]
 @inline_llvm
 def report_point(point, place, report):  # type: ignore[no-untyped-def]
     """Fill a `PointReport`."""
-    report.x, report.y, report.slide = place.real, place.imag, point.sliding_speed
-    report.normal, report.friction = point.normal_force, point.friction_force
+    report.x = place.real
+    report.y = place.imag
+    report.slide = point.sliding_speed
+    report.normal = point.normal_force
+    report.friction = point.friction_force
 
 
 @inline_llvm
 def count_stride(trunk, leg, form, h):  # type: ignore[no-untyped-def]
     """Add a whole step of `h` [s] that ends here."""
     find_drives(trunk, leg)
-    push, load = leg.ground_force, leg.toe.normal_force + leg.heel.normal_force
-    force, loaded = sqrt(dot(push, push)), load > leg.settings.lift_off
+    push = leg.ground_force
+    load = leg.toe.normal_force + leg.heel.normal_force
+    force = sqrt(dot(push, push))
+    loaded = load > leg.settings.lift_off
     was_open = (leg.strides.stance_open > 0.0) & (leg.state.theta - leg.strides.stance_began < REVOLUTION)
     goes_on = loaded & was_open
     begins = where(loaded, 1.0, 0.0) - where(goes_on, 1.0, 0.0)
@@ -138,7 +162,8 @@ def count_stride(trunk, leg, form, h):  # type: ignore[no-untyped-def]
     rise = where(higher > peak, (load - leg.strides.load) * (1.0 / h), 0.0)
     steepest = where(goes_on, leg.strides.steepest_rise, 0.0)
     steeper = where(loaded, maximum(steepest, rise), 0.0)
-    leg.strides.steepest_rise, leg.strides.load = steeper, load
+    leg.strides.steepest_rise = steeper
+    leg.strides.load = load
     leg.sums.loading_rate_increase = leg.sums.loading_rate_increase + (steeper - steepest)
     leg.sums.stances = leg.sums.stances + begins
     leg.sums.peak_grf_increase = leg.sums.peak_grf_increase + (higher - peak)
@@ -184,10 +209,13 @@ class StanceCounter:
         goes_on = loaded and self.is_open and theta - self.began < REVOLUTION
         before, steepest = (self.peak, self.steepest) if goes_on else (0.0, 0.0)
         if loaded and not goes_on:
-            self.began, self.count = theta, self.count + 1
-        self.is_open, self.peak = loaded, max(before, force) if loaded else 0.0
+            self.began = theta
+            self.count = self.count + 1
+        self.is_open = loaded
+        self.peak = max(before, force) if loaded else 0.0
         rise = (normal - self.load) * (1.0 / h) if self.peak > before else 0.0
-        self.steepest, self.load = max(steepest, rise) if loaded else 0.0, normal
+        self.steepest = max(steepest, rise) if loaded else 0.0
+        self.load = normal
         running = min(self.running, 2 * force)
         self.running = max(running, force)
         return self.peak - before, max(force - running, 0.0), self.steepest - steepest
@@ -208,7 +236,8 @@ def stance_figures(sums: Mapping[str, Floats], seconds: ArrayLike, turns: ArrayL
         and forward while the hoof bears load [N]. Not a number where there was no stance.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
-        stances, loaded = sums["stances"] / (sums["stances"] > 0), sums["loaded_time"]
+        stances = sums["stances"] / (sums["stances"] > 0)
+        loaded = sums["loaded_time"]
         found = {
             "peak": sums["peak_grf_increase"] / stances,
             "mean": sums["normal_impulse"] / loaded,

@@ -69,8 +69,10 @@ class StepLength(Mechanics):
         """Longest step [s] for each cause, infinite where there is none: "elastic", "damping" and "friction"
         of the ground (`ground.stiffness`), "hoof" of its springs, "servo" of the motors, "support" of
         what holds or drags the trunk."""
-        trunk, decay = self.trunk, SCHEME_LIMITS[self.integrator].decay
-        mass, is_held = trunk.mass + sum(limb.geometry.mass for limb in self.limbs), trunk.kind == "suspended"
+        trunk = self.trunk
+        decay = SCHEME_LIMITS[self.integrator].decay
+        mass = trunk.mass + sum(limb.geometry.mass for limb in self.limbs)
+        is_held = trunk.kind == "suspended"
         damper, spring = (trunk.damping, trunk.stiffness) if is_held else (0.0, 0.0)
         drag = trunk.drag if trunk.kind != "fixed" else 0.0
         return self._ground_limits(self.ground) | {
@@ -125,7 +127,8 @@ class StepLength(Mechanics):
                         limits[name] = min(limits[name], longest)
                 continue
             for speed in {FAST, ground.approach_floor}:
-                mass, sliding_mass = min(sinks, whole), min(slides, whole)
+                mass = min(sinks, whole)
+                sliding_mass = min(slides, whole)
                 rates = contact_rates(ground, mass, load, speed, sliding_mass, self.terrain)
                 for name, longest in rates.longest_steps(self.integrator, self.step_error).items():
                     if np.isfinite(slides if name == "friction" else sinks):
@@ -138,9 +141,11 @@ class StepLength(Mechanics):
         """The same of a hoof with a spring, on masses [kg] that it sets against forces along the ground and
         into it."""
         slides, sinks = masses
-        k, c = spring.tangential_stiffness or 0.0, spring.tangential_damping or 0.0
+        k = spring.tangential_stiffness or 0.0
+        c = spring.tangential_damping or 0.0
         along = ContactRates(math.sqrt(k / slides), c / slides, 0.0, 1.0)
-        found, soles = [along], [k / c]
+        found = [along]
+        soles = [k / c]
         for speed in {FAST, ground.approach_floor, HARD}:
             vertical = (spring.stiffness, spring.damping)
             rates, sole = spring_rates(ground, vertical, sinks, load, speed, self.terrain)
@@ -167,7 +172,8 @@ class StepLength(Mechanics):
 
     def _mobility(self, limb: Limb, value: Functions, slope: Functions, axis: str) -> Floats:
         """Larger acceleration of toe and heel per force along x or y [1/kg], for each crank angle."""
-        trunk, across = self.trunk, "y" if axis == "x" else "x"
+        trunk = self.trunk
+        across = "y" if axis == "x" else "x"
         mobility = np.zeros((2, len(value["toe_x"])))
         if axis in {"fixed": "", "rail": "x", "suspended": "xy", "free": "xy"}[trunk.kind]:
             mobility += 1 / trunk.mass
@@ -187,13 +193,16 @@ class StepLength(Mechanics):
         for limb, profile in zip(self.limbs, self.profiles, strict=True):
             if isinstance(limb.drive, Motor):
                 f = by_name(_samples(profile)[0])
-                motor, side = limb.drive, limb.geometry.travel
+                motor = limb.drive
+                side = limb.geometry.travel
                 matrix = np.zeros((len(f["toe_x"]), 4, 4))  # of crank, frame, x and y
                 matrix[:, 0, 0] = f["crank_inertia"] + motor.reflected_inertia
                 matrix[:, 0, 1] = f["coupling"] - side * motor.gear_ratio * motor.rotor_inertia
                 matrix[:, 1, 1] = f["frame_inertia"] + motor.rotor_inertia
-                matrix[:, 0, 2], matrix[:, 0, 3] = f["moment_slope_x"], f["moment_slope_y"]
-                matrix[:, 1, 2], matrix[:, 1, 3] = -f["first_moment_y"], f["first_moment_x"]
+                matrix[:, 0, 2] = f["moment_slope_x"]
+                matrix[:, 0, 3] = f["moment_slope_y"]
+                matrix[:, 1, 2] = -f["first_moment_y"]
+                matrix[:, 1, 3] = f["first_moment_x"]
                 matrix[:, [2, 3], [2, 3]] = self.trunk.mass + limb.geometry.mass
                 matrix = np.triu(matrix) + np.triu(matrix, 1).transpose(0, 2, 1)
                 rates.append(motor.speed_gain * float(np.linalg.inv(matrix)[:, 0, 0].max()))

@@ -26,7 +26,9 @@ from hoof_env.simd.math import clip
 def filter_accelerations(leg, count, settings):  # type: ignore[no-untyped-def]
     """Accelerations of the command filters: bounded, towards a bounded rate, towards the command."""
     for k in range(count):
-        gain, rate_bound, acc_bound = settings[3 * k], settings[3 * k + 1], settings[3 * k + 2]
+        gain = settings[3 * k]
+        rate_bound = settings[3 * k + 1]
+        acc_bound = settings[3 * k + 2]
         wanted = clip(gain * (leg.command[k] - leg.state.gait[k]), rate_bound)
         leg.gait_acceleration[k] = clip(INNER * gain * (wanted - leg.state.gait_rate[k]), acc_bound)
 
@@ -53,10 +55,12 @@ def begin_step(trunk, legs, leg_count, model):  # type: ignore[no-untyped-def]
     for i in range(leg_count):
         leg = block_at(legs, i)
         filter_accelerations(leg, model.form.gait, model.settings)
-        leg.theta, leg.theta_rate = leg.state.theta, leg.state.theta_rate
+        leg.theta = leg.state.theta
+        leg.theta_rate = leg.state.theta_rate
         begin_springs(leg, model.form.springs)
         if model.averages:
-            leg.mean_theta_rate, leg.mean_theta_acceleration = 0.0, 0.0
+            leg.mean_theta_rate = 0.0
+            leg.mean_theta_acceleration = 0.0
             clear_springs(leg, model.form.springs)
 
 
@@ -78,7 +82,9 @@ def weigh_stage(trunk, legs, leg_count, model, weight):  # type: ignore[no-untyp
 @inline_llvm
 def prescribed(leg, elapsed):  # type: ignore[no-untyped-def]
     """Angle and rate of a prescribed crank `elapsed` [s] into the step, exactly as the filter moves them."""
-    value, rate, bend = leg.state.gait[SPEED], leg.state.gait_rate[SPEED], leg.gait_acceleration[SPEED]
+    value = leg.state.gait[SPEED]
+    rate = leg.state.gait_rate[SPEED]
+    bend = leg.gait_acceleration[SPEED]
     theta = leg.state.theta + elapsed * (value + elapsed * (0.5 * rate + elapsed * (1 / 6) * bend))
     return theta, value + elapsed * (rate + 0.5 * elapsed * bend)
 
@@ -118,9 +124,11 @@ def end_step(trunk, legs, leg_count, model, h):  # type: ignore[no-untyped-def]
         leg = block_at(legs, i)
         is_motor = leg.settings.is_motor > 0.0
         angle, spin = prescribed(leg, h)
-        rate, acceleration = leg.theta_rate, leg.theta_acceleration
+        rate = leg.theta_rate
+        acceleration = leg.theta_acceleration
         if model.averages:
-            rate, acceleration = leg.mean_theta_rate, leg.mean_theta_acceleration
+            rate = leg.mean_theta_rate
+            acceleration = leg.mean_theta_acceleration
         omega = leg.state.theta_rate + h * acceleration
         if model.new_rates:
             rate = omega
@@ -128,7 +136,8 @@ def end_step(trunk, legs, leg_count, model, h):  # type: ignore[no-untyped-def]
         leg.state.theta_rate = where(is_motor, omega, spin)
         end_springs(leg, model.form.springs, model.averages, h)
         for k in range(model.form.gait):
-            rate, bend = leg.state.gait_rate[k], leg.gait_acceleration[k]
+            rate = leg.state.gait_rate[k]
+            bend = leg.gait_acceleration[k]
             leg.state.gait[k] = leg.state.gait[k] + h * (rate + 0.5 * h * bend)
             leg.state.gait_rate[k] = rate + h * bend
 

@@ -15,27 +15,40 @@ if TYPE_CHECKING:
 
 def tally_of(engine: TrunkEngine) -> Tally:
     """See `TrunkEngine.tally`."""
-    r, s, own = engine.report, engine.state, engine.trunk
-    place, velocity = r["x"] + 1j * r["y"], r["vx"] + 1j * r["vy"]
-    pitch_rate, turn = r["pitch_rate"], np.exp(1j * s["pitch"])
-    moment, momentum = own.mass * place, own.mass * velocity  # first moment about the origin
+    r = engine.report
+    s = engine.state
+    own = engine.trunk
+    place = r["x"] + 1j * r["y"]
+    velocity = r["vx"] + 1j * r["vy"]
+    pitch_rate = r["pitch_rate"]
+    turn = np.exp(1j * s["pitch"])
+    # first moment about the origin
+    moment = own.mass * place
+    momentum = own.mass * velocity
     spin = own.pitch_inertia * pitch_rate + own.mass * cross(place, velocity)  # about the origin
     kinetic = 0.5 * own.mass * np.abs(velocity) ** 2 + 0.5 * own.pitch_inertia * pitch_rate**2
     for i, limb in enumerate(engine.limbs):
         theta_rate = s["theta_rate"][i]
         f = by_name(engine.profiles[i](s["theta"][i])[0])
-        a, b, c = f["crank_inertia"], f["coupling"], f["frame_inertia"]
+        a = f["crank_inertia"]
+        b = f["coupling"]
+        c = f["frame_inertia"]
         side = limb.geometry.travel
         if isinstance(limb.drive, Motor):
-            rotor, gear = limb.drive.rotor_inertia, limb.drive.gear_ratio
-            a, b, c = a + gear**2 * rotor, b - side * gear * rotor, c + rotor
+            rotor = limb.drive.rotor_inertia
+            gear = limb.drive.gear_ratio
+            a = a + gear**2 * rotor
+            b = b - side * gear * rotor
+            c = c + rotor
         frame = turn * np.exp(1j * side * r["phi"][i])
         frame_rate = pitch_rate + side * r["phi_rate"][i]
         first_moment = frame * (f["first_moment_x"] + 1j * f["first_moment_y"])
         slope = f["moment_slope_x"] + 1j * f["moment_slope_y"]
         own_rate = frame * slope * theta_rate + 1j * first_moment * frame_rate
         arm = turn * complex(*limb.hip)
-        hip, hip_rate, mass = place + arm, velocity + 1j * arm * pitch_rate, limb.geometry.mass
+        hip = place + arm
+        hip_rate = velocity + 1j * arm * pitch_rate
+        mass = limb.geometry.mass
         moment = moment + mass * hip + first_moment
         momentum = momentum + mass * hip_rate + own_rate
         spin = spin + cross(hip, mass * hip_rate + own_rate) + cross(first_moment, hip_rate)

@@ -90,7 +90,8 @@ class LegBase:
         if render_mode is not None:
             check_choice("render_mode", render_mode, self.metadata["render_modes"])
         self._size = check_side("width", size[0]), check_side("height", size[1])
-        self.task, self.render_mode = task_of(task), render_mode
+        self.task = task_of(task)
+        self.render_mode = render_mode
         self._given = {name: as_plain(name, value) for name, value in given.items()}
         self.batch = EpisodeBatch(self.task, self.task.settings(given), n, num_threads)
         self.metadata = {**self.metadata, "render_fps": max(1, round(1 / self.batch.dt))}

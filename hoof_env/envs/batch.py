@@ -89,7 +89,9 @@ class EpisodeBatch:
     def __init__(
         self, task: Task, settings: Settings, num_envs: int, num_threads: int = 1, *, runs: bool = True
     ) -> None:
-        self.task, self.num_envs, self.asked = task, num_envs, settings
+        self.task = task
+        self.num_envs = num_envs
+        self.asked = settings
         self.conditions = RowConditions(num_envs)
         self._next: EpisodeBatch | None = None
         self.settings = s = resolved(settings)
@@ -101,7 +103,8 @@ class EpisodeBatch:
         for name in ("motor_gain", "motor_torque", "motor_inertia"):
             check_number(name, getattr(s, name), low=0.0, high=LARGEST)
         self.randomize = {} if s.randomize is None else check_parameters("randomize", s.randomize, s)
-        self._terrain, self._validated = make_terrain(s.terrain), ""
+        self._terrain = make_terrain(s.terrain)
+        self._validated = ""
         if is_paper:
             check_paper(s)
         self.body = Horse(s) if task.is_horse else OneLeg(s)
@@ -171,8 +174,10 @@ class EpisodeBatch:
         task["rate_bound"][:ACTIONS] = self.engine.filters.to_array()[:, 1]
         task["weights"] = [self.weights[term.name] for term in self.task.terms]
         task["episode_seconds"] = self.episode_seconds
-        task["h"], task["substeps"] = self.engine.substep, self.substeps * self.engine.substeps
-        task["dt"], task["episode_steps"] = self.dt, self.steps_per_episode
+        task["h"] = self.engine.substep
+        task["substeps"] = self.substeps * self.engine.substeps
+        task["dt"] = self.dt
+        task["episode_steps"] = self.steps_per_episode
         task["stays"] = self.settings.trunk == "fixed"
         task["observation_size"] = len(self.names)
         task["observation_columns"] = -1
@@ -280,7 +285,8 @@ class EpisodeBatch:
     def _adopt(self) -> None:
         """Work under the conditions that `change` asked for."""
         assert self._next is not None
-        old, begun = [*self.randomize], self.start_values
+        old = [*self.randomize]
+        begun = self.start_values
         self.conditions.add(conditions_of(self), conditions_of(self._next))
         enter(self, self.conditions.all[-1])
         self._next = None
@@ -391,19 +397,23 @@ class EpisodeBatch:
             getattr(now, name)[which] = 0.0
         self.rewards[which] = 0.0
         now.allowance[which] = BEARING * LONGEST_STRIDE
-        now.terms[:, which], now.target[which], now.switch[which] = 0.0, np.inf, np.inf
+        now.terms[:, which] = 0.0
+        now.target[which] = np.inf
+        now.switch[which] = np.inf
         if self.target_speed:
             now.target[which] = self.target_speed[0]
         if self.target_speed and self.speed_changes:
             now.target[which] = [generator.uniform(*self.target_speed) for generator in generators]
             self._draw_targets(which, generators)
         if "target_speed" in options:  # for the whole episode
-            now.target[which], now.switch[which] = options["target_speed"], np.inf
+            now.target[which] = options["target_speed"]
+            now.switch[which] = np.inf
         self.body.complete_start(start, now.target[which], options, self.engine)
         self.engine.reset(start.commands, start.theta, envs=which, **start.trunk)
         begun = [*(start.values[name] for name in self.body.start_names), *start.gaits.T]
         self.start_values[:, which] = [*begun, *(drawn[name] for name in self.randomize)]
-        now.x_before[which], now.ended[which] = start.trunk["x"], 0.0
+        now.x_before[which] = start.trunk["x"]
+        now.ended[which] = 0.0
         if self.body.legs > 1:
             now.gait[:, which] = start.gaits.T
             now.offset[:, which] = 0.0
@@ -437,10 +447,13 @@ class EpisodeBatch:
         conditions: Mapping[str, Any],
     ) -> None:
         when, which = np.array([generator.random(2) for generator in generators]).reshape(-1, 2).T
-        (shortest, longest), (low, high) = conditions["target_seconds"], conditions["target_speed"]
+        (shortest, longest) = conditions["target_seconds"]
+        (low, high) = conditions["target_speed"]
         steps = np.rint((shortest + (longest - shortest) * when) / self.dt)
-        now, step = self.episode_rows.target[envs], self.body.command_step
-        low, high = np.maximum(low, now - step), np.minimum(high, now + step)
+        now = self.episode_rows.target[envs]
+        step = self.body.command_step
+        low = np.maximum(low, now - step)
+        high = np.minimum(high, now + step)
         self.episode_rows.switch[envs] = self.episode_rows.steps[envs] + steps
         self.episode_rows.next_target[envs] = low + (high - low) * which
 
@@ -481,7 +494,8 @@ class EpisodeBatch:
 
     def _observe_broken(self, envs: NDArray[np.int64]) -> None:
         """Observe the last good state of what could not be simulated, whose report is of where it broke."""
-        data, form = self.engine.arrays[0], engine_layout(self.engine.features)
+        data = self.engine.arrays[0]
+        form = engine_layout(self.engine.features)
         kept = data.copy()
         leg = form.leg_memory.rows("report")
         self.engine.advance(None, 0)
@@ -498,12 +512,15 @@ class EpisodeBatch:
         """What all started with, what is measured of them, and the terms of the last reward, by name: shape
         (num_envs,), but for "gait", "measured" and "parameters", which are `NamedArray`. `ended` says whether
         there may be environments that could not be simulated."""
-        n, begun, memory = self.num_envs, self.start_values.copy(), self.engine.arrays[0]
+        n = self.num_envs
+        begun = self.start_values.copy()
+        memory = self.engine.arrays[0]
         measured = self.measurements.read(memory[:, :n])
         if ended:
             nothing = broken(self.engine.results)
             measured[np.ix_(self.measurements.last_step, nothing)] = 0.0
-        first, names = self.start_row_count, self.body.start_names
+        first = self.start_row_count
+        names = self.body.start_names
         infos: dict[str, NDArray[Any]] = dict(zip(names, begun, strict=False))
         infos["gait"] = name_columns(begun[len(names) : first].T, self.body.gait_names)
         if self.randomize:
@@ -531,8 +548,10 @@ class EpisodeBatch:
         seconds, distance, work, impulse, loaded, stances, peaks, rates, highest, slip = (
             getattr(self.episode_rows, name)[envs] for name in SUMS
         )
-        weight, time = self.episode_rows.weight[envs], np.maximum(seconds, 1e-12)
-        mean, each = impulse / time, np.maximum(stances, 1.0)
+        weight = self.episode_rows.weight[envs]
+        time = np.maximum(seconds, 1e-12)
+        mean = impulse / time
+        each = np.maximum(stances, 1.0)
         steps = np.rint(seconds / self.dt)
         cost = np.full(len(work), np.inf)
         np.divide(work, weight * distance, out=cost, where=distance > 0)
@@ -596,7 +615,8 @@ class EpisodeBatch:
             return np.repeat(np.asarray(values, np.float64), n, -1)
 
         try:
-            engine, layout = state["engine"], state["engine"]["layout"]
+            engine = state["engine"]
+            layout = state["engine"]["layout"]
             if layout["num_envs"] != 1 or np.shape(state["episode"])[-1] != 1:
                 raise ValueError
             parts = {name: repeated(values) for name, values in engine.items() if name != "layout"}
@@ -647,7 +667,8 @@ class EpisodeBatch:
         self.engine.set_state(state["engine"])
         if self.paper and of_paper:
             self.paper.set_state(*of_paper)
-        self.episode[:, : self.num_envs], self.start_values[:] = episode, begun
+        self.episode[:, : self.num_envs] = episode
+        self.start_values[:] = begun
         self._has_overrides[:] = True
         if self.conditions.all:
             self.conditions.start(np.arange(self.num_envs))

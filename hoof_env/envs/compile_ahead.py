@@ -28,7 +28,8 @@ def compile_kernels(say: Callable[[str], None]) -> list[str]:
     `OutputError` where there is something to compile and the cache folder is not writable."""
     first = len(COMPILED)
     for name, make in KERNELS.items():
-        begun, count = time.monotonic(), len(COMPILED)
+        begun = time.monotonic()
+        count = len(COMPILED)
         make()
         if found := COMPILED[count:]:
             say(f"{name}: {time.monotonic() - begun:.1f} s for {', '.join(found)}")

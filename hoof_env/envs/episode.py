@@ -18,7 +18,8 @@ from hoof_env.simd.layout import Block, Constants, Layout, Row, Size
 ACTIONS = len(PARAMETERS)
 """Of a leg."""
 
-FAILED, TRUNCATED = 1, 2
+FAILED = 1
+TRUNCATED = 2
 """How an episode ended, in the place of 0."""
 
 SUMS = (
@@ -28,7 +29,8 @@ SUMS = (
 """Fields of `Episode` that begin at 0 and are added to."""
 
 
-ACTION, REWARD = Size("action", ACTIONS), Size("reward", len(TERMS))
+ACTION = Size("action", ACTIONS)
+REWARD = Size("reward", len(TERMS))
 
 
 class Episode(Layout):

@@ -60,10 +60,14 @@ from hoof_env.leg.limb_masses import with_limb_masses
 
 Floats = NDArray[np.float64]
 
-HIP_HEIGHT, MASS, GYRATION = 1.4, 475.0, 0.5  # [m], [kg], of the trunk about its centre [m]
+HIP_HEIGHT = 1.4  # [m]
+MASS = 475.0  # [kg]
+GYRATION = 0.5  # radius of gyration of the trunk about its centre [m]
 HIPS = {"fore": 1.0, "hind": -0.2}  # crank centres, forward from the trunk's centre [m]
 STAND = -0.5  # of a hoof from its crank centre, in the middle of a stance [m]
-PITCH, HEIGHT, CLEARANCE = 0.5, (0.75, 1.8), 0.02
+PITCH = 0.5
+HEIGHT = (0.75, 1.8)
+CLEARANCE = 0.02
 """Where it has fallen: +-pitch [rad], heights of the trunk [m], of a joint over the ground [m]."""
 GAP = 0.005  # between the lowest rigid hoof and the ground at a start [m]
 SAG = MASS * GRAVITY / (4 * TASKS["horse"].defaults["hoof_stiffness"])  # of two legs that bear the weight [m]
@@ -94,7 +98,9 @@ COMMAND_STEP = 0.5
 """From one commanded speed to the next at most [m/s]: the reference gait changes at once with the command,
 and after larger changes horses fall, see docs/evidence/horse.md."""
 
-SPEED_SPREAD, PITCH_SPREAD, PHASE_SPREAD = 0.1, 0.02, 0.02
+SPEED_SPREAD = 0.1
+PITCH_SPREAD = 0.02
+PHASE_SPREAD = 0.02
 """How far starts are from the gait: of the commanded speed [-], pitch [rad], each crank [strides]."""
 
 
@@ -112,10 +118,12 @@ class Horse:
         action_names: of its actions, leg after leg.
     """
 
-    legs, action_names = COUNT, tuple(f"{leg}_{name}" for leg, name in product(LEGS, PARAMETERS))
+    legs = COUNT
+    action_names = tuple(f"{leg}_{name}" for leg, name in product(LEGS, PARAMETERS))
     action_form = "offsets"
     step_error = STEP_ERROR
-    start_names, gait_names = ("phase", "speed", "pitch", "x"), NAMES
+    start_names = ("phase", "speed", "pitch", "x")
+    gait_names = NAMES
 
     def __init__(self, settings: Settings) -> None:
         s = settings
@@ -138,7 +146,8 @@ class Horse:
             )
         self.command_step = COMMAND_STEP * self.speed_scale
         self.lowest, self.highest = (self.size * height for height in HEIGHT)
-        spring, stored = self._spring(s), TASKS["horse"].defaults["hoof_stiffness"]
+        spring = self._spring(s)
+        stored = TASKS["horse"].defaults["hoof_stiffness"]
         self._softness = 0.0 if spring is None else stored * self.size**2 / spring.stiffness
         self.limits = Limits((-PITCH, PITCH), (self.lowest, self.highest), CLEARANCE * self.size)
 
@@ -148,7 +157,8 @@ class Horse:
         mass = check_number("trunk_mass", s.trunk_mass, low=0, exclusive_low=True) * size**3
         inertia = mass * (GYRATION * size) ** 2
         trunk = Trunk("free", mass, drag=0.0, height=self.height, pitch_inertia=inertia)
-        drive, spring = self._drive(s), self._spring(s)
+        drive = self._drive(s)
+        spring = self._spring(s)
         fore, hind = (
             Limb(_limb(self.geometry, pair, MASS * size**3), self.hips[f"left_{pair}"], drive, spring)
             for pair in HIPS
@@ -156,7 +166,8 @@ class Horse:
         return trunk, self._ground(s, mass), (fore, fore, hind, hind)
 
     def _drive(self, s: Settings) -> Drive:
-        drive, size = drive_of(s), self.size
+        drive = drive_of(s)
+        size = self.size
         if not isinstance(drive, Motor):
             return drive
         return replace(
@@ -235,7 +246,8 @@ class Horse:
         """Complete starts with the gaits of the commanded speeds [m/s]. In a reference gait the trunk moves
         as it does in that, along the ground between its feet; in others it is as low as the springs of two
         legs give under the weight."""
-        begun, own = start.values, options.get("gait")
+        begun = start.values
+        own = options.get("gait")
         start.gaits = self.reference(targets, own)
         start.theta[:] = crank_angles(start.gaits, begun["phase"], start.theta)
         start.commands[:] = commands_of(start.gaits, start.theta, start.commands.shape[1])
@@ -251,7 +263,8 @@ class Horse:
         # of the lowest hoof over the slope; below it is what the springs have given
         lift = hoof + self.height * motion["y"] if is_known else np.full(len(hoof), -SAG * self.size)
         lift = np.where(lift < 0, self._softness * lift, lift) + (0 if self._softness else GAP * self.size)
-        ground, rate = engine.terrain.height_at(begun["x"] + x), start.gaits[:, 0]
+        ground = engine.terrain.height_at(begun["x"] + x)
+        rate = start.gaits[:, 0]
         start.trunk = {
             "x": begun["x"], "y": (ground - y).max((0, 1)) + lift / np.cos(slope), "vx": begun["speed"],
             "vy": self.height * rate * motion["vy"] + begun["speed"] * np.tan(slope), "pitch": begun["pitch"],
@@ -266,10 +279,12 @@ class Horse:
     def _hoofs(self, start: Start, pitch: Floats, engine: TrunkEngine) -> tuple[Floats, Floats]:
         """x and y of all toes and heels from the centre of trunks that pitch so [rad], in metres, shape
         (4, 2, n) each."""
-        found, n = [], len(pitch)
+        found = []
+        n = len(pitch)
         for k in range(0, COUNT, 2):  # the legs of a pair have one profile and one hip
             gaits = np.concatenate(start.commands[k : k + 2], axis=1).T
-            angles, turn = start.theta[k : k + 2].ravel(), np.tile(pitch * self.geometry.travel, 2)
+            angles = start.theta[k : k + 2].ravel()
+            turn = np.tile(pitch * self.geometry.travel, 2)
             points = hoof_points(engine.profiles[k], gaits, angles, turn)
             hip = engine.limbs[k].hip[0] * np.array([np.cos(pitch), np.sin(pitch)])
             found.append([at + of.reshape(2, 2, n) for at, of in zip(hip, points, strict=True)])

@@ -65,7 +65,8 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def _attach(self) -> None:
         """What every step reads, writes or calls, found once."""
-        batch, terms = self.batch, self.task.terms
+        batch = self.batch
+        terms = self.task.terms
         weighed = [(k, term) for k, term in enumerate(terms) if batch.weights[term.name]]
         paid = [(term.key, k) for k, term in weighed if term.compute is not failure]  # 0 before the end
         self._views: tuple[Any, ...] = (
@@ -157,8 +158,10 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             self._read_action(action)
         happened = kernel(addresses)  # not through the batch: a call costs as much as a substep
         ended = happened != 0 and self._follow(happened)
-        info, gait = self._begun[0](), self._begun[1]()  # all keys are there, and stay in their places
-        info["gait"], info["measured"] = gait, measure()
+        info = self._begun[0]()  # all keys are there
+        gait = self._begun[1]()  # and stay in their places
+        info["gait"] = gait
+        info["measured"] = measure()
         if draws:
             info["parameters"] = info["parameters"].copy()
         for key, k in paid:
@@ -199,7 +202,9 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def _begin(self) -> None:
         """What each info of this episode says of its start, and the keys of what a step fills in."""
-        row, body, first = self.batch.start_values[:, 0].copy(), self.batch.body, self.batch.start_row_count
+        row = self.batch.start_values[:, 0].copy()
+        body = self.batch.body
+        first = self.batch.start_row_count
         info = dict[str, Any](zip(body.start_names, row, strict=False))
         info["gait"] = gait = name_columns(row[len(body.start_names) : first], body.gait_names)
         if self.batch.randomize:
@@ -207,7 +212,8 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self.batch.target_speed:
             info["target_speed"] = self.batch.episode_rows.target[0]
         info |= {"measured": None, **dict.fromkeys(self.batch.terms, np.float64(0.0))}
-        self._begun, self._began_with = (info.copy, gait.copy), self._start_and_target()
+        self._began_with = self._start_and_target()
+        self._begun = (info.copy, gait.copy)
 
     def _start_and_target(self) -> tuple[bytes, float]:
         """What infos say that no step measures."""
@@ -297,7 +303,8 @@ class RandomizeParameters(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         leg.batch.check_options({"parameters": ranges})
         RecordConstructorArgs.__init__(self, ranges=dict(ranges), enabled=enabled)
         gym.Wrapper.__init__(self, env)
-        self.ranges, self.enabled = dict(ranges), flag("enabled", enabled)
+        self.ranges = dict(ranges)
+        self.enabled = flag("enabled", enabled)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, Any]:
         """Start an episode with parameters of its own."""

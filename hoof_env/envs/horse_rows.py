@@ -32,7 +32,8 @@ def _from_hips(x, scene):  # type: ignore[no-untyped-def]
 
 def _in_bounds(k: int) -> Scale:
     low, high = list(WIDEST.values())[k]
-    middle, per = (low + high) / 2, 2 / (high - low)
+    middle = (low + high) / 2
+    per = 2 / (high - low)
     return Scale(f"linear, -1 at {low:g} and 1 at {high:g}", lambda x, scene: (x - middle) * per)
 
 

@@ -56,7 +56,9 @@ class InfoLayout:
         self.names = measured_names(features, legs)
         self.kind = _kind(self.names)
         form = engine_layout(features)
-        trunk, leg, first = form.trunk_memory.rows, form.leg_memory.rows, form.trunk_rows
+        trunk = form.trunk_memory.rows
+        leg = form.leg_memory.rows
+        first = form.trunk_rows
         self._rows: Any = slice(trunk("report").start, first + leg("sums").stop)
         if legs > 1:
             pitch = trunk("state").stop - 2
@@ -81,7 +83,8 @@ class InfoLayout:
         if isinstance(self._rows, slice):
             copied: Callable[[], Any] = name_columns(column[self._rows], self.names).copy
             return copied
-        rows, kind = self._rows, self.kind
+        rows = self._rows
+        kind = self.kind
         return lambda: column[rows].view(kind)
 
 

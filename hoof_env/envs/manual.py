@@ -96,9 +96,11 @@ def page(task: str, with_film: bool = False) -> str:
         return _tidy(
             Template(MO_PAGE).substitute(film=film, observations=_observations(what), objectives=objectives)
         )
-    s, kind = what.settings({}), "horse" if what.is_horse else "leg"
+    s = what.settings({})
+    kind = "horse" if what.is_horse else "leg"
     body = Horse(s) if what.is_horse else OneLeg(s)
-    trunk, groups = TABLES[s.trunk], observation.groups_of(what.entries)
+    trunk = TABLES[s.trunk]
+    groups = observation.groups_of(what.entries)
     weights = check_weights(s.reward_weights, what.terms)
     rewards = [(f"`{t.key}`", f"`{t.name}`", f"{weights[t.name]:g}", t.unit, t.meaning) for t in what.terms]
     defaults = {name: literal(value) for name, value in to_json(s).items()}
@@ -160,7 +162,8 @@ def index() -> str:
     """All ids in one table, in Markdown."""
     rows = []
     for task, name in _NAMES.items():
-        what, native = TASKS.get(task, TASKS["leg"]), "yes" if task in TASKS else "no"
+        what = TASKS.get(task, TASKS["leg"])
+        native = "yes" if task in TASKS else "no"
         summary = what.summary if task in TASKS else str(HorseLegMOEnv.__doc__).splitlines()[0]
         link = f"[`hoof_env/{name}-v0`]({name}.md)"
         actions = str(ACTED * (COUNT if what.is_horse else 1))
@@ -220,7 +223,8 @@ def _settings(what: Task, defaults: Mapping[str, str]) -> list[tuple[str, ...]]:
     """The settings that an id takes, with those `defaults`."""
     if not what.is_horse:
         return _rows("settings", defaults)
-    s, own = what.settings({}), TABLES["horse_settings"]
+    s = what.settings({})
+    own = TABLES["horse_settings"]
     contexts = s, replace(s, hoof_stiffness=None)  # what needs a rigid hoof can be, too
     return [
         (f"`{name}`", defaults[name], *own.get(name, cells))
@@ -268,7 +272,8 @@ def _actions(settings: Settings) -> str:
     rates = [settings.crank_rate, *[settings.swing_rate] * (len(LIMITS) - 1)]
     rows = []
     for k, (low, high) in enumerate(LIMITS.values()):
-        value, rate = GAIT[k], GAIT[len(LIMITS) + k]
+        value = GAIT[k]
+        rate = GAIT[len(LIMITS) + k]
         limits = f"{low:.5g} to {high:.5g} {value.unit}"
         rows.append((str(k), value.name, f"{-rates[k]:g}", f"{rates[k]:g}", rate.unit, limits))
     return markdown_table(("Num", "Rate of", "At -1", "At +1", "Unit", "Limits of the value"), rows)

@@ -18,7 +18,8 @@ from hoof_env.simd.math import cos_sin
 from hoof_env.simd.user_functions import check_function
 
 LOW, HIGH = (np.array([limit[i] for limit in LIMITS.values()]) for i in (0, 1))
-MIDDLE, HALF_RANGE = (LOW + HIGH) / 2, (HIGH - LOW) / 2
+MIDDLE = (LOW + HIGH) / 2
+HALF_RANGE = (HIGH - LOW) / 2
 """Limits, middle and half range of the gait parameters, shape (4,)."""
 
 AHEAD = (0.25, 0.5, 0.75, 1.0)  # where the height of the ground is seen, from O forward [m]
@@ -108,7 +109,8 @@ def tanh_of(scale: float, text: str = "") -> Scale:
     return Scale(text or f"tanh(x / {scale:g})", lambda x, scene: x * per, True)
 
 
-PLAIN, TRUTH = Scale("none"), Scale("0 or 1")
+PLAIN = Scale("none")
+TRUTH = Scale("0 or 1")
 IN_WEIGHTS = Scale("tanh(x / 3 weights)", lambda x, scene: x / (3.0 * scene.episode.weight), True)
 RISE = Scale("tanh(x / (30 weights / s))", lambda x, scene: x / (30.0 * scene.episode.weight), True)
 

@@ -73,14 +73,20 @@ def reach_per_rate(dt: float, substep: float) -> float:
         substep: of the filters [s].
     """
     gain = FilterSettings().gain
-    follow, h, n = INNER * gain, substep, round(dt / substep)
-    keeps_distance, from_speed = 1 - 0.5 * h * h * follow * gain, -h + 0.5 * h * h * follow
-    from_distance, keeps_speed = h * follow * gain, 1 - h * follow
-    middle, product = 0.5 * (keeps_distance + keeps_speed), keeps_distance * keeps_speed
+    follow = INNER * gain
+    h = substep
+    n = round(dt / substep)
+    keeps_distance = 1 - 0.5 * h * h * follow * gain
+    from_speed = -h + 0.5 * h * h * follow
+    from_distance = h * follow * gain
+    keeps_speed = 1 - h * follow
+    middle = 0.5 * (keeps_distance + keeps_speed)
+    product = keeps_distance * keeps_speed
     apart = math.sqrt(middle**2 - product + from_speed * from_distance)
     factors = middle + apart, middle - apart
     slopes = [from_distance / (factor - keeps_speed) for factor in factors]
-    reach, lead = 0.0, lead_of(dt)
+    reach = 0.0
+    lead = lead_of(dt)
     for factor, slope, other in zip(factors, slopes, reversed(slopes), strict=True):
         distance = dt * other / (other - slope) / (1 - factor**n)
         reach += distance * (1 - lead * slope)
@@ -133,12 +139,17 @@ def heading_now(engine: TrunkEngine, dt: float) -> Floats:
 class OneLeg:
     """A leg under a trunk; attributes and methods are as of `horse.Horse`."""
 
-    legs, harmonics, filters, limits = 1, 1, None, None
+    legs = 1
+    harmonics = 1
+    filters = None
+    limits = None
     action_names = tuple(f"rate_of_{name}" for name in PARAMETERS)
     action_form = "rates"
     hips: Mapping[str, tuple[float, float]] = MappingProxyType({})
-    step_error, command_step = 0.01, math.inf
-    start_names, gait_names = ("crank_angle", "speed", "height", "x"), PARAMETERS
+    step_error = 0.01
+    command_step = math.inf
+    start_names = ("crank_angle", "speed", "height", "x")
+    gait_names = PARAMETERS
 
     def __init__(self, settings: Settings) -> None:
         s = settings

@@ -22,11 +22,16 @@ def bear(episode, impulse, seconds):  # type: ignore[no-untyped-def]
 @inline_llvm
 def sum_up(first_leg, layouts):  # type: ignore[no-untyped-def]
     """What all legs did in the step, and the highest of their forces."""
-    sums, slip = first_leg.sums, first_leg.sums.slip
-    running_peak_increase, peak_grf_increase = sums.running_peak_increase, sums.peak_grf_increase
-    loading_rate_increase, highest_grf = sums.loading_rate_increase, sums.highest_grf
-    positive_work, normal_impulse = sums.positive_work, sums.normal_impulse
-    loaded_time, stances = sums.loaded_time, sums.stances
+    sums = first_leg.sums
+    slip = first_leg.sums.slip
+    running_peak_increase = sums.running_peak_increase
+    peak_grf_increase = sums.peak_grf_increase
+    loading_rate_increase = sums.loading_rate_increase
+    highest_grf = sums.highest_grf
+    positive_work = sums.positive_work
+    normal_impulse = sums.normal_impulse
+    loaded_time = sums.loaded_time
+    stances = sums.stances
     for i in range(1, layouts.legs):
         sums = block_at(first_leg, i).sums
         running_peak_increase = running_peak_increase + sums.running_peak_increase
@@ -48,7 +53,8 @@ def sum_up(first_leg, layouts):  # type: ignore[no-untyped-def]
 def find_outcome(task, trunk, leg, episode, layouts):  # type: ignore[no-untyped-def]
     """What the step brought."""
     works = has_moved(trunk.result)  # else the state is of before: nothing is paid
-    x, y = trunk.report.place.real, trunk.report.place.imag
+    x = trunk.report.place.real
+    y = trunk.report.place.imag
     running, peak, loading, highest, work, impulse, loaded, stances, slip = sum_up(leg, layouts)
     progress = x - episode.x_before
     if task.stays:
@@ -102,7 +108,8 @@ def decide(task, outcome, episode):  # type: ignore[no-untyped-def]
     late = where(steps >= task.episode_steps, float(TRUNCATED), 0.0)
     ended = where(outcome.failed > 0.0, float(FAILED), late)
     switched = steps >= episode.switch
-    episode.steps, episode.ended = steps, ended
+    episode.steps = steps
+    episode.ended = ended
     episode.target = where(switched, episode.next_target, episode.target)
     return ended > 0.0, switched
 

@@ -67,7 +67,8 @@ class PaperSolver:
 
     def __init__(self, settings: Settings, engine: TrunkEngine, substeps: int) -> None:
         s = settings
-        self.engine, self.substeps = engine, substeps
+        self.engine = engine
+        self.substeps = substeps
         self.legs = [
             ConstrainedLeg(
                 engine.limbs[0].geometry, engine.ground, s.sim_dt, engine.filters,
@@ -99,11 +100,13 @@ class PaperSolver:
         memory = self._memory()
         for env, leg in enumerate(self.legs):
             trace = new_trace(self.substeps)
-            kept, self.traces[env] = leg.state.copy(), self.traces[env][-1:]
+            kept = leg.state.copy()
+            self.traces[env] = self.traces[env][-1:]
             result = leg.advance(memory.command[0, :, env].copy(), trace)  # not strided, as alone
             self.apart[env] = result is Result.OK and np.abs(leg.closure().error).max() > APART
             if self.apart[env]:
-                result, leg.state = Result.NOT_FINITE, kept
+                result = Result.NOT_FINITE
+                leg.state = kept
             memory.result[env] = result
             memory.stride_sums[:, :, env] = 0.0
             if result is Result.OK:
@@ -114,7 +117,8 @@ class PaperSolver:
     def record(self, env: int) -> dict[str, Floats]:
         """What `Recording.last` gives: the rows of the last control step by name, shaped as `TrunkEngine.run`
         shapes them."""
-        trace, of_trunk = self.traces[env], {*TRUNK_STATE, *TRUNK_REPORT}
+        trace = self.traces[env]
+        of_trunk = {*TRUNK_STATE, *TRUNK_REPORT}
         shapes = {name: (-1, 1) if name in of_trunk else (-1, 1, 1) for name in TRACE.names or ()}
         return {name: trace[name].reshape(shape).copy() for name, shape in shapes.items()}
 
@@ -131,7 +135,8 @@ class PaperSolver:
         """What `get_state` gave, as `set_state` takes it; `ParameterError` of anything else."""
         try:
             legs = [_state_like(leg.state, one) for leg, one in zip(self.legs, state["legs"], strict=True)]
-            accounts, last = np.array(state["accounts"], ACCOUNT), np.array(state["last"], TRACE)
+            accounts = np.array(state["accounts"], ACCOUNT)
+            last = np.array(state["last"], TRACE)
             if not len(accounts) == len(last) == len(legs):
                 raise ValueError
             if not np.isfinite([(leg.q, leg.qd) for leg in legs]).all():
@@ -147,7 +152,8 @@ class PaperSolver:
         self._accounts = accounts
         memory = self._memory()
         for env, (leg, leg_state) in enumerate(zip(self.legs, legs, strict=True)):
-            leg.state, self.traces[env] = leg_state, last[env : env + 1]
+            leg.state = leg_state
+            self.traces[env] = last[env : env + 1]
             self._put(env, memory)
 
     def _memory(self) -> Memory:
@@ -167,7 +173,9 @@ class PaperSolver:
         """The rows `layout.StrideSums` of a control step; the account goes on."""
         h = self.legs[env].sim_dt
         *stance, impulse_before, loaded_before = self._accounts[env].item()
-        since, impulse, loaded = StanceCounter(self._threshold, *stance), impulse_before, loaded_before
+        since = StanceCounter(self._threshold, *stance)
+        impulse = impulse_before
+        loaded = loaded_before
         stances = since.count
         normal = trace["toe_normal"] + trace["heel_normal"]
         friction = trace["toe_friction"] + trace["heel_friction"]
@@ -181,7 +189,9 @@ class PaperSolver:
         rows = zip(*(values.tolist() for values in columns), strict=True)
         for theta, n, f, slid, rubbed, crank, hip in rows:
             grown = since.add(theta, n, f, h)
-            growth, higher, steeper = growth + grown[0], higher + grown[1], steeper + grown[2]
+            growth = growth + grown[0]
+            higher = higher + grown[1]
+            steeper = steeper + grown[2]
             work += h * (max(crank, 0.0) + max(hip, 0.0))
             impulse += h * n
             if n > 0.0:

@@ -86,7 +86,8 @@ def drive_of(s: Settings) -> Drive:
 def hoof_spring(settings: Settings) -> HoofSpring | None:
     """The spring at toe and heel each; without a damping, with a tenth of the critical one under the trunk of
     the settings, whatever a reset draws."""
-    stiffness, damping = settings.hoof_stiffness, settings.hoof_damping
+    stiffness = settings.hoof_stiffness
+    damping = settings.hoof_damping
     if stiffness is None:
         if damping is not None:
             raise ParameterError(f"hoof_damping: expected a hoof_stiffness beside it, got {damping!r}")
@@ -146,7 +147,9 @@ def draw_parameters(
     }
 
 
-STRETCH, DRIFT, HIGHEST_HILLS = 10.0, 0.03, 0.2
+STRETCH = 10.0
+DRIFT = 0.03
+HIGHEST_HILLS = 0.2
 """Over so long a stretch of ground [m] its mean height must stay within so large a part of the hip height of
 y = 0 where the trunk does not follow the ground. The springs of `HorseLeg-v0` take 1.1 times the weight off
 the leg, or put it on, at that height. Hills rise and fall about y = 0, so they may be so much higher."""
@@ -164,7 +167,8 @@ def check_drift(terrain: Terrain, description: Any, trunk: str, hip_height: floa
         " the ground; slopes are for hoof_env/Horse-v0, whose trunk follows them"
     )
     if isinstance(description, Mapping) and description.get("kind") == "hills":
-        rise, most = float({**HILLS, **description}["rise"]), HIGHEST_HILLS * hip_height
+        rise = float({**HILLS, **description}["rise"])
+        most = HIGHEST_HILLS * hip_height
         if rise > most:
             raise ParameterError(f"terrain['rise']: expected at most {most:.3g} m {remedy}; got {rise:.3g} m")
         return
@@ -179,7 +183,8 @@ def check_drift(terrain: Terrain, description: Any, trunk: str, hip_height: floa
 def farthest_mean(terrain: Terrain, stretch: float) -> tuple[float, float]:
     """The mean height over a stretch [m] of the ground that is farthest from 0 [m], of those that begin, end
     or have their middle at a knot or between two, and where the middle is [m]."""
-    x, height = terrain.x, np.array(terrain.height)
+    x = terrain.x
+    height = np.array(terrain.height)
     areas = np.concatenate([[0.0], np.cumsum((height[1:] + height[:-1]) / 2 * terrain.spacing)])
 
     def area_to(to: Any) -> Any:
@@ -239,18 +244,24 @@ def _hills(given: dict[str, Any]) -> Terrain:
     rise = check_number("terrain['rise']", given["rise"], low=0.0, high=10.0)
     steepest = check_number("terrain['slope']", given["slope"], low=1e-3, high=1.0)
     patch = check_number("terrain['patch']", given["patch"], low=0.2, high=1e3)
-    generator, knots = np.random.default_rng(seed), round(length / SPACING) + 1
+    generator = np.random.default_rng(seed)
+    knots = round(length / SPACING) + 1
 
-    height, row, k = 0.0, np.zeros(knots), 1
+    height = 0.0
+    row = np.zeros(knots)
+    k = 1
     while k < knots:
-        there, slope = generator.uniform(-rise, rise), generator.uniform(0.2, 1.0) * steepest
+        there = generator.uniform(-rise, rise)
+        slope = generator.uniform(0.2, 1.0) * steepest
         many = max(round(abs(there - height) / slope / SPACING), 1)
         row[k : k + many] = np.linspace(height, there, many + 1)[1:][: knots - k]
-        height, k = there, k + many
+        height = there
+        k = k + many
     factors = {}
     for name in ("stiffness", "friction"):
         low, high = np.log(check_range(f"terrain[{name!r}]", given[name], 1e-3, 1e3, or_one=False))
-        factor, k = np.empty(knots), 0
+        factor = np.empty(knots)
+        k = 0
         while k < knots:
             many = max(round(generator.exponential(patch) / SPACING), 5)
             factor[k : k + many] = np.exp(generator.uniform(low, high))

@@ -38,7 +38,8 @@ class Scripted:
     """
 
     def __init__(self, act: Any, dt: float, start: Mapping[str, Any] | None = None) -> None:
-        self._act, self._dt = act, dt
+        self._act = act
+        self._dt = dt
         self.start = dict(start or {})
         self.reset()
 
@@ -117,7 +118,8 @@ def towards(env: Any, gait_at: Any) -> Any:
     """A function of observations and times that goes to the gait that `gait_at` gives for them, as fast as is
     allowed; see `LegBase.action_for`."""
     batch = env.unwrapped.batch
-    heading, reach = heading_seen(env), batch.body.reach(batch.engine, batch.dt)
+    heading = heading_seen(env)
+    reach = batch.body.reach(batch.engine, batch.dt)
 
     def act(observation: Any, time: Any) -> Action:
         return action_towards(np.asarray(gait_at(observation, time), float), heading(observation), reach)
@@ -285,7 +287,8 @@ def load_open_loop(path_or_env_id: str | Path, env: Any) -> Scripted:
             known = ", ".join(sorted(file.name for file in GAITS.glob("*.json"))) or "none"
             raise DataFileError(f"open-loop gait of {name}: expected one of those in {GAITS.name}/: {known}")
         path = max(files, key=lambda file: open_loop_record(file)["score"]["mean"]["return"])
-    record, leg = open_loop_record(path), env.unwrapped
+    record = open_loop_record(path)
+    leg = env.unwrapped
     if leg.action_form != "rates":
         raise DataFileError(
             f"open-loop gait {path}: expected an environment of one leg, got {type(leg).__name__} whose"

@@ -30,7 +30,9 @@ class Recording:
     """Substeps of one environment of a batch, and pictures of them, `size` wide and high [pixels]."""
 
     def __init__(self, batch: EpisodeBatch, env: int = 0, size: tuple[int, int] = USUAL_SIZE) -> None:
-        self.batch, self.env, self.size = batch, env, size
+        self.batch = batch
+        self.env = env
+        self.size = size
         self._ends: deque[Any] = deque(maxlen=round(SHOWN / batch.dt) + 2)  # of control steps; first a start
         self._unseen = 0  # of them, which no picture shows yet
         self.renderer: Any = None
@@ -41,7 +43,8 @@ class Recording:
     def _find(self) -> None:
         """What is copied at the end of a control step: the engine's memory of this environment, or the record
         of the paper's solver."""
-        paper, env = self.batch.paper, self.env
+        paper = self.batch.paper
+        env = self.env
         column = self.batch.engine.arrays[0][:, env]
         self._end = (lambda: paper.record(env)) if paper else column.copy
 
@@ -50,7 +53,8 @@ class Recording:
         conditions = self.batch.conditions.of(self.env)
         if conditions is not self._conditions and (conditions or self._conditions):
             self.close()  # it may have drawn another ground
-            self._conditions, self._engine = conditions, None
+            self._conditions = conditions
+            self._engine = None
         self._ends.clear()
         self._unseen = 0
         self.add()

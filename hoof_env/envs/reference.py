@@ -55,7 +55,8 @@ and two harmonics of the swing [rad]."""
 
 PAIR = tuple(LIMITS)
 SWING = 5  # of these are the swing's
-COUNT, ACTED = len(LEGS), 4  # legs, and actions of each
+COUNT = len(LEGS)
+ACTED = 4  # actions of each leg
 SCRATCH_SIZE = 3 * COUNT  # numbers that `command_gait` needs room for
 NAMES = ("rate", "lead", *(f"{pair}_{name}" for pair in PAIRS for name in PAIR))
 """Of the numbers of a gait, in their order."""
@@ -63,7 +64,8 @@ NAMES = ("rate", "lead", *(f"{pair}_{name}" for pair in PAIRS for name in PAIR))
 SIZES = 0.25, 2.0
 """Smallest and largest horse over one of 475 kg [-]; the filters of a smaller one's commands would be too
 quick for the usual time step."""
-SLOWEST, FASTEST = 0.1, 6 * np.pi
+SLOWEST = 0.1
+FASTEST = 6 * np.pi
 """Rate of a gait, and a crank within a stride, of a horse of 475 kg [rad/s]."""
 LEADS = (-10.0, 10.0)  # of a gait [strides]
 COUPLING = 0.2  # most that falling out of step changes the speed of a crank [-]
@@ -225,7 +227,8 @@ def trunk_motion(speeds: Floats, phase: Floats) -> dict[str, Floats]:
     rate of the crank [-]. From simulation, in harmonics of half a stride, after which left is right."""
     mixed = np.moveaxis(_mixed(speeds, _reference()[2]), 0, -1)  # of y, vx, pitch: mean, cosine and sine, ...
     order = 2 * np.arange(1, mixed.shape[1] // 2 + 1)[:, None]
-    cosine, sine = np.cos(2 * np.pi * order * phase), np.sin(2 * np.pi * order * phase)
+    cosine = np.cos(2 * np.pi * order * phase)
+    sine = np.sin(2 * np.pi * order * phase)
     value = mixed[:, 0] + (mixed[:, 1::2] * cosine + mixed[:, 2::2] * sine).sum(1)
     slope = (order * (mixed[:, 2::2] * cosine - mixed[:, 1::2] * sine)).sum(1)
     return {"y": value[0], "vy": slope[0], "vx": value[1], "pitch": value[2], "pitch_rate": slope[2]}
@@ -264,12 +267,14 @@ class Stride:
     def __init__(self, cosine: Floats, sine: Floats) -> None:
         self.wave = cosine, sine
         self.r = np.sqrt(1 - (cosine * cosine + sine * sine))
-        self.half, by = (1 + self.r) / 2, 2 + 2 * self.r
+        self.half = (1 + self.r) / 2
+        by = 2 + 2 * self.r
         self.fold = (cosine * cosine - sine * sine) / by, 2 * cosine * sine / by
 
     def begin(self) -> tuple[Floats, Floats]:
         """`phase` at angle 0."""
-        (u, v), (f, g) = self.wave, self.fold
+        (u, v) = self.wave
+        (f, g) = self.fold
         return (self.half + f + u) / (1 + u), (g + v) / (1 + u)
 
     def phase(self, x: Floats, y: Floats) -> tuple[Floats, Floats]:
@@ -281,7 +286,8 @@ class Stride:
         return self._map(x, y, -1.0)
 
     def _map(self, x: Floats, y: Floats, sign: float) -> tuple[Floats, Floats]:
-        (u, v), (f, g) = self.wave, self.fold
+        (u, v) = self.wave
+        (f, g) = self.fold
         speed = 1 + sign * (u * x + v * y)
         return (
             (self.half * x + (f * x + g * y) + sign * u) / speed,
@@ -300,10 +306,13 @@ def crank_angles(gaits: Floats, phase: Floats, off: Floats) -> Floats:
     each is off, shape (4, n), both [strides]; shape (4, n)."""
     wave = np.repeat(_pairs(gaits)[:, :2], 2, axis=0)
     stride = Stride(wave[:, 0], wave[:, 1])
-    ahead, half = np.zeros((COUNT, len(gaits))), 0.5 * (np.arange(COUNT) % 2)[:, None]
+    ahead = np.zeros((COUNT, len(gaits)))
+    half = 0.5 * (np.arange(COUNT) % 2)[:, None]
     ahead[:2] = gaits[:, 1]
     turned = 2 * np.pi * (phase + off + ahead + half)
-    (x, y), c, s = stride.begin(), np.cos(turned), np.sin(turned)
+    (x, y) = stride.begin()
+    c = np.cos(turned)
+    s = np.sin(turned)
     x, y = stride.angle(x * c - y * s, x * s + y * c)
     found: Floats = np.arctan2(y, x) % (2 * np.pi)
     return found
@@ -333,23 +342,29 @@ def command_gait(task, actions, episode, first_leg, parameters, n, scratch):  # 
 
     The first action of a leg scales its crank's speed, the others are added to the swing's first three
     coefficients."""
-    gait, together = episode.gait, vector(full_like(episode, 0.0), 0.0)
+    gait = episode.gait
+    together = vector(full_like(episode, 0.0), 0.0)
     for p in range(len(PAIRS)):
         wave = block_at(gait.fore, p).wave
         r = sqrt(1.0 - dot(wave, wave))
-        half, fold, speed = 0.5 * (1.0 + r), (1.0 / (2.0 + 2.0 * r)) * (wave * wave), gait.rate / r
+        half = 0.5 * (1.0 + r)
+        fold = (1.0 / (2.0 + 2.0 * r)) * (wave * wave)
+        speed = gait.rate / r
         cosine, sine = cos_sin(2.0 * math.pi * gait.lead * (1.0 - p))
         begin = vector(cosine, sine) * phase_of(wave, half, fold, vector(full_like(episode, 1.0), 0.0))
         for side in range(2):
-            i, sign = 2 * p + side, 1.0 - 2.0 * side
+            i = 2 * p + side
+            sign = 1.0 - 2.0 * side
             cosine, sine = cos_sin(block_at(first_leg, i).state.theta)
             crank = vector(cosine, sine)
             phase = sign * (conjugate(begin) * phase_of(wave, half, fold, crank))
             scratch[3 * i] = speed * (1.0 + dot(wave, crank))
-            scratch[3 * i + 1], scratch[3 * i + 2] = phase.real, phase.imag
+            scratch[3 * i + 1] = phase.real
+            scratch[3 * i + 2] = phase.imag
             together = together + phase
     for i in range(COUNT):
-        leg, pair = block_at(first_leg, i), block_at(gait.fore, i // 2)
+        leg = block_at(first_leg, i)
+        pair = block_at(gait.fore, i // 2)
         behind = cross(vector(scratch[3 * i + 1], scratch[3 * i + 2]), together)
         speed = scratch[3 * i] * (1.0 + (COUPLING / COUNT) * behind)
         for k in range(parameters):
@@ -383,7 +398,9 @@ def refer_to_target(task, episode, switched):  # type: ignore[no-untyped-def]
     """Where another speed is commanded its reference gait is the episode's, see `reference_gaits`."""
     if not (task.follows and any_lane(switched)):
         return
-    speeds, gaits, last = task.speeds, task.gaits, len(task.speeds) - 1
+    speeds = task.speeds
+    gaits = task.gaits
+    last = len(task.speeds) - 1
     speed = episode.target * (1.0 / task.speed_scale)
     within = minimum(maximum(speed, speeds[0]), speeds[last])
     for k in range(len(NAMES)):

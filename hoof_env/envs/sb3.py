@@ -58,7 +58,8 @@ class Sb3VecEnv(VecEnv):
             raise ParameterError(f"env_id: expected an id of this package with many at once, got {env_id!r}")
         if envs.autoreset_mode != AutoresetMode.SAME_STEP:
             raise ParameterError(f"autoreset_mode: expected SAME_STEP, got {settings['autoreset_mode']!r}")
-        self.envs, self.render_mode = envs, envs.render_mode
+        self.envs = envs
+        self.render_mode = envs.render_mode
         self._actions: NDArray[Any] | None = None
         self.terms = {name: np.zeros(num_envs) for name in envs.batch.terms}
         super().__init__(num_envs, envs.single_observation_space, envs.single_action_space)
@@ -101,11 +102,13 @@ class Sb3VecEnv(VecEnv):
     def step_wait(self) -> Any:
         """Take the step."""
         observations, rewards, terminated, truncated, infos = self.envs.step(self._actions)  # type: ignore[arg-type]
-        self.terms, self.measured = {name: infos[name] for name in self.terms}, infos["measured"]
+        self.terms = {name: infos[name] for name in self.terms}
+        self.measured = infos["measured"]
         dones = terminated | truncated
         each: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         if dones.any():
-            final, figures = infos["final_info"], infos["final_info"]["episode_summary"]
+            final = infos["final_info"]
+            figures = infos["final_info"]["episode_summary"]
             names = [name for name in figures if not name.startswith("_")]
             for name in self.terms:
                 self.terms[name] = np.where(dones, final[name], infos[name])

@@ -20,7 +20,8 @@ from hoof_env.leg.profile import LegProfile, by_name
 
 Floats = NDArray[np.float64]
 
-LOWEST, HIGHEST = 0.6, 2.0
+LOWEST = 0.6
+HIGHEST = 2.0
 """Heights of the trunk at which an episode fails, as parts of its nominal height."""
 
 START_SPEED = 1.0
@@ -35,7 +36,9 @@ OPTIONS = {
 FOREIGN_OPTIONS = ("minari_autoseed",)
 """Options that others put there for themselves: Minari hands its own on to the environment."""
 
-FLAT, MARGIN, REACH = Terrain.flat(), 50.0, 1.0
+FLAT = Terrain.flat()
+MARGIN = 50.0
+REACH = 1.0
 """Level ground; how far from its ends an episode on a terrain begins [m], for it goes somewhere; how far
 ahead and behind O a hoof may come down [m]."""
 
@@ -69,7 +72,8 @@ def hoof_points(
     phi: Floats = gaits[:, 1] + gaits[:, 2] * np.sin(theta) + gaits[:, 3] * np.cos(theta) + np.asarray(turn)
     for k in range(2, gaits.shape[1] // 2):
         phi = phi + gaits[:, 2 * k] * np.sin(k * theta) + gaits[:, 2 * k + 1] * np.cos(k * theta)
-    sine, cosine = profile.geometry.travel * np.sin(phi), np.cos(phi)
+    sine = profile.geometry.travel * np.sin(phi)
+    cosine = np.cos(phi)
     f = by_name(profile(theta)[0])
     places = [(f[f"{point}_x"], f[f"{point}_y"]) for point in ("toe", "heel")]
     return (
@@ -111,7 +115,8 @@ def draw_starts(
     theta = np.full(n, options["crank_angle"]) if "crank_angle" in options else 2 * np.pi * drawn[:, 1]
     rolling = np.zeros(n) if trunk.kind == "fixed" else START_SPEED * drawn[:, 2]
     speed = np.full(n, options["speed"]) if "speed" in options else rolling
-    height, x = np.full(n, options.get("height", trunk.height)), np.full(n, options.get("x", 0.0))
+    height = np.full(n, options.get("height", trunk.height))
+    x = np.full(n, options.get("x", 0.0))
     ground = np.zeros(n)
     if terrain != FLAT:
         x = start_anywhere(terrain, x, options, generators)
@@ -134,7 +139,8 @@ def start_anywhere(
     terrain: Terrain, x: Floats, options: Mapping[str, Any], generators: Sequence[np.random.Generator]
 ) -> Floats:
     """Where episodes on a terrain begin: at `x` if it is short or one slope, or if the options say so."""
-    low, high = terrain.x[0] + MARGIN, terrain.x[-1] - MARGIN
+    low = terrain.x[0] + MARGIN
+    high = terrain.x[-1] - MARGIN
     if "x" not in options and low < high and len(terrain.height) > 2:
         return np.array([generator.uniform(low, high) for generator in generators])
     return x
@@ -181,7 +187,8 @@ def with_parameters(options: dict[str, Any], settings: Settings) -> dict[str, An
 
 def highest(terrain: Terrain, x: Floats, reach: float) -> Floats:
     """Highest ground within a reach of `x`, shape (n,): it is at an end or at a knot."""
-    low, high = x[:, None] - reach, x[:, None] + reach
+    low = x[:, None] - reach
+    high = x[:, None] + reach
     first = np.ceil((low - terrain.start) / terrain.spacing)
     knots = terrain.start + terrain.spacing * (first + np.arange(int(2 * reach / terrain.spacing) + 1))
     return terrain.height_at(np.hstack([low, np.clip(knots, low, high), high])).max(1)
@@ -189,7 +196,8 @@ def highest(terrain: Terrain, x: Floats, reach: float) -> Floats:
 
 def _check_trunk(options: Mapping[str, float], trunk: Trunk) -> None:
     """Raise where a trunk cannot be at a height or have a speed."""
-    height, speed = options.get("height", trunk.height), options.get("speed", 0.0)
+    height = options.get("height", trunk.height)
+    speed = options.get("speed", 0.0)
     if trunk.kind != "suspended" and height != trunk.height:
         raise ParameterError(
             f"options['height']: a {trunk.kind} trunk is at {trunk.height:g} m, got {height:g} m"

@@ -52,7 +52,9 @@ from hoof_env.simd.memory import (
 from hoof_env.simd.reach import fingerprint, refresh
 from hoof_env.simd.user_functions import number_of
 
-NOT_A_NUMBER, SOME_ENDED, SOME_SWITCHED = -1, 1, 2
+NOT_A_NUMBER = -1
+SOME_ENDED = 1
+SOME_SWITCHED = 2
 """What a step returns: an action is none, and nothing has happened; else the sum of what happened
 somewhere."""
 
@@ -62,7 +64,9 @@ ADDRESSES = Addresses(
 )  # fmt: skip
 """The arrays of a step, those of the engine first."""
 
-AT, BEGIN, END = ADDRESSES.slots, ADDRESSES.begin, ADDRESSES.end
+AT = ADDRESSES.slots
+BEGIN = ADDRESSES.begin
+END = ADDRESSES.end
 BUILT_IN_TERMS = tuple(term.name for term in TERMS)
 
 
@@ -85,7 +89,8 @@ def apply_action(task, actions, leg, n):  # type: ignore[no-untyped-def]
 def memories(addresses, lanes, layouts, n):  # type: ignore[no-untyped-def]
     """Trunk, leg and episode of environments n, n + 1, ..., as `lanes` columns, see `simd.columns`."""
     row = addresses[AT.data + COLUMNS]
-    data, episode = doubles_at(addresses[AT.data]), doubles_at(addresses[AT.episode])
+    data = doubles_at(addresses[AT.data])
+    episode = doubles_at(addresses[AT.episode])
     return (
         columns(data, lanes, layouts.trunk, n, row, 1),
         columns(data, lanes, layouts.leg, layouts.trunk_rows * row + n, row, 1),
@@ -98,8 +103,11 @@ def _with_terms(terms: tuple[Term, ...], layouts: Memories, k: int = 0) -> Calla
     of all. numba has no loop over functions, so each calls the next."""
     if k == len(terms):
         return inline_llvm(lambda addresses, lanes, task, outcome, episode, n, total: total)
-    compute, rest, is_first = inline_llvm(terms[k].compute), _with_terms(terms, layouts, k + 1), k == 0
-    from_outside, number = is_user_term(terms[k]), number_of(terms[k].title)
+    compute = inline_llvm(terms[k].compute)
+    rest = _with_terms(terms, layouts, k + 1)
+    is_first = k == 0
+    from_outside = is_user_term(terms[k])
+    number = number_of(terms[k].title)
 
     @inline_llvm
     def add_term(addresses, lanes, task, outcome, episode, n, total):  # type: ignore[no-untyped-def]
@@ -145,7 +153,8 @@ def _with_entries(entries: tuple[Entry, ...], layouts: Memories, scaled: bool) -
         if last - first == 1:
             return _with_entry(entries[first], slots[first], layouts, scaled)
         middle = (first + last) // 2
-        one, other = put_from(first, middle), put_from(middle, last)
+        one = put_from(first, middle)
+        other = put_from(middle, last)
 
         @inline_llvm
         def put_both(addresses, lanes, scene, numbers, n):  # type: ignore[no-untyped-def]
@@ -158,9 +167,11 @@ def _with_entries(entries: tuple[Entry, ...], layouts: Memories, scaled: bool) -
 
 
 def _with_entry(entry: Entry, slot: int, layouts: Memories, scaled: bool) -> Callable[..., Any]:
-    measure, apply = inline_llvm(entry.measure), entry.scale.apply
+    measure = inline_llvm(entry.measure)
+    apply = entry.scale.apply
     scale = inline_llvm(apply) if scaled and apply is not None else inline_llvm(lambda x, scene: x)
-    number, scaled_number = number_of(entry.title), number_of(f"the scale of {entry.title}")
+    number = number_of(entry.title)
+    scaled_number = number_of(f"the scale of {entry.title}")
 
     @inline_llvm
     def put_entry(addresses, lanes, scene, numbers, n):  # type: ignore[no-untyped-def]
@@ -257,12 +268,14 @@ def _made(
     advance = advance_kernels(contact_law, features)
     advance_one = advance.advance_leg if legs == 1 else advance.advance_four
     advance_batch = advance.advance_batch
-    task_at, model_at = record_at(task_record), record_at(MODEL)
+    task_at = record_at(task_record)
+    model_at = record_at(MODEL)
 
     @inline_source
     def scene_of(addresses, lanes, task, n):  # type: ignore[no-untyped-def]
         trunk, leg, episode = memories(addresses, lanes, layouts, n)
-        model, ground = model_at(addresses[AT.model])[0], matrix_at(addresses, AT.ground)
+        model = model_at(addresses[AT.model])[0]
+        ground = matrix_at(addresses, AT.ground)
         return ObservationInputs(
             trunk, leg, episode, task, ground, model.ground_origin, model.ground_per_metre
         )
@@ -270,7 +283,9 @@ def _made(
     @inline_source
     def are_numbers(addresses):  # type: ignore[no-untyped-def]
         """Whether all actions are, those of other blocks, too."""
-        actions, count, good = singles_at(addresses[AT.actions]), addresses[AT.data + COLUMNS], True
+        actions = singles_at(addresses[AT.actions])
+        count = addresses[AT.data + COLUMNS]
+        good = True
         for k in range(count * (legs * ACTIONS)):
             good &= absolute(float(actions[k])) < np.inf
         return good
@@ -333,8 +348,10 @@ def _made(
         """One group of lanes after the other, whose memory stays in the cache from action to observation."""
         if not are_numbers(addresses):
             return NOT_A_NUMBER
-        task, happened = task_at(addresses[AT.task])[0], 0
-        scratch, memory = doubles(SCRATCH_SIZE * lanes), doubles(slots * lanes)
+        task = task_at(addresses[AT.task])[0]
+        happened = 0
+        scratch = doubles(SCRATCH_SIZE * lanes)
+        memory = doubles(slots * lanes)
         for n in range(addresses[BEGIN], addresses[END], lanes):
             apply_actions(addresses, lanes, task, n, scratch)
             advance(
@@ -347,7 +364,8 @@ def _made(
 
     @inline_source
     def observe_all(addresses, lanes):  # type: ignore[no-untyped-def]
-        task, memory = task_at(addresses[AT.task])[0], doubles(slots * lanes)
+        task = task_at(addresses[AT.task])[0]
+        memory = doubles(slots * lanes)
         for n in range(addresses[BEGIN], addresses[END], lanes):
             observe(addresses, lanes, task, n, memory)
 
@@ -358,14 +376,18 @@ def _made(
         return step(addresses, LANES, advance_batch)
 
     def apply_one(addresses):  # type: ignore[no-untyped-def]
-        task, scratch, good = task_at(addresses[AT.task])[0], doubles(SCRATCH_SIZE), are_numbers(addresses)
+        task = task_at(addresses[AT.task])[0]
+        scratch = doubles(SCRATCH_SIZE)
+        good = are_numbers(addresses)
         if good:
             for n in range(addresses[BEGIN], addresses[END]):
                 apply_actions(addresses, 1, task, n, scratch)
         return good
 
     def finish_one(addresses):  # type: ignore[no-untyped-def]
-        task, memory, happened = task_at(addresses[AT.task])[0], doubles(slots), 0
+        task = task_at(addresses[AT.task])[0]
+        memory = doubles(slots)
+        happened = 0
         for n in range(addresses[BEGIN], addresses[END]):
             happened |= finish(addresses, 1, task, n, memory)
         return happened
@@ -377,7 +399,8 @@ def _made(
         observe_all(addresses, LANES)
 
     def measure_one(addresses, out):  # type: ignore[no-untyped-def]
-        task, numbers = task_at(addresses[AT.task])[0], rows(doubles(slots), 1, None)
+        task = task_at(addresses[AT.task])[0]
+        numbers = rows(doubles(slots), 1, None)
         for n in range(out.shape[1]):
             put_measured(addresses, 1, scene_of(addresses, 1, task, n), numbers, n)
             for slot in range(slots):

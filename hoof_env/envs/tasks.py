@@ -105,7 +105,8 @@ class Task:
                 near = difflib.get_close_matches(name, SETTINGS, 1)
                 hint = f"; did you mean {near[0]}?" if near else f" (known: {', '.join(SETTINGS)})"
                 raise UnknownArgumentError(f"{self.id}: unexpected keyword argument {name!r}{hint}")
-        weights, own = changes.get("reward_weights"), self.defaults.get("reward_weights", {})
+        weights = changes.get("reward_weights")
+        own = self.defaults.get("reward_weights", {})
         if own and (weights is None or isinstance(weights, Mapping)):
             changes = {**changes, "reward_weights": {**own, **(weights or {})}}
         changes = {name: as_plain(name, value) for name, value in changes.items()}  # a copy, too

@@ -155,7 +155,9 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
             ResetNeeded: `reset` was not called, or with autoreset disabled an episode that ended.
         """
         self._check_started("step")
-        batch, n, before = self.batch, self.num_envs, self._ended
+        batch = self.batch
+        n = self.num_envs
+        before = self._ended
         again = before if before.any() else None
         if again is not None and self.autoreset_mode == AutoresetMode.DISABLED:
             raise ResetNeeded(
@@ -165,11 +167,14 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         batch.actions[:n] = self._check_actions(actions)
         some_ended = batch.step(self._generators, again)
         how = batch.episode_rows.ended[:n]
-        terminated, truncated = how == FAILED, how == TRUNCATED
+        terminated = how == FAILED
+        truncated = how == TRUNCATED
         if again is not None:  # NEXT_STEP: these were not stepped, they start
-            terminated[again], truncated[again] = False, False
+            terminated[again] = False
+            truncated[again] = False
             self._start(np.flatnonzero(again), {})
-        done, infos = terminated | truncated, batch.infos(some_ended)
+        done = terminated | truncated
+        infos = batch.infos(some_ended)
         rewards = batch.rewards[:n].copy()
         if done.any():
             infos |= self._endings(done, terminated)
@@ -185,7 +190,8 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         """What infos say of episodes that end, as Gymnasium's `_add_info` puts them together one by one."""
         figures: dict[str, Any] = {}
         for name, values in self.batch.summaries(np.flatnonzero(done)).items():
-            figures[name], figures[f"_{name}"] = np.zeros(self.num_envs), done.copy()
+            figures[name] = np.zeros(self.num_envs)
+            figures[f"_{name}"] = done.copy()
             figures[name][done] = values
         endings = {"episode_summary": figures, "_episode_summary": done.copy()}
         if terminated.any():
@@ -381,7 +387,8 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         return mask
 
     def _check_actions(self, actions: Any) -> NDArray[np.float32]:
-        given, shape = array_of(actions), (self.num_envs, len(self.batch.body.action_names))
+        given = array_of(actions)
+        shape = (self.num_envs, len(self.batch.body.action_names))
         if given.dtype.kind not in "fiu" or given.shape != shape:
             raise ParameterError(
                 f"actions: expected finite numbers in [-1, 1], shape {shape}, "
@@ -432,7 +439,8 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
 
     def _new_generators(self, seeds: Sequence[int | None]) -> None:
         made = [seeding.np_random(seed) for seed in seeds]
-        self._generators, self._seeds = [one for one, _ in made], [seed for _, seed in made]
+        self._generators = [one for one, _ in made]
+        self._seeds = [seed for _, seed in made]
 
     # State
 
@@ -456,7 +464,8 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
             self._check_state(state)
             state = self._in_every_row(state)
         self._check_state(state, "ended")
-        n, states = self.num_envs, state["generator"]
+        n = self.num_envs
+        states = state["generator"]
         ended = array_of(state["ended"]).copy()
         if ended.dtype != bool or ended.ndim != 1:
             raise ParameterError(
@@ -468,7 +477,9 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
             raise ParameterError(f"state['generator']: expected a list of {n}, got {states!r:.60}")
         generators = [generator_of(values) for values in states]
         self.batch.set_state(state)
-        self._ended, self._started, self._generators = ended, np.ones(n, bool), generators
+        self._ended = ended
+        self._started = np.ones(n, bool)
+        self._generators = generators
         self._seeds = [UNKNOWN_SEED] * n
         self._phase = "running"
         for recording in self._watched.values():

@@ -31,7 +31,8 @@ CONTACT = np.dtype(
 )
 """State of one hoof point; contacts are arrays of two, toe first."""
 
-TOE, HEEL = 0, 1
+TOE = 0
+HEEL = 1
 
 _COPIED = ("stiffness", "exponent", "approach_floor", "friction", "friction_slow", "friction_fast")
 GROUND = np.dtype(
@@ -88,7 +89,8 @@ class Ground:
         check_choice("approach", self.approach, ("interpolated", "sampled"))
         check_choice("friction_law", self.friction_law, FRICTION_LAWS)
         check_number("friction", self.friction, low=0, high=10)
-        slow, fast = check_number("friction_slow", self.friction_slow, low=0), self.friction_fast
+        slow = check_number("friction_slow", self.friction_slow, low=0)
+        fast = self.friction_fast
         for name in ("friction_fast", "reference_mass"):
             check_number(name, getattr(self, name), low=0, exclusive_low=True)
         if self.friction_law == "ambrosio" and fast <= slow:

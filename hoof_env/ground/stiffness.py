@@ -106,7 +106,8 @@ def spring_rates(
     """
     k, c = spring
     speed = max(speed, ground.approach_floor)
-    n, stiffness = ground.exponent, ground.stiffness * float(np.max((terrain or Terrain()).stiffness))
+    n = ground.exponent
+    stiffness = ground.stiffness * float(np.max((terrain or Terrain()).stiffness))
     chi, dashpot = ground.damping
     force = 2 * load + speed * (math.sqrt(k * mass) + c)
     depth = (force / stiffness) ** (1 / n) * np.linspace(0.0, 1.0, DEPTHS)
@@ -142,7 +143,8 @@ def contact_rates(
     sliding_mass = mass if sliding_mass is None else sliding_mass
     sliding_mass = check_number("sliding_mass", sliding_mass, low=0, exclusive_low=True)
     terrain = terrain or Terrain()
-    n, stiffness = ground.exponent, ground.stiffness * float(np.max(terrain.stiffness))
+    n = ground.exponent
+    stiffness = ground.stiffness * float(np.max(terrain.stiffness))
     mu = ground.friction * float(np.max(terrain.friction))
     chi, dashpot = ground.damping
     # K d^(n+1) / (n+1) = m v^2 / 2 + load d; the sum of the two depths alone is not less than d

@@ -189,7 +189,8 @@ class Terrain:
         rises = np.diff(rows, axis=1)
         slope = rises[0] / self.spacing
         ny = 1 / np.sqrt(1 + slope**2)
-        (height, stiffness, friction), (rise, harder, rougher) = rows[:, :-1], rises
+        (height, stiffness, friction) = rows[:, :-1]
+        (rise, harder, rougher) = rises
         cells = np.column_stack([height, rise, 0.0 - slope * ny, ny, stiffness, harder, friction, rougher])
         return TerrainGrid(np.ascontiguousarray(cells), self.start - self.spacing, 1 / self.spacing)
 

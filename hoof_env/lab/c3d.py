@@ -29,7 +29,9 @@ CHANNELS = {"Fx": "N", "Fy": "N", "Fz": "N", "Mx": "Nmm", "My": "Nmm", "Mz": "Nm
 
 MOST_FRAMES = 65_535  # a c3d header counts in 16 bits
 MM = 1000.0
-MARGIN, HALF_WIDTH = 0.5, 0.5  # of a plate, beyond the first and last CoP, and to the left and right [m]
+# of a plate, beyond the first and last CoP, and to the left and right [m]
+MARGIN = 0.5
+HALF_WIDTH = 0.5
 
 
 def ezc3d() -> Any:
@@ -56,11 +58,13 @@ def plane_of(terrain: Terrain, low: float, high: float) -> tuple[complex, comple
 def write_c3d(record: Columns, about: Mapping[str, Any], path: Path) -> None:
     """Write points [mm], analog channels and the group FORCE_PLATFORM, all at the rate of the record; limbs,
     weight and threshold [N] are in a group HOOF_ENV. `ParameterError` of a record that is too long."""
-    time, limbs = record["time"], limbs_of(record)
+    time = record["time"]
+    limbs = limbs_of(record)
     if len(time) > MOST_FRAMES:
         raise ParameterError(f"seconds: expected at most {MOST_FRAMES} frames of a c3d, got {len(time)}")
     file = ezc3d().c3d()
-    parameters, rate = file["parameters"], [1 / float(np.median(np.diff(time)))]
+    parameters = file["parameters"]
+    rate = [1 / float(np.median(np.diff(time)))]
     markers = {f"{limb}{name}": f"{limb}{name}_" for limb in limbs for name in MARKERS}
     markers["trunk"] = "trunk_" if "trunk_x" in record else ""
     points = [

@@ -12,7 +12,9 @@ from pathlib import Path
 
 from hoof_env.errors import DataFileError
 
-BLOCK, KEY = 512, 80  # bytes of a block; the second byte of every c3d
+# bytes of a block; the second byte of every c3d
+BLOCK = 512
+KEY = 80
 MIPS = 86  # the code of processors that write the high byte first
 FIRST = 4  # bytes of a parameter section before its first entry
 BYTES = {-1: 1, 1: 1, 2: 2, 4: 4}  # of a number by the type of a parameter: text, byte, integer, float

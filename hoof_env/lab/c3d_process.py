@@ -15,8 +15,12 @@ from typing import Any
 
 import numpy as np
 
-SECONDS, SECONDS_A_MEGABYTE = 2.0, 0.5  # of processor time; a healthy file takes some 0.05 s a megabyte
-BYTES, TIMES_ITS_SIZE = 1 << 30, 100  # of memory beyond that of the libraries
+# of processor time; a healthy file takes some 0.05 s a megabyte
+SECONDS = 2.0
+SECONDS_A_MEGABYTE = 0.5
+# of memory beyond that of the libraries
+BYTES = 1 << 30
+TIMES_ITS_SIZE = 100
 GROUPS = ("POINT", "ANALOG", "FORCE_PLATFORM", "HOOF_ENV")
 
 

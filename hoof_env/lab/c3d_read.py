@@ -30,11 +30,21 @@ from hoof_env.lab.c3d_header import frames_of
 
 Floats = NDArray[np.float64]
 
-EIGHT_FORCES, CALIBRATED = 3, 4  # types of plates: eight channels of forces; a matrix calibrates the channels
-SECONDS, BYTES_A_SECOND = 120.0, 1e6  # that reading takes at most where processor time has no limit
-STEADY, IDLE = 0.05, 0.02  # shares of the highest force: of changes, and of pull, that an unloaded plate has
-ROBUST, NOISY = 1.4826, 6.0  # standard deviations a median deviation; and those that noise reaches
-LARGE, SMALL = 0.25, 0.1  # shares of the highest force and of the baseline: a load in place of an offset
+# types of plates: eight channels of forces; a matrix calibrates the channels
+EIGHT_FORCES = 3
+CALIBRATED = 4
+# that reading takes at most where processor time has no limit
+SECONDS = 120.0
+BYTES_A_SECOND = 1e6
+# shares of the highest force: of changes, and of pull, that an unloaded plate has
+STEADY = 0.05
+IDLE = 0.02
+# standard deviations a median deviation; and those that noise reaches
+ROBUST = 1.4826
+NOISY = 6.0
+# shares of the highest force and of the baseline: a load in place of an offset
+LARGE = 0.25
+SMALL = 0.1
 PLEA = re.compile(
     r"[\s,.]*\b(please|this is probably due|if you want to ignore)\b.*", re.IGNORECASE | re.DOTALL
 )
@@ -163,7 +173,8 @@ def _without_baseline(
     if end >= frames:
         return raw, [f"{said}, but the file has {frames} frames; no baseline is subtracted"]
     highest = max(float(np.ptp(force, axis=0).max()) for force in raw)
-    forces, loaded = [], []
+    forces = []
+    loaded = []
     for limb, force in zip(limbs, raw, strict=True):
         each = len(force) // frames
         quiet = force[begin * each : (end + 1) * each]
@@ -202,8 +213,10 @@ def _unloaded(quiet: Floats, force: Floats, base: Floats, highest: float) -> boo
 def _force_unit(parameters: Mapping[str, Any], plate: int) -> str:
     """The unit of a plate's forces: that of its force channels, each named if they differ. N where the file
     says nothing, as c3d has it, and where a calibration (type 4) makes forces of volts."""
-    of_plates, units = parameters["FORCE_PLATFORM"], parameters["ANALOG"].get("UNITS", [])
-    kind, channels = int(of_plates["TYPE"][plate]), np.array(of_plates["CHANNEL"])[:, plate]
+    of_plates = parameters["FORCE_PLATFORM"]
+    units = parameters["ANALOG"].get("UNITS", [])
+    kind = int(of_plates["TYPE"][plate])
+    channels = np.array(of_plates["CHANNEL"])[:, plate]
     if kind == CALIBRATED:
         return "N"
     numbers = [int(channel) - 1 for channel in channels[: 8 if kind == EIGHT_FORCES else 3]]

@@ -27,7 +27,9 @@ TIMES = dict.fromkeys(("s", "sec", "secs", "second", "seconds"), 1.0) | dict.fro
 UNEVEN = 0.01  # most that sampling intervals may differ from each other, of their mean
 COARSE = 0.9  # of a step, from which on the last digit hides a sample that is left out,
 FEW = 3  # unless as many steps or more differ, as those of rounded times do again and again
-SLOW, FAST = 10.0, 1e5  # rates between which those of force records lie [Hz]
+# rates between which those of force records lie [Hz]
+SLOW = 10.0
+FAST = 1e5
 ROUND = (1000, 100, 50, 10, 5, 1)  # what rates are multiples of, the likeliest first [Hz]
 MANY = 10  # numbers between powers of ten that show how many decimals are written there
 DIGITS = 9  # most decimals that are looked for
@@ -157,7 +159,8 @@ def _line(column: Floats, most: float) -> Floats | None:
         return float(np.ptp(rest)) / 2
 
     mean = float(column[-1] - column[0]) / (len(column) - 1)
-    low, high = mean - 2 * most / (len(column) - 1), mean + 2 * most / (len(column) - 1)
+    low = mean - 2 * most / (len(column) - 1)
+    high = mean + 2 * most / (len(column) - 1)
     for scale in (1.0, 1e3):  # of s and of ms
         for round_to in ROUND:
             rate = round(scale / mean / round_to) * round_to

@@ -158,7 +158,10 @@ def compare(
     shift = 0.0
     if align != "none":
         shift = float(time_a[0] - time_b[0]) + best_shift(forces_a, forces_b, stances, rate, near)
-    limbs, curves, missing, warnings = {}, {}, _unshared(a, b, names), []
+    limbs = {}
+    curves = {}
+    missing = _unshared(a, b, names)
+    warnings = []
     for k, (name, _) in enumerate(names):
         sides = (
             Side(time_a, forces_a[k], stances[0][k]),
@@ -219,7 +222,8 @@ def _span(record: ForceRecord) -> str:
 def why_none(verticals: list[Floats], time: Floats, level: float, unit: str) -> str:
     """What to say of vertical forces without a whole stance; the remedy for a plate that is not zeroed."""
     together = np.concatenate(verticals)
-    low, high = float(np.percentile(together, 5)), float(together.max())
+    low = float(np.percentile(together, 5))
+    high = float(together.max())
     why = f"above {level:g} {unit}, found none"
     if low > level:
         why += f": it hardly falls below {low:.4g} {unit}; subtract the plate's offset, or raise --threshold"
@@ -257,7 +261,8 @@ def _doubts(sides: tuple[Side, Side], errors: LimbErrors) -> list[str]:
     a, b = sides
     period = a.period if a.period > 0 else b.period
     edge = 0.1 * period if period > 0 else 0.0  # a stance may be whole in one record and not in the other
-    low, high = max(a.time[0], b.time[0]) + edge, min(a.time[-1], b.time[-1]) - edge
+    low = max(a.time[0], b.time[0]) + edge
+    high = min(a.time[-1], b.time[-1]) - edge
     counts = [side.whole_between(low, high) for side in sides]
     found = []
     if counts[0] != counts[1]:
@@ -275,7 +280,8 @@ def _doubts(sides: tuple[Side, Side], errors: LimbErrors) -> list[str]:
 
 def _common_unit(a: ForceRecord, b: ForceRecord, units: str) -> tuple[str, tuple[float, float]]:
     for unit in ("N", "BW") if units == "auto" else (units,):
-        by_a, by_b = a.per(unit), b.per(unit)
+        by_a = a.per(unit)
+        by_b = b.per(unit)
         if by_a and by_b:
             return unit, (by_a, by_b)
     wanted = "N" if units == "auto" else units
@@ -333,7 +339,8 @@ def _errors(pairs: list[Pair], rate: float) -> LimbErrors:
         figures = np.array([
             [(part(force).max(), part(force).sum() / rate) for force in pair.own] for pair in pairs
         ]).mean(axis=0)  # fmt: skip
-        (peak, impulse), (peak_error, impulse_error) = figures[0], figures[1] - figures[0]
+        (peak, impulse) = figures[0]
+        (peak_error, impulse_error) = figures[1] - figures[0]
         spread = x.std() * y.std()
         r = float(((x - x.mean()) * (y - y.mean())).mean() / spread) if spread > 0 else math.nan
         rmse = math.sqrt(((x - y) ** 2).mean())

@@ -15,7 +15,9 @@ Floats = NDArray[np.float64]
 IDLE = 0.1  # share of the highest force of all limbs up to which a limb is not loaded
 LOADED = 0.2  # share of a limb's highest vertical force from which on its other forces count
 SMALL = 0.01  # share of that up to which a horizontal force is none
-BACKWARD, ALONE = -0.2, -0.35  # order of braking and propulsion, the mean of all limbs and that of one, from
+# order of braking and propulsion, the mean of all limbs and that of one, from
+BACKWARD = -0.2
+ALONE = -0.35
 # which on it is remarked; see `order`
 BOTH = 0.1  # least share of braking, and of propulsion, in the fore-aft force, for an order to be there
 
@@ -79,7 +81,9 @@ def order(force: Floats, rate: float) -> float:
     each, -0.5 for propulsion first, and 0 where there is only one of them, or no whole stance. Forces forward
     and upward, shape (n, 2), at `rate` [Hz]."""
     level = LOADED * float(force[:, 1].max())
-    moments, sizes, parts = 0.0, 0.0, np.zeros(2)
+    moments = 0.0
+    sizes = 0.0
+    parts = np.zeros(2)
     for first, last in whole_stances(force[:, 1], level, rate):
         forward = force[first:last, 0]
         moments += float(forward @ np.linspace(-1.0, 1.0, last - first))

@@ -34,7 +34,8 @@ IDENTIFIERS = {"force": "ground_force_v", "point": "ground_force_p", "torque": "
 def write_mot(record: Columns, about: Mapping[str, Any], path: Path) -> None:
     """Write `time` and `MOT_COLUMNS` of each limb, then joint reactions, if any; and beside it `loads_of`.
     The header says the weight and the threshold of stances, too, in `STATED`."""
-    limbs, nothing = limbs_of(record), np.zeros(len(record["time"]))
+    limbs = limbs_of(record)
+    nothing = np.zeros(len(record["time"]))
     columns = {"time": record["time"]} | {
         f"{limb}{name}": record[f"{limb}{column}"] if column else nothing
         for limb in limbs for name, column in MOT_COLUMNS.items()

@@ -71,7 +71,8 @@ def _about(which: str, record: ForceRecord) -> str:
 
 
 def _table(found: Comparison) -> str:
-    unit, places = found.unit, 1 if found.unit == "N" else 4
+    unit = found.unit
+    places = 1 if found.unit == "N" else 4
     head = (
         "limb", "force", "stances", f"RMSE [{unit}]", "r", f"peak [{unit}]", f"impulse [{unit} s]",
         "contact [ms]", "touchdown [ms]", "time of peak [ms]",

@@ -48,7 +48,9 @@ that of the limb on the plate does."""
 AXES = ("auto", "x", "y", "z", "-x", "-y", "-z")
 """Of a file, for the upward and the forward direction."""
 
-STRONG, IDLE, ONE_WAY = 0.2, 0.05, 0.5
+STRONG = 0.2
+IDLE = 0.05
+ONE_WAY = 0.5
 """Share of the highest vertical force of a limb from which on samples tell its direction, so that an offset
 does not; share of that of all limbs up to which a limb has no direction; and what is left of the forces of
 one that has, where those of both directions are added."""

@@ -52,7 +52,8 @@ def best_shift(
     least = min(whole_a.shape[1], whole_b.shape[1]) // 2
 
     def difference(lag: int) -> float:
-        first, last = max(0, lag), min(whole_a.shape[1], whole_b.shape[1] + lag)
+        first = max(0, lag)
+        last = min(whole_a.shape[1], whole_b.shape[1] + lag)
         if last - first < max(least, 1):
             return math.inf
         off = whole_a[:, first:last] - whole_b[:, first - lag : last - lag]
@@ -101,10 +102,12 @@ def pairs_of(a: Side, b: Side, rate: float, by_touchdown: bool) -> list[Pair]:
     """Stances that belong together, touchdown on touchdown or at the times they have."""
     if not a.stances or not b.stances:
         return []
-    touch_a, touch_b = a.touchdowns, b.touchdowns
+    touch_a = a.touchdowns
+    touch_b = b.touchdowns
     found = []
     for m, n in _together(a, b, by_touchdown):
-        (first_a, last_a), (first_b, last_b) = a.stances[m], b.stances[n]
+        (first_a, last_a) = a.stances[m]
+        (first_b, last_b) = b.stances[n]
         ahead = first_b - first_a if by_touchdown else round((a.time[0] - b.time[0]) * rate)
         low = max(min(first_a, first_b - ahead), 0, -ahead)
         high = min(max(last_a, last_b - ahead), len(a.force), len(b.force) - ahead)

@@ -82,7 +82,8 @@ def _read_opensim(path: Path) -> Table:
     below = [k for k in range(top, len(lines)) if lines[k].strip()]
     if not below:
         raise DataFileError(f"record {str(path)!r}: expected a line endheader and names below it")
-    titles, rows = lines[below[0]].split(), [(k + 1, cells_of(lines[k], None)) for k in below[1:]]
+    titles = lines[below[0]].split()
+    rows = [(k + 1, cells_of(lines[k], None)) for k in below[1:]]
     said = {match[1].lower(): match[2] for line in lines[:top] if (match := ENTRY.fullmatch(line))}
     for (entry, what), found in zip(COUNTS.items(), (len(rows), len(titles)), strict=True):
         if said.get(entry, "").isdigit() and int(said[entry]) != found:
@@ -102,7 +103,8 @@ def _read_opensim(path: Path) -> Table:
 def _table(path: Path, text: Text) -> Table:
     """Columns, every one for itself, so that one of words or with gaps harms nobody who does not ask for it.
     `DataFileError` of a row that lacks cells or has too many."""
-    titles, rows = text.titles, text.rows
+    titles = text.titles
+    rows = text.rows
     while titles and not titles[-1].strip():  # behind a separator at the end of the line
         titles = titles[:-1]
     parts = [match for title in titles if (match := TITLE.fullmatch(title))]
@@ -134,8 +136,10 @@ def _table(path: Path, text: Text) -> Table:
 
 def _keys(names: list[str], text: Text) -> tuple[list[str], dict[str, str]]:
     """A key for each column, and what to say of names that do not tell columns apart."""
-    times, seen = Counter(names), Counter[str]()
-    keys, repeated = [], {}
+    times = Counter(names)
+    seen = Counter[str]()
+    keys = []
+    repeated = {}
     for at, name in enumerate(names):
         seen[name] += 1
         keys.append(f"#{at + 1}" if not name else f"{name}#{seen[name]}" if times[name] > 1 else name)

@@ -105,7 +105,8 @@ def cells_of(line: str, between: str | None) -> list[str]:
 def _separator(line: str, least: int) -> tuple[bool, str | None]:
     """Whether most cells of a line are numbers, the first of them too, `least` cells or more; and what is
     between its cells."""
-    best, found = 0.0, None
+    best = 0.0
+    found = None
     for between in SEPARATORS:
         if between is not None and between not in line:
             continue
@@ -113,7 +114,8 @@ def _separator(line: str, least: int) -> tuple[bool, str | None]:
         known = [is_number(cell, between != ",") for cell in cells]
         share = sum(known) / len(known) if known and known[0] and len(known) >= least else 0.0
         if share > best:
-            best, found = share, between
+            best = share
+            found = between
     return best > 0.5, found
 
 
@@ -144,14 +146,18 @@ def parse(lines: list[str]) -> Text:
     above = [k for k in range(begin) if lines[k].strip()]
     if begin == len(lines) and not above:
         return Text([], [])
-    titles, units, groups, line = [], [], [], 0
+    titles = []
+    units = []
+    groups = []
+    line = 0
     if above:
         split = _between_names(lines[above[-1]], between, lines[begin] if begin < len(lines) else "")
         rows = [_titles(lines[k], split) for k in above[-3:]]
         if len(rows) > 1 and _are_units(rows[-1], rows[-2]):
             units = [cell.strip(" []()") for cell in rows.pop()]
             above.pop()
-        titles, line = rows[-1], above[-1] + 1
+        titles = rows[-1]
+        line = above[-1] + 1
         if len(rows) > 1 and _are_groups(rows[-2], titles):
             groups = _filled(rows[-2])
     table, after = _rows(lines, begin, between)

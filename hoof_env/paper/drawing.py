@@ -34,7 +34,8 @@ PRINT: dict[Any, Any] = {
 }
 """For print over two columns; in SVG text stays text."""
 
-WIDTH, HEAD = 6.9, 0.5  # two columns of a journal, height of the lines above the panels [inch]
+WIDTH = 6.9  # two columns of a journal [inch]
+HEAD = 0.5  # height of the lines above the panels [inch]
 GAITS = {"walk": "(a) Walking", "run": "(b) Running"}
 CONDITION_COLOURS = dict(zip(CONDITIONS, (BLUE, ORANGE), strict=True))
 POINT_COLOURS = {"toe": PURPLE, "heel": GREEN}

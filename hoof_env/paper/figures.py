@@ -56,8 +56,10 @@ def draw_paths(figure: Any, reproduction: Reproduction) -> None:
     """
     cycles = elastic_cycles(reproduction)
     boxes = np.array([_extent(reproduction, *cycle) for cycle in cycles.values()])
-    boxes[:, 0, 1], boxes[:, 1, 1] = boxes[:, 0, 1].min(), boxes[:, 1, 1].max()
-    tall, low = panel_height(*boxes), 1.0
+    boxes[:, 0, 1] = boxes[:, 0, 1].min()
+    boxes[:, 1, 1] = boxes[:, 1, 1].max()
+    tall = panel_height(*boxes)
+    low = 1.0
     head(
         figure, tall + low + 1.9, reproduction, "Figure 3. Paths of the hoof", "elastic",
         "Marks lie on the paths at the published instants of contact. Below, heights are stretched.",
@@ -111,7 +113,8 @@ def _draw_leg(ax: Any, reproduction: Reproduction, trace: Trace, stance: Stance)
 
 def _draw_hoof_paths(ax: Any, trace: Trace) -> None:
     for name, colour in POINT_COLOURS.items():
-        x, y = trace[f"{name}_x"], -trace[f"{name}_penetration"]
+        x = trace[f"{name}_x"]
+        y = -trace[f"{name}_penetration"]
         ax.plot(x, y, color=colour, lw=0.9, label=f"path of the {name}", zorder=4)
         ground = np.where(y < 0, y, np.nan)
         ax.plot(x, ground, color=colour, lw=2.4, label=f"{name} in the ground", zorder=5)
@@ -149,9 +152,11 @@ def draw_angles(figure: Any, reproduction: Reproduction) -> None:
     hooves = {gait: _hooves(reproduction, *cycle) for gait, cycle in cycles.items()}
     every = np.concatenate(list(hooves.values()))
     between = 1.1 * float(np.ptp(every[..., 0], axis=1).max())
-    low, high = every[..., 1].min() - 0.05, every[..., 1].max() + 0.05
+    low = every[..., 1].min() - 0.05
+    high = every[..., 1].max() + 0.05
     box = np.array([(-0.6 * between, low), ((SKETCHES - 0.4) * between, high)])
-    tall, low = panel_height(box, box), 2.3
+    tall = panel_height(box, box)
+    low = 2.3
     head(
         figure, tall + low + 2.1, reproduction, "Figure 4. Hoof angle over the cycle", "elastic",
         " ".join(["Bars: margin of each row; flat has no time in print.", *changed]),
@@ -165,7 +170,8 @@ def draw_angles(figure: Any, reproduction: Reproduction) -> None:
         show_box(sketch, box)
         draw_ground(sketch)
         for place, hoof in zip(places, hooves[gait], strict=True):
-            x, y = hoof[:, 0] + place, hoof[:, 1]
+            x = hoof[:, 0] + place
+            y = hoof[:, 1]
             sketch.fill(x, y, fc=SKY, ec=BLUE, lw=0.7, alpha=0.9, zorder=3)
             for corner, (name, colour) in enumerate(POINT_COLOURS.items(), start=1):
                 sketch.plot(x[corner], y[corner], "o", color=colour, ms=3, label=name, zorder=4, ls="none")
@@ -191,7 +197,8 @@ def _hooves(reproduction: Reproduction, trace: Trace, stance: Stance) -> Point:
 def _mark_angles(ax: Any, reproduction: Reproduction, gait: str, stance: Stance) -> None:
     rows = {row.id.removeprefix(f"{gait}."): row for row in reproduction.published.rows if row.gait == gait}
     for time, angle in (("contact_start", "angle_contact"), ("contact_end", "angle_liftoff")):
-        t, value = rows[time], rows[angle]
+        t = rows[time]
+        value = rows[angle]
         mark_published(ax, t.value, value.value, xerr=half_bar(t), yerr=half_bar(value))
     if "angle_flat" in rows:
         middle = sum(stance.double) / 2 if stance.double else stance.middle
@@ -236,7 +243,8 @@ def draw_forces(figure: Any, reproduction: Reproduction) -> None:
 
 
 def _draw_curve(ax: Any, trace: Trace, condition: str, colour: str) -> None:
-    t, force = trace["time"], trace["normal"]
+    t = trace["time"]
+    force = trace["normal"]
     ax.plot(t, force, color=colour, lw=1.4, label=f"{condition}, normal force", zorder=4)
     ax.plot(t, trace["grf"], color=colour, lw=0.7, ls=DASHED, zorder=3)
     peaks = find_peaks(force)
@@ -265,7 +273,8 @@ def draw_vectors(figure: Any, reproduction: Reproduction) -> None:
             angles="uv", scale_units="y", scale=1, units="inches", width=0.018, cmap="viridis",
             clim=(min(times), late), zorder=3, headwidth=4, headlength=5, headaxislength=4.5,
         )  # fmt: skip
-        low, high = float(rows["cop_x"].min()), float(rows["cop_x"].max())
+        low = float(rows["cop_x"].min())
+        high = float(rows["cop_x"].max())
         room = 0.55 * max(high - low, 0.02)
         top = 1.1 * float(rows["normal"].max())
         ax.set(xlim=(low - room, high + room), ylim=(-0.1 * top, top), title=GAITS[gait])

@@ -148,7 +148,8 @@ def measure_stance(trace: Trace) -> Stance:
     angle = np.degrees(trace["hoof_angle"])
     touching = np.concatenate((np.interp([start, end], t, angle), angle[(t > start) & (t < end)]))
     impulse = integral(trace, trace["normal"], float(t[0]), float(t[-1]))
-    period, top = float(t[-1] - t[0]), int(np.argmax(trace["normal"]))
+    period = float(t[-1] - t[0])
+    top = int(np.argmax(trace["normal"]))
     return Stance(
         period=period,
         start=start,

@@ -46,7 +46,8 @@ NAME_TO = {"C": (1.0, 0.3)}  # the side of a name that cannot stand where its li
 def draw_mechanism(figure: Any, reproduction: Reproduction) -> None:
     """Figure 1: the leg in its walking stance: all of it, and its hoof with the forces on the point that
     bears most, slip, penetration and angle; every point named, every link numbered as in Eq. 2."""
-    geometry, (trace, _) = reproduction.geometry, elastic_cycles(reproduction)["walk"]
+    geometry = reproduction.geometry
+    (trace, _) = elastic_cycles(reproduction)["walk"]
     tip = max(POINTS, key=lambda point: trace[f"{point}_normal"].max())
     row = trace[int(np.argmax(trace[f"{tip}_normal"] * (0.01 + np.abs(trace["hoof_angle"]))))]
     at = leg_at(geometry, trace, float(row["time"]))
@@ -81,7 +82,9 @@ def _draw_links(ax: Any, at: dict[str, Point], *, close: bool) -> None:
     for number, body in enumerate(BODIES, start=1):
         numbers[body.role] = f"{numbers[body.role]}, {number}" if body.role in numbers else str(number)
     for number, body in enumerate(BODIES, start=1):
-        tail, tip, colour = at[body.tail], at[body.head], ROLE_COLOURS[body.role]
+        tail = at[body.tail]
+        tip = at[body.head]
+        colour = ROLE_COLOURS[body.role]
         label = f"{numbers[body.role]}  {body.role}"
         ax.plot(*np.array([tail, tip]).T, color=colour, lw=2, label=label, solid_capstyle="round")
         if close == body.role.startswith("hoof triangle"):
@@ -97,7 +100,8 @@ def _name_points(ax: Any, at: dict[str, Point], names: Any, geometry: Geometry) 
     """Mark every joint, and name some of them on the side that their links leave free."""
     sole = {geometry.toe: "toe", geometry.heel: "heel"}
     for name, point in at.items():
-        fixed, fill = name in ("O", "C"), POINT_COLOURS.get(sole.get(name, ""), "white")
+        fixed = name in ("O", "C")
+        fill = POINT_COLOURS.get(sole.get(name, ""), "white")
         look = {"marker": "^", "ms": 6, "mfc": "black"} if fixed else {"marker": "o", "ms": 4, "mfc": fill}
         ax.plot(*point, mec="black", mew=0.8, zorder=7, **look)
         if name in names:

@@ -37,7 +37,8 @@ _PACKAGES = ("gymnasium", "numpy", "numba")
 def markdown(reproduction: Reproduction, *, command: str, figures: bool) -> str:
     """The whole page; it names `command` as what wrote it, and shows pictures if `figures` lie beside it."""
     solvers = list(dict.fromkeys(row["solver"] for row in reproduction.rows))
-    geometry, published = reproduction.geometry, reproduction.published
+    geometry = reproduction.geometry
+    published = reproduction.published
     page = Template(PAGE.read_text(encoding="utf-8")).substitute(
         source=published.source,
         preset=geometry.name,
@@ -188,7 +189,8 @@ def listed(items: Iterable[str], last: str = "and") -> str:
 def which_beta(reproduction: Reproduction) -> dict[str, str]:
     """What both readings of beta do in this run, by the names that the page has for it."""
     published = reproduction.published
-    alpha, by_name = published.parameters["baumgarte_alpha"], betas(published)
+    alpha = published.parameters["baumgarte_alpha"]
+    by_name = betas(published)
     seconds = published.parameters["duration_s"]
     roots = {name: slowest_root(alpha, beta) for name, beta in by_name.items()}
     drifts = {name: largest_drift(reproduction, solver) for solver, name in EULER.items()}
@@ -221,10 +223,12 @@ def which_beta(reproduction: Reproduction) -> dict[str, str]:
 
 def largest_drift(reproduction: Reproduction, solver: str) -> tuple[float, float]:
     """Largest distance of toe or heel from the exact motion over both gaits [m]: in the cycle, in stance."""
-    cycle, stance = [], []
+    cycle = []
+    stance = []
     for gait in {gait for gait, _, _ in reproduction.traces}:
         trace, exact = (reproduction.traces[gait, "elastic", name] for name in (solver, EXACT))
-        error, on_ground = hoof_error(trace, exact), measure_stance(exact)
+        error = hoof_error(trace, exact)
+        on_ground = measure_stance(exact)
         inside = (trace["time"] >= on_ground.start) & (trace["time"] <= on_ground.end)
         cycle.append(float(error.max()))
         stance.append(float(error[inside].max()))

@@ -48,7 +48,9 @@ def run_cycle(gait: str, solver: str, **settings: Any) -> Trace:
         env.reset(seed=0)
         action = np.zeros(env.action_space.shape or (), np.float32)
         leg: Any = env.unwrapped
-        parts, terminated, truncated = [cycle_of(leg.record())], False, False
+        parts = [cycle_of(leg.record())]
+        terminated = False
+        truncated = False
         while not truncated:
             _, _, terminated, truncated, _ = env.step(action)
             if terminated:
@@ -67,12 +69,15 @@ def reproduce(progress: Callable[[str], None] | None = None, *, preset: str | No
     tell = progress or (lambda line: None)
     settings: dict[str, Any] = {} if preset is None else {"preset": preset}
     leg: Any = gymnasium.make(ENVIRONMENT, **settings).unwrapped
-    geometry, ground, published = leg.geometry, leg.engine.ground, load_published()
+    geometry = leg.geometry
+    ground = leg.engine.ground
+    published = load_published()
     traces: dict[tuple[str, str, str], Trace] = {}
     rows: list[dict[str, Any]] = []
     medians: dict[str, dict[str, dict[float, float]]] = {}
     for solver in SOLVERS:
-        stances, medians[solver] = {}, {}
+        stances = {}
+        medians[solver] = {}
         for gait in GAITS:
             for condition, restitution in CONDITIONS.items():
                 trace = run_cycle(gait, solver, restitution=restitution, **settings)

@@ -168,7 +168,9 @@ def read_row(entry: dict[str, Any]) -> PublishedRow:
     )
 
 
-PRINTED, PROBABLE, EXACT = "paper", "paper, probable beta", "exact"
+PRINTED = "paper"
+PROBABLE = "paper, probable beta"
+EXACT = "exact"
 
 EULER = {PRINTED: "printed", PROBABLE: "probable"}
 """The reading of beta by solver, of those that integrate as the paper does."""
@@ -182,7 +184,9 @@ ILL_CONDITIONED = ("walk.peak_inelastic", "walk.mean_inelastic", "walk.reduction
 """Rows without a bar for the paper's solver, with either beta: the walk grazes, and they depend on how its
 loop samples touch-down (docs/evidence/conditions.md has how far they move)."""
 
-REPORTED, ILL = "reported", "ill-conditioned"  # why a row is spared
+# why a row is spared
+REPORTED = "reported"
+ILL = "ill-conditioned"
 
 
 @dataclass(frozen=True)
@@ -316,7 +320,8 @@ def _compare(row: PublishedRow, stances: Stances, solver: str) -> dict[str, Any]
 
 def _measure(row: PublishedRow, stances: Stances) -> tuple[float | None, str, dict[str, Any]]:
     if row.id == "ratio.angle_variation":
-        run, walk = stances["run", "elastic"], stances["walk", "elastic"]
+        run = stances["run", "elastic"]
+        walk = stances["walk", "elastic"]
         return (
             run.angle_variation_deg / walk.angle_variation_deg,
             "ratio of the net changes of the hoof angle",

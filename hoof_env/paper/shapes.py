@@ -25,7 +25,9 @@ PEAK_GAP = 0.01  # two peaks are apart in time if at least this far [s], ten tim
 FLAT_DEG = 3.0  # a hoof is flat within this angle [deg]: the bar of the published angle at mid-stance
 DEPTHS = (0.0, 0.05, 0.1)  # how much deeper than the identified level a leg must walk and run, too [m]
 BACKWARD = 0.3  # how fast the sole must go back there under load [m/s]
-BRAKING, HOOF_ON_GROUND = "braking", "hoof on ground"  # readings of `walk.direction`
+# readings of `walk.direction`
+BRAKING = "braking"
+HOOF_ON_GROUND = "hoof on ground"
 
 
 @dataclass(frozen=True)
@@ -55,7 +57,8 @@ def find_peaks(force: NDArray[np.float64]) -> list[int]:
     places = []
     for k in (moving[:-1][turns] + 1).tolist():
         higher = np.flatnonzero(force > force[k])
-        left, right = higher[higher < k], higher[higher > k]
+        left = higher[higher < k]
+        right = higher[higher > k]
         base_left = force[left[-1] if left.size else 0 : k].min()
         base_right = force[k : right[0] + 1 if right.size else None].min()
         if force[k] - max(base_left, base_right) >= PROMINENCE * force.max():
@@ -76,7 +79,8 @@ def _last(stance: Stance) -> str:
 def walk_order(walk: Stance, trace: Trace) -> Verdict:
     """Heel-strike, flat, toe-off: the heel touches first, then both bear with the sole flat within
     `FLAT_DEG` at some instant, and the toe leaves last."""
-    smallest, phase = float("inf"), "never both in the ground"
+    smallest = float("inf")
+    phase = "never both in the ground"
     if walk.double:
         start, end = walk.double
         phase = f"both bear {start:.3f}-{end:.3f} s"
@@ -90,14 +94,16 @@ def walk_order(walk: Stance, trace: Trace) -> Verdict:
 
 def walk_peaks(walk: Stance, trace: Trace) -> Verdict:
     """Two peaks of the normal force, one in each half of stance; toe and heel both bear at the dip."""
-    force, t = trace["normal"], trace["time"]
+    force = trace["normal"]
+    t = trace["time"]
     peaks = find_peaks(force)
     evidence = ", ".join(f"{force[k]:.0f} N at {t[k]:.3f} s" for k in peaks)
     evidence = f"{len(peaks)} peak(s): {evidence}; middle of stance {walk.middle:.3f} s"
     if len(peaks) != 2:
         return Verdict(False, evidence)
     dip = peaks[0] + int(np.argmin(force[peaks[0] : peaks[1]]))
-    toe, heel = float(trace["toe_normal"][dip]), float(trace["heel_normal"][dip])
+    toe = float(trace["toe_normal"][dip])
+    heel = float(trace["heel_normal"][dip])
     return Verdict(
         bool(t[peaks[0]] < walk.middle < t[peaks[1]]) and toe > 0 and heel > 0,
         f"{evidence}; dip {force[dip]:.0f} N at {t[dip]:.3f} s with toe {toe:.0f} N and heel {heel:.0f} N",
@@ -146,7 +152,8 @@ def step_length(trace: Trace, stance: Stance) -> tuple[float, float]:
 
 def run_step(run: Stance, walk: Stance, run_trace: Trace, walk_trace: Trace) -> Verdict:
     """The sole travels farther back in the running stance than in the walking one (`step_length`)."""
-    (run_step, run_path), (walk_step, walk_path) = step_length(run_trace, run), step_length(walk_trace, walk)
+    (run_step, run_path) = step_length(run_trace, run)
+    (walk_step, walk_path) = step_length(walk_trace, walk)
     return Verdict(
         run_step > walk_step,
         f"sole travels back {run_step:.3f} m in the running stance, {walk_step:.3f} m in the walking one; "
@@ -230,8 +237,10 @@ def judge(
 ) -> dict[str, Verdict]:
     """Every claim by id, from a cycle for each (gait, condition), `gait_walks`'s medians by gait, and whether
     the leg `walk_brakes`."""
-    walk_trace, run_trace = traces["walk", "elastic"], traces["run", "elastic"]
-    walk, run = measure_stance(walk_trace), measure_stance(run_trace)
+    walk_trace = traces["walk", "elastic"]
+    run_trace = traces["run", "elastic"]
+    walk = measure_stance(walk_trace)
+    run = measure_stance(run_trace)
     return {
         "walk.order": walk_order(walk, walk_trace),
         "walk.peaks": walk_peaks(walk, walk_trace),

@@ -75,7 +75,8 @@ class _Files(_caching.IndexDataCacheFile):
         super().__init__(impl.locator.get_cache_path(), impl.filename_base, stamp)
         # numba alone, and older versions of this package, take it for one of another numba
         self._start = pickle.dumps(f"{self._version}+{self.FORMAT}", protocol=-1)
-        self._say, self._told = say, set[str]()
+        self._say = say
+        self._told = set[str]()
 
     def _tell(self, path: str, what: str) -> None:
         if path not in self._told:
@@ -84,7 +85,8 @@ class _Files(_caching.IndexDataCacheFile):
 
     def save(self, key: Any, data: Any) -> None:
         """Write the file first: an index never names what is not there yet."""
-        entries, content = self._load_index(), self._dump(data)
+        entries = self._load_index()
+        content = self._dump(data)
         taken = {name for name, _ in entries.values()}
         free = (self._data_name(k) for k in range(1, len(taken) + 2))
         name = entries[key][0] if key in entries else next(name for name in free if name not in taken)
@@ -114,7 +116,8 @@ class _Files(_caching.IndexDataCacheFile):
         if not content.startswith(self._start) and self._OTHER_VERSION.match(content):
             return {}  # of numba, or of this format
         rest = content.removeprefix(self._start)
-        digest, rest = rest[:32], rest[32:]
+        digest = rest[:32]
+        rest = rest[32:]
         if self._own(rest) != digest:
             self._tell(self._index_path, "the index of compiled kernels")
             return {}
@@ -159,7 +162,9 @@ class KernelCache(_caching.FunctionCache):
         self._cache_file = _Files(self._impl, stamp, say)
         if not given_folder():
             trust.close_new(self.cache_path)
-        self._say, self._kernel, self._identity = say, function.__name__, identity
+        self._say = say
+        self._kernel = function.__name__
+        self._identity = identity
         self._lock: Any = None
 
     def _index_key(self, sig: Any, codegen: Any) -> Any:
@@ -227,7 +232,8 @@ class KernelCache(_caching.FunctionCache):
 def keep(dispatcher: Any, say: Callable[[str], None], identity: str = "") -> None:
     """Have numba's `dispatcher` keep what it compiles in files, one process at a time compiling a kernel; no
     folder is looked for before it compiles."""
-    compile_now, files = dispatcher.compile, None
+    compile_now = dispatcher.compile
+    files = None
 
     def compile_once(signature: Any) -> Any:
         nonlocal files

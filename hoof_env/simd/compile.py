@@ -67,7 +67,9 @@ class _Announcer(event.Listener):
     """Says on stderr that kernels of this package are compiled, not read from the cache, and how long the
     long ones took. numba tells when it compiles; it costs nothing when it does not."""
 
-    depth, started, is_told = 0, 0.0, False
+    depth = 0
+    started = 0.0
+    is_told = False
     long = ("step_", "advance_", "react_")  # names of kernels that take long begin so
 
     def on_start(self, event: Any) -> None:

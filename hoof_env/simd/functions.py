@@ -67,7 +67,8 @@ def cross(code: Code, z: Any, w: Any) -> Any:
 @instruction(lambda *kinds: kinds[1](*kinds) if isinstance(kinds[1], Plane) else _real(*kinds))
 def where(code: Code, condition: Any, yes: Any, no: Any) -> Any:
     """`yes` where the condition holds, else `no`, lane by lane; both real, or both planar vectors."""
-    select, both = code.builder.select, code._replace(args=code.args[1:])
+    select = code.builder.select
+    both = code._replace(args=code.args[1:])
     if isinstance(code.result, Plane):
         (a, b), (c, d) = both.planes(yes, no)
         return code.join(select(condition, a, c), select(condition, b, d))
@@ -110,7 +111,9 @@ def floor(code: Code, x: Any) -> Any:
 def quarter_turns(code: Code, cosine: Any, sine: Any, shifted: Any) -> Any:
     """(cosine, sine) of an angle plus as many quarter turns as the last two bits of `shifted` say, a whole
     number to which 3 2^51 was added. Bits are moved, nothing is rounded or compared."""
-    builder, count, double = code.builder, getattr(code.args[0], "count", 1), cosine.type
+    builder = code.builder
+    count = getattr(code.args[0], "count", 1)
+    double = cosine.type
     cosine, sine, quarters = (builder.bitcast(value, wide(INDEX, count)) for value in (cosine, sine, shifted))
 
     def constant(number: int) -> Any:
@@ -130,7 +133,8 @@ def quarter_turns(code: Code, cosine: Any, sine: Any, shifted: Any) -> Any:
 def lane_sum(code: Code, start: Any, x: Any) -> Any:
     """start + x_0 + x_1 + ..., added in this order, in every lane; `start` is the same in all. Of lanes or of
     planar vectors."""
-    builder, count = code.builder, code.result.count
+    builder = code.builder
+    count = code.result.count
 
     def total(start: Any, x: Any) -> Any:
         total = pick(builder, start, 0, count)
@@ -165,7 +169,8 @@ def transposed(builder: Any, rows: list[Any], width: int) -> list[Any]:
     n = len(rows)
     if n == 1:
         return [pick(builder, rows[0], k, width) for k in range(width)]
-    side, found = min(n, width), []
+    side = min(n, width)
+    found = []
     for begin in range(0, width, side):
         square = [_shuffle(builder, row, row, list(range(begin, begin + side))) for row in rows]
         size = side
@@ -180,10 +185,12 @@ def transposed(builder: Any, rows: list[Any], width: int) -> list[Any]:
             high = [i + block if not i & block else n + i for i in range(n)]
             for i in range(side):
                 if not i & block:
-                    one, two = square[i], square[i + block]
+                    one = square[i]
+                    two = square[i + block]
                     swapped[i] = _shuffle(builder, one, two, low)
                     swapped[i + block] = _shuffle(builder, one, two, high)
-            square, block = swapped, 2 * block
+            square = swapped
+            block = 2 * block
         found += square
     return found
 
@@ -192,7 +199,9 @@ def transposed(builder: Any, rows: list[Any], width: int) -> list[Any]:
 def gather_eight(code: Code, pointer: Any, index: Any) -> Any:
     """pointer[index] to pointer[index + 7] in every lane, eight results; the index is a double that holds a
     whole number. One conversion and one load of a vector a lane."""
-    builder, count, loaded = code.builder, getattr(code.args[1], "count", 1), []
+    builder = code.builder
+    count = getattr(code.args[1], "count", 1)
+    loaded = []
     for lane in range(count):
         at = builder.fptosi(pick(builder, index, lane, count), INDEX)
         place = builder.bitcast(builder.gep(pointer, [at]), ir.VectorType(DOUBLE, 8).as_pointer())

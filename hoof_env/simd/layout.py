@@ -63,7 +63,9 @@ class _Named(type):
 
     def __init__(cls, name: str, bases: Any, namespace: dict[str, Any]) -> None:
         super().__init__(name, bases, namespace)
-        cls.fields, cls.size, names = {}, 0, []
+        cls.fields = {}
+        cls.size = 0
+        names = []
         for key, hint in get_type_hints(cls, include_extras=True).items():
             kind, size = (Block, hint.__metadata__[0]) if get_origin(hint) is Annotated else (hint, hint.size)
             size = size.rows if isinstance(size, Size) else size
@@ -94,7 +96,9 @@ class Layout(metaclass=_Named):
 
 @cache
 def _sized(layout: Any, sizes: tuple[tuple[str, int], ...]) -> Any:
-    wanted, hints, kept = dict(sizes), get_type_hints(layout, include_extras=True), {}
+    wanted = dict(sizes)
+    hints = get_type_hints(layout, include_extras=True)
+    kept = {}
     for key, hint in hints.items():
         if get_origin(hint) is not Annotated:
             kept[key] = hint.sized(**wanted) if isinstance(hint, _Named) else hint
@@ -204,7 +208,8 @@ class _FieldsOfMemory(AttributeTemplate):
 
 
 def _get_field(context: Any, builder: Any, memory: Any, value: Any, name: str) -> Any:
-    (start, _, kind), code = memory.layout.fields[name], Code(context, builder)
+    (start, _, kind) = memory.layout.fields[name]
+    code = Code(context, builder)
     if kind is Row:
         return read_row(code, memory, value, INDEX(start))
     if kind is Vector:
@@ -214,8 +219,10 @@ def _get_field(context: Any, builder: Any, memory: Any, value: Any, name: str) -
 
 
 def _set_field(context: Any, builder: Any, signature: Any, values: Any, name: str) -> Any:
-    (memory, given), (place, value) = signature.args, values
-    (start, _, kind), code = memory.layout.fields[name], Code(context, builder)
+    (memory, given) = signature.args
+    (place, value) = values
+    (start, _, kind) = memory.layout.fields[name]
+    code = Code(context, builder)
     if kind not in (Row, Vector):
         raise TypeError(f"{name}: the rows of a block or a layout are set one by one")
     for k, x in enumerate([value] if kind is Row else code.split(given, value)):

@@ -40,7 +40,8 @@ LINE = 64
 """Bytes of a line of the cache, and of the widest vector."""
 
 
-LARGE, ENOUGH = 2**21, 2**22
+LARGE = 2**21
+ENOUGH = 2**22
 """Bytes of a large page of the system, and of the smallest array for which NumPy asks for them."""
 
 
@@ -49,7 +50,8 @@ def aligned(*shape: int) -> NDArray[np.float64]:
     takes two loads. One as large as a large page begins with one, where the system has them: else each row of
     many environments is in a page of its own, and to find pages takes time. That reserves up to 4 MiB more,
     of which nothing is touched."""
-    size, each = math.prod(shape), np.dtype(np.float64).itemsize
+    size = math.prod(shape)
+    each = np.dtype(np.float64).itemsize
     is_large = size * each >= LARGE
     step, least = (LARGE, ENOUGH // each) if is_large else (LINE, 0)
     room = np.empty(max(size, least) + step // each)
@@ -88,7 +90,8 @@ def _pointer_to(kind: Any) -> Any:
     )
 
 
-doubles_at, singles_at = _pointer_to(types.float64), _pointer_to(types.float32)
+doubles_at = _pointer_to(types.float64)
+singles_at = _pointer_to(types.float32)
 """For kernels: a pointer to what is at an address."""
 
 COLUMNS = 2
@@ -106,7 +109,8 @@ class Addresses:
 
     def __init__(self, *names: str) -> None:
         self.slots: Any = namedtuple("Slots", names)(*range(0, 4 * len(names), 4))
-        self.begin, self.end = 4 * len(names), 4 * len(names) + 1
+        self.begin = 4 * len(names)
+        self.end = 4 * len(names) + 1
 
     def of(self, *arrays: NDArray[Any], columns: range) -> NDArray[np.int64]:
         """The array of addresses; the arrays in the order of the names, each of three axes at most."""
@@ -158,7 +162,9 @@ def columns(code: Code, pointer: Any, count: Any, layout: Any, start: Any, row: 
     """Columns of an array of doubles, `stride` apart; its rows are `row` apart, and the first number of the
     first one is pointer[start]. They have the names of a layout, or None."""
     record = code.context.make_helper(code.builder, code.result)
-    record.first, record.row, record.stride = code.builder.gep(pointer, [start]), row, stride
+    record.first = code.builder.gep(pointer, [start])
+    record.row = row
+    record.stride = stride
     return record._getvalue()
 
 
@@ -210,7 +216,8 @@ def _place(builder: Any, rows: Any, row: Any, count: int) -> Any:
 
 def _read(builder: Any, pointer: Any, at: Any, stride: Any, count: int) -> Any:
     """`count` doubles from pointer[at] on, `stride` apart: one load if they are neighbours."""
-    first, element = builder.gep(pointer, [at]), pointer.type.pointee
+    first = builder.gep(pointer, [at])
+    element = pointer.type.pointee
     if count == 1:
         loaded = builder.load(first)
     else:
@@ -325,7 +332,8 @@ def _get_row(context: Any, builder: Any, signature: Any, values: Any) -> Any:
 
 
 def _set_row(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-    (memory, place, given), code = signature.args, Code(context, builder)
+    (memory, place, given) = signature.args
+    code = Code(context, builder)
     row = context.cast(builder, values[1], place, types.intp)
     x = code.number(given, values[2], max(memory.count, 1))
     write_row(code, memory, values[0], row, x)

@@ -72,7 +72,9 @@ def _sum(sign: str) -> Callable[..., Any]:
 
 
 def _product(code: Code, one: Any, two: Any) -> Any:
-    (left, right), builder, times = code.args, code.builder, code.builder.fmul
+    (left, right) = code.args
+    builder = code.builder
+    times = code.builder.fmul
     if isinstance(code.result, Lanes):
         return times(*code.reals(one, two))
     if isinstance(left, Plane) and isinstance(right, Plane):
@@ -82,7 +84,8 @@ def _product(code: Code, one: Any, two: Any) -> Any:
         return code.join(x, y)
     if isinstance(left, Plane):
         left, one, right, two = right, two, left, one
-    factor, (x, y) = code.number(left, one, code.result.count), code.split(right, two)
+    factor = code.number(left, one, code.result.count)
+    (x, y) = code.split(right, two)
     return code.join(times(factor, x), times(factor, y))
 
 

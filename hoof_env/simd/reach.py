@@ -195,7 +195,8 @@ class _Digest:
             for attribute in attributes:
                 if not isinstance(value, _FOLLOWED) or _is_foreign(value):
                     break
-                value, where = getattr(value, attribute, _MISSING), f"{where}.{attribute}"
+                value = getattr(value, attribute, _MISSING)
+                where = f"{where}.{attribute}"
             self.put(where)
             is_enclosed = root in cells and where == root and not isinstance(value, ModuleType)
             if value is _MISSING:

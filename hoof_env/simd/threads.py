@@ -27,7 +27,8 @@ def available() -> int:
 
 def check_threads(num_threads: Any) -> int:
     """The number of threads; `ParameterError` below 1 or above what there is."""
-    threads, most = count("num_threads", num_threads), min(available(), MOST_THREADS)
+    threads = count("num_threads", num_threads)
+    most = min(available(), MOST_THREADS)
     if threads > most:
         raise ParameterError(
             f"num_threads: expected 1 to {most}, the processors that there are, got {threads}"

@@ -83,7 +83,8 @@ def _is_ours(group: int) -> bool:
     import pwd
 
     with suppress(KeyError):
-        user, found = pwd.getpwuid(os.geteuid()), grp.getgrgid(group)
+        user = pwd.getpwuid(os.geteuid())
+        found = grp.getgrgid(group)
         if user.pw_gid == group and found.gr_name == user.pw_name and set(found.gr_mem) <= {user.pw_name}:
             return True
     return group == 0

@@ -11,7 +11,10 @@ from numba.core import cgutils, extending, types
 from numba.core.datamodel import models
 from numba.core.extending import register_model
 
-INDEX, DOUBLE, SINGLE, TRUTH = ir.IntType(64), ir.DoubleType(), ir.FloatType(), ir.IntType(1)
+INDEX = ir.IntType(64)
+DOUBLE = ir.DoubleType()
+SINGLE = ir.FloatType()
+TRUTH = ir.IntType(1)
 _POSITION = ir.IntType(32)
 
 

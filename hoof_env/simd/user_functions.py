@@ -73,7 +73,8 @@ def _operation(text: str) -> str:
 
 def _place(found: tuple[str, str]) -> str:
     """Function and line of a place in somebody else's file; nothing of one in this package's."""
-    path, line = os.path.abspath(found[0]), int(found[1])
+    path = os.path.abspath(found[0])
+    line = int(found[1])
     if Path(path).is_relative_to(PACKAGE):
         return ""
     inside = [
