@@ -28,6 +28,7 @@ from hoof_env.envs import horse, observation, start
 from hoof_env.envs.horse import Horse
 from hoof_env.envs.horse_leg import OBJECTIVES, HorseLegMOEnv
 from hoof_env.envs.infos import measured_names
+from hoof_env.envs.manual_common import without_common
 from hoof_env.envs.one_leg import CARRIED, OneLeg
 from hoof_env.envs.parameters import HILLS, SPACING
 from hoof_env.envs.policies import STANDS_FOR
@@ -50,6 +51,9 @@ PAGE, MO_PAGE = (
 _NAMES = {name: task.name for name, task in TASKS.items()} | {"mo": "HorseLegMO"}
 
 PAGES = tuple(_NAMES)  # the tasks, and the id with three rewards
+
+COMMON = _NAMES["leg"]
+"""The page that the others refer to."""
 
 GAIT = [entry for entry in observation.ENTRIES if entry.group == "gait"]
 
@@ -181,6 +185,8 @@ def _can_be(name: str, settings: Settings) -> bool:
 def write_pages(out: Path, films: Path | None = None) -> list[Path]:
     """Write all pages and the index into a folder, which is made if need be, and return the files.
 
+    What a page shares with that of `HorseLeg` is a link to it (`without_common`); `page` has all of it.
+
     Args:
         out: the folder.
         films: folder of trained policies, as agents.ship writes it. Each page shows the film of its policy
@@ -191,8 +197,13 @@ def write_pages(out: Path, films: Path | None = None) -> list[Path]:
         OutputError: the folder cannot be written.
     """
     shown = {name: "" if films is None else _find_film(films, name, out) for name in _NAMES.values()}
-    pages = {f"{name}.md": page(task, shown[name]) for task, name in _NAMES.items()}
-    texts = {"README.md": index(), **pages}
+    texts = {f"{name}.md": page(task, shown[name]) for task, name in _NAMES.items()}
+    texts["HorseLegMO.md"] = _tidy(texts["HorseLegMO.md"].replace(_observations(TASKS["leg"]), ""))
+    for name in _NAMES.values():
+        if name not in (COMMON, "HorseLegMO"):  # which says by itself what it shares
+            common = texts[f"{COMMON}.md"].replace(f"/{COMMON}-v0", f"/{name}-v0")
+            texts[f"{name}.md"] = without_common(texts[f"{name}.md"], COMMON, common)
+    texts["README.md"] = index()
     try:
         out.mkdir(parents=True, exist_ok=True)
         for name, text in texts.items():
