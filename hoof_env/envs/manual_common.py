@@ -10,9 +10,9 @@ from difflib import SequenceMatcher
 def without_common(page: str, name: str, other: str) -> str:
     """Replace what a page shares with another page by links to that page's sections.
 
-    Paragraphs that stand in the same section of both go. So do equal rows of tables that list the same names,
-    and what is left says that it is not all. A section stays whole where the other page's has a paragraph
-    without a counterpart, for a reader would take that for said here, too.
+    Paragraphs that stand in the same section of both go, and so do equal rows of tables. A section stays
+    whole where the other page's has a paragraph without a counterpart, and a table where the other one has a
+    name that it lacks: a reader would take them for said here, too.
 
     Args:
         page: the page in Markdown.
@@ -66,10 +66,12 @@ def _differing(own: Sequence[str], others: Sequence[str]) -> list[str] | None:
 
 
 def _differing_rows(block: str, others: Sequence[str]) -> str:
-    """Return a table without the rows that another one of the same names has, too; another block whole."""
+    """Return a table without the rows that another one has, too, if it has all names of that one; another
+    block whole."""
     rows = block.split("\n")
+    names = {_first_cell(row) for row in rows}
     for other in (text.split("\n") for text in others if block.startswith("|")):
-        if [_first_cell(row) for row in rows] == [_first_cell(row) for row in other]:
+        if other[0] == rows[0] and {_first_cell(row) for row in other} <= names:
             return "\n".join([*rows[:2], *(row for row in rows[2:] if row not in other)])
     return block
 
