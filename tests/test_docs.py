@@ -3,6 +3,7 @@
 import json
 import re
 import runpy
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -119,6 +120,15 @@ def test_every_call_of_posix_is_in_the_table_of_contributing():
         }
         told = " ".join(row for row in rows if f"`{call}`" in row)
         assert not {file for file in files if f"`{file}`" not in told}, call
+
+
+def test_pages_and_repository_stay_small():
+    """What is new replaces something: words of all pages of docs/, bytes of all files that git knows."""
+    words = sum(len(page.read_text(encoding="utf-8").split()) for page in (ROOT / "docs").rglob("*.md"))
+    assert words <= 60_000
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=False)
+    files = [ROOT / name for name in listed.stdout.split("\0") if name]
+    assert sum(file.stat().st_size for file in files if file.is_file()) <= 14e6
 
 
 def test_the_hand_written_pages_are_eight():
