@@ -58,6 +58,8 @@ FILM_LIMIT = 750_000
 
 FILM_SECONDS = 4.0
 
+FILM = "film.gif"
+
 COPIED = (WEIGHTS, ABOUT, runs.CONFIG)
 
 
@@ -143,17 +145,29 @@ def ship(choice: Choice, env_id: str, out: Path) -> dict[str, Any]:
         (stage / "score.json").write_text(text + "\n", encoding="utf-8")
         no_name = {"Software": None}  # of the program that drew it
         draw_learning_curve(saved.path.parent, scores, stage / "curve.png", dpi=90, metadata=no_name)
-        film(stage, env_id)
-        write_card(stage, env_id, record, score, scores, choice)
+        shown = shared_film(stage, out / trained_on.rpartition("/")[2]) if env_id != trained_on else ""
+        if not shown:
+            film(stage, env_id)
+        write_card(stage, env_id, record, score, scores, choice, shown or FILM)
         size = sum(file.stat().st_size for file in stage.iterdir())
         if size > LIMIT:
             raise OutputError(f"{folder}: expected at most {LIMIT:,} bytes, got {size:,}")
+    if shown:
+        (folder / FILM).unlink(missing_ok=True)  # of an earlier policy
     return score
 
 
+def shared_film(folder: Path, other: Path) -> str:
+    """Find a film of the same weights in another policy's folder, as a link from `folder`; "" for none."""
+    both = folder / WEIGHTS, other / WEIGHTS
+    if not all(file.is_file() for file in (*both, other / FILM)):
+        return ""
+    return f"../{other.name}/{FILM}" if both[0].read_bytes() == both[1].read_bytes() else ""
+
+
 def film(folder: Path, env_id: str) -> None:
-    """Write film.gif of the policy in `folder`, shorter where it would be larger than `FILM_LIMIT`."""
-    path = folder / "film.gif"
+    """Write the film of the policy in `folder`, shorter where it would be larger than `FILM_LIMIT`."""
+    path = folder / FILM
     policy = str(folder / FILE)
     seconds = FILM_SECONDS
     while not path.is_file() or path.stat().st_size > FILM_LIMIT:
@@ -224,6 +238,7 @@ def write_card(
     score: dict[str, Any],
     scores: Sequence[Score],
     choice: Choice,
+    shown: str,
 ) -> None:
     keys = [key for key in SHOWN if key in scores[0].estimates]
     with runs.make_env(env_id) as env:
@@ -247,6 +262,7 @@ def write_card(
         rows=[(one.policy, [" ".join(cell(key, one.estimates[key])) for key in keys]) for one in scores],
         estimates={one.policy: one.estimates for one in scores},
         choice=choice,
+        film=shown,
         suspended=is_suspended,
         files={file.name for file in folder.iterdir()},
     )

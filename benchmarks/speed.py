@@ -38,7 +38,7 @@ BATCH = 1024
 
 PRESET = "identified"
 """With its swing held, its walk meets the ground under a fixed trunk too; that of
-`research/identify/first_fit.json` does not."""
+`tests/data/first_fit.json` does not."""
 
 ASSEMBLIES = {"ALL": ALL, "RIGID": RIGID}
 

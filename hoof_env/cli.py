@@ -262,25 +262,20 @@ def average(
     _say(f"{mean.report(found)}\n\n{out}: {points} rows, {_size(out)}{made}")
 
 
-def manual(id: str = "hoof_env/HorseLeg-v0", out: Path | None = None, films: bool = False) -> None:
+def manual(id: str = "hoof_env/HorseLeg-v0", out: Path | None = None, films: Path | None = None) -> None:
     """Print the manual page of an environment, or write those of all.
 
     Args:
         id: the environment.
         out: folder for a page of each id, and their index; made if need be.
-        films: film each id's reference gait, too (needs 'render' and 'video'); with `out`.
+        films: folder of trained policies, as agents/policies, whose films the pages show; with `out`.
     """
-    from hoof_env.envs.manual import FILM_SECONDS, FILMS, page_of, write_pages
+    from hoof_env.envs.manual import page_of, write_pages
 
     if out is None:
         _say(page_of(id))
         return
     written = len(write_pages(out, films))
-    for seed, (name, gait) in enumerate(FILMS.items() if films else ()):
-        policy = None if gait == "reference" else gait
-        film = out / "films" / f"{name}.gif"
-        render(film, policy, f"hoof_env/{name}-v0", (), seed, FILM_SECONDS, 1, 20, (480, 270), overwrite=True)
-        written += 1
     _say(f"{written} files written; read {out / 'README.md'} first")
 
 

@@ -1,9 +1,22 @@
-"""The leg that golden numbers of many tests are of: the seed of the search in `research/identify`, which does
-not ship."""
+"""Legs beside the one that ships: golden numbers of many tests belong to the first of them."""
 
-from research.identify.leg import FIRST_FIT
+import json
+from pathlib import Path
+
+DATA = Path(__file__).with_name("data")
+
+FIRST_FIT = str(DATA / "first_fit.json")
+"""The leg that the search for `identified` set out from."""
 
 PRESETS = {"first_fit": FIRST_FIT, "identified": "identified"}
+
+
+def load_ensemble():
+    """Load 24 legs that also meet the paper's numbers, far apart, each as the content of a preset file."""
+    data = json.loads((DATA / "ensemble.json").read_text(encoding="utf-8"))
+    shared = {"provenance": "a member of the ensemble of identified", "ground": data["ground"]}
+    return [shared | {"geometry": one["geometry"], "gaits": one["gaits"]} for one in data["members"]]
+
 
 OLD_HORSE = {
     "preset": FIRST_FIT,  # with its ground

@@ -3,6 +3,7 @@
 import json
 import re
 import runpy
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,7 @@ from hoof_env.envs.tasks import TASKS
 from tests.test_rooms import FLOORS
 
 ROOT = Path(__file__).resolve().parent.parent
-FOLDERS = ("agents", "benchmarks", "docs", "examples", "hoof_env", "research", "scripts", "tests")
+FOLDERS = ("agents", "benchmarks", "docs", "examples", "hoof_env", "scripts", "tests")
 PAGES = sorted([*ROOT.glob("*.md"), *(page for folder in FOLDERS for page in (ROOT / folder).rglob("*.md"))])
 LIVE = [page for page in PAGES if "evidence" not in page.parts]
 """Frozen pages name the commands of their commits."""
@@ -63,14 +64,12 @@ def test_links_lead_somewhere(page):
 @pytest.mark.parametrize("page", LIVE, ids=name)
 def test_commands_and_files_exist(page):
     text = page.read_text(encoding="utf-8")
-    modules = set(re.findall(r"python -m ((?:agents|benchmarks|hoof_env|research|tests)[\w.]*\w)", text))
+    modules = set(re.findall(r"python -m ((?:agents|benchmarks|hoof_env|tests)[\w.]*\w)", text))
     assert not {one for one in modules if not is_command(ROOT / one.replace(".", "/"))}
     commands = set(re.findall(r"(?:`|bin/)hoof-env ([a-z]+)\b(?![^.:]{0,60}\sof commit)", text))
     assert not commands - set(COMMANDS)
     files = set(
-        re.findall(
-            r"`((?:agents|benchmarks|docs|examples|hoof_env|research|scripts|tests)/[\w./-]+\.\w+)`", text
-        )
+        re.findall(r"`((?:agents|benchmarks|docs|examples|hoof_env|scripts|tests)/[\w./-]+\.\w+)`", text)
     )
     assert not {file for file in files if not (ROOT / file).is_file()}
 
@@ -115,12 +114,21 @@ def test_every_call_of_posix_is_in_the_table_of_contributing():
     for call in ("os.sched_getaffinity", "os.kill", "os.fork", "os.killpg", "fcntl.flock"):
         files = {
             name(path)
-            for folder in ("agents", "benchmarks", "hoof_env", "research", "scripts")
+            for folder in ("agents", "benchmarks", "hoof_env", "scripts")
             for path in (ROOT / folder).rglob("*.py")
             if f"{call}(" in path.read_text(encoding="utf-8")
         }
         told = " ".join(row for row in rows if f"`{call}`" in row)
         assert not {file for file in files if f"`{file}`" not in told}, call
+
+
+def test_pages_and_repository_stay_small():
+    """What is new replaces something: words of all pages of docs/, bytes of all files that git knows."""
+    words = sum(len(page.read_text(encoding="utf-8").split()) for page in (ROOT / "docs").rglob("*.md"))
+    assert words <= 60_000
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=False)
+    files = [ROOT / name for name in listed.stdout.split("\0") if name]
+    assert sum(file.stat().st_size for file in files if file.is_file()) <= 14e6
 
 
 def test_the_hand_written_pages_are_eight():

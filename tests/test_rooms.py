@@ -25,7 +25,7 @@ FLOORS = (
     ("hoof_env/film.py", "hoof_env/play.py"),
     ("hoof_env/cli.py",),
     ("hoof_env/__main__.py",),
-    ("research", "agents", "examples"),
+    ("agents", "examples"),
     ("benchmarks",),
 )
 """Rooms from the foundation up; those of a floor do not import each other. `import hoof_env` registers the
@@ -73,7 +73,7 @@ def test_a_room_imports_what_stands_above_it(room):
 
 
 def test_every_file_has_its_room():
-    tops = ("hoof_env", "agents", "benchmarks", "research", "examples")
+    tops = ("hoof_env", "agents", "benchmarks", "examples")
     files = {path for top in tops for path in (ROOT / top).rglob("*.py")}
     assert files == {path for room in FLOOR for path in files_of(room)} | {ROOT / PUBLIC}
 

@@ -6,10 +6,10 @@ from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
+import gymnasium
 import pytest
 
 import hoof_env
-from hoof_env.envs.manual import FILMS
 
 ROOT = Path(__file__).resolve().parent.parent
 pytest.importorskip("sphinx")
@@ -65,9 +65,9 @@ def test_every_page_and_every_id_is_there(site):
     pages, _ = site
     sources = [page.with_suffix(".html").relative_to(ROOT) for page in (ROOT / "docs").rglob("*.md")]
     assert not set(sources) - set(pages)
-    for name in FILMS:
-        page = pages[Path(f"docs/environments/{name}.html")]
-        assert any(image.endswith(f"/{name}.gif") for image in page.images)
+    for id in (id for id in gymnasium.registry if id.startswith("hoof_env/")):
+        page = pages[Path(f"docs/environments/{id[9:-3]}.html")]
+        assert any(image.endswith(".gif") for image in page.images)
     assert not [image for page in pages.values() for image in page.untold]
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import inspect
 import json
 import math
+import os
 import re
 import tomllib
 from collections.abc import Iterable, Mapping
@@ -27,13 +28,15 @@ from hoof_env.envs import horse, observation, start
 from hoof_env.envs.horse import Horse
 from hoof_env.envs.horse_leg import HorseLegMOEnv
 from hoof_env.envs.infos import measured_names
+from hoof_env.envs.manual_common import without_common
 from hoof_env.envs.one_leg import CARRIED, OneLeg
 from hoof_env.envs.parameters import HILLS, SPACING
+from hoof_env.envs.policies import STANDS_FOR
 from hoof_env.envs.reference import ACTED, COUNT, FASTEST, FOLLOWED, SIZES, horse_gaits
 from hoof_env.envs.reward import BEARING, LONGEST_STRIDE, OBJECTIVES, check_weights
 from hoof_env.envs.settings import PER_EPISODE, Settings, check_effect, to_json
 from hoof_env.envs.tasks import TASKS, Task, task_of
-from hoof_env.errors import OutputError, ParameterError, check_choice
+from hoof_env.errors import DataFileError, OutputError, ParameterError, check_choice
 from hoof_env.gait import LIMITS, QUICK, WIDEST, FilterSettings
 from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS
 from hoof_env.leg.geometry import preset_names
@@ -49,11 +52,8 @@ _NAMES = {name: task.name for name, task in TASKS.items()} | {"mo": "HorseLegMO"
 
 PAGES = tuple(_NAMES)  # the tasks, and the id with three rewards
 
-FILMS = {name: TASKS.get(task, TASKS["leg"]).reference for task, name in _NAMES.items()}
-"""The gait that the film of each page shows."""
-
-FILM_SECONDS = 2.0
-"""What a film shows; longer ones are large."""
+COMMON = _NAMES["leg"]
+"""The page that the others refer to."""
 
 GAIT = [entry for entry in observation.ENTRIES if entry.group == "gait"]
 
@@ -86,11 +86,15 @@ TABLES = tables()
 WORDS = TABLES["words"]
 
 
-def page(task: str, with_film: bool = False) -> str:
-    """The manual page of a task in Markdown; `task` is one of `PAGES`, or an id of one's own, which has no
-    film."""
+def page(task: str, film: str = "") -> str:
+    """Write the manual page of a task in Markdown.
+
+    Args:
+        task: one of `PAGES`, or an id of one's own.
+        film: where the page finds the film that it shows; "" for a page without one.
+    """
     what = task_of("leg" if task == "mo" else task)
-    film = _film(_NAMES[task], what.is_horse) if with_film else ""
+    film = _film(_NAMES[task], what.is_horse, film) if film else ""
     if task == "mo":
         objectives = _objectives(check_weights(what.settings({}).reward_weights))
         return _tidy(
@@ -181,11 +185,28 @@ def _can_be(name: str, settings: Settings) -> bool:
     return False
 
 
-def write_pages(out: Path, with_films: bool = False) -> list[Path]:
-    """Write all pages and the index into a folder, which is made if need be; returns the files. With films
-    the pages show what lies in `films` beside them."""
-    pages = {f"{name}.md": page(task, with_films) for task, name in _NAMES.items()}
-    texts = {"README.md": index(), **pages}
+def write_pages(out: Path, films: Path | None = None) -> list[Path]:
+    """Write all pages and the index into a folder, which is made if need be, and return the files.
+
+    What a page shares with that of `HorseLeg` is a link to it (`without_common`); `page` has all of it.
+
+    Args:
+        out: the folder.
+        films: folder of trained policies, as agents.ship writes it. Each page shows the film of its policy
+            there. None for pages without films.
+
+    Raises:
+        DataFileError: a policy has no film.
+        OutputError: the folder cannot be written.
+    """
+    shown = {name: "" if films is None else _find_film(films, name, out) for name in _NAMES.values()}
+    texts = {f"{name}.md": page(task, shown[name]) for task, name in _NAMES.items()}
+    texts["HorseLegMO.md"] = _tidy(texts["HorseLegMO.md"].replace(_observations(TASKS["leg"]), ""))
+    for name in _NAMES.values():
+        if name not in (COMMON, "HorseLegMO"):  # which says by itself what it shares
+            common = texts[f"{COMMON}.md"].replace(f"/{COMMON}-v0", f"/{name}-v0")
+            texts[f"{name}.md"] = without_common(texts[f"{name}.md"], COMMON, common)
+    texts["README.md"] = index()
     try:
         out.mkdir(parents=True, exist_ok=True)
         for name, text in texts.items():
@@ -213,10 +234,18 @@ def _tidy(text: str) -> str:
     return re.sub(r"\n{3,}", "\n\n", text)
 
 
-def _film(name: str, is_of_horse: bool) -> str:
+def _find_film(films: Path, name: str, out: Path) -> str:
+    """Find the film of an id, or of the id whose policy stands for it, as a page in `out` links to it."""
+    for id in (f"hoof_env/{name}-v0", STANDS_FOR.get(f"hoof_env/{name}-v0", "")):
+        film = films / id.rpartition("/")[2] / "film.gif"
+        if film.is_file():
+            return Path(os.path.relpath(film, out)).as_posix()
+    raise DataFileError(f"films {films}: expected {name}-v0/film.gif, as agents.ship writes it, found none")
+
+
+def _film(name: str, is_of_horse: bool, film: str) -> str:
     shown = WORDS["horse_film" if is_of_horse else "leg_film"]
-    words = {"name": name, "gait": FILMS[name], "seconds": f"{FILM_SECONDS:g}", "shown": shown}
-    return Template(WORDS["film"].strip()).substitute(words)
+    return Template(WORDS["film"].strip()).substitute(name=name, film=film, shown=shown)
 
 
 def _settings(what: Task, defaults: Mapping[str, str]) -> list[tuple[str, ...]]:

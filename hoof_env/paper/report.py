@@ -128,7 +128,7 @@ def _ill_conditioned(reproduction: Reproduction) -> str:
         "touch-down that grazes the ground. The paper's loop takes that speed at its first step inside the "
         "ground, so a small change of the time step, of β or of the identified ground level moves these rows "
         "by many bars. How far each row moves is measured in the repository's "
-        "[docs/evidence/conditions.md](../evidence/conditions.md).\n\n"
+        "[docs/evidence/README.md](../evidence/README.md#the-paper).\n\n"
     )
 
 

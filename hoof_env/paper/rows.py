@@ -182,7 +182,7 @@ Stances = Mapping[tuple[str, str], Stance]
 
 ILL_CONDITIONED = ("walk.peak_inelastic", "walk.mean_inelastic", "walk.reduction")
 """Rows without a bar for the paper's solver, with either beta: the walk grazes, and they depend on how its
-loop samples touch-down (docs/evidence/conditions.md has how far they move)."""
+loop samples touch-down (docs/evidence/README.md has how far they move)."""
 
 # why a row is spared
 REPORTED = "reported"

@@ -83,14 +83,16 @@ def test_weights_act_as_the_exported_policy(folder):
 @SHIPPED
 def test_folder(folder):
     files = {path.name: path.stat().st_size for path in folder.iterdir()}
-    assert {"policy.onnx", "run.json", "config.yml", "score.json", "card.md", "curve.png", "film.gif"} <= {
-        *files
-    }
+    assert {"policy.onnx", "run.json", "config.yml", "score.json", "card.md", "curve.png"} <= {*files}
     assert sum(files.values()) <= ship.LIMIT
     score, card = read(folder / "score.json"), (folder / "card.md").read_text()
     assert score["env_id"].endswith(f"/{folder.name}")
     assert np.mean(score["returns"]) == pytest.approx(score["policies"]["policy"]["mean"]["return"], abs=1e-3)
     assert f"value: {np.mean(score['returns']):.2f} +/-" in card
+    film = "../HorseLeg-v0/film.gif" if folder.name == "HorseLegMO-v0" else "film.gif"
+    assert f"![{folder.name}]({film})" in card
+    assert (folder / film).is_file()
+    assert ("film.gif" in files) == (film == "film.gif")
     for name in ("card.md", "run.json", "score.json", "policy.onnx"):
         assert not re.search(rb"/(home|work|root|tmp|Users)/", (folder / name).read_bytes()), name
 
@@ -121,10 +123,12 @@ def test_a_run_is_shipped_by_one_command(tmp_path, monkeypatch, capsys):
     command = [str(tmp_path / "runs"), "--out", str(tmp_path / "out"), "--ids"]
     with pytest.raises(ParameterError, match="ids"):
         ship.main([*command, "hoof_env/HorseLegRail-v0"])
-    ship.main([*command, "hoof_env/HorseLeg-v0"])
-    assert [path.name for path in (tmp_path / "out").glob("HorseLeg*")] == ["HorseLeg-v0"]
-    folder = tmp_path / "out" / "HorseLeg-v0"
-    test_folder(folder)
+    ship.main([*command, "hoof_env/HorseLeg-v0", "hoof_env/HorseLegMO-v0"])
+    folders = sorted((tmp_path / "out").glob("HorseLeg*"))
+    assert [path.name for path in folders] == ["HorseLeg-v0", "HorseLegMO-v0"]
+    for folder in folders:
+        test_folder(folder)
+    folder = folders[0]
     score = read(folder / "score.json")
     assert checked_mean(OnnxPolicy(folder), {**score, "check": {"episodes": 3}}) == pytest.approx(
         np.mean(score["returns"]), abs=1

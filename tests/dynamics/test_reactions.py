@@ -12,9 +12,8 @@ from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
 from hoof_env.leg.linkage import FRAME, JOINTS
-from research.identify.ensemble import load_ensemble
 from tests.dynamics.scenes import LEG, NATURAL, RUN, WALK, horse, inertia, loads
-from tests.legs import PRESETS
+from tests.legs import PRESETS, load_ensemble
 
 OTHER = load_geometry("identified")
 LEGS = {
@@ -23,7 +22,7 @@ LEGS = {
     "mirrored": LEG.replace(travel=-LEG.travel),
     "other toe": OTHER.replace(toe=OTHER.heel, heel=OTHER.toe),
     "own masses": OTHER.replace(masses=tuple(np.linspace(3, 0.2, 14)), inertia="paper"),
-    **{f"ensemble {k}": load_geometry(m) for k, m in enumerate(load_ensemble("identified")) if k % 5 == 0},
+    **{f"ensemble {k}": load_geometry(m) for k, m in enumerate(load_ensemble()) if k % 5 == 0},
 }
 
 

@@ -1,4 +1,4 @@
-"""The horse's strokes of docs/evidence/strokes, driven through the engine and its command filters: a stance
+"""A horse's strokes (docs/evidence/README.md), driven through the engine and its command filters: a stance
 that is level, at a constant speed, and a swing that clears the ground."""
 
 import json
@@ -14,7 +14,7 @@ from hoof_env.leg.geometry import load_geometry
 from tests.legs import FIRST_FIT
 
 HIP_HEIGHT, HIGH, TURN = 1.4, 10.0, 2 * np.pi  # of the horse; of O in the test, away from the ground [m]
-GAITS = json.loads(Path("docs/evidence/strokes/gaits.json").read_text(encoding="utf-8"))
+GAITS = json.loads(Path(__file__).with_name("data").joinpath("strokes.json").read_text(encoding="utf-8"))
 LEAD = 1 / (5 * QUICK.gain) + 5e-4  # how long the filter's rate takes [s]
 PULL = 60.0  # of what is missing on the command [1/s]
 

@@ -3,7 +3,7 @@
 Ground forces are this project's, given to the peers from outside. Every engine runs twice, at a fine step
 and at twice that; the difference of the two is called its own and bounds what it can be trusted with. MuJoCo
 has no swing that moves: those cases are Exudyn's alone. All quantities of all cases on two legs:
-docs/evidence/agreement.md.
+docs/evidence/README.md.
 """
 
 from dataclasses import dataclass

@@ -60,7 +60,7 @@ def test_engine_agrees_with_the_peers_in_the_air(preset, case):
 @pytest.mark.peers
 @pytest.mark.parametrize("case", GROUND, ids=lambda case: case.name)
 def test_engine_agrees_with_the_peers_on_the_ground(case):
-    """On one leg, for time; docs/evidence/agreement.md has both."""
+    """On one leg, for time; docs/evidence/README.md has both."""
     for row in compare("identified", case):
         label = f"{row.engine}, {row.quantity}: {row}"
         if row.engine in PEERS:

@@ -37,7 +37,7 @@ PICTURES = {
     "phone": ("docs/environments/HorseLeg.html", 390, "light"),
     "evidence": ("docs/evidence/README.html", 1280, "dark"),
 }
-"""Pages of docs/evidence/site.md: file, width, scheme."""
+"""Pages to take pictures of: file, width, scheme."""
 
 TOO_WIDE = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
 BAD_IMAGES = (
@@ -112,9 +112,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--site", type=Path, default=SITE, help="the folder that make docs wrote")
     parser.add_argument("--only", default="", help="pages whose path has this alone")
-    parser.add_argument(
-        "--pictures", type=Path, help="also write the pictures of docs/evidence/site.md there"
-    )
+    parser.add_argument("--pictures", type=Path, help="also write pictures of some pages there")
     parser.add_argument("--all", action="store_true", help="both widths, light and dark each")
     given = parser.parse_args()
     windows = tuple(product(HEIGHTS, ("light", "dark"))) if given.all else WINDOWS

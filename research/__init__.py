@@ -1,1 +1,0 @@
-"""How the leg was found. In the repository only: no part of the package."""

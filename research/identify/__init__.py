@@ -1,1 +1,0 @@
-"""The search for what the paper does not print."""

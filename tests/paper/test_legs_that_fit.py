@@ -1,0 +1,33 @@
+"""The leg that ships and the ensemble of others meet the published numbers."""
+
+import pytest
+
+from hoof_env.leg.geometry import load_geometry
+from hoof_env.paper.reproduce import reproduce
+from hoof_env.paper.rows import EXACT, PROBABLE, counted
+from tests.legs import load_ensemble
+
+ENSEMBLE = load_ensemble()
+
+
+def check(reproduction):
+    for solver, rows in ((EXACT, 22), (PROBABLE, 19)):
+        words = counted(reproduction.rows, reproduction.shapes, solver)
+        assert words.startswith(f"{rows} of {rows} rows within their bar")
+        assert words.endswith("9 of 9 claims about shape hold")
+
+
+def test_the_identified_leg_meets_every_row_and_claim(reproduction):
+    check(reproduction)
+
+
+@pytest.mark.parametrize(
+    "member", [0, *(pytest.param(number, marks=pytest.mark.slow) for number in range(1, len(ENSEMBLE)))]
+)
+def test_a_member_of_the_ensemble_does_too(member):
+    check(reproduce(preset=ENSEMBLE[member]))
+
+
+def test_the_ensemble_has_24_different_legs():
+    legs = {load_geometry(member).replace(name="leg") for member in ENSEMBLE}
+    assert len(legs) == len(ENSEMBLE) == 24
