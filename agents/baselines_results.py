@@ -24,9 +24,9 @@ from agents.score import FINAL_SEEDS, score_vector
 from agents.settings import FOLDER, load_settings
 from agents.statistics import TABLE, Scored, cells, mean_figures, over_episodes, over_seeds
 from hoof_env._output import markdown_table
-from hoof_env.envs.tasks import TASKS
 from hoof_env.errors import DataFileError, HoofEnvError, parse_json
 from hoof_env.saved_policy import ABOUT
+from hoof_env.tasks.registry import TASKS
 
 GAITS = ("run", "walk")
 OPEN_LOOP = "open-loop"  # name of the gait that CMA-ES found for an id, without learning

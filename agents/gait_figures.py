@@ -22,7 +22,7 @@ from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.dynamics.observables import stance_figures
 from hoof_env.dynamics.parts import GRAVITY
 from hoof_env.envs.policies import start_of
-from hoof_env.envs.reference import LEGS, PAIRS
+from hoof_env.tasks.horse_gaits import LEGS, PAIRS
 
 Floats = NDArray[np.float64]
 

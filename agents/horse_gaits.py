@@ -26,10 +26,10 @@ from agents import gait_figures, runs
 from agents.command import run
 from agents.score import make_rows
 from hoof_env.dynamics.parts import GRAVITY
-from hoof_env.envs.horse import HIP_HEIGHT
 from hoof_env.envs.policies import make_policy
-from hoof_env.envs.reference import LEGS, LIMITS, PAIRS, Stride, bounds
 from hoof_env.errors import HoofEnvError, parse_json
+from hoof_env.tasks.horse import HIP_HEIGHT
+from hoof_env.tasks.horse_gaits import LEGS, LIMITS, PAIRS, Stride, bounds
 
 Floats = NDArray[np.float64]
 

@@ -37,9 +37,9 @@ from agents.judges import of_speeds, read_judges
 from agents.score import find_policy, make_rows
 from agents.statistics import estimate
 from hoof_env._output import markdown_table
-from hoof_env.envs.horse import HIP_HEIGHT
-from hoof_env.envs.reference import PAIRS
 from hoof_env.errors import ParameterError, check_number, count
+from hoof_env.tasks.horse import HIP_HEIGHT
+from hoof_env.tasks.horse_gaits import PAIRS
 
 ENV_ID = "hoof_env/Horse-v0"
 TROT = 0.05  # largest lag of what counts as one

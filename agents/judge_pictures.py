@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.judges import of_speeds, read_judges
-from hoof_env.envs.reference import LEGS, PAIRS
+from hoof_env.tasks.horse_gaits import LEGS, PAIRS
 
 Floats = NDArray[np.float64]
 Figures = dict[str, list[dict[str, Any]]]

@@ -32,10 +32,10 @@ from agents.command import parse_pairs, run
 from agents.score import make_rows, play_rows
 from agents.statistics import estimate
 from hoof_env._output import check_folder
-from hoof_env.envs.observation import HALF_RANGE, MIDDLE
 from hoof_env.envs.policies import FORM, open_loop, open_loop_record
 from hoof_env.errors import DataFileError, HoofEnvError, ParameterError, check_number, parse_json
 from hoof_env.gait import PARAMETERS
+from hoof_env.tasks.observation import HALF_RANGE, MIDDLE
 
 Floats = NDArray[np.float64]
 Episodes = list[dict[str, float]]

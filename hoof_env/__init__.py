@@ -26,13 +26,8 @@ if TYPE_CHECKING:
     from hoof_env.envs.horse_leg import HorseLegEnv as HorseLegEnv
     from hoof_env.envs.horse_leg import HorseLegMOEnv as HorseLegMOEnv
     from hoof_env.envs.horse_leg import RandomizeParameters as RandomizeParameters
-    from hoof_env.envs.observation import Entry as Entry
-    from hoof_env.envs.observation import Scale as Scale
     from hoof_env.envs.policies import make_policy as make_policy
-    from hoof_env.envs.reference import HorseGait as HorseGait
-    from hoof_env.envs.reward import Term as Term
     from hoof_env.envs.sb3 import Sb3VecEnv as Sb3VecEnv
-    from hoof_env.envs.tasks import register as register
     from hoof_env.envs.vector import HorseLegVectorEnv as HorseLegVectorEnv
     from hoof_env.errors import DataFileError as DataFileError
     from hoof_env.errors import GeometryError as GeometryError
@@ -48,6 +43,11 @@ if TYPE_CHECKING:
     from hoof_env.leg.geometry import Geometry as Geometry
     from hoof_env.leg.geometry import load_geometry as load_geometry
     from hoof_env.leg.geometry import read_preset as read_preset
+    from hoof_env.tasks.horse_gaits import HorseGait as HorseGait
+    from hoof_env.tasks.observation import Entry as Entry
+    from hoof_env.tasks.observation import Scale as Scale
+    from hoof_env.tasks.registry import register as register
+    from hoof_env.tasks.reward import Term as Term
 
 _MODULES = {
     "dynamics.constrained": "ConstrainedLeg",
@@ -55,12 +55,12 @@ _MODULES = {
     "dynamics.parts": "HoofSpring Limb Limits Motor Prescribed Result Trunk",
     "dynamics.step_length": "StepWarning",
     "envs.horse_leg": "HorseLegEnv HorseLegMOEnv RandomizeParameters",
-    "envs.observation": "Entry Scale",
+    "tasks.observation": "Entry Scale",
     "envs.policies": "make_policy",
-    "envs.reference": "HorseGait",
-    "envs.reward": "Term",
+    "tasks.horse_gaits": "HorseGait",
+    "tasks.reward": "Term",
     "envs.sb3": "Sb3VecEnv",
-    "envs.tasks": "register",
+    "tasks.registry": "register",
     "envs.vector": "HorseLegVectorEnv",
     "errors": "DataFileError GeometryError HoofEnvError MissingExtraError OutputError ParameterError",
     "gait": "GaitParameters HarmonicGait load_gait",

@@ -150,7 +150,7 @@ def same_id(one: Any, other: Any) -> bool:
 
 
 def registered_task(task: str) -> str:
-    """What `tasks.task_of` takes for a task of one's own that is registered already, so that it imports
+    """What `registry.task_of` takes for a task of one's own that is registered already, so that it imports
     nothing."""
     return str(gym.registry[own_id(task)].kwargs.get("task", own_id(task)))
 

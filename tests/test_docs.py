@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from hoof_env.cli import COMMANDS
-from hoof_env.envs.reward import BEARING, STEPPING, check_weights
-from hoof_env.envs.tasks import TASKS
+from hoof_env.tasks.registry import TASKS
+from hoof_env.tasks.reward import BEARING, STEPPING, check_weights
 from tests.test_rooms import FLOORS
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -18,6 +18,7 @@ FLOORS = (
     ("hoof_env/ground", "hoof_env/gait.py"),
     ("hoof_env/dynamics",),
     ("hoof_env/render",),
+    ("hoof_env/tasks",),
     ("hoof_env/envs", "hoof_env/__init__.py"),
     ("hoof_env/paper", "hoof_env/saved_policy.py"),
     ("hoof_env/lab",),

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 import hoof_env
-from hoof_env.envs.settings import Keywords, Settings, VectorKeywords, to_json
-from hoof_env.envs.tasks import TASKS
+from hoof_env.tasks.registry import TASKS
+from hoof_env.tasks.settings import Keywords, Settings, VectorKeywords, to_json
 
 SCRIPT = """\
 from typing import assert_type

@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.envs.batch import EpisodeBatch
 from hoof_env.envs.conditions import CHANGEABLE
-from hoof_env.envs.settings import PER_EPISODE, SETTINGS, Settings, as_plain, json_value, to_json
-from hoof_env.envs.tasks import Task, task_of
 from hoof_env.errors import FixedSettingError, ParameterError, check_choice
 from hoof_env.gait import GaitParameters
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
 from hoof_env.render.renderer import check_side
+from hoof_env.tasks.registry import Task, task_of
+from hoof_env.tasks.settings import PER_EPISODE, SETTINGS, Settings, as_plain, json_value, to_json
 
 
 def fixed_setting(name: str) -> FixedSettingError:

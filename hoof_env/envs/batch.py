@@ -31,13 +31,19 @@ from hoof_env.envs.conditions import (
     keep_others,
     under_each,
 )
-from hoof_env.envs.episode import ACTIONS, FAILED, SUMS, episode_layout, task_type
-from hoof_env.envs.horse import Horse
 from hoof_env.envs.infos import InfoLayout, name_columns
-from hoof_env.envs.observation import MIDDLE, check_groups, groups_of, observed
-from hoof_env.envs.one_leg import OneLeg
 from hoof_env.envs.paper_solver import PaperSolver, check_paper
-from hoof_env.envs.parameters import (
+from hoof_env.errors import ParameterError, check_choice, check_number
+from hoof_env.gait import GaitParameters
+from hoof_env.leg.profile import leg_profile
+from hoof_env.simd.layout import views
+from hoof_env.simd.threads import run_together
+from hoof_env.simd.user_functions import what_cannot_be_compiled
+from hoof_env.tasks.episode import ACTIONS, FAILED, SUMS, episode_layout, task_type
+from hoof_env.tasks.horse import Horse
+from hoof_env.tasks.observation import MIDDLE, check_groups, groups_of, observed
+from hoof_env.tasks.one_leg import OneLeg
+from hoof_env.tasks.parameters import (
     check_drift,
     check_parameters,
     check_range,
@@ -47,15 +53,9 @@ from hoof_env.envs.parameters import (
     resolved,
     substeps_of,
 )
-from hoof_env.envs.reward import BEARING, LONGEST_STRIDE, check_weights
-from hoof_env.envs.settings import Settings
-from hoof_env.envs.tasks import Task
-from hoof_env.errors import ParameterError, check_choice, check_number
-from hoof_env.gait import GaitParameters
-from hoof_env.leg.profile import leg_profile
-from hoof_env.simd.layout import views
-from hoof_env.simd.threads import run_together
-from hoof_env.simd.user_functions import what_cannot_be_compiled
+from hoof_env.tasks.registry import Task
+from hoof_env.tasks.reward import BEARING, LONGEST_STRIDE, check_weights
+from hoof_env.tasks.settings import Settings
 
 Floats = NDArray[np.float64]
 

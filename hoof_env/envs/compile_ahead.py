@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 from hoof_env.dynamics.advance import LANES
 from hoof_env.envs.batch import EpisodeBatch
-from hoof_env.envs.tasks import TASKS
 from hoof_env.simd.cache import COMPILED, given_folder
+from hoof_env.tasks.registry import TASKS
 
 KERNELS: dict[str, Callable[[], object]] = {
     "one environment": lambda: EpisodeBatch(TASKS["leg"], TASKS["leg"].settings({}), 1),

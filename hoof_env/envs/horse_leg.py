@@ -15,21 +15,21 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.parts import broken
 from hoof_env.envs.base import LegBase, array_of, generator_of
-from hoof_env.envs.episode import FAILED
 from hoof_env.envs.infos import name_columns
 from hoof_env.envs.recording import Recording
-from hoof_env.envs.reward import OBJECTIVES, TERMS, Term, failure
-from hoof_env.envs.settings import Keywords
 from hoof_env.envs.step import SOME_SWITCHED
 from hoof_env.errors import ParameterError, count, flag
 from hoof_env.render.renderer import USUAL_SIZE
+from hoof_env.tasks.episode import FAILED
+from hoof_env.tasks.reward import OBJECTIVES, TERMS, Term, failure
+from hoof_env.tasks.settings import Keywords
 
 
 class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     """A horse's leg: rates of its gait in, a trunk that moves, a ground reaction force that costs.
 
     Args:
-        task: name in `tasks.TASKS`; the registered ids set it.
+        task: name in `registry.TASKS`; the registered ids set it.
         render_mode: "rgb_array" or "human".
         width, height: of a picture [pixels].
         settings: any of `settings.Settings`; the manual page (`manual`) says what they mean.

@@ -24,13 +24,13 @@ from hoof_env.dynamics.layout import (
     leg_state,
     stride_sums,
 )
-from hoof_env.envs.reference import LEGS
 from hoof_env.gait import parameter_names
+from hoof_env.tasks.horse_gaits import LEGS
 
 
 def measured_names(features: Features = PLAIN, legs: int = 1) -> tuple[str, ...]:
     """What an info measures: of one leg neighbours in the engine's memory, read with one copy; of a horse
-    the trunk's pitch, too, and each leg's command and report, under its name in `reference.LEGS`."""
+    the trunk's pitch, too, and each leg's command and report, under its name in `horse_gaits.LEGS`."""
     leg = (*leg_state(features), *STRIDES, *stride_sums(features))
     if legs == 1:
         return (*TRUNK_REPORT, "result", *leg)

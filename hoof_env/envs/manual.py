@@ -24,23 +24,23 @@ from hoof_env.dynamics.layout import Features
 from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.dynamics.parts import ONE_LEG
 from hoof_env.dynamics.stepping import SCHEMES
-from hoof_env.envs import horse, observation, start
-from hoof_env.envs.horse import Horse
 from hoof_env.envs.horse_leg import HorseLegMOEnv
 from hoof_env.envs.infos import measured_names
 from hoof_env.envs.manual_common import without_common
-from hoof_env.envs.one_leg import CARRIED, OneLeg
-from hoof_env.envs.parameters import HILLS, SPACING
 from hoof_env.envs.policies import STANDS_FOR
-from hoof_env.envs.reference import ACTED, COUNT, FASTEST, FOLLOWED, SIZES, horse_gaits
-from hoof_env.envs.reward import BEARING, LONGEST_STRIDE, OBJECTIVES, check_weights
-from hoof_env.envs.settings import PER_EPISODE, Settings, check_effect, to_json
-from hoof_env.envs.tasks import TASKS, Task, task_of
 from hoof_env.errors import DataFileError, OutputError, ParameterError, check_choice
 from hoof_env.gait import LIMITS, QUICK, WIDEST, FilterSettings
 from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS
 from hoof_env.leg.geometry import preset_names
 from hoof_env.render.renderer import USUAL_SIZE
+from hoof_env.tasks import horse, leg_starts, observation
+from hoof_env.tasks.horse import Horse
+from hoof_env.tasks.horse_gaits import ACTED, COUNT, FASTEST, FOLLOWED, SIZES, horse_gaits
+from hoof_env.tasks.one_leg import CARRIED, OneLeg
+from hoof_env.tasks.parameters import HILLS, SPACING
+from hoof_env.tasks.registry import TASKS, Task, task_of
+from hoof_env.tasks.reward import BEARING, LONGEST_STRIDE, OBJECTIVES, check_weights
+from hoof_env.tasks.settings import PER_EPISODE, Settings, check_effect, to_json
 
 HERE = Path(__file__).parent
 PAGE, MO_PAGE = (
@@ -66,8 +66,9 @@ def tables() -> dict[str, dict[str, Any]]:
     }  # fmt: skip
     values = {name: ", ".join(f'\\"{one}\\"' for one in choices) for name, choices in names.items()}
     numbers = {
-        "lowest": start.LOWEST, "highest": start.HIGHEST, "spacing": SPACING, "margin": start.MARGIN,
-        "start_speed": start.START_SPEED, "horse_mass": horse.MASS, "fastest": FASTEST,
+        "lowest": leg_starts.LOWEST, "highest": leg_starts.HIGHEST,
+        "spacing": SPACING, "margin": leg_starts.MARGIN,
+        "start_speed": leg_starts.START_SPEED, "horse_mass": horse.MASS, "fastest": FASTEST,
         "smallest_size": SIZES[0], "largest_size": SIZES[1],
         "speed_spread": 100 * horse.SPEED_SPREAD, "pitch_spread": horse.PITCH_SPREAD,
         "phase_spread": horse.PHASE_SPREAD, "fall_pitch": horse.PITCH, "fall_low": horse.HEIGHT[0],
@@ -340,7 +341,7 @@ def _start(settings: Settings, options: Mapping[str, float]) -> str:
 
 
 def _options(of_horse: bool) -> Iterable[tuple[str, ...]]:
-    ranges = horse.OPTIONS if of_horse else start.OPTIONS
+    ranges = horse.OPTIONS if of_horse else leg_starts.OPTIONS
     for name, (unit, meaning) in TABLES["horse_options" if of_horse else "options"].items():
         low, high = ranges.get(name, (0.0, 0.0))
         within = "" if low == high else f"{low:.7g} to {high:.7g}" if math.isfinite(high) else f"from {low:g}"

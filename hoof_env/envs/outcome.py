@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from hoof_env.dynamics.limits import has_moved
-from hoof_env.envs.episode import FAILED, TRUNCATED
-from hoof_env.envs.reward import BEARING, LONGEST_STRIDE, Outcome
 from hoof_env.simd import block_at, lane_of, maximum, minimum, where
 from hoof_env.simd.compile import inline_llvm
+from hoof_env.tasks.episode import FAILED, TRUNCATED
+from hoof_env.tasks.reward import BEARING, LONGEST_STRIDE, Outcome
 
 
 @inline_llvm

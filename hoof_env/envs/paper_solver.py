@@ -20,9 +20,9 @@ from hoof_env.dynamics.layout import LEG_REPORT, LEG_STATE, TRUNK_REPORT, TRUNK_
 from hoof_env.dynamics.memory import LIFT_OFF, Memory, memory_of
 from hoof_env.dynamics.observables import StanceCounter
 from hoof_env.dynamics.parts import Result
-from hoof_env.envs.settings import Settings
 from hoof_env.errors import ParameterError
 from hoof_env.gait import GaitParameters
+from hoof_env.tasks.settings import Settings
 
 Floats = NDArray[np.float64]
 Records = NDArray[np.void]
@@ -88,7 +88,7 @@ class PaperSolver:
         leg.advance(gait.to_array(), trace)
 
     def start(self, envs: Sequence[int], gaits: Floats, crank_angle: Floats, x: Floats) -> None:
-        """Start some environments; with gaits, crank angles and places as in `start.Start`."""
+        """Start some environments; with gaits, crank angles and places as in `leg_starts.Start`."""
         for k, env in enumerate(envs):
             gait = GaitParameters.from_array(gaits[k])
             self.traces[env] = self.legs[env].reset(gait, float(crank_angle[k]), x=float(x[k]))

@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env._version import __version__
-from hoof_env.envs.observation import HALF_RANGE, HIGH, LOW, MIDDLE
-from hoof_env.envs.one_leg import action_towards, check_reachable, lead_of
-from hoof_env.envs.start import extreme_posture
 from hoof_env.errors import DataFileError, ParameterError, check_choice, parse_json
 from hoof_env.gait import LIMITS, GaitParameters, paper_gaits
 from hoof_env.leg.profile import leg_profile
+from hoof_env.tasks.leg_starts import extreme_posture
+from hoof_env.tasks.observation import HALF_RANGE, HIGH, LOW, MIDDLE
+from hoof_env.tasks.one_leg import action_towards, check_reachable, lead_of
 
 Action = NDArray[np.float32]
 

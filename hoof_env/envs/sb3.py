@@ -13,9 +13,9 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from hoof_env.envs.base import fixed_setting
 from hoof_env.envs.infos import row_of
-from hoof_env.envs.settings import SETTINGS, VectorKeywords
 from hoof_env.envs.vector import PER_ENV, HorseLegVectorEnv
 from hoof_env.errors import ParameterError
+from hoof_env.tasks.settings import SETTINGS, VectorKeywords
 
 
 class Sb3VecEnv(VecEnv):

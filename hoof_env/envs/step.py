@@ -16,12 +16,7 @@ import numpy as np
 from hoof_env.dynamics.advance import LANES, MODEL, advance_kernels
 from hoof_env.dynamics.layout import PLAIN, Features
 from hoof_env.dynamics.limits import has_moved
-from hoof_env.envs.episode import ACTIONS, FAILED, TRUNCATED, Memories, memories_of, task_type
-from hoof_env.envs.horse_rows import HORSE_TERMS
-from hoof_env.envs.observation import Entry, ObservationInputs
 from hoof_env.envs.outcome import add_up, decide, find_outcome, outcome_of_one
-from hoof_env.envs.reference import SCRATCH_SIZE, command_gait, refer_to_target
-from hoof_env.envs.reward import TERMS, Term
 from hoof_env.simd import (
     absolute,
     any_lane,
@@ -51,6 +46,11 @@ from hoof_env.simd.memory import (
 )
 from hoof_env.simd.reach import fingerprint, refresh
 from hoof_env.simd.user_functions import number_of
+from hoof_env.tasks.episode import ACTIONS, FAILED, TRUNCATED, Memories, memories_of, task_type
+from hoof_env.tasks.horse_gaits import SCRATCH_SIZE, command_gait, refer_to_target
+from hoof_env.tasks.horse_terms import HORSE_TERMS
+from hoof_env.tasks.observation import Entry, ObservationInputs
+from hoof_env.tasks.reward import TERMS, Term
 
 NOT_A_NUMBER = -1
 SOME_ENDED = 1

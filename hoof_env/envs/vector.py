@@ -20,12 +20,12 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from hoof_env.envs.base import LegBase, array_of, fixed_setting, generator_of
-from hoof_env.envs.episode import FAILED, TRUNCATED
 from hoof_env.envs.infos import name_columns
 from hoof_env.envs.recording import Recording
-from hoof_env.envs.settings import Keywords
 from hoof_env.errors import ParameterError, all_of, count
 from hoof_env.render.renderer import USUAL_SIZE
+from hoof_env.tasks.episode import FAILED, TRUNCATED
+from hoof_env.tasks.settings import Keywords
 
 Floats = NDArray[np.float64]
 

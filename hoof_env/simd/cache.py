@@ -32,8 +32,13 @@ from numba.core.utils import _dynamic_module
 from hoof_env.errors import OutputError
 from hoof_env.simd import trust
 
+PACKAGE = Path(__file__).parents[1]
+
 MECHANICS = ("simd", "leg", "ground", "gait", "dynamics")
 """The rooms of this package whose sources end up in kernels, folders or files."""
+
+CALLED = {"envs": ("tasks",)}
+"""Further rooms whose functions the kernels of a room call."""
 
 LONGEST_WAIT = 600.0
 """Seconds to wait for another process, which may be stopped; then the kernel is compiled here."""
@@ -158,7 +163,10 @@ class KernelCache(_caching.FunctionCache):
             raise _no_folder(os.path.dirname(function.__code__.co_filename), error) from None
         # numba looks for changes in the file of a kernel alone, but a kernel contains those that it calls
         own = Path(function.__code__.co_filename).parent
-        stamp = self._impl.locator.get_source_stamp(), _sources(), _digest(own)
+        beside = "".join(
+            _digest(PACKAGE / room) for room in CALLED.get(own.name, ()) if own.parent == PACKAGE
+        )
+        stamp = self._impl.locator.get_source_stamp(), _sources(), _digest(own), beside
         self._cache_file = _Files(self._impl, stamp, say)
         if not given_folder():
             trust.close_new(self.cache_path)
@@ -262,7 +270,7 @@ def _no_folder(folder: str, error: Exception) -> OutputError:
 @cache
 def _sources() -> str:
     """Digest of everything in this package that kernels are made from."""
-    rooms = [Path(__file__).parents[1] / room for room in MECHANICS]
+    rooms = [PACKAGE / room for room in MECHANICS]
     files = [room.with_suffix(".py") for room in rooms]
     return "".join(_digest(file if file.is_file() else room) for room, file in zip(rooms, files, strict=True))
 

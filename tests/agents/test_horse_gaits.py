@@ -9,8 +9,8 @@ import pytest
 
 from agents import horse_gaits
 from agents.horse_gaits import BatchRollout, Search, decode, encode, landings, shipped, slip_at, speed_of
-from hoof_env.envs.reference import FASTEST, HorseGait, bounds, crank_angles, reference_gaits
-from hoof_env.envs.reference import horse_gaits as gaits_of_the_package
+from hoof_env.tasks.horse_gaits import FASTEST, HorseGait, bounds, crank_angles, reference_gaits
+from hoof_env.tasks.horse_gaits import horse_gaits as gaits_of_the_package
 
 
 def test_every_point_of_the_box_is_a_gait_and_the_way_back_is_the_same():
@@ -125,7 +125,7 @@ def test_a_gait_that_falls_has_no_slip_and_the_trot_like_one_little():
 
 
 def test_the_package_has_gaits_in_the_order_of_their_speeds():
-    from hoof_env.envs.reference import _data
+    from hoof_env.tasks.horse_gaits import _data
 
     speeds = _data()["reference"]["speeds"]
     assert speeds == sorted(set(speeds))

@@ -14,8 +14,8 @@ from agents.judges import read_judges
 from agents.score import make_rows
 from hoof_env.dynamics.layout import Features, stride_sums
 from hoof_env.dynamics.memory import LIFT_OFF
-from hoof_env.envs.reference import reference_gaits
 from hoof_env.errors import HoofEnvError, ParameterError
+from hoof_env.tasks.horse_gaits import reference_gaits
 
 TIME = np.arange(0.0, 6.0, 1e-3)
 PUSHES = np.zeros((len(TIME), 4))

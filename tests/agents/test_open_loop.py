@@ -14,9 +14,9 @@ from agents.runs import make_env
 from agents.score import find_policy, play, score_vector
 from hoof_env import records
 from hoof_env.envs import policies
-from hoof_env.envs.observation import HIGH, LOW
 from hoof_env.envs.policies import GAITS, load_open_loop, open_loop_record
 from hoof_env.errors import DataFileError, HoofEnvError, ParameterError
+from hoof_env.tasks.observation import HIGH, LOW
 from tests.agents.conftest import ENV_ID, KWARGS, SHORT
 
 

@@ -9,9 +9,9 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
-from hoof_env.envs.settings import Settings, check_effect
-from hoof_env.envs.tasks import TASKS
 from hoof_env.errors import ParameterError
+from hoof_env.tasks.registry import TASKS
+from hoof_env.tasks.settings import Settings, check_effect
 
 HORSE = "hoof_env/Horse-v0"
 

@@ -4,7 +4,7 @@ import gymnasium as gym
 import numpy as np
 from family import HORSE
 
-from hoof_env.envs.reference import FASTEST, LIMITS, reference_gaits
+from hoof_env.tasks.horse_gaits import FASTEST, LIMITS, reference_gaits
 
 SPEEDS = (1.853, 2.62)  # Froude numbers 0.25 and 0.5
 SEEDS = 40

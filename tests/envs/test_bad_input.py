@@ -12,9 +12,9 @@ from family import HORSE, IDS, actions, same
 from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 
 from hoof_env import Sb3VecEnv, make_policy, read_preset
-from hoof_env.envs.episode import episode_layout
 from hoof_env.errors import ParameterError
 from hoof_env.gait import load_gait
+from hoof_env.tasks.episode import episode_layout
 
 LEG, NAN = "hoof_env/HorseLeg-v0", float("nan")
 OTHER_LEG = {**read_preset("identified"), "provenance": "another"}

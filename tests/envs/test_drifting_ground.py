@@ -4,9 +4,9 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from hoof_env.envs.parameters import DRIFT, STRETCH, farthest_mean, make_terrain
 from hoof_env.errors import ParameterError
 from hoof_env.ground.terrain import Terrain
+from hoof_env.tasks.parameters import DRIFT, STRETCH, farthest_mean, make_terrain
 
 HELD = {"suspended": "hoof_env/HorseLeg-v0", "rail": "hoof_env/HorseLegRail-v0"}
 HIP = gym.make(HELD["rail"]).unwrapped.geometry.hip_height

@@ -10,9 +10,13 @@ from horses import SPEEDS, played, random_gaits
 
 from hoof_env import Sb3VecEnv
 from hoof_env.dynamics.layout import Features
-from hoof_env.envs import reference, step
-from hoof_env.envs.horse import COMMAND_STEP, MASS, SPANS
-from hoof_env.envs.reference import (
+from hoof_env.envs import step
+from hoof_env.errors import ParameterError
+from hoof_env.gait import PARAMETERS, WIDEST
+from hoof_env.leg.limb_masses import segment_masses, trunk_mass
+from hoof_env.tasks import horse_gaits as reference
+from hoof_env.tasks.horse import COMMAND_STEP, MASS, SPANS
+from hoof_env.tasks.horse_gaits import (
     COUPLING,
     FASTEST,
     FOLLOWED,
@@ -25,10 +29,7 @@ from hoof_env.envs.reference import (
     horse_gaits,
     reference_gaits,
 )
-from hoof_env.envs.tasks import TASKS
-from hoof_env.errors import ParameterError
-from hoof_env.gait import PARAMETERS, WIDEST
-from hoof_env.leg.limb_masses import segment_masses, trunk_mass
+from hoof_env.tasks.registry import TASKS
 
 
 def commands(gait, theta, offset):

@@ -8,10 +8,10 @@ import pytest
 from family import substeps
 
 from hoof_env.dynamics.layout import TRUNK_STATE
-from hoof_env.envs.observation import MIDDLE
 from hoof_env.envs.policies import make_policy, policy_names
 from hoof_env.errors import ParameterError
 from hoof_env.gait import GaitParameters, load_gait
+from hoof_env.tasks.observation import MIDDLE
 
 LEG, FIXED = "hoof_env/HorseLeg-v0", "hoof_env/HorseLegFixed-v0"
 

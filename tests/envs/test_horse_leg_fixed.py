@@ -11,12 +11,12 @@ import pytest
 from family import LEGS, actions, running_peak_charge, same, together
 
 from hoof_env.envs.policies import make_policy
-from hoof_env.envs.settings import Settings
 from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.gait import PARAMETERS
 from hoof_env.ground.contact import Ground, load_ground
 from hoof_env.leg.geometry import preset_names, read_preset
 from hoof_env.records import record_episode
+from hoof_env.tasks.settings import Settings
 
 FIXED, LEG = "hoof_env/HorseLegFixed-v0", "hoof_env/HorseLeg-v0"
 

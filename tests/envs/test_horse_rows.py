@@ -6,8 +6,8 @@ import pytest
 from family import HORSE
 from horses import die
 
-from hoof_env.envs.horse_rows import HORSE_TERMS
-from hoof_env.envs.reference import LEGS
+from hoof_env.tasks.horse_gaits import LEGS
+from hoof_env.tasks.horse_terms import HORSE_TERMS
 
 DT, MANY, SPEEDS = 0.02, 32, (1.853, 2.620, 3.706)
 WEIGHTS = {term.name: term.weight for term in HORSE_TERMS}

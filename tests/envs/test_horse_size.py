@@ -8,9 +8,9 @@ from horses import SEEDS, played
 
 from hoof_env import register
 from hoof_env.dynamics.parts import GRAVITY
-from hoof_env.envs.reference import FASTEST, LEGS, HorseGait, horse_gaits, reference_gaits
-from hoof_env.envs.tasks import _OWN
 from hoof_env.errors import ParameterError
+from hoof_env.tasks.horse_gaits import FASTEST, LEGS, HorseGait, horse_gaits, reference_gaits
+from hoof_env.tasks.registry import _OWN
 
 
 def test_a_pony_is_a_similar_horse():

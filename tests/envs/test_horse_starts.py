@@ -6,8 +6,8 @@ import pytest
 from family import HORSE, make, same
 from horses import SEEDS, SPEEDS
 
-from hoof_env.envs.horse import GAP, PHASE_SPREAD, PITCH_SPREAD, SPEED_SPREAD
-from hoof_env.envs.reference import LEGS, _data, crank_angles, reference_gaits, trunk_motion
+from hoof_env.tasks.horse import GAP, PHASE_SPREAD, PITCH_SPREAD, SPEED_SPREAD
+from hoof_env.tasks.horse_gaits import LEGS, _data, crank_angles, reference_gaits, trunk_motion
 
 
 def test_rates_of_the_trunk_are_those_of_its_places():

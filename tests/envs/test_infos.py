@@ -12,10 +12,10 @@ from family import FALLS, IDS, actions, same, together
 from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 
 from hoof_env.envs.infos import MEASURED, NamedArray, name_columns, row_of
-from hoof_env.envs.one_leg import OneLeg
-from hoof_env.envs.reward import TERMS as TABLE
 from hoof_env.errors import ParameterError
 from hoof_env.gait import PARAMETERS
+from hoof_env.tasks.one_leg import OneLeg
+from hoof_env.tasks.reward import TERMS as TABLE
 
 LEG = "hoof_env/HorseLeg-v0"
 START = OneLeg.start_names

@@ -15,18 +15,19 @@ import pytest
 from family import HORSE, OTHER, scaled
 
 from hoof_env import cli
-from hoof_env.envs import horse, manual
-from hoof_env.envs.horse import OPTIONS as HORSE_OPTIONS
+from hoof_env.envs import manual
 from hoof_env.envs.manual import TABLES
-from hoof_env.envs.parameters import HILLS
-from hoof_env.envs.reference import FASTEST, LEGS
-from hoof_env.envs.reward import BEARING, LONGEST_STRIDE
-from hoof_env.envs.settings import PER_EPISODE, Settings, to_json
-from hoof_env.envs.start import OPTIONS
-from hoof_env.envs.tasks import TASKS
 from hoof_env.envs.vector import HorseLegVectorEnv
 from hoof_env.errors import ParameterError
 from hoof_env.gait import LIMITS, WIDEST, load_gait
+from hoof_env.tasks import horse
+from hoof_env.tasks.horse import OPTIONS as HORSE_OPTIONS
+from hoof_env.tasks.horse_gaits import FASTEST, LEGS
+from hoof_env.tasks.leg_starts import OPTIONS
+from hoof_env.tasks.parameters import HILLS
+from hoof_env.tasks.registry import TASKS
+from hoof_env.tasks.reward import BEARING, LONGEST_STRIDE
+from hoof_env.tasks.settings import PER_EPISODE, Settings, to_json
 
 ROOT = Path(__file__).parents[2]
 DOCS, POLICIES = ROOT / "docs" / "environments", ROOT / "agents" / "policies"

@@ -6,9 +6,9 @@ import pytest
 from family import FALLS
 
 from hoof_env.envs.horse_leg import HorseLegEnv, HorseLegMOEnv, vector_reward
-from hoof_env.envs.reward import OBJECTIVES, Term
-from hoof_env.envs.reward import TERMS as REWARD
 from hoof_env.errors import ParameterError
+from hoof_env.tasks.reward import OBJECTIVES, Term
+from hoof_env.tasks.reward import TERMS as REWARD
 
 TERMS = {
     "reward_progress": 0.5,

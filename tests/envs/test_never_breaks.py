@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from hoof_env.dynamics.parts import GRAVITY
 from hoof_env.dynamics.stepping import SCHEMES
-from hoof_env.envs.settings import PER_EPISODE
 from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS
+from hoof_env.tasks.settings import PER_EPISODE
 from tests.legs import PRESETS
 
 STEPS = int(float(os.environ.get("HOOF_ENV_STEPS", "1e5")))

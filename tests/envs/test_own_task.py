@@ -23,14 +23,14 @@ from hoof_env import Entry, Scale, Term, register
 from hoof_env.cli import main
 from hoof_env.dynamics.hoof import GroundHere
 from hoof_env.dynamics.layout import TRUNK_STATE, LegMemory, TrunkMemory
-from hoof_env.envs import tasks
-from hoof_env.envs.episode import Episode
 from hoof_env.envs.manual import page_of
-from hoof_env.envs.observation import ObservationInputs
-from hoof_env.envs.reward import Outcome
 from hoof_env.errors import ParameterError
 from hoof_env.simd.reach import fingerprint
 from hoof_env.simd.user_functions import what_cannot_be_compiled
+from hoof_env.tasks import registry as tasks
+from hoof_env.tasks.episode import Episode
+from hoof_env.tasks.observation import ObservationInputs
+from hoof_env.tasks.reward import Outcome
 
 PAGE = (Path(__file__).parents[2] / "docs" / "own_task.md").read_text(encoding="utf-8")
 PAGE = PAGE.split("## A leg of your own", 1)[0]  # tests/envs/test_own_leg.py has the rest

@@ -15,8 +15,8 @@ import hoof_env
 from hoof_env import RandomizeParameters
 from hoof_env.dynamics.parts import GRAVITY
 from hoof_env.dynamics.step_length import StepWarning
-from hoof_env.envs.settings import PER_EPISODE
 from hoof_env.errors import ParameterError
+from hoof_env.tasks.settings import PER_EPISODE
 
 LEG, SPEED = "hoof_env/HorseLeg-v0", "hoof_env/HorseLegSpeed-v0"
 PARAMETERS = {name: OTHER[name] for name in PER_EPISODE}

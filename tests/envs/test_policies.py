@@ -7,7 +7,6 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from hoof_env.envs.observation import HALF_RANGE, HIGH, LOW, MIDDLE
 from hoof_env.envs.policies import (
     HORSE_POLICIES,
     POLICIES,
@@ -19,6 +18,7 @@ from hoof_env.envs.policies import (
 )
 from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.gait import PARAMETERS, GaitParameters, load_gait
+from hoof_env.tasks.observation import HALF_RANGE, HIGH, LOW, MIDDLE
 
 ENV_ID = "hoof_env/HorseLeg-v0"
 CLOCKED = {

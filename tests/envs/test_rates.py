@@ -9,10 +9,10 @@ from family import LEGS, actions, same, substeps
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hoof_env.envs.observation import HIGH, LOW, MIDDLE
 from hoof_env.envs.policies import open_loop
 from hoof_env.errors import ParameterError
 from hoof_env.gait import PARAMETERS, FilterSettings, GaitParameters, HarmonicGait, load_gait
+from hoof_env.tasks.observation import HIGH, LOW, MIDDLE
 
 LEG, FIXED = "hoof_env/HorseLeg-v0", "hoof_env/HorseLegFixed-v0"
 ZERO = np.zeros(4, np.float32)

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hoof_env.envs.policies import make_policy, start_of
-from hoof_env.envs.reward import BEARING, LONGEST_STRIDE, STEPPING
-from hoof_env.envs.reward import TERMS as TABLE
+from hoof_env.tasks.reward import BEARING, LONGEST_STRIDE, STEPPING
+from hoof_env.tasks.reward import TERMS as TABLE
 
 TERMS = [term.key for term in TABLE]
 WEIGHTS = {term.name: term.weight for term in TABLE}

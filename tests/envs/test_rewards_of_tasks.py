@@ -12,12 +12,12 @@ import pytest
 from family import running_peak_charge, together
 
 from hoof_env._output import markdown_table
-from hoof_env.envs import tasks
-from hoof_env.envs.observation import HIGH, LOW
 from hoof_env.envs.policies import heading_seen, make_policy, start_of, towards
-from hoof_env.envs.reward import STEPPING, check_weights
-from hoof_env.envs.start import HIGHEST, LOWEST
 from hoof_env.gait import FilterSettings
+from hoof_env.tasks import registry as tasks
+from hoof_env.tasks.leg_starts import HIGHEST, LOWEST
+from hoof_env.tasks.observation import HIGH, LOW
+from hoof_env.tasks.reward import STEPPING, check_weights
 
 TASKS = {name: task for name, task in tasks.TASKS.items() if not task.is_horse}
 """Of one leg; test_horse.py has the horse's."""

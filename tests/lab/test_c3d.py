@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from hoof_env import records
-from hoof_env.envs.reference import LEGS
 from hoof_env.errors import DataFileError, MissingExtraError, ParameterError
 from hoof_env.ground.terrain import Terrain
 from hoof_env.lab.c3d import CHANNELS, MARKERS, plane_of
 from hoof_env.lab.forces import loaded
 from hoof_env.lab.read import read_record
+from hoof_env.tasks.horse_gaits import LEGS
 
 
 def read(path):

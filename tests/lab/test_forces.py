@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from hoof_env import Terrain, records
 from hoof_env.dynamics.parts import GRAVITY
 from hoof_env.envs.policies import make_policy
-from hoof_env.envs.reference import LEGS
 from hoof_env.errors import ParameterError
 from hoof_env.lab.forces import above_threshold, in_units, limbs_of, loaded, onto_surface
+from hoof_env.tasks.horse_gaits import LEGS
 
 ANGLES = (-0.05, 0.0, 0.05)
 

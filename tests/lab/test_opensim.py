@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from hoof_env import cli, records
-from hoof_env.envs.reference import LEGS
 from hoof_env.errors import ParameterError
 from hoof_env.lab.opensim import MOT_COLUMNS, check_bodies, loads_path
 from hoof_env.lab.read import read_record
+from hoof_env.tasks.horse_gaits import LEGS
 
 NEEDED = 'pip install "hoof-env[opensim]"'
 

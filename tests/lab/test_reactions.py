@@ -9,9 +9,9 @@ import pytest
 from hoof_env import records
 from hoof_env.dynamics.parts import GRAVITY
 from hoof_env.envs.policies import make_policy
-from hoof_env.envs.reference import LEGS
 from hoof_env.errors import ParameterError
 from hoof_env.lab.reactions import JOINT_COLUMNS, REACTION_UNITS
+from hoof_env.tasks.horse_gaits import LEGS
 
 
 @pytest.mark.parametrize("env_id", ["hoof_env/HorseLeg-v0", "hoof_env/Horse-v0"])

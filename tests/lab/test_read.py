@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from hoof_env import cli, records
-from hoof_env.envs.reference import LEGS
 from hoof_env.lab.compare import compare
 from hoof_env.lab.read import read_record
+from hoof_env.tasks.horse_gaits import LEGS
 
 
 @pytest.fixture(scope="module")

@@ -12,11 +12,11 @@ import pytest
 from hoof_env import records
 from hoof_env.dynamics.parts import GRAVITY
 from hoof_env.envs.policies import make_policy
-from hoof_env.envs.reference import LEGS
 from hoof_env.film import frames
 from hoof_env.play import Game
 from hoof_env.render.instant import HorseInstant
 from hoof_env.render.renderer import new_renderer
+from hoof_env.tasks.horse_gaits import LEGS
 
 HORSE = "hoof_env/Horse-v0"
 

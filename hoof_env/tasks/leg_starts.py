@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.dynamics.parts import Trunk
-from hoof_env.envs.parameters import check_parameters
-from hoof_env.envs.settings import Settings
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait import GaitParameters, gait_array, paper_gaits
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.profile import LegProfile, by_name
+from hoof_env.tasks.parameters import check_parameters
+from hoof_env.tasks.settings import Settings
 
 Floats = NDArray[np.float64]
 

@@ -25,8 +25,13 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import FREE, GRAVITY, TRUNKS, Drive, HoofSpring, Limb, Limits, Motor, Trunk
-from hoof_env.envs.parameters import check_range, drive_of, ground_of
-from hoof_env.envs.reference import (
+from hoof_env.errors import ParameterError, check_choice, check_number, count
+from hoof_env.gait import PARAMETERS, QUICK, WIDEST, FilterSettings
+from hoof_env.ground.contact import Ground
+from hoof_env.ground.terrain import Terrain
+from hoof_env.leg.geometry import Geometry, load_geometry
+from hoof_env.leg.limb_masses import with_limb_masses
+from hoof_env.tasks.horse_gaits import (
     ACTED,
     COUNT,
     LEGS,
@@ -41,8 +46,7 @@ from hoof_env.envs.reference import (
     reference_gaits,
     trunk_motion,
 )
-from hoof_env.envs.settings import Settings
-from hoof_env.envs.start import (
+from hoof_env.tasks.leg_starts import (
     FLAT,
     Start,
     checked_options,
@@ -50,13 +54,9 @@ from hoof_env.envs.start import (
     start_anywhere,
     with_parameters,
 )
-from hoof_env.envs.tasks import TASKS
-from hoof_env.errors import ParameterError, check_choice, check_number, count
-from hoof_env.gait import PARAMETERS, QUICK, WIDEST, FilterSettings
-from hoof_env.ground.contact import Ground
-from hoof_env.ground.terrain import Terrain
-from hoof_env.leg.geometry import Geometry, load_geometry
-from hoof_env.leg.limb_masses import with_limb_masses
+from hoof_env.tasks.parameters import check_range, drive_of, ground_of
+from hoof_env.tasks.registry import TASKS
+from hoof_env.tasks.settings import Settings
 
 Floats = NDArray[np.float64]
 

@@ -19,13 +19,13 @@ from typing import Any, TypeVar
 import gymnasium as gym
 import numpy as np
 
-from hoof_env.envs.horse_rows import HORSE_ENTRIES, HORSE_TERMS
-from hoof_env.envs.observation import ENTRIES, Entry, check_groups, groups_of
-from hoof_env.envs.reference import checked_size
-from hoof_env.envs.reward import TERMS, Term, check_weights
-from hoof_env.envs.settings import SETTINGS, Settings, as_plain, check_effect, json_value
 from hoof_env.errors import ParameterError, UnknownArgumentError, check_choice
 from hoof_env.simd.user_functions import check_function, function_name
+from hoof_env.tasks.horse_gaits import checked_size
+from hoof_env.tasks.horse_terms import HORSE_ENTRIES, HORSE_TERMS
+from hoof_env.tasks.observation import ENTRIES, Entry, check_groups, groups_of
+from hoof_env.tasks.reward import TERMS, Term, check_weights
+from hoof_env.tasks.settings import SETTINGS, Settings, as_plain, check_effect, json_value
 
 
 @dataclass(frozen=True)

@@ -6,14 +6,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from hoof_env.envs.observation import PLAIN, TRUE_RATE, TRUTH, Entry, Scale, in_contact, tanh_of
-from hoof_env.envs.reference import LEGS
-from hoof_env.envs.reward import Term
 from hoof_env.gait import PARAMETERS, WIDEST
 from hoof_env.ground.terrain import surface
 from hoof_env.simd import absolute, block_at, maximum, minimum, where
 from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.math import cos_sin
+from hoof_env.tasks.horse_gaits import LEGS
+from hoof_env.tasks.observation import PLAIN, TRUE_RATE, TRUTH, Entry, Scale, in_contact, tanh_of
+from hoof_env.tasks.reward import Term
 
 # The observation
 

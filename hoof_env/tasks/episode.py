@@ -10,10 +10,10 @@ import numpy as np
 
 from hoof_env.dynamics.form import engine_layout
 from hoof_env.dynamics.layout import Features
-from hoof_env.envs.reference import GaitRows, reference_type
-from hoof_env.envs.reward import TERMS
 from hoof_env.gait import PARAMETERS
 from hoof_env.simd.layout import Block, Constants, Layout, Row, Size
+from hoof_env.tasks.horse_gaits import GaitRows, reference_type
+from hoof_env.tasks.reward import TERMS
 
 ACTIONS = len(PARAMETERS)
 """Of a leg."""

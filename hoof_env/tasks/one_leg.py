@@ -12,10 +12,6 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import ONE_LEG, Limb, Trunk
-from hoof_env.envs.observation import HALF_RANGE, HIGH, LOW, MIDDLE
-from hoof_env.envs.parameters import check_range, drive_of, ground_of, hoof_spring
-from hoof_env.envs.settings import Settings
-from hoof_env.envs.start import HIGHEST, LOWEST, Start, check_options, draw_starts
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait import (
     INNER,
@@ -28,6 +24,10 @@ from hoof_env.gait import (
 )
 from hoof_env.ground.contact import Ground, load_ground
 from hoof_env.leg.geometry import load_geometry, preset_error_type, preset_label
+from hoof_env.tasks.leg_starts import HIGHEST, LOWEST, Start, check_options, draw_starts
+from hoof_env.tasks.observation import HALF_RANGE, HIGH, LOW, MIDDLE
+from hoof_env.tasks.parameters import check_range, drive_of, ground_of, hoof_spring
+from hoof_env.tasks.settings import Settings
 
 Floats = NDArray[np.float64]
 
@@ -197,13 +197,13 @@ class OneLeg:
         }  # fmt: skip
 
     def check_options(self, options: Any, trunk: Trunk, settings: Settings) -> dict[str, Any]:
-        """See `start.check_options`."""
+        """See `leg_starts.check_options`."""
         return check_options(options, self.gaits, trunk, settings)
 
     def draw(
         self, options: Mapping[str, Any], generators: Sequence[np.random.Generator], engine: TrunkEngine
     ) -> Start:
-        """Starts of episodes; see `start.draw_starts`."""
+        """Starts of episodes; see `leg_starts.draw_starts`."""
         return draw_starts(
             options, generators, engine.profiles[0], engine.trunk, self.gaits, engine.terrain, self.gait
         )
