@@ -3,8 +3,10 @@ they pass; and the motion of crank and swing that follows."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from functools import cache
 from types import MappingProxyType
 from typing import Any, TypeVar
 
@@ -12,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.errors import ParameterError, check_choice, check_number
-from hoof_env.leg.geometry import DEFAULT_PRESET, Preset, named, read_preset, wrong
+from hoof_env.leg.geometry import DEFAULT_PRESET, Geometry, Preset, load_geometry, named, read_preset, wrong
 from hoof_env.simd.compile import kernel
 from hoof_env.simd.math import clip
 
@@ -26,8 +28,31 @@ LIMITS = MappingProxyType(
         "swing_cos": (-0.9, 0.9),
     }
 )
-"""Lowest and highest value of each gait parameter [rad/s, rad, rad, rad]. Both gaits of the paper lie inside,
-and so do the best gaits that were learned: docs/evidence/actions.md has the sweep."""
+"""Lowest and highest value of each gait parameter of the published leg [rad/s, rad, rad, rad]; `limits_of`
+has those of others. Both gaits of the paper lie inside, and so do the best gaits that were learned:
+docs/evidence/actions.md has the sweep."""
+
+FASTEST_CRANK = 1000.0
+"""Of any leg [rad/s]: that of a leg of a quarter of a millimetre may turn so fast."""
+
+
+@cache
+def _published_hip_height() -> float:
+    return load_geometry(DEFAULT_PRESET).hip_height
+
+
+def pace_of(geometry: Geometry) -> float:
+    """Speed of a leg over that of the published leg at the same Froude number [-]: the root of the ratio of
+    their hip heights. A similar motion takes so many times as long."""
+    return math.sqrt(geometry.hip_height / _published_hip_height())
+
+
+def limits_of(geometry: Geometry) -> dict[str, tuple[float, float]]:
+    """The `LIMITS` of a leg: angles are those of the published leg, and at one Froude number the crank turns
+    faster by the root of how much smaller the leg is."""
+    low, high = LIMITS["crank_speed"]
+    pace = pace_of(geometry)
+    return {**LIMITS, "crank_speed": (low / pace, high / pace)}
 
 
 @dataclass(frozen=True)
@@ -39,14 +64,16 @@ class GaitParameters:
     The paper says that running 'controls the leg orientation by swinging motion with respect to the body' and
     does not print the law; one harmonic is this project's assumption.
 
+    How fast a crank may be commanded to turn depends on the size of the leg; environments check it.
+
     Attributes:
-        crank_speed: theta's rate [rad/s], 0 to 4 pi.
+        crank_speed: theta's rate [rad/s], 0 to `FASTEST_CRANK`; to 4 pi in environments of the published leg.
         swing_offset: phi0 [rad], -0.4 to 1.4.
         swing_sin: A [rad], -0.9 to 0.9.
         swing_cos: B [rad], -0.9 to 0.9.
 
     Raises:
-        ParameterError: a value is not finite or outside `LIMITS`.
+        ParameterError: a value is not finite or outside these limits.
     """
 
     crank_speed: float
@@ -59,7 +86,7 @@ class GaitParameters:
 
     def _check(self, limits: Mapping[str, tuple[float, float]]) -> None:
         for name in PARAMETERS:
-            low, high = limits[name]
+            low, high = limits[name] if name != "crank_speed" else (0.0, FASTEST_CRANK)
             object.__setattr__(self, name, check_number(name, getattr(self, name), low=low, high=high))
 
     def to_array(self) -> NDArray[np.float64]:
@@ -87,7 +114,7 @@ WIDEST = MappingProxyType(
         "swing_sin": (-1.5, 1.5), "swing_cos": (-1.5, 1.5), "higher": (-0.6, 0.6),
     }
 )  # fmt: skip
-"""The `LIMITS` of a `HarmonicGait`."""
+"""The `LIMITS` of a `HarmonicGait`, of a leg of a horse's size."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +128,8 @@ class HarmonicGait(GaitParameters):
         higher: A2, B2 and perhaps A3, B3 [rad], -0.6 to 0.6; the others are those of `GaitParameters`.
 
     Raises:
-        ParameterError: a value is not finite or outside `WIDEST`, or there are not 2 or 4 of `higher`.
+        ParameterError: a value is not finite, an angle is outside `WIDEST`, or there are not 2 or 4 of
+            `higher`.
     """
 
     higher: tuple[float, ...] = (0.0, 0.0)

@@ -216,7 +216,7 @@ class EpisodeBatch:
         """Have every kernel of a step compiled, or loaded, by running it on no environment."""
         if self.paper:
             self._run_idle(self._kernels.apply_one, self._kernels.finish_one)
-            self.paper.compile(GaitParameters.from_array(MIDDLE))
+            self.paper.compile(GaitParameters(*MIDDLE))
         else:
             self._run_idle(self.kernel)
         self._run_idle(self._observe)

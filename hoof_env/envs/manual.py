@@ -94,7 +94,9 @@ def page(task: str, with_film: bool = False) -> str:
     if task == "mo":
         objectives = _objectives(check_weights(what.settings({}).reward_weights))
         return _tidy(
-            Template(MO_PAGE).substitute(film=film, observations=_observations(what), objectives=objectives)
+            Template(MO_PAGE).substitute(
+                film=film, observations=_observations(what, OneLeg(what.settings({}))), objectives=objectives
+            )
         )
     s, kind = what.settings({}), "horse" if what.is_horse else "leg"
     body = Horse(s) if what.is_horse else OneLeg(s)
@@ -116,7 +118,7 @@ def page(task: str, with_film: bool = False) -> str:
         about=what.about,
         body=Template(WORDS[f"{kind}_body"].strip()).safe_substitute(trunk=trunk["moves"]),
         action_space=f"Box(-1, 1, ({len(body.action_names)},), float32)",
-        actions=_horse_actions() if what.is_horse else _actions(s),
+        actions=_horse_actions() if isinstance(body, Horse) else _actions(body),
         commands=WORDS[f"{kind}_commands"].strip(),
         observed=WORDS[f"{kind}_observed"].strip(),
         still="" if what.is_horse else " " + WORDS["leg_still"].strip(),
@@ -126,7 +128,7 @@ def page(task: str, with_film: bool = False) -> str:
         prefixes=WORDS["prefixes"] if what.is_horse else "",
         example='"phase": 0.0' if what.is_horse else '"gait": "run", "crank_angle": 0.0',
         observation_space=f"Box(-1, 1, ({len(_observed(what))},), float32)",
-        observations=_observations(what),
+        observations=_observations(what, body),
         other_groups=", ".join(f"`{group}`" for group in groups if group not in s.observation),
         rewards=markdown_table(("Term", "Weight", "Default", "Unit", "Meaning"), rewards),
         target_reward=WORDS["target_reward"] if s.target_speed and not what.is_horse else "",
@@ -264,13 +266,13 @@ def _horse_actions() -> str:
     return markdown_table(head, rows)
 
 
-def _actions(settings: Settings) -> str:
-    rates = [settings.crank_rate, *[settings.swing_rate] * (len(LIMITS) - 1)]
+def _actions(body: OneLeg) -> str:
     rows = []
-    for k, (low, high) in enumerate(LIMITS.values()):
+    for k, (low, high) in enumerate(zip(body.low, body.high, strict=True)):
         value, rate = GAIT[k], GAIT[len(LIMITS) + k]
         limits = f"{low:.5g} to {high:.5g} {value.unit}"
-        rows.append((str(k), value.name, f"{-rates[k]:g}", f"{rates[k]:g}", rate.unit, limits))
+        ends = f"{-body.rates[k]:g}", f"{body.rates[k]:g}"
+        rows.append((str(k), value.name, *ends, rate.unit, limits))
     return markdown_table(("Num", "Rate of", "At -1", "At +1", "Unit", "Limits of the value"), rows)
 
 
@@ -284,9 +286,20 @@ def _objectives(weights: Mapping[str, float]) -> str:
     return markdown_table(("Num", "Objective", "Terms", "Weights by default"), rows)
 
 
-def _observations(what: Task) -> str:
-    rows = [(str(k), e.name, e.scale.text, e.unit, e.group) for k, e in enumerate(_observed(what))]
+def _observations(what: Task, body: Horse | OneLeg) -> str:
+    entries = enumerate(_observed(what))
+    rows = [(str(k), e.name, _scaling(e.scale, body), e.unit, e.group) for k, e in entries]
     return markdown_table(("Num", "Observation", "Scaling", "Unit before scaling", "Group"), rows)
+
+
+def _scaling(scale: observation.Scale, body: Horse | OneLeg) -> str:
+    """The formula of a scale; limits and bounds are those of the leg."""
+    if isinstance(body, OneLeg) and scale in observation.IN_RANGE:
+        k = observation.IN_RANGE.index(scale)
+        return observation.range_text(body.low[k], body.high[k])
+    if isinstance(body, OneLeg) and scale in observation.IN_RATE:
+        return observation.rate_text(body.filters.to_array()[observation.IN_RATE.index(scale), 1])
+    return scale.text
 
 
 def _start(settings: Settings, options: Mapping[str, float]) -> str:
