@@ -126,7 +126,8 @@ class Objective:
         if envs.action_form != "rates":
             raise ParameterError(f"env_id: expected an id of one leg, got {env_id!r}")
         self.envs, self.spent, self.family = envs, 0, family
-        self.box = Box(envs.batch.body.middle, envs.batch.body.half)
+        body: Any = envs.batch.body
+        self.box = Box(body.middle, body.half)
 
     def decode(self, x: Floats) -> dict[str, Floats]:
         """See `decode`, for this leg."""

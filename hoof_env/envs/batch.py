@@ -196,7 +196,7 @@ class EpisodeBatch:
         )
         is_few = self.engine.is_few or self.paper
         self.kernel, self._observe = (
-            (k.step_one, k.observe_one) if is_few else (k.step_batch, k.observe_batch)
+            (k.step_one, k.observers.observe_one) if is_few else (k.step_batch, k.observers.observe_batch)
         )
         if self.paper:
             self.kernel = self._step_paper
@@ -252,12 +252,12 @@ class EpisodeBatch:
 
             def measure(rows: NDArray[np.int64]) -> None:
                 found = np.zeros_like(out)
-                self._kernels.measure_one(self.addresses, found)
+                self._kernels.observers.measure_one(self.addresses, found)
                 out[:, rows] = found[:, rows]
 
             under_each(self, np.arange(self.num_envs), measure)
         else:
-            self._kernels.measure_one(self.addresses, out)
+            self._kernels.observers.measure_one(self.addresses, out)
         return dict(zip(self.names, out, strict=True))
 
     # Conditions
