@@ -22,7 +22,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,21 +93,31 @@ class Args:
     """file; otherwise runs/open_loop/ENV-FAMILY.json"""
 
 
-def decode(family: str, x: Floats) -> dict[str, Floats]:
-    """Parameters of `open_loop` for points of the box [-1, 1], shape (..., SIZES[family]): the box is the
-    range of the gait parameters, and the unit of a harmonic is half of it."""
-    constant = MIDDLE + HALF_RANGE * x[..., :4]
+class Box(NamedTuple):
+    """Middle and half range of the gait parameters, shape (4,); those of the published leg by default."""
+
+    middle: Floats = MIDDLE
+    half: Floats = HALF_RANGE
+
+
+PUBLISHED = Box()
+
+
+def decode(family: str, x: Floats, box: Box = PUBLISHED) -> dict[str, Floats]:
+    """Parameters of `open_loop` for points of [-1, 1], shape (..., SIZES[family]): the `box` is the range of
+    the gait parameters, and the unit of a harmonic is half of it."""
+    constant = box.middle + box.half * x[..., :4]
     if family == "constant":
         return {"constant": constant}
     frequency = SLOWEST * (FASTEST / SLOWEST) ** ((x[..., 12] + 1) / 2)
-    sine = HALF_RANGE * x[..., 4:8]
-    cosine = HALF_RANGE * x[..., 8:12]
+    sine = box.half * x[..., 4:8]
+    cosine = box.half * x[..., 8:12]
     return {"constant": constant, "sin": sine, "cos": cosine, "frequency_hz": frequency}
 
 
-def encode(constant: Sequence[float]) -> Floats:
+def encode(constant: Sequence[float], box: Box = PUBLISHED) -> Floats:
     """Inverse of `decode` for a constant gait, shape (4,), within the box."""
-    return np.clip((np.asarray(constant, float) - MIDDLE) / HALF_RANGE, -1.0, 1.0)
+    return np.clip((np.asarray(constant, float) - box.middle) / box.half, -1.0, 1.0)
 
 
 class Objective:
@@ -125,11 +135,17 @@ class Objective:
         self.envs = envs
         self.spent = 0
         self.family = family
+        body: Any = envs.batch.body
+        self.box = Box(body.middle, body.half)
+
+    def decode(self, x: Floats) -> dict[str, Floats]:
+        """See `decode`, for this leg."""
+        return decode(self.family, x, self.box)
 
     def costs(self, x: Floats, seeds: Sequence[int]) -> list[float]:
         """Minus the mean returns of candidates, shape (n, size), that meet the same starts; n * len(seeds) is
         `ROWS`."""
-        episodes = self._play(decode(self.family, np.repeat(x, len(seeds), axis=0)), [*seeds] * len(x))
+        episodes = self._play(self.decode(np.repeat(x, len(seeds), axis=0)), [*seeds] * len(x))
         returns = np.reshape([one["return"] for one in episodes], (len(x), len(seeds)))
         return [-float(np.mean(some)) for some in returns]
 
@@ -175,7 +191,7 @@ def search(
     size = SIZES[objective.family]
     step = STEP
     if start is not None:
-        first = np.array([*encode(start), *[0.0] * (size - len(start))])
+        first = np.array([*encode(start, objective.box), *[0.0] * (size - len(start))])
         step = STEP / 3
     else:
         screened = generator.uniform(-1, 1, (ROWS // 4, size))
@@ -257,7 +273,7 @@ def search_once(objective: Objective, seed: int, about: dict[str, Any], bar: Any
 
     start = about["start"] if seed % 2 else None
     x, cost, interrupted = search(objective, seed, about["episodes_of_a_search"], tick, start)
-    parameters = {key: value.tolist() for key, value in decode(objective.family, x).items()}
+    parameters = {key: value.tolist() for key, value in objective.decode(x).items()}
     return {
         "seed": seed,
         "cost": cost,

@@ -3,8 +3,10 @@ they pass; and the motion of crank and swing that follows."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from functools import cache
 from types import MappingProxyType
 from typing import Any, TypeVar
 
@@ -12,7 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.errors import ParameterError, check_choice, check_number
-from hoof_env.leg.geometry import DEFAULT_PRESET, Preset, preset_error_type, preset_label, read_preset
+from hoof_env.leg.geometry import (
+    DEFAULT_PRESET,
+    Geometry,
+    Preset,
+    load_geometry,
+    preset_error_type,
+    preset_label,
+    read_preset,
+)
 from hoof_env.simd.compile import kernel
 from hoof_env.simd.math import clip
 
@@ -26,8 +36,31 @@ LIMITS = MappingProxyType(
         "swing_cos": (-0.9, 0.9),
     }
 )
-"""Lowest and highest value of each gait parameter [rad/s, rad, rad, rad]. Both gaits of the paper lie inside,
-and so do the best gaits that were learned: docs/evidence/actions.md has the sweep."""
+"""Lowest and highest value of each gait parameter of the published leg [rad/s, rad, rad, rad]; `limits_of`
+has those of others. Both gaits of the paper lie inside, and so do the best gaits that were learned:
+docs/evidence/actions.md has the sweep."""
+
+FASTEST_CRANK = 1000.0
+"""Of any leg [rad/s]: that of a leg of a quarter of a millimetre may turn so fast."""
+
+
+@cache
+def _published_hip_height() -> float:
+    return load_geometry(DEFAULT_PRESET).hip_height
+
+
+def speed_scale_of(geometry: Geometry) -> float:
+    """Speed of a leg over that of the published leg at the same Froude number [-]: the root of the ratio of
+    their hip heights. A similar motion takes so many times as long."""
+    return math.sqrt(geometry.hip_height / _published_hip_height())
+
+
+def limits_of(geometry: Geometry) -> dict[str, tuple[float, float]]:
+    """The `LIMITS` of a leg: angles are those of the published leg, and at one Froude number the crank turns
+    faster by the root of how much smaller the leg is."""
+    low, high = LIMITS["crank_speed"]
+    speed_scale = speed_scale_of(geometry)
+    return {**LIMITS, "crank_speed": (low / speed_scale, high / speed_scale)}
 
 
 @dataclass(frozen=True)
@@ -39,14 +72,16 @@ class GaitParameters:
     The paper says that running 'controls the leg orientation by swinging motion with respect to the body' and
     does not print the law; one harmonic is this project's assumption.
 
+    How fast a crank may be commanded to turn depends on the size of the leg; environments check it.
+
     Attributes:
-        crank_speed: theta's rate [rad/s], 0 to 4 pi.
+        crank_speed: theta's rate [rad/s], 0 to `FASTEST_CRANK`; to 4 pi in environments of the published leg.
         swing_offset: phi0 [rad], -0.4 to 1.4.
         swing_sin: A [rad], -0.9 to 0.9.
         swing_cos: B [rad], -0.9 to 0.9.
 
     Raises:
-        ParameterError: a value is not finite or outside `LIMITS`.
+        ParameterError: a value is not finite or outside these limits.
     """
 
     crank_speed: float
@@ -59,7 +94,7 @@ class GaitParameters:
 
     def _check(self, limits: Mapping[str, tuple[float, float]]) -> None:
         for name in PARAMETERS:
-            low, high = limits[name]
+            low, high = limits[name] if name != "crank_speed" else (0.0, FASTEST_CRANK)
             object.__setattr__(self, name, check_number(name, getattr(self, name), low=low, high=high))
 
     def to_array(self) -> NDArray[np.float64]:
@@ -87,7 +122,7 @@ WIDEST = MappingProxyType(
         "swing_sin": (-1.5, 1.5), "swing_cos": (-1.5, 1.5), "higher": (-0.6, 0.6),
     }
 )  # fmt: skip
-"""The `LIMITS` of a `HarmonicGait`."""
+"""The `LIMITS` of a `HarmonicGait`, of a leg of a horse's size."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +136,8 @@ class HarmonicGait(GaitParameters):
         higher: A2, B2 and perhaps A3, B3 [rad], -0.6 to 0.6; the others are those of `GaitParameters`.
 
     Raises:
-        ParameterError: a value is not finite or outside `WIDEST`, or there are not 2 or 4 of `higher`.
+        ParameterError: a value is not finite, an angle is outside `WIDEST`, or there are not 2 or 4 of
+            `higher`.
     """
 
     higher: tuple[float, ...] = (0.0, 0.0)
@@ -255,11 +291,11 @@ class FilterSettings:
                     f"got {self.gain:g} * {rate:g} > {acc:g}"
                 )
 
-    def sped_up(self, pace: float) -> FilterSettings:
+    def sped_up(self, speed_scale: float) -> FilterSettings:
         """The filters of a motion that takes its course so many times as fast [-]."""
         return FilterSettings(
-            self.gain * pace, self.crank_rate * pace**2, self.crank_acc * pace**3,
-            self.swing_rate * pace, self.swing_acc * pace**2,
+            self.gain * speed_scale, self.crank_rate * speed_scale**2, self.crank_acc * speed_scale**3,
+            self.swing_rate * speed_scale, self.swing_acc * speed_scale**2,
         )  # fmt: skip
 
     @property

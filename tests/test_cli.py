@@ -99,7 +99,7 @@ BAD_REQUESTS = {
         (["--out", "{}/x.txt"], "expected a file that ends in .c3d, .csv, .mot, .parquet, .sto"),
         (["--out", "{}/x.csv", "--policy", "gallop"], "policy: expected a name"),
         (["--out", "{}/x.csv", "--policy", "1,0.2,0.3,nan"], "swing_cos: expected"),
-        (["--out", "{}/x.csv", "--policy", "99,0,0,0"], "crank_speed: expected"),
+        (["--out", "{}/x.csv", "--policy", "99,0,0,0"], "expected crank_speed from 0 to 12.5664"),
         (["--out", "{}/x.csv", "--policy", "no.zip"], "model no.zip"),
         (["--out", "{}/x.csv", "--id", "hoof_env/Nobody-v0"], "environment 'hoof_env/Nobody-v0'"),
         (["--out", "{}/x.csv", "--id", "CartPole-v1"], "expected one leg of this package"),

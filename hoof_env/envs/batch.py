@@ -205,7 +205,9 @@ class EpisodeBatch:
         )
         runs_scalar = self.engine.runs_scalar or self.paper
         self.kernel, self._observe = (
-            (k.step_one, k.observe_one) if runs_scalar else (k.step_batch, k.observe_batch)
+            (k.step_one, k.observers.observe_one)
+            if runs_scalar
+            else (k.step_batch, k.observers.observe_batch)
         )
         if self.paper:
             self.kernel = self._step_paper
@@ -225,7 +227,7 @@ class EpisodeBatch:
         """Have every kernel of a step compiled, or loaded, by running it on no environment."""
         if self.paper:
             self._run_idle(self._kernels.apply_one, self._kernels.finish_one)
-            self.paper.compile(GaitParameters.from_array(MIDDLE))
+            self.paper.compile(GaitParameters(*MIDDLE))
         else:
             self._run_idle(self.kernel)
         self._run_idle(self._observe)
@@ -261,12 +263,12 @@ class EpisodeBatch:
 
             def measure(rows: NDArray[np.int64]) -> None:
                 found = np.zeros_like(out)
-                self._kernels.measure_one(self.addresses, found)
+                self._kernels.observers.measure_one(self.addresses, found)
                 out[:, rows] = found[:, rows]
 
             under_each(self, np.arange(self.num_envs), measure)
         else:
-            self._kernels.measure_one(self.addresses, out)
+            self._kernels.observers.measure_one(self.addresses, out)
         return dict(zip(self.names, out, strict=True))
 
     # Conditions

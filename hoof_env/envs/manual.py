@@ -99,7 +99,9 @@ def page(task: str, film: str = "") -> str:
     if task == "mo":
         objectives = _objectives(check_weights(what.settings({}).reward_weights))
         return _tidy(
-            Template(MO_PAGE).substitute(film=film, observations=_observations(what), objectives=objectives)
+            Template(MO_PAGE).substitute(
+                film=film, observations=_observations(what, OneLeg(what.settings({}))), objectives=objectives
+            )
         )
     s = what.settings({})
     kind = "horse" if what.is_horse else "leg"
@@ -123,7 +125,7 @@ def page(task: str, film: str = "") -> str:
         about=what.about,
         body=Template(WORDS[f"{kind}_body"].strip()).safe_substitute(trunk=trunk["moves"]),
         action_space=f"Box(-1, 1, ({len(body.action_names)},), float32)",
-        actions=_horse_actions() if what.is_horse else _actions(s),
+        actions=_horse_actions() if isinstance(body, Horse) else _actions(body),
         commands=WORDS[f"{kind}_commands"].strip(),
         observed=WORDS[f"{kind}_observed"].strip(),
         still="" if what.is_horse else " " + WORDS["leg_still"].strip(),
@@ -133,7 +135,7 @@ def page(task: str, film: str = "") -> str:
         prefixes=WORDS["prefixes"] if what.is_horse else "",
         example='"phase": 0.0' if what.is_horse else '"gait": "run", "crank_angle": 0.0',
         observation_space=f"Box(-1, 1, ({len(_observed(what))},), float32)",
-        observations=_observations(what),
+        observations=_observations(what, body),
         other_groups=", ".join(f"`{group}`" for group in groups if group not in s.observation),
         rewards=markdown_table(("Term", "Weight", "Default", "Unit", "Meaning"), rewards),
         target_reward=WORDS["target_reward"] if s.target_speed and not what.is_horse else "",
@@ -202,7 +204,9 @@ def write_pages(out: Path, films: Path | None = None) -> list[Path]:
     """
     shown = {name: "" if films is None else _find_film(films, name, out) for name in _NAMES.values()}
     texts = {f"{name}.md": page(task, shown[name]) for task, name in _NAMES.items()}
-    texts["HorseLegMO.md"] = _tidy(texts["HorseLegMO.md"].replace(_observations(TASKS["leg"]), ""))
+    texts["HorseLegMO.md"] = _tidy(
+        texts["HorseLegMO.md"].replace(_observations(TASKS["leg"], OneLeg(TASKS["leg"].settings({}))), "")
+    )
     for name in _NAMES.values():
         if name not in (COMMON, "HorseLegMO"):  # which says by itself what it shares
             common = texts[f"{COMMON}.md"].replace(f"/{COMMON}-v0", f"/{name}-v0")
@@ -298,14 +302,14 @@ def _horse_actions() -> str:
     return markdown_table(head, rows)
 
 
-def _actions(settings: Settings) -> str:
-    rates = [settings.crank_rate, *[settings.swing_rate] * (len(LIMITS) - 1)]
+def _actions(body: OneLeg) -> str:
     rows = []
-    for k, (low, high) in enumerate(LIMITS.values()):
+    for k, (low, high) in enumerate(zip(body.low, body.high, strict=True)):
         value = GAIT[k]
         rate = GAIT[len(LIMITS) + k]
         limits = f"{low:.5g} to {high:.5g} {value.unit}"
-        rows.append((str(k), value.name, f"{-rates[k]:g}", f"{rates[k]:g}", rate.unit, limits))
+        ends = f"{-body.rates[k]:g}", f"{body.rates[k]:g}"
+        rows.append((str(k), value.name, *ends, rate.unit, limits))
     return markdown_table(("Num", "Rate of", "At -1", "At +1", "Unit", "Limits of the value"), rows)
 
 
@@ -319,9 +323,20 @@ def _objectives(weights: Mapping[str, float]) -> str:
     return markdown_table(("Num", "Objective", "Terms", "Weights by default"), rows)
 
 
-def _observations(what: Task) -> str:
-    rows = [(str(k), e.name, e.scale.text, e.unit, e.group) for k, e in enumerate(_observed(what))]
+def _observations(what: Task, body: Horse | OneLeg) -> str:
+    entries = enumerate(_observed(what))
+    rows = [(str(k), e.name, _scaling(e.scale, body), e.unit, e.group) for k, e in entries]
     return markdown_table(("Num", "Observation", "Scaling", "Unit before scaling", "Group"), rows)
+
+
+def _scaling(scale: observation.Scale, body: Horse | OneLeg) -> str:
+    """The formula of a scale; limits and bounds are those of the leg."""
+    if isinstance(body, OneLeg) and scale in observation.IN_RANGE:
+        k = observation.IN_RANGE.index(scale)
+        return observation.range_text(body.low[k], body.high[k])
+    if isinstance(body, OneLeg) and scale in observation.IN_RATE:
+        return observation.rate_text(body.filters.to_array()[observation.IN_RATE.index(scale), 1])
+    return scale.text
 
 
 def _start(settings: Settings, options: Mapping[str, float]) -> str:

@@ -20,8 +20,7 @@ from hoof_env.errors import DataFileError, ParameterError, check_choice, parse_j
 from hoof_env.gait import LIMITS, GaitParameters, paper_gaits
 from hoof_env.leg.profile import leg_profile
 from hoof_env.tasks.leg_starts import extreme_posture
-from hoof_env.tasks.observation import HALF_RANGE, HIGH, LOW, MIDDLE
-from hoof_env.tasks.one_leg import action_towards, check_reachable, lead_of
+from hoof_env.tasks.one_leg import action_towards, lead_of
 
 Action = NDArray[np.float32]
 
@@ -103,12 +102,13 @@ def heading_seen(env: Any) -> Any:
     first = leg.observation_names.index("crank speed")
     middle = first + len(LIMITS)
     last = middle + len(LIMITS)
-    lead = lead_of(leg.batch.dt)
-    rate_bounds = leg.batch.engine.filters.to_array()[:, 1]
+    body = leg.batch.body
+    lead = lead_of(body.filters, leg.batch.dt)
+    rate_bounds = body.filters.to_array()[:, 1]
 
     def heading(observation: Any) -> Any:
         seen = np.asarray(observation, float)
-        gait = MIDDLE + HALF_RANGE * seen[..., first:middle]
+        gait = body.middle + body.half * seen[..., first:middle]
         return gait + lead * rate_bounds * seen[..., middle:last]
 
     return heading
@@ -168,8 +168,10 @@ def _bang_bang(count: int, observation: Any, time: Any) -> Any:
 
 
 def constant_gait(gait: GaitParameters, env: Any, starts_in_it: bool = False) -> Scripted:
-    """A policy that goes to a gait and keeps it, in an episode that perhaps starts in it."""
+    """A policy that goes to a gait and keeps it, in an episode that perhaps starts in it; `ParameterError` of
+    one that cannot be commanded."""
     values = gait.to_array()
+    env.unwrapped.batch.body.check_reachable("gait", values)
     start = {"gait": gait} if starts_in_it else None
     return Scripted(towards(env, lambda observation, time: values), env.unwrapped.dt, start)
 
@@ -183,7 +185,7 @@ def _at_a_posture(name: str, env: Any, middle: float) -> Scripted:
             f"policy {name!r}: expected 'crank' among the observed groups, got {leg.settings.observation!r}"
         )
     sine, cosine = map(leg.observation_names.index, seen)
-    brakes = leg.settings.crank_rate
+    brakes = leg.batch.body.rates[0]
     offsets = np.linspace(*LIMITS["swing_offset"], 14) if name == "airborne" else [middle]
     rests = np.array([(0.0, offset, 0.0, 0.0) for offset in offsets])
     posture, target = extreme_posture(leg_profile(leg.geometry), rests, name == "drag")
@@ -209,23 +211,24 @@ def open_loop(parameters: Mapping[str, Any], env: Any) -> Scripted:
     Args:
         parameters: "constant", gait parameters, shape (4,), or (n, 4) for n environments; and, if there is a
             clock, "sin" and "cos" of the same shape and "frequency_hz", a number or shape (n,). The sum is
-            kept within `gait.LIMITS`.
+            kept within the limits of the leg.
         env: environment of one leg.
 
     Raises:
-        ParameterError: a constant gait beyond `gait.LIMITS`.
+        ParameterError: a constant gait beyond the limits of the leg.
     """
     constant = np.asarray(parameters["constant"], float)
     dt = env.unwrapped.dt
+    body = env.unwrapped.batch.body
     if "frequency_hz" not in parameters:
-        check_reachable("constant", constant)
+        body.check_reachable("constant", constant)
         return Scripted(towards(env, lambda observation, time: constant), dt)
     sine, cosine = (np.asarray(parameters[name], float) for name in ("sin", "cos"))
     rate = 2 * np.pi * np.asarray(parameters["frequency_hz"], float)
 
     def gait_at(observation: Any, time: Any) -> Any:
         phase = np.asarray(rate * time)[..., None]
-        return np.clip(constant + sine * np.sin(phase) + cosine * np.cos(phase), LOW, HIGH)
+        return np.clip(constant + sine * np.sin(phase) + cosine * np.cos(phase), body.low, body.high)
 
     return Scripted(towards(env, gait_at), dt)
 

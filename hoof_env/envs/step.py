@@ -9,6 +9,7 @@ arguments costs more than a step."""
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -146,24 +147,36 @@ def slots_of(entries: tuple[Entry, ...]) -> tuple[list[int], int, int]:
 
 def _with_entries(entries: tuple[Entry, ...], layouts: Memories, scaled: bool) -> Callable[..., Any]:
     """A function that puts the entries that are observed into their slots: scaled but for tanh, or as they
-    are measured. numba has no loop over functions, so each half is a function of its own."""
-    slots = slots_of(entries)[0]
+    are measured. Those of this package are compiled once for all tasks that have them in these slots."""
+    placed = tuple(zip(entries, slots_of(entries)[0], strict=True))
+    ours = tuple(one for one in placed if not _from_outside(_functions_of(one[0])))
+    own = tuple(one for one in placed if one not in ours)
+    if not own or not ours:
+        return (_put_ours if ours else _put_all)(placed, layouts, scaled)
+    return _one_and_other(_put_ours(ours, layouts, scaled), _put_all(own, layouts, scaled))
 
-    def put_from(first: int, last: int) -> Callable[..., Any]:
-        if last - first == 1:
-            return _with_entry(entries[first], slots[first], layouts, scaled)
-        middle = (first + last) // 2
-        one = put_from(first, middle)
-        other = put_from(middle, last)
 
-        @inline_llvm
-        def put_both(addresses, lanes, scene, numbers, n):  # type: ignore[no-untyped-def]
-            one(addresses, lanes, scene, numbers, n)
-            other(addresses, lanes, scene, numbers, n)
+def _put_all(placed: tuple[tuple[Entry, int], ...], layouts: Memories, scaled: bool) -> Callable[..., Any]:
+    """A function that puts entries into the slots beside them. numba has no loop over functions, so each half
+    is a function of its own."""
+    if len(placed) == 1:
+        return _with_entry(*placed[0], layouts, scaled)
+    middle = len(placed) // 2
+    halves = (_put_all(half, layouts, scaled) for half in (placed[:middle], placed[middle:]))
+    return _one_and_other(*halves)
 
-        return put_both
 
-    return put_from(0, len(entries))
+_put_ours = lru_cache(maxsize=32)(_put_all)
+"""The same for entries of this package."""
+
+
+def _one_and_other(one: Callable[..., Any], other: Callable[..., Any]) -> Callable[..., Any]:
+    @inline_llvm
+    def put_both(addresses, lanes, scene, numbers, n):  # type: ignore[no-untyped-def]
+        one(addresses, lanes, scene, numbers, n)
+        other(addresses, lanes, scene, numbers, n)
+
+    return put_both
 
 
 def _with_entry(entry: Entry, slot: int, layouts: Memories, scaled: bool) -> Callable[..., Any]:
@@ -191,6 +204,23 @@ def _with_entry(entry: Entry, slot: int, layouts: Memories, scaled: bool) -> Cal
     return put_one_by_one if entry.scalar else put_entry
 
 
+class Observers(Kernels):
+    """Kernels of the observation, which tasks with the same entries share; they take what those of
+    `StepKernels` take.
+
+    Attributes:
+        observe_one, observe_batch: observations without a step.
+        measure_one: puts what is observed, before it is scaled, into an array of doubles, shape (count,
+            columns).
+        observe: a part of other kernels; observes n and, with lanes, its neighbours.
+    """
+
+    observe_one: Any
+    observe_batch: Any
+    measure_one: Any
+    observe: Any
+
+
 class StepKernels(Kernels):
     """Kernels of a task: each takes the array of `ADDRESSES`. What ends in `_one` goes through the
     environments one by one, what ends in `_batch` takes `LANES` at a time.
@@ -198,21 +228,18 @@ class StepKernels(Kernels):
     Attributes:
         step_one, step_batch: a control step; returns what `NOT_A_NUMBER` and the others say.
         apply_one, finish_one: what is before and behind the engine, for a solver that is not a kernel.
-        observe_one, observe_batch: observations without a step.
-        measure_one: puts what is observed, before it is scaled, into an array of doubles, shape (count,
-            columns).
+        observers: of the observation alone.
     """
 
     step_one: Any
     step_batch: Any
     apply_one: Any
     finish_one: Any
-    observe_one: Any
-    observe_batch: Any
-    measure_one: Any
+    observers: Observers
 
 
 _KEPT = Kept()
+_OBSERVERS = Kept()
 
 
 def step_kernels(
@@ -225,8 +252,7 @@ def step_kernels(
     """The kernels of tasks with these terms, entries and law of contact, on an engine of this kind with one
     leg, or with a horse's four. `ParameterError` where one of their functions reaches what cannot be read."""
     what = terms, entries, contact_law, features, legs
-    functions = _functions(terms, entries, contact_law)
-    own = [function for function in functions if not str(function.__module__).startswith("hoof_env.")]
+    own = _from_outside(_functions(terms, entries, contact_law))
     now = fingerprint(*own)  # what a function names may be another's by now, as in a notebook
     found: StepKernels = _KEPT.get((*what, now), lambda: _made(own, *what), bool(own))
     return found
@@ -237,37 +263,28 @@ def _functions(
 ) -> list[Callable[..., Any]]:
     """All that a task gives to its kernels."""
     parts: list[Any] = [term.compute for term in terms]
-    parts += [part for entry in entries for part in (entry.measure, entry.scale.apply) if part]
+    parts += [part for entry in entries for part in _functions_of(entry)]
     return [*parts, contact_law] if contact_law else parts
 
 
-def _made(
-    own: list[Callable[..., Any]],
-    terms: tuple[Term, ...],
-    entries: tuple[Entry, ...],
-    contact_law: Callable[..., Any] | None,
-    features: Features,
-    legs: int,
-) -> StepKernels:
-    refresh(*own)
-    flags = (
-        [(term.scalar, not is_user_term(term)) for term in terms],
-        [(entry.scalar, entry.scale.saturates) for entry in entries],
-    )
-    parts = _functions(terms, entries, contact_law)
-    layouts = memories_of(len(terms), features, legs)
-    identity = fingerprint(*parts, flags, layouts.episode.names, (FAILED, TRUNCATED))
-    if features != PLAIN:
-        identity += f" {tuple(features)}"
+def _functions_of(entry: Entry) -> list[Callable[..., Any]]:
+    return [part for part in (entry.measure, entry.scale.apply) if part]
+
+
+def _from_outside(functions: list[Callable[..., Any]]) -> list[Callable[..., Any]]:
+    """Those that are not of this package."""
+    return [function for function in functions if not str(function.__module__).startswith("hoof_env.")]
+
+
+def _observers(entries: tuple[Entry, ...], terms: int, features: Features, legs: int) -> Observers:
+    """The kernels of entries, beside so many terms."""
+    layouts = memories_of(terms, features, legs)
     _, vectors, slots = slots_of(entries)
-    task_record = task_type(len(terms), slots, layouts.gait, legs)
-    if legs > 1:
-        identity += f" {legs} legs, {task_record.descr}"  # how many gaits there are is data
-    compute_reward = _with_terms(terms, layouts)
+    task_record = task_type(terms, slots, layouts.gait, legs)
+    flags = [(entry.scalar, entry.scale.saturates) for entry in entries], (terms, features, legs)
+    parts = [part for entry in entries for part in _functions_of(entry)]
+    identity = fingerprint(*parts, flags, layouts.episode.names, str(task_record.descr))
     put_scaled, put_measured = (_with_entries(entries, layouts, scaled) for scaled in (True, False))
-    advance = advance_kernels(contact_law, features)
-    advance_one = advance.advance_leg if legs == 1 else advance.advance_four
-    advance_batch = advance.advance_batch
     task_at = record_at(task_record)
     model_at = record_at(MODEL)
 
@@ -279,25 +296,6 @@ def _made(
         return ObservationInputs(
             trunk, leg, episode, task, ground, model.ground_origin, model.ground_per_metre
         )
-
-    @inline_source
-    def are_numbers(addresses):  # type: ignore[no-untyped-def]
-        """Whether all actions are, those of other blocks, too."""
-        actions = singles_at(addresses[AT.actions])
-        count = addresses[AT.data + COLUMNS]
-        good = True
-        for k in range(count * (legs * ACTIONS)):
-            good &= absolute(float(actions[k])) < np.inf
-        return good
-
-    @inline_source
-    def apply_actions(addresses, lanes, task, n, scratch):  # type: ignore[no-untyped-def]
-        _, leg, episode = memories(addresses, lanes, layouts, n)
-        actions = singles_at(addresses[AT.actions])
-        if legs == 1:
-            apply_action(task, actions, leg, n)
-        else:
-            command_gait(task, actions, episode, leg, layouts.gait, n, rows(scratch, lanes, None))
 
     @inline_source
     def observe(addresses, lanes, task, n, memory):  # type: ignore[no-untyped-def]
@@ -322,6 +320,88 @@ def _made(
                     n * task.observation_size + place,
                     task.observation_size,
                 )
+
+    @inline_source
+    def observe_all(addresses, lanes):  # type: ignore[no-untyped-def]
+        task = task_at(addresses[AT.task])[0]
+        memory = doubles(slots * lanes)
+        for n in range(addresses[BEGIN], addresses[END], lanes):
+            observe(addresses, lanes, task, n, memory)
+
+    def observe_one(addresses):  # type: ignore[no-untyped-def]
+        observe_all(addresses, 1)
+
+    def observe_batch(addresses):  # type: ignore[no-untyped-def]
+        observe_all(addresses, LANES)
+
+    def measure_one(addresses, out):  # type: ignore[no-untyped-def]
+        task = task_at(addresses[AT.task])[0]
+        numbers = rows(doubles(slots), 1, None)
+        for n in range(out.shape[1]):
+            put_measured(addresses, 1, scene_of(addresses, 1, task, n), numbers, n)
+            for slot in range(slots):
+                if task.observation_columns[slot] >= 0:
+                    write(numbers[slot], address(out), task.observation_columns[slot] * out.shape[1] + n, 1)
+
+    functions = observe_one, observe_batch, measure_one
+    return Observers(
+        observe=observe, **{function.__name__: kernel(function, identity) for function in functions}
+    )
+
+
+def _made(
+    own: list[Callable[..., Any]],
+    terms: tuple[Term, ...],
+    entries: tuple[Entry, ...],
+    contact_law: Callable[..., Any] | None,
+    features: Features,
+    legs: int,
+) -> StepKernels:
+    refresh(*own)
+    flags = (
+        [(term.scalar, not is_user_term(term)) for term in terms],
+        [(entry.scalar, entry.scale.saturates) for entry in entries],
+    )
+    parts = _functions(terms, entries, contact_law)
+    layouts = memories_of(len(terms), features, legs)
+    identity = fingerprint(*parts, flags, layouts.episode.names, (FAILED, TRUNCATED))
+    if features != PLAIN:
+        identity += f" {tuple(features)}"
+    slots = slots_of(entries)[2]
+    task_record = task_type(len(terms), slots, layouts.gait, legs)
+    if legs > 1:
+        identity += f" {legs} legs, {task_record.descr}"  # how many gaits there are is data
+    compute_reward = _with_terms(terms, layouts)
+    of_entries = _from_outside([part for entry in entries for part in _functions_of(entry)])
+    observers: Observers = _OBSERVERS.get(
+        (entries, len(terms), features, legs, fingerprint(*of_entries)),
+        lambda: _observers(entries, len(terms), features, legs), bool(of_entries),
+    )  # fmt: skip
+    observe = observers.observe
+    advance = advance_kernels(contact_law, features)
+    advance_one = advance.advance_leg if legs == 1 else advance.advance_four
+    advance_batch = advance.advance_batch
+    task_at = record_at(task_record)
+    model_at = record_at(MODEL)
+
+    @inline_source
+    def are_numbers(addresses):  # type: ignore[no-untyped-def]
+        """Whether all actions are, those of other blocks, too."""
+        actions = singles_at(addresses[AT.actions])
+        count = addresses[AT.data + COLUMNS]
+        good = True
+        for k in range(count * (legs * ACTIONS)):
+            good &= absolute(float(actions[k])) < np.inf
+        return good
+
+    @inline_source
+    def apply_actions(addresses, lanes, task, n, scratch):  # type: ignore[no-untyped-def]
+        _, leg, episode = memories(addresses, lanes, layouts, n)
+        actions = singles_at(addresses[AT.actions])
+        if legs == 1:
+            apply_action(task, actions, leg, n)
+        else:
+            command_gait(task, actions, episode, leg, layouts.gait, n, rows(scratch, lanes, None))
 
     @inline_source
     def finish(addresses, lanes, task, n, memory):  # type: ignore[no-untyped-def]
@@ -362,13 +442,6 @@ def _made(
             happened |= finish(addresses, lanes, task, n, memory)
         return happened
 
-    @inline_source
-    def observe_all(addresses, lanes):  # type: ignore[no-untyped-def]
-        task = task_at(addresses[AT.task])[0]
-        memory = doubles(slots * lanes)
-        for n in range(addresses[BEGIN], addresses[END], lanes):
-            observe(addresses, lanes, task, n, memory)
-
     def step_one(addresses):  # type: ignore[no-untyped-def]
         return step(addresses, 1, advance_one)
 
@@ -392,22 +465,8 @@ def _made(
             happened |= finish(addresses, 1, task, n, memory)
         return happened
 
-    def observe_one(addresses):  # type: ignore[no-untyped-def]
-        observe_all(addresses, 1)
-
-    def observe_batch(addresses):  # type: ignore[no-untyped-def]
-        observe_all(addresses, LANES)
-
-    def measure_one(addresses, out):  # type: ignore[no-untyped-def]
-        task = task_at(addresses[AT.task])[0]
-        numbers = rows(doubles(slots), 1, None)
-        for n in range(out.shape[1]):
-            put_measured(addresses, 1, scene_of(addresses, 1, task, n), numbers, n)
-            for slot in range(slots):
-                if task.observation_columns[slot] >= 0:
-                    write(numbers[slot], address(out), task.observation_columns[slot] * out.shape[1] + n, 1)
-
-    functions = (step_one, step_batch, apply_one, finish_one, observe_one, observe_batch, measure_one)
+    functions = step_one, step_batch, apply_one, finish_one
     return StepKernels(
-        **{function.__name__: kernel(function, identity, function is step_batch) for function in functions}
+        observers=observers,
+        **{function.__name__: kernel(function, identity, function is step_batch) for function in functions},
     )

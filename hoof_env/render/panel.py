@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -12,7 +12,6 @@ import numpy as np
 import pygame
 
 from hoof_env.dynamics.observables import StanceCounter
-from hoof_env.gait import LIMITS
 from hoof_env.render.brush import CRANK, FAINT, FINE, FORCE, GREY, INK, PAPER, Brush
 from hoof_env.render.instant import Instant
 
@@ -100,15 +99,21 @@ class Stances:
 
 class Panel:
     """Numbers, gait and force curve in one box (left, top, width, height) of the picture, with the weight of
-    trunk and leg [N] as a line, if there is one, and stances from `lift_off_n` [N] on.
+    trunk and leg [N] as a line, if there is one, and stances from `lift_off_n` [N] on. `limits` are those of
+    the gait parameters, by name, see `gait.limits_of`.
 
     Its `full_scale`, the force at the top of the curve's axis [N], only grows during an episode.
     """
 
     def __init__(
-        self, brush: Brush, box: tuple[int, int, int, int], weight_n: float | None, lift_off_n: float
+        self,
+        brush: Brush,
+        box: tuple[int, int, int, int],
+        weight_n: float | None,
+        lift_off_n: float,
+        limits: Mapping[str, tuple[float, float]],
     ) -> None:
-        unit = brush.unit
+        unit, self._limits = brush.unit, limits
         self._brush, self._box, self._weight = brush, pygame.Rect(box), weight_n
         self._lift_off, self._force = lift_off_n, unit_of(lift_off_n)
         self._least = SMALLEST_OF_LIGHT if self._force is NEWTONS else SMALLEST_SCALE
@@ -180,7 +185,7 @@ class Panel:
             write(title, x, y, 20)
             left, right = self._track
             whole.fill(FAINT, (round(left), round(y - unit), round(right - left), max(2, round(3 * unit))))
-            low, high = LIMITS[name]
+            low, high = self._limits[name]
             if low < 0 < high:
                 whole.fill(GREY, (round(left + (right - left) * -low / (high - low)), round(y - 4 * unit), 1,
                                   round(9 * unit)))  # fmt: skip
@@ -209,7 +214,7 @@ class Panel:
         left, right = self._track
         for k, (_, name, unit_name) in enumerate(GAIT):
             _, y = self._line(len(NUMBERS) + 1.4 + k, 0)
-            low, high = LIMITS[name]
+            low, high = self._limits[name]
             actual, wanted = getattr(now, name), getattr(now, f"command_{name}")
             for value, mark in ((wanted, self._mark_command), (actual, self._mark_actual)):
                 if math.isfinite(value):

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.parts import ONE_LEG, TRUNKS
 from hoof_env.errors import HoofEnvError, ParameterError, check_choice, check_number, count
+from hoof_env.gait import limits_of
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
 from hoof_env.render.instant import HorseInstant, Instant, Surroundings
@@ -95,7 +96,8 @@ class Renderer:
             self._scene = Scene(
                 brush, geometry, ground, self.size, column + 2 * edge, trunk, unit_of(lift_off_n)
             )
-            self._panel = Panel(brush, box, weight_n if trunk == "suspended" else None, lift_off_n)
+            line = weight_n if trunk == "suspended" else None
+            self._panel = Panel(brush, box, line, lift_off_n, limits_of(geometry))
         self._window_open = False
         self._clock = pygame.time.Clock()
         self._closed = False

@@ -1,10 +1,11 @@
-"""Sets of kernels that are in memory, some 60 MB each once compiled: those of this package stay, those with
-functions from outside go once nothing uses them, but for the last few."""
+"""Sets of kernels that are in memory: those of this package stay, those with functions from outside go once
+nothing uses them, but for the last few. numba never gives back the machine code of a set that goes and what
+it was made from, 10 MB and more."""
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Hashable
+from threading import RLock
 from types import SimpleNamespace
 from typing import Any
 from weakref import WeakValueDictionary
@@ -21,23 +22,24 @@ class Kernels(SimpleNamespace):
 
 
 class Kept:
-    """The sets of one kind."""
+    """The sets of one kind. Of several threads that ask for a set that is not there one makes it."""
 
     def __init__(self) -> None:
         self._own: dict[Hashable, Kernels] = {}
         self._used: WeakValueDictionary[Hashable, Kernels] = WeakValueDictionary()
-        self._last: deque[Kernels] = deque(maxlen=MOST)
+        self._last: list[Kernels] = []
+        self._lock = RLock()
 
     def get(self, key: Hashable, make: Callable[[], Kernels], from_outside: bool) -> Any:
         """The kernels of a key, made where there are none."""
-        if not from_outside:
-            if key not in self._own:
-                self._own[key] = make()
-            return self._own[key]
-        found = self._used.get(key)
-        if found is None:
-            found = self._used[key] = make()
-        if found in self._last:
-            self._last.remove(found)
-        self._last.append(found)
-        return found
+        with self._lock:
+            if not from_outside:
+                if key not in self._own:
+                    self._own[key] = make()
+                return self._own[key]
+            found = self._used.get(key)
+            if found is None:
+                found = self._used[key] = make()
+            others = [one for one in self._last if one is not found]
+            self._last = [*others, found][-MOST:]
+            return found

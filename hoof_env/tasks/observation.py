@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hoof_env.errors import ParameterError
-from hoof_env.gait import LIMITS
+from hoof_env.gait import LIMITS, FilterSettings
 from hoof_env.ground.terrain import surface
 from hoof_env.simd import where
 from hoof_env.simd.compile import inline_llvm
@@ -20,7 +20,7 @@ from hoof_env.simd.user_functions import check_function
 LOW, HIGH = (np.array([limit[i] for limit in LIMITS.values()]) for i in (0, 1))
 MIDDLE = (LOW + HIGH) / 2
 HALF_RANGE = (HIGH - LOW) / 2
-"""Limits, middle and half range of the gait parameters, shape (4,)."""
+"""Limits, middle and half range of the gait parameters of the published leg, shape (4,)."""
 
 AHEAD = (0.25, 0.5, 0.75, 1.0)  # where the height of the ground is seen, from O forward [m]
 
@@ -123,14 +123,24 @@ def _in_range(k: int) -> Scale:
     def apply(x, scene):  # type: ignore[no-untyped-def]
         return (x - scene.task.middle[k]) / scene.task.half[k]
 
-    return Scale(f"linear, -1 at {LOW[k]:.8g} and 1 at {HIGH[k]:.8g}", apply)
+    return Scale(range_text(LOW[k], HIGH[k]), apply)
 
 
 def _in_rate(k: int) -> Scale:
     def apply(x, scene):  # type: ignore[no-untyped-def]
         return x / scene.task.rate_bound[k]
 
-    return Scale("/ 20" if k == 0 else "/ 6", apply)
+    return Scale(rate_text(FilterSettings().to_array()[k, 1]), apply)
+
+
+def range_text(low: float, high: float) -> str:
+    """The formula of a number between limits."""
+    return f"linear, -1 at {low:.8g} and 1 at {high:.8g}"
+
+
+def rate_text(bound: float) -> str:
+    """The formula of a rate with a bound."""
+    return f"/ {bound:.6g}"
 
 
 def _gait(k: int) -> Callable[[Any], Any]:
@@ -174,14 +184,18 @@ TRUE_RATE = "true rate of the crank"
 
 _PARAMETERS = ("crank speed", "swing offset", "swing sine coefficient", "swing cosine coefficient")
 _UNITS = ("rad/s", "rad", "rad", "rad")
+IN_RANGE = tuple(map(_in_range, range(4)))
+IN_RATE = tuple(map(_in_rate, range(4)))
+"""Scales of the gait parameters and their rates; limits and bounds are those of the leg, their texts those of
+the published one."""
 
 ENTRIES = (
     Entry("sin(crank angle)", "crank", "-", _sine, PLAIN),
     Entry("cos(crank angle)", "crank", "-", _cosine, PLAIN),
-    Entry(TRUE_RATE, "crank", "rad/s", lambda s: s.leg.state.theta_rate, _in_range(0)),
-    *(Entry(name, "gait", _UNITS[k], _gait(k), _in_range(k)) for k, name in enumerate(_PARAMETERS)),
+    Entry(TRUE_RATE, "crank", "rad/s", lambda s: s.leg.state.theta_rate, IN_RANGE[0]),
+    *(Entry(name, "gait", _UNITS[k], _gait(k), IN_RANGE[k]) for k, name in enumerate(_PARAMETERS)),
     *(
-        Entry(f"rate of {name}", "gait", "rad/s^2" if k == 0 else "rad/s", _gait_rate(k), _in_rate(k))
+        Entry(f"rate of {name}", "gait", "rad/s^2" if k == 0 else "rad/s", _gait_rate(k), IN_RATE[k])
         for k, name in enumerate(_PARAMETERS)
     ),
     Entry("forward speed", "trunk", "m/s", lambda s: s.trunk.report.velocity.real, tanh_of(5.0)),

@@ -20,12 +20,13 @@ from hoof_env.gait import (
     GaitParameters,
     HarmonicGait,
     gait_names,
+    limits_of,
     load_gait,
+    speed_scale_of,
 )
 from hoof_env.ground.contact import Ground, load_ground
 from hoof_env.leg.geometry import load_geometry, preset_error_type, preset_label
 from hoof_env.tasks.leg_starts import HIGHEST, LOWEST, Start, check_options, draw_starts
-from hoof_env.tasks.observation import HALF_RANGE, HIGH, LOW, MIDDLE
 from hoof_env.tasks.parameters import check_range, drive_of, ground_of, hoof_spring
 from hoof_env.tasks.settings import Settings
 
@@ -37,14 +38,18 @@ CARRIED = 5 / 6
 jump in every step; with 1 a change would go on."""
 
 
-def lead_of(dt: float) -> float:
+def lead_of(filters: FilterSettings, dt: float) -> float:
     """Time by which a zero action commands what is ahead of a gait that changes [s]: a part of the lag of the
     filters behind a command that moves at a steady rate, in control steps of `dt` [s]."""
-    return CARRIED * (1 / FilterSettings().gain + dt / 2)
+    return CARRIED * (1 / filters.gain + dt / 2)
 
 
-def check_rates(s: Settings) -> Floats:
+def check_rates(s: Settings, speed_scale: float = 1.0) -> Floats:
     """The rates at which an action of 1 changes the gait, shape (4,) [rad/s^2, rad/s, rad/s, rad/s].
+
+    Args:
+        s: settings, which are of the published leg.
+        speed_scale: see `gait.speed_scale_of`.
 
     Raises:
         ParameterError: a rate is not above 0, or beyond the bound of the filters.
@@ -52,10 +57,11 @@ def check_rates(s: Settings) -> Floats:
     filters = FilterSettings()
     crank = check_number("crank_rate", s.crank_rate, low=0, high=filters.crank_rate, exclusive_low=True)
     swing = check_number("swing_rate", s.swing_rate, low=0, high=filters.swing_rate, exclusive_low=True)
-    return np.array([crank, swing, swing, swing])
+    swing = swing / speed_scale
+    return np.array([crank / speed_scale**2, swing, swing, swing])
 
 
-def reach_per_rate(dt: float, substep: float) -> float:
+def reach_per_rate(filters: FilterSettings, dt: float, substep: float) -> float:
     """How far a command must be from where the gait is heading, over the rate at which the gait then changes
     if this is repeated in every control step [s].
 
@@ -69,10 +75,11 @@ def reach_per_rate(dt: float, substep: float) -> float:
         d_1 (1 - l_1^n) = r dt m_2 / (m_2 - m_1),    d_2 (1 - l_2^n) = r dt m_1 / (m_1 - m_2).
 
     Args:
+        filters: bounds of the commands.
         dt: control step [s].
         substep: of the filters [s].
     """
-    gain = FilterSettings().gain
+    gain = filters.gain
     follow = INNER * gain
     h = substep
     n = round(dt / substep)
@@ -86,25 +93,11 @@ def reach_per_rate(dt: float, substep: float) -> float:
     factors = middle + apart, middle - apart
     slopes = [from_distance / (factor - keeps_speed) for factor in factors]
     reach = 0.0
-    lead = lead_of(dt)
+    lead = lead_of(filters, dt)
     for factor, slope, other in zip(factors, slopes, reversed(slopes), strict=True):
         distance = dt * other / (other - slope) / (1 - factor**n)
         reach += distance * (1 - lead * slope)
     return reach
-
-
-def check_reachable(name: str, gaits: Floats) -> None:
-    """`ParameterError` where gait parameters, shape (..., 4), are beyond what can be commanded: commands are
-    clipped there, and another gait would be played without a word."""
-    for k, parameter in enumerate(PARAMETERS):
-        values = gaits[..., k]
-        slack = 1e-9 * HALF_RANGE[k]  # of sums like MIDDLE + HALF_RANGE
-        if ((values < LOW[k] - slack) | (values > HIGH[k] + slack)).any():
-            beyond = float(values.flat[np.argmax(np.abs(values - MIDDLE[k]))])
-            raise ParameterError(
-                f"{name}: expected {parameter} from {LOW[k]:.6g} to {HIGH[k]:.6g}, beyond which commands are"
-                f" clipped, got {beyond:.6g}"
-            )
 
 
 AT_REST = 1e-6
@@ -132,16 +125,22 @@ def heading_now(engine: TrunkEngine, dt: float) -> Floats:
     gait, rate = (
         np.stack([state[name + suffix][0] for name in PARAMETERS], axis=-1) for suffix in ("", "_rate")
     )
-    heading: Floats = gait + lead_of(dt) * rate
+    heading: Floats = gait + lead_of(engine.filters, dt) * rate
     return heading
 
 
 class OneLeg:
-    """A leg under a trunk; attributes and methods are as of `horse.Horse`."""
+    """A leg under a trunk; attributes and methods are as of `horse.Horse`, and others are
+
+    Attributes:
+        speed_scale: see `gait.speed_scale_of`.
+        low, high, middle, half: limits of the gait parameters, their middle and half range, shape (4,)
+            [rad/s, rad, rad, rad].
+        rates: at which an action of 1 changes them, shape (4,) [rad/s^2, rad/s, rad/s, rad/s].
+    """
 
     legs = 1
     harmonics = 1
-    filters = None
     limits = None
     action_names = tuple(f"rate_of_{name}" for name in PARAMETERS)
     action_form = "rates"
@@ -156,6 +155,11 @@ class OneLeg:
         check_choice("trunk", s.trunk, ONE_LEG)
         self.geometry = load_geometry(s.preset)
         load_ground(s.preset)  # what is wrong with it is said, also where the settings replace it
+        self.speed_scale = speed_scale_of(self.geometry)
+        self.filters = FilterSettings().sped_up(1 / self.speed_scale)
+        self.low, self.high = np.array([*limits_of(self.geometry).values()]).T
+        self.middle = (self.low + self.high) / 2
+        self.half = (self.high - self.low) / 2
         self.gaits = {name: load_gait(name, s.preset) for name in gait_names(s.preset)}
         for name, gait in self.gaits.items():
             if isinstance(gait, HarmonicGait):
@@ -163,9 +167,12 @@ class OneLeg:
                     f"{preset_label(s.preset)}, gait {name!r}: expected the four parameters of one harmonic, "
                     f"which environments of one leg take, got {gait!r}"
                 )
+            self.check_reachable(
+                f"{preset_label(s.preset)}, gait {name!r}", gait.to_array(), preset_error_type(s.preset)
+            )
         self.gait = None if s.gait is None else self.gaits[check_choice("gait", s.gait, self.gaits)]
         self._spring = hoof_spring(s)
-        self.rates = check_rates(s)
+        self.rates = check_rates(s, self.speed_scale)
         nominal = self.geometry.hip_height
         height = nominal if s.hip_height is None else s.hip_height
         self.height = check_number("hip_height", height, low=LOWEST * nominal, high=HIGHEST * nominal)
@@ -186,19 +193,38 @@ class OneLeg:
     def reach(self, engine: TrunkEngine, dt: float) -> Floats:
         """How far an action of 1 puts the command from where the gait is heading, shape (4,) [rad/s, and rad
         thrice]."""
-        return self.rates * reach_per_rate(dt, engine.substep)
+        return self.rates * reach_per_rate(self.filters, dt, engine.substep)
+
+    def check_reachable(self, name: str, gaits: Floats, error: type[Exception] = ParameterError) -> None:
+        """Raise an `error` where gait parameters, shape (..., 4), are beyond what can be commanded: commands
+        are clipped there, and another gait would be played without a word."""
+        for k, parameter in enumerate(PARAMETERS):
+            values = gaits[..., k]
+            low = self.low[k]
+            high = self.high[k]
+            slack = 1e-9 * self.half[k]  # of sums like middle + half
+            if ((values < low - slack) | (values > high + slack)).any():
+                beyond = float(values.flat[np.argmax(np.abs(values - self.middle[k]))])
+                whose = f" of a leg of {self.geometry.hip_height:.4g} m" if parameter == "crank_speed" else ""
+                raise error(
+                    f"{name}: expected {parameter} from {low:.6g} to {high:.6g}{whose}, beyond which commands"
+                    f" are clipped, got {beyond:.6g}"
+                )
 
     def constants(self, engine: TrunkEngine, dt: float) -> dict[str, Any]:
         """Of the task's record, with a control step of `dt` [s]."""
         return {
-            "reach": self.reach(engine, dt), "lead": lead_of(dt),
-            "middle": MIDDLE, "half": HALF_RANGE, "low": LOW, "high": HIGH,
+            "reach": self.reach(engine, dt), "lead": lead_of(self.filters, dt),
+            "middle": self.middle, "half": self.half, "low": self.low, "high": self.high,
             "height": self.height, "lowest": LOWEST * self.height, "highest": HIGHEST * self.height,
         }  # fmt: skip
 
     def check_options(self, options: Any, trunk: Trunk, settings: Settings) -> dict[str, Any]:
         """See `leg_starts.check_options`."""
-        return check_options(options, self.gaits, trunk, settings)
+        checked = check_options(options, self.gaits, trunk, settings)
+        if checked.get("gait") is not None:
+            self.check_reachable("options['gait']", checked["gait"].to_array())
+        return checked
 
     def draw(
         self, options: Mapping[str, Any], generators: Sequence[np.random.Generator], engine: TrunkEngine
@@ -226,5 +252,5 @@ class OneLeg:
                 f"gait: expected one of {', '.join(self.gaits)}, GaitParameters or an array of shape (4,) or "
                 f"({engine.num_envs}, 4), got {gaits!r}"
             )
-        check_reachable("gait", values)
+        self.check_reachable("gait", values)
         return action_towards(values, heading_now(engine, dt), self.reach(engine, dt))

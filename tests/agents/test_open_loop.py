@@ -37,7 +37,7 @@ def arguments(path, **changes):
 class Bowl:
     """An objective where the distance to a point costs, and starts add noise that all candidates share."""
 
-    family = "constant"
+    family, box = "constant", open_loop.PUBLISHED
 
     def __init__(self, interrupt_after=None):
         self.middle, self.met, self.left = np.array([0.3, -0.5, 0.9, 0.0]), [], interrupt_after

@@ -24,13 +24,14 @@ from hoof_env.cli import main
 from hoof_env.dynamics.hoof import GroundHere
 from hoof_env.dynamics.layout import TRUNK_STATE, LegMemory, TrunkMemory
 from hoof_env.envs.manual import page_of
+from hoof_env.envs.step import step_kernels
 from hoof_env.errors import ParameterError
 from hoof_env.simd.reach import fingerprint
 from hoof_env.simd.user_functions import what_cannot_be_compiled
 from hoof_env.tasks import registry as tasks
 from hoof_env.tasks.episode import Episode
-from hoof_env.tasks.observation import ObservationInputs
-from hoof_env.tasks.reward import Outcome
+from hoof_env.tasks.observation import ENTRIES, ObservationInputs
+from hoof_env.tasks.reward import TERMS, Outcome
 
 PAGE = (Path(__file__).parents[2] / "docs" / "own_task.md").read_text(encoding="utf-8")
 PAGE = PAGE.split("## A leg of your own", 1)[0]  # tests/envs/test_own_leg.py has the rest
@@ -466,6 +467,47 @@ def rows_under(heading):
     part = PAGE.split(heading, 1)[1].split("\n## ", 1)[0]
     cells = re.findall(r"^\| (`.*?) \|", part, re.MULTILINE)
     return [name for cell in cells for name in re.findall(r"`([\w.]+)`", cell)]
+
+
+TRIALS = """
+import gc, os, sys
+import gymnasium as gym
+import hoof_env
+
+sys.stderr = open(os.devnull, "w")
+seen = []
+for trial in range(4):
+    names = {"__name__": "__main__"}
+    exec(f"def slip(step, weight): return weight * step.slip * {trial + 1}.25", names)
+    hoof_env.register("own/Trial-v0", terms=[hoof_env.Term("slip", 0.5, "1/m", "slip", names["slip"])])
+    env = gym.make("own/Trial-v0")
+    env.reset(seed=0)
+    env.step(env.action_space.sample())
+    del env
+    gc.collect()
+    with open("/proc/self/statm") as file:
+        seen.append(int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6)
+print((seen[3] - seen[1]) / 2)
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="the system does not tell how much memory")
+def test_a_reward_that_is_tried_after_another_takes_little_memory(tmp_path):
+    """Some 11 MB with what numba keeps of its kernel; 42 MB where the observation is compiled anew, too."""
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+    done = subprocess.run([sys.executable, "-c", TRIALS], env=environment, capture_output=True, text=True)
+    assert float(done.stdout) < 20, done.stderr
+
+
+def test_tasks_with_the_same_entries_share_the_kernels_of_the_observation():
+    def kernels(*terms):
+        return step_kernels(terms, ENTRIES, None)
+
+    one, other = (Term("own", 1.0, "-", "x", function) for function in (lambda s, w: w, lambda s, w: 2.0 * w))
+    a, b, c = kernels(*TERMS, one), kernels(*TERMS, other), kernels(*TERMS, one, other)
+    assert a is not b
+    assert a.observers is b.observers
+    assert a.observers is not c.observers  # an episode's memory is larger
 
 
 def test_the_page_has_every_name_that_functions_reach():
