@@ -38,16 +38,8 @@ from hoof_env.lab.forces import THRESHOLD, above_threshold, in_units, limbs_of, 
 from hoof_env.lab.forces import UNITS as FORCE_UNITS
 from hoof_env.lab.opensim import check_bodies, loads_path, write_mot
 from hoof_env.lab.reactions import REACTION_UNITS, JointReactions
-from hoof_env.render.instant import (
-    OF_TRUNK,
-    UNITS,
-    Columns,
-    Surroundings,
-    columns_of_engine,
-    columns_of_horse,
-    horse_instants,
-    instants,
-)
+from hoof_env.render import instant
+from hoof_env.render.instant import UNITS, Columns, Surroundings, columns_of, units_of_legs
 from hoof_env.saved_policy import find_saved
 
 RECORD = {name: unit for name, unit in UNITS.items() if name not in PARAMETERS[1:]} | {"free_moment": "N m"}
@@ -88,15 +80,12 @@ def substeps(env: Any) -> Columns:
     start after a reset, with what was commanded."""
     leg = env.unwrapped
     command = leg.engine.command_in(leg.engine.column(0))
-    if hips := leg.batch.body.hips:
-        return columns_of_horse(leg.record(), hips, leg.terrain, command=command)
-    return columns_of_engine(leg.record(), leg.terrain, command=command[0])
+    return columns_of(leg.record(), leg.batch.body.hips, leg.terrain, command)
 
 
 def instants_of(env: Any, columns: Columns) -> list[Any]:
     """Records of the rows of `columns` of an environment, `Instant`s or `HorseInstant`s."""
-    hips = env.unwrapped.batch.body.hips
-    return horse_instants(columns, hips) if hips else instants(columns)
+    return instant.instants_of(columns, env.unwrapped.batch.body.hips)
 
 
 def make_env(env_id: str, arguments: Mapping[str, Any] | None = None) -> gym.Env[Any, Any]:
@@ -244,14 +233,8 @@ def record_episode(
 def units_of(env: gym.Env[Any, Any], reactions: bool = False) -> dict[str, str]:
     """Columns of a record and their units: `RECORD`, with `reactions` also `REACTION_UNITS`; of a horse those
     of the trunk, and each leg's under its name, `left_fore_force_y`."""
-    hips = surroundings(env).hips
     of_leg = RECORD | (REACTION_UNITS if reactions else {})
-    if not hips:
-        return of_leg
-    found = {name: UNITS[name if name in UNITS else f"trunk_{name}"] for name in OF_TRUNK}
-    own = {name: unit for name, unit in of_leg.items() if name not in ("time", "pitch")}
-    own = {name: unit for name, unit in own.items() if not name.startswith("trunk_")}
-    return found | {f"{leg}_{name}": unit for leg in hips for name, unit in own.items()}
+    return units_of_legs(of_leg, surroundings(env).hips)
 
 
 def describe(env: gym.Env[Any, Any], **about: Any) -> dict[str, Any]:

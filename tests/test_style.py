@@ -20,15 +20,15 @@ LONGEST_FUNCTION, LONGEST_CLASS, LONGEST_FILE = 60, 250, 450
 MOST_PARAMETERS, MOST_OF_KERNELS = 8, 12
 
 MOST = {
-    "packed": 130,
-    "unformatted": 142,
-    "fragments": 338,
-    "people": 162,
+    "packed": 131,
+    "unformatted": 140,
+    "fragments": 330,
+    "people": 166,
     "long_functions": 10,
     "long_classes": 5,
     "long_files": 7,
     "many_parameters": 11,
-    "leg_or_horse": 37,
+    "leg_or_horse": 7,
 }
 """Largest counts."""
 

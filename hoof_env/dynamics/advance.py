@@ -288,6 +288,9 @@ KERNELS = {"leg": (1, 1, False), "four": (1, 4, True), "batch": (0, LANES, False
 number; lanes; whether these are the legs of one trunk."""
 
 
+BY_LEGS = {1: "leg", 4: "four"}
+"""Kernels that run environments one by one, by the number of their legs."""
+
 _KEPT = Kept()
 
 

@@ -19,7 +19,7 @@ from numba.core.errors import NumbaError
 from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.dynamics import layout, memory
-from hoof_env.dynamics.advance import LANES, RESET_REQUESTED, advance_kernels
+from hoof_env.dynamics.advance import BY_LEGS, LANES, RESET_REQUESTED, advance_kernels
 from hoof_env.dynamics.form import engine_layout
 from hoof_env.dynamics.layout import Features
 from hoof_env.dynamics.limits import CHECK_EVERY
@@ -173,7 +173,7 @@ class TrunkEngine(Mechanics):
         self.substeps = length.choose(self.sim_dt, asked)
         self.reacts = flag("reactions", reactions)
         self.counts_strides = flag("strides", strides)
-        self.runs_scalar = len(self.limbs) in (1, 4) and self.num_envs <= MAX_SCALAR_ENVS
+        self.runs_scalar = len(self.limbs) in BY_LEGS and self.num_envs <= MAX_SCALAR_ENVS
         self._choose_kernel()
         columns = self.num_envs if self.runs_scalar else memory.columns_for(self.num_envs)
         self.blocks = [range(columns)] if self.runs_scalar else blocks(columns, LANES, self.num_threads)
@@ -181,7 +181,7 @@ class TrunkEngine(Mechanics):
         self._model = memory.new_model(self, self.filters, self.counts_strides)
 
     def _choose_kernel(self) -> None:
-        which = ("leg" if len(self.limbs) == 1 else "four") if self.runs_scalar else "batch"
+        which = BY_LEGS[len(self.limbs)] if self.runs_scalar else "batch"
         does = "react" if self.reacts else "advance"
         self._run = getattr(advance_kernels(self.contact_law, self.features), f"{does}_{which}")
 

@@ -165,11 +165,11 @@ class TrunkReport(Layout):
 
 
 class TrunkMemory(Layout):
-    """A trunk in the engine's array."""
+    """A trunk in the engine's array. What infos measure stands together, see `envs.infos`."""
 
-    state: TrunkState
     settings: TrunkSettings
     account: Account
+    state: TrunkState
     report: TrunkReport
     result: Row  # of the last call, see `parts.Result`
 
@@ -346,8 +346,8 @@ class LegMemory(Layout):
     strides: Strides
     sums: StrideSums
     command: Annotated[Block, GAIT]
-    settings: LegSettings
     report: LegReport
+    settings: LegSettings
 
 
 # The names that people see, in records, states and infos

@@ -24,6 +24,7 @@ from hoof_env.dynamics.parts import GRAVITY, LARGEST, Result, broken
 from hoof_env.dynamics.step_length import StepLength
 from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.envs import step as kernels
+from hoof_env.envs.addresses import ADDRESSES, BEGIN, END
 from hoof_env.envs.conditions import (
     RowConditions,
     conditions_of,
@@ -32,6 +33,7 @@ from hoof_env.envs.conditions import (
     under_each,
 )
 from hoof_env.envs.infos import InfoLayout, name_columns
+from hoof_env.envs.observation_kernel import slots_of
 from hoof_env.envs.paper_solver import PaperSolver, check_paper
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait import GaitParameters
@@ -40,9 +42,7 @@ from hoof_env.simd.layout import views
 from hoof_env.simd.threads import run_together
 from hoof_env.simd.user_functions import what_cannot_be_compiled
 from hoof_env.tasks.episode import ACTIONS, FAILED, SUMS, episode_layout, task_type
-from hoof_env.tasks.horse import Horse
 from hoof_env.tasks.observation import MIDDLE, check_groups, groups_of, observed
-from hoof_env.tasks.one_leg import OneLeg
 from hoof_env.tasks.parameters import (
     check_drift,
     check_parameters,
@@ -107,7 +107,8 @@ class EpisodeBatch:
         self._validated = ""
         if is_paper:
             check_paper(s)
-        self.body = Horse(s) if task.is_horse else OneLeg(s)
+        self.body = task.body(s)
+        self.legs = self.body.kernels.legs
         check_drift(self._terrain, s.terrain, s.trunk, self.body.height)
         self.terms = tuple(term.key for term in task.terms)
         self.weights = check_weights(s.reward_weights, task.terms)
@@ -164,9 +165,15 @@ class EpisodeBatch:
             raise ParameterError(f"{task.id}: {what_cannot_be_compiled(error)}") from error
 
     def _task_record(self) -> NDArray[Any]:
-        slots, _, count = kernels.slots_of(self.task.entries)
+        slots, _, count = slots_of(self.task.entries)
         constants = np.zeros(
-            1, task_type(len(self.task.terms), count, self.engine.features.gait_size, self.body.legs)
+            1,
+            task_type(
+                len(self.task.terms),
+                count,
+                self.engine.features.gait_size,
+                self.body.kernels.task_fields,
+            ),
         )
         task = constants[0]
         for name, value in self.body.constants(self.engine, self.dt).items():
@@ -188,7 +195,7 @@ class EpisodeBatch:
 
     @property
     def _episode_layout(self) -> Any:
-        return episode_layout(len(self.task.terms), self.body.legs)
+        return episode_layout(self.body.kernels.episode, len(self.task.terms), self.legs)
 
     @property
     def start_row_count(self) -> int:
@@ -199,9 +206,9 @@ class EpisodeBatch:
         """Find the kernels, and the arrays where they are now."""
         s = self.settings
         self.entries = observed(self.groups, s.trunk, s.drive, self.task.entries)
-        self.measurements = InfoLayout(self.engine.features, self.body.legs)
+        self.measurements = InfoLayout(self.engine.features, self.body.leg_prefixes)
         self._kernels = k = kernels.step_kernels(
-            self.task.terms, self.task.entries, self.task.contact_law, self.engine.features, self.body.legs
+            self.task.terms, self.task.entries, self.task.contact_law, self.engine.features, self.body.kernels
         )
         runs_scalar = self.engine.runs_scalar or self.paper
         self.kernel, self._observe = (
@@ -219,9 +226,9 @@ class EpisodeBatch:
         arrays = (
             *self.engine.arrays, self.episode, self._task, self.actions, self.observations, self.rewards
         )  # fmt: skip
-        self.addresses = kernels.ADDRESSES.of(*arrays, columns=range(self.engine.columns))
+        self.addresses = ADDRESSES.of(*arrays, columns=range(self.engine.columns))
         blocks = self.engine.blocks[:1] if self.paper else self.engine.blocks
-        self._blocks = [(kernels.ADDRESSES.of(*arrays, columns=block),) for block in blocks]
+        self._blocks = [(ADDRESSES.of(*arrays, columns=block),) for block in blocks]
 
     def _compile(self) -> None:
         """Have every kernel of a step compiled, or loaded, by running it on no environment."""
@@ -231,11 +238,11 @@ class EpisodeBatch:
         else:
             self._run_idle(self.kernel)
         self._run_idle(self._observe)
-        self.engine.reset(np.empty((self.body.legs, self.engine.features.gait_size, 0)), envs=[])
+        self.engine.reset(np.empty((self.legs, self.engine.features.gait_size, 0)), envs=[])
 
     def _run_idle(self, *step_kernels: Any) -> None:
         idle = self.addresses.copy()
-        idle[kernels.END] = 0
+        idle[END] = 0
         for run in step_kernels:
             run(idle)
 
@@ -416,14 +423,12 @@ class EpisodeBatch:
         self.start_values[:, which] = [*begun, *(drawn[name] for name in self.randomize)]
         now.x_before[which] = start.trunk["x"]
         now.ended[which] = 0.0
-        if self.body.legs > 1:
-            now.gait[:, which] = start.gaits.T
-            now.offset[:, which] = 0.0
+        self.body.begin_episodes(now, which, start)
         if self.paper:
             self.paper.start(which.tolist(), start.gaits, start.values["crank_angle"], start.values["x"])
         near = self.addresses.copy()  # the groups of lanes from the first of them to the last
-        near[kernels.BEGIN] = which.min() // LANES * LANES
-        near[kernels.END] = min(self.engine.columns, (which.max() // LANES + 1) * LANES)
+        near[BEGIN] = which.min() // LANES * LANES
+        near[END] = min(self.engine.columns, (which.max() // LANES + 1) * LANES)
         self._observe(near)
         return drawn
 
@@ -502,7 +507,7 @@ class EpisodeBatch:
         leg = form.leg_memory.rows("report")
         self.engine.advance(None, 0)
         reports = [form.trunk_memory.rows("report")]
-        for k in range(self.body.legs):
+        for k in range(self.legs):
             first = form.trunk_rows + k * form.leg_rows
             reports.append(slice(first + leg.start, first + leg.stop))
         for rows in reports:
@@ -566,7 +571,7 @@ class EpisodeBatch:
             "stance_peak_sum_n": peaks,
             "stances": stances,
             "loading_rate_n_s": rates / each,
-            "duty_factor": loaded / time / self.body.legs,
+            "duty_factor": loaded / time / self.legs,
             "slip_m": slip / each,
             "drive_work_j": work,
             "cost_of_transport": cost,
@@ -637,13 +642,12 @@ class EpisodeBatch:
 
     def _is_possible(self, episode: Floats) -> bool:
         """Whether weights, and the gaits of horses, are numbers that can be."""
-        layout = self._episode_layout
-        if self.body.legs == 1 and (episode[layout.rows("weight")] > 0).all():
+        weight = episode[self._episode_layout.rows("weight")]
+        if not self.body.finite_fields and (weight > 0).all():
             return True
         begun = ~np.isnan(self.start_values[0])
-        rows = episode[:, begun]
-        gaits = rows[layout.rows("gait")] if self.body.legs > 1 else rows[:0]
-        return bool((rows[layout.rows("weight")] > 0).all() and np.isfinite(gaits).all())
+        rows = [episode[self._episode_layout.rows(name)][:, begun] for name in self.body.finite_fields]
+        return bool((weight[:, begun] > 0).all() and all(np.isfinite(values).all() for values in rows))
 
     def set_state(self, state: Mapping[str, Any]) -> None:
         """Put back what `get_state` gave; `ParameterError` for one of another task, geometry or setting."""

@@ -25,61 +25,53 @@ from hoof_env.dynamics.layout import (
     stride_sums,
 )
 from hoof_env.gait import parameter_names
-from hoof_env.tasks.horse_gaits import LEGS
 
 
-def measured_names(features: Features = PLAIN, legs: int = 1) -> tuple[str, ...]:
-    """What an info measures: of one leg neighbours in the engine's memory, read with one copy; of a horse
-    the trunk's pitch, too, and each leg's command and report, under its name in `horse_gaits.LEGS`."""
+def measured_names(features: Features = PLAIN, prefixes: tuple[str, ...] = ("",)) -> tuple[str, ...]:
+    """Return the names of what an info measures, in order: the trunk's, then each leg's.
+
+    Args:
+        features: of the engine.
+        prefixes: what stands before the names of each leg, see `body.Body`.
+    """
     leg = (*leg_state(features), *STRIDES, *stride_sums(features))
-    if legs == 1:
-        return (*TRUNK_REPORT, "result", *leg)
     command = tuple(f"command_{name}" for name in parameter_names(features.harmonics))
-    each = (f"{one}_{name}" for one in LEGS for name in (*leg, *command, *LEG_REPORT))
-    return ("pitch", *TRUNK_REPORT, "result", *each)
-
-
-MEASURED = measured_names()
-"""Of a leg with a rigid hoof."""
+    each = (f"{prefix}{name}" for prefix in prefixes for name in (*leg, *command, *LEG_REPORT))
+    return ("pitch", "spin", *TRUNK_REPORT, "result", *each)
 
 
 class InfoLayout:
-    """Where what is measured lies in the memory of engines of a kind.
+    """Places of what is measured in the memory of engines of a kind.
 
     Attributes:
-        names: of it.
-        kind: of `NamedArray`, to view arrays as.
-        last_step: which of it is of the last control step, not of its end.
+        names: names of what is measured.
+        kind: class of `NamedArray` with these names, to view arrays as.
+        last_step: positions of what is about the last control step, not about its end.
     """
 
-    def __init__(self, features: Features, legs: int) -> None:
-        self.names = measured_names(features, legs)
+    def __init__(self, features: Features, prefixes: tuple[str, ...]) -> None:
+        self.names = measured_names(features, prefixes)
         self.kind = _kind(self.names)
         form = engine_layout(features)
         trunk = form.trunk_memory.rows
         leg = form.leg_memory.rows
-        first = form.trunk_rows
-        self._rows: Any = slice(trunk("report").start, first + leg("sums").stop)
-        if legs > 1:
-            pitch = trunk("state").stop - 2
-            rows = [pitch, *range(trunk("report").start, first)]
-            for k in range(legs):
-                parts = (range(0, leg("sums").stop), *(range(leg(name).start, leg(name).stop)
-                         for name in ("command", "report")))  # fmt: skip
-                rows += [first + k * form.leg_rows + row for part in parts for row in part]
-            self._rows = np.array(rows)
-        sums = [
-            f"{leg}{name}" for leg in ("", *(f"{one}_" for one in LEGS)) for name in stride_sums(features)
-        ]
+        rows = [*range(trunk("state").stop - 2, form.trunk_rows)]  # from the pitch on
+        for k in range(len(prefixes)):
+            first = form.trunk_rows + k * form.leg_rows
+            for part in ("state", "strides", "sums", "command", "report"):
+                rows += [first + row for row in range(leg(part).start, leg(part).stop)]
+        # A slice is read several times faster than rows by number
+        is_slice = rows == [*range(rows[0], rows[-1] + 1)]
+        self._rows: Any = slice(rows[0], rows[-1] + 1) if is_slice else np.array(rows)
+        sums = [f"{prefix}{name}" for prefix in prefixes for name in stride_sums(features)]
         self.last_step = np.array([k for k, name in enumerate(self.names) if name in sums])
 
     def read(self, memory: NDArray[np.float64]) -> NDArray[np.float64]:
-        """A copy of what is measured, from columns of memory, shape (rows, ...)."""
-        found: NDArray[np.float64] = memory[self._rows]
-        return found.copy() if isinstance(self._rows, slice) else found
+        """Return a copy of what is measured, from columns of memory, shape (rows, ...)."""
+        return np.array(memory[self._rows])
 
     def reader(self, column: NDArray[np.float64]) -> Callable[[], Any]:
-        """A function that reads a column that stays where it is, with names."""
+        """Return a function that reads a column that stays where it is, as a `NamedArray`."""
         if isinstance(self._rows, slice):
             copied: Callable[[], Any] = name_columns(column[self._rows], self.names).copy
             return copied

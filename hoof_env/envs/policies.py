@@ -70,20 +70,9 @@ def start_of(policy: Any) -> dict[str, Any]:
     return dict(getattr(policy, "start", None) or {})
 
 
-POLICIES = ("idle", "random", "bang-bang", "drag", "airborne")
-"""Names of the policies that are not a gait of the preset."""
-
-
-HORSE_POLICIES = ("reference", "random", "bang-bang")
-"""Those of a horse."""
-
-
 def policy_names(env: Any) -> list[str]:
-    """Names accepted by `make_policy` for an environment: the gaits of its preset and `POLICIES`, or
-    `HORSE_POLICIES`."""
-    if env.unwrapped.batch.body.legs > 1:
-        return list(HORSE_POLICIES)
-    return sorted(env.unwrapped.gaits) + list(POLICIES)
+    """Return the names accepted by `make_policy` for an environment, see `body.Body.policy_names`."""
+    return list(env.unwrapped.batch.body.policy_names)
 
 
 def heading_seen(env: Any) -> Any:

@@ -18,7 +18,7 @@ from hoof_env.dynamics.form import engine_layout
 from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.dynamics.parts import broken
 from hoof_env.envs.batch import EpisodeBatch
-from hoof_env.render.instant import columns_of_engine, columns_of_horse, horse_instants, instants
+from hoof_env.render.instant import columns_of, instants_of
 from hoof_env.render.renderer import USUAL_SIZE, Renderer
 
 SHOWN = 4.0  # seconds before a picture that it can show
@@ -100,7 +100,7 @@ class Recording:
             weight = float(self.batch.episode_rows.weight[self.env])
             self.renderer = Renderer(
                 self.batch.body.geometry, mode, fps, self.size, self.batch.settings.trunk, weight,
-                LIFT_OFF * weight / self.batch.body.legs, terrain, hips,
+                LIFT_OFF * weight / self.batch.legs, terrain, hips,
             )  # fmt: skip
         if not self._ends:
             self.begin()
@@ -112,12 +112,8 @@ class Recording:
         for k in range(-unseen, 0):
             record = self._record(k)
             command = self._commanded(k)
-            if hips:
-                columns = columns_of_horse(record, hips, terrain, command=command)
-                self.renderer.add(horse_instants(columns, hips))
-            else:
-                columns = columns_of_engine(record, terrain, command=command[0])
-                self.renderer.add(instants(columns))
+            columns = columns_of(record, hips, terrain, command)
+            self.renderer.add(instants_of(columns, hips))
         self._unseen = 0
         return self.renderer.frame()
 

@@ -155,6 +155,36 @@ def columns_of_horse(
     return columns
 
 
+def columns_of(
+    record: Mapping[str, NDArray[Any]],
+    hips: Mapping[str, tuple[float, float]],
+    terrain: Terrain | None,
+    command: NDArray[np.float64],
+) -> Columns:
+    """Return the columns of a body from what `TrunkEngine` says of it: of a horse with these hips, or of one
+    leg without; `command` has a row for each leg."""
+    if hips:
+        return columns_of_horse(record, hips, terrain, command=command)
+    return columns_of_engine(record, terrain, command=command[0])
+
+
+def instants_of(columns: Mapping[str, NDArray[np.float64]], hips: Iterable[str]) -> list[Any]:
+    """Return the records of the rows of `columns`: `HorseInstant`s of a horse with these legs, or `Instant`s
+    without."""
+    return horse_instants(columns, hips) if hips else instants(columns)
+
+
+def units_of_legs(of_leg: Mapping[str, str], hips: Iterable[str]) -> dict[str, str]:
+    """Return the columns of a body's record with their units, from those of one leg: of a horse those of the
+    trunk, and each leg's under its name."""
+    if not hips:
+        return dict(of_leg)
+    found = {name: UNITS[name if name in UNITS else f"trunk_{name}"] for name in OF_TRUNK}
+    own = {name: unit for name, unit in of_leg.items() if name not in ("time", "pitch")}
+    own = {name: unit for name, unit in own.items() if not name.startswith("trunk_")}
+    return found | {f"{leg}_{name}": unit for leg in hips for name, unit in own.items()}
+
+
 def columns_of_engine(
     record: Mapping[str, NDArray[Any]],
     terrain: Terrain | None = None,

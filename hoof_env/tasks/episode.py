@@ -12,7 +12,6 @@ from hoof_env.dynamics.form import engine_layout
 from hoof_env.dynamics.layout import Features
 from hoof_env.gait import PARAMETERS
 from hoof_env.simd.layout import Block, Constants, Layout, Row, Size
-from hoof_env.tasks.horse_gaits import GaitRows, reference_type
 from hoof_env.tasks.reward import TERMS
 
 ACTIONS = len(PARAMETERS)
@@ -57,17 +56,10 @@ class Episode(Layout):
     next_target: Row  # and which [m/s]
 
 
-class HorseEpisode(Episode):
-    """That of a horse."""
-
-    gait: GaitRows  # around which its actions lie
-    offset: Annotated[Block, ACTION]  # what actions have made of it so far, 1 is the whole span
-
-
 @cache
-def episode_layout(terms: int, legs: int = 1) -> Any:
-    """`Episode` of so many legs with room for so many terms."""
-    layout: Any = Episode if legs == 1 else HorseEpisode
+def episode_layout(layout: Any, terms: int, legs: int = 1) -> Any:
+    """Return the layout of an episode's memory, `Episode` or one with more fields, sized for a number of
+    terms and legs."""
     return layout.sized(action=legs * ACTIONS, reward=terms)
 
 
@@ -87,17 +79,17 @@ class Memories(Constants, _Memories):
 
 
 @cache
-def memories_of(terms: int, features: Features, legs: int = 1) -> Memories:
-    """The layouts with so many terms, of an engine of this kind."""
+def memories_of(layout: Any, terms: int, features: Features, legs: int = 1) -> Memories:
+    """Return the layouts of an engine with these features and of episodes with a number of terms and legs."""
     form = engine_layout(features)
     return Memories(
-        episode_layout(terms, legs), form.trunk_memory, form.leg_memory, form.trunk_rows, legs, form.gait,
-        form.has_limits,
+        episode_layout(layout, terms, legs), form.trunk_memory, form.leg_memory, form.trunk_rows, legs,
+        form.gait, form.has_limits,
     )  # fmt: skip
 
 
-def task_type(terms: int, entries: int, gait: int = ACTIONS, legs: int = 1) -> np.dtype[Any]:
-    """The record of a task's constants."""
+def task_type(terms: int, entries: int, gait: int = ACTIONS, more: tuple[Any, ...] = ()) -> np.dtype[Any]:
+    """Return the record type of a task's constants, with `more` fields of the body's own."""
     return np.dtype(
         [
             ("reach", "f8", (gait,)), ("lead", "f8"),  # of an action of 1; of a command [s]
@@ -110,7 +102,7 @@ def task_type(terms: int, entries: int, gait: int = ACTIONS, legs: int = 1) -> n
             ("stays", "?"),  # a fixed trunk
             ("observation_size", "i8"),
             ("observation_columns", "i8", (entries,)),  # of the observation; -1: not observed
-            *(reference_type() if legs > 1 else ()),
+            *more,
         ],
         align=True,
     )  # fmt: skip

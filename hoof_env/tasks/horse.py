@@ -18,7 +18,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from itertools import product
-from typing import Any, NoReturn
+from typing import Annotated, Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,19 +31,27 @@ from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry, load_geometry
 from hoof_env.leg.limb_masses import with_limb_masses
+from hoof_env.simd.layout import Block
+from hoof_env.tasks.body import BodyKernels
+from hoof_env.tasks.episode import ACTION, Episode
 from hoof_env.tasks.horse_gaits import (
     ACTED,
     COUNT,
     LEGS,
     NAMES,
+    SCRATCH_SIZE,
+    GaitRows,
     checked_size,
+    command_gait,
     commands_of,
     crank_angles,
     gait_numbers,
     horse_gaits,
     rates,
+    refer_to_target,
     reference_constants,
     reference_gaits,
+    reference_type,
     trunk_motion,
 )
 from hoof_env.tasks.leg_starts import (
@@ -55,7 +63,6 @@ from hoof_env.tasks.leg_starts import (
     with_parameters,
 )
 from hoof_env.tasks.parameters import check_range, drive_of, ground_of
-from hoof_env.tasks.registry import TASKS
 from hoof_env.tasks.settings import Settings
 
 Floats = NDArray[np.float64]
@@ -70,7 +77,8 @@ HEIGHT = (0.75, 1.8)
 CLEARANCE = 0.02
 """Where it has fallen: +-pitch [rad], heights of the trunk [m], of a joint over the ground [m]."""
 GAP = 0.005  # between the lowest rigid hoof and the ground at a start [m]
-SAG = MASS * GRAVITY / (4 * TASKS["horse"].defaults["hoof_stiffness"])  # of two legs that bear the weight [m]
+HOOF_STIFFNESS = 24000.0  # of a horse of size 1, by default [N/m]
+SAG = MASS * GRAVITY / (4 * HOOF_STIFFNESS)  # of two legs that bear the weight [m]
 DEFAULT_MOTION: dict[str, Any] = {"vx": 1.0, "vy": 0.0, "pitch": 0.0, "pitch_rate": 0.0}
 """How a trunk starts in a gait that is not a reference gait."""
 
@@ -104,6 +112,26 @@ PHASE_SPREAD = 0.02
 """How far starts are from the gait: of the commanded speed [-], pitch [rad], each crank [strides]."""
 
 
+class HorseEpisode(Episode):
+    """Memory of an episode of a horse."""
+
+    gait: GaitRows  # around which its actions lie
+    offset: Annotated[Block, ACTION]  # what actions have made of it so far, 1 is the whole span
+
+
+HORSE_KERNELS = BodyKernels(
+    legs=COUNT,
+    episode=HorseEpisode,
+    task_fields=tuple(reference_type()),
+    scratch_size=SCRATCH_SIZE,
+    command=command_gait,
+    on_switch=refer_to_target,
+)
+
+POLICIES = ("reference", "random", "bang-bang")
+"""Names of the scripted policies."""
+
+
 class Horse:
     """Four legs on a free trunk.
 
@@ -118,12 +146,14 @@ class Horse:
         action_names: of its actions, leg after leg.
     """
 
-    legs = COUNT
-    action_names = tuple(f"{leg}_{name}" for leg, name in product(LEGS, PARAMETERS))
+    kernels = HORSE_KERNELS
+    leg_prefixes: tuple[str, ...] = tuple(f"{leg}_" for leg in LEGS)
+    finite_fields: tuple[str, ...] = ("gait",)
+    action_names: tuple[str, ...] = tuple(f"{leg}_{name}" for leg, name in product(LEGS, PARAMETERS))
     action_form = "offsets"
     step_error = STEP_ERROR
-    start_names = ("phase", "speed", "pitch", "x")
-    gait_names = NAMES
+    start_names: tuple[str, ...] = ("phase", "speed", "pitch", "x")
+    gait_names: tuple[str, ...] = NAMES
 
     def __init__(self, settings: Settings) -> None:
         s = settings
@@ -134,8 +164,12 @@ class Horse:
         self.geometry = load_geometry(s.preset)
         self.geometry = self.geometry.scaled(HIP_HEIGHT * self.size / self.geometry.hip_height)
         self.height = HIP_HEIGHT * self.size
-        self.hips = {leg: (HIPS[leg.partition("_")[2]] * self.size, 0.0) for leg in LEGS}
-        self.gaits = {name: gait.of_size(self.size) for name, gait in horse_gaits().items()}
+        self.hips: Mapping[str, tuple[float, float]] = {
+            leg: (HIPS[leg.partition("_")[2]] * self.size, 0.0) for leg in LEGS
+        }
+        self.gaits: Mapping[str, Any] = {
+            name: gait.of_size(self.size) for name, gait in horse_gaits().items()
+        }
         self.gait = None if s.gait is None else self.gaits[check_choice("gait", s.gait, self.gaits)]
         self.harmonics = 2 if s.harmonics is None else count("harmonics", s.harmonics, most=2)
         filters = "quick" if s.filters is None else check_choice("filters", s.filters, FILTERS)
@@ -147,9 +181,10 @@ class Horse:
         self.command_step = COMMAND_STEP * self.speed_scale
         self.lowest, self.highest = (self.size * height for height in HEIGHT)
         spring = self._spring(s)
-        stored = TASKS["horse"].defaults["hoof_stiffness"]
-        self._softness = 0.0 if spring is None else stored * self.size**2 / spring.stiffness
-        self.limits = Limits((-PITCH, PITCH), (self.lowest, self.highest), CLEARANCE * self.size)
+        self._softness = 0.0 if spring is None else HOOF_STIFFNESS * self.size**2 / spring.stiffness
+        self.limits: Limits | None = Limits(
+            (-PITCH, PITCH), (self.lowest, self.highest), CLEARANCE * self.size
+        )
 
     def parts(self, s: Settings) -> tuple[Trunk, Ground, tuple[Limb, ...]]:
         """Trunk, ground and legs of some settings."""
@@ -236,7 +271,7 @@ class Horse:
         if engine.terrain != FLAT:
             begun["x"] = start_anywhere(engine.terrain, begun["x"], options, generators)
         begun |= {name: np.full(n, options[name]) for name in begun if name in options}
-        commands = np.zeros((self.legs, 2 + 2 * self.harmonics, n))
+        commands = np.zeros((COUNT, 2 + 2 * self.harmonics, n))
         theta = PHASE_SPREAD * off[:, 3:].T
         return Start(begun, np.empty(0), commands, theta, {})
 
@@ -270,6 +305,16 @@ class Horse:
             "vy": self.height * rate * motion["vy"] + begun["speed"] * np.tan(slope), "pitch": begun["pitch"],
             "pitch_rate": rate * motion["pitch_rate"],
         }  # fmt: skip
+
+    @property
+    def policy_names(self) -> list[str]:
+        """Names of the scripted policies."""
+        return list(POLICIES)
+
+    def begin_episodes(self, episode: Any, which: NDArray[np.int64], start: Start) -> None:
+        """Write the gaits around which actions lie, and offsets of 0."""
+        episode.gait[:, which] = start.gaits.T
+        episode.offset[:, which] = 0.0
 
     def _slope(self, terrain: Terrain, x: Floats) -> Floats:
         """Of the ground from the hind feet to the fore feet of animals at `x` [rad]."""

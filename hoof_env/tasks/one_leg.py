@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.dynamics.parts import ONE_LEG, Limb, Trunk
+from hoof_env.dynamics.parts import ONE_LEG, Limb, Limits, Trunk
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait import (
     INNER,
@@ -26,6 +26,11 @@ from hoof_env.gait import (
 )
 from hoof_env.ground.contact import Ground, load_ground
 from hoof_env.leg.geometry import load_geometry, preset_error_type, preset_label
+from hoof_env.simd import maximum, minimum, read
+from hoof_env.simd.compile import inline_llvm
+from hoof_env.simd.math import clip
+from hoof_env.tasks.body import BodyKernels
+from hoof_env.tasks.episode import ACTIONS, Episode
 from hoof_env.tasks.leg_starts import HIGHEST, LOWEST, Start, check_options, draw_starts
 from hoof_env.tasks.parameters import check_range, drive_of, ground_of, hoof_spring
 from hoof_env.tasks.settings import Settings
@@ -129,6 +134,34 @@ def heading_now(engine: TrunkEngine, dt: float) -> Floats:
     return heading
 
 
+@inline_llvm
+def command_rates(task, actions, episode, leg, parameters, n, scratch):  # type: ignore[no-untyped-def]
+    """Command the rates that an action asks for, from where the gait is heading and within the limits."""
+    for k in range(ACTIONS):
+        action = clip(read(leg, actions, n * ACTIONS + k, ACTIONS), 1.0)
+        heading = leg.state.gait[k] + task.lead * leg.state.gait_rate[k]
+        command = heading + task.reach[k] * action
+        leg.command[k] = minimum(maximum(command, task.low[k]), task.high[k])
+
+
+@inline_llvm
+def keep_gait(task, episode, switched):  # type: ignore[no-untyped-def]
+    """Change nothing: the gait of one leg does not depend on the commanded speed."""
+
+
+LEG_KERNELS = BodyKernels(
+    legs=1,
+    episode=Episode,
+    task_fields=(),
+    scratch_size=1,
+    command=command_rates,
+    on_switch=keep_gait,
+)
+
+POLICIES = ("idle", "random", "bang-bang", "drag", "airborne")
+"""Names of the scripted policies that are not a gait of the preset."""
+
+
 class OneLeg:
     """A leg under a trunk; attributes and methods are as of `horse.Horse`, and others are
 
@@ -139,16 +172,18 @@ class OneLeg:
         rates: at which an action of 1 changes them, shape (4,) [rad/s^2, rad/s, rad/s, rad/s].
     """
 
-    legs = 1
+    kernels = LEG_KERNELS
+    leg_prefixes: tuple[str, ...] = ("",)
+    finite_fields: tuple[str, ...] = ()
     harmonics = 1
-    limits = None
-    action_names = tuple(f"rate_of_{name}" for name in PARAMETERS)
+    limits: Limits | None = None
+    action_names: tuple[str, ...] = tuple(f"rate_of_{name}" for name in PARAMETERS)
     action_form = "rates"
     hips: Mapping[str, tuple[float, float]] = MappingProxyType({})
     step_error = 0.01
     command_step = math.inf
-    start_names = ("crank_angle", "speed", "height", "x")
-    gait_names = PARAMETERS
+    start_names: tuple[str, ...] = ("crank_angle", "speed", "height", "x")
+    gait_names: tuple[str, ...] = PARAMETERS
 
     def __init__(self, settings: Settings) -> None:
         s = settings
@@ -160,7 +195,7 @@ class OneLeg:
         self.low, self.high = np.array([*limits_of(self.geometry).values()]).T
         self.middle = (self.low + self.high) / 2
         self.half = (self.high - self.low) / 2
-        self.gaits = {name: load_gait(name, s.preset) for name in gait_names(s.preset)}
+        self.gaits: Mapping[str, Any] = {name: load_gait(name, s.preset) for name in gait_names(s.preset)}
         for name, gait in self.gaits.items():
             if isinstance(gait, HarmonicGait):
                 raise preset_error_type(s.preset)(
@@ -235,7 +270,15 @@ class OneLeg:
         )
 
     def complete_start(self, start: Start, targets: Floats, options: Any, engine: TrunkEngine) -> None:
-        """Nothing depends on the commanded speeds."""
+        """Do nothing: no start depends on the commanded speeds."""
+
+    def begin_episodes(self, episode: Any, which: NDArray[np.int64], start: Start) -> None:
+        """Do nothing: an episode of one leg has no fields of its own."""
+
+    @property
+    def policy_names(self) -> list[str]:
+        """Names of the scripted policies: the gaits of the preset, and `POLICIES`."""
+        return sorted(self.gaits) + list(POLICIES)
 
     def action_for(
         self, gaits: str | GaitParameters | Floats, engine: TrunkEngine, dt: float

@@ -21,9 +21,12 @@ import numpy as np
 
 from hoof_env.errors import ParameterError, UnknownArgumentError, check_choice
 from hoof_env.simd.user_functions import check_function, function_name
+from hoof_env.tasks.body import Body
+from hoof_env.tasks.horse import HOOF_STIFFNESS, Horse
 from hoof_env.tasks.horse_gaits import checked_size
 from hoof_env.tasks.horse_terms import HORSE_ENTRIES, HORSE_TERMS
 from hoof_env.tasks.observation import ENTRIES, Entry, check_groups, groups_of
+from hoof_env.tasks.one_leg import OneLeg
 from hoof_env.tasks.reward import TERMS, Term, check_weights
 from hoof_env.tasks.settings import SETTINGS, Settings, as_plain, check_effect, json_value
 
@@ -41,7 +44,7 @@ class Task:
         reference: the scripted gait that simple policies must stay below.
         terms: of the reward.
         entries: all that can be observed.
-        is_horse: it is about a trunk on four legs, see `horse.Horse`, not about one leg.
+        body: makes the `body.Body` of some settings.
         speeds: of a horse of size 1, between which a `target_speed` of None commands; they go with the root
             of the size [m/s].
         contact_law: instead of `normal_law`, see `dynamics.hoof.law_of`.
@@ -56,7 +59,7 @@ class Task:
     reference: str = "run"
     terms: tuple[Term, ...] = TERMS
     entries: tuple[Entry, ...] = ENTRIES
-    is_horse: bool = False
+    body: Callable[[Settings], Body] = OneLeg
     speeds: tuple[float, float] | None = None
     contact_law: Callable[..., Any] | None = None
     module: str = ""
@@ -219,7 +222,7 @@ TASKS: Mapping[str, Task] = MappingProxyType(
                 "stiffness": 2e6,
                 "exponent": 1.5,
                 "friction": 0.6,
-                "hoof_stiffness": 24000.0,
+                "hoof_stiffness": HOOF_STIFFNESS,
                 "integrator": "semi_implicit_euler",
                 "motor_gain": 2000.0,
                 "motor_torque": 4000.0,
@@ -230,7 +233,7 @@ TASKS: Mapping[str, Task] = MappingProxyType(
             reference="reference",
             terms=HORSE_TERMS,
             entries=HORSE_ENTRIES,
-            is_horse=True,
+            body=Horse,
             speeds=(1.172, 3.706),
         ),
     }

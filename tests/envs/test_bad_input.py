@@ -15,6 +15,7 @@ from hoof_env import Sb3VecEnv, make_policy, read_preset
 from hoof_env.errors import ParameterError
 from hoof_env.gait import load_gait
 from hoof_env.tasks.episode import episode_layout
+from hoof_env.tasks.horse import HorseEpisode
 
 LEG, NAN = "hoof_env/HorseLeg-v0", float("nan")
 OTHER_LEG = {**read_preset("identified"), "provenance": "another"}
@@ -363,7 +364,7 @@ def test_states_of_a_horse_that_cannot_be(row, value):
     env = gym.make(HORSE).unwrapped
     env.reset(seed=0)
     state, before = env.get_state(), env.get_state()
-    state["episode"][episode_layout(len(env.batch.task.terms), 4).rows(row).start] = value
+    state["episode"][episode_layout(HorseEpisode, len(env.batch.task.terms), 4).rows(row).start] = value
     with pytest.raises(ParameterError, match=r"state\['episode'\]: expected numbers"):
         env.set_state(state)
     same(env.get_state(), before)

@@ -11,7 +11,7 @@ import pytest
 from family import FALLS, IDS, actions, same, together
 from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 
-from hoof_env.envs.infos import MEASURED, NamedArray, name_columns, row_of
+from hoof_env.envs.infos import NamedArray, measured_names, name_columns, row_of
 from hoof_env.errors import ParameterError
 from hoof_env.gait import PARAMETERS
 from hoof_env.tasks.one_leg import OneLeg
@@ -64,7 +64,7 @@ def test_what_is_measured_is_what_the_record_says():
     for taken in actions(1, 60):
         measured, record = env.step(taken)[4]["measured"], env.record()
         last, trace = {name: values[-1].item() for name, values in record.items()}, together([record])
-        for name in set(last) & set(MEASURED):
+        for name in set(last) & set(measured_names()):
             assert measured[name] == last[name], name
         assert measured["highest_grf"] == pytest.approx(trace["grf"].max(), rel=1e-12)
         assert measured["normal_impulse"] == pytest.approx(env.sim_dt * trace["normal"].sum(), rel=1e-9)

@@ -24,6 +24,7 @@ from hoof_env.tasks import horse
 from hoof_env.tasks.horse import OPTIONS as HORSE_OPTIONS
 from hoof_env.tasks.horse_gaits import FASTEST, LEGS
 from hoof_env.tasks.leg_starts import OPTIONS
+from hoof_env.tasks.one_leg import OneLeg
 from hoof_env.tasks.parameters import HILLS
 from hoof_env.tasks.registry import TASKS
 from hoof_env.tasks.reward import BEARING, LONGEST_STRIDE
@@ -31,7 +32,7 @@ from hoof_env.tasks.settings import PER_EPISODE, Settings, to_json
 
 ROOT = Path(__file__).parents[2]
 DOCS, POLICIES = ROOT / "docs" / "environments", ROOT / "agents" / "policies"
-OF_LEGS = [name for name, task in TASKS.items() if not task.is_horse]
+OF_LEGS = [name for name, task in TASKS.items() if task.body is OneLeg]
 
 IDS = {page: re.search(r'gym.make\("(.+?)"', manual.page(page))[1] for page in manual.PAGES}
 

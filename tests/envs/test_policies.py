@@ -8,8 +8,6 @@ import numpy as np
 import pytest
 
 from hoof_env.envs.policies import (
-    HORSE_POLICIES,
-    POLICIES,
     load_open_loop,
     make_policy,
     open_loop,
@@ -18,7 +16,9 @@ from hoof_env.envs.policies import (
 )
 from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.gait import PARAMETERS, GaitParameters, load_gait
+from hoof_env.tasks import horse as horse_body
 from hoof_env.tasks.observation import HALF_RANGE, HIGH, LOW, MIDDLE
+from hoof_env.tasks.one_leg import POLICIES
 
 ENV_ID = "hoof_env/HorseLeg-v0"
 CLOCKED = {
@@ -119,7 +119,7 @@ def test_who_does_not_see_the_gait_cannot_go_to_one():
 
 def test_a_horse_has_no_gait_to_go_to():
     horse = gym.make("hoof_env/Horse-v0")
-    assert policy_names(horse) == list(HORSE_POLICIES)
+    assert policy_names(horse) == list(horse_body.POLICIES)
     with pytest.raises(ParameterError, match="policy: expected one of bang-bang, random, reference, got 'id"):
         make_policy("idle", horse)
     action, _ = make_policy("reference", horse).predict(np.zeros(66))

@@ -1,0 +1,60 @@
+"""Tables of the manual pages: `manual.toml` with the numbers that the environments run on."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from string import Template
+from typing import Any
+
+from hoof_env.dynamics.constrained import INTEGRATORS
+from hoof_env.dynamics.parts import ONE_LEG
+from hoof_env.dynamics.stepping import SCHEMES
+from hoof_env.gait import WIDEST, FilterSettings
+from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS
+from hoof_env.leg.geometry import preset_names
+from hoof_env.tasks import horse, leg_starts
+from hoof_env.tasks.horse_gaits import FASTEST, FOLLOWED, SIZES, horse_gaits
+from hoof_env.tasks.one_leg import CARRIED
+from hoof_env.tasks.parameters import SPACING
+from hoof_env.tasks.reward import BEARING, LONGEST_STRIDE
+
+HERE = Path(__file__).parent
+
+
+def tables() -> dict[str, dict[str, Any]]:
+    """Return what `manual.toml` says, by table and name: unit and meaning, or the words of a page."""
+    names = {
+        "presets": preset_names(), "trunks": ONE_LEG, "schemes": SCHEMES, "paper_schemes": INTEGRATORS,
+        "normal_laws": NORMAL_LAWS, "friction_laws": FRICTION_LAWS, "horse_gaits": horse_gaits(),
+    }  # fmt: skip
+    values = {name: ", ".join(f'\\"{one}\\"' for one in choices) for name, choices in names.items()}
+    numbers = {
+        "lowest": leg_starts.LOWEST, "highest": leg_starts.HIGHEST,
+        "spacing": SPACING, "margin": leg_starts.MARGIN,
+        "start_speed": leg_starts.START_SPEED, "horse_mass": horse.MASS, "fastest": FASTEST,
+        "smallest_size": SIZES[0], "largest_size": SIZES[1],
+        "speed_spread": 100 * horse.SPEED_SPREAD, "pitch_spread": horse.PITCH_SPREAD,
+        "phase_spread": horse.PHASE_SPREAD, "fall_pitch": horse.PITCH, "fall_low": horse.HEIGHT[0],
+        "fall_high": horse.HEIGHT[1], "clearance": 100 * horse.CLEARANCE, "followed": FOLLOWED,
+        "carried": round(100 * CARRIED),
+        "crank_bound": FilterSettings().crank_rate, "swing_bound": FilterSettings().swing_rate,
+        "bearing": BEARING, "full_allowance": BEARING * LONGEST_STRIDE,
+    }  # fmt: skip
+    numbers |= {f"{name}_{end}": WIDEST[name][k] for name in WIDEST for k, end in enumerate(("low", "high"))}
+    values |= {name: f"{number:g}" for name, number in numbers.items()}
+    text = (HERE / "manual.toml").read_text(encoding="utf-8")
+    return tomllib.loads(Template(text).safe_substitute(values))
+
+
+TABLES = tables()
+WORDS = TABLES["words"]
+
+
+def rows_of(table: str, values: Mapping[str, str] | None = None) -> list[tuple[str, ...]]:
+    """Return the rows of a table of `manual.toml`: names, what `values` has of them, and cells."""
+    return [
+        (", ".join(f"`{one}`" for one in name.split(", ")), *([values[name]] if values else []), *cells)
+        for name, cells in TABLES[table].items()
+    ]

@@ -1,0 +1,222 @@
+"""Observation of a control step: the entries of a task in one kernel."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Any
+
+from hoof_env.dynamics.advance import LANES, MODEL
+from hoof_env.dynamics.layout import Features
+from hoof_env.envs.addresses import AT, BEGIN, END, memories
+from hoof_env.simd import rows, set_lane, write
+from hoof_env.simd.compile import inline_llvm, inline_source, kernel
+from hoof_env.simd.kept import Kept, Kernels
+from hoof_env.simd.math import clip, tanh
+from hoof_env.simd.memory import address, doubles, matrix_at, record_at, singles_at
+from hoof_env.simd.reach import fingerprint
+from hoof_env.simd.user_functions import number_of
+from hoof_env.tasks.body import BodyKernels
+from hoof_env.tasks.episode import Memories, memories_of, task_type
+from hoof_env.tasks.observation import Entry, ObservationInputs
+
+
+def slots_of(entries: tuple[Entry, ...]) -> tuple[list[int], int, int]:
+    """Where the entries stand while they are scaled: those that saturate first, as whole vectors. Returns the
+    slots of the entries, how many vectors they are, and how many slots there are."""
+    saturating = [k for k, entry in enumerate(entries) if entry.scale.saturates]
+    others = [k for k, entry in enumerate(entries) if not entry.scale.saturates]
+    vectors = -(-len(saturating) // LANES)
+    slots = {k: slot for slot, k in enumerate(saturating)}
+    slots |= {k: vectors * LANES + slot for slot, k in enumerate(others)}
+    return [slots[k] for k in range(len(entries))], vectors, vectors * LANES + len(others)
+
+
+def _with_entries(entries: tuple[Entry, ...], layouts: Memories, scaled: bool) -> Callable[..., Any]:
+    """A function that puts the entries that are observed into their slots: scaled but for tanh, or as they
+    are measured. Those of this package are compiled once for all tasks that have them in these slots."""
+    placed = tuple(zip(entries, slots_of(entries)[0], strict=True))
+    ours = tuple(one for one in placed if not from_outside(functions_of(one[0])))
+    own = tuple(one for one in placed if one not in ours)
+    if not own or not ours:
+        return (_put_ours if ours else _put_all)(placed, layouts, scaled)
+    return _one_and_other(_put_ours(ours, layouts, scaled), _put_all(own, layouts, scaled))
+
+
+def _put_all(placed: tuple[tuple[Entry, int], ...], layouts: Memories, scaled: bool) -> Callable[..., Any]:
+    """A function that puts entries into the slots beside them. numba has no loop over functions, so each half
+    is a function of its own."""
+    if len(placed) == 1:
+        return _with_entry(*placed[0], layouts, scaled)
+    middle = len(placed) // 2
+    halves = (_put_all(half, layouts, scaled) for half in (placed[:middle], placed[middle:]))
+    return _one_and_other(*halves)
+
+
+_put_ours = lru_cache(maxsize=32)(_put_all)
+"""The same for entries of this package."""
+
+
+def _one_and_other(one: Callable[..., Any], other: Callable[..., Any]) -> Callable[..., Any]:
+    @inline_llvm
+    def put_both(addresses, lanes, scene, numbers, n):  # type: ignore[no-untyped-def]
+        one(addresses, lanes, scene, numbers, n)
+        other(addresses, lanes, scene, numbers, n)
+
+    return put_both
+
+
+def _with_entry(entry: Entry, slot: int, layouts: Memories, scaled: bool) -> Callable[..., Any]:
+    measure = inline_llvm(entry.measure)
+    apply = entry.scale.apply
+    scale = inline_llvm(apply) if scaled and apply is not None else inline_llvm(lambda x, scene: x)
+    number = number_of(entry.title)
+    scaled_number = number_of(f"the scale of {entry.title}")
+
+    @inline_llvm
+    def put_entry(addresses, lanes, scene, numbers, n):  # type: ignore[no-untyped-def]
+        if scene.task.observation_columns[slot] >= 0:
+            numbers[slot] = scaled_number(scale(number(measure(scene)), scene))
+
+    @inline_llvm
+    def put_one_by_one(addresses, lanes, scene, numbers, n):  # type: ignore[no-untyped-def]
+        if scene.task.observation_columns[slot] >= 0:
+            for lane in range(lanes):
+                trunk, leg, episode = memories(addresses, 0, layouts, n + lane)
+                own = ObservationInputs(
+                    trunk, leg, episode, scene.task, scene.ground, scene.ground_origin, scene.ground_per_metre
+                )
+                set_lane(numbers, slot, lane, scaled_number(scale(number(measure(own)), own)))
+
+    return put_one_by_one if entry.scalar else put_entry
+
+
+class Observers(Kernels):
+    """Kernels of the observation, which tasks with the same entries share; they take what those of
+    `StepKernels` take.
+
+    Attributes:
+        observe_one, observe_batch: observations without a step.
+        measure_one: puts what is observed, before it is scaled, into an array of doubles, shape (count,
+            columns).
+        observe: a part of other kernels; observes n and, with lanes, its neighbours.
+    """
+
+    observe_one: Any
+    observe_batch: Any
+    measure_one: Any
+    observe: Any
+
+
+def functions_of(entry: Entry) -> list[Callable[..., Any]]:
+    return [part for part in (entry.measure, entry.scale.apply) if part]
+
+
+def from_outside(functions: list[Callable[..., Any]]) -> list[Callable[..., Any]]:
+    """Those that are not of this package."""
+    return [function for function in functions if not str(function.__module__).startswith("hoof_env.")]
+
+
+_OBSERVERS = Kept()
+
+
+def observers_of(entries: tuple[Entry, ...], terms: int, features: Features, body: BodyKernels) -> Observers:
+    """Return the kernels of the observation for some entries; tasks with the same ones share them.
+
+    Args:
+        entries: all that can be observed.
+        terms: number of the reward's terms, for the layout of the episode's memory.
+        features: of the engine.
+        body: the body's own parts.
+    """
+    own = from_outside([part for entry in entries for part in functions_of(entry)])
+    key = (entries, terms, features, body, fingerprint(*own))
+    found: Observers = _OBSERVERS.get(key, lambda: _made(entries, terms, features, body), bool(own))
+    return found
+
+
+def _made(entries: tuple[Entry, ...], terms: int, features: Features, body: BodyKernels) -> Observers:
+    layouts = memories_of(body.episode, terms, features, body.legs)
+    slots = slots_of(entries)[2]
+    task_record = task_type(terms, slots, layouts.gait, body.task_fields)
+    flags = [(entry.scalar, entry.scale.saturates) for entry in entries], (terms, features, body.legs)
+    parts = [part for entry in entries for part in functions_of(entry)]
+    identity = fingerprint(*parts, flags, layouts.episode.names, str(task_record.descr))
+    put_measured = _with_entries(entries, layouts, scaled=False)
+    inputs_of = _inputs(layouts)
+    observe = _observe(entries, layouts, inputs_of)
+    task_at = record_at(task_record)
+
+    @inline_source
+    def observe_all(addresses, lanes):  # type: ignore[no-untyped-def]
+        task = task_at(addresses[AT.task])[0]
+        memory = doubles(slots * lanes)
+        for n in range(addresses[BEGIN], addresses[END], lanes):
+            observe(addresses, lanes, task, n, memory)
+
+    def observe_one(addresses):  # type: ignore[no-untyped-def]
+        observe_all(addresses, 1)
+
+    def observe_batch(addresses):  # type: ignore[no-untyped-def]
+        observe_all(addresses, LANES)
+
+    def measure_one(addresses, out):  # type: ignore[no-untyped-def]
+        task = task_at(addresses[AT.task])[0]
+        numbers = rows(doubles(slots), 1, None)
+        for n in range(out.shape[1]):
+            put_measured(addresses, 1, inputs_of(addresses, 1, task, n), numbers, n)
+            for slot in range(slots):
+                column = task.observation_columns[slot]
+                if column >= 0:
+                    write(numbers[slot], address(out), column * out.shape[1] + n, 1)
+
+    functions = (observe_one, observe_batch, measure_one)
+    kernels = {function.__name__: kernel(function, identity) for function in functions}
+    return Observers(observe=observe, **kernels)
+
+
+def _inputs(layouts: Memories) -> Callable[..., Any]:
+    """Return a part of kernels that makes the inputs of entries in row n and, with lanes, its neighbours."""
+    model_at = record_at(MODEL)
+
+    @inline_source
+    def inputs_of(addresses, lanes, task, n):  # type: ignore[no-untyped-def]
+        trunk, leg, episode = memories(addresses, lanes, layouts, n)
+        model = model_at(addresses[AT.model])[0]
+        ground = matrix_at(addresses, AT.ground)
+        return ObservationInputs(
+            trunk, leg, episode, task, ground, model.ground_origin, model.ground_per_metre
+        )
+
+    return inputs_of
+
+
+def _observe(
+    entries: tuple[Entry, ...], layouts: Memories, inputs_of: Callable[..., Any]
+) -> Callable[..., Any]:
+    """Return a part of kernels that writes the observation of row n and, with lanes, of its neighbours."""
+    _, vectors, slots = slots_of(entries)
+    put_scaled = _with_entries(entries, layouts, scaled=True)
+
+    @inline_source
+    def observe(addresses, lanes, task, n, memory):  # type: ignore[no-untyped-def]
+        numbers = rows(memory, lanes, None)
+        for slot in range(slots):
+            numbers[slot] = 0.0
+        put_scaled(addresses, lanes, inputs_of(addresses, lanes, task, n), numbers, n)
+        # All entries that saturate stand first, so that one environment takes their tanh in vectors, too
+        if lanes == 1:
+            together = rows(memory, LANES, None)
+            for k in range(vectors):
+                together[k] = tanh(together[k])
+        else:
+            for k in range(vectors * LANES):
+                numbers[k] = tanh(numbers[k])
+        observations = singles_at(addresses[AT.observations])
+        size = task.observation_size
+        for slot in range(slots):
+            column = task.observation_columns[slot]
+            if column >= 0:
+                write(clip(numbers[slot], 1.0), observations, n * size + column, size)
+
+    return observe

@@ -1,0 +1,118 @@
+"""Interface of what carries legs: one leg under a trunk (`one_leg.OneLeg`), or a horse (`horse.Horse`).
+
+Environments know bodies by this interface alone. A body says what actions mean, where episodes start, which
+engine moves it, and which functions its kernels have.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoof_env.dynamics.engine import TrunkEngine
+from hoof_env.dynamics.parts import Limb, Limits, Trunk
+from hoof_env.gait import FilterSettings
+from hoof_env.ground.contact import Ground
+from hoof_env.leg.geometry import Geometry
+from hoof_env.tasks.leg_starts import Start
+from hoof_env.tasks.settings import Settings
+
+Floats = NDArray[np.float64]
+
+
+class BodyKernels(NamedTuple):
+    """Parts of the kernels of a step that are a body's own; kernels of equal ones are shared.
+
+    Attributes:
+        legs: number of legs.
+        episode: layout of an episode's memory, `episode.Episode` or one with more fields.
+        task_fields: further fields of the task's record, as of a NumPy record type.
+        scratch_size: numbers of scratch memory that `command` needs for each row.
+        command: inlined function of task, actions, episode, first leg, number of gait parameters, row n and
+            scratch memory, which turns the actions of row n into commands.
+        on_switch: inlined function of task, episode and the mask of rows in which another speed is commanded.
+    """
+
+    legs: int
+    episode: Any
+    task_fields: tuple[Any, ...]
+    scratch_size: int
+    command: Callable[..., None]
+    on_switch: Callable[..., None]
+
+
+class Body(Protocol):
+    """A trunk on one leg or several.
+
+    Attributes:
+        kernels: see `BodyKernels`.
+        leg_prefixes: what stands before a quantity's name for each leg, "" for a single leg.
+        geometry: of a leg.
+        height: nominal height of the trunk [m].
+        hips: crank centres on the trunk by the names of the legs [m]; empty where O is the trunk's place.
+        gaits: gaits by name.
+        harmonics, filters, limits, step_error: arguments of the engine.
+        command_step: largest change from one commanded speed to the next [m/s].
+        start_names, gait_names: names of what infos say of an episode's start.
+        action_names: names of the actions, leg after leg.
+        action_form: tag of what actions mean, "rates" or "offsets".
+        finite_fields: fields of the episode's memory that must be finite in a state, beside the weight.
+    """
+
+    kernels: BodyKernels
+    leg_prefixes: tuple[str, ...]
+    geometry: Geometry
+    height: float
+    hips: Mapping[str, tuple[float, float]]
+    gaits: Mapping[str, Any]
+    harmonics: int
+    filters: FilterSettings
+    limits: Limits | None
+    step_error: float
+    command_step: float
+    start_names: tuple[str, ...]
+    gait_names: tuple[str, ...]
+    action_names: tuple[str, ...]
+    action_form: str
+    finite_fields: tuple[str, ...]
+
+    @property
+    def policy_names(self) -> list[str]:
+        """Names of the scripted policies."""
+
+    def parts(self, s: Settings) -> tuple[Trunk, Ground, tuple[Limb, ...]]:
+        """Make trunk, ground and legs of some settings."""
+
+    def commanded_speeds(self, s: Settings) -> tuple[float, float] | None:
+        """Return the lowest and highest commanded speed [m/s]; None if no speed is commanded."""
+
+    def constants(self, engine: TrunkEngine, dt: float) -> dict[str, Any]:
+        """Return the body's part of the task's record, for a control step of `dt` [s]."""
+
+    def check_options(self, options: Any, trunk: Trunk, settings: Settings) -> dict[str, Any]:
+        """Check reset options; return them with numbers and gaits converted.
+
+        Raises:
+            ParameterError: an unknown option or a bad value.
+        """
+
+    def draw(
+        self, options: Mapping[str, Any], generators: Sequence[np.random.Generator], engine: TrunkEngine
+    ) -> Start:
+        """Draw starts of episodes, one for each generator."""
+
+    def complete_start(
+        self, start: Start, targets: Floats, options: Mapping[str, Any], engine: TrunkEngine
+    ) -> None:
+        """Complete starts with what depends on the commanded speeds [m/s]."""
+
+    def begin_episodes(
+        self, episode: Mapping[str, Any] | Any, which: NDArray[np.int64], start: Start
+    ) -> None:
+        """Write the body's own fields of the episodes' memory."""
+
+    def action_for(self, gaits: Any, engine: TrunkEngine, dt: float) -> NDArray[np.float32]:
+        """Return the actions that go towards gaits, see `LegBase.action_for`."""
