@@ -208,21 +208,45 @@ class Strides(Layout):
     running_peak: Row  # of the resultant force, at most twice that force [N]
 
 
-class StrideSums(Layout):
-    """Of one call of the engine."""
+class Quantity(NamedTuple):
+    """What is said of a measured quantity where it is declared.
 
-    peak_grf_increase: Row  # increases of the running peaks of stances [N]
-    running_peak_increase: Row  # what it rose [N]
-    loading_rate_increase: Row  # increases of the running steepest rises of stances [N/s]
-    highest_grf: Row  # [N]
-    positive_work: Row  # of both drives [J]
-    normal_impulse: Row  # [N s]
-    loaded_time: Row  # [s]
-    stances: Row  # that began
-    travel: Row  # backward, of the hoof along the ground, weighted with the load [m]
-    slip: Row  # in stance, the same without sign, so that to and fro adds up [m]
-    braking: Annotated[Block, LIMITED]  # impulse of the ground backward [N s]
-    propulsion: Annotated[Block, LIMITED]  # forward [N s]
+    Attributes:
+        unit: of the number.
+        text: meaning, for the manual.
+        is_peak: the largest value counts where values are put together, not their sum.
+    """
+
+    unit: str
+    text: str
+    is_peak: bool = False
+
+
+class StrideSums(Layout):
+    """Quantities of one call of the engine, which a control step is: the table of all that is measured of it.
+
+    A row here, with its line in `observables.count_stride`, is all that a new quantity takes: it is then in
+    `step.sums` of the reward's terms, in `episode.sums`, in infos and in the manual.
+    """
+
+    peak_grf_increase: Annotated[Row, Quantity("N", "increase of the stances' peaks in it")]
+    running_peak_increase: Annotated[
+        Row, Quantity("N", "increase of the running peak in it; the reward's peak term charges it")
+    ]
+    loading_rate_increase: Annotated[Row, Quantity("N/s", "increase of the stances' steepest rises in it")]
+    highest_grf: Annotated[
+        Row, Quantity("N", "highest resultant force of any substep of the control step", is_peak=True)
+    ]
+    positive_work: Annotated[Row, Quantity("J", "of both drives in it; braking is not recovered")]
+    normal_impulse: Annotated[
+        Row, Quantity("N s", "normal force integrated over the control step; over `dt` its mean [N]")
+    ]
+    loaded_time: Annotated[Row, Quantity("s", "part of the control step with load on the hoof")]
+    stances: Annotated[Row, Quantity("-", "stances that began in it")]
+    travel: Annotated[Row, Quantity("m", "load-weighted backward travel of the hoof along the ground in it")]
+    slip: Annotated[Row, Quantity("m", "way that the hoof slid in stance in it, to and fro")]
+    braking: Annotated[Block, LIMITED, Quantity("N s", "impulse of the ground backward in it")]
+    propulsion: Annotated[Block, LIMITED, Quantity("N s", "impulse of the ground forward in it")]
 
 
 class LegSettings(Layout):
@@ -372,12 +396,12 @@ def leg_state(features: Features = PLAIN) -> tuple[str, ...]:
 
 
 def stride_sums(features: Features = PLAIN) -> tuple[str, ...]:
-    """Names of the rows of `StrideSums`."""
-    return (
-        "peak_grf_increase", "running_peak_increase", "loading_rate_increase", "highest_grf", "positive_work",
-        "normal_impulse", "loaded_time", "stances", "travel", "slip",
-        *("braking", "propulsion")[: 2 * features.has_limits],
-    )  # fmt: skip
+    """Return the names of the rows of `StrideSums`."""
+    return tuple(name for name, field in features.of(StrideSums).fields.items() if field.size)
+
+
+PEAKS = sum(StrideSums.notes[name].is_peak << k for k, name in enumerate(StrideSums.fields))
+"""Rows of `StrideSums` that are peaks, as bits."""
 
 
 def account(features: Features = PLAIN) -> tuple[str, ...]:

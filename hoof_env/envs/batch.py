@@ -20,6 +20,7 @@ from hoof_env.dynamics.advance import LANES
 from hoof_env.dynamics.constrained import INTEGRATORS
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.form import engine_layout
+from hoof_env.dynamics.layout import stride_sums
 from hoof_env.dynamics.parts import GRAVITY, LARGEST, Result, broken
 from hoof_env.dynamics.step_length import StepLength
 from hoof_env.dynamics.stepping import SCHEMES
@@ -41,7 +42,7 @@ from hoof_env.leg.profile import leg_profile
 from hoof_env.simd.layout import views
 from hoof_env.simd.threads import run_together
 from hoof_env.simd.user_functions import what_cannot_be_compiled
-from hoof_env.tasks.episode import ACTIONS, FAILED, SUMS, episode_layout, task_type
+from hoof_env.tasks.episode import ACTIONS, FAILED, episode_layout, task_type
 from hoof_env.tasks.observation import MIDDLE, check_groups, groups_of, observed
 from hoof_env.tasks.parameters import (
     check_drift,
@@ -195,7 +196,8 @@ class EpisodeBatch:
 
     @property
     def _episode_layout(self) -> Any:
-        return episode_layout(self.body.kernels.episode, len(self.task.terms), self.legs)
+        terms = len(self.task.terms)
+        return episode_layout(self.body.kernels.episode, terms, self.engine.features, self.legs)
 
     @property
     def start_row_count(self) -> int:
@@ -402,8 +404,9 @@ class EpisodeBatch:
             options = {**options, "gait": gaits[which]}
         start = self.body.draw(options, generators, self.engine)
         now.steps[which] = 0.0
-        for name in SUMS:
-            getattr(now, name)[which] = 0.0
+        now.time[which] = 0.0
+        now.distance[which] = 0.0
+        now.sums[:, which] = 0.0
         self.rewards[which] = 0.0
         now.allowance[which] = BEARING * LONGEST_STRIDE
         now.terms[:, which] = 0.0
@@ -552,12 +555,15 @@ class EpisodeBatch:
         support_share (the rest: what the rail or the suspension bore), slip_m (mean over stances), failed
         (0 or 1); of a horse mean, sum and duty factor are of all its legs.
         """
-        seconds, distance, work, impulse, loaded, stances, peaks, rates, highest, slip = (
-            getattr(self.episode_rows, name)[envs] for name in SUMS
-        )
+        seconds = self.episode_rows.time[envs]
+        distance = self.episode_rows.distance[envs]
+        names = stride_sums(self.engine.features)
+        total = dict(zip(names, self.episode_rows.sums[:, envs], strict=True))
+        work = total["positive_work"]
+        stances = total["stances"]
         weight = self.episode_rows.weight[envs]
         time = np.maximum(seconds, 1e-12)
-        mean = impulse / time
+        mean = total["normal_impulse"] / time
         each = np.maximum(stances, 1.0)
         steps = np.rint(seconds / self.dt)
         cost = np.full(len(work), np.inf)
@@ -566,13 +572,13 @@ class EpisodeBatch:
             "seconds": np.array([round(count * self.dt, 12) for count in steps]),  # sums of steps are 9.99...
             "distance_m": distance,
             "speed_m_s": distance / time,
-            "peak_grf_n": highest,
+            "peak_grf_n": total["highest_grf"],
             "mean_grf_n": mean,
-            "stance_peak_sum_n": peaks,
+            "stance_peak_sum_n": total["peak_grf_increase"],
             "stances": stances,
-            "loading_rate_n_s": rates / each,
-            "duty_factor": loaded / time / self.legs,
-            "slip_m": slip / each,
+            "loading_rate_n_s": total["loading_rate_increase"] / each,
+            "duty_factor": total["loaded_time"] / time / self.legs,
+            "slip_m": total["slip"] / each,
             "drive_work_j": work,
             "cost_of_transport": cost,
             "weight_share": mean / weight,

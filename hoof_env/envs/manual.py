@@ -100,7 +100,7 @@ def page(task: str, film: str = "") -> str:
         parameters=", ".join(f"`{name}`" for name in own.parameters(s)),
         infos=markdown_table(("Key", "Unit", "Meaning"), own.infos(s)),
         measured=str(len(measured_names(_features(s, body), body.leg_prefixes))),
-        quantities=markdown_table(("Name", "In", "Unit", "Meaning"), own.quantities()),
+        quantities=markdown_table(("Name", "In", "Unit", "Meaning"), own.quantities(_features(s, body))),
         leaves=Template(trunk["leaves"]).substitute(height=f"{body.height:.4g}"),
         seconds=literal(s.episode_seconds),
         figures=markdown_table(("Figure", "Unit", "Meaning"), rows_of("summary")),

@@ -11,6 +11,7 @@ from types import MappingProxyType
 from typing import Any
 
 from hoof_env._output import markdown_table
+from hoof_env.dynamics.layout import Features, StrideSums, stride_sums
 from hoof_env.envs.manual_words import TABLES, WORDS, rows_of
 from hoof_env.errors import ParameterError
 from hoof_env.gait import LIMITS, QUICK
@@ -55,10 +56,15 @@ class BodyPage(ABC):
         """Return the names of the settings that an episode can change."""
         return list(PER_EPISODE)
 
-    def quantities(self) -> list[tuple[str, ...]]:
-        """Return the rows of what is measured and recorded."""
+    def quantities(self, features: Features) -> list[tuple[str, ...]]:
+        """Return the rows of what is measured and recorded, those of a control step from where they are
+        declared."""
         own = TABLES["quantities"] | TABLES.get(f"{self.table_prefix}quantities", {})
-        return [(", ".join(f"`{one}`" for one in names.split(", ")), *cells) for names, cells in own.items()]
+        found = [(", ".join(f"`{one}`" for one in names.split(", ")), *cells) for names, cells in own.items()]
+        for name in stride_sums(features):
+            quantity = StrideSums.notes[name]
+            found.append((f"`{name}`", "measured", quantity.unit, quantity.text))
+        return found
 
     def options(self) -> Iterable[tuple[str, ...]]:
         """Yield the rows of the reset options."""

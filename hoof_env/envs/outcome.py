@@ -20,63 +20,43 @@ def bear(episode, impulse, seconds):  # type: ignore[no-untyped-def]
 
 
 @inline_llvm
-def sum_up(first_leg, layouts):  # type: ignore[no-untyped-def]
-    """What all legs did in the step, and the highest of their forces."""
-    sums = first_leg.sums
-    slip = first_leg.sums.slip
-    running_peak_increase = sums.running_peak_increase
-    peak_grf_increase = sums.peak_grf_increase
-    loading_rate_increase = sums.loading_rate_increase
-    highest_grf = sums.highest_grf
-    positive_work = sums.positive_work
-    normal_impulse = sums.normal_impulse
-    loaded_time = sums.loaded_time
-    stances = sums.stances
-    for i in range(1, layouts.legs):
-        sums = block_at(first_leg, i).sums
-        running_peak_increase = running_peak_increase + sums.running_peak_increase
-        peak_grf_increase = peak_grf_increase + sums.peak_grf_increase
-        loading_rate_increase = loading_rate_increase + sums.loading_rate_increase
-        highest_grf = maximum(highest_grf, sums.highest_grf)
-        positive_work = positive_work + sums.positive_work
-        normal_impulse = normal_impulse + sums.normal_impulse
-        loaded_time = loaded_time + sums.loaded_time
-        stances = stances + sums.stances
-        slip = slip + sums.slip
-    return (
-        running_peak_increase, peak_grf_increase, loading_rate_increase, highest_grf, positive_work,
-        normal_impulse, loaded_time, stances, slip,
-    )  # fmt: skip
+def sum_up(first_leg, layouts, works, sums):  # type: ignore[no-untyped-def]
+    """Add up what all legs did in the step, 0 where the engine failed."""
+    for k in range(layouts.sums):
+        total = first_leg.sums[k]
+        for i in range(1, layouts.legs):
+            other = block_at(first_leg, i).sums[k]
+            total = put_together(layouts, k, total, other)
+        sums[k] = where(works, total, 0.0)
 
 
 @inline_llvm
-def find_outcome(task, trunk, leg, episode, layouts):  # type: ignore[no-untyped-def]
-    """What the step brought."""
+def put_together(layouts, k, one, other):  # type: ignore[no-untyped-def]
+    """Return the sum of two values of the k-th of `StrideSums`, or the larger one of a peak."""
+    if (layouts.peaks >> k) & 1:
+        return maximum(one, other)
+    return one + other
+
+
+@inline_llvm
+def find_outcome(task, trunk, leg, episode, layouts, sums):  # type: ignore[no-untyped-def]
+    """Return what the step brought; `sums` is memory for `StrideSums`."""
     works = has_moved(trunk.result)  # else the state is of before: nothing is paid
     x = trunk.report.place.real
     y = trunk.report.place.imag
-    running, peak, loading, highest, work, impulse, loaded, stances, slip = sum_up(leg, layouts)
+    sum_up(leg, layouts, works, sums)
     progress = x - episode.x_before
     if task.stays:
         progress = leg.sums.travel
     episode.x_before = x
     seconds = where(works, task.dt, 0.0)
-    impulse = where(works, impulse, 0.0)
-    borne = bear(episode, impulse / episode.weight, seconds)
+    borne = bear(episode, sums.normal_impulse / episode.weight, seconds)
     return Outcome(
         seconds=seconds,
         progress=where(works, progress, 0.0),
         commanded_progress=task.dt * episode.target,
-        running_peak_increase=where(works, running, 0.0),
-        peak_grf_increase=where(works, peak, 0.0),
-        loading_rate_increase=where(works, loading, 0.0),
-        highest_grf=where(works, highest, 0.0),
-        positive_work=where(works, work, 0.0),
-        normal_impulse=impulse,
+        sums=sums,
         borne=borne,
-        loaded_time=where(works, loaded, 0.0),
-        stances=where(works, stances, 0.0),
-        slip=where(works, slip, 0.0),
         failed=where((trunk.result == 0.0) & (y > task.lowest) & (y < task.highest), 0.0, 1.0),
         episode_seconds=task.episode_seconds,
         weight=episode.weight,
@@ -87,18 +67,12 @@ def find_outcome(task, trunk, leg, episode, layouts):  # type: ignore[no-untyped
 
 
 @inline_llvm
-def add_up(outcome, episode):  # type: ignore[no-untyped-def]
-    """The sums of the episode."""
+def add_up(outcome, episode, layouts):  # type: ignore[no-untyped-def]
+    """Add the step to the sums of the episode."""
     episode.time = episode.time + outcome.seconds
     episode.distance = episode.distance + outcome.progress
-    episode.work = episode.work + outcome.positive_work
-    episode.impulse = episode.impulse + outcome.normal_impulse
-    episode.loaded_time = episode.loaded_time + outcome.loaded_time
-    episode.stances = episode.stances + outcome.stances
-    episode.peak_sum = episode.peak_sum + outcome.peak_grf_increase
-    episode.loading_rate_sum = episode.loading_rate_sum + outcome.loading_rate_increase
-    episode.highest = maximum(episode.highest, outcome.highest_grf)
-    episode.slip = episode.slip + outcome.slip
+    for k in range(layouts.sums):
+        episode.sums[k] = put_together(layouts, k, episode.sums[k], outcome.sums[k])
 
 
 @inline_llvm
@@ -115,15 +89,20 @@ def decide(task, outcome, episode):  # type: ignore[no-untyped-def]
 
 
 @inline_llvm
-def outcome_of_one(outcome, lane, trunk, leg, episode):  # type: ignore[no-untyped-def]
-    """One lane of an `Outcome`, ordinary numbers."""
+def outcome_of_one(outcome, lane, trunk, leg, episode, layouts, sums):  # type: ignore[no-untyped-def]
+    """Return one lane of an `Outcome`, ordinary numbers; `sums` is memory for its `StrideSums`."""
+    for k in range(layouts.sums):
+        sums[k] = lane_of(outcome.sums[k], lane)
     return Outcome(
-        lane_of(outcome.seconds, lane), lane_of(outcome.progress, lane),
-        lane_of(outcome.commanded_progress, lane), lane_of(outcome.running_peak_increase, lane),
-        lane_of(outcome.peak_grf_increase, lane), lane_of(outcome.loading_rate_increase, lane),
-        lane_of(outcome.highest_grf, lane), lane_of(outcome.positive_work, lane),
-        lane_of(outcome.normal_impulse, lane), lane_of(outcome.borne, lane),
-        lane_of(outcome.loaded_time, lane), lane_of(outcome.stances, lane), lane_of(outcome.slip, lane),
-        lane_of(outcome.failed, lane),
-        outcome.episode_seconds, lane_of(outcome.weight, lane), trunk, leg, episode,
-    )  # fmt: skip
+        seconds=lane_of(outcome.seconds, lane),
+        progress=lane_of(outcome.progress, lane),
+        commanded_progress=lane_of(outcome.commanded_progress, lane),
+        sums=sums,
+        borne=lane_of(outcome.borne, lane),
+        failed=lane_of(outcome.failed, lane),
+        episode_seconds=outcome.episode_seconds,
+        weight=lane_of(outcome.weight, lane),
+        trunk=trunk,
+        leg=leg,
+        episode=episode,
+    )

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.constrained import TRACE, ConstrainedLeg, ConstrainedState, new_trace
 from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.dynamics.layout import LEG_REPORT, LEG_STATE, TRUNK_REPORT, TRUNK_STATE
+from hoof_env.dynamics.layout import LEG_REPORT, LEG_STATE, TRUNK_REPORT, TRUNK_STATE, stride_sums
 from hoof_env.dynamics.memory import LIFT_OFF, Memory, memory_of
 from hoof_env.dynamics.observables import StanceCounter
 from hoof_env.dynamics.parts import Result
@@ -111,7 +111,8 @@ class PaperSolver:
             memory.stride_sums[:, :, env] = 0.0
             if result is Result.OK:
                 self.traces[env] = trace
-                memory.stride_sums[0, :, env] = self._sum(env, trace)
+                sums = self._sum(env, trace)
+                memory.stride_sums[0, :, env] = [sums[name] for name in stride_sums()]
                 self._put(env, memory)
 
     def record(self, env: int) -> dict[str, Floats]:
@@ -169,8 +170,8 @@ class PaperSolver:
         account = self._accounts[env]
         memory.strides[0, :, env] = account[["open", "began", "peak", "steepest", "load", "running"]].item()
 
-    def _sum(self, env: int, trace: Records) -> tuple[float, ...]:
-        """The rows `layout.StrideSums` of a control step; the account goes on."""
+    def _sum(self, env: int, trace: Records) -> dict[str, float]:
+        """Return the `layout.StrideSums` of a control step by name; the account goes on."""
         h = self.legs[env].sim_dt
         *stance, impulse_before, loaded_before = self._accounts[env].item()
         since = StanceCounter(self._threshold, *stance)
@@ -199,9 +200,19 @@ class PaperSolver:
                 travel -= h * slid / n
             if n > self._threshold:
                 slip += h * rubbed / n
-        sums = growth, higher, steeper, force.max(), work, impulse - impulse_before, loaded - loaded_before
         self._accounts[env] = *astuple(since)[1:], impulse, loaded
-        return *sums, since.count - stances, travel, slip
+        return {
+            "peak_grf_increase": growth,
+            "running_peak_increase": higher,
+            "loading_rate_increase": steeper,
+            "highest_grf": force.max(),
+            "positive_work": work,
+            "normal_impulse": impulse - impulse_before,
+            "loaded_time": loaded - loaded_before,
+            "stances": since.count - stances,
+            "travel": travel,
+            "slip": slip,
+        }
 
 
 def _state_like(own: ConstrainedState, given: Mapping[str, Any]) -> ConstrainedState:

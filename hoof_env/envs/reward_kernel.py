@@ -8,7 +8,7 @@ from typing import Any
 from hoof_env.dynamics.limits import has_moved
 from hoof_env.envs.addresses import memories
 from hoof_env.envs.outcome import outcome_of_one
-from hoof_env.simd import where
+from hoof_env.simd import columns, where
 from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.user_functions import number_of
 from hoof_env.tasks.episode import Memories
@@ -27,7 +27,7 @@ def sum_of_terms(terms: tuple[Term, ...], layouts: Memories, k: int = 0) -> Call
     """A function that computes the terms from the k-th on, keeps them in `episode.terms` and returns the sum
     of all. numba has no loop over functions, so each calls the next."""
     if k == len(terms):
-        return inline_llvm(lambda addresses, lanes, task, outcome, episode, n, total: total)
+        return inline_llvm(lambda addresses, lanes, task, outcome, episode, n, spare, total: total)
     compute = inline_llvm(terms[k].compute)
     rest = sum_of_terms(terms, layouts, k + 1)
     is_first = k == 0
@@ -35,24 +35,25 @@ def sum_of_terms(terms: tuple[Term, ...], layouts: Memories, k: int = 0) -> Call
     number = number_of(terms[k].title)
 
     @inline_llvm
-    def add_term(addresses, lanes, task, outcome, episode, n, total):  # type: ignore[no-untyped-def]
+    def add_term(addresses, lanes, task, outcome, episode, n, spare, total):  # type: ignore[no-untyped-def]
         if from_outside:
             works = has_moved(outcome.trunk.result)  # else the reports that it may read are of where it broke
             episode.terms[k] = where(works, episode.terms[k], 0.0)
         total = episode.terms[k] if is_first else total + episode.terms[k]
-        return rest(addresses, lanes, task, outcome, episode, n, total)
+        return rest(addresses, lanes, task, outcome, episode, n, spare, total)
 
     @inline_llvm
-    def compute_term(addresses, lanes, task, outcome, episode, n, total):  # type: ignore[no-untyped-def]
+    def compute_term(addresses, lanes, task, outcome, episode, n, spare, total):  # type: ignore[no-untyped-def]
         episode.terms[k] = number(compute(outcome, task.weights[k])) + 0.0  # no -0 where it weighs nothing
-        return add_term(addresses, lanes, task, outcome, episode, n, total)
+        return add_term(addresses, lanes, task, outcome, episode, n, spare, total)
 
     @inline_llvm
-    def compute_one_by_one(addresses, lanes, task, outcome, episode, n, total):  # type: ignore[no-untyped-def]
+    def compute_one_by_one(addresses, lanes, task, outcome, episode, n, spare, total):  # type: ignore[no-untyped-def]
+        sums = columns(spare, 0, layouts.stride_sums, 0, 1, 1)
         for lane in range(lanes):
             trunk, leg, own = memories(addresses, 0, layouts, n + lane)
-            one = outcome_of_one(outcome, lane, trunk, leg, own)
+            one = outcome_of_one(outcome, lane, trunk, leg, own, layouts, sums)
             own.terms[k] = number(compute(one, task.weights[k])) + 0.0
-        return add_term(addresses, lanes, task, outcome, episode, n, total)
+        return add_term(addresses, lanes, task, outcome, episode, n, spare, total)
 
     return compute_one_by_one if terms[k].scalar else compute_term

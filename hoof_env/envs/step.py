@@ -22,7 +22,16 @@ from hoof_env.envs.reward_kernel import is_user_term, sum_of_terms
 from hoof_env.simd import absolute, any_lane, full_like, rows, write
 from hoof_env.simd.compile import inline_source, kernel
 from hoof_env.simd.kept import Kept, Kernels
-from hoof_env.simd.memory import COLUMNS, cube_at, doubles, doubles_at, matrix_at, record_at, singles_at
+from hoof_env.simd.memory import (
+    COLUMNS,
+    cube_at,
+    doubles,
+    doubles_at,
+    matrix_at,
+    offset,
+    record_at,
+    singles_at,
+)
 from hoof_env.simd.reach import fingerprint, refresh
 from hoof_env.tasks.body import BodyKernels
 from hoof_env.tasks.episode import ACTIONS, FAILED, TRUNCATED, Memories, memories_of, task_type
@@ -113,7 +122,8 @@ def _made(
     advance = advance_kernels(contact_law, features)
     advance_one = getattr(advance, f"advance_{BY_LEGS[body.legs]}")
     advance_batch = advance.advance_batch
-    step = _step(task_record, slots, body, apply, finish)
+    sums_size = layouts.sums
+    step = _step(task_record, slots, sums_size, body, apply, finish)
     task_at = record_at(task_record)
 
     def step_one(addresses):  # type: ignore[no-untyped-def]
@@ -137,9 +147,10 @@ def _made(
     def finish_one(addresses):  # type: ignore[no-untyped-def]
         task = task_at(addresses[AT.task])[0]
         memory = doubles(slots)
+        sums = doubles(sums_size * 2)
         happened = 0
         for n in range(addresses[BEGIN], addresses[END]):
-            happened |= finish(addresses, 1, task, n, memory)
+            happened |= finish(addresses, 1, task, n, memory, sums)
         return happened
 
     functions = (step_one, step_batch, apply_one, finish_one)
@@ -189,15 +200,17 @@ def _finish(
     on_switch = body.on_switch
 
     @inline_source
-    def finish(addresses, lanes, task, n, memory):  # type: ignore[no-untyped-def]
+    def finish(addresses, lanes, task, n, memory, sums):  # type: ignore[no-untyped-def]
         happened = 0
         trunk, leg, episode = memories(addresses, lanes, layouts, n)
-        outcome = find_outcome(task, trunk, leg, episode, layouts)
-        add_up(outcome, episode)
+        of_step = rows(sums, lanes, layouts.stride_sums)
+        outcome = find_outcome(task, trunk, leg, episode, layouts, of_step)
+        add_up(outcome, episode, layouts)
         ended, switched = decide(task, outcome, episode)
         on_switch(task, episode, switched)
         nothing = full_like(episode, 0.0)
-        reward = compute_reward(addresses, lanes, task, outcome, episode, n, nothing)
+        spare = offset(sums, layouts.sums * lanes)
+        reward = compute_reward(addresses, lanes, task, outcome, episode, n, spare, nothing)
         write(reward, doubles_at(addresses[AT.rewards]), n, 1)
         if any_lane(ended):
             happened |= SOME_ENDED
@@ -212,6 +225,7 @@ def _finish(
 def _step(
     task_record: np.dtype[Any],
     slots: int,
+    sums_size: int,
     body: BodyKernels,
     apply: Callable[..., Any],
     finish: Callable[..., Any],
@@ -230,6 +244,7 @@ def _step(
         happened = 0
         scratch = doubles(scratch_size * lanes)
         memory = doubles(slots * lanes)
+        sums = doubles(sums_size * (lanes + 1))  # and those of one lane, for terms that take no lanes
         # One group of lanes after the other: its memory stays in the cache from action to observation
         for n in range(addresses[BEGIN], addresses[END], lanes):
             apply(addresses, lanes, task, n, scratch)
@@ -246,7 +261,7 @@ def _step(
                 n,
                 n + lanes,
             )
-            happened |= finish(addresses, lanes, task, n, memory)
+            happened |= finish(addresses, lanes, task, n, memory, sums)
         return happened
 
     return step

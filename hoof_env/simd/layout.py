@@ -1,7 +1,8 @@
 """Named rows of memory: `leg.theta` instead of a row number.
 
 A subclass of `Layout` says which fields lie one after the other, each a `Row`, a planar `Vector`, a `Block`
-of rows or another layout. Positions follow from the order, here and nowhere else. Kernels reach the fields as
+of rows or another layout. Positions follow from the order, here and nowhere else. `Annotated[Row, note]` and
+`Annotated[Block, size, note]` keep a note about a field, such as its unit. Kernels reach the fields as
 attributes, of `Rows` on the stack and of `Columns` in an array; Python reaches them by `rows` and `names`.
 """
 
@@ -58,17 +59,22 @@ class _Named(type):
     """Makes of the annotations of a `Layout` its fields."""
 
     fields: dict[str, Field]
+    notes: dict[str, Any]
     size: int
     names: tuple[str, ...]
 
     def __init__(cls, name: str, bases: Any, namespace: dict[str, Any]) -> None:
         super().__init__(name, bases, namespace)
         cls.fields = {}
+        cls.notes = {}
         cls.size = 0
         names = []
         for key, hint in get_type_hints(cls, include_extras=True).items():
-            kind, size = (Block, hint.__metadata__[0]) if get_origin(hint) is Annotated else (hint, hint.size)
+            kind, notes = _taken_apart(hint)
+            size = notes.pop(0) if kind is Block else kind.size
             size = size.rows if isinstance(size, Size) else size
+            if notes:
+                cls.notes[key] = notes[0]
             cls.fields[key] = Field(cls.size, size, kind)
             cls.size += size
             names += _names(key, cls.fields[key])
@@ -89,6 +95,7 @@ class Layout(metaclass=_Named):
 
     Attributes:
         fields: `Field`s by name; `sized` gives the layout with other sizes of blocks.
+        notes: notes about fields, by name, of those that have one.
         size: how many rows they take.
         names: of the rows, those of inner fields behind their field's name.
     """
@@ -100,13 +107,14 @@ def _sized(layout: Any, sizes: tuple[tuple[str, int], ...]) -> Any:
     hints = get_type_hints(layout, include_extras=True)
     kept = {}
     for key, hint in hints.items():
-        if get_origin(hint) is not Annotated:
+        kind, notes = _taken_apart(hint)
+        if kind is not Block:
             kept[key] = hint.sized(**wanted) if isinstance(hint, _Named) else hint
             continue
-        size = hint.__metadata__[0]
+        size, *rest = notes
         if isinstance(size, Size):
             size = size._replace(rows=wanted.get(size.name, size.rows))
-        kept[key] = Annotated[Block, size]
+        kept[key] = Annotated[(Block, size, *rest)]
     if kept == hints:
         return layout  # one layout, one type
     name = layout.__qualname__ + "".join(f" {key}={rows}" for key, rows in sizes)
@@ -118,6 +126,13 @@ def views(layout: Any, data: NDArray[Any]) -> Any:
     that axis, of anything else with it."""
     found = {name: data[layout.rows(name)] for name in layout.fields}
     return SimpleNamespace(**{k: v[0] if layout.fields[k].kind is Row else v for k, v in found.items()})
+
+
+def _taken_apart(hint: Any) -> tuple[Any, list[Any]]:
+    """Return what an annotation is of, and what is said of it."""
+    if get_origin(hint) is Annotated:
+        return hint.__origin__, list(hint.__metadata__)
+    return hint, []
 
 
 def _names(key: str, field: Field) -> list[str]:

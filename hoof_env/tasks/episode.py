@@ -9,7 +9,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from hoof_env.dynamics.form import engine_layout
-from hoof_env.dynamics.layout import Features
+from hoof_env.dynamics.layout import PEAKS, PLAIN, Features, StrideSums
 from hoof_env.gait import PARAMETERS
 from hoof_env.simd.layout import Block, Constants, Layout, Row, Size
 from hoof_env.tasks.reward import TERMS
@@ -20,13 +20,6 @@ ACTIONS = len(PARAMETERS)
 FAILED = 1
 TRUNCATED = 2
 """How an episode ended, in the place of 0."""
-
-SUMS = (
-    "time", "distance", "work", "impulse", "loaded_time", "stances", "peak_sum", "loading_rate_sum",
-    "highest", "slip",
-)  # fmt: skip
-"""Fields of `Episode` that begin at 0 and are added to."""
-
 
 ACTION = Size("action", ACTIONS)
 REWARD = Size("reward", len(TERMS))
@@ -42,14 +35,7 @@ class Episode(Layout):
     weight: Row  # of trunk and leg [N]
     time: Row  # simulated [s]
     distance: Row  # forward [m]
-    work: Row  # positive, of both drives [J]
-    impulse: Row  # of the normal force [N s]
-    loaded_time: Row  # [s]
-    stances: Row
-    peak_sum: Row  # of the stances' peaks [N]
-    loading_rate_sum: Row  # of the stances' loading rates [N/s]
-    highest: Row  # force of the episode [N]
-    slip: Row  # of hooves in stance, without sign [m]
+    sums: StrideSums  # of all legs and steps so far
     terms: Annotated[Block, REWARD]  # of the last reward
     ended: Row  # 0, `FAILED` or `TRUNCATED`
     switch: Row  # the control step after which another speed is commanded
@@ -57,10 +43,10 @@ class Episode(Layout):
 
 
 @cache
-def episode_layout(layout: Any, terms: int, legs: int = 1) -> Any:
+def episode_layout(layout: Any, terms: int, features: Features = PLAIN, legs: int = 1) -> Any:
     """Return the layout of an episode's memory, `Episode` or one with more fields, sized for a number of
-    terms and legs."""
-    return layout.sized(action=legs * ACTIONS, reward=terms)
+    terms and legs and an engine with these features."""
+    return features.of(layout).sized(action=legs * ACTIONS, reward=terms)
 
 
 class _Memories(NamedTuple):
@@ -71,11 +57,15 @@ class _Memories(NamedTuple):
     legs: int
     gait: int
     has_limits: bool
+    stride_sums: Any
+    sums: int
+    peaks: int
 
 
 class Memories(Constants, _Memories):
     """Layouts of what a step works on, how many rows the trunk's has, how many legs there are and how many
-    gait parameters each has, and whether their slip is known."""
+    gait parameters each has, whether the engine has limits, the layout of `StrideSums`, how many there are
+    and which of these are peaks."""
 
 
 @cache
@@ -83,8 +73,8 @@ def memories_of(layout: Any, terms: int, features: Features, legs: int = 1) -> M
     """Return the layouts of an engine with these features and of episodes with a number of terms and legs."""
     form = engine_layout(features)
     return Memories(
-        episode_layout(layout, terms, legs), form.trunk_memory, form.leg_memory, form.trunk_rows, legs,
-        form.gait, form.has_limits,
+        episode_layout(layout, terms, features, legs), form.trunk_memory, form.leg_memory,
+        form.trunk_rows, legs, form.gait, form.has_limits, features.of(StrideSums), form.sums, PEAKS,
     )  # fmt: skip
 
 

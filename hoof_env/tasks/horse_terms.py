@@ -132,24 +132,24 @@ def tracking(step, weight):  # type: ignore[no-untyped-def]
 
 def peak(step, weight):  # type: ignore[no-untyped-def]
     """In units of the weight."""
-    return -weight * step.running_peak_increase / step.weight
+    return -weight * step.sums.running_peak_increase / step.weight
 
 
 def slip(step, weight):  # type: ignore[no-untyped-def]
     """Over the commanded distance, at most all of it, for every second."""
     asked = maximum(step.commanded_progress, 1e-9)
-    return -weight * step.seconds * minimum(step.slip / asked, 1.0)
+    return -weight * step.seconds * minimum(step.sums.slip / asked, 1.0)
 
 
 def landing(step, weight):  # type: ignore[no-untyped-def]
     """For each stance that begins."""
-    return -weight * step.stances
+    return -weight * step.sums.stances
 
 
 def work(step, weight):  # type: ignore[no-untyped-def]
     """Over the weight and the commanded distance, for every second."""
     asked = maximum(step.commanded_progress, 1e-9)
-    return -weight * step.seconds * step.positive_work / (step.weight * asked)
+    return -weight * step.seconds * step.sums.positive_work / (step.weight * asked)
 
 
 def pitch(step, weight):  # type: ignore[no-untyped-def]

@@ -25,16 +25,9 @@ class Outcome(NamedTuple):
         seconds: simulated [s].
         progress: forward [m].
         commanded_progress: at the commanded speed; infinite without one [m].
-        running_peak_increase: of the running peak, see `dynamics.observables` [N].
-        peak_grf_increase: of the peaks of stances [N]; they add up to every stance's peak.
-        loading_rate_increase: of the steepest rises of the force in stances [N/s]; they add up likewise.
-        highest_grf: [N].
-        positive_work: of both drives; braking is not recovered [J].
-        normal_impulse: of the ground on the hoof [N s].
+        sums: `dynamics.layout.StrideSums` of the step, `sums.slip` and so on; all legs together, peaks the
+            highest.
         borne: impulse over the weight that bearing is paid for [s], see `BEARING`.
-        loaded_time: [s].
-        stances: that began.
-        slip: of hooves in stance, without sign [m].
         failed: 1 where the episode ends by failure, else 0.
         episode_seconds: of a whole episode [s].
         weight: of trunk and legs [N].
@@ -46,16 +39,8 @@ class Outcome(NamedTuple):
     seconds: Any
     progress: Any
     commanded_progress: Any
-    running_peak_increase: Any
-    peak_grf_increase: Any
-    loading_rate_increase: Any
-    highest_grf: Any
-    positive_work: Any
-    normal_impulse: Any
+    sums: Any
     borne: Any
-    loaded_time: Any
-    stances: Any
-    slip: Any
     failed: Any
     episode_seconds: Any
     weight: Any
@@ -88,22 +73,22 @@ def overspeed(step, weight):  # type: ignore[no-untyped-def]
 
 def peak(step, weight):  # type: ignore[no-untyped-def]
     """Weight in 1/kN."""
-    return -0.001 * weight * step.running_peak_increase
+    return -0.001 * weight * step.sums.running_peak_increase
 
 
 def loading(step, weight):  # type: ignore[no-untyped-def]
     """Weight in s/MN."""
-    return -1e-6 * weight * step.loading_rate_increase
+    return -1e-6 * weight * step.sums.loading_rate_increase
 
 
 def energy(step, weight):  # type: ignore[no-untyped-def]
     """Weight in 1/kJ."""
-    return -0.001 * weight * step.positive_work
+    return -0.001 * weight * step.sums.positive_work
 
 
 def slip(step, weight):  # type: ignore[no-untyped-def]
     """Way that the hoof slides in stance, to and fro."""
-    return -weight * step.slip
+    return -weight * step.sums.slip
 
 
 def failure(step, weight):  # type: ignore[no-untyped-def]

@@ -14,8 +14,6 @@ from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from hoof_env import Sb3VecEnv, make_policy, read_preset
 from hoof_env.errors import ParameterError
 from hoof_env.gait import load_gait
-from hoof_env.tasks.episode import episode_layout
-from hoof_env.tasks.horse import HorseEpisode
 
 LEG, NAN = "hoof_env/HorseLeg-v0", float("nan")
 OTHER_LEG = {**read_preset("identified"), "provenance": "another"}
@@ -364,7 +362,7 @@ def test_states_of_a_horse_that_cannot_be(row, value):
     env = gym.make(HORSE).unwrapped
     env.reset(seed=0)
     state, before = env.get_state(), env.get_state()
-    state["episode"][episode_layout(HorseEpisode, len(env.batch.task.terms), 4).rows(row).start] = value
+    state["episode"][env.batch._episode_layout.rows(row).start] = value
     with pytest.raises(ParameterError, match=r"state\['episode'\]: expected numbers"):
         env.set_state(state)
     same(env.get_state(), before)
