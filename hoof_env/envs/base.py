@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.envs.batch import EpisodeBatch
+from hoof_env.envs.batch_reports import summaries_of
+from hoof_env.envs.batch_states import state_of
 from hoof_env.envs.conditions import CHANGEABLE
 from hoof_env.errors import FixedSettingError, ParameterError, check_choice
 from hoof_env.gait import GaitParameters
@@ -219,7 +221,7 @@ class LegBase:
             ResetNeeded: there is no episode yet.
         """
         self._check_started("episode_summary")
-        figures = self.batch.summaries(np.arange(self.batch.num_envs))
+        figures = summaries_of(self.batch, np.arange(self.batch.num_envs))
         return {name: self._each(values) for name, values in figures.items()}
 
     def raw_observation(self) -> dict[str, Any]:
@@ -296,7 +298,7 @@ class LegBase:
         values = self._settings_as_json()
         settings = values | {name: json_value(values[name]) for name in self._as_json[2]}  # nobody else's
         about = {"id": self.task.id, "actions": self.action_form, "settings": settings}
-        return about | self.batch.get_state()
+        return about | state_of(self.batch)
 
     def _settings_as_json(self) -> dict[str, Any]:
         """As values that JSON can hold, found once for these settings."""

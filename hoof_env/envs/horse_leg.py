@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.parts import broken
 from hoof_env.envs.base import LegBase, array_of, generator_of
+from hoof_env.envs.batch_reports import failure_of, summary_of
+from hoof_env.envs.batch_starts import check_options
+from hoof_env.envs.batch_states import set_state
 from hoof_env.envs.infos import name_columns
 from hoof_env.envs.recording import Recording
 from hoof_env.envs.step import SOME_SWITCHED
@@ -116,7 +119,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             ParameterError: a bad seed or option; nothing has changed then.
         """
         self._check_open("reset")
-        checked = self.batch.check_options(options)  # before the generator is touched
+        checked = check_options(self.batch, options)  # before the generator is touched
         super().reset(seed=None if seed is None else count("seed", seed, low=0))
         before = self.batch.addresses
         parameters = self.batch.reset([0], [self.np_random], checked)
@@ -173,9 +176,9 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             truncated = not failed
             if self._phase == "running":
                 self._phase = "ended"
-            info["episode_summary"] = self.batch.summary(0)
+            info["episode_summary"] = summary_of(self.batch, 0)
             if failed:
-                info["failure"] = self.batch.failure(0)
+                info["failure"] = failure_of(self.batch, 0)
             if broken(self.batch.engine.results)[0]:
                 info["measured"][self.batch.measurements.last_step] = 0.0
         if self._recording is not None:
@@ -262,7 +265,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         """
         self._check_state(state)
         generator = generator_of(state["generator"])
-        self.batch.set_state(state)
+        set_state(self.batch, state)
         self.np_random = generator
         self._phase = "ended" if self.batch.episode_rows.ended[0] else "running"
         if self._start_and_target() != self._began_with:  # else infos say it
@@ -300,7 +303,7 @@ class RandomizeParameters(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         leg = env.unwrapped
         if not isinstance(leg, HorseLegEnv):
             raise ParameterError(f"env: expected a leg of this package, got {type(leg).__name__}")
-        leg.batch.check_options({"parameters": ranges})
+        check_options(leg.batch, {"parameters": ranges})
         RecordConstructorArgs.__init__(self, ranges=dict(ranges), enabled=enabled)
         gym.Wrapper.__init__(self, env)
         self.ranges = dict(ranges)

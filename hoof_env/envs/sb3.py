@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
 from hoof_env.envs.base import fixed_setting
+from hoof_env.envs.batch_starts import check_options
 from hoof_env.envs.infos import row_of
 from hoof_env.envs.vector import PER_ENV, HorseLegVectorEnv
 from hoof_env.errors import ParameterError
@@ -81,7 +82,7 @@ class Sb3VecEnv(VecEnv):
             else:
                 rows.append(env)
         for options, _ in groups:  # what is refused changes nothing
-            self.envs.batch.check_options(options)
+            check_options(self.envs.batch, options)
         self.reset_infos = [{} for _ in range(self.num_envs)]
         for options, rows in groups:
             mask = np.zeros(self.num_envs, bool)

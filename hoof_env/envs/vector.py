@@ -20,6 +20,9 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from hoof_env.envs.base import LegBase, array_of, fixed_setting, generator_of
+from hoof_env.envs.batch_reports import failure_of, infos_of, summaries_of
+from hoof_env.envs.batch_starts import check_options
+from hoof_env.envs.batch_states import set_state, spread_state
 from hoof_env.envs.infos import name_columns
 from hoof_env.envs.recording import Recording
 from hoof_env.errors import ParameterError, all_of, count
@@ -133,13 +136,13 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         self._check_open("reset")
         rest: Any = dict(options) if isinstance(options, Mapping) else options
         mask = self._check_mask(rest.pop("reset_mask", None) if isinstance(rest, dict) else None)
-        checked = self.batch.check_options(rest)
+        checked = check_options(self.batch, rest)
         self._seed(seed, mask)
         parameters = self._start(np.flatnonzero(mask), checked)
         self._ended[mask] = False
         observations = self._observed()
         observations[~self._started] = 0.0
-        infos: dict[str, Any] = self.batch.infos()
+        infos: dict[str, Any] = infos_of(self.batch)
         if parameters:
             infos["parameters"] = name_columns(np.zeros((self.num_envs, len(parameters))), [*parameters])
             infos["parameters"][mask] = np.transpose([*parameters.values()])
@@ -174,7 +177,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
             truncated[again] = False
             self._start(np.flatnonzero(again), {})
         done = terminated | truncated
-        infos = batch.infos(some_ended)
+        infos = infos_of(batch, some_ended)
         rewards = batch.rewards[:n].copy()
         if done.any():
             infos |= self._endings(done, terminated)
@@ -189,7 +192,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
     def _endings(self, done: NDArray[np.bool_], terminated: NDArray[np.bool_]) -> dict[str, Any]:
         """What infos say of episodes that end, as Gymnasium's `_add_info` puts them together one by one."""
         figures: dict[str, Any] = {}
-        for name, values in self.batch.summaries(np.flatnonzero(done)).items():
+        for name, values in summaries_of(self.batch, np.flatnonzero(done)).items():
             figures[name] = np.zeros(self.num_envs)
             figures[f"_{name}"] = done.copy()
             figures[name][done] = values
@@ -197,7 +200,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         if terminated.any():
             reasons = np.full(self.num_envs, None, dtype=object)
             for env in np.flatnonzero(terminated).tolist():
-                reasons[env] = self.batch.failure(env)
+                reasons[env] = failure_of(self.batch, env)
             endings |= {"failure": reasons, "_failure": terminated.copy()}
         return endings
 
@@ -208,7 +211,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
             last[env] = self.batch.observations[env].copy()
         self._remember()
         self._start(np.flatnonzero(done), {})
-        infos: dict[str, Any] = self.batch.infos()
+        infos: dict[str, Any] = infos_of(self.batch)
         infos |= {key: copy.deepcopy(value) for key, value in final.items() if key not in infos}
         final |= {
             f"_{key}": done.copy() for key in final if not key.startswith("_") and f"_{key}" not in final
@@ -476,7 +479,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         if not isinstance(states, (list, tuple)) or len(states) != n:
             raise ParameterError(f"state['generator']: expected a list of {n}, got {states!r:.60}")
         generators = [generator_of(values) for values in states]
-        self.batch.set_state(state)
+        set_state(self.batch, state)
         self._ended = ended
         self._started = np.ones(n, bool)
         self._generators = generators
@@ -488,5 +491,5 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
 
     def _in_every_row(self, state: Mapping[str, Any]) -> dict[str, Any]:
         """The state of a single environment as one of this vector environment."""
-        found = {**self.batch.spread(state), "generator": [state["generator"]] * self.num_envs}
+        found = {**spread_state(self.batch, state), "generator": [state["generator"]] * self.num_envs}
         return found | {"ended": found["episode"][self.batch.ended_row] != 0.0}

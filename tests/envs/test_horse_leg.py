@@ -8,6 +8,7 @@ import pytest
 from family import substeps
 
 from hoof_env.dynamics.layout import TRUNK_STATE
+from hoof_env.envs.batch_reports import summary_of
 from hoof_env.envs.policies import make_policy, policy_names
 from hoof_env.errors import ParameterError
 from hoof_env.gait import GaitParameters, load_gait
@@ -116,7 +117,7 @@ def test_a_step_that_could_not_be_simulated_pays_for_nothing_but_the_failure():
     for _ in range(20):
         _, reward, *_ = env.step(keep)
     assert reward != 0.0
-    before, state = env.batch.summary(0), env.get_state()
+    before, state = summary_of(env.batch, 0), env.get_state()
     state["engine"]["trunk"][TRUNK_STATE.index("momentum_x")] = 1e308
     there = env.set_state(state)
     seen, reward, terminated, _, info = env.step(keep)

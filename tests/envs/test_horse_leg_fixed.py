@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from family import LEGS, actions, running_peak_charge, same, together
 
+from hoof_env.envs.batch_reports import summary_of
 from hoof_env.envs.policies import make_policy
 from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.gait import PARAMETERS
@@ -145,7 +146,7 @@ def test_the_papers_solver_goes_on_alike_from_a_copy(copied):
             same(*(e.reset(options={"reset_mask": mask, "gait": "walk"})[0] for e in (env, twin)))
         one = env.step(action)
         same(one[:4], twin.step(action)[:4])
-        highest = max(highest, env.batch.summary(0)["peak_grf_n"])
+        highest = max(highest, summary_of(env.batch, 0)["peak_grf_n"])
     assert highest > 0
 
 
@@ -172,7 +173,7 @@ def test_the_papers_solver_counts_strides_as_the_kernels_do():
         for _ in range(50):
             paid += env.step(np.zeros(4, np.float32))[4]["reward_peak"]
             records.append(env.unwrapped.record())
-        trace, summary = together(records[1:]), env.unwrapped.batch.summary(0)
+        trace, summary = together(records[1:]), summary_of(env.unwrapped.batch, 0)
         slid = sum(trace[f"{point}_normal"] * trace[f"{point}_slide"] for point in ("toe", "heel"))
         down = trace["normal"] > 0
         assert summary["distance_m"] == pytest.approx(-1e-3 * np.sum(slid[down] / trace["normal"][down]))
@@ -193,7 +194,7 @@ def test_a_linkage_that_diverges_ends_the_episode_and_pays_nothing(settings):
     env.record()
     done = False
     while not done:
-        before, time = env.batch.summary(0), env.batch.paper.legs[0].state.body["time"]
+        before, time = summary_of(env.batch, 0), env.batch.paper.legs[0].state.body["time"]
         observation, reward, done, truncated, info = env.step(np.zeros(4, np.float32))
         assert not truncated
         assert np.isfinite(observation).all()

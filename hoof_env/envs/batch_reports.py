@@ -1,0 +1,95 @@
+"""Figures of episodes: what infos say, summaries of episodes that ended, reasons of failures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoof_env.dynamics.layout import stride_sums
+from hoof_env.dynamics.parts import Result, broken
+from hoof_env.envs.infos import name_columns
+from hoof_env.tasks.episode import FAILED
+
+Floats = NDArray[np.float64]
+
+
+def infos_of(batch: Any, ended: bool = True) -> dict[str, NDArray[Any]]:
+    """What all started with, what is measured of them, and the terms of the last reward, by name: shape
+    (num_envs,), but for "gait", "measured" and "parameters", which are `NamedArray`. `ended` says whether
+    there may be environments that could not be simulated."""
+    n = batch.num_envs
+    begun = batch.start_values.copy()
+    memory = batch.engine.arrays[0]
+    measured = batch.measurements.read(memory[:, :n])
+    if ended:
+        nothing = broken(batch.engine.results)
+        measured[np.ix_(batch.measurements.last_step, nothing)] = 0.0
+    first = batch.start_row_count
+    names = batch.body.start_names
+    infos: dict[str, NDArray[Any]] = dict(zip(names, begun, strict=False))
+    infos["gait"] = name_columns(begun[len(names) : first].T, batch.body.gait_names)
+    if batch.randomize:
+        infos["parameters"] = name_columns(begun[first:].T, tuple(batch.randomize))
+    if batch.target_speed:
+        infos["target_speed"] = batch.episode_rows.target[:n].copy()
+    infos["measured"] = measured.T.view(batch.measurements.kind)
+    infos.update(zip(batch.terms, batch.episode_rows.terms[:, :n].copy(), strict=True))
+    return infos
+
+
+def summary_of(batch: Any, env: int) -> dict[str, float]:
+    """Figures of an episode, see `summaries_of`."""
+    return {name: float(values[0]) for name, values in summaries_of(batch, [env]).items()}
+
+
+def summaries_of(batch: Any, envs: Sequence[int] | NDArray[np.int64]) -> dict[str, Floats]:
+    """Figures of the episodes of some environments, by name, shape (len(envs),) each.
+
+    seconds, distance_m, speed_m_s, peak_grf_n (highest of the episode), mean_grf_n (normal force over the
+    whole time), stance_peak_sum_n, stances, loading_rate_n_s (mean over stances), duty_factor,
+    drive_work_j (braking is not recovered), cost_of_transport (work per weight and distance; infinite
+    without forward progress), weight_share (mean normal force over weight: what the leg bore),
+    support_share (the rest: what the rail or the suspension bore), slip_m (mean over stances), failed
+    (0 or 1); of a horse mean, sum and duty factor are of all its legs.
+    """
+    seconds = batch.episode_rows.time[envs]
+    distance = batch.episode_rows.distance[envs]
+    names = stride_sums(batch.engine.features)
+    total = dict(zip(names, batch.episode_rows.sums[:, envs], strict=True))
+    work = total["positive_work"]
+    stances = total["stances"]
+    weight = batch.episode_rows.weight[envs]
+    time = np.maximum(seconds, 1e-12)
+    mean = total["normal_impulse"] / time
+    each = np.maximum(stances, 1.0)
+    steps = np.rint(seconds / batch.dt)
+    cost = np.full(len(work), np.inf)
+    np.divide(work, weight * distance, out=cost, where=distance > 0)
+    return {
+        "seconds": np.array([round(count * batch.dt, 12) for count in steps]),  # sums of steps are 9.99...
+        "distance_m": distance,
+        "speed_m_s": distance / time,
+        "peak_grf_n": total["highest_grf"],
+        "mean_grf_n": mean,
+        "stance_peak_sum_n": total["peak_grf_increase"],
+        "stances": stances,
+        "loading_rate_n_s": total["loading_rate_increase"] / each,
+        "duty_factor": total["loaded_time"] / time / batch.legs,
+        "slip_m": total["slip"] / each,
+        "drive_work_j": work,
+        "cost_of_transport": cost,
+        "weight_share": mean / weight,
+        "support_share": 1 - mean / weight,
+        "failed": (batch.episode_rows.ended[envs] == FAILED).astype(np.float64),
+    }
+
+
+def failure_of(batch: Any, env: int) -> str:
+    """Why an episode failed, for people."""
+    if batch.paper and batch.paper.apart[env]:
+        return "the linkage came apart; the state was put back to the last good one"
+    result = Result(int(batch.engine.results[env]))
+    return result.message if result is not Result.OK else "the trunk left its range of heights"

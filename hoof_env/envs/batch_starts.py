@@ -1,0 +1,137 @@
+"""Starts of episodes in a batch: options, drawn parameters, commanded speeds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoof_env.dynamics.advance import LANES
+from hoof_env.dynamics.parts import GRAVITY
+from hoof_env.envs.addresses import BEGIN, END
+from hoof_env.envs.batch_build import substeps_under
+from hoof_env.errors import ParameterError
+from hoof_env.tasks.parameters import draw_parameters, extremes
+from hoof_env.tasks.reward import BEARING, LONGEST_STRIDE
+
+Floats = NDArray[np.float64]
+
+
+def check_options(batch: Any, options: Any) -> dict[str, Any]:
+    """Reset options as `reset` takes them; `ParameterError` of whatever can be wrong with them, so that a
+    refused reset changes nothing."""
+    if batch.changed is not None:
+        return check_options(batch.changed, options)
+    checked = batch.body.check_options(options, batch.engine.trunk, batch.settings)
+    if batch.paper and checked.get("parameters"):
+        raise ParameterError(
+            f"options['parameters']: expected none with solver=\"paper\", got {checked['parameters']!r}"
+        )
+    gaits = checked.get("gait")
+    if isinstance(gaits, np.ndarray) and gaits.ndim == 2 and len(gaits) != batch.num_envs:
+        raise ParameterError(
+            f"options['gait']: expected one gait or {batch.num_envs}, one for each environment, got"
+            f" {len(gaits)}"
+        )
+    check_extremes(batch, batch.randomize | checked.get("parameters", {}))
+    return checked
+
+
+def check_extremes(batch: Any, parameters: Mapping[str, float | tuple[float, float]]) -> None:
+    """Raise where something that can be drawn is out of range, warn where it needs shorter substeps."""
+    if parameters and batch.validated != (words := repr(parameters)):
+        for corner in extremes(parameters):
+            substeps_under(batch, corner, batch.engine.substeps)
+        batch.validated = words
+
+
+def start(
+    batch: Any,
+    which: NDArray[np.int64],
+    generators: Sequence[np.random.Generator],
+    options: Mapping[str, Any],
+) -> dict[str, Floats]:
+    now = batch.episode_rows
+    options = {**batch.task.start, **options}
+    parameters = batch.randomize | options.get("parameters", {})
+    drawn = {name: np.zeros(len(which)) for name in parameters}
+    if parameters or batch.has_overrides[which].any():  # what was set for one episode is not for the next
+        for k, (env, generator) in enumerate(zip(which, generators, strict=True)):
+            values = draw_parameters(parameters, generator)
+            for name, value in values.items():
+                drawn[name][k] = value
+            vary(batch, int(env), values)
+        batch.has_overrides[which] = bool(parameters)
+    gaits: Any = options.get("gait")
+    if np.ndim(gaits) == 2:  # one for each environment
+        options = {**options, "gait": gaits[which]}
+    start = batch.body.draw(options, generators, batch.engine)
+    now.steps[which] = 0.0
+    now.time[which] = 0.0
+    now.distance[which] = 0.0
+    now.sums[:, which] = 0.0
+    batch.rewards[which] = 0.0
+    now.allowance[which] = BEARING * LONGEST_STRIDE
+    now.terms[:, which] = 0.0
+    now.target[which] = np.inf
+    now.switch[which] = np.inf
+    if batch.target_speed:
+        now.target[which] = batch.target_speed[0]
+    if batch.target_speed and batch.speed_changes:
+        now.target[which] = [generator.uniform(*batch.target_speed) for generator in generators]
+        draw_targets(batch, which, generators)
+    if "target_speed" in options:  # for the whole episode
+        now.target[which] = options["target_speed"]
+        now.switch[which] = np.inf
+    batch.body.complete_start(start, now.target[which], options, batch.engine)
+    batch.engine.reset(start.commands, start.theta, envs=which, **start.trunk)
+    begun = [*(start.values[name] for name in batch.body.start_names), *start.gaits.T]
+    batch.start_values[:, which] = [*begun, *(drawn[name] for name in batch.randomize)]
+    now.x_before[which] = start.trunk["x"]
+    now.ended[which] = 0.0
+    batch.body.begin_episodes(now, which, start)
+    if batch.paper:
+        batch.paper.start(which.tolist(), start.gaits, start.values["crank_angle"], start.values["x"])
+    near = batch.addresses.copy()  # the groups of lanes from the first of them to the last
+    near[BEGIN] = which.min() // LANES * LANES
+    near[END] = min(batch.engine.columns, (which.max() // LANES + 1) * LANES)
+    batch.observe_kernel(near)
+    return drawn
+
+
+def vary(batch: Any, env: int, values: Mapping[str, float]) -> None:
+    """Give one environment settings of its own."""
+    trunk, ground, limbs = batch.body.parts(replace(batch.settings, **dict(values)))
+    batch.engine.vary(env, trunk, ground, limbs=limbs)
+    batch.episode_rows.weight[env] = (trunk.mass + sum(limb.geometry.mass for limb in limbs)) * GRAVITY
+
+
+def draw_targets(batch: Any, envs: NDArray[np.int64], generators: Sequence[np.random.Generator]) -> None:
+    """When other speeds are commanded, and which, with a generator for each of `envs`."""
+    if batch.conditions.are_mixed:
+        each = dict(zip(envs.tolist(), generators, strict=True))
+        for conditions, rows in batch.conditions.groups(envs):
+            _draw_between(batch, rows, [each[env] for env in rows.tolist()], conditions)
+    else:
+        _draw_between(batch, envs, generators, vars(batch))
+
+
+def _draw_between(
+    batch: Any,
+    envs: NDArray[np.int64],
+    generators: Sequence[np.random.Generator],
+    conditions: Mapping[str, Any],
+) -> None:
+    when, which = np.array([generator.random(2) for generator in generators]).reshape(-1, 2).T
+    (shortest, longest) = conditions["target_seconds"]
+    (low, high) = conditions["target_speed"]
+    steps = np.rint((shortest + (longest - shortest) * when) / batch.dt)
+    now = batch.episode_rows.target[envs]
+    step = batch.body.command_step
+    low = np.maximum(low, now - step)
+    high = np.minimum(high, now + step)
+    batch.episode_rows.switch[envs] = batch.episode_rows.steps[envs] + steps
+    batch.episode_rows.next_target[envs] = low + (high - low) * which
