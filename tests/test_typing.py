@@ -12,8 +12,10 @@ from pathlib import Path
 import pytest
 
 import hoof_env
+from hoof_env.tasks.keywords import Keywords, VectorKeywords
+from hoof_env.tasks.plain import to_json
 from hoof_env.tasks.registry import TASKS
-from hoof_env.tasks.settings import Keywords, Settings, VectorKeywords, to_json
+from hoof_env.tasks.settings import Settings
 
 SCRIPT = """\
 from typing import assert_type

@@ -23,8 +23,9 @@ from hoof_env.gait import GaitParameters
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
 from hoof_env.render.renderer import check_side
+from hoof_env.tasks.plain import as_plain, json_value, to_json
 from hoof_env.tasks.registry import Task, task_of
-from hoof_env.tasks.settings import PER_EPISODE, SETTINGS, Settings, as_plain, json_value, to_json
+from hoof_env.tasks.settings import PER_EPISODE, SETTINGS, Settings
 
 
 def fixed_setting(name: str) -> FixedSettingError:

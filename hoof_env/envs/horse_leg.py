@@ -24,8 +24,8 @@ from hoof_env.envs.step import SOME_SWITCHED
 from hoof_env.errors import ParameterError, count, flag
 from hoof_env.render.renderer import USUAL_SIZE
 from hoof_env.tasks.episode import FAILED
+from hoof_env.tasks.keywords import Keywords
 from hoof_env.tasks.reward import OBJECTIVES, TERMS, Term, failure
-from hoof_env.tasks.settings import Keywords
 
 
 class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):

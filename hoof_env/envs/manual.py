@@ -29,9 +29,10 @@ from hoof_env.tasks import observation
 from hoof_env.tasks.body import Body
 from hoof_env.tasks.one_leg import OneLeg
 from hoof_env.tasks.parameters import HILLS
+from hoof_env.tasks.plain import to_json
 from hoof_env.tasks.registry import TASKS, Task, task_of
 from hoof_env.tasks.reward import OBJECTIVES, check_weights
-from hoof_env.tasks.settings import Settings, to_json
+from hoof_env.tasks.settings import Settings
 
 PAGE, MO_PAGE = (
     (HERE / f"{name}.md.in").read_text(encoding="utf-8") for name in ("manual", "multi_objective")

@@ -17,10 +17,11 @@ from hoof_env.errors import ParameterError
 from hoof_env.gait import LIMITS, QUICK
 from hoof_env.tasks import horse, leg_starts, observation
 from hoof_env.tasks.body import Body
+from hoof_env.tasks.effects import check_effect
 from hoof_env.tasks.horse import Horse
 from hoof_env.tasks.horse_gaits import ACTED, COUNT
 from hoof_env.tasks.one_leg import OneLeg
-from hoof_env.tasks.settings import PER_EPISODE, Settings, check_effect
+from hoof_env.tasks.settings import PER_EPISODE, Settings
 
 GAIT = [entry for entry in observation.ENTRIES if entry.group == "gait"]
 

@@ -19,6 +19,7 @@ from hoof_env.tasks.horse_gaits import FASTEST, FOLLOWED, SIZES, horse_gaits
 from hoof_env.tasks.one_leg import CARRIED
 from hoof_env.tasks.parameters import SPACING
 from hoof_env.tasks.reward import BEARING, LONGEST_STRIDE
+from hoof_env.tasks.settings import ABOUT, About
 
 HERE = Path(__file__).parent
 
@@ -45,7 +46,17 @@ def tables() -> dict[str, dict[str, Any]]:
     numbers |= {f"{name}_{end}": WIDEST[name][k] for name in WIDEST for k, end in enumerate(("low", "high"))}
     values |= {name: f"{number:g}" for name, number in numbers.items()}
     text = (HERE / "manual.toml").read_text(encoding="utf-8")
-    return tomllib.loads(Template(text).safe_substitute(values))
+    found = tomllib.loads(Template(text).safe_substitute(values))
+    plain = {name: value.replace('\\"', '"') for name, value in values.items()}
+
+    def filled(about: About, text: str) -> list[str]:
+        return [about.unit, Template(text).safe_substitute(plain)]
+
+    found["settings"] = {name: filled(about, about.text) for name, about in ABOUT.items()}
+    found["horse_settings"] = {
+        name: filled(about, about.of_horse) for name, about in ABOUT.items() if about.of_horse
+    }
+    return found
 
 
 TABLES = tables()

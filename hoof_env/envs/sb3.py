@@ -16,7 +16,8 @@ from hoof_env.envs.batch_starts import check_options
 from hoof_env.envs.infos import row_of
 from hoof_env.envs.vector import PER_ENV, HorseLegVectorEnv
 from hoof_env.errors import ParameterError
-from hoof_env.tasks.settings import SETTINGS, VectorKeywords
+from hoof_env.tasks.keywords import VectorKeywords
+from hoof_env.tasks.settings import SETTINGS
 
 
 class Sb3VecEnv(VecEnv):

@@ -28,7 +28,7 @@ from hoof_env.envs.recording import Recording
 from hoof_env.errors import ParameterError, all_of, count
 from hoof_env.render.renderer import USUAL_SIZE
 from hoof_env.tasks.episode import FAILED, TRUNCATED
-from hoof_env.tasks.settings import Keywords
+from hoof_env.tasks.keywords import Keywords
 
 Floats = NDArray[np.float64]
 

@@ -3,17 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
-from enum import Enum
-from pathlib import PurePath
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
 from types import MappingProxyType
-from typing import Any, TypedDict
+from typing import Annotated, Any, NamedTuple, get_type_hints
 
-import numpy as np
-from gymnasium.vector import AutoresetMode
-
-from hoof_env.errors import ParameterError
 from hoof_env.leg.geometry import DEFAULT_PRESET, Preset
 
 PRINTED_BETA = math.sqrt(2 * 15.0)
@@ -23,209 +17,406 @@ meant."""
 SOLVERS = ("exact", "paper")  # the closed form, and Eq. 8 as the paper solves it
 
 
+class About(NamedTuple):
+    """What is said of a setting where it is declared.
+
+    Attributes:
+        unit: of its value, "" for none.
+        text: meaning, for the manual; $names stand for numbers and choices, see `envs.manual_words`.
+        of_horse: meaning for a horse, if it is another.
+        per_episode: True if `reset(options={"parameters": ...})` and `randomize` can change it.
+        needs: another setting, and the values of that with which this one has an effect; () for any range.
+    """
+
+    unit: str
+    text: str
+    of_horse: str = ""
+    per_episode: bool = False
+    needs: tuple[str, tuple[str, ...]] | None = None
+
+
 @dataclass(frozen=True)
 class Settings:
-    """Everything that can be set, plain values that JSON can hold; `HorseLegEnv` says what they mean."""
+    """Settings of an environment, plain values that JSON can hold, each with its default and `About` it."""
 
-    preset: Preset = DEFAULT_PRESET
-    gait: str | None = None
-    trunk: str = "suspended"
-    hip_height: float | None = None
-    trunk_mass: float = 50.0
-    trunk_share: float = 0.8
-    trunk_stiffness: float = 12000.0
-    trunk_damping: float = 1590.0
-    trunk_drag: float = 20.0
-    stiffness: float | None = None
-    exponent: float | None = None
-    normal_law: str = "lankarani-nikravesh"
-    restitution: float = 0.5
-    approach_floor: float = 0.1
-    friction_law: str = "ambrosio"
-    friction: float = 0.4
-    friction_slow: float = 1e-3
-    friction_fast: float = 5e-2
-    hoof_stiffness: float | None = None
-    hoof_damping: float | None = None
-    terrain: Mapping[str, Any] | None = None
-    crank_rate: float = 18.0
-    swing_rate: float = 1.2
-    drive: str = "prescribed"
-    motor_gain: float = 100.0
-    motor_torque: float = 600.0
-    motor_inertia: float = 0.5
-    solver: str = "exact"
-    baumgarte_alpha: float = 15.0
-    baumgarte_beta: float = PRINTED_BETA
-    integrator: str = "midpoint"
-    sim_dt: float = 1e-3
-    dt: float = 0.02
-    episode_seconds: float = 10.0
-    target_speed: tuple[float, float] | None = (2.5, 2.5)
-    target_seconds: tuple[float, float] = (2.0, 4.0)
-    size: float | None = None
-    harmonics: int | None = None
-    filters: str | None = None
-    observation: tuple[str, ...] = ("crank", "gait", "trunk", "hoof")
-    reward_weights: Mapping[str, float] | None = None
-    randomize: Mapping[str, Any] | None = None
+    preset: Annotated[
+        Preset,
+        About(
+            "",
+            (
+                "leg and gaits: $presets, or [one's own](../own_task.md#a-leg-of-your-own): a mapping or a "
+                "JSON file"
+            ),
+            of_horse=(
+                "the legs' linkage: $presets, or [one's own](../own_task.md#a-leg-of-your-own): a mapping "
+                "or a JSON file"
+            ),
+        ),
+    ] = DEFAULT_PRESET
+    gait: Annotated[
+        str | None,
+        About(
+            "",
+            "gait of the preset that episodes start in; None for one between walk and run",
+            of_horse=(
+                "gait from which actions make offsets whatever speed is commanded: $horse_gaits; None for "
+                "the reference gait of the commanded speed"
+            ),
+        ),
+    ] = None
+    trunk: Annotated[str, About("", "$trunks; a fixed one stays where it is")] = "suspended"
+    hip_height: Annotated[
+        float | None,
+        About(
+            "m",
+            (
+                "nominal height of O, the crank centre, $lowest to $highest times the geometry's own; None"
+                " for that"
+            ),
+        ),
+    ] = None
+    trunk_mass: Annotated[
+        float,
+        About(
+            "kg",
+            "of the trunk that goes with this leg",
+            of_horse="of the trunk without the limbs; at `size` 1",
+            per_episode=True,
+        ),
+    ] = 50.0
+    trunk_share: Annotated[
+        float,
+        About(
+            "-",
+            "part of the weight of trunk and leg that the leg must bear; suspended",
+            per_episode=True,
+            needs=("trunk", ("suspended",)),
+        ),
+    ] = 0.8
+    trunk_stiffness: Annotated[
+        float,
+        About(
+            "N/m",
+            "of the suspension's spring; suspended",
+            per_episode=True,
+            needs=("trunk", ("suspended",)),
+        ),
+    ] = 12000.0
+    trunk_damping: Annotated[
+        float,
+        About(
+            "N s/m",
+            "of the suspension's damper; suspended",
+            per_episode=True,
+            needs=("trunk", ("suspended",)),
+        ),
+    ] = 1590.0
+    trunk_drag: Annotated[
+        float,
+        About(
+            "N s/m",
+            "resistance to forward motion",
+            per_episode=True,
+            needs=("trunk", ("suspended", "rail")),
+        ),
+    ] = 20.0
+    stiffness: Annotated[
+        float | None,
+        About(
+            "N/m^n",
+            "K of the contact law (Eq. 14); None for the preset's",
+            per_episode=True,
+        ),
+    ] = None
+    exponent: Annotated[
+        float | None, About("-", "n of the contact law, 1 to 3 in steps of 1/8; None for the preset's")
+    ] = None
+    normal_law: Annotated[str, About("", "$normal_laws")] = "lankarani-nikravesh"
+    restitution: Annotated[
+        float,
+        About(
+            "-",
+            "nominal coefficient of restitution, 0 to 1",
+            per_episode=True,
+        ),
+    ] = 0.5
+    approach_floor: Annotated[
+        float,
+        About(
+            "m/s",
+            "smallest approach speed in the damping term",
+            of_horse="smallest approach speed in the damping term; at `size` 1",
+            per_episode=True,
+        ),
+    ] = 0.1
+    friction_law: Annotated[
+        str,
+        About(
+            "",
+            "$friction_laws",
+            of_horse="$friction_laws; of a rigid hoof",
+        ),
+    ] = "ambrosio"
+    friction: Annotated[
+        float,
+        About(
+            "-",
+            "mu_k",
+            per_episode=True,
+        ),
+    ] = 0.4
+    friction_slow: Annotated[
+        float,
+        About(
+            "m/s",
+            "lower threshold of the friction law",
+            of_horse="lower threshold of the friction law; of a rigid hoof, at `size` 1",
+            per_episode=True,
+            needs=("friction_law", ("ambrosio",)),
+        ),
+    ] = 1e-3
+    friction_fast: Annotated[
+        float,
+        About(
+            "m/s",
+            "upper threshold of the friction law",
+            of_horse="upper threshold of the friction law; of a rigid hoof, at `size` 1",
+            per_episode=True,
+        ),
+    ] = 5e-2
+    hoof_stiffness: Annotated[
+        float | None,
+        About(
+            "N/m",
+            (
+                "of a spring at each hoof point, along the ground's normal and tangent; with one friction is "
+                "Coulomb's, without thresholds; None for a rigid hoof"
+            ),
+            of_horse=(
+                "of a spring at each hoof point, along the ground's normal and tangent, at `size` 1; with "
+                "one friction is Coulomb's, without thresholds; None for a rigid hoof"
+            ),
+        ),
+    ] = None
+    hoof_damping: Annotated[
+        float | None,
+        About(
+            "N s/m",
+            "of its damper; None for a tenth of the critical one under the trunk; needs `hoof_stiffness`",
+            of_horse=(
+                "of its damper, at `size` 1; None for a tenth of the critical one under a fourth of "
+                "$horse_mass kg; needs `hoof_stiffness`"
+            ),
+        ),
+    ] = None
+    terrain: Annotated[
+        Mapping[str, Any] | None,
+        About(
+            "",
+            (
+                'None for level ground, {"kind": "slope", "angle": rad}, {"kind": "hills", ...} as in '
+                "[HorseLegTerrain](HorseLegTerrain.md#terrain), or what `Terrain.to_dict` gives; ground that "
+                "drifts from y = 0 is refused under a suspended trunk and a rail, which keep their height"
+            ),
+        ),
+    ] = None
+    crank_rate: Annotated[
+        float,
+        About(
+            "rad/s^2",
+            (
+                "rate of the crank's speed at an action of 1; above 0, to $crank_bound; for the published"
+                " leg, and by similarity as 1 over the hip height"
+            ),
+            needs=("trunk", ("suspended", "rail", "fixed")),
+        ),
+    ] = 18.0
+    swing_rate: Annotated[
+        float,
+        About(
+            "rad/s",
+            (
+                "rate of the swing's coefficients at an action of 1; above 0, to $swing_bound; for the "
+                "published leg, and by similarity as 1 over the root of the hip height"
+            ),
+            needs=("trunk", ("suspended", "rail", "fixed")),
+        ),
+    ] = 1.2
+    drive: Annotated[
+        str,
+        About(
+            "",
+            '"prescribed": the crank follows its command; "motor": a servo that the ground can slow',
+        ),
+    ] = "prescribed"
+    motor_gain: Annotated[
+        float,
+        About(
+            "N m s/rad",
+            "torque of the motor per difference of crank speed",
+            of_horse="torque of the motor per difference of crank speed; at `size` 1",
+            per_episode=True,
+            needs=("drive", ("motor",)),
+        ),
+    ] = 100.0
+    motor_torque: Annotated[
+        float,
+        About(
+            "N m",
+            "largest torque of the motor, at the crank",
+            of_horse="largest torque of the motor, at the crank; at `size` 1",
+            per_episode=True,
+            needs=("drive", ("motor",)),
+        ),
+    ] = 600.0
+    motor_inertia: Annotated[
+        float,
+        About(
+            "kg m^2",
+            "of its rotor, at the crank",
+            of_horse="of its rotor, at the crank; at `size` 1",
+            needs=("drive", ("motor",)),
+        ),
+    ] = 0.5
+    solver: Annotated[
+        str,
+        About(
+            "",
+            (
+                '"exact": the closed form; "paper": Eq. 8 as the paper solves it, on a fixed trunk over level'
+                " ground, with a prescribed drive and nothing drawn"
+            ),
+        ),
+    ] = "exact"
+    baumgarte_alpha: Annotated[
+        float,
+        About(
+            "1/s",
+            "alpha of the paper's solver",
+            needs=("solver", ("paper",)),
+        ),
+    ] = 15.0
+    baumgarte_beta: Annotated[
+        float,
+        About(
+            "1/s",
+            "beta of the paper's solver; by default as printed, sqrt(2 * 15)",
+            needs=("solver", ("paper",)),
+        ),
+    ] = PRINTED_BETA
+    integrator: Annotated[
+        str,
+        About(
+            "",
+            "$schemes; of the paper's solver $paper_schemes; None for midpoint, and for the paper's Euler",
+            of_horse="$schemes; None for midpoint",
+        ),
+    ] = "midpoint"
+    sim_dt: Annotated[
+        float,
+        About(
+            "s",
+            (
+                "substep; it is divided where ground, suspension or motor need shorter ones; None for the "
+                "solver's own, 1e-4 or the paper's 1e-3"
+            ),
+            of_horse="substep; it is divided where ground or motor need shorter ones; None for 1e-4",
+        ),
+    ] = 1e-3
+    dt: Annotated[float, About("s", "control step, a whole multiple of `sim_dt`")] = 0.02
+    episode_seconds: Annotated[float, About("s", "time limit of an episode")] = 10.0
+    target_speed: Annotated[
+        tuple[float, float] | None,
+        About(
+            "m/s",
+            (
+                "lowest and highest commanded speed, up to which progress is paid; one that never changes "
+                "where both are the same; None for no command"
+            ),
+            of_horse=(
+                "lowest and highest commanded speed; one that never changes where both are the same; None "
+                "for the default times the root of `size`"
+            ),
+        ),
+    ] = (2.5, 2.5)
+    target_seconds: Annotated[
+        tuple[float, float],
+        About(
+            "s",
+            "shortest and longest time for which a command holds",
+            needs=("target_speed", ()),
+        ),
+    ] = (2.0, 4.0)
+    size: Annotated[
+        float | None,
+        About(
+            "-",
+            (
+                "of a horse over one of 475 kg, by geometric similarity: lengths go with it, masses with its "
+                "cube, hoof stiffness with its square; None for 1"
+            ),
+            of_horse=(
+                "length over that of a horse of $horse_mass kg, $smallest_size to $largest_size; None for 1"
+            ),
+            needs=("trunk", ("free",)),
+        ),
+    ] = None
+    harmonics: Annotated[
+        int | None,
+        About(
+            "-",
+            "of a horse's swing, 1 or 2; None for 2",
+            of_horse="of the swing, 1 or 2; None for 2",
+            needs=("trunk", ("free",)),
+        ),
+    ] = None
+    filters: Annotated[
+        str | None,
+        About(
+            "",
+            (
+                'of a horse\'s commands: "quick", with which its cranks follow a stance, or "slow", as of '
+                "one leg; None for quick"
+            ),
+            of_horse=(
+                'of the commands: "quick", with which cranks follow a stance, or "slow", as of one leg; '
+                "None for quick"
+            ),
+            needs=("trunk", ("free",)),
+        ),
+    ] = None
+    observation: Annotated[tuple[str, ...], About("", "groups to observe, in this order")] = (
+        "crank",
+        "gait",
+        "trunk",
+        "hoof",
+    )
+    reward_weights: Annotated[
+        Mapping[str, float] | None, About("", "mapping of the weights that are to differ from those above")
+    ] = None
+    randomize: Annotated[
+        Mapping[str, Any] | None,
+        About(
+            "", "physical parameters to draw at each reset, as the reset option `parameters`; None for none"
+        ),
+    ] = None
 
     def __deepcopy__(self, memo: Any) -> Settings:
         """Itself, for nothing in it changes."""
         return self
 
 
-Range = float | Sequence[float]
-"""Lowest and highest, or one number for both."""
-
-
-class Keywords(TypedDict, total=False):
-    """Keywords of `HorseLegEnv`, beside its own: `Settings` as callers may give them."""
-
-    preset: Preset
-    gait: str | None
-    trunk: str
-    hip_height: float | None
-    trunk_mass: float
-    trunk_share: float
-    trunk_stiffness: float
-    trunk_damping: float
-    trunk_drag: float
-    stiffness: float | None
-    exponent: float | None
-    normal_law: str
-    restitution: float
-    approach_floor: float
-    friction_law: str
-    friction: float
-    friction_slow: float
-    friction_fast: float
-    hoof_stiffness: float | None
-    hoof_damping: float | None
-    terrain: Mapping[str, Any] | None
-    crank_rate: float
-    swing_rate: float
-    drive: str
-    motor_gain: float
-    motor_torque: float
-    motor_inertia: float
-    solver: str
-    baumgarte_alpha: float
-    baumgarte_beta: float
-    integrator: str | None
-    sim_dt: float | None
-    dt: float
-    episode_seconds: float
-    target_speed: Range | None
-    target_seconds: Range
-    size: float | None
-    harmonics: int | None
-    filters: str | None
-    observation: Sequence[str]
-    reward_weights: Mapping[str, float] | None
-    randomize: Mapping[str, Range] | None
-
-
-class VectorKeywords(Keywords, total=False):
-    """Of `Sb3VecEnv`, which hands them to `HorseLegVectorEnv`."""
-
-    num_threads: int
-    autoreset_mode: AutoresetMode | str
-    max_episode_steps: int | None
-    render_mode: str | None
-    rendered: int | None
-    width: int
-    height: int
-
-
 SETTINGS = tuple(item.name for item in fields(Settings))
 
-PER_EPISODE = (
-    "trunk_mass", "trunk_share", "trunk_stiffness", "trunk_damping", "trunk_drag",
-    "stiffness", "restitution", "approach_floor", "friction", "friction_slow", "friction_fast",
-    "motor_gain", "motor_torque",
-)  # fmt: skip
+ABOUT: Mapping[str, About] = MappingProxyType(
+    {name: hint.__metadata__[0] for name, hint in get_type_hints(Settings, include_extras=True).items()}
+)
+"""What is said of each setting, by name."""
+
+PER_EPISODE = tuple(name for name, about in ABOUT.items() if about.per_episode)
 """Settings that `reset(options={"parameters": ...})` and `randomize` can change for an episode."""
 
-
 NEEDED: Mapping[str, tuple[str, tuple[str, ...]]] = MappingProxyType(
-    dict.fromkeys(("trunk_share", "trunk_stiffness", "trunk_damping"), ("trunk", ("suspended",)))
-    | {"trunk_drag": ("trunk", ("suspended", "rail")), "friction_slow": ("friction_law", ("ambrosio",))}
-    | dict.fromkeys(("crank_rate", "swing_rate"), ("trunk", ("suspended", "rail", "fixed")))
-    | dict.fromkeys(("motor_gain", "motor_torque", "motor_inertia"), ("drive", ("motor",)))
-    | dict.fromkeys(("baumgarte_alpha", "baumgarte_beta"), ("solver", ("paper",)))
-    | dict.fromkeys(("size", "harmonics", "filters"), ("trunk", ("free",)))
-    | {"target_seconds": ("target_speed", ())}
+    {name: about.needs for name, about in ABOUT.items() if about.needs}
 )
-"""Settings that have an effect only beside certain values of another one; () stands for any range."""
-
-
-def check_effect(name: str, settings: Settings, within: str = "") -> None:
-    """Raise `ParameterError` where a setting that somebody names, perhaps `within` another argument or
-    option, has no effect beside the others."""
-    if name in ("friction_law", "friction_slow", "friction_fast") and settings.hoof_stiffness is not None:
-        named = f"{within}: {name!r}" if within else name
-        raise ParameterError(
-            f"{named}: expected none with a hoof_stiffness, whose friction needs no sliding speed, got "
-            f"hoof_stiffness={settings.hoof_stiffness!r}"
-        )
-    needed, values = NEEDED.get(name, ("", ()))
-    given: Any = getattr(settings, needed, None)
-    if needed and (given not in values if values else _is_one(given)):
-        good = " or ".join(f"{needed}={value!r}" for value in values) or f"a range of {needed}"
-        named = f"{within}: {name!r}" if within else name
-        if needed == "trunk" and "free" in (given, *values):  # which no argument changes
-            who = "a horse" if given == "free" else "one leg"
-            raise ParameterError(f"{named}: expected none of {who}, where it has no effect")
-        raise ParameterError(
-            f"{named}: expected {good} beside it, without which it has no effect, got {needed}={given!r}"
-        )
-
-
-def _is_one(given: Any) -> bool:
-    """Whether nothing can be drawn: no range, or one whose ends are the same."""
-    ends = tuple(given) if isinstance(given, Iterable) else (given, given)
-    return len(ends) == 2 and bool(ends[0] == ends[1])
-
-
-def to_json(settings: Settings) -> dict[str, Any]:
-    """The settings as values that JSON can hold."""
-    return {key: json_value(value) for key, value in asdict(settings).items()}
-
-
-def as_plain(name: str, value: Any) -> Any:
-    """A value as Python and JSON know it: numbers of NumPy and pandas as numbers, arrays as lists, paths as
-    text, enumerations by their value.
-
-    Raises:
-        ParameterError: another kind of number, such as a tensor.
-    """
-    if value is None or type(value) in (bool, int, float, str):
-        return value
-    if isinstance(value, (np.generic, np.ndarray)) and value.dtype != object:
-        return as_plain(name, value.tolist())
-    if isinstance(value, Enum):
-        return as_plain(name, value.value)
-    if isinstance(value, PurePath):
-        return str(value)
-    if isinstance(value, Mapping):
-        return {str(key): as_plain(f"{name}[{key!r}]", inner) for key, inner in value.items()}
-    if isinstance(value, (list, tuple)):
-        plain = (as_plain(f"{name}[{k}]", inner) for k, inner in enumerate(value))
-        return tuple(plain) if isinstance(value, tuple) else list(plain)
-    if isinstance(value, (int, float, str)):
-        return next(kind(value) for kind in (int, float, str) if isinstance(value, kind))
-    if hasattr(type(value), "__float__"):
-        raise ParameterError(
-            f"{name}: expected a number of Python or NumPy, which JSON can hold, got {value!r}"
-        )
-    return value  # what takes it says what is wrong
-
-
-def json_value(value: Any) -> Any:
-    """Lists for tuples, however deep, as JSON gives them back."""
-    if isinstance(value, (list, tuple)):
-        return [json_value(inner) for inner in value]
-    if isinstance(value, Mapping):
-        return {key: json_value(inner) for key, inner in value.items()}
-    return value
+"""Settings that have an effect only with certain values of another one; () stands for any range."""

@@ -10,8 +10,9 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from hoof_env.errors import ParameterError
+from hoof_env.tasks.effects import check_effect
 from hoof_env.tasks.registry import TASKS
-from hoof_env.tasks.settings import Settings, check_effect
+from hoof_env.tasks.settings import Settings
 
 HORSE = "hoof_env/Horse-v0"
 

@@ -26,9 +26,10 @@ from hoof_env.tasks.horse_gaits import FASTEST, LEGS
 from hoof_env.tasks.leg_starts import OPTIONS
 from hoof_env.tasks.one_leg import OneLeg
 from hoof_env.tasks.parameters import HILLS
+from hoof_env.tasks.plain import to_json
 from hoof_env.tasks.registry import TASKS
 from hoof_env.tasks.reward import BEARING, LONGEST_STRIDE
-from hoof_env.tasks.settings import PER_EPISODE, Settings, to_json
+from hoof_env.tasks.settings import PER_EPISODE, Settings
 
 ROOT = Path(__file__).parents[2]
 DOCS, POLICIES = ROOT / "docs" / "environments", ROOT / "agents" / "policies"

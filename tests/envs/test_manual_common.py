@@ -9,8 +9,8 @@ import pytest
 from hoof_env.envs import manual
 from hoof_env.envs.manual_common import without_common
 from hoof_env.tasks.one_leg import OneLeg
+from hoof_env.tasks.plain import to_json
 from hoof_env.tasks.registry import TASKS
-from hoof_env.tasks.settings import to_json
 
 DOCS = Path(__file__).parents[2] / "docs" / "environments"
 OTHERS = [task for task in TASKS if task != "leg"]
