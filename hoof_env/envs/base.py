@@ -309,3 +309,12 @@ class LegBase:
             changeable = [name for name, value in values.items() if isinstance(value, (dict, list))]
             self._as_json = self.settings, values, changeable
         return values
+
+    def _warn_ended(self) -> None:
+        if self._phase == "ended":
+            self._phase = "warned"
+            gym.logger.warn(
+                "You are calling 'step()' even though this environment has already returned terminated = True"
+                " or truncated = True. You should always call 'reset()' once you receive either -- any"
+                " further steps are undefined behavior."
+            )

@@ -15,11 +15,9 @@ import numpy as np
 from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.dynamics.form import engine_layout
 from hoof_env.dynamics.parts import broken
-from hoof_env.envs.addresses import ADDRESSES, END
 from hoof_env.envs.batch_build import check_choices, make_engine, task_record
+from hoof_env.envs.batch_kernels import BatchKernels
 from hoof_env.envs.batch_starts import draw_targets, start
 from hoof_env.envs.conditions import (
     RowConditions,
@@ -28,16 +26,13 @@ from hoof_env.envs.conditions import (
     keep_others,
     under_each,
 )
-from hoof_env.envs.infos import InfoLayout
 from hoof_env.envs.paper_solver import PaperSolver, check_paper
-from hoof_env.envs.step import NOT_A_NUMBER, SOME_ENDED, SOME_SWITCHED, step_kernels
+from hoof_env.envs.step import NOT_A_NUMBER, SOME_ENDED, SOME_SWITCHED
 from hoof_env.errors import ParameterError, check_number
-from hoof_env.gait import GaitParameters
-from hoof_env.simd.layout import views
 from hoof_env.simd.threads import run_together
 from hoof_env.simd.user_functions import what_cannot_be_compiled
 from hoof_env.tasks.episode import episode_layout
-from hoof_env.tasks.observation import MIDDLE, check_groups, groups_of, observed
+from hoof_env.tasks.observation import check_groups, groups_of, observed
 from hoof_env.tasks.parameters import (
     check_drift,
     check_parameters,
@@ -55,7 +50,7 @@ Floats = NDArray[np.float64]
 LONGEST_EPISODE = 1e6  # seconds of an episode at most
 
 
-class EpisodeBatch:
+class EpisodeBatch(BatchKernels):
     """`num_envs` episodes of a task.
 
     Attributes:
@@ -162,82 +157,6 @@ class EpisodeBatch:
         """How many numbers an episode starts with, besides those drawn."""
         return len(self.body.start_names) + len(self.body.gait_names)
 
-    def _open(self) -> None:
-        """Find the kernels, and the arrays where they are now."""
-        s = self.settings
-        self.entries = observed(self.groups, s.trunk, s.drive, self.task.entries)
-        self.measurements = InfoLayout(self.engine.features, self.body.leg_prefixes)
-        self.kernels = k = step_kernels(
-            self.task.terms, self.task.entries, self.task.contact_law, self.engine.features, self.body.kernels
-        )
-        runs_scalar = self.engine.runs_scalar or self.paper
-        self.kernel, self.observe_kernel = (
-            (k.step_one, k.observers.observe_one)
-            if runs_scalar
-            else (k.step_batch, k.observers.observe_batch)
-        )
-        if self.paper:
-            self.kernel = self._step_paper
-        self.find()
-
-    def find(self) -> None:
-        """Find the arrays where they are now."""
-        self.episode_rows = views(self.layout, self.episode)
-        arrays = (
-            *self.engine.arrays, self.episode, self.task_record, self.actions, self.observations, self.rewards
-        )  # fmt: skip
-        self.addresses = ADDRESSES.of(*arrays, columns=range(self.engine.columns))
-        blocks = self.engine.blocks[:1] if self.paper else self.engine.blocks
-        self._blocks = [(ADDRESSES.of(*arrays, columns=block),) for block in blocks]
-
-    def _compile(self) -> None:
-        """Have every kernel of a step compiled, or loaded, by running it on no environment."""
-        if self.paper:
-            self._run_idle(self.kernels.apply_one, self.kernels.finish_one)
-            self.paper.compile(GaitParameters(*MIDDLE))
-        else:
-            self._run_idle(self.kernel)
-        self._run_idle(self.observe_kernel)
-        self.engine.reset(np.empty((self.legs, self.engine.features.gait_size, 0)), envs=[])
-
-    def _run_idle(self, *kernels: Any) -> None:
-        idle = self.addresses.copy()
-        idle[END] = 0
-        for run in kernels:
-            run(idle)
-
-    def direct_kernel(self) -> Any:
-        """`kernel` without numba's choice by types, a hundredth of a single step: only for `addresses`."""
-        if self.paper:
-            return self.kernel
-        if not self.kernel.overloads:  # as in a process that unpickled this
-            self._run_idle(self.kernel)
-        (compiled,) = self.kernel.overloads.values()
-        return compiled.entry_point
-
-    def _step_paper(self, addresses: NDArray[np.int64]) -> int:
-        assert self.paper
-        if not self.kernels.apply_one(addresses):
-            return NOT_A_NUMBER
-        self.paper.advance()
-        happened: int = self.kernels.finish_one(addresses)
-        return happened
-
-    def measured(self) -> dict[str, Floats]:
-        """What is observed now, before it is scaled: the entries by name, shape (num_envs,)."""
-        out = np.zeros((len(self.names), self.num_envs))
-        if self.conditions.are_mixed:
-
-            def measure(rows: NDArray[np.int64]) -> None:
-                found = np.zeros_like(out)
-                self.kernels.observers.measure_one(self.addresses, found)
-                out[:, rows] = found[:, rows]
-
-            under_each(self, np.arange(self.num_envs), measure)
-        else:
-            self.kernels.observers.measure_one(self.addresses, out)
-        return dict(zip(self.names, out, strict=True))
-
     # Conditions
 
     def change(self, settings: Settings) -> None:
@@ -265,14 +184,6 @@ class EpisodeBatch:
         for k, name in enumerate(self.randomize):
             if name in old:
                 self.start_values[first + k] = begun[first + old.index(name)]
-
-    def alone(self, env: int) -> TrunkEngine:
-        """An engine like that of one environment."""
-        if not self.conditions.are_mixed:
-            return self.engine.alone()
-        (engine,) = under_each(self, np.array([env]), lambda rows: self.engine.alone())
-        made: TrunkEngine = engine
-        return made
 
     # Episodes
 
@@ -338,22 +249,6 @@ class EpisodeBatch:
             due = np.flatnonzero(due if idle is None else due & ~idle)
             draw_targets(self, due, [generators[env] for env in due.tolist()])
         return bool(happened & SOME_ENDED)
-
-    def _observe_broken(self, envs: NDArray[np.int64]) -> None:
-        """Observe the last good state of what could not be simulated, whose report is of where it broke."""
-        data = self.engine.arrays[0]
-        form = engine_layout(self.engine.features)
-        kept = data.copy()
-        leg = form.leg_memory.rows("report")
-        self.engine.advance(None, 0)
-        reports = [form.trunk_memory.rows("report")]
-        for k in range(self.legs):
-            first = form.trunk_rows + k * form.leg_rows
-            reports.append(slice(first + leg.start, first + leg.stop))
-        for rows in reports:
-            kept[rows, envs] = data[rows, envs]
-        data[:] = kept
-        self.observe_kernel(self.addresses)
 
     # State
 

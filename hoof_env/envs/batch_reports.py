@@ -93,3 +93,19 @@ def failure_of(batch: Any, env: int) -> str:
         return "the linkage came apart; the state was put back to the last good one"
     result = Result(int(batch.engine.results[env]))
     return result.message if result is not Result.OK else "the trunk left its range of heights"
+
+
+def endings_of(batch: Any, done: NDArray[np.bool_], terminated: NDArray[np.bool_]) -> dict[str, Any]:
+    """What infos say of episodes that end, as Gymnasium's `_add_info` puts them together one by one."""
+    figures: dict[str, Any] = {}
+    for name, values in summaries_of(batch, np.flatnonzero(done)).items():
+        figures[name] = np.zeros(batch.num_envs)
+        figures[f"_{name}"] = done.copy()
+        figures[name][done] = values
+    endings = {"episode_summary": figures, "_episode_summary": done.copy()}
+    if terminated.any():
+        reasons = np.full(batch.num_envs, None, dtype=object)
+        for env in np.flatnonzero(terminated).tolist():
+            reasons[env] = failure_of(batch, env)
+        endings |= {"failure": reasons, "_failure": terminated.copy()}
+    return endings

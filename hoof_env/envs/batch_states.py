@@ -30,7 +30,7 @@ def state_of(batch: Any) -> dict[str, Any]:
 
 
 def spread_state(batch: Any, state: Mapping[str, Any]) -> dict[str, Any]:
-    """The state of one environment as one of `num_envs` that are where it is.
+    """Return the state of a single environment as one of a vector environment, all of whose rows are there.
 
     Raises:
         ParameterError: it is no state of one.
@@ -57,7 +57,8 @@ def spread_state(batch: Any, state: Mapping[str, Any]) -> dict[str, Any]:
         raise ParameterError(
             "state: expected what get_state gives of one environment, or of this vector environment"
         ) from None
-    return found
+    ended = found["episode"][batch.ended_row] != 0.0
+    return {**found, "ended": ended, "generator": [state["generator"]] * n}
 
 
 def is_possible(batch: Any, episode: Floats) -> bool:

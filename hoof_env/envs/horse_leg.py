@@ -194,15 +194,6 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             self._begin()
         return ended
 
-    def _warn_ended(self) -> None:
-        if self._phase == "ended":
-            self._phase = "warned"
-            gym.logger.warn(
-                "You are calling 'step()' even though this environment has already returned terminated = True"
-                " or truncated = True. You should always call 'reset()' once you receive either -- any"
-                " further steps are undefined behavior."
-            )
-
     def _begin(self) -> None:
         """What each info of this episode says of its start, and the keys of what a step fills in."""
         row = self.batch.start_values[:, 0].copy()

@@ -14,7 +14,8 @@ from stable_baselines3.common.vec_env import VecEnv
 from hoof_env.envs.base import fixed_setting
 from hoof_env.envs.batch_starts import check_options
 from hoof_env.envs.infos import row_of
-from hoof_env.envs.vector import PER_ENV, HorseLegVectorEnv
+from hoof_env.envs.rows import PER_ENV
+from hoof_env.envs.vector import HorseLegVectorEnv
 from hoof_env.errors import ParameterError
 from hoof_env.tasks.keywords import VectorKeywords
 from hoof_env.tasks.settings import SETTINGS
