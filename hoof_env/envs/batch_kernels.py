@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hoof_env.dynamics.engine import TrunkEngine
+from hoof_env.dynamics.form import engine_layout
 from hoof_env.envs.addresses import ADDRESSES, END
 from hoof_env.envs.conditions import (
     under_each,
