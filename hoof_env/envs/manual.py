@@ -60,19 +60,15 @@ def page(task: str, film: str = "") -> str:
     own = page_of_body(body)
     film = _film(_NAMES[task], own.kind, film) if film else ""
     if task == "mo":
-        objectives = _objectives(check_weights(what.settings({}).reward_weights))
-        return _tidy(
-            Template(MO_PAGE).substitute(
-                film=film, observations=_observations(what, body), objectives=objectives
-            )
-        )
+        objectives = _objectives(check_weights(s.reward_weights))
+        observations = _observations(what, body)
+        text = Template(MO_PAGE).substitute(film=film, observations=observations, objectives=objectives)
+        return _tidy(text)
     trunk = TABLES[s.trunk]
     groups = observation.groups_of(what.entries)
     weights = check_weights(s.reward_weights, what.terms)
-    rewards = [(f"`{t.key}`", f"`{t.name}`", f"{weights[t.name]:g}", t.unit, t.meaning) for t in what.terms]
     defaults = {name: literal(value) for name, value in to_json(s).items()}
     defaults |= {name: f"**{defaults[name]}**" for name in what.defaults}
-    hills = {name: literal(value) for name, value in HILLS.items()}
     head = ("Name", "Default", "Unit", "Meaning")
     module = what.module or ("hoof_env" if what.id.startswith("hoof_env/") else "my_module")
     text = Template(PAGE).substitute(
@@ -93,7 +89,7 @@ def page(task: str, film: str = "") -> str:
         observation_space=f"Box(-1, 1, ({len(_observed(what))},), float32)",
         observations=_observations(what, body),
         other_groups=", ".join(f"`{group}`" for group in groups if group not in s.observation),
-        rewards=markdown_table(("Term", "Weight", "Default", "Unit", "Meaning"), rewards),
+        rewards=_rewards(what, weights),
         target_reward=own.target_reward(s),
         lift_off=f"{100 * LIFT_OFF:g}",
         start=_start(s, what.start),
@@ -108,9 +104,20 @@ def page(task: str, film: str = "") -> str:
         vector_arguments=markdown_table(("Argument", "Default", "Meaning"), _vector_arguments()),
         bold=WORDS["bold"] if what.defaults else "",
         settings=markdown_table(head, [*own.settings(s, defaults), *PICTURES]),
-        terrain=WORDS["terrain"] + markdown_table(head, rows_of("hills", hills)) if s.terrain else "",
+        terrain=WORDS["terrain"] + markdown_table(head, rows_of("hills", _hills())) if s.terrain else "",
     )
     return _tidy(text)
+
+
+def _hills() -> dict[str, str]:
+    """Return the defaults of hilly terrain, as Python writes them."""
+    return {name: literal(value) for name, value in HILLS.items()}
+
+
+def _rewards(what: Task, weights: Mapping[str, float]) -> str:
+    """Write the table of the reward's terms."""
+    rows = [(f"`{t.key}`", f"`{t.name}`", f"{weights[t.name]:g}", t.unit, t.meaning) for t in what.terms]
+    return markdown_table(("Term", "Weight", "Default", "Unit", "Meaning"), rows)
 
 
 def page_of(id: str) -> str:

@@ -108,13 +108,8 @@ def _made(
     layouts = memories_of(body.episode, len(terms), features, body.legs)
     slots = slots_of(entries)[2]
     task_record = task_type(len(terms), slots, layouts.gait, body.task_fields)
-    flags = (
-        [(term.scalar, not is_user_term(term)) for term in terms],
-        [(entry.scalar, entry.scale.saturates) for entry in entries],
-    )
-    identity = fingerprint(
-        *_functions(terms, entries, contact_law), flags, layouts.episode.names, (FAILED, TRUNCATED)
-    )
+    functions = _functions(terms, entries, contact_law)
+    identity = fingerprint(*functions, _flags(terms, entries), layouts.episode.names, (FAILED, TRUNCATED))
     identity += f" {tuple(features)} {body.legs} legs, {task_record.descr}"
     observers = observers_of(entries, len(terms), features, body)
     apply = _apply(layouts, body)
@@ -153,11 +148,16 @@ def _made(
             happened |= finish(addresses, 1, task, n, memory, sums)
         return happened
 
-    functions = (step_one, step_batch, apply_one, finish_one)
-    kernels = {
-        function.__name__: kernel(function, identity, function is step_batch) for function in functions
-    }
+    parts = (step_one, step_batch, apply_one, finish_one)
+    kernels = {function.__name__: kernel(function, identity, function is step_batch) for function in parts}
     return StepKernels(observers=observers, **kernels)
+
+
+def _flags(terms: tuple[Term, ...], entries: tuple[Entry, ...]) -> Any:
+    """Return what kernels depend on besides the functions themselves."""
+    of_terms = [(term.scalar, not is_user_term(term)) for term in terms]
+    of_entries = [(entry.scalar, entry.scale.saturates) for entry in entries]
+    return of_terms, of_entries
 
 
 def _are_numbers(body: BodyKernels) -> Callable[..., Any]:

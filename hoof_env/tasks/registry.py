@@ -281,6 +281,13 @@ def _several(name: str, values: Any, kind: type[Part]) -> tuple[Part, ...]:
     return parts
 
 
+def _check_twice(env_id: str, names: list[str]) -> None:
+    """Raise `ParameterError` if a name is there twice."""
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise ParameterError(f"{env_id}: expected names that differ, got {', '.join(twice)} twice")
+
+
 def register(
     env_id: str,
     *,
@@ -317,23 +324,21 @@ def register(
     old = task_of(base)
     if contact_law is not None:
         check_function(f"{env_id}: contact_law", contact_law, 4)
-    for names in ([term.name for term in own], [entry.name for entry in (*old.entries, *more)]):
-        if twice := sorted({name for name in names if names.count(name) > 1}):
-            raise ParameterError(f"{env_id}: expected names that differ, got {', '.join(twice)} twice")
+    _check_twice(env_id, [term.name for term in own])
+    _check_twice(env_id, [entry.name for entry in (*old.entries, *more)])
     mine = {term.name: term for term in own}
     kept = [mine.pop(term.name, term) for term in old.terms]
-    law = contact_law or old.contact_law
+    of_law = f" The normal force is that of `{function_name(contact_law)}`." if contact_law else ""
     caller = str(sys._getframe(1).f_globals.get("__name__", ""))
     task = replace(
         old,
         name=env_id,
         module="" if caller in ("__main__", "__mp_main__") else caller,
         summary=f"{old.summary} With terms, entries or laws from outside this package.",
-        about=old.about
-        + (f" The normal force is that of `{function_name(contact_law)}`." if contact_law else ""),
+        about=old.about + of_law,
         terms=(*kept, *mine.values()),
         entries=(*old.entries, *more),
-        contact_law=law,
+        contact_law=contact_law or old.contact_law,
     )
     groups = dict.fromkeys((*old.chosen({}).observation, *groups_of(more)))
     settings = task.chosen({"observation": tuple(groups), **defaults})
@@ -341,11 +346,16 @@ def register(
     check_weights(settings.reward_weights, task.terms)
     changed = {name: getattr(settings, name) for name in ("observation", *old.defaults, *defaults)}
     task = replace(task, defaults=changed)
+    _add_to_gymnasium(task)
+    _OWN[env_id] = task
+
+
+def _add_to_gymnasium(task: Task) -> None:
+    """Register the id of a task for `gymnasium.make` and `make_vec`."""
     gym.register(
-        env_id,
+        task.id,
         entry_point="hoof_env.envs.horse_leg:HorseLegEnv",
         vector_entry_point="hoof_env.envs.vector:HorseLegVectorEnv",
         kwargs={"task": task.key},
-        disable_env_checker=True,  # as of the package's own ids
+        disable_env_checker=True,  # as for the package's own ids
     )
-    _OWN[env_id] = task
