@@ -38,7 +38,8 @@ from hoof_env.envs.tasks import TASKS
 from hoof_env.errors import DataFileError, OutputError, ParameterError, check_choice, parse_json
 from hoof_env.film import render_episode
 from hoof_env.records import surroundings
-from hoof_env.saved_policy import ABOUT, FILE, WEIGHTS, OnnxPolicy, environment_of, own_id
+from hoof_env.saved_policy import ABOUT, FILE, WEIGHTS, OnnxPolicy
+from hoof_env.saved_record import environment_of, own_id
 
 POLICIES = Path(__file__).with_name("policies")
 SHOWN = ("return", "distance_m", "stance_peak_n", "weight_share", "cost_of_transport", "failed")
