@@ -194,9 +194,10 @@ def compare(
         overwrite: replace the picture if there is one.
     """
     from hoof_env._output import check_new
+    from hoof_env.lab.columns import parse_mapping
     from hoof_env.lab.compare import compare
     from hoof_env.lab.picture import check_picture, draw, report
-    from hoof_env.lab.read import parse_mapping, read_record
+    from hoof_env.lab.read import read_record
 
     made = check_new(out, overwrite)
     check_picture(out)
@@ -246,8 +247,9 @@ def average(
     """
     from hoof_env._output import check_folder, check_new
     from hoof_env.lab import average as mean
+    from hoof_env.lab.columns import parse_mapping
     from hoof_env.lab.doubts import for_one
-    from hoof_env.lab.read import parse_mapping, read_record
+    from hoof_env.lab.read import read_record
 
     made = check_new(out, overwrite)
     mean.check_table(out)
