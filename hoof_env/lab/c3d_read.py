@@ -6,7 +6,8 @@ the floor, then decide its sense.
 
 **Baseline.** FORCE_PLATFORM:ZERO names the first and the last frame in which the plates were unloaded. The
 mean force of a plate there is subtracted, unless the plate bore a load then, or the frames are not in the
-file."""
+file.
+"""
 
 from __future__ import annotations
 

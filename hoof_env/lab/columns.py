@@ -91,7 +91,7 @@ def sources_of(
         ahead, upward: axes of the file that are forward and upward, as "x" or "-x".
 
     Returns:
-        Sources by limb, whose forces are to be added; the name of the column of times; and notes on limbs
+        Sources by limb, to be added if there are several; the name of the column of times; and notes on limbs
         that the mapping leaves out.
 
     Raises:
@@ -128,8 +128,8 @@ def sources_of(
 
 
 def _recognised(table: Table, ahead: str, upward: str) -> dict[str, Source]:
-    """Return the sources of all limbs with a vertical force whose columns have names of ours or of OpenSim,
-    or are those of plates."""
+    """Return the sources of all limbs with a vertical force that are plates, or have columns with names of
+    ours or of OpenSim."""
     by_limb: dict[str, dict[str, str]] = {}
     for limb in table.plates:
         by_limb[limb] = {axis: f"{limb}_{axis}" for axis in "xyz"}
@@ -176,7 +176,7 @@ def _renamed(
 
     Args:
         path: the file, for error messages.
-        named: limbs whose columns the mapping names.
+        named: limbs of which the mapping names the columns.
         known: limbs that are recognised in the file.
         renames: one limb of the file, or several as "plate_1+plate_3", by new name.
 

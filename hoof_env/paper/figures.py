@@ -150,7 +150,8 @@ def draw_angles(figure: Any, reproduction: Reproduction) -> None:
     cycle with the published angles at their published times, and the sub-phases shaded.
 
     An angle that is printed without a time is marked at the middle of the time in which toe and heel both
-    bear."""
+    bear.
+    """
     changed = [
         f"{row.printed:g}° in print is read as {row.value:+g}°.".replace("-", "\N{MINUS SIGN}")
         for row in reproduction.published.rows

@@ -44,7 +44,7 @@ NUMBER_AT = {8: 0.75, 10: 0.65, 12: 0.35}
 """Places of numbers along their links, from 0 at the tail to 1 at the head; 0.5 for other links."""
 
 NAME_TO = {"C": (1.0, 0.3)}
-"""Directions from a point to its name, for points whose links leave no room on their free side."""
+"""Directions from a point to its name, for points without room on the side that their links leave free."""
 
 
 def draw_mechanism(figure: Any, reproduction: Reproduction) -> None:

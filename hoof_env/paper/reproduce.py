@@ -1,7 +1,8 @@
 """Reproduction of the paper's four conditions: walking and running, on elastic and inelastic ground.
 
 The public environment simulates them. The trunk is fixed and the action is zero, so that the leg moves
-exactly in its gait."""
+exactly in its gait.
+"""
 
 from __future__ import annotations
 
