@@ -132,6 +132,7 @@ def export(
     from hoof_env._output import check_new
     from hoof_env.records import export_episode, files_of
 
+    # All files of the format are checked; the message names the first of them.
     made, *_ = [check_new(file, overwrite) for file in files_of(out)]
     rows, weight = export_episode(out, policy, id, args, seed, seconds, threshold, units, reactions, bodies)
     others = "".join(f", with {file.name}" for file in files_of(out)[1:])

@@ -263,9 +263,9 @@ def _with_progress(pictures: Iterable[NDArray[np.uint8]], most: int) -> Iterator
         # For a GIF, ffmpeg's work begins only now, and takes a while.
         print("all frames are drawn; ffmpeg ends the file ...", file=sys.stderr)
         return
-    told = time.monotonic()
+    printed = time.monotonic()
     for count, picture in enumerate(pictures, 1):
         yield picture
-        if time.monotonic() - told >= TELL_SECONDS:
-            told = time.monotonic()
+        if time.monotonic() - printed >= TELL_SECONDS:
+            printed = time.monotonic()
             print(f"{count} of {most} frames", file=sys.stderr, flush=True)

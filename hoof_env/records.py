@@ -213,11 +213,11 @@ def check_memory(rows: float, columns: int) -> None:
 def _with_progress(played: Iterator[Columns], longest: float) -> Iterator[Columns]:
     """Yield the parts of an episode of at most `longest` [s]; print a line on its progress to stderr every
     `TELL_SECONDS`."""
-    told = time.monotonic()
+    printed = time.monotonic()
     for part in played:
         yield part
-        if time.monotonic() - told >= TELL_SECONDS:
-            told = time.monotonic()
+        if time.monotonic() - printed >= TELL_SECONDS:
+            printed = time.monotonic()
             print(f"{part['time'][-1]:.1f} of at most {longest:g} s", file=sys.stderr, flush=True)
 
 
@@ -281,18 +281,18 @@ def units_of(env: gym.Env[Any, Any], reactions: bool = False) -> dict[str, str]:
 def describe(env: gym.Env[Any, Any], **about: Any) -> dict[str, Any]:
     """Return the description of a record for its file, as JSON has it: version, units, leg, ground and the
     entries of `about`."""
-    here = surroundings(env)
+    setting = surroundings(env)
     ground = asdict(env.unwrapped.engine.ground).items()  # type: ignore[attr-defined]
     return {
         "hoof_env": hoof_env.__version__,
         **about,
-        "sim_dt_s": here.sim_dt,
-        "weight_n": here.weight_n,
+        "sim_dt_s": setting.sim_dt,
+        "weight_n": setting.weight_n,
         "axes": "x forward, y up, z to the right; angles counter-clockwise",
         "units": units_of(env),
-        "geometry": here.geometry.to_dict(),
+        "geometry": setting.geometry.to_dict(),
         "ground": {name: value.item() if isinstance(value, np.generic) else value for name, value in ground},
-        "terrain": here.terrain.to_dict(),
+        "terrain": setting.terrain.to_dict(),
     }
 
 

@@ -132,9 +132,9 @@ class OnnxPolicy:
                 raise ValueError(f"tensors {names}, metadata {self.record}")
         # Exceptions of onnxruntime have no common base.
         except Exception as error:
-            said = (getattr(error, "strerror", None) or str(error) or type(error).__name__).splitlines()[0]
+            reason = (getattr(error, "strerror", None) or str(error) or type(error).__name__).splitlines()[0]
             raise DataFileError(
-                f"policy {self.path}: expected an ONNX file of agents.export, cannot read it ({said})"
+                f"policy {self.path}: expected an ONNX file of agents.export, cannot read it ({reason})"
             ) from None
 
     def load(self, env: Any, env_id: str) -> OnnxPolicy:
@@ -251,6 +251,7 @@ class SavedModel:
         return policy
 
     def _unpickle(self, env: gym.Env[Any, Any]) -> TrainedPolicy:
+        """Load the .zip and the statistics of observations next to it, if there are any."""
         from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
         model = algorithm_class(self.record.get("algo", "ppo")).load(self.path, device="cpu")

@@ -86,14 +86,14 @@ def environment_of(
     Raises:
         DataFileError: the record's id is not registered, or one of its arguments needs an import.
     """
-    there = record.get("env_id")
-    if there is None or (env_id is not None and not same_id(env_id, there)):
+    trained_id = record.get("env_id")
+    if trained_id is None or (env_id is not None and not same_id(env_id, trained_id)):
         return env_id, {}  # arguments of another environment would not fit
     kwargs: dict[str, Any] = record.get("env_kwargs", {})
     if not isinstance(kwargs, dict):
         raise DataFileError(f"{path}: env_kwargs: expected arguments by name, got {kwargs!r}")
     # Ids that the file alone asks for. An `env_id` of the user is trusted and may import its module.
-    asks = {"env_id": there} if env_id is None else {}
+    asks = {"env_id": trained_id} if env_id is None else {}
     asks |= {"task": kwargs["task"]} if ":" in str(kwargs.get("task", "")) else {}
     for name, asked in asks.items():
         if own_id(asked) not in gym.registry:
@@ -104,7 +104,7 @@ def environment_of(
             )
     if "task" in asks:
         kwargs = kwargs | {"task": registered_task(asks["task"])}
-    return (own_id(there) if env_id is None else env_id), kwargs
+    return (own_id(trained_id) if env_id is None else env_id), kwargs
 
 
 def own_id(env_id: Any) -> str:

@@ -115,8 +115,8 @@ def read_plates(path: Path) -> Plates:
         raise DataFileError(
             f"record {str(path)!r}: expected force plates (FORCE_PLATFORM), found no force plates{without}"
         )
-    own = parameters.get("HOOF_ENV", {})
-    limbs = own["LIMBS"] if "LIMBS" in own else [f"plate_{k}" for k in range(1, len(raw) + 1)]
+    ours = parameters.get("HOOF_ENV", {})
+    limbs = ours["LIMBS"] if "LIMBS" in ours else [f"plate_{k}" for k in range(1, len(raw) + 1)]
     rate = float(np.ravel(parameters["ANALOG"]["RATE"])[0])
     camera = float(np.ravel(parameters["POINT"]["RATE"])[0])
     if not rate > 0 or len(limbs) != len(raw):
@@ -128,7 +128,7 @@ def read_plates(path: Path) -> Plates:
     time = start + np.arange(len(raw[0])) / rate
     forces, notes = _without_baseline(raw, limbs, parameters, frames, first)
     units = {limb: _force_unit(parameters, k) for k, limb in enumerate(limbs)}
-    weight = float(np.ravel(own["WEIGHT"])[0]) if "WEIGHT" in own else None
+    weight = float(np.ravel(ours["WEIGHT"])[0]) if "WEIGHT" in ours else None
     up = _upward(content["corners"], content["middle"])
     return Plates(dict(zip(limbs, forces, strict=True)), units, time, up, weight, notes)
 

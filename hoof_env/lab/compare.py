@@ -230,6 +230,7 @@ def _why_missing(sides: tuple[Side, Side], levels: tuple[float, float], unit: st
 
 
 def _span(record: ForceRecord) -> str:
+    """Return the first and the last time of a record as text."""
     return f"{record.time[0]:.4g} to {record.time[-1]:.4g} s"
 
 

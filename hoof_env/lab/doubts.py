@@ -144,13 +144,13 @@ def backward(forces: Mapping[str, Floats], time: Floats, ahead: str, by_axis: bo
     limbs = [limb for limb, value in orders.items() if value < least]
     if not limbs:
         return []
-    other = ahead[1:] if ahead.startswith("-") else f"-{ahead}"
+    opposite = ahead[1:] if ahead.startswith("-") else f"-{ahead}"
     remedy = (
-        f"--forward-a={other} or --forward-b={other}"
+        f"--forward-a={opposite} or --forward-b={opposite}"
         if by_axis
         else "a minus before the column of force_x in --map-a or --map-b"
     )
     return [
-        f"{', '.join(limbs)}: propulsion before braking; if the animal travels in the direction of {other}, "
-        f"{remedy} says so"
+        f"{', '.join(limbs)}: propulsion before braking; if the animal travels in the direction of "
+        f"{opposite}, {remedy} says so"
     ]

@@ -190,6 +190,7 @@ def read_record(
     notes += table.notes + doubts
     notes += sideways(forces, _others(table, sources), ahead, upward, (up, forward))
     notes += backward(forces, times, ahead, has_axes)
+    # A mass that is given goes before the weight in the file.
     weight = table.weight if mass is None else mass * GRAVITY
     return ForceRecord(path.name, times, forces, unit, weight, signs, turned, tuple(notes))
 
@@ -230,6 +231,7 @@ def _downward(forces: dict[str, list[Floats]]) -> dict[str, list[bool]]:
 def _points_down(vertical: Floats, least: float) -> bool:
     """Return True if a vertical force of shape (n,) points down and is higher than `least`."""
     highest = float(np.abs(vertical).max())
+    # Only strong samples: an offset in swing lasts longer than a stance.
     strong = vertical[np.abs(vertical) > STRONG * highest]
     return highest > least and bool(strong.sum() < -ONE_WAY * np.abs(strong).sum())
 

@@ -153,6 +153,7 @@ def integral(trace: Trace, values: NDArray[np.float64], start: float, end: float
         start, end: limits of the integral [s]; they may lie between samples.
     """
     t = trace["time"]
+    # The limits are added as samples, so that the trapezoids end there.
     inner = (t > start) & (t < end)
     times = np.concatenate(([start], t[inner], [end]))
     sampled = np.interp(times, t, values)

@@ -111,6 +111,7 @@ def _summary(reproduction: Reproduction, solver: str) -> str:
         f"{row['id']} {format_error(row, reproduction)} (bar {row['bar']})"
         for row in _worst(reproduction, solver)
     )
+    # The same sentence as on the command line.
     counts = counted(reproduction.rows, reproduction.shapes, solver)
     return f"Solver `{solver}`: {counts}. Worst: {worst or 'none outside'}."
 
@@ -163,8 +164,8 @@ def _resultants(reproduction: Reproduction, solvers: list[str]) -> str:
         readings = []
         for row in _of(reproduction.rows, solver=solver, spared=""):
             bar = reproduction.published.row(row["id"]).bar
-            other = [value for name, value in row["beside"].items() if name.startswith("resultant")]
-            readings += [(row["within_bar"], bar.holds(bar.error(v, row["published"]))) for v in other]
+            resultants = [value for name, value in row["beside"].items() if name.startswith("resultant")]
+            readings += [(row["within_bar"], bar.holds(bar.error(v, row["published"]))) for v in resultants]
         used = sum(bool(as_used) for as_used, _ in readings)
         as_resultant = sum(bool(verdict) for _, verdict in readings)
         parts.append(f"{used} and {as_resultant} of {len(readings)} counted with solver `{solver}`")
@@ -241,6 +242,7 @@ def which_beta(reproduction: Reproduction) -> dict[str, str]:
             f"{1e3 * a:.2f} mm, {1e3 * b:.2f} mm in stance ({name} β)," for name, (a, b) in drifts.items()
         ),
         "within": listed(f"{sum(rows)} of {len(rows)} ({name} β)" for name, rows in judged.items()),
+        # Both readings of beta share the leg, so that none, one or both can meet all rows.
         "verdict": {
             0: "This leg meets all of them with neither",
             1: f"This leg meets all of them with the {met[0] if met else ''} β only",
@@ -258,6 +260,7 @@ def largest_drift(reproduction: Reproduction, solver: str) -> tuple[float, float
         trace = reproduction.traces[gait, "elastic", solver]
         exact = reproduction.traces[gait, "elastic", EXACT]
         error = hoof_error(trace, exact)
+        # The exact stance for all solvers: drift would move the contacts of the other.
         on_ground = measure_stance(exact)
         inside = (trace["time"] >= on_ground.start) & (trace["time"] <= on_ground.end)
         cycle.append(float(error.max()))

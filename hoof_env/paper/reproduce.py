@@ -121,6 +121,7 @@ def _judge_all(
 ) -> list[dict[str, Any]]:
     """Judge every claim with every solver; the reading of `walk.direction` is decided by the exact solver's
     walk for all solvers."""
+    # One reading for all solvers, or a claim would mean different things in one row of the report.
     walk = traces["walk", "elastic", EXACT]
     brakes = walk_brakes(measure_stance(walk), walk)
     shapes: list[dict[str, Any]] = []

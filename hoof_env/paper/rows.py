@@ -153,6 +153,7 @@ def load_published(path: Path | None = None) -> Published:
         raise DataFileError(f"{file}: {error}") from None
     except (ValueError, KeyError, TypeError) as error:
         raise DataFileError(f"{file}: expected source, parameters, rows and shapes: {error!r}") from None
+    # Ids are keys of the results and of the page's tables.
     ids = [row.id for row in published.rows] + [claim.id for claim in published.claims]
     if len(ids) != len(set(ids)):
         raise DataFileError(
@@ -357,8 +358,8 @@ def _measure(row: PublishedRow, stances: Stances) -> tuple[float | None, str, di
         )
     quantity = QUANTITIES[row.id.split(".")[1].removesuffix(f"_{row.condition}")]
     condition = row.condition or "elastic"
-    other = "inelastic" if condition == "elastic" else "elastic"
-    pair = (stances[row.gait, condition], stances[row.gait, other])
+    opposite = "inelastic" if condition == "elastic" else "elastic"
+    pair = (stances[row.gait, condition], stances[row.gait, opposite])
     return quantity.value(*pair), quantity.definition, quantity.beside(*pair)
 
 

@@ -76,6 +76,7 @@ def find_peaks(force: NDArray[np.float64]) -> list[int]:
     turns = (steps[moving[:-1]] > 0) & (steps[moving[1:]] < 0)
     places = []
     for k in (moving[:-1][turns] + 1).tolist():
+        # A pass to higher values on one side may be lower than on the other; the higher pass counts.
         higher = np.flatnonzero(force > force[k])
         left = higher[higher < k]
         right = higher[higher > k]
@@ -172,6 +173,7 @@ def step_length(trace: Trace, stance: Stance) -> tuple[float, float]:
         The way back from first to last contact [m], by which a body would pass over the hoof in one stance;
         and the horizontal extent of the closed path over the cycle [m].
     """
+    # Relative to the trunk, which is fixed here, but need not be at x = 0.
     sole = (trace["toe_x"] + trace["heel_x"]) / 2 - trace["x"]
     start, end = np.interp([stance.start, stance.end], trace["time"], sole)
     return float(start - end), float(np.ptp(sole))
@@ -212,6 +214,7 @@ def walk_direction(walk: Stance, trace: Trace, brakes: bool) -> Verdict:
         brakes: True, of a leg that `walk_brakes`, uses the reading `BRAKING`; False uses `HOOF_ON_GROUND`.
     """
     (first, _), (second, _) = half_impulses(trace, walk)
+    # Friction is the force of the ground on the leg; the force of the hoof on the ground is its opposite.
     readings = {BRAKING: first < 0 and second < 0, HOOF_ON_GROUND: first > 0 and second > 0}
     used, why = (
         (BRAKING, "this walk is braked over its stance as a whole, and cannot move its animal forward")
@@ -250,6 +253,7 @@ def sole_velocity(trace: Trace) -> float:
     """
     velocity = np.concatenate([trace[f"{name}_slide"] for name in POINTS])
     load = np.concatenate([trace[f"{name}_normal"] for name in POINTS])
+    # Both points share the load, so that their samples are ranked together.
     order = np.argsort(velocity)
     below = np.cumsum(load[order])
     return float(velocity[order][np.searchsorted(below, below[-1] / 2)]) if below[-1] > 0 else float("nan")
