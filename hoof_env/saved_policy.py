@@ -146,8 +146,7 @@ class OnnxPolicy:
     def predict(
         self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
     ) -> tuple[NDArray[np.float32], Any]:
-        """Return the deterministic actions, shape (..., n), for observations of shape (..., k), and `state`
-        unchanged."""
+        """Return deterministic actions, shape (..., n), for observations of shape (..., k), and `state`."""
         rows = np.asarray(observation, np.float32)
         (actions,) = self._session.run([OUTPUT], {INPUT: rows.reshape(-1, rows.shape[-1])})
         return actions.reshape(*rows.shape[:-1], actions.shape[-1]), state

@@ -116,8 +116,7 @@ def write_c3d(record: Columns, about: Mapping[str, Any], path: Path) -> None:
 
 
 def _channels(record: Columns, limb: str, middle: complex, along: complex) -> Floats:
-    """Return the `CHANNELS` of a limb's plate, shape (6, n), from its middle [m] and its unit vector
-    forward."""
+    """Return the `CHANNELS` of a limb's plate, shape (6, n), by its middle [m] and its vector forward."""
     bears = loaded(record, limb)
     force = (record[f"{limb}force_x"] + 1j * record[f"{limb}force_y"]) * along.conjugate()
     arm = (record[f"{limb}cop_x"] + 1j * record[f"{limb}cop_y"] - middle) * along.conjugate()

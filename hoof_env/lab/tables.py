@@ -80,8 +80,7 @@ def _read_text(path: Path) -> Table:
 
 
 def _read_opensim(path: Path) -> Table:
-    """Read a .mot or .sto; raise `DataFileError` unless it has as many rows and columns as its header
-    states."""
+    """Read a .mot or .sto; raise `DataFileError` unless its rows and columns are as many as stated."""
     lines = lines_of(path)
     top = next((k + 1 for k, line in enumerate(lines) if line.strip().lower() == "endheader"), len(lines))
     below = [k for k in range(top, len(lines)) if lines[k].strip()]

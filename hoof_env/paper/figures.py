@@ -84,8 +84,7 @@ def draw_paths(figure: Any, reproduction: Reproduction) -> None:
 
 
 def _extent(reproduction: Reproduction, trace: Trace, stance: Stance) -> Point:
-    """Return lower left and upper right corner of all that is drawn of a gait, with a margin, shape (2, 2)
-    [m]."""
+    """Return lower left and upper right corner of a gait's drawing, with a margin, shape (2, 2) [m]."""
     leg = leg_at(reproduction.geometry, trace, stance.middle).values()
     hooves = [leg_at(reproduction.geometry, trace, t)["G"] for t in _instants(stance)]
     paths = [np.stack([trace[f"{name}_x"], -trace[f"{name}_penetration"]], 1) for name in POINTS]

@@ -52,8 +52,7 @@ class Bar:
         return 100 * difference / published if self.measure == "%" else difference
 
     def holds(self, error: float | None) -> bool | None:
-        """Return True if an error is within the bar, None if it is only reported, and False without a
-        value."""
+        """Return True if an error is within the bar, None if it is only reported, False without a value."""
         if self.limit is None:
             return None
         return error is not None and abs(error) <= self.limit
@@ -345,8 +344,7 @@ def _compare(row: PublishedRow, stances: Stances, solver: str) -> dict[str, Any]
 
 
 def _measure(row: PublishedRow, stances: Stances) -> tuple[float | None, str, dict[str, Any]]:
-    """Return the simulated value of a row, its definition in words, and values under other readings by
-    name."""
+    """Return the simulated value of a row, its definition, and values under other readings by name."""
     # The only row of both gaits; all others compare conditions of one gait.
     if row.id == "ratio.angle_variation":
         run = stances["run", "elastic"]
