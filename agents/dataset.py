@@ -38,7 +38,8 @@ from agents.score import find_policy, is_model
 from hoof_env.envs.policies import start_of
 from hoof_env.errors import DataFileError, MissingExtraError, OutputError, ParameterError, count
 from hoof_env.gait import GaitParameters
-from hoof_env.saved_policy import ABOUT, STATISTICS, WEIGHTS, describe_actions, find_saved
+from hoof_env.saved_policy import ABOUT, STATISTICS, WEIGHTS, find_saved
+from hoof_env.saved_record import describe_actions
 
 MANIFEST = "manifest.json"
 PROJECT = Path(__file__).parents[1] / "pyproject.toml"  # of the checkout, which need not be installed

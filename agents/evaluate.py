@@ -27,7 +27,7 @@ from agents.statistics import Interval, estimate
 from hoof_env import records
 from hoof_env._output import check_folder
 from hoof_env.errors import OutputError, ParameterError, check_number
-from hoof_env.saved_policy import environment_of
+from hoof_env.saved_record import environment_of
 
 FPS = 50.0  # of films
 

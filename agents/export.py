@@ -30,7 +30,8 @@ from agents.command import run
 from hoof_env._output import staged
 from hoof_env.errors import DataFileError, HoofEnvError, ParameterError
 from hoof_env.records import check_place
-from hoof_env.saved_policy import INPUT, LISTS, OUTPUT, OnnxPolicy, describe, environment_of, settings_of
+from hoof_env.saved_policy import INPUT, LISTS, OUTPUT, OnnxPolicy
+from hoof_env.saved_record import describe, environment_of, settings_of
 
 OPSET = 18  # of the file; onnxruntime reads it from 1.14 on
 TRIED = 1000  # random observations on which file and model must agree

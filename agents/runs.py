@@ -37,8 +37,8 @@ from hoof_env.saved_policy import CHECKPOINTS as CHECKPOINTS
 from hoof_env.saved_policy import STATISTICS as STATISTICS
 from hoof_env.saved_policy import SavedModel as SavedModel
 from hoof_env.saved_policy import TrainedPolicy as TrainedPolicy
-from hoof_env.saved_policy import describe_env as describe_env
-from hoof_env.saved_policy import read_record as read_record
+from hoof_env.saved_record import describe_env as describe_env
+from hoof_env.saved_record import read_record as read_record
 
 MODEL = "model.zip"
 CONFIG = "config.yml"

@@ -38,7 +38,8 @@ from hoof_env._output import check_folder, markdown_table
 from hoof_env.envs.policies import open_loop_record, start_of
 from hoof_env.envs.vector import HorseLegVectorEnv
 from hoof_env.errors import DataFileError, OutputError, ParameterError
-from hoof_env.saved_policy import environment_of, find_saved
+from hoof_env.saved_policy import find_saved
+from hoof_env.saved_record import environment_of
 
 ROWS = 1024  # episodes side by side at most; more are played one batch after the other
 

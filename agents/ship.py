@@ -37,7 +37,8 @@ from hoof_env.envs.policies import STANDS_FOR
 from hoof_env.errors import DataFileError, OutputError, ParameterError, check_choice, parse_json
 from hoof_env.film import render_episode
 from hoof_env.records import surroundings
-from hoof_env.saved_policy import ABOUT, FILE, WEIGHTS, OnnxPolicy, environment_of, own_id
+from hoof_env.saved_policy import ABOUT, FILE, WEIGHTS, OnnxPolicy
+from hoof_env.saved_record import environment_of, own_id
 from hoof_env.tasks.registry import TASKS
 
 POLICIES = Path(__file__).with_name("policies")

@@ -1,7 +1,7 @@
-"""The command line `hoof-env`: one function a sub-command, its signature the options, its docstring the help.
+"""Command line `hoof-env`: a function is a sub-command, its parameters the options, its docstring the help.
 
-Exit codes: 0 done, 2 a wrong argument or an error that is explained in one line, 130 interrupted, 141
-the reader of its output has left.
+Exit codes: 0 done, 2 a wrong argument or an error that is explained in one line, 130 interrupted, 141 the
+reader of the output has gone.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from hoof_env.errors import HoofEnvError
 
 
 def reproduce(out: Path, figures: bool = True, preset: str | None = None) -> None:
-    """Run the paper's four conditions with every solver and compare every published number with them.
+    """Run the paper's four conditions with every solver and compare them with every published number.
 
     Args:
-        out: folder for reproduction.json, reproduction.md and the figures; made if need be.
-        figures: draw figures 1 and 3 to 6 too (needs the extra 'plot').
+        out: folder for reproduction.json, reproduction.md and the figures; made if it is missing.
+        figures: draw figures 1 and 3 to 6, too (needs the extra 'plot').
         preset: geometry and gaits, a name or a JSON file; the package's default if left out.
     """
     from hoof_env._output import check_folder
@@ -30,6 +30,7 @@ def reproduce(out: Path, figures: bool = True, preset: str | None = None) -> Non
 
     options = ([] if figures else ["--no-figures"]) + (["--preset", preset] if preset else [])
     command = shlex.join(["hoof-env", "reproduce", "--out", str(out), *options])
+    # Before the simulation, which takes a while.
     check_folder(out)
     if figures:
         check_matplotlib()
@@ -54,19 +55,19 @@ def render(
     """Film an episode of a policy (needs 'render' and 'video').
 
     Args:
-        out: the film; ends in .mp4 or .gif. Its folder is made if need be.
+        out: the film; ends in .mp4 or .gif. Its folder is made if it is missing.
         policy: a gait of the preset, or four gait parameters as 6.28,0.7,-0.2,-0.3, in which the episode
             starts; idle, random, bang-bang, drag or airborne; the .json of an open-loop gait, to which the
-            policy goes, or open-loop for the best that the package holds; or a trained model (a trusted one
-            only: a model is code). Otherwise run, and of a horse its reference gait.
-        id: the environment.
-        args: its arguments: key=value ..., or one JSON object.
-        seed: of the episode and of "random".
-        seconds: of the episode at most.
-        slow: how many times slower than life the film plays.
+            policy goes, or open-loop for the best one of the package; or a trained model (only one that you
+            trust: a model is code). The default is run, or the reference gait of a horse.
+        id: id of the environment.
+        args: arguments of the environment: key=value ..., or one JSON object.
+        seed: seed of the episode and of "random".
+        seconds: longest duration of the episode.
+        slow: factor by which the film plays slower than life.
         fps: frames a second.
         size: width and height [pixels].
-        overwrite: replace the file if there is one.
+        overwrite: replace an existing file.
     """
     from hoof_env._output import check_new
     from hoof_env.film import render_episode
@@ -86,10 +87,10 @@ def play(
     """Drive the crank and the swing by keyboard in a window (needs 'render').
 
     Args:
-        id: the environment.
-        args: its arguments: key=value ..., or one JSON object.
-        seed: of the first episode; the next ones follow it.
-        slow: how many times slower than life it runs.
+        id: id of the environment.
+        args: arguments of the environment: key=value ..., or one JSON object.
+        seed: seed of the first episode; the next ones follow it.
+        slow: factor by which it runs slower than life.
         size: width and height of the picture above the keys [pixels].
     """
     from hoof_env.play import play
@@ -114,27 +115,28 @@ def export(
 
     Args:
         out: the file; ends in .csv, .parquet (needs 'export'), .c3d (needs 'lab'), or OpenSim's .mot or .sto,
-            which has its ExternalLoads beside it, as run_loads.xml (run_sto_loads.xml). Its folder is made if
-            need be.
-        policy: as in `hoof-env render`.
-        id: the environment.
-        args: its arguments: key=value ..., or one JSON object.
-        seed: of the episode and of "random".
-        seconds: of the episode at most; its own end otherwise.
+            which come with ExternalLoads in the same folder, as run_loads.xml (run_sto_loads.xml). The folder
+            is made if it is missing.
+        policy: the policy, as in `hoof-env render`.
+        id: id of the environment.
+        args: arguments of the environment: key=value ..., or one JSON object.
+        seed: seed of the episode and of "random".
+        seconds: longest duration of the episode; without it, the episode is played to its end.
         threshold: force along the ground's normal below which a limb counts as unloaded, as on a force
             plate [N].
-        units: of forces: N, or BW for body weights (.csv and .parquet).
+        units: unit of forces: N, or BW for body weights (.csv and .parquet).
         reactions: add the forces in the joints of each leg (not in .c3d).
         bodies: bodies of your OpenSim model that carry the forces: leg=BODY, or left_fore=BODY ...
-        overwrite: replace the files if there are some.
+        overwrite: replace existing files.
     """
     from hoof_env._output import check_new
     from hoof_env.records import export_episode, files_of
 
+    # All files of the format are checked; the message names the first of them.
     made, *_ = [check_new(file, overwrite) for file in files_of(out)]
     rows, weight = export_episode(out, policy, id, args, seed, seconds, threshold, units, reactions, bodies)
-    beside = "".join(f", with {file.name}" for file in files_of(out)[1:])
-    _say(f"{out}: {rows} rows, 1 BW = {weight:.1f} N, {_size(out)}{beside}{made}")
+    others = "".join(f", with {file.name}" for file in files_of(out)[1:])
+    _say(f"{out}: {rows} rows, 1 BW = {weight:.1f} N, {_size(out)}{others}{made}")
 
 
 def compare(
@@ -164,39 +166,40 @@ def compare(
     """Compare the ground reaction forces of two records, simulated or measured, limb by limb (needs 'lab').
 
     Args:
-        a: a record that counts as right: .csv, .txt, .tsv, .parquet (needs 'export'), .mot, .sto or .c3d.
-        b: the one whose errors are told.
+        a: the record that is taken as right: .csv, .txt, .tsv, .parquet (needs 'export'), .mot, .sto or .c3d.
+        b: the record of which the errors are reported.
         out: the picture; ends in .png, .pdf or .svg.
-        map_a: columns of A where they have other names than ours: time=Seconds force_x=-Fx force_y=Fz, or
+        map_a: columns of A if they have other names than ours: time=Seconds force_x=-Fx force_y=Fz, or
             left_fore_force_y=LF_Fz ...; a - turns a column round, a + adds two, as left_force_y=p1_z+p3_z;
             Fz#2 is the second column Fz, #3 the third of all. left_fore=plate_1 renames a limb,
             left_fore=plate_1+plate_3 is the sum of two.
         map_b: columns of B.
-        units_a: unit of A's forces: N, kN, N/kg, BW or %BW; auto takes what the file says.
+        units_a: unit of A's forces: N, kN, N/kg, BW or %BW; auto takes the unit that the file states.
         units_b: unit of B's forces.
-        reverse_a: components of A that point the other way: none, x, y or xy; auto turns both of each limb
-            whose vertical force points into the ground.
-        reverse_b: components of B that do.
-        rate_a: samples a second of A, if it has no times, or none that can be read.
+        reverse_a: components of A that point the other way: none, x, y or xy; auto turns both components of
+            each limb with a vertical force that points into the ground.
+        reverse_b: components of B that point the other way.
+        rate_a: samples a second of A, if it has no times, or times that cannot be read.
         rate_b: samples a second of B.
-        mass_a: of A's animal [kg], for body weights, if the file does not say it.
-        mass_b: of B's animal [kg].
+        mass_a: mass of A's animal [kg], for body weights, if the file does not state the weight.
+        mass_b: mass of B's animal [kg].
         up_a: axis of A's file that points upward: x, y, z, -x, -y or -z; auto is y, and in a .c3d the normal
             of its plates.
-        up_b: that of B.
+        up_b: axis of B's file that points upward.
         forward_a: axis of A's file in which the animal travels, likewise; auto is x.
-        forward_b: that of B.
+        forward_b: axis of B's file in which the animal travels.
         align: stances lays each pair touchdown on touchdown, shift shifts B as a whole, none takes the times
             of the files.
-        threshold: vertical force that makes a stance [N]; 20, or 1 % of the weight in body weights of an
-            animal whose weight is not known.
-        units: of the errors: N or BW; auto is N where both records can be in N.
-        overwrite: replace the picture if there is one.
+        threshold: vertical force that makes a stance [N]; 20, or 1 % of the weight if forces are in body
+            weights and the weight is unknown.
+        units: unit of the errors: N or BW; auto is N if both records can be in N.
+        overwrite: replace an existing picture.
     """
     from hoof_env._output import check_new
+    from hoof_env.lab.columns import parse_mapping
     from hoof_env.lab.compare import compare
     from hoof_env.lab.picture import check_picture, draw, report
-    from hoof_env.lab.read import parse_mapping, read_record
+    from hoof_env.lab.read import read_record
 
     made = check_new(out, overwrite)
     check_picture(out)
@@ -204,9 +207,9 @@ def compare(
     of_b = parse_mapping("--map-b", map_b)
     first = read_record(a, of_a, units_a, reverse_a, rate_a, mass_a, up_a, forward_a)
     second = read_record(b, of_b, units_b, reverse_b, rate_b, mass_b, up_b, forward_b)
-    found = compare(first, second, align, threshold, units)
-    draw(found, out)
-    _say(f"{report(found)}\n\n{out}: {_size(out)}{made}")
+    comparison = compare(first, second, align, threshold, units)
+    draw(comparison, out)
+    _say(f"{report(comparison)}\n\n{out}: {_size(out)}{made}")
 
 
 def average(
@@ -231,43 +234,46 @@ def average(
         records: one file or more that `hoof-env compare` reads; the options below hold for all of them.
         out: the table; ends in .csv.
         map: columns, as --map-a of `hoof-env compare`.
-        units_in: unit of the files' forces: N, kN, N/kg, BW or %BW; auto takes what each file says.
-        reverse: components that point the other way: none, x, y or xy; auto turns both of each limb whose
-            vertical force points into the ground.
+        units_in: unit of the files' forces: N, kN, N/kg, BW or %BW; auto takes the unit that each file
+            states.
+        reverse: components that point the other way: none, x, y or xy; auto turns both components of each
+            limb with a vertical force that points into the ground.
         rate: samples a second, if the files have no times.
-        mass: of the animal [kg], for body weights, if the files do not say it.
+        mass: mass of the animal [kg], for body weights, if the files do not state the weight.
         up: axis of the files that points upward, as --up-a of `hoof-env compare`.
         forward: axis of the files in which the animal travels.
-        threshold: vertical force that makes a stance [N]; 20, or 1 % of the weight in body weights of an
-            animal whose weight is not known.
-        units: of the table: N or BW; auto is N where all files can be in N.
+        threshold: vertical force that makes a stance [N]; 20, or 1 % of the weight if forces are in body
+            weights and the weight is unknown.
+        units: unit of the table: N or BW; auto is N if all files can be in N.
         points: rows of the table, from touchdown to lift-off.
-        overwrite: replace the table if there is one.
+        overwrite: replace an existing table.
     """
     from hoof_env._output import check_folder, check_new
     from hoof_env.lab import average as mean
+    from hoof_env.lab.columns import parse_mapping
     from hoof_env.lab.doubts import for_one
-    from hoof_env.lab.read import parse_mapping, read_record
+    from hoof_env.lab.read import read_record
 
     made = check_new(out, overwrite)
     mean.check_table(out)
     check_folder(out.parent)
     mapping = parse_mapping("--map", map)
     try:
-        read = [read_record(file, mapping, units_in, reverse, rate, mass, up, forward) for file in records]
-    except HoofEnvError as error:  # which names the options of `compare`
+        trials = [read_record(file, mapping, units_in, reverse, rate, mass, up, forward) for file in records]
+    except HoofEnvError as error:
+        # Its message names the options of `compare`, which end in -a and -b.
         raise type(error)(for_one(str(error), "").replace("--units", "--units-in")) from None
-    found = mean.average(read, threshold, units, points)
-    mean.write_table(found, out)
-    _say(f"{mean.report(found)}\n\n{out}: {points} rows, {_size(out)}{made}")
+    stances = mean.average(trials, threshold, units, points)
+    mean.write_table(stances, out)
+    _say(f"{mean.report(stances)}\n\n{out}: {points} rows, {_size(out)}{made}")
 
 
 def manual(id: str = "hoof_env/HorseLeg-v0", out: Path | None = None, films: Path | None = None) -> None:
-    """Print the manual page of an environment, or write those of all.
+    """Print the manual page of an environment, or write the pages of all environments.
 
     Args:
-        id: the environment.
-        out: folder for a page of each id, and their index; made if need be.
+        id: id of the environment.
+        out: folder for a page of each id, and their index; made if it is missing.
         films: folder of trained policies, as agents/policies, whose films the pages show; with `out`.
     """
     from hoof_env.envs.manual import page_of, write_pages
@@ -283,7 +289,7 @@ def compile() -> None:
     """Compile the kernels of all environments now, for an image of a container or before workers begin.
 
     They are kept in the folder NUMBA_CACHE_DIR. Environments with a hoof_stiffness, an engine with four
-    legs and `reproduce` have more of their own, which the first use compiles.
+    legs and `reproduce` have further kernels, which are compiled at the first use.
     """
     from hoof_env.envs.compile_ahead import compile_kernels
 
@@ -294,40 +300,45 @@ COMMANDS: dict[str, Callable[..., None]] = {
     command.__name__: command
     for command in (reproduce, render, play, export, compare, average, manual, compile)
 }
+"""Functions by sub-command, in the order of the help."""
 
 
 def _say(line: str) -> None:
+    """Print a line at once, also where the output is a pipe."""
     print(line, flush=True)
 
 
 def _size(path: Path) -> str:
+    """Return the size of a file as text."""
     size = path.stat().st_size
     return f"{size / 1e6:.1f} MB" if size >= 1e5 else f"{size / 1e3:.1f} kB"
 
 
 AXIS_OPTIONS = frozenset(f"--{name}{which}" for name in ("up", "forward") for which in ("", "-a", "-b"))
+"""Options with an axis, such as -x, as their value."""
 
 
-def _with_axes(given: list[str]) -> list[str]:
-    """Arguments in which an axis as -x stays with its option: it looks like an option of its own."""
-    found: list[str] = []
-    for item in given:
-        if found and found[-1] in AXIS_OPTIONS and item in ("-x", "-y", "-z"):
-            found[-1] += f"={item}"
+def _with_axes(arguments: list[str]) -> list[str]:
+    """Join an axis such as -x to the option before it, as the parser would take it for another option."""
+    joined: list[str] = []
+    for item in arguments:
+        if joined and joined[-1] in AXIS_OPTIONS and item in ("-x", "-y", "-z"):
+            joined[-1] += f"={item}"
         else:
-            found.append(item)
-    return found
+            joined.append(item)
+    return joined
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one sub-command, by default the one on the command line; returns the exit code."""
-    given = _with_axes(sys.argv[1:] if arguments is None else list(arguments))
+    """Run one sub-command, by default the one of the command line; return the exit code."""
+    options = _with_axes(sys.argv[1:] if arguments is None else list(arguments))
     bear_any_output()
-    if given == ["--version"]:
+    if options == ["--version"]:
         _say(f"hoof-env {__version__}")
         return 0
-    if not {"", os.getcwd()} & set(sys.path):  # behind all others, which nothing there may replace
-        sys.path.append(os.getcwd())  # for --id module:..., as python -m hoof_env has it
+    # For --id module:..., as `python -m hoof_env` has it; last, so that no file there hides another module.
+    if not {"", os.getcwd()} & set(sys.path):
+        sys.path.append(os.getcwd())
     try:
         import tyro
 
@@ -335,16 +346,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
             COMMANDS,
             prog="hoof-env",
             description="A horse's leg on the ground. --version prints the version.",
-            args=given,
+            args=options,
         )
         sys.stdout.flush()
     except HoofEnvError as error:
         print(f"hoof-env: error: {error}", file=sys.stderr)
         return 2
-    except BrokenPipeError:  # who read our output, as `head`, has left
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # of what is still to be flushed
+    except BrokenPipeError:
+        # The reader of the output, such as `head`, has gone. The rest of the buffer goes nowhere, as flushing
+        # it at the end would raise the error again.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 141
-    except OSError as error:  # a full disk
+    except OSError as error:
+        # The disk that takes our output is full.
         flush_or_drop()
         print(f"hoof-env: error: cannot write the output: {error.strerror or error}", file=sys.stderr)
         return 2

@@ -1,4 +1,4 @@
-"""An episode as a film: MP4 (H.264, which every browser plays) or GIF."""
+"""Films of episodes: MP4 (H.264, which every browser plays) or GIF."""
 
 from __future__ import annotations
 
@@ -28,27 +28,48 @@ FFMPEG: dict[str, dict[str, Any]] = {
         "codec": "libx264",
         "pix_fmt_out": "yuv420p",
         "output_params": [
-            "-vf", "crop=trunc(iw/2)*2:trunc(ih/2)*2",  # what H.264 can have
-            "-crf", "22", "-preset", "medium", "-movflags", "+faststart",
+            "-vf",
+            "crop=trunc(iw/2)*2:trunc(ih/2)*2",  # H.264 with yuv420p needs even widths and heights
+            "-crf",
+            "22",
+            "-preset",
+            "medium",
+            "-movflags",
+            "+faststart",
         ],
     },
-    ".gif": {  # one palette for the whole film, so that colours do not flicker; it takes all frames at once
+    ".gif": {
         "codec": "gif",
         "pix_fmt_out": "pal8",
         "output_params": [
-            "-vf", "split[a][b];[a]palettegen[p];[b][p]paletteuse=dither=none:diff_mode=rectangle",
-            "-loop", "0",
+            "-vf",
+            # One palette for the whole film, so that colours do not flicker. It needs all frames in memory.
+            "split[a][b];[a]palettegen[p];[b][p]paletteuse=dither=none:diff_mode=rectangle",
+            "-loop",
+            "0",
         ],
     },
-}  # fmt: skip
-"""How ffmpeg writes each kind of film."""
+}
+"""Arguments of ffmpeg by the suffix of a film."""
 
 NOT_WHOLE = "ffmpeg could not write the whole film; is the disk full?"
-TELL_SECONDS = 5.0  # time between two lines about how far a film is, where there is no bar [s]
+"""Message of an incomplete film."""
+
+TELL_SECONDS = 5.0
+"""Time between two lines about the progress of a film, on output without a bar [s]."""
 
 
 def check_film(path: Path, fps: float) -> None:
-    """Raise unless a film of this kind and pace can be written here: a GIF counts hundredths of a second."""
+    """Check that a film can be written.
+
+    Args:
+        path: the film; its suffix decides the format.
+        fps: frames a second [Hz].
+
+    Raises:
+        ParameterError: the rate is out of range, or not one of a GIF, which counts hundredths of a second.
+        HoofEnvError: pygame, imageio-ffmpeg or ffmpeg is missing.
+    """
     check_number("fps", fps, low=0, high=1000, exclusive_low=True)
     for name, package, extra in (
         ("pygame", "pygame-ce", "render"),
@@ -64,17 +85,18 @@ def check_film(path: Path, fps: float) -> None:
         raise no_ffmpeg() from None
     if shutil.which(program) is None:
         raise no_ffmpeg()
-    hundredths = 100 / fps  # in which a GIF counts; browsers slow down what has less than two
+    # A GIF counts its frames' durations in hundredths of a second, and browsers slow down less than two.
+    hundredths = 100 / fps
     if path.suffix.lower() == ".gif" and (hundredths < 2 or abs(hundredths - round(hundredths)) > 1e-6):
         raise ParameterError(f"fps: expected 50, 25, 20, 10 ... of a GIF, got {fps:g}")
 
 
 def no_ffmpeg() -> HoofEnvError:
-    """The error where there is no program ffmpeg, or it does not start."""
-    given = os.environ.get("IMAGEIO_FFMPEG_EXE")
-    found = f"IMAGEIO_FFMPEG_EXE={given!r} leads to none" if given else "imageio-ffmpeg has brought none"
+    """Return the error for a program ffmpeg that is missing or does not start."""
+    program = os.environ.get("IMAGEIO_FFMPEG_EXE")
+    reason = f"IMAGEIO_FFMPEG_EXE={program!r} leads to none" if program else "imageio-ffmpeg has brought none"
     return HoofEnvError(
-        f"films need the program ffmpeg, and {found}: install it, perhaps by pip install --force-reinstall"
+        f"films need the program ffmpeg, and {reason}: install it, perhaps by pip install --force-reinstall"
         " imageio-ffmpeg, and let IMAGEIO_FFMPEG_EXE be its path, or unset"
     )
 
@@ -86,30 +108,52 @@ def frames(
     slow: float = 1.0,
     read: Callable[[Columns], list[Any]] = instants,
 ) -> Iterator[NDArray[np.uint8]]:
-    """Pictures of an episode, 1 / (fps slow) of its seconds apart, each at the last substep before its time;
-    `renderer` is in mode "rgb_array" and is reset, `episode` as `records.episode` yields it; `read` makes
-    instants of its columns."""
+    """Draw pictures of an episode, 1 / (fps slow) of its seconds apart.
+
+    Args:
+        renderer: renderer in mode "rgb_array"; it is reset.
+        episode: columns as `records.episode` yields them.
+        fps: frames a second [Hz].
+        slow: factor by which the film is slower than the episode.
+        read: function that converts columns to instants.
+
+    Yields:
+        Pictures of shape (height, width, 3), each at the first substep at or after its time.
+    """
     renderer.reset()
     step = 1 / (fps * slow)
     shown = 0
     news: list[Any] = []
     for columns in episode:
-        for now in read(columns):
-            news.append(now)
-            if now.time >= shown * step - 1e-9:
+        for instant in read(columns):
+            news.append(instant)
+            # Times are sums of substeps, and rounding must not delay a frame by one.
+            if instant.time >= shown * step - 1e-9:
                 renderer.add(news)
                 news = []
                 frame = renderer.frame()
                 assert frame is not None
-                while now.time >= shown * step - 1e-9:  # substeps longer than a frame repeat it
+                # A substep longer than a frame repeats it.
+                while instant.time >= shown * step - 1e-9:
                     shown += 1
                     yield frame
 
 
 def write_film(pictures: Iterable[NDArray[np.uint8]], path: Path, fps: float) -> int:
-    """Write pictures of one shape (height, width, 3) to an .mp4 or a .gif and return how many; an older file
-    is replaced when this is whole. `OutputError` where the folder cannot be written, or the disk is full, and
-    `HoofEnvError` where there is no ffmpeg."""
+    """Write pictures to a film; an older file is replaced when the new one is complete.
+
+    Args:
+        pictures: pictures of the same shape (height, width, 3).
+        path: the film, an .mp4 or a .gif.
+        fps: frames a second [Hz].
+
+    Returns:
+        The number of frames.
+
+    Raises:
+        OutputError: the folder cannot be written, or the disk is full.
+        ParameterError, HoofEnvError: as in `check_film`.
+    """
     check_film(path, fps)
     with staged(path.parent) as stage:
         writer: Any = None
@@ -120,18 +164,21 @@ def write_film(pictures: Iterable[NDArray[np.uint8]], path: Path, fps: float) ->
                     writer = _writer(stage / path.name, picture.shape, fps)
                 try:
                     writer.send(np.ascontiguousarray(picture))
-                except OSError:  # in many lines
+                except OSError:
+                    # The message of imageio-ffmpeg has many lines.
                     raise OSError(NOT_WHOLE) from None
                 count += 1
         finally:
             if writer is not None:
                 writer.close()
-        if count and _count_frames(stage / path.name) < count:  # ffmpeg may fail after it took the last one
+        # ffmpeg may fail after it has taken the last picture.
+        if count and _count_frames(stage / path.name) < count:
             raise OSError(NOT_WHOLE)
     return count
 
 
 def _count_frames(path: Path) -> int:
+    """Return the number of frames of a film, 0 if it cannot be read."""
     import imageio_ffmpeg
 
     try:
@@ -141,6 +188,7 @@ def _count_frames(path: Path) -> int:
 
 
 def _writer(path: Path, shape: tuple[int, ...], fps: float) -> Any:
+    """Start ffmpeg for pictures of shape (height, width, 3); return the generator that takes them."""
     import imageio_ffmpeg
 
     options: dict[str, Any] = FFMPEG[path.suffix.lower()]
@@ -148,7 +196,8 @@ def _writer(path: Path, shape: tuple[int, ...], fps: float) -> Any:
         str(path), shape[1::-1], fps=fps, macro_block_size=1, ffmpeg_log_level="error", **options
     )
     try:
-        writer.send(None)  # looks for it, and starts it
+        # The first `send` of the generator looks for ffmpeg and starts it.
+        writer.send(None)
     except (RuntimeError, OSError):
         raise no_ffmpeg() from None
     return writer
@@ -165,8 +214,25 @@ def render_episode(
     fps: float = 50.0,
     size: tuple[int, int] = (960, 540),
 ) -> int:
-    """Film an episode; returns the number of frames. What `hoof-env render` does; errors are those of
-    `records.make_env`, `records.find_policy` and `write_film`."""
+    """Film an episode, as `hoof-env render` does.
+
+    Args:
+        path: the film, an .mp4 or a .gif.
+        policy: policy as `records.find_policy` takes it.
+        env_id: id of the environment.
+        arguments: arguments of the environment, key=value or JSON objects.
+        seed: seed of the episode and of the policy "random".
+        seconds: time after which the episode is stopped [s].
+        slow: factor by which the film is slower than the episode.
+        fps: frames a second [Hz].
+        size: width and height [pixels].
+
+    Returns:
+        The number of frames.
+
+    Raises:
+        HoofEnvError: a subclass as in `records.make_env`, `records.find_policy` and `write_film`.
+    """
     from hoof_env.render.renderer import new_renderer
 
     records.check_place(path, FFMPEG)
@@ -184,16 +250,22 @@ def render_episode(
 
 
 def _with_progress(pictures: Iterable[NDArray[np.uint8]], most: int) -> Iterator[NDArray[np.uint8]]:
-    """The same, and how far it is, on stderr: a bar on a terminal that has tqdm, else a line now and then."""
+    """Yield pictures and show the progress on stderr, by a bar on a terminal with tqdm, else by lines.
+
+    Args:
+        pictures: the pictures.
+        most: largest number of them.
+    """
     if sys.stderr.isatty() and find_spec("tqdm"):
         from tqdm import tqdm
 
         yield from tqdm(pictures, total=most, unit=" frames", leave=False)
-        print("all frames are drawn; ffmpeg ends the file ...", file=sys.stderr)  # of a GIF it begins now
+        # For a GIF, ffmpeg's work begins only now, and takes a while.
+        print("all frames are drawn; ffmpeg ends the file ...", file=sys.stderr)
         return
-    told = time.monotonic()
+    printed = time.monotonic()
     for count, picture in enumerate(pictures, 1):
         yield picture
-        if time.monotonic() - told >= TELL_SECONDS:
-            told = time.monotonic()
+        if time.monotonic() - printed >= TELL_SECONDS:
+            printed = time.monotonic()
             print(f"{count} of {most} frames", file=sys.stderr, flush=True)

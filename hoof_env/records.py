@@ -1,8 +1,8 @@
-"""Episodes of any policy on any environment of the package, substep by substep: for pictures, and for files.
+"""Episodes of any policy on any environment of the package, substep by substep, for pictures and files.
 
-`surroundings` and `substeps` are all that is read from behind an environment; the rest is written against
-them. The files are CSV, Parquet, OpenSim's .mot and .sto, and .c3d; `write` chooses by the suffix. Frame,
-signs and centre of pressure are those of `hoof_env.lab`.
+Only `surroundings` and `substeps` read the inside of an environment; all other functions use these two. Files
+are CSV, Parquet, OpenSim's .mot and .sto, and .c3d; `write` chooses by the suffix. Frame, signs and centre of
+pressure are those of `hoof_env.lab`.
 """
 
 from __future__ import annotations
@@ -43,19 +43,19 @@ from hoof_env.render.instant import UNITS, Columns, Surroundings, columns_of, un
 from hoof_env.saved_policy import find_saved
 
 RECORD = {name: unit for name, unit in UNITS.items() if name not in PARAMETERS[1:]} | {"free_moment": "N m"}
-"""Columns of a record and their units: fields of `Instant` but for the swing's parameters, which are known at
-the end of a control step only. The free moment about the centre of pressure is 0."""
-
+"""Units of a record's columns: fields of `Instant` without the swing's parameters, which are known at the
+end of a control step only. The free moment about the centre of pressure is 0."""
 
 TELL_SECONDS = 5.0
-"""Time between two lines about how far an episode is [s]."""
+"""Time between two lines about the progress of an episode [s]."""
 
 COPIES = 3
-"""Of a record, while it is put together and written."""
+"""Number of copies of a record in memory while it is assembled and written."""
 
 
 def surroundings(env: Any) -> Surroundings:
-    """The setting of an environment of this package, wrapped or not; `ParameterError` of another."""
+    """Return the setting of an environment of this package, wrapped or not: leg, ground, weight and time
+    steps; raise `ParameterError` for another environment."""
     leg = env.unwrapped
     try:
         hips = leg.batch.body.hips
@@ -76,20 +76,24 @@ def surroundings(env: Any) -> Surroundings:
 
 
 def substeps(env: Any) -> Columns:
-    """What happened in the last control step of an environment of this package, one row a substep, or the
-    start after a reset, with what was commanded."""
+    """Return the columns of the last control step of an environment of this package, commands included: one
+    row for each substep, or one row after a reset."""
     leg = env.unwrapped
     command = leg.engine.command_in(leg.engine.column(0))
     return columns_of(leg.record(), leg.batch.body.hips, leg.terrain, command)
 
 
 def instants_of(env: Any, columns: Columns) -> list[Any]:
-    """Records of the rows of `columns` of an environment, `Instant`s or `HorseInstant`s."""
+    """Convert the rows of an environment's columns to `Instant`s, or to `HorseInstant`s of a horse."""
     return instant.instants_of(columns, env.unwrapped.batch.body.hips)
 
 
 def make_env(env_id: str, arguments: Mapping[str, Any] | None = None) -> gym.Env[Any, Any]:
-    """`gymnasium.make`, refusals in our words, environments of other packages among them."""
+    """Make an environment of this package by `gymnasium.make`.
+
+    Raises:
+        ParameterError: the id or an argument is wrong, or the environment is of another package.
+    """
     arguments = dict(arguments or {})
     if "render_mode" in arguments:
         raise ParameterError("render_mode: expected none here, where the environment need not draw itself")
@@ -99,17 +103,21 @@ def make_env(env_id: str, arguments: Mapping[str, Any] | None = None) -> gym.Env
         raise
     except (gym.error.Error, ModuleNotFoundError, TypeError) as error:
         raise ParameterError(f"environment {env_id!r} with {arguments or 'no arguments'}: {error}") from None
+    # Refuses environments of other packages, which have no substeps to read.
     surroundings(env)
     return env
 
 
 def find_policy(name: str | None, env: gym.Env[Any, Any], env_id: str, seed: int = 0) -> Any:
-    """A policy for an environment by its name: a gait or another scripted one, "6.28,0.7,-0.2,-0.3" (crank
-    speed [rad/s], swing offset, sine and cosine coefficient [rad]), "open-loop", the best gait that comes
-    with this package for the id, or a path; None is "run", or a horse's "reference".
+    """Return a policy for an environment; raise `ParameterError` for an unknown name, and `DataFileError`
+    for a file that cannot be read or does not fit.
 
-    The .zip or run folder of a model is a pickle: it can run code. A policy's .onnx file, the folder of one
-    that is shipped, or a gait's .json are data. `seed` is that of "random".
+    The name is that of a gait or of another scripted policy; "6.28,0.7,-0.2,-0.3" (crank speed [rad/s], swing
+    offset, sine and cosine coefficient [rad]); "open-loop", the best gait that this package has for the id;
+    or a path. None is "run", or "reference" of a horse. `seed` is that of the policy "random".
+
+    The .zip or run folder of a model is a pickle: it can run code. An .onnx file, the folder of a shipped
+    policy and a gait's .json are data.
     """
     names = policy_names(env)
     if name is None:
@@ -142,40 +150,46 @@ def episode(
     options: Mapping[str, Any] | None = None,
     joints: JointReactions | None = None,
 ) -> Iterator[Columns]:
-    """Play an episode; yields the columns of its start (one row) and of every control step.
+    """Play an episode; yield the columns of its start (one row) and of every control step.
 
-    `policy` is anything with Stable-Baselines3's `predict`; `seed` and `options` are those of `reset`. It
-    stops after some `seconds`, or at its own end. With `joints` the columns have their reactions, too.
+    Args:
+        env: the environment.
+        policy: object with Stable-Baselines3's `predict`.
+        seed, options: arguments of `reset`.
+        seconds: time after which the episode is stopped [s]; None plays it to its end.
+        joints: adds columns of joint reactions.
     """
     if seconds is not None:
         check_number("seconds", seconds, low=0, exclusive_low=True)
     observation, _ = env.reset(seed=seed, options=start_of(policy) | dict(options or {}))
-    here = substeps(env)
-    yield here | (_named(env, joints.now()) if joints else {})
+    columns = substeps(env)
+    yield columns | (_named(env, joints.now()) if joints else {})
     start = np.ones(1, bool)
     ended = False
-    while not ended and (seconds is None or here["time"][-1] < seconds - 1e-9):
+    # Times are sums of steps, and rounding must not add a step.
+    while not ended and (seconds is None or columns["time"][-1] < seconds - 1e-9):
         action, _ = policy.predict(observation, episode_start=start, deterministic=True)
         began = joints.before() if joints else None
         observation, _, failed, truncated, _ = env.step(action)
         start = np.zeros(1, bool)
         ended = failed or truncated
-        before = here["time"][-1]
-        here = substeps(env)
-        if here["time"][-1] > before:  # else the simulation failed and nothing happened
+        before = columns["time"][-1]
+        columns = substeps(env)
+        # A step in which the simulation failed has no new substeps.
+        if columns["time"][-1] > before:
             if joints and began is not None:
-                here |= _named(env, joints.after(began, len(here["time"])))
-            yield here
+                columns |= _named(env, joints.after(began, len(columns["time"])))
+            yield columns
 
 
 def longest_of(env: gym.Env[Any, Any], seconds: float | None) -> float:
-    """How long an episode that is stopped after some `seconds`, if not before, lasts at most [s]."""
-    own = float(env.unwrapped.settings.episode_seconds)  # type: ignore[attr-defined]
-    return own if seconds is None else min(seconds, own)
+    """Return the longest duration of an episode that is stopped after `seconds` [s]."""
+    episode_seconds = float(env.unwrapped.settings.episode_seconds)  # type: ignore[attr-defined]
+    return episode_seconds if seconds is None else min(seconds, episode_seconds)
 
 
 def check_memory(rows: float, columns: int) -> None:
-    """`ParameterError` where a record of so many rows would not fit into the memory that is free."""
+    """Raise `ParameterError` if a record with `rows` and `columns` does not fit into the free memory."""
     needed = COPIES * 8.0 * rows * columns
     free = free_memory()
     if needed > free:
@@ -186,23 +200,24 @@ def check_memory(rows: float, columns: int) -> None:
 
 
 def _with_progress(played: Iterator[Columns], longest: float) -> Iterator[Columns]:
-    """The same; every `TELL_SECONDS` a line says how far it is."""
-    told = time.monotonic()
+    """Yield the parts of an episode of at most `longest` [s]; print a line on its progress to stderr every
+    `TELL_SECONDS`."""
+    printed = time.monotonic()
     for part in played:
         yield part
-        if time.monotonic() - told >= TELL_SECONDS:
-            told = time.monotonic()
+        if time.monotonic() - printed >= TELL_SECONDS:
+            printed = time.monotonic()
             print(f"{part['time'][-1]:.1f} of at most {longest:g} s", file=sys.stderr, flush=True)
 
 
 def _named(env: gym.Env[Any, Any], reactions: NDArray[np.float64]) -> Columns:
-    """Reactions of shape (n, legs, columns) by name."""
+    """Return reactions of shape (n, legs, columns) as columns by name."""
     limbs = [f"{leg}_" for leg in surroundings(env).hips] or [""]
-    return {
-        f"{limb}{name}": reactions[:, i, k]
-        for i, limb in enumerate(limbs)
-        for k, name in enumerate(REACTION_UNITS)
-    }
+    columns = {}
+    for i, limb in enumerate(limbs):
+        for k, name in enumerate(REACTION_UNITS):
+            columns[f"{limb}{name}"] = reactions[:, i, k]
+    return columns
 
 
 def record_episode(
@@ -214,10 +229,12 @@ def record_episode(
     reactions: bool = False,
     tell: bool = False,
 ) -> Columns:
-    """The record of an episode at every substep: arrays of shape (n,), names and units as `units_of` says.
-    Arguments and errors are those of `episode`; `reactions` adds the forces in the joints, see
-    `lab.reactions`; `tell` says now and then on stderr how far it is. `ParameterError` where the memory of
-    this machine cannot hold it."""
+    """Play an episode and return its record at every substep: columns of shape (n,), see `units_of`.
+
+    Arguments and errors are those of `episode`, and `ParameterError` if the record does not fit into the
+    memory. `reactions` adds the forces in the joints, see `lab.reactions`; `tell` prints the progress to
+    stderr.
+    """
     units = units_of(env, reactions)
     longest = longest_of(env, seconds)
     check_memory(longest / surroundings(env).sim_dt, len(units))
@@ -225,37 +242,43 @@ def record_episode(
     played = episode(env, policy, seed, seconds, options, joints)
     parts = list(_with_progress(played, longest) if tell else played)
     moments = [name for name in units if name.endswith("free_moment")]
+    # Columns in the order of `units`; the free moment is no column of an episode.
     record = {name: np.concatenate([part[name] for part in parts]) for name in units if name in parts[0]}
     record |= {name: np.zeros(len(record["time"])) for name in moments}
     return onto_surface(record, surroundings(env).terrain)
 
 
 def units_of(env: gym.Env[Any, Any], reactions: bool = False) -> dict[str, str]:
-    """Columns of a record and their units: `RECORD`, with `reactions` also `REACTION_UNITS`; of a horse those
-    of the trunk, and each leg's under its name, `left_fore_force_y`."""
+    """Return the units of a record by column.
+
+    The columns are those of `RECORD`, with `reactions` also those of `REACTION_UNITS`. A horse has columns of
+    its trunk, and those of each leg with its name as prefix: `left_fore_force_y`.
+    """
     of_leg = RECORD | (REACTION_UNITS if reactions else {})
     return units_of_legs(of_leg, surroundings(env).hips)
 
 
 def describe(env: gym.Env[Any, Any], **about: Any) -> dict[str, Any]:
-    """What a file says about its record, JSON-serialisable: version, units, leg, ground and `about`."""
-    here = surroundings(env)
+    """Return the description of a record for its file, as JSON has it: version, units, leg, ground and the
+    entries of `about`."""
+    setting = surroundings(env)
     ground = asdict(env.unwrapped.engine.ground).items()  # type: ignore[attr-defined]
     return {
         "hoof_env": hoof_env.__version__,
         **about,
-        "sim_dt_s": here.sim_dt,
-        "weight_n": here.weight_n,
+        "sim_dt_s": setting.sim_dt,
+        "weight_n": setting.weight_n,
         "axes": "x forward, y up, z to the right; angles counter-clockwise",
         "units": units_of(env),
-        "geometry": here.geometry.to_dict(),
+        "geometry": setting.geometry.to_dict(),
         "ground": {name: value.item() if isinstance(value, np.generic) else value for name, value in ground},
-        "terrain": here.terrain.to_dict(),
+        "terrain": setting.terrain.to_dict(),
     }
 
 
 def check_place(path: Path, suffixes: Iterable[str]) -> None:
-    """Raise unless a file can be written at `path` and its suffix is one of `suffixes`."""
+    """Raise `ParameterError` unless the suffix of a path is one of `suffixes`, and `OutputError` if it is a
+    folder or its folder cannot be written."""
     known = sorted(suffixes)
     if path.suffix.lower() not in known:
         raise ParameterError(f"out: expected a file that ends in {', '.join(known)}, got {str(path)!r}")
@@ -265,19 +288,24 @@ def check_place(path: Path, suffixes: Iterable[str]) -> None:
 
 
 def write_csv(record: Columns, about: Mapping[str, Any], path: Path) -> None:
-    """One row a substep under one header line with name and unit; numbers keep their bits. Beside forces in
-    body weights stands the column `weight`, the same in all rows: there is no other place for it."""
+    """Write a CSV file with one row for each substep under one line of names and units.
+
+    Numbers keep their bits. With forces in body weights there is a column `weight` [N], the same in all rows.
+    """
     units = dict(about["units"])
+    # A CSV file has no other place for the weight, by which a reader gets newtons.
     if "BW" in units.values():
         record = record | {"weight": np.full(len(record["time"]), about["weight_n"])}
         units["weight"] = "N"
     header = ",".join(f"{name} [{units[name]}]" for name in record)
     table = np.column_stack([*record.values()])
+    # 17 digits bring back every bit of a float64.
     np.savetxt(path, table, "%.17g", delimiter=",", header=header, comments="", encoding="utf-8")
 
 
 def write_parquet(record: Columns, about: Mapping[str, Any], path: Path) -> None:
-    """Columns of float64; a field's metadata has its "unit", the schema's "hoof_env" has `about` as JSON."""
+    """Write a Parquet file of float64; the metadata of a field have its "unit", and those of the schema have
+    `about` as JSON under "hoof_env"."""
     import pyarrow as pa
     from pyarrow import parquet
 
@@ -288,19 +316,25 @@ def write_parquet(record: Columns, about: Mapping[str, Any], path: Path) -> None
     parquet.write_table(pa.table(dict(record), schema=schema), path)
 
 
-WRITERS: dict[str, Callable[[Columns, Mapping[str, Any], Path], None]]
-WRITERS = {
-    ".csv": write_csv, ".parquet": write_parquet, ".mot": write_mot, ".sto": write_mot, ".c3d": write_c3d
-}  # fmt: skip
+WRITERS: dict[str, Callable[[Columns, Mapping[str, Any], Path], None]] = {
+    ".csv": write_csv,
+    ".parquet": write_parquet,
+    ".mot": write_mot,
+    ".sto": write_mot,
+    ".c3d": write_c3d,
+}
+"""Writers by suffix."""
+
 OPENSIM = (".mot", ".sto")
-"""Formats with ExternalLoads beside them."""
+"""Formats with an ExternalLoads XML."""
 
 NEWTONS = (*OPENSIM, ".c3d")
-"""Formats whose readers take forces for newtons."""
+"""Formats with forces in newtons, which their readers expect."""
 
 
 def check_export(path: Path) -> None:
-    """Raise unless `write` can write to `path`; before an episode is played."""
+    """Check that `write` can write to a path, before an episode is played; errors are those of `check_place`,
+    and `MissingExtraError` if the format needs a package that is not installed."""
     check_place(path, WRITERS)
     if path.suffix.lower() == ".c3d":
         ezc3d()
@@ -312,14 +346,17 @@ def check_export(path: Path) -> None:
 
 
 def files_of(path: Path) -> list[Path]:
-    """What `write` writes: the record and, of OpenSim's formats, the ExternalLoads XML."""
+    """Return the paths of the files that `write` writes: the record and, in OpenSim's formats, the
+    ExternalLoads XML."""
     return [path, loads_path(path)] if path.suffix.lower() in OPENSIM else [path]
 
 
 def write(record: Columns, about: Mapping[str, Any], path: Path) -> Path:
-    """Write what `record_episode` and `describe` return, in the format of the path's suffix;
-    older files are replaced when these are complete. Errors are those of `check_export`, and `ParameterError`
-    of a record that does not fit into the format."""
+    """Write the results of `record_episode` and `describe` in the format of the path's suffix.
+
+    Older files are replaced when all new ones are complete. Errors are those of `check_export`, and
+    `ParameterError` if the record does not fit into the format.
+    """
     check_export(path)
     with staged(path.parent) as stage:
         WRITERS[path.suffix.lower()](record, about, stage / path.name)
@@ -338,9 +375,22 @@ def export_episode(
     reactions: bool = False,
     bodies: Sequence[str] = (),
 ) -> tuple[int, float]:
-    """Play an episode and write its record; returns the number of rows and the weight [N]. What
-    `hoof-env export` does; errors are those of `make_env`, `find_policy` and, before the episode is played,
-    `write`."""
+    """Play an episode and write its record, as `hoof-env export` does with the same options; return the
+    number of rows and the weight [N].
+
+    Args:
+        path: the file.
+        policy: name of a policy, see `find_policy`.
+        env_id, arguments: id and arguments of the environment, key=value or JSON objects.
+        seed, seconds, reactions: arguments of `record_episode`; `seed` is also that of the policy "random".
+        threshold: force along the ground's normal below which a limb counts as unloaded [N].
+        units: unit of forces, "N" or "BW".
+        bodies: bodies of an OpenSim model that carry the forces, LIMB=BODY.
+
+    Raises:
+        HoofEnvError: a subclass, as in `make_env`, `find_policy` and, before the episode is played, `write`.
+    """
+    # All arguments are checked first: an episode may take long.
     check_export(path)
     suffix = path.suffix.lower()
     check_number("seed", seed, low=0)
@@ -354,16 +404,20 @@ def export_episode(
         )
     if reactions and suffix == ".c3d":
         raise ParameterError("reactions: expected a .csv, .parquet, .mot or .sto, got .c3d")
-    with make_env(env_id, given := parse_pairs("--args", arguments)) as env:
+    env_arguments = parse_pairs("--args", arguments)
+    with make_env(env_id, env_arguments) as env:
         names = units_of(env, reactions)
         on = check_bodies(parse_pairs("--bodies", bodies), limbs_of(names))
         player = find_policy(policy, env, env_id, seed)
         record = record_episode(env, player, seed, seconds, reactions=reactions, tell=True)
         kept = above_threshold(record, threshold, surroundings(env).terrain)
-        about = describe(env, environment=env_id, arguments=given, policy=policy, seed=seed) | {
-            "threshold_n": threshold, "bodies": on, "units": names,
+        about = describe(env, environment=env_id, arguments=env_arguments, policy=policy, seed=seed)
+        about |= {
+            "threshold_n": threshold,
+            "bodies": on,
+            "units": names,
             "reactions": [name for name in names if reactions and name.endswith(tuple(REACTION_UNITS))],
-        }  # fmt: skip
-    written, said = in_units(kept, about, units)
-    write(written, said, path)
+        }
+    written, description = in_units(kept, about, units)
+    write(written, description, path)
     return len(record["time"]), about["weight_n"]

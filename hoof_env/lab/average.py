@@ -1,8 +1,8 @@
-"""The mean stance of several trials: `hoof-env average`.
+"""Mean stance of several trials: `hoof-env average`.
 
 Each whole stance, from the first to the last sample above the threshold, is interpolated linearly to points
 that are evenly spaced in its duration. Mean and standard deviation (of a sample, over n - 1) are those of all
-stances of a limb; every stance counts the same, of whichever trial it is.
+stances of a limb; every stance has the same weight, whatever its trial.
 """
 
 from __future__ import annotations
@@ -25,18 +25,19 @@ from hoof_env.lab.stances import whole_stances
 Floats = NDArray[np.float64]
 
 POINTS = 101
-"""Of a stance, from 0 to 100 %."""
+"""Number of points of a stance, from 0 to 100 % of its duration."""
 
 
 @dataclass(frozen=True)
 class MeanStance:
-    """Of a limb.
+    """Mean stance of a limb.
 
     Attributes:
-        trials, stances: how many records have one, and how many there are in all.
-        mean, sd: of the forces forward and upward, shape (points, 2); sd is not a number for one stance, and
-            the forward force where a record has none.
-        contact: how long each stance lasts, shape (stances,) [s].
+        trials: number of records that have a whole stance of the limb.
+        stances: number of stances in all records.
+        mean, sd: mean and standard deviation of the forces forward and upward, shape (points, 2); `sd` is NaN
+            for one stance, and the forward force is NaN if a record has none.
+        contact: duration of each stance, shape (stances,) [s].
     """
 
     trials: int
@@ -48,12 +49,12 @@ class MeanStance:
 
 @dataclass(frozen=True)
 class Average:
-    """What `average` finds.
+    """Result of `average`.
 
     Attributes:
-        unit: of all forces, "N" or "BW".
-        limbs: by limb, in the order of the records.
-        warnings: limbs that a record lacks, and what is doubtful about the records.
+        unit: unit of all forces, "N" or "BW".
+        limbs: mean stances by limb, in the order of the records.
+        warnings: limbs that a record lacks, and doubts about the records.
     """
 
     unit: str
@@ -64,14 +65,14 @@ class Average:
 def average(
     records: Sequence[ForceRecord], threshold: float | None = None, units: str = "auto", points: int = POINTS
 ) -> Average:
-    """The mean stance of each limb over records.
+    """Compute the mean stance of each limb over records.
 
     Args:
         records: trials; limbs of the same name belong together.
-        threshold: vertical force that makes a stance [N]; None is `THRESHOLD`, or 1 % of the weight where
-            forces are in body weights of a weight that is not known.
-        units: "N" or "BW"; "auto" is N where all records can be in N, else BW.
-        points: of a stance.
+        threshold: vertical force that makes a stance [N]; None is `THRESHOLD`, or 1 % of the weight if forces
+            are in body weights and the weight is unknown.
+        units: "N" or "BW"; "auto" is N if all records can be in N, else BW.
+        points: number of points of a stance.
 
     Raises:
         ParameterError: an argument is wrong, or the records have no unit in common.
@@ -82,15 +83,17 @@ def average(
     if not records:
         raise ParameterError("records: expected one file or more, got none")
     unit = _common_unit(records, units)
-    found: dict[str, list[list[Floats]]] = {}
+    # By limb, a list of curves for each record that has the limb.
+    curves_by_trial: dict[str, list[list[Floats]]] = {}
     contact: dict[str, list[float]] = {}
     reasons = {}
     for record in records:
         level = _level(record, threshold, unit)
         for limb, forces in record.limbs.items():
-            force = forces * (record.per(unit) or 1.0)
+            force = forces * (record.per(unit) or 1.0)  # not None: `_common_unit` has checked it
             spans = whole_stances(force[:, 1], level, record.rate)
-            found.setdefault(limb, []).append([_normalised(force[i:j], points) for i, j in spans])
+            curves = [_normalised(force[i:j], points) for i, j in spans]
+            curves_by_trial.setdefault(limb, []).append(curves)
             contact.setdefault(limb, []).extend((j - i) / record.rate for i, j in spans)
             if not spans:
                 why = why_none([force[:, 1]], record.time, level, unit)
@@ -98,27 +101,28 @@ def average(
     if not any(contact.values()):
         raise DataFileError("; ".join(reasons.values()))
     warnings = [f"{record.name}: {for_one(note, '')}" for record in records for note in record.notes]
-    warnings += [
-        f"{record.name}: has no {limb}"
-        for limb in found for record in records if limb not in record.limbs
-    ]  # fmt: skip
+    for limb in curves_by_trial:
+        warnings += [f"{record.name}: has no {limb}" for record in records if limb not in record.limbs]
     warnings += reasons.values()
     limbs = {}
-    for limb, trials in found.items():
+    for limb, trials in curves_by_trial.items():
         curves = [curve for trial in trials for curve in trial]
         if not curves:
             continue
-        together = np.array(curves)
-        sd = together.std(axis=0, ddof=1) if len(curves) > 1 else np.full(together.shape[1:], np.nan)
-        if len(curves) == 1:
+        stacked = np.array(curves)
+        if len(curves) > 1:
+            sd = stacked.std(axis=0, ddof=1)
+        else:
+            # NumPy would warn of a division by zero.
+            sd = np.full(stacked.shape[1:], np.nan)
             warnings.append(f"{limb}: one stance has no standard deviation")
-        limbs[limb] = MeanStance(
-            sum(map(bool, trials)), len(curves), together.mean(axis=0), sd, np.array(contact[limb])
-        )
+        with_stance = sum(map(bool, trials))
+        limbs[limb] = MeanStance(with_stance, len(curves), stacked.mean(axis=0), sd, np.array(contact[limb]))
     return Average(unit, limbs, warnings)
 
 
 def _common_unit(records: Sequence[ForceRecord], units: str) -> str:
+    """Return the unit that all records can have, newtons first; raise `ParameterError` if there is none."""
     for unit in ("N", "BW") if units == "auto" else (units,):
         if all(record.per(unit) for record in records):
             return unit
@@ -130,7 +134,7 @@ def _common_unit(records: Sequence[ForceRecord], units: str) -> str:
 
 
 def _level(record: ForceRecord, threshold: float | None, unit: str) -> float:
-    """The vertical force that makes a stance, in `unit`."""
+    """Return the vertical force that makes a stance of a record, in `unit`."""
     newtons = THRESHOLD if threshold is None else check_number("threshold", threshold, low=0.0, high=1e6)
     if unit == "N":
         return newtons
@@ -145,30 +149,35 @@ def _level(record: ForceRecord, threshold: float | None, unit: str) -> float:
 
 
 def _normalised(force: Floats, points: int) -> Floats:
-    """A stance at evenly spaced points of its duration, shape (points, 2)."""
-    own = np.arange(len(force))
+    """Interpolate a stance of shape (n, 2) at evenly spaced points of its duration, shape (points, 2)."""
+    samples = np.arange(len(force))
     at = np.linspace(0.0, len(force) - 1.0, points)
-    return np.column_stack([np.interp(at, own, column) for column in force.T])
+    return np.column_stack([np.interp(at, samples, column) for column in force.T])
 
 
 def write_table(found: Average, path: Path) -> Path:
-    """Write a CSV table, a row a point: `stance [%]`, and of each limb the mean and the standard deviation of
-    the forces, as `left_force_y_mean [N]` and `left_force_y_sd [N]`, and how many stances it has. Errors are
-    those of `check_table`."""
+    """Write a CSV table with one row for each point.
+
+    Its columns are `stance [%]` and, for each limb, mean and standard deviation of the forces, as
+    `left_force_y_mean [N]` and `left_force_y_sd [N]`, and the number of stances. Errors are those of
+    `check_table`.
+    """
     check_table(path)
     rows = len(next(iter(found.limbs.values())).mean)
     columns: dict[str, Floats] = {"stance [%]": np.linspace(0.0, 100.0, rows)}
     for limb, stance in found.limbs.items():
         for k, axis in enumerate("xy"):
+            # A record may have no forward force; a column of NaN would say nothing.
             if np.isfinite(stance.mean[:, k]).all():
                 columns[f"{limb}_force_{axis}_mean [{found.unit}]"] = stance.mean[:, k]
                 columns[f"{limb}_force_{axis}_sd [{found.unit}]"] = stance.sd[:, k]
         columns[f"{limb}_stances"] = np.full(rows, float(stance.stances))
     with staged(path.parent) as stage:
+        table = np.column_stack([*columns.values()])
+        header = ",".join(columns)
         np.savetxt(
-            stage / path.name, np.column_stack([*columns.values()]), "%.10g", delimiter=",",
-            header=",".join(columns), comments="", encoding="utf-8",
-        )  # fmt: skip
+            stage / path.name, table, "%.10g", delimiter=",", header=header, comments="", encoding="utf-8"
+        )
     return path
 
 
@@ -179,18 +188,23 @@ def check_table(path: Path) -> None:
 
 
 def report(found: Average) -> str:
-    """A table of how many stances there are, how long they last and how high they peak; and the warnings."""
+    """Return a table of the number of stances, their durations and the highest mean forces, and the warnings,
+    as text."""
     places = 1 if found.unit == "N" else 4
     head = ("limb", "trials", "stances", "contact [ms]", f"highest mean of force_y [{found.unit}]", "at [%]")
     rows = []
     for limb, stance in found.limbs.items():
         spread = 1e3 * stance.contact.std(ddof=1) if stance.stances > 1 else np.nan
         k = int(stance.mean[:, 1].argmax())
-        rows.append([
-            limb, str(stance.trials), str(stance.stances),
+        row = [
+            limb,
+            str(stance.trials),
+            str(stance.stances),
             f"{1e3 * stance.contact.mean():.0f} ± {spread:.0f}",
             f"{stance.mean[k, 1]:.{places}f} ± {stance.sd[k, 1]:.{places}f}",
             f"{100 * k / (len(stance.mean) - 1):.0f}",
-        ])  # fmt: skip
+        ]
+        rows.append(row)
+    # The standard deviation of one stance is NaN, which a reader would take for an error.
     table = markdown_table(head, rows).replace("± nan", "± -")
     return "\n".join([table, *(f"warning: {text}" for text in found.warnings)])

@@ -1,7 +1,7 @@
-"""The header and the parameters of a .c3d, checked before a library follows what they say.
+"""Checks of the header and the parameters of a .c3d, before a library trusts them.
 
-A parameter section is a chain: each entry says how far the next one is. A damaged link leads into numbers
-that are taken for names and sizes then. Checked is what every file has, whichever program wrote it.
+A parameter section is a chain: each entry holds the distance to the next one. A damaged link leads into
+numbers, which are then taken for names and sizes. The checks hold for files of all programs.
 """
 
 from __future__ import annotations
@@ -12,20 +12,36 @@ from pathlib import Path
 
 from hoof_env.errors import DataFileError
 
-# bytes of a block; the second byte of every c3d
 BLOCK = 512
+"""Bytes of a block."""
+
 KEY = 80
-MIPS = 86  # the code of processors that write the high byte first
-FIRST = 4  # bytes of a parameter section before its first entry
-BYTES = {-1: 1, 1: 1, 2: 2, 4: 4}  # of a number by the type of a parameter: text, byte, integer, float
+"""Second byte of every c3d."""
+
+MIPS = 86
+"""Code of processors that write the high byte first."""
+
+FIRST = 4
+"""Bytes of a parameter section before its first entry."""
+
+BYTES = {-1: 1, 1: 1, 2: 2, 4: 4}
+"""Bytes of a number by the type of a parameter: text, byte, integer, float."""
+
 MOST_DIMENSIONS = 7
-PRINTED = range(32, 127)  # ASCII
+"""Largest number of dimensions of a parameter that c3d allows."""
+
+PRINTED = range(32, 127)
+"""Printable characters of ASCII, of which names consist."""
 
 
 def frames_of(path: Path) -> tuple[int, int]:
-    """The first and the last frame that the header names. `DataFileError` of a file that is no c3d, or one
-    with a damaged parameter section."""
+    """Return the first and the last frame that the header names.
+
+    Raises:
+        DataFileError: the file is not a c3d, or its parameter section is damaged.
+    """
     with path.open("rb") as file:
+        # The section begins in block 255 at most and has 255 blocks at most: each number is one byte.
         head = file.read((255 + 255 + 1) * BLOCK)
     begin = (head[0] - 1) * BLOCK if head else 0
     if len(head) < 2 * BLOCK or head[1] != KEY or not 0 < begin < len(head) - FIRST:
@@ -49,9 +65,20 @@ def frames_of(path: Path) -> tuple[int, int]:
 
 
 def _check_parameters(head: bytes, at: int, order: str) -> None:
-    """Follow the chain of entries from byte `at` on. `ValueError` of one that is none, `struct.error` and
-    `IndexError` beyond the end."""
+    """Follow the chain of entries from byte `at` on.
+
+    Args:
+        head: bytes of the file.
+        at: number of the first entry's first byte.
+        order: order of bytes as `struct` has it, "<" or ">".
+
+    Raises:
+        ValueError: an entry is damaged.
+        struct.error, IndexError: the chain leads beyond the end.
+    """
     while head[at] != 0:
+        # The length of a name is negative if the entry is locked; the number of a group is negative in the
+        # entry that names the group, and positive in those of its parameters.
         length, group = struct.unpack_from("2b", head, at)
         name = head[at + 2 : at + 2 + abs(length)]
         if group == 0 or any(sign not in PRINTED for sign in name):
@@ -62,8 +89,9 @@ def _check_parameters(head: bytes, at: int, order: str) -> None:
             end = link + 2 + _size(head, link + 2, name.decode("ascii"))
             if 0 < ahead < end - link:
                 raise ValueError(f"{name.decode('ascii')} is longer than its place")
-        if ahead == 0:
+        if ahead == 0:  # the last entry
             return
+        # The distance counts from its own two bytes. A smaller one would make an endless loop.
         if ahead < 2:
             raise ValueError(f"{name.decode('ascii')} leads backward")
         at = link + ahead
@@ -72,7 +100,7 @@ def _check_parameters(head: bytes, at: int, order: str) -> None:
 
 
 def _size(head: bytes, at: int, name: str) -> int:
-    """Bytes of a parameter from its type on to the end of its numbers."""
+    """Return the bytes of a parameter from its type, in byte `at`, to the end of its numbers."""
     kind, dimensions = struct.unpack_from("bB", head, at)
     if kind not in BYTES or dimensions > MOST_DIMENSIONS:
         raise ValueError(f"{name} has type {kind} and {dimensions} dimensions")

@@ -1,7 +1,7 @@
-"""A script that reads a .c3d by ezc3d in a process of its own: `python c3d_process.py FILE`.
+"""Script that reads a .c3d by ezc3d in a process of its own: `python c3d_process.py FILE`.
 
-It writes an .npz to its standard output. ezc3d is compiled code that trusts what a file says of itself: a
-damaged file can end it, or keep it in a loop or filling memory for ever. Here it can harm nothing, and has
+It writes an .npz to its standard output. ezc3d is compiled code that trusts the sizes in a file: a damaged
+file can crash it, keep it in a loop or fill the memory. In a process of its own it does no harm, and has
 limits of processor time and memory. Nothing of this package is imported, so that it starts at once.
 """
 
@@ -15,20 +15,28 @@ from typing import Any
 
 import numpy as np
 
-# of processor time; a healthy file takes some 0.05 s a megabyte
 SECONDS = 2.0
+"""Limit of processor time for a small file [s]."""
+
 SECONDS_A_MEGABYTE = 0.5
-# of memory beyond that of the libraries
+"""Processor time allowed for each megabyte in addition [s]; an undamaged file takes some 0.05 s."""
+
 BYTES = 1 << 30
+"""Limit of memory for a small file, beyond the memory of the libraries [bytes]."""
+
 TIMES_ITS_SIZE = 100
+"""Memory allowed in addition, in sizes of the file."""
+
 GROUPS = ("POINT", "ANALOG", "FORCE_PLATFORM", "HOOF_ENV")
+"""Groups of parameters that are passed on."""
 
 
 def limit(size: int) -> None:
-    """Limit processor time and memory by the size of the file, where the system can."""
+    """Limit processor time and memory by the file's size [bytes], as far as the system supports it."""
     try:
         import resource
-    except ImportError:  # Windows; the limit of the caller holds there
+    except ImportError:
+        # Windows has no such module; there only the caller's limit of time holds.
         return
     used = sum(resource.getrusage(resource.RUSAGE_SELF)[:2])
     seconds = int(used + SECONDS + SECONDS_A_MEGABYTE * size / 1e6) + 1
@@ -36,43 +44,45 @@ def limit(size: int) -> None:
     lower(resource, resource.RLIMIT_CORE, 0)
     try:
         pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
-    except (OSError, ValueError):  # macOS, which does not enforce it
+    except (OSError, ValueError):
+        # macOS has no /proc and would not enforce a limit of memory.
         return
     lower(resource, resource.RLIMIT_AS, pages * resource.getpagesize() + BYTES + TIMES_ITS_SIZE * size)
 
 
 def lower(resource: Any, which: int, most: int) -> None:
-    """Set a limit, unless there is a lower one already."""
-    if any(0 <= limit < most for limit in resource.getrlimit(which)):  # endless is -1 or a large number
+    """Set a limit of the module `resource`, unless there is a lower one already."""
+    # No limit is -1 or a large number, depending on the system.
+    if any(0 <= limit < most for limit in resource.getrlimit(which)):
         return
     resource.setrlimit(which, (most, most))
 
 
 def plain(value: Any) -> Any:
-    """`value` as JSON has it."""
+    """Convert a value to types that JSON has."""
     if isinstance(value, (list, tuple)):
-        return [plain(one) for one in value]
+        return [plain(item) for item in value]
     return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
 
 
 def main(path: str) -> None:
-    """Write the plates' forces, the middle of all markers and the parameters that are asked for."""
+    """Write the plates' forces and corners, the median of all markers and the `GROUPS` of parameters."""
     import ezc3d
 
     limit(Path(path).stat().st_size)
     file = ezc3d.c3d(path, extract_forceplat_data=True)
     points = np.asarray(file["data"]["points"][:3], float)
+    # A marker that was not seen is NaN, or in files of some programs at the origin.
     seen = points[:, np.isfinite(points).all(axis=0) & (points != 0).any(axis=0)]
     groups = {group: file["parameters"][group] for group in GROUPS if group in file["parameters"]}
-    parameters = {
-        group: {name: plain(one["value"]) for name, one in rows.items() if not name.startswith("__")}
-        for group, rows in groups.items()
-    }
-    arrays = {
-        f"force_{k}": np.asarray(plate["force"], float)
-        for k, plate in enumerate(file["data"]["platform"])
-    }  # fmt: skip
-    corners = [plate["corners"] for plate in file["data"]["platform"]]
+    parameters = {}
+    for group, rows in groups.items():
+        parameters[group] = {
+            name: plain(row["value"]) for name, row in rows.items() if not name.startswith("__")
+        }
+    plates = file["data"]["platform"]
+    arrays = {f"force_{k}": np.asarray(plate["force"], float) for k, plate in enumerate(plates)}
+    corners = [plate["corners"] for plate in plates]
     out = io.BytesIO()
     np.savez(
         out,
@@ -88,6 +98,7 @@ def main(path: str) -> None:
 if __name__ == "__main__":
     try:
         main(sys.argv[1])
-    except Exception as error:  # of a library that raises all kinds
+    # ezc3d raises exceptions of any type; the caller shows the last line.
+    except Exception as error:
         sys.stderr.write(f"{type(error).__name__}: {error}\n")
         sys.exit(1)

@@ -1,11 +1,12 @@
-"""Force plates of .c3d files: forces in the laboratory's axes, which of these is up, and the baseline.
+"""Force plates of .c3d files: forces in the laboratory's axes, the axis that points up, and the baseline.
 
-**Up.** A plate's own z points down into it, so the normal of FORCE_PLATFORM:CORNERS says which axis of the
-laboratory is up. Corners in another order than c3d's turn that normal over; markers, which are above the
-floor, then decide its sense.
+**Up.** A plate's own z points down into it, so the normal of FORCE_PLATFORM:CORNERS gives the axis of the
+laboratory that points up. Corners in another order than c3d's turn that normal over; markers, which are above
+the floor, then decide its sense.
 
-**Baseline.** FORCE_PLATFORM:ZERO names the first and the last frame in which the plates were unloaded. What a
-plate shows there on average is subtracted, unless it bore a load then, or the frames are not in the file.
+**Baseline.** FORCE_PLATFORM:ZERO names the first and the last frame in which the plates were unloaded. The
+mean force of a plate there is subtracted, unless the plate bore a load then, or the frames are not in the
+file.
 """
 
 from __future__ import annotations
@@ -30,25 +31,40 @@ from hoof_env.lab.c3d_header import frames_of
 
 Floats = NDArray[np.float64]
 
-# types of plates: eight channels of forces; a matrix calibrates the channels
 EIGHT_FORCES = 3
+"""Type of plates with eight channels of forces."""
+
 CALIBRATED = 4
-# that reading takes at most where processor time has no limit
+"""Type of plates with a matrix that calibrates the channels."""
+
 SECONDS = 120.0
+"""Limit of time for reading a small file [s], for systems without a limit of processor time."""
+
 BYTES_A_SECOND = 1e6
-# shares of the highest force: of changes, and of pull, that an unloaded plate has
+"""Size for which one more second is allowed [bytes]."""
+
 STEADY = 0.05
+"""Largest change of an unloaded plate's force, as a share of the highest force."""
+
 IDLE = 0.02
-# standard deviations a median deviation; and those that noise reaches
+"""Largest pull of a plate, as a share of its highest force."""
+
 ROBUST = 1.4826
+"""Standard deviation of normal noise, in median absolute deviations."""
+
 NOISY = 6.0
-# shares of the highest force and of the baseline: a load in place of an offset
+"""Largest deviation that counts as noise, in standard deviations."""
+
 LARGE = 0.25
+"""Share of a plate's highest force above which a baseline may be a load instead of an offset."""
+
 SMALL = 0.1
+"""Share of the baseline below which a plate's force counts as zero."""
+
 PLEA = re.compile(
     r"[\s,.]*\b(please|this is probably due|if you want to ignore)\b.*", re.IGNORECASE | re.DOTALL
 )
-"""What ezc3d asks of people who read its messages, such as to open an issue: it is not for ours."""
+"""Request in ezc3d's messages, such as to open an issue; it is cut off, as it does not concern our users."""
 
 
 @dataclass
@@ -56,12 +72,12 @@ class Plates:
     """Force plates of a file.
 
     Attributes:
-        forces: by limb, or `plate_1` and so on, along the laboratory's x, y and z, shape (n, 3).
-        units: of them, by limb.
-        time: shape (n,) [s]; that of the first frame of the trial is 0, though the file may begin later.
-        up: the axis of the laboratory that points upward: "x", "y" or "z", with "-" for its other end.
-        weight: of the animal [N], if a file of this package says it.
-        notes: what was made of the baseline, where that is remarkable.
+        forces: forces along the laboratory's x, y and z by limb, or by `plate_1` and so on, shape (n, 3).
+        units: units of the forces by limb.
+        time: times, shape (n,) [s]; 0 is the first frame of the trial, though the file may begin later.
+        up: axis of the laboratory that points upward: "x", "y" or "z", with "-" for its other end.
+        weight: weight of the animal [N], from files of this package, else None.
+        notes: messages about a baseline that was not subtracted.
     """
 
     forces: dict[str, Floats]
@@ -73,29 +89,34 @@ class Plates:
 
 
 def read_plates(path: Path) -> Plates:
-    """The force plates of a file. Limbs are `plate_1` and so on in files of others. `DataFileError` of a file
-    that is damaged, without plates or with fewer frames than its header says."""
+    """Read the force plates of a file; limbs are `plate_1` and so on in files of other programs.
+
+    Raises:
+        DataFileError: the file is damaged, has no plates, or has fewer frames than its header states.
+        MissingExtraError: ezc3d is not installed.
+    """
     library = importlib.util.find_spec("ezc3d")
     if library is None or library.origin is None:
         raise MissingExtraError('c3d needs ezc3d: pip install "hoof-env[lab]"')
     first, last = frames_of(path)
-    found = _in_a_process(path, [Path(one).parents[1] for one in (library.origin, np.__file__)])
-    frames = int(found["frames"])
+    # The child needs the folders of both libraries: it starts without the paths of this process.
+    folders = [Path(file).parents[1] for file in (library.origin, np.__file__)]
+    content = _in_a_process(path, folders)
+    frames = int(content["frames"])
     if frames < last - first + 1:
         raise DataFileError(
             f"record {str(path)!r}: expected {last - first + 1} frames, as its header says, found {frames}: "
             "is the file cut off?"
         )
-    parameters = json.loads(str(found["parameters"]))
-    raw = [found[name].T for name in found if name.startswith("force_")]
+    parameters = json.loads(str(content["parameters"]))
+    raw = [content[name].T for name in content if name.startswith("force_")]
     if not raw or any(len(force) < 2 for force in raw):
+        without = " with data" if raw else ""
         raise DataFileError(
-            f"record {str(path)!r}: expected force plates (FORCE_PLATFORM), found no force plates with data"
-            if raw else
-            f"record {str(path)!r}: expected force plates (FORCE_PLATFORM), found no force plates"
-        )  # fmt: skip
-    own = parameters.get("HOOF_ENV", {})
-    limbs = own["LIMBS"] if "LIMBS" in own else [f"plate_{k}" for k in range(1, len(raw) + 1)]
+            f"record {str(path)!r}: expected force plates (FORCE_PLATFORM), found no force plates{without}"
+        )
+    ours = parameters.get("HOOF_ENV", {})
+    limbs = ours["LIMBS"] if "LIMBS" in ours else [f"plate_{k}" for k in range(1, len(raw) + 1)]
     rate = float(np.ravel(parameters["ANALOG"]["RATE"])[0])
     camera = float(np.ravel(parameters["POINT"]["RATE"])[0])
     if not rate > 0 or len(limbs) != len(raw):
@@ -107,22 +128,34 @@ def read_plates(path: Path) -> Plates:
     time = start + np.arange(len(raw[0])) / rate
     forces, notes = _without_baseline(raw, limbs, parameters, frames, first)
     units = {limb: _force_unit(parameters, k) for k, limb in enumerate(limbs)}
-    weight = float(np.ravel(own["WEIGHT"])[0]) if "WEIGHT" in own else None
-    up = _upward(found["corners"], found["middle"])
+    weight = float(np.ravel(ours["WEIGHT"])[0]) if "WEIGHT" in ours else None
+    up = _upward(content["corners"], content["middle"])
     return Plates(dict(zip(limbs, forces, strict=True)), units, time, up, weight, notes)
 
 
 def _in_a_process(path: Path, folders: list[Path]) -> dict[str, Any]:
-    """What `c3d_process.py` finds with the libraries in some folders, and nothing from the current one.
-    `DataFileError` if it fails, dies or takes too long."""
+    """Run `c3d_process.py` on a file and return its arrays by name.
+
+    Args:
+        path: the file.
+        folders: folders from which the script imports its libraries; it imports nothing from the current one.
+
+    Raises:
+        DataFileError: the script fails, dies or takes too long.
+    """
     script = Path(__file__).with_name("c3d_process.py")
     places = os.pathsep.join(dict.fromkeys(map(str, folders)))
     try:
         done = subprocess.run(
-            [sys.executable, "-P", str(script), str(path.resolve())], capture_output=True, check=False,
-            timeout=SECONDS + path.stat().st_size / BYTES_A_SECOND, stdin=subprocess.DEVNULL,
+            # -P keeps the script's folder off the path of imports, where its modules could hide libraries.
+            [sys.executable, "-P", str(script), str(path.resolve())],
+            capture_output=True,
+            check=False,
+            timeout=SECONDS + path.stat().st_size / BYTES_A_SECOND,
+            stdin=subprocess.DEVNULL,
+            # More threads of OpenBLAS would only reserve memory.
             env=os.environ | {"PYTHONPATH": places, "OPENBLAS_NUM_THREADS": "1"},
-        )  # fmt: skip
+        )
     except subprocess.TimeoutExpired as error:
         raise DataFileError(
             f"record {str(path)!r}: ezc3d did not end within {error.timeout:.0f} s; is the file damaged?"
@@ -131,8 +164,9 @@ def _in_a_process(path: Path, folders: list[Path]) -> dict[str, Any]:
         with np.load(io.BytesIO(done.stdout), allow_pickle=False) as arrays:
             return {name: arrays[name] for name in arrays.files}
     if done.returncode == 1:
-        said = done.stderr.decode(errors="replace").strip().splitlines()
-        reason = PLEA.sub("", said[-1].partition(": ")[2]) if said else ""
+        # The script caught an exception: its last line is "TypeOfError: message".
+        lines = done.stderr.decode(errors="replace").strip().splitlines()
+        reason = PLEA.sub("", lines[-1].partition(": ")[2]) if lines else ""
         raise DataFileError(
             f"record {str(path)!r}: cannot read it (ezc3d says: {reason or 'no reason':.200})"
         )
@@ -143,10 +177,15 @@ def _in_a_process(path: Path, folders: list[Path]) -> dict[str, Any]:
 
 
 def _upward(corners: Floats, middle: Floats) -> str:
-    """The laboratory's axis that points upward, from corners of shape (plates, 3, 4) and the middle of the
-    markers, shape (3,)."""
+    """Return the laboratory's axis that points upward, as "z" or "-z".
+
+    Args:
+        corners: corners of the plates, shape (plates, 3, 4).
+        middle: median of the markers, shape (3,), NaN without markers.
+    """
     ahead = corners[:, :, 0] + corners[:, :, 3] - corners[:, :, 1] - corners[:, :, 2]
     aside = corners[:, :, 0] + corners[:, :, 1] - corners[:, :, 2] - corners[:, :, 3]
+    # With c3d's order of corners, ahead and aside are the plate's x and y, and their product points down.
     normal = -np.cross(ahead, aside)
     size = np.linalg.norm(normal, axis=1, keepdims=True)
     normal = np.divide(normal, size, out=np.zeros_like(normal), where=size > 0)
@@ -154,6 +193,7 @@ def _upward(corners: Floats, middle: Floats) -> str:
         return "z"
     k = int(np.abs(normal).sum(axis=0).argmax())
     above = middle[k] - corners[:, k].mean()
+    # Markers are more reliable than the order of the corners, but they may be missing.
     down = above < 0 if np.isfinite(above) and above != 0 else normal[:, k].sum() < 0
     return ("-" if down and normal[:, k].sum() < 0 else "") + "xyz"[k]
 
@@ -161,21 +201,34 @@ def _upward(corners: Floats, middle: Floats) -> str:
 def _without_baseline(
     raw: list[Floats], limbs: list[str], parameters: Mapping[str, Any], frames: int, first: int
 ) -> tuple[list[Floats], list[str]]:
-    """Forces without what plates show while they are unloaded, and what to say of that."""
+    """Subtract the baseline of each plate.
+
+    Args:
+        raw: forces by plate, shape (n, 3).
+        limbs: names of the plates.
+        parameters: groups of parameters of the file.
+        frames: number of frames of the file.
+        first: number of the file's first frame.
+
+    Returns:
+        Forces by plate, and notes on a baseline that was not subtracted.
+    """
     zero = [int(value) for value in np.ravel(parameters["FORCE_PLATFORM"].get("ZERO", []))[:2]]
     if len(zero) < 2 or zero[0] < 0 or zero[1] < max(zero[0], 1):
         return raw, []  # the file names none: 0 0, or 1 0
     zero[0] = max(zero[0], 1)  # there is no frame 0
     begin, end = (value - first for value in zero)
-    if begin < 0 or end >= frames:  # numbers that count from the first frame of the file
+    if begin < 0 or end >= frames:
+        # Some programs count from the first frame of the file and not of the trial.
         begin, end = (value - 1 for value in zero)
-    said = f"FORCE_PLATFORM:ZERO names frames {zero[0]} to {zero[1]} for the baseline"
+    stated = f"FORCE_PLATFORM:ZERO names frames {zero[0]} to {zero[1]} for the baseline"
     if end >= frames:
-        return raw, [f"{said}, but the file has {frames} frames; no baseline is subtracted"]
+        return raw, [f"{stated}, but the file has {frames} frames; no baseline is subtracted"]
     highest = max(float(np.ptp(force, axis=0).max()) for force in raw)
     forces = []
     loaded = []
     for limb, force in zip(limbs, raw, strict=True):
+        # Plates have several samples in each frame of the cameras.
         each = len(force) // frames
         quiet = force[begin * each : (end + 1) * each]
         base = quiet.mean(axis=0)
@@ -186,16 +239,25 @@ def _without_baseline(
             loaded.append(limb)
     if loaded:
         return forces, [
-            f"{said}, in which {', '.join(loaded)} bore a load; no baseline of it is subtracted: if it has "
+            f"{stated}, in which {', '.join(loaded)} bore a load; no baseline of it is subtracted: if it has "
             "an offset, subtract that before"
         ]
     return forces, []
 
 
 def _unloaded(quiet: Floats, force: Floats, base: Floats, highest: float) -> bool:
-    """Whether a plate bore no load in its quiet frames: it is steady there, later pushed and not pulled, as
-    it would seem to be once a load were subtracted, and does not rest at zero at other times. Forces less
-    `base`, their mean in those frames."""
+    """Return True if a plate bore no load in its quiet frames.
+
+    It bore none if its force is steady there, if the plate is pushed and not pulled at other times (it would
+    seem to be pulled if a load were subtracted), and if its force does not rest at zero at other times.
+
+    Args:
+        quiet: forces in the quiet frames less `base`, shape (m, 3).
+        force: forces in all frames less `base`, shape (n, 3).
+        base: mean force in the quiet frames, shape (3,).
+        highest: range of the forces of all plates.
+    """
+    # Median deviations, so that a few outliers do not hide how steady the other samples are.
     off = np.abs(quiet - np.median(quiet, axis=0))
     noise = ROBUST * np.median(off, axis=0)
     if (noise > STEADY * highest).any() or (off > np.maximum(STEADY * highest, NOISY * noise)).any():
@@ -211,14 +273,17 @@ def _unloaded(quiet: Floats, force: Floats, base: Floats, highest: float) -> boo
 
 
 def _force_unit(parameters: Mapping[str, Any], plate: int) -> str:
-    """The unit of a plate's forces: that of its force channels, each named if they differ. N where the file
-    says nothing, as c3d has it, and where a calibration (type 4) makes forces of volts."""
+    """Return the unit of a plate's forces: the unit of its force channels, or all of them if they differ.
+
+    It is N, c3d's default, if the file states none, and if a calibration (type 4) makes forces of volts.
+    """
     of_plates = parameters["FORCE_PLATFORM"]
     units = parameters["ANALOG"].get("UNITS", [])
     kind = int(of_plates["TYPE"][plate])
     channels = np.array(of_plates["CHANNEL"])[:, plate]
     if kind == CALIBRATED:
         return "N"
+    # The first channels of a plate are its forces; the others are moments, in other units.
     numbers = [int(channel) - 1 for channel in channels[: 8 if kind == EIGHT_FORCES else 3]]
-    said = {units[number].strip() for number in numbers if 0 <= number < len(units)} - {""}
-    return " and ".join(sorted(said)) or "N"
+    stated = {units[number].strip() for number in numbers if 0 <= number < len(units)} - {""}
+    return " and ".join(sorted(stated)) or "N"

@@ -1,17 +1,18 @@
-"""Two force records beside each other, limb by limb: `hoof-env compare`.
+"""Comparison of two force records, limb by limb: `hoof-env compare`.
 
 Both are resampled by linear interpolation to the higher of both rates, so that no peak of either is lost.
-`lab.stances` says what a stance is.
+`lab.stances` defines a stance. Times in results and messages are those of the files.
 
-Times are those of the files, in results and messages, too.
+There are three ways to align B with A:
 
-Three ways to align B with A. "none": the times of the files. "shift": one shift for all limbs. It is a
-difference of the touchdowns of one stance of A and one of B, the one under which the vertical forces of all
-limbs differ least (root mean square over at least half of the shorter record; of shifts within 10 % of the
-least, the shortest, as strides repeat), then moved within two sampling intervals to the least difference.
-"stances": that shift tells which stances belong together, and then each pair is laid touchdown on touchdown.
-Of a limb those are paired whose touchdowns are nearest under the shift. Where stride periods differ by more
-than 10 %, pairs begin with the two that are nearest and go on from there in order.
+- "none": the times of the files.
+- "shift": one shift for all limbs. Candidates are the differences between touchdowns of A and of B. The shift
+  is the candidate under which the vertical forces of all limbs differ least (root mean square over at least
+  half of the shorter record; of candidates within 10 % of the least difference, the shortest, as strides
+  repeat), moved within two sampling intervals to the least difference.
+- "stances": under that shift, stances of a limb with the nearest touchdowns make pairs, and each pair is laid
+  touchdown on touchdown. If stride periods differ by more than 10 %, pairs begin with the two nearest
+  touchdowns and go on from there in order.
 """
 
 from __future__ import annotations
@@ -31,20 +32,28 @@ from hoof_env.lab.stances import SHORTEST, Pair, Side, best_shift, pairs_of, who
 Floats = NDArray[np.float64]
 
 ALIGNMENTS = ("stances", "shift", "none")
-ONE_PERCENT = 0.01  # threshold in body weights of an animal whose weight is not known
-WIDE = 0.1  # share of a stride that touchdowns may scatter by unremarked
-MOST_SAMPLES = 20_000_000  # of a record at the common rate: some hours of a force plate
+"""Ways to align B with A, see above."""
+
+ONE_PERCENT = 0.01
+"""Threshold of a stance in body weights, if the weight of the animal is unknown."""
+
+WIDE = 0.1
+"""Largest spread of touchdowns without a warning, as a share of a stride."""
+
+MOST_SAMPLES = 20_000_000
+"""Largest number of samples of a record at the common rate, some hours of a force plate."""
 
 
 @dataclass(frozen=True)
 class Force:
-    """How B differs from A in one component of a limb's force, means over the pairs; errors are B less A.
+    """Errors of B against A in one component of a limb's force, means over the pairs; an error is B less A.
 
     Attributes:
-        rmse: root mean square difference over all pairs, from the earlier touchdown to the later lift-off.
-        r: Pearson's correlation there; not a number where a force does not change.
-        peak, peak_error: of A, and the error [the records' unit].
-        impulse, impulse_error: of A, and the error [that unit times s].
+        rmse: root mean square difference over all pairs, from the earlier touchdown to the later lift-off
+            [the records' unit].
+        r: Pearson's correlation there; NaN if a force is constant.
+        peak, peak_error: largest force of A, and its error [the records' unit].
+        impulse, impulse_error: impulse of A, and its error [that unit times s].
     """
 
     rmse: float
@@ -57,16 +66,16 @@ class Force:
 
 @dataclass(frozen=True)
 class LimbErrors:
-    """How a limb of B differs from that of A.
+    """Errors of a limb of B against the limb of A, means over the pairs; an error is B less A.
 
     Attributes:
-        pairs: how many stances are compared.
-        forces: by component: "vertical", "fore-aft", and of the latter "braking" and "propulsion" alone,
-            whose peaks and impulses are positive; the vertical alone where a record has no other.
-        contact, contact_error: how long a stance lasts in A, and the error [s].
-        touchdown_error: how much later B touches down after the shift [s], mean over the pairs.
-        touchdown_spread: their standard deviation [s].
-        peak_time_error: how much later after touchdown the vertical peak comes [s].
+        pairs: number of pairs of stances.
+        forces: errors by component: "vertical", "fore-aft", and of the latter "braking" and "propulsion"
+            alone, with positive peaks and impulses; "vertical" alone if a record has no fore-aft force.
+        contact, contact_error: duration of a stance in A, and its error [s].
+        touchdown_error: delay of touchdown in B after the shift [s].
+        touchdown_spread: standard deviation of that delay over the pairs [s].
+        peak_time_error: error of the time from touchdown to the vertical peak [s].
     """
 
     pairs: int
@@ -80,19 +89,19 @@ class LimbErrors:
 
 @dataclass(frozen=True)
 class Comparison:
-    """What `compare` finds.
+    """Result of `compare`.
 
     Attributes:
         a, b: the records.
-        unit: of all forces, "N" or "BW".
-        rate: that both are resampled to [Hz].
+        unit: unit of all forces, "N" or "BW".
+        rate: rate to which both records are resampled [Hz].
         levels: vertical force of A and of B that makes a stance [unit].
-        shift: added to the times of B, by the clocks of both files [s].
+        shift: time that is added to the times of B, by the clocks of both files [s].
         limbs: errors by limb, in the order of A.
-        curves: by limb, of each pair the time from A's touchdown [s], shape (n,), the forces of A and those
-            of B there, forward and upward, shape (n, 2).
-        missing: limbs that are not compared, and why.
-        warnings: what makes a limb's errors doubtful.
+        curves: pairs of stances by limb: time from A's touchdown, shape (n,) [s], and the forces of A and of
+            B at that time, forward and upward, shape (n, 2).
+        missing: limbs that are not compared, with the reason.
+        warnings: doubts about the errors of limbs.
     """
 
     a: ForceRecord
@@ -114,19 +123,20 @@ def compare(
     threshold: float | None = None,
     units: str = "auto",
 ) -> Comparison:
-    """Errors of B against A.
+    """Compute the errors of B against A.
 
     Args:
-        a, b: the records; limbs of the same name are compared, and where both have one only, those.
-        align: one of `ALIGNMENTS`; see above.
-        threshold: vertical force that makes a stance [N]; None is `THRESHOLD`, or 1 % of the weight where
-            forces are in body weights of a weight that is not known.
-        units: "N" or "BW" for the errors; "auto" is N where both records can be in N, else BW.
+        a, b: the records; limbs of the same name are compared, or the two limbs if both records have only
+            one.
+        align: one of `ALIGNMENTS`, see the module.
+        threshold: vertical force that makes a stance [N]; None is `THRESHOLD`, or 1 % of the weight if forces
+            are in body weights and the weight is unknown.
+        units: "N" or "BW" for the errors; "auto" is N if both records can be in N, else BW.
 
     Raises:
-        ParameterError: an argument is wrong, records have no limb or no unit in common, do not overlap or
-            would be too long at the common rate.
-        DataFileError: a record has no whole stance of any of those limbs.
+        ParameterError: an argument is wrong, or the records have no limb or no unit in common, do not
+            overlap, or would be too long at the common rate.
+        DataFileError: a record has no whole stance of the limbs that are compared.
     """
     check_choice("align", align, ALIGNMENTS)
     check_choice("units", units, ("auto", "N", "BW"))
@@ -136,24 +146,26 @@ def compare(
     rate = max(a.rate, b.rate)
     _check_length(a, b, rate)
     start = float(b.time[0])
-    if align == "none":  # on the samples of A
+    if align == "none":
+        # B is resampled at the instants of A's samples, from the first of them within B on.
         start = float(a.time[0]) + math.ceil((start - float(a.time[0])) * rate - 1e-6) / rate
     if align == "none" and not max(a.time[0], b.time[0]) < min(a.time[-1], b.time[-1]):
         raise ParameterError(
             f"align: expected records that overlap, got {_span(a)} of {a.name} and {_span(b)} of {b.name}"
         )
-    time_a, forces_a = _resampled(a, [one for one, _ in names], by_a, rate, float(a.time[0]))
-    time_b, forces_b = _resampled(b, [two for _, two in names], by_b, rate, start)
+    time_a, forces_a = _resampled(a, [of_a for of_a, _ in names], by_a, rate, float(a.time[0]))
+    time_b, forces_b = _resampled(b, [of_b for _, of_b in names], by_b, rate, start)
     stances = [
         [whole_stances(force[:, 1], level, rate) for force in forces]
         for forces, level in zip((forces_a, forces_b), levels, strict=True)
     ]
-    for record, found, forces, times, level in zip(
+    for record, by_limb, forces, times, level in zip(
         (a, b), stances, (forces_a, forces_b), (time_a, time_b), levels, strict=True
     ):
-        if not any(found):
+        if not any(by_limb):
             why = why_none([force[:, 1] for force in forces], times, level, unit)
             raise DataFileError(f"record {record.name!r}: expected a whole stance {why}")
+    # Touchdowns are known to a sampling interval of the slower record; two of them are searched.
     near = math.ceil(2 * rate / min(a.rate, b.rate))
     shift = 0.0
     if align != "none":
@@ -183,7 +195,7 @@ def compare(
 
 
 def _levels(a: ForceRecord, b: ForceRecord, threshold: float | None, unit: str) -> tuple[float, float]:
-    """The vertical force of A and of B that makes a stance, in `unit`: each by its own weight."""
+    """Return the vertical force of A and of B that makes a stance, in `unit`, each by its own weight."""
     newtons = THRESHOLD if threshold is None else check_number("threshold", threshold, low=0.0, high=1e6)
     if unit == "N":
         return newtons, newtons
@@ -199,6 +211,7 @@ def _levels(a: ForceRecord, b: ForceRecord, threshold: float | None, unit: str) 
 
 
 def _check_length(a: ForceRecord, b: ForceRecord, rate: float) -> None:
+    """Raise `ParameterError` if a record would have more than `MOST_SAMPLES` at `rate` [Hz]."""
     longest = max(float(record.time[-1] - record.time[0]) for record in (a, b))
     if longest * rate > MOST_SAMPLES:
         raise ParameterError(
@@ -208,6 +221,7 @@ def _check_length(a: ForceRecord, b: ForceRecord, rate: float) -> None:
 
 
 def _why_missing(sides: tuple[Side, Side], levels: tuple[float, float], unit: str) -> str:
+    """Return the reason why a limb has no pair of stances."""
     for name, side, level in zip("AB", sides, levels, strict=True):
         if not side.stances:
             why = why_none([side.force[:, 1]], side.time, level, unit)
@@ -216,14 +230,23 @@ def _why_missing(sides: tuple[Side, Side], levels: tuple[float, float], unit: st
 
 
 def _span(record: ForceRecord) -> str:
+    """Return the first and the last time of a record as text."""
     return f"{record.time[0]:.4g} to {record.time[-1]:.4g} s"
 
 
 def why_none(verticals: list[Floats], time: Floats, level: float, unit: str) -> str:
-    """What to say of vertical forces without a whole stance; the remedy for a plate that is not zeroed."""
-    together = np.concatenate(verticals)
-    low = float(np.percentile(together, 5))
-    high = float(together.max())
+    """Return the reason why vertical forces have no whole stance, and a remedy, for messages.
+
+    Args:
+        verticals: vertical forces of limbs, shape (n,).
+        time: their times, shape (n,) [s].
+        level: vertical force that makes a stance [unit].
+        unit: unit of the forces.
+    """
+    samples = np.concatenate(verticals)
+    # A percentile, as a few low samples do not make a swing.
+    low = float(np.percentile(samples, 5))
+    high = float(samples.max())
     why = f"above {level:g} {unit}, found none"
     if low > level:
         why += f": it hardly falls below {low:.4g} {unit}; subtract the plate's offset, or raise --threshold"
@@ -235,10 +258,10 @@ def why_none(verticals: list[Floats], time: Floats, level: float, unit: str) -> 
     if high <= level:
         return f"{why}: the highest force is {high:.4g} {unit}"
     ends = {"start": (0, time[0]), "end": (-1, time[-1])}
-    cut = [
-        f"{which} ({at:.4g} s)" for which, (k, at) in ends.items()
-        if any(force[k] > level for force in verticals)
-    ]  # fmt: skip
+    cut = []
+    for which, (k, at) in ends.items():
+        if any(force[k] > level for force in verticals):
+            cut.append(f"{which} ({at:.4g} s)")
     if cut:
         return (
             f"{why}: what it has is cut off by the {' and the '.join(cut)} of the record, where the limb "
@@ -248,37 +271,39 @@ def why_none(verticals: list[Floats], time: Floats, level: float, unit: str) -> 
 
 
 def _unshared(a: ForceRecord, b: ForceRecord, names: list[tuple[str, str]]) -> dict[str, str]:
-    """Limbs that only one of the records has, and which."""
-    shared = [{one for one, _ in names}, {two for _, two in names}]
-    return {
-        limb: f"only {which} has it" for which, record, known in zip("AB", (a, b), shared, strict=True)
-        for limb in record.limbs if limb not in known
-    }  # fmt: skip
+    """Return the limbs that only one of the records has, with the reason."""
+    of_a = {limb for limb, _ in names}
+    of_b = {limb for _, limb in names}
+    missing = {limb: "only A has it" for limb in a.limbs if limb not in of_a}
+    return missing | {limb: "only B has it" for limb in b.limbs if limb not in of_b}
 
 
 def _doubts(sides: tuple[Side, Side], errors: LimbErrors) -> list[str]:
-    """What makes the errors of a limb doubtful: stances that one record lacks, touchdowns that scatter."""
+    """Return doubts about the errors of a limb: stances that one record lacks, touchdowns that scatter."""
     a, b = sides
     period = a.period if a.period > 0 else b.period
-    edge = 0.1 * period if period > 0 else 0.0  # a stance may be whole in one record and not in the other
+    # Near the ends a stance may be whole in one record and cut off in the other.
+    edge = 0.1 * period if period > 0 else 0.0
     low = max(a.time[0], b.time[0]) + edge
     high = min(a.time[-1], b.time[-1]) - edge
     counts = [side.whole_between(low, high) for side in sides]
-    found = []
+    doubts = []
     if counts[0] != counts[1]:
-        found.append(
+        doubts.append(
             f"A has {counts[0]} whole stances and B {counts[1]} in the same time, {errors.pairs} are "
             "compared; if noise makes or splits stances, raise --threshold"
         )
     if period > 0 and errors.touchdown_spread > WIDE * period:
-        found.append(
+        doubts.append(
             f"touchdowns scatter by {1e3 * errors.touchdown_spread:.0f} ms, of a stride of "
             f"{1e3 * period:.0f} ms: the records differ in pace, or stances are paired wrongly"
         )
-    return found
+    return doubts
 
 
 def _common_unit(a: ForceRecord, b: ForceRecord, units: str) -> tuple[str, tuple[float, float]]:
+    """Return the unit that both records can have, newtons first, and the factors that convert them to it;
+    raise `ParameterError` if there is none."""
     for unit in ("N", "BW") if units == "auto" else (units,):
         by_a = a.per(unit)
         by_b = b.per(unit)
@@ -293,6 +318,7 @@ def _common_unit(a: ForceRecord, b: ForceRecord, units: str) -> tuple[str, tuple
 
 
 def _common_limbs(a: ForceRecord, b: ForceRecord) -> list[tuple[str, str]]:
+    """Return pairs of limbs of A and of B that are compared; raise `ParameterError` if there is none."""
     if shared := [(limb, limb) for limb in a.limbs if limb in b.limbs]:
         return shared
     if len(a.limbs) == len(b.limbs) == 1:
@@ -306,16 +332,28 @@ def _common_limbs(a: ForceRecord, b: ForceRecord) -> list[tuple[str, str]]:
 def _resampled(
     record: ForceRecord, limbs: list[str], factor: float, rate: float, start: float
 ) -> tuple[Floats, list[Floats]]:
-    """Times by the clock of the file, from `start` on, and forces of limbs, times `factor`, at `rate`."""
+    """Resample a record.
+
+    Args:
+        record: the record.
+        limbs: its limbs in the order of the result.
+        factor: factor of the forces.
+        rate: rate of the result [Hz].
+        start: first time of the result, by the clock of the file [s].
+
+    Returns:
+        Times by the clock of the file, shape (m,) [s], and the forces of each limb, shape (m, 2).
+    """
     first = record.time[0]
+    # A little more, as rounding must not lose the last sample.
     steps = int((record.time[-1] - start) * rate + 1e-6) + 1
-    own = start - first + np.arange(steps) / rate
-    forces = [
-        np.column_stack([np.interp(own, record.time - first, column) for column in record.limbs[limb].T])
-        * factor
-        for limb in limbs
-    ]  # fmt: skip
-    return first + own, forces
+    # Relative to the first sample: large times of a clock would lose digits in the interpolation.
+    elapsed = start - first + np.arange(steps) / rate
+    forces = []
+    for limb in limbs:
+        columns = [np.interp(elapsed, record.time - first, column) for column in record.limbs[limb].T]
+        forces.append(np.column_stack(columns) * factor)
+    return first + elapsed, forces
 
 
 PARTS: dict[str, Callable[[Floats], Floats]] = {
@@ -324,11 +362,11 @@ PARTS: dict[str, Callable[[Floats], Floats]] = {
     "braking": lambda force: np.maximum(-force[:, 0], 0.0),
     "propulsion": lambda force: np.maximum(force[:, 0], 0.0),
 }
-"""Components of forces of shape (n, 2)."""
+"""Components by name, functions of forces forward and upward of shape (n, 2)."""
 
 
 def _errors(pairs: list[Pair], rate: float) -> LimbErrors:
-    """Errors of a limb over pairs of stances."""
+    """Compute the errors of a limb over pairs of stances at `rate` [Hz]."""
     forces = {}
     has_fore_aft = all(np.isfinite(force).all() for pair in pairs for force in (pair.a, pair.b))
     for name, part in PARTS.items():
@@ -336,23 +374,34 @@ def _errors(pairs: list[Pair], rate: float) -> LimbErrors:
             continue
         x = np.concatenate([part(pair.a) for pair in pairs])
         y = np.concatenate([part(pair.b) for pair in pairs])
-        figures = np.array([
-            [(part(force).max(), part(force).sum() / rate) for force in pair.own] for pair in pairs
-        ]).mean(axis=0)  # fmt: skip
-        (peak, impulse) = figures[0]
-        (peak_error, impulse_error) = figures[1] - figures[0]
+        # Peak and impulse of each stance alone, shape (pairs, 2 records, 2).
+        figures = [[(part(force).max(), part(force).sum() / rate) for force in pair.own] for pair in pairs]
+        means = np.array(figures).mean(axis=0)
+        peak, impulse = means[0]
+        peak_error, impulse_error = means[1] - means[0]
+        # Pearson's correlation by hand: NumPy's warns of a force that does not change.
         spread = x.std() * y.std()
         r = float(((x - x.mean()) * (y - y.mean())).mean() / spread) if spread > 0 else math.nan
         rmse = math.sqrt(((x - y) ** 2).mean())
         forces[name] = Force(
-            rmse, r, float(peak), float(peak_error), float(impulse), float(impulse_error)
-        )  # fmt: skip
-    contact, peak_time = (
-        np.array([[measure(force) / rate for force in pair.own] for pair in pairs]).mean(axis=0)
-        for measure in (len, lambda force: int(force[:, 1].argmax()))
-    )
+            rmse=rmse,
+            r=r,
+            peak=float(peak),
+            peak_error=float(peak_error),
+            impulse=float(impulse),
+            impulse_error=float(impulse_error),
+        )
+    contacts = [[len(force) / rate for force in pair.own] for pair in pairs]
+    contact = np.array(contacts).mean(axis=0)
+    peak_times = [[int(force[:, 1].argmax()) / rate for force in pair.own] for pair in pairs]
+    peak_time = np.array(peak_times).mean(axis=0)
     late = np.array([pair.late for pair in pairs])
     return LimbErrors(
-        len(pairs), forces, float(contact[0]), float(contact[1] - contact[0]),
-        float(late.mean()), float(late.std()), float(peak_time[1] - peak_time[0]),
-    )  # fmt: skip
+        pairs=len(pairs),
+        forces=forces,
+        contact=float(contact[0]),
+        contact_error=float(contact[1] - contact[0]),
+        touchdown_error=float(late.mean()),
+        touchdown_spread=float(late.std()),
+        peak_time_error=float(peak_time[1] - peak_time[0]),
+    )

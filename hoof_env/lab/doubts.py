@@ -1,4 +1,4 @@
-"""What makes the axes of a force record doubtful: another force is larger, or propulsion comes first."""
+"""Doubts about the axes of a force record: another force is larger, or propulsion comes before braking."""
 
 from __future__ import annotations
 
@@ -12,22 +12,35 @@ from hoof_env.lab.stances import whole_stances
 
 Floats = NDArray[np.float64]
 
-IDLE = 0.1  # share of the highest force of all limbs up to which a limb is not loaded
-LOADED = 0.2  # share of a limb's highest vertical force from which on its other forces count
-SMALL = 0.01  # share of that up to which a horizontal force is none
-# order of braking and propulsion, the mean of all limbs and that of one, from
-BACKWARD = -0.2
-ALONE = -0.35
-# which on it is remarked; see `order`
-BOTH = 0.1  # least share of braking, and of propulsion, in the fore-aft force, for an order to be there
+IDLE = 0.1
+"""Share of the highest force of all limbs below which a limb counts as unloaded."""
 
+LOADED = 0.2
+"""Share of a limb's highest vertical force above which its other forces count."""
+
+SMALL = 0.01
+"""Share of a limb's highest vertical force below which a horizontal force counts as 0."""
+
+BACKWARD = -0.2
+"""Mean `order` of all limbs below which every limb with propulsion first is remarked."""
+
+ALONE = -0.35
+"""The `order` of one limb below which it is remarked, whatever the others."""
+
+BOTH = 0.1
+"""Least share of braking, and of propulsion, in the fore-aft force that defines an order."""
 
 OPTION = re.compile(r"--(?P<name>\w+)-a(?P<value>=\S+)?(?: or |, )--(?P=name)-b(?:=\S+)?")
-"""What notes say of options, as a record does not know whether it is A or B."""
+"""Options in notes, which name both records, as a record does not know whether it is A or B."""
 
 
 def for_one(note: str, which: str) -> str:
-    """A note with the option of one record: "-a" or "-b", or "" where options have no such ending."""
+    """Return a note with the option of one record.
+
+    Args:
+        note: the note with the options of both records.
+        which: "-a" or "-b", or "" for commands with options without such an ending.
+    """
     return OPTION.sub(rf"--\g<name>{which}\g<value>", note)
 
 
@@ -36,16 +49,19 @@ def sideways(
     sizes: Mapping[str, Mapping[str, Floats]],
     ahead: str,
     upward: str,
-    given: tuple[str, str],
+    options: tuple[str, str],
 ) -> list[str]:
-    """Warnings of limbs whose largest force is not the vertical, or whose larger horizontal force is not the
-    fore-aft one, with the options that change that.
+    """Warn of limbs with a largest force that is not the vertical one, or a larger horizontal force that is
+    not the fore-aft one.
 
     Args:
-        forces: forward and upward by limb, shape (n, 2).
-        sizes: of forces by limb and axis of the file, shape (n,).
-        ahead, upward: axes that are taken.
-        given: what the options say of up and forward; what they name is not doubted.
+        forces: forces forward and upward by limb, shape (n, 2).
+        sizes: absolute forces by limb and axis of the file, shape (n,).
+        ahead, upward: axes that are taken, as "x" or "-x".
+        options: values of the options up and forward; an axis that they name is not doubted.
+
+    Returns:
+        Warnings, with the options that choose other axes.
     """
     highest = max((float(size.max()) for axes in sizes.values() for size in axes.values()), default=0.0)
     wrong: dict[tuple[str, str], list[str]] = {}
@@ -55,37 +71,47 @@ def sideways(
         largest = max(others, key=lambda axis: float(others[axis].max()), default="")
         peak = float(vertical.max())
         if largest and others[largest].max() > max(peak, IDLE * highest):
-            if given[0] == "auto":
+            if options[0] == "auto":
                 wrong.setdefault(("up", largest), []).append(limb)
+            # With a doubtful vertical, the horizontal forces are not to be judged.
             continue
         loaded = vertical > LOADED * peak
-        if peak <= IDLE * highest or given[1] != "auto":
+        if peak <= IDLE * highest or options[1] != "auto":
             continue
+        # Means under load and not peaks, which an impact may cause.
         means = {axis: float(size[loaded].mean()) for axis, size in others.items()}
         most = max(means, key=lambda axis: means[axis], default=ahead[-1])
         if most != ahead[-1] and means[most] > max(SMALL * peak, means.get(ahead[-1], 0.0)):
             wrong.setdefault(("forward", most), []).append(limb)
-    said = {
+    reasons = {
         "up": f"is larger than that along {upward}, which is taken for the vertical force",
         "forward": f"is larger than that along {ahead}, which is taken for the direction of travel",
     }
     return [
-        f"{', '.join(limbs)}: the {'' if which == 'up' else 'horizontal '}force along {axis} {said[which]}; "
-        f"--{which}-a={axis} or --{which}-b={axis} (or =-{axis}) changes that"
+        f"{', '.join(limbs)}: the {'' if which == 'up' else 'horizontal '}force along {axis} "
+        f"{reasons[which]}; --{which}-a={axis} or --{which}-b={axis} (or =-{axis}) changes that"
         for (which, axis), limbs in wrong.items()
     ]
 
 
 def order(force: Floats, rate: float) -> float:
-    """Whether braking comes before propulsion, as in an animal that travels forward: 0.5 for half a sine of
-    each, -0.5 for propulsion first, and 0 where there is only one of them, or no whole stance. Forces forward
-    and upward, shape (n, 2), at `rate` [Hz]."""
+    """Compute the order of braking and propulsion, which is positive if braking comes first, as in an animal
+    that travels forward.
+
+    It is 0.5 for half a sine of braking and another of propulsion, -0.5 for propulsion first, and 0 if there
+    is only one of them, or no whole stance.
+
+    Args:
+        force: forces forward and upward, shape (n, 2).
+        rate: sampling rate [Hz].
+    """
     level = LOADED * float(force[:, 1].max())
     moments = 0.0
     sizes = 0.0
     parts = np.zeros(2)
     for first, last in whole_stances(force[:, 1], level, rate):
         forward = force[first:last, 0]
+        # The first moment of the force about mid-stance, over a duration from -1 to 1.
         moments += float(forward @ np.linspace(-1.0, 1.0, last - first))
         sizes += float(np.abs(forward).sum())
         parts += np.maximum(forward, 0.0).sum(), np.maximum(-forward, 0.0).sum()
@@ -95,26 +121,36 @@ def order(force: Floats, rate: float) -> float:
 
 
 def backward(forces: Mapping[str, Floats], time: Floats, ahead: str, by_axis: bool) -> list[str]:
-    """A warning of limbs with propulsion before braking, and the option that turns the direction of travel
-    round. Forces forward and upward by limb, shape (n, 2); `by_axis` where the options of axes work."""
+    """Warn of limbs with propulsion before braking.
+
+    Args:
+        forces: forces forward and upward by limb, shape (n, 2).
+        time: times, shape (n,) [s].
+        ahead: axis that is taken for forward, as "x" or "-x".
+        by_axis: True if the options of axes have an effect on the file.
+
+    Returns:
+        One warning with the remedy, or none.
+    """
     rate = (len(time) - 1) / float(time[-1] - time[0])
     highest = max(float(np.abs(force[:, 1]).max()) for force in forces.values())
-    orders = {
-        limb: order(force, rate) for limb, force in forces.items()
-        if np.isfinite(force).all() and force[:, 1].max() > IDLE * highest
-    }  # fmt: skip
-    known = [one for one in orders.values() if one != 0.0]
+    orders = {}
+    for limb, force in forces.items():
+        if np.isfinite(force).all() and force[:, 1].max() > IDLE * highest:
+            orders[limb] = order(force, rate)
+    known = [value for value in orders.values() if value != 0.0]
+    # A limb alone must be clearer than the mean of all, as its order scatters more.
     least = 0.0 if known and float(np.mean(known)) < BACKWARD else ALONE
-    limbs = [limb for limb, one in orders.items() if one < least]
+    limbs = [limb for limb, value in orders.items() if value < least]
     if not limbs:
         return []
-    other = ahead[1:] if ahead.startswith("-") else f"-{ahead}"
+    opposite = ahead[1:] if ahead.startswith("-") else f"-{ahead}"
     remedy = (
-        f"--forward-a={other} or --forward-b={other}"
+        f"--forward-a={opposite} or --forward-b={opposite}"
         if by_axis
         else "a minus before the column of force_x in --map-a or --map-b"
     )
     return [
-        f"{', '.join(limbs)}: propulsion before braking; if the animal travels in the direction of {other}, "
-        f"{remedy} says so"
+        f"{', '.join(limbs)}: propulsion before braking; if the animal travels in the direction of "
+        f"{opposite}, {remedy} says so"
     ]

@@ -1,4 +1,4 @@
-"""What `hoof-env compare` prints and draws: a table of errors, and both records over the stance."""
+"""Report and picture of `hoof-env compare`: a table of errors, and both records over the stance."""
 
 from __future__ import annotations
 
@@ -16,13 +16,18 @@ from hoof_env.lab.doubts import for_one
 from hoof_env.lab.read import REVERSED, ForceRecord
 
 SUFFIXES = (".pdf", ".png", ".svg")
+"""Formats of the picture."""
+
 NO_DATE = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
-POINTS = 201  # of a mean curve
+"""Metadata by format without the date, so that the same comparison gives the same bytes."""
+
+POINTS = 201
+"""Number of points of a mean curve."""
 
 
 def report(found: Comparison) -> str:
-    """What was compared, a table of errors, and warnings: of limbs that are left out, of doubtful stances,
-    and of fore-aft forces that point opposite ways, with the option that turns them."""
+    """Return the report of a comparison as text: the records, a table of errors, and warnings of limbs that
+    are left out, of doubtful stances, and of fore-aft forces in opposite directions, with the remedy."""
     lines = [
         _about("A", found.a),
         _about("B", found.b),
@@ -31,6 +36,7 @@ def report(found: Comparison) -> str:
         "",
         _table(found),
     ]
+    # A record that is compared with itself has its doubts once, with the options of both.
     same = (found.a.name, found.a.notes) == (found.b.name, found.b.notes)
     doubts = [f"{found.a.name}: {note if same else for_one(note, '-a')}" for note in found.a.notes]
     doubts += [f"{found.b.name}: {for_one(note, '-b')}" for note in found.b.notes if not same]
@@ -42,24 +48,31 @@ def report(found: Comparison) -> str:
 
 
 def _remedy(found: Comparison, limb: str) -> str:
-    """The option that turns the fore-aft forces of a limb. It counts from what the file has: where "auto" has
-    turned both components, the vertical alone is to be turned. A is at fault if only A was turned."""
-    of_b = limb if limb in found.b.limbs else next(iter(found.b.limbs))  # the only ones may differ in name
+    """Return the option that turns the fore-aft forces of a limb.
+
+    The option counts from the file: if "auto" has turned both components, the vertical one alone is to be
+    turned. A is taken to be wrong if only A was turned, else B.
+    """
+    # The only limbs of two records are compared even with different names.
+    of_b = limb if limb in found.b.limbs else next(iter(found.b.limbs))
     at_a = limb in found.a.turned and of_b not in found.b.turned
     which, record, limb = ("a", found.a, limb) if at_a else ("b", found.b, of_b)
     forward, upward = record.signs.get(limb, (1, 1))
-    if len({record.signs.get(one, (1, 1)) for one in record.limbs}) > 1:  # an option is for all limbs
+    # An option turns all limbs, so that it is no remedy if their signs differ.
+    if len({record.signs.get(name, (1, 1)) for name in record.limbs}) > 1:
         return f"a minus before the column of {limb}_force_x in --map-{which} turns those of {which.upper()}"
     option = next(name for name, signs in REVERSED.items() if signs == (-forward, upward))
     return f"--reverse-{which} {option} turns those of {which.upper()}"
 
 
 def _levels(found: Comparison) -> str:
+    """Return a sentence on the thresholds of stances."""
     of_a, of_b = (f"{level:.4g} {found.unit}" for level in found.levels)
     return f"Stances are above {of_a}." if of_a == of_b else f"Stances are above {of_a} in A and {of_b} in B."
 
 
 def _about(which: str, record: ForceRecord) -> str:
+    """Return a line on a record, `which` is "A" or "B"."""
     limbs = "" if len(record.turned) == len(record.limbs) else f" of {', '.join(record.turned)}"
     turned = f"; forces{limbs} pointed into the ground and are turned round" if record.turned else ""
     level = [limb for limb, force in record.limbs.items() if not np.isfinite(force[:, 0]).any()]
@@ -71,12 +84,21 @@ def _about(which: str, record: ForceRecord) -> str:
 
 
 def _table(found: Comparison) -> str:
+    """Return the table of errors, one row for each limb and component."""
     unit = found.unit
     places = 1 if found.unit == "N" else 4
     head = (
-        "limb", "force", "stances", f"RMSE [{unit}]", "r", f"peak [{unit}]", f"impulse [{unit} s]",
-        "contact [ms]", "touchdown [ms]", "time of peak [ms]",
-    )  # fmt: skip
+        "limb",
+        "force",
+        "stances",
+        f"RMSE [{unit}]",
+        "r",
+        f"peak [{unit}]",
+        f"impulse [{unit} s]",
+        "contact [ms]",
+        "touchdown [ms]",
+        "time of peak [ms]",
+    )
     rows = []
     for limb, errors in found.limbs.items():
         for name, force in errors.forces.items():
@@ -85,6 +107,7 @@ def _table(found: Comparison) -> str:
                 row += [str(errors.pairs), f"{force.rmse:.{places}f}", _r(force)]
             else:
                 row += ["", "", ""]
+            # The largest fore-aft force is that of propulsion, which has its own row.
             row.append("" if name == "fore-aft" else _pair(force.peak_error, force.peak, places))
             row.append(_pair(force.impulse_error, force.impulse, places + 1))
             if name == "vertical":
@@ -99,16 +122,22 @@ def _table(found: Comparison) -> str:
 
 
 def _r(force: Force) -> str:
+    """Return the correlation as text, "-" if it is NaN."""
     return "-" if math.isnan(force.r) else f"{force.r:.3f}"
 
 
-def _pair(error: float, of: float, places: int) -> str:
-    return f"{round(error, places) + 0.0:+.{places}f} ({round(of, places) + 0.0:.{places}f})"  # no -0
+def _pair(error: float, of_a: float, places: int) -> str:
+    """Return an error and A's own value in brackets as text."""
+    # Adding 0 after rounding turns -0 into 0.
+    return f"{round(error, places) + 0.0:+.{places}f} ({round(of_a, places) + 0.0:.{places}f})"
 
 
 def draw(found: Comparison, path: Path) -> Path:
-    """Write a picture, a row of panels for each limb: the vertical and the fore-aft force from touchdown on,
-    each stance thin and their mean heavy, A and B; no panel for a force that a record does not have."""
+    """Write a picture of a comparison and return its path. Errors are those of `check_picture`.
+
+    Each limb has a row of panels: the vertical and the fore-aft force of A and B from touchdown on, single
+    stances thin and their mean thick. A force that a record lacks has no panel.
+    """
     check_picture(path)
     from matplotlib import style
     from matplotlib.figure import Figure
@@ -124,6 +153,7 @@ def draw(found: Comparison, path: Path) -> Path:
                 if title not in found.limbs[limb].forces:
                     panel.set_visible(False)
                     continue
+                # A is drawn first and thicker, so that it shows behind B where both agree.
                 for side, colour, width in ((1, BLUE, 2.4), (2, ORANGE, 1.2)):
                     for pair in pairs:
                         panel.plot(pair[0], pair[side][:, component], color=colour, lw=0.5, alpha=0.35)
@@ -142,15 +172,30 @@ def draw(found: Comparison, path: Path) -> Path:
 
 
 def _mean(pairs: list[Any], side: int, component: int) -> tuple[Any, Any]:
-    """Mean curve over the longest pair; a limb bears nothing outside its stance."""
+    """Compute the mean curve of pairs of stances over the longest of them.
+
+    Args:
+        pairs: times and forces of A and of B, see `Comparison.curves`.
+        side: 1 for A, 2 for B.
+        component: 0 for the forward force, 1 for the upward force.
+
+    Returns:
+        Times [s] and forces, both of shape (POINTS,).
+    """
     time = np.linspace(min(pair[0][0] for pair in pairs), max(pair[0][-1] for pair in pairs), POINTS)
+    # A limb bears nothing outside its stance.
     curves = [np.interp(time, pair[0], pair[side][:, component], 0.0, 0.0) for pair in pairs]
     return time, np.mean(curves, axis=0)
 
 
 def check_picture(path: Path) -> None:
-    """Raise unless a picture can be drawn at `path`: `ParameterError` of another suffix, `OutputError` of a
-    folder that cannot be written, `MissingExtraError` without matplotlib."""
+    """Check that a picture can be drawn at `path`.
+
+    Raises:
+        ParameterError: the suffix is not one of `SUFFIXES`.
+        OutputError: the folder cannot be written.
+        MissingExtraError: matplotlib is not installed.
+    """
     if path.suffix.lower() not in SUFFIXES:
         raise ParameterError(f"out: expected a file that ends in {', '.join(SUFFIXES)}, got {str(path)!r}")
     check_folder(path.parent)

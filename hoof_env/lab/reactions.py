@@ -1,7 +1,7 @@
-"""Joint reactions along an episode: its substeps are run again on an engine that computes them.
+"""Joint reactions along an episode, from a second engine that runs its substeps again and computes them.
 
-That engine begins every control step with the same bits, and arrives at the same bits. Its kernels are
-compiled at the first use.
+The second engine begins every control step with the same bits as the first, and arrives at the same bits. Its
+kernels are compiled at the first use.
 """
 
 from __future__ import annotations
@@ -16,29 +16,29 @@ from hoof_env.errors import ParameterError
 from hoof_env.leg.linkage import FRAME, JOINTS
 
 MOMENTS = {"lock_moment": "lock", "crank_moment": "driver", "hip_moment": "hip"}
-"""Columns [N m] and parts of `dynamics.parts.Reactions`: on body 10 by 7, on the crank by the leg's frame,
-and on the leg's frame by the trunk about the crank centre."""
+"""Parts of `dynamics.parts.Reactions` by column [N m]: moments on body 10 by body 7, on the crank by the
+leg's frame, and on the leg's frame by the trunk about the crank centre."""
 
 JOINT_COLUMNS = tuple(
     f"joint_{joint.point}_{joint.i + 1}_{'frame' if joint.j == FRAME else joint.j + 1}_{axis}"
     for joint in JOINTS
     for axis in "xy"
 )
-"""Force [N] at a joint on a body by another, by their numbers in the paper's Eq. 2: `joint_G_11_10_x` is the
-force at the ankle on the hoof triangle (11) by the shank (10) along x."""
+"""Columns of forces [N] at a joint on one body by another, with the bodies' numbers in the paper's Eq. 2:
+`joint_G_11_10_x` is the force at the ankle on the hoof triangle (11) by the shank (10) along x."""
 
 REACTION_UNITS = dict.fromkeys(JOINT_COLUMNS, "N") | dict.fromkeys(MOMENTS, "N m")
-"""Columns of a limb and their units."""
+"""Units by column of a limb's reactions."""
 
 
 class JointReactions:
     """Reactions at the substeps of an environment of this package.
 
     Args:
-        env: the environment, wrapped or not; its next `reset` is the first that counts.
+        env: the environment, wrapped or not, before its `reset`.
 
     Raises:
-        ParameterError: it is run by the paper's solver, or its legs vary in size.
+        ParameterError: the environment is run by the paper's solver, or its legs vary in size.
     """
 
     def __init__(self, env: Any) -> None:
@@ -46,28 +46,40 @@ class JointReactions:
         if batch.paper:
             raise ParameterError('reactions: expected an environment with solver="exact", got solver="paper"')
         e = batch.engine
+        # The environment's engine has kernels without reactions, which are faster.
         self._engine = TrunkEngine(
-            e.limbs, e.trunk, e.ground, e.terrain, sim_dt=e.sim_dt, integrator=e.integrator,
-            substeps=e.substeps, step_error=e.step_error, harmonics=e.features.harmonics,
-            filters=e.filters, reactions=True, strides=e.counts_strides, limits=e.motion_limits,
+            e.limbs,
+            e.trunk,
+            e.ground,
+            e.terrain,
+            sim_dt=e.sim_dt,
+            integrator=e.integrator,
+            substeps=e.substeps,
+            step_error=e.step_error,
+            harmonics=e.features.harmonics,
+            filters=e.filters,
+            reactions=True,
+            strides=e.counts_strides,
+            limits=e.motion_limits,
             contact_law=e.contact_law,
-        )  # fmt: skip
+        )
 
     def before(self) -> NDArray[np.float64]:
-        """Where the environment is, for `after`."""
+        """Return the memory of the environment's engine, for `after`."""
         column: NDArray[np.float64] = self._batch.engine.column(0)
         return column
 
     def now(self) -> NDArray[np.float64]:
-        """Reactions where the environment is, one row; see `after`."""
+        """Compute the reactions in the present state of the environment, shape (1, legs, columns)."""
         self._engine.set_column(0, self.before())
         self._engine.observe()
         return self._row()[None]
 
     def after(self, before: NDArray[np.float64], steps: int) -> NDArray[np.float64]:
-        """Reactions at the `steps` substeps since `before`, shape (steps, legs, columns), columns as in
-        `REACTION_UNITS`."""
+        """Compute the reactions at the `steps` substeps since `before`, shape (steps, legs, columns), with
+        the columns of `REACTION_UNITS`."""
         self._engine.set_column(0, before)
+        # The command of these substeps is in the memory after them.
         command = self._engine.command_in(self.before())
         rows = []
         for _ in range(steps):
@@ -76,7 +88,8 @@ class JointReactions:
         return np.array(rows)
 
     def _row(self) -> NDArray[np.float64]:
-        found = self._engine.reactions()
-        legs = len(found.joints)
-        moments = [getattr(found, part)[:, 0] for part in MOMENTS.values()]
-        return np.column_stack([found.joints.reshape(legs, -1), *moments])
+        """Return the reactions of the second engine, shape (legs, columns)."""
+        reactions = self._engine.reactions()
+        legs = len(reactions.joints)
+        moments = [getattr(reactions, part)[:, 0] for part in MOMENTS.values()]
+        return np.column_stack([reactions.joints.reshape(legs, -1), *moments])

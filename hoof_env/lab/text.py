@@ -1,8 +1,8 @@
-"""How a text file of numbers is laid out: in which encoding, what separates cells, where names and units are.
+"""Layout of text files of numbers: encoding, separators of cells, and places of names and units.
 
 Above the numbers there may be anything, as BioWare, Vicon Nexus and other programs write it. The names are in
-the last line above the numbers, or in the one before if the last has units alone. A table ends where a blank
-line and then words follow: what comes then is another table.
+the last line above the numbers, or in the line before it if the last has units only. A table ends at a blank
+line that words follow; after that, another table begins.
 """
 
 from __future__ import annotations
@@ -14,12 +14,13 @@ from pathlib import Path
 
 from hoof_env.errors import DataFileError
 
+# A name, with its unit in brackets behind it if it has one.
 TITLE = re.compile(r"\s*(?P<name>.*?)\s*(?:[\[(]\s*(?P<unit>[^\[\]()]*?)\s*[\])])?\s*")
 WORD = re.compile(r"[^\s\[(]+(?:\s*[\[(][^\])]*[\])])?")
-"""A name between blanks, with its unit."""
+"""Pattern of a name between blanks, with its unit."""
 
 COMMENT = re.compile(r"\s*(#|%|//)+\s*")
-"""What names may have before them, as NumPy writes it."""
+"""Pattern of a comment sign before the names, which NumPy writes."""
 
 UNIT_WORDS = frozenset(
     word
@@ -31,16 +32,16 @@ UNIT_WORDS = frozenset(
     )
     for word in line.split()
 )
-"""What a row of units below the names consists of."""
+"""Words of a row of units below the names."""
 
 SEPARATORS = ("\t", ";", ",", None)
-"""Between cells; None are blanks."""
+"""Separators of cells; None stands for blanks."""
 
 SURE = 10
-"""Rows of numbers below each other that are the table, or as many as there are in a shorter file."""
+"""Number of successive rows of numbers that make a table, unless the file has fewer."""
 
 Row = tuple[int, list[str]]
-"""A line's number in its file, and its cells."""
+"""Number of a line in its file, and its cells."""
 
 
 @dataclass
@@ -48,13 +49,13 @@ class Text:
     """A table of a text file as cells.
 
     Attributes:
-        titles: names by column, with units behind some.
-        units: by column, from a row of their own; empty if there is none.
-        groups: what stands above the names by column, such as the plate they belong to; may be empty.
-        line: the number of the line of names, 0 if there is none.
-        rows: of numbers.
-        decimal_comma: whether a comma may be a decimal sign.
-        notes: what is not read.
+        titles: names by column, some with a unit.
+        rows: rows of numbers.
+        units: units by column, from a row of their own; empty if there is none.
+        groups: texts above the names by column, such as the plate of several columns; may be empty.
+        line: number of the line of names, 0 if there is none.
+        decimal_comma: True if a comma may be a decimal sign.
+        notes: messages about parts of the file that are not read.
     """
 
     titles: list[str]
@@ -67,8 +68,8 @@ class Text:
 
 
 def lines_of(path: Path) -> list[str]:
-    """The lines of a text file in UTF-8, UTF-16 with its mark, or else the code page of Windows, in which
-    every byte is some sign. `DataFileError` of bytes 0, which no text has."""
+    """Read the lines of a text file in UTF-8, in UTF-16 with its byte order mark, or else in the code page of
+    Windows, in which every byte is a character; raise `DataFileError` for bytes 0, which no text has."""
     raw = path.read_bytes()
     if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
         return raw.decode("utf-16", errors="replace").splitlines()
@@ -84,12 +85,12 @@ def lines_of(path: Path) -> list[str]:
 
 
 def number(cell: str, decimal_comma: bool = True) -> float:
-    """The number in a cell; `ValueError` if it is none."""
+    """Convert a cell to a number; raise `ValueError` if it is not one."""
     return float(cell.replace(",", ".") if decimal_comma else cell)
 
 
 def is_number(cell: str, decimal_comma: bool = True) -> bool:
-    """Whether a cell is a number."""
+    """Return True if a cell is a number."""
     try:
         number(cell, decimal_comma)
     except ValueError:
@@ -98,15 +99,22 @@ def is_number(cell: str, decimal_comma: bool = True) -> bool:
 
 
 def cells_of(line: str, between: str | None) -> list[str]:
-    """The cells of a line."""
+    """Split a line at a separator, one of `SEPARATORS`."""
     return line.split() if between is None else next(csv.reader([line], delimiter=between), [])
 
 
 def _separator(line: str, least: int) -> tuple[bool, str | None]:
-    """Whether most cells of a line are numbers, the first of them too, `least` cells or more; and what is
-    between its cells."""
+    """Find the separator with which the largest share of a line's cells are numbers.
+
+    Args:
+        line: the line.
+        least: least number of cells.
+
+    Returns:
+        True if most cells are numbers, the first one included; and the separator.
+    """
     best = 0.0
-    found = None
+    separator = None
     for between in SEPARATORS:
         if between is not None and between not in line:
             continue
@@ -115,14 +123,20 @@ def _separator(line: str, least: int) -> tuple[bool, str | None]:
         share = sum(known) / len(known) if known and known[0] and len(known) >= least else 0.0
         if share > best:
             best = share
-            found = between
-    return best > 0.5, found
+            separator = between
+    return best > 0.5, separator
 
 
 def _first_row(lines: list[str]) -> tuple[int, str | None]:
-    """Where the numbers begin, and what is between them; (the number of lines, None) if there are none."""
-    for least in (2, 1):  # cells in a row
-        runs: list[tuple[int, int, str | None]] = []  # how long, from where, separated by what
+    """Find the first row of numbers.
+
+    Returns:
+        The number of the row and the separator of its cells; the number of lines and None without numbers.
+    """
+    # Tables of one column last, as single numbers occur in headers, too.
+    for least in (2, 1):
+        # Runs of rows of numbers: length, first row and separator.
+        runs: list[tuple[int, int, str | None]] = []
         for k, line in enumerate(lines):
             if not line.strip():
                 continue
@@ -131,9 +145,11 @@ def _first_row(lines: list[str]) -> tuple[int, str | None]:
                 runs.append((0, k + 1, None))
                 continue
             length, begin, first = runs[-1] if runs else (0, 0, None)
+            # A run has the separator of its first row: later rows may be read in more than one way.
             runs[-1:] = [(length + 1, begin if length else k, first if length else between)]
             if length + 1 == SURE:
                 return runs[-1][1:]
+        # The file is shorter than a sure table: the first of its longest runs.
         if runs and max(runs)[0]:
             most = max(length for length, _, _ in runs)
             return next(run[1:] for run in runs if run[0] == most)
@@ -141,7 +157,7 @@ def _first_row(lines: list[str]) -> tuple[int, str | None]:
 
 
 def parse(lines: list[str]) -> Text:
-    """The table in the lines of a file."""
+    """Parse the first table in the lines of a file."""
     begin, between = _first_row(lines)
     above = [k for k in range(begin) if lines[k].strip()]
     if begin == len(lines) and not above:
@@ -166,12 +182,20 @@ def parse(lines: list[str]) -> Text:
 
 
 def _between_names(line: str, between: str | None, row: str) -> str | None:
-    """What separates names: what separates the cells of a row, unless that is not among the names; then what
-    makes as many names as there are cells, or else what there is most of."""
+    """Find the separator of names.
+
+    It is the separator of the numbers if the line of names contains it; else the one that gives as many names
+    as a row has cells; else the most frequent one.
+
+    Args:
+        line: line of names.
+        between: separator of the cells of a row.
+        row: first row of numbers, "" without one.
+    """
     if between is not None and between in line:
         return between
     width = len(cells_of(row, between)) if row else 0
-    fits = [one for one in (between, *SEPARATORS) if len(_titles(line, one)) == width]
+    fits = [separator for separator in (between, *SEPARATORS) if len(_titles(line, separator)) == width]
     if fits:
         return fits[0]
     most = max("\t;,", key=line.count)
@@ -179,34 +203,41 @@ def _between_names(line: str, between: str | None, row: str) -> str | None:
 
 
 def _titles(line: str, between: str | None) -> list[str]:
+    """Split a line of names, without a comment sign before them, at a separator."""
     bare = COMMENT.sub("", line, count=1) if COMMENT.match(line) else line
     return WORD.findall(bare) if between is None else cells_of(bare, between)
 
 
 def _are_units(cells: list[str], names: list[str]) -> bool:
-    """Whether a row is one of units below names."""
+    """Return True if a row is one of units below names."""
     words = [cell.strip() for cell in cells if cell.strip()]
     if not words or len(words) > len(names):
         return False
     if all(word.strip(" []()").casefold() in UNIT_WORDS or word[0] in "[(" for word in words):
         return True
+    # Unknown units: unlike names, units of several columns are the same.
     return len(cells) == len(names) == len(set(names)) > len(set(words))
 
 
 def _are_groups(cells: list[str], names: list[str]) -> bool:
-    """Whether a row above the names says what several of them belong to."""
-    said = [cell for cell in cells if cell.strip()]
-    return 1 <= len(said) < len(names) and len(cells) > len(said) and len(cells) >= len(names) - 2
+    """Return True if a row above the names has texts for groups of them, such as plates."""
+    filled = [cell for cell in cells if cell.strip()]
+    # A group's text stands in its first column, so that there are gaps; the last ones may be left out.
+    return 1 <= len(filled) < len(names) and len(cells) > len(filled) and len(cells) >= len(names) - 2
 
 
 def _filled(cells: list[str]) -> list[str]:
-    """Each empty cell as the one before it."""
-    found = ""
-    return [found := cell.strip() or found for cell in cells]
+    """Fill each empty cell with the text of the cell before it."""
+    filled = []
+    text = ""
+    for cell in cells:
+        text = cell.strip() or text
+        filled.append(text)
+    return filled
 
 
 def _rows(lines: list[str], begin: int, between: str | None) -> tuple[list[Row], int]:
-    """Rows from a line on, and the number of the line where another table begins, 0 if none does."""
+    """Return the rows from line `begin` on, and the number of the line where another table begins, else 0."""
     rows: list[Row] = []
     blank = False
     for k in range(begin, len(lines)):

@@ -1,5 +1,5 @@
-"""What the redrawn figures of the paper share: type, names and colours, heads and legends, the ground, arrows
-and published values."""
+"""Parts of all redrawn figures of the paper: type, names, colours, headings, legends, the ground, arrows and
+published values."""
 
 from __future__ import annotations
 
@@ -17,7 +17,9 @@ from hoof_env.leg.linkage import POINTS as JOINTS
 from hoof_env.paper.measure import POINTS, Stance, Trace, measure_stance
 from hoof_env.paper.rows import CONDITIONS, EXACT, PublishedRow, Reproduction
 
-SMALL = 7.0  # smallest type [points]
+SMALL = 7.0
+"""Smallest size of type [points]."""
+
 PRINT: dict[Any, Any] = {
     **STYLE,
     "font.family": "sans-serif",
@@ -32,10 +34,14 @@ PRINT: dict[Any, Any] = {
     "svg.fonttype": "none",
     "savefig.dpi": 300,
 }
-"""For print over two columns; in SVG text stays text."""
+"""Settings of matplotlib for print over two columns; text stays text in SVG."""
 
-WIDTH = 6.9  # two columns of a journal [inch]
-HEAD = 0.5  # height of the lines above the panels [inch]
+WIDTH = 6.9
+"""Width of two columns of a journal [inch]."""
+
+HEAD = 0.5
+"""Height of the lines above the panels [inch]."""
+
 GAITS = {"walk": "(a) Walking", "run": "(b) Running"}
 CONDITION_COLOURS = dict(zip(CONDITIONS, (BLUE, ORANGE), strict=True))
 POINT_COLOURS = {"toe": PURPLE, "heel": GREEN}
@@ -44,7 +50,7 @@ PHASES = {
     ("toe", "heel"): ("#FBF2D3", "toe and heel: flat or roll-over"),
     ("toe",): ("#F6E4EE", "toe alone: strike or off"),
 }
-"""Colour and name of the sub-phases of stance, by the points that bear."""
+"""Colours and names of the sub-phases of stance, by the points that bear load."""
 
 FORWARD = "x forward of O [m]"
 HEIGHT = "height above the ground [m]"
@@ -52,21 +58,29 @@ Point = NDArray[np.float64]
 
 
 def leg_at(geometry: Geometry, trace: Trace, t: float) -> dict[str, Point]:
-    """World position (x, y) [m] of every named point at the row of a trace nearest to an instant [s]."""
+    """Return the world position (x, y) [m] of every named point, at the row of a trace nearest to `t` [s]."""
     row = trace[int(np.argmin(np.abs(trace["time"] - t)))]
     frame = FrameMotion(phi=float(row["phi"]), position=(float(row["x"]), float(row["y"])))
     return dict(zip(JOINTS, pose(geometry, float(row["theta"]), frame=frame).points, strict=True))
 
 
 def elastic_cycles(reproduction: Reproduction) -> dict[str, tuple[Trace, Stance]]:
-    """Trace and stance of each gait on elastic ground."""
+    """Return trace and stance of each gait on elastic ground with the exact solver."""
     traces = {gait: reproduction.traces[gait, "elastic", EXACT] for gait in GAITS}
     return {gait: (trace, measure_stance(trace)) for gait, trace in traces.items()}
 
 
 def head(figure: Any, height: float, reproduction: Reproduction, title: str, ground: str, note: str) -> None:
-    """Make the figure `height` [inch] high and head it: what it shows; that the leg is identified, its
-    preset, solver and ground; a note."""
+    """Set a figure's size and write its heading.
+
+    Args:
+        figure: the figure.
+        height: its height [inch].
+        reproduction: the reproduction, for the name of its preset.
+        title: first line.
+        ground: condition of the ground, for the second line, which also says that the leg is identified.
+        note: third line.
+    """
     figure.set_size_inches(WIDTH, height)
     figure.set_layout_engine("constrained", rect=(0, 0, 1, 1 - HEAD / height))
     preset = Path(reproduction.geometry.name).name
@@ -78,18 +92,22 @@ def head(figure: Any, height: float, reproduction: Reproduction, title: str, gro
 
 
 def panel_height(*boxes: Point) -> float:
-    """Height [inch] at which panels of these boxes, lower left and upper right corner [m], as high as each
-    other, fill the figure side by side."""
+    """Return the common height [inch] at which panels side by side fill the figure.
+
+    Args:
+        boxes: lower left and upper right corner of each panel [m], shape (2, 2).
+    """
+    # 1.2 inches are left for labels of the axes.
     return (WIDTH - 1.2) / float(sum(across / up for across, up in (high - low for low, high in boxes)))
 
 
 def show_box(ax: Any, box: Point) -> None:
-    """Show a box, lower left and upper right corner [m], in its true shape."""
+    """Limit axes to a box, its lower left and upper right corner [m], with equal scales."""
     ax.set(xlim=box[:, 0], ylim=box[:, 1], aspect="equal")
 
 
 def legend_below(figure: Any, columns: int) -> None:
-    """One legend at the foot of the figure, every label once."""
+    """Draw one legend at the foot of the figure, with every label once."""
     entries = {
         label: line for ax in figure.axes for line, label in zip(*ax.get_legend_handles_labels(), strict=True)
     }
@@ -97,7 +115,8 @@ def legend_below(figure: Any, columns: int) -> None:
 
 
 def draw_ground(ax: Any) -> None:
-    """Level ground y = 0, shaded down to the end of the axes, whose limits stay."""
+    """Draw level ground at y = 0, shaded down to the end of the axes."""
+    # The shading must not widen the limits, which are set again below.
     low, high = ax.get_ylim()
     ax.axhspan(low - (high - low), 0, color=SOIL, zorder=0, lw=0)
     ax.axhline(0, color=GREY, lw=0.8, zorder=1)
@@ -105,39 +124,62 @@ def draw_ground(ax: Any) -> None:
 
 
 def draw_arrow(ax: Any, start: Any, end: Any, colour: str) -> None:
+    """Draw an arrow from `start` to `end`, (x, y) in the units of the axes."""
     look = {"arrowstyle": "-|>", "color": colour, "lw": 1.2, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 8}
     ax.annotate("", end, start, arrowprops=look, zorder=8)
 
 
 def mark_published(ax: Any, x: Any, y: Any, *, xerr: Any = None, yerr: Any = None) -> None:
-    """Published values: one mark in all figures, with the bars within which they count as reproduced."""
+    """Draw published values as diamonds, with the bars within which they count as reproduced."""
     ax.errorbar(
-        x, y, yerr, xerr, fmt="D", ms=4.2, mfc="white", mec="black", mew=0.9, ecolor="black",
-        elinewidth=0.7, capsize=1.8, capthick=0.7, clip_on=False, zorder=9, label="published",
-    )  # fmt: skip
+        x,
+        y,
+        yerr,
+        xerr,
+        fmt="D",
+        ms=4.2,
+        mfc="white",
+        mec="black",
+        mew=0.9,
+        ecolor="black",
+        elinewidth=0.7,
+        capsize=1.8,
+        capthick=0.7,
+        clip_on=False,
+        zorder=9,
+        label="published",
+    )
 
 
 def half_bar(row: PublishedRow) -> float:
-    """How far a value may lie from the published one, in the row's unit; 0 where it is only reported."""
+    """Return the largest accepted difference from the published value, in the row's unit; 0 if the row is
+    only reported."""
     limit = row.bar.limit or 0.0
     return abs(row.value) * limit / 100 if row.bar.measure == "%" else limit
 
 
 def contact_rows(reproduction: Reproduction, gait: str) -> list[PublishedRow]:
+    """Return the published rows of the first and the last contact of a gait."""
     return [reproduction.published.row(f"{gait}.{name}") for name in ("contact_start", "contact_end")]
 
 
 def mark_contacts(ax: Any, reproduction: Reproduction, gait: str, y: float) -> None:
-    """The published instants of contact on an axis of time [s]."""
+    """Draw the published instants of contact at height `y` over an axis of time [s]."""
     for row in contact_rows(reproduction, gait):
         mark_published(ax, row.value, y, xerr=half_bar(row))
 
 
 def shade(ax: Any, stance: Stance) -> None:
-    """Shade the stance behind curves over time [s], cut where toe or heel enters or leaves the ground."""
-    instants = sorted({t for name in POINTS for interval in getattr(stance, name) for t in interval})
+    """Shade the sub-phases of a stance behind curves over time [s]."""
+    intervals = {name: getattr(stance, name) for name in POINTS}
+    # Sub-phases change where toe or heel enters or leaves the ground.
+    instants = sorted({t for contacts in intervals.values() for contact in contacts for t in contact})
     for start, end in pairwise(instants):
-        bearing = tuple(n for n in POINTS if any(a <= start and end <= b for a, b in getattr(stance, n)))
+        bearing = tuple(
+            name
+            for name, contacts in intervals.items()
+            if any(enter <= start and end <= leave for enter, leave in contacts)
+        )
         if bearing:
             colour, label = PHASES[bearing]
             ax.axvspan(start, end, fc=colour, lw=0, zorder=0, label=label)

@@ -1,8 +1,8 @@
 """Figures 1 and 3 to 6 of the paper, redrawn from a reproduction (needs matplotlib, extra `plot`).
 
 Figure 1 is the labelled mechanism. Figure 3 has the paths of the hoof, figure 4 the hoof over the stance and
-its angle over the cycle, figure 5 the ground reaction force over time, and figure 6 the same force as a
-vector along the stance. All show the exact solver; published values are diamonds, with the bars within which
+its angle over the cycle, figure 5 the ground reaction force over time, and figure 6 that force as a vector
+along the stance. All show the exact solver; published values are diamonds, with the bars within which
 they count as reproduced.
 """
 
@@ -45,25 +45,26 @@ from hoof_env.paper.mechanism import draw_mechanism
 from hoof_env.paper.rows import EXACT, Reproduction
 from hoof_env.paper.shapes import find_peaks
 
-HOOVES = 8  # the hoof is drawn at this many equally spaced instants of the cycle
+HOOVES = 8
+"""Number of equally spaced instants of the cycle at which figure 3 has the hoof."""
 
 
 def draw_paths(figure: Any, reproduction: Reproduction) -> None:
-    """Figure 3: paths of toe and heel over the cycle, their parts in the ground heavy, with the published
-    instants of contact, the leg at mid-stance and the hoof around the cycle; below, the same near the ground.
+    """Draw figure 3: paths of toe and heel over the cycle, thick in the ground, with the published instants
+    of contact, the leg at mid-stance and the hoof around the cycle.
 
-    Both gaits have the same scale. Above each other are the true shape and a stretched height.
+    Both gaits have the same scale. The upper row has the true shape, the lower row heights near the ground,
+    stretched.
     """
     cycles = elastic_cycles(reproduction)
     boxes = np.array([_extent(reproduction, *cycle) for cycle in cycles.values()])
+    # The same heights in both panels, so that their scales are the same.
     boxes[:, 0, 1] = boxes[:, 0, 1].min()
     boxes[:, 1, 1] = boxes[:, 1, 1].max()
     tall = panel_height(*boxes)
     low = 1.0
-    head(
-        figure, tall + low + 1.9, reproduction, "Figure 3. Paths of the hoof", "elastic",
-        "Marks lie on the paths at the published instants of contact. Below, heights are stretched.",
-    )  # fmt: skip
+    note = "Marks lie on the paths at the published instants of contact. Below, heights are stretched."
+    head(figure, tall + low + 1.9, reproduction, "Figure 3. Paths of the hoof", "elastic", note)
     axes = figure.subplots(
         2, 2, sharex="col", height_ratios=(tall, low), width_ratios=np.ptp(boxes[..., 0], axis=1)
     )
@@ -83,7 +84,7 @@ def draw_paths(figure: Any, reproduction: Reproduction) -> None:
 
 
 def _extent(reproduction: Reproduction, trace: Trace, stance: Stance) -> Point:
-    """Lower left and upper right corner [m] of what is drawn of a gait, with a margin."""
+    """Return lower left and upper right corner of a gait's drawing, with a margin, shape (2, 2) [m]."""
     leg = leg_at(reproduction.geometry, trace, stance.middle).values()
     hooves = [leg_at(reproduction.geometry, trace, t)["G"] for t in _instants(stance)]
     paths = [np.stack([trace[f"{name}_x"], -trace[f"{name}_penetration"]], 1) for name in POINTS]
@@ -92,10 +93,12 @@ def _extent(reproduction: Reproduction, trace: Trace, stance: Stance) -> Point:
 
 
 def _instants(stance: Stance) -> Point:
+    """Return the instants of the cycle at which the hoof is drawn, shape (HOOVES,) [s]."""
     return np.arange(HOOVES) / HOOVES * stance.period
 
 
 def _draw_leg(ax: Any, reproduction: Reproduction, trace: Trace, stance: Stance) -> None:
+    """Draw the leg at mid-stance, and the hoof around the cycle."""
     at = leg_at(reproduction.geometry, trace, stance.middle)
     for body in BODIES:
         line = np.array([at[body.tail], at[body.head]])
@@ -112,21 +115,24 @@ def _draw_leg(ax: Any, reproduction: Reproduction, trace: Trace, stance: Stance)
 
 
 def _draw_hoof_paths(ax: Any, trace: Trace) -> None:
+    """Draw the paths of toe and heel, thick in the ground, with an arrow in the direction of motion."""
     for name, colour in POINT_COLOURS.items():
         x = trace[f"{name}_x"]
         y = -trace[f"{name}_penetration"]
         ax.plot(x, y, color=colour, lw=0.9, label=f"path of the {name}", zorder=4)
         ground = np.where(y < 0, y, np.nan)
         ax.plot(x, ground, color=colour, lw=2.4, label=f"{name} in the ground", zorder=5)
-        k = int(np.argmax(y))  # far from the ground: an arrow shows which way round
+        # The arrow stands at the highest point, where it hides nothing near the ground.
+        k = int(np.argmax(y))
         tip = min(k + len(x) // 200, len(x) - 1)
         draw_arrow(ax, (x[k], y[k]), (x[tip], y[tip]), colour)
 
 
 def _published_contacts(reproduction: Reproduction, gait: str, trace: Trace, stance: Stance) -> Point:
-    """Where the points that touch first and leave last are at the published instants of contact [m]."""
+    """Return the positions (x, y) at the published instants of contact, shape (n, 2) [m]: of the points that
+    touch first at the first contact, and of the points that leave last at the last."""
     places = []
-    touching = stance.first_points, stance.last_points
+    touching = (stance.first_points, stance.last_points)
     for row, points in zip(contact_rows(reproduction, gait), touching, strict=True):
         for name in sorted(points):
             columns = trace[f"{name}_x"], -trace[f"{name}_penetration"]
@@ -134,14 +140,16 @@ def _published_contacts(reproduction: Reproduction, gait: str, trace: Trace, sta
     return np.array(places)
 
 
-SKETCHES = 7  # the hoof is sketched at this many equally spaced instants of the stance, its ends included
+SKETCHES = 7
+"""Number of equally spaced instants of the stance, its ends included, at which figure 4 has the hoof."""
 
 
 def draw_angles(figure: Any, reproduction: Reproduction) -> None:
-    """Figure 4: above, the hoof over the stance at one scale for both gaits; below, its angle over the cycle
-    with the published angles at their published times, and the sub-phases shaded.
+    """Draw figure 4: above, the hoof over the stance at one scale for both gaits; below, its angle over the
+    cycle with the published angles at their published times, and the sub-phases shaded.
 
-    An angle printed without a time is marked at the middle of the time in which toe and heel both bear.
+    An angle that is printed without a time is marked at the middle of the time in which toe and heel both
+    bear.
     """
     changed = [
         f"{row.printed:g}° in print is read as {row.value:+g}°.".replace("-", "\N{MINUS SIGN}")
@@ -157,10 +165,8 @@ def draw_angles(figure: Any, reproduction: Reproduction) -> None:
     box = np.array([(-0.6 * between, low), ((SKETCHES - 0.4) * between, high)])
     tall = panel_height(box, box)
     low = 2.3
-    head(
-        figure, tall + low + 2.1, reproduction, "Figure 4. Hoof angle over the cycle", "elastic",
-        " ".join(["Bars: margin of each row; flat has no time in print.", *changed]),
-    )  # fmt: skip
+    note = " ".join(["Bars: margin of each row; flat has no time in print.", *changed])
+    head(figure, tall + low + 2.1, reproduction, "Figure 4. Hoof angle over the cycle", "elastic", note)
     axes = figure.subplots(2, 2, height_ratios=(tall, low))
     for (gait, (trace, stance)), (sketch, angle) in zip(cycles.items(), axes.T, strict=True):
         times = np.linspace(stance.start, stance.end, SKETCHES)
@@ -173,6 +179,7 @@ def draw_angles(figure: Any, reproduction: Reproduction) -> None:
             x = hoof[:, 0] + place
             y = hoof[:, 1]
             sketch.fill(x, y, fc=SKY, ec=BLUE, lw=0.7, alpha=0.9, zorder=3)
+            # Corner 0 is G; toe and heel follow in the order of POINT_COLOURS.
             for corner, (name, colour) in enumerate(POINT_COLOURS.items(), start=1):
                 sketch.plot(x[corner], y[corner], "o", color=colour, ms=3, label=name, zorder=4, ls="none")
         shade(angle, stance)
@@ -184,9 +191,9 @@ def draw_angles(figure: Any, reproduction: Reproduction) -> None:
 
 
 def _hooves(reproduction: Reproduction, trace: Trace, stance: Stance) -> Point:
-    """Corners G, toe, heel at the instants of the sketches, x from the middle of each hoof,
-    shape (SKETCHES, 3, 2) [m]."""
-    names = "G", reproduction.geometry.toe, reproduction.geometry.heel
+    """Return the corners G, toe and heel of the hoof at the instants of the sketches, shape (SKETCHES, 3, 2)
+    [m]; x is measured from the middle of each hoof."""
+    names = ("G", reproduction.geometry.toe, reproduction.geometry.heel)
     legs = [leg_at(reproduction.geometry, trace, t) for t in np.linspace(stance.start, stance.end, SKETCHES)]
     hooves = np.array([[at[name] for name in names] for at in legs])
     x = hooves[..., 0]
@@ -195,27 +202,28 @@ def _hooves(reproduction: Reproduction, trace: Trace, stance: Stance) -> Point:
 
 
 def _mark_angles(ax: Any, reproduction: Reproduction, gait: str, stance: Stance) -> None:
+    """Draw the published angles of a gait over its axis of time [s]."""
     rows = {row.id.removeprefix(f"{gait}."): row for row in reproduction.published.rows if row.gait == gait}
     for time, angle in (("contact_start", "angle_contact"), ("contact_end", "angle_liftoff")):
         t = rows[time]
         value = rows[angle]
         mark_published(ax, t.value, value.value, xerr=half_bar(t), yerr=half_bar(value))
     if "angle_flat" in rows:
+        # The paper gives no time for the flat hoof.
         middle = sum(stance.double) / 2 if stance.double else stance.middle
         mark_published(ax, middle, rows["angle_flat"].value, yerr=half_bar(rows["angle_flat"]))
 
 
 DASHED = (0, (3, 2))
+"""Dashes of the resultant's lines."""
 
 
 def draw_forces(figure: Any, reproduction: Reproduction) -> None:
-    """Figure 5: force of the ground over time in the four conditions, with sub-phases, simulated peaks,
-    published peaks at the times of the simulated ones, published instants of contact on the time axis; means
-    over the cycle at the side."""
-    head(
-        figure, 4.2, reproduction, "Figure 5. Ground reaction force", "elastic and inelastic",
-        "Bars: margin of each row. Peaks have no time in print; marks stand at that of the simulated one.",
-    )  # fmt: skip
+    """Draw figure 5: force of the ground over time in the four conditions, with sub-phases, simulated peaks,
+    published peaks at the times of the simulated ones, and published instants of contact on the time axis;
+    means over the cycle stand at the side."""
+    note = "Bars: margin of each row. Peaks have no time in print; marks stand at that of the simulated one."
+    head(figure, 4.2, reproduction, "Figure 5. Ground reaction force", "elastic and inelastic", note)
     axes = figure.subplots(1, 4, width_ratios=(9, 2, 9, 2)).reshape(2, 2)
     for (gait, (_, stance)), (ax, mean) in zip(elastic_cycles(reproduction).items(), axes, strict=True):
         shade(ax, stance)
@@ -228,6 +236,7 @@ def draw_forces(figure: Any, reproduction: Reproduction) -> None:
             mean.plot([place - 0.45, place + 0.45], [measured.mean] * 2, color=colour, lw=2)
             row = reproduction.published.row(f"{gait}.mean_{condition}")
             mark_published(mean, place, row.value, yerr=half_bar(row))
+        # Empty lines, for entries of the legend without a condition's colour.
         ax.plot([], [], color=GREY, lw=0.7, ls=DASHED, label="resultant")
         ax.plot([], [], "o", color=GREY, ms=2.8, label="simulated peak")
         ax.plot([], [], color=GREY, lw=2, label="simulated mean")
@@ -243,6 +252,7 @@ def draw_forces(figure: Any, reproduction: Reproduction) -> None:
 
 
 def _draw_curve(ax: Any, trace: Trace, condition: str, colour: str) -> None:
+    """Draw normal force, its peaks and the resultant over time [s]."""
     t = trace["time"]
     force = trace["normal"]
     ax.plot(t, force, color=colour, lw=1.4, label=f"{condition}, normal force", zorder=4)
@@ -251,28 +261,44 @@ def _draw_curve(ax: Any, trace: Trace, condition: str, colour: str) -> None:
     ax.plot(t[peaks], force[peaks], "o", color=colour, ms=2.8, zorder=5)
 
 
-ARROWS = 36  # equal parts of the stance; an arrow in the middle of each
+ARROWS = 36
+"""Number of equal parts of the stance; figure 6 has an arrow in the middle of each."""
 
 
 def draw_vectors(figure: Any, reproduction: Reproduction) -> None:
-    """Figure 6: the ground reaction force at the centre of pressure at equal steps of the stance, elastic,
-    directions true, its normal part on the axis; below, the colours' times and the published contacts."""
-    head(
-        figure, 3.7, reproduction, "Figure 6. Ground reaction force on the leg along the stance", "elastic",
-        "A vector that leans forward propels, one that leans back brakes. Marks: published contact times.",
-    )  # fmt: skip
+    """Draw figure 6: the ground reaction force on elastic ground at the centre of pressure at equal steps of
+    the stance, with true directions and its normal part on the axis; below, times by colour and the published
+    contacts."""
+    title = "Figure 6. Ground reaction force on the leg along the stance"
+    note = "A vector that leans forward propels, one that leans back brakes. Marks: published contact times."
+    head(figure, 3.7, reproduction, title, "elastic", note)
     axes = figure.subplots(1, 2)
     for (gait, (trace, stance)), ax in zip(elastic_cycles(reproduction).items(), axes, strict=True):
         edges = np.linspace(stance.start, stance.end, ARROWS + 1)
         rows = trace[np.searchsorted(trace["time"], (edges[1:] + edges[:-1]) / 2)]
         rows = rows[rows["normal"] > 0]
         times = [stance.start, stance.end, *(row.value for row in contact_rows(reproduction, gait))]
-        late = max(times) + 0.1 * (max(times) - min(times))  # the palest colours are hard to see on white
+        # The scale of colours goes on a little, as its palest ones are hard to see on white.
+        late = max(times) + 0.1 * (max(times) - min(times))
         arrows = ax.quiver(
-            rows["cop_x"], np.zeros(len(rows)), rows["friction"], rows["normal"], rows["time"],
-            angles="uv", scale_units="y", scale=1, units="inches", width=0.018, cmap="viridis",
-            clim=(min(times), late), zorder=3, headwidth=4, headlength=5, headaxislength=4.5,
-        )  # fmt: skip
+            rows["cop_x"],
+            np.zeros(len(rows)),
+            rows["friction"],
+            rows["normal"],
+            rows["time"],
+            # In units of the y axis, a newton of friction is as long as one of the normal force.
+            angles="uv",
+            scale_units="y",
+            scale=1,
+            cmap="viridis",
+            clim=(min(times), late),
+            zorder=3,
+            units="inches",
+            width=0.018,
+            headwidth=4,
+            headlength=5,
+            headaxislength=4.5,
+        )
         low = float(rows["cop_x"].min())
         high = float(rows["cop_x"].max())
         room = 0.55 * max(high - low, 0.02)
@@ -291,11 +317,12 @@ DRAWINGS: dict[str, Callable[[Any, Reproduction], None]] = {
     "figure5": draw_forces,
     "figure6": draw_vectors,
 }
+"""Functions that draw the figures, by the names of their files."""
 
 
 def draw_all(reproduction: Reproduction, folder: Path | str) -> list[Path]:
-    """Draw figures 1 and 3 to 6 as PNG and SVG, the same bytes for the same reproduction; returns the
-    paths."""
+    """Draw figures 1 and 3 to 6 as PNG and SVG into `folder`, with the same bytes for the same reproduction;
+    return the paths."""
     check_matplotlib()
     from matplotlib import style
     from matplotlib.figure import Figure
@@ -306,6 +333,7 @@ def draw_all(reproduction: Reproduction, folder: Path | str) -> list[Path]:
         for name, draw in DRAWINGS.items():
             figure = Figure()
             draw(figure, reproduction)
+            # Without the date, which would differ each time.
             for file, metadata in ((f"{name}.png", {}), (f"{name}.svg", {"Date": None})):
                 figure.savefig(stage / file, metadata=metadata)
                 paths.append(folder / file)

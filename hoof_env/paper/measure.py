@@ -1,8 +1,8 @@
-"""From the record of one cycle to what the paper reports about it.
+"""Measures of one cycle that the paper reports, from its record.
 
 A hoof point is in contact between the instants at which its penetration crosses zero, interpolated linearly
 between samples. First contact is the earliest of these instants over toe and heel, last contact the latest;
-hoof angles there are interpolated too.
+hoof angles there are interpolated, too.
 """
 
 from __future__ import annotations
@@ -18,27 +18,32 @@ from hoof_env.dynamics.constrained import TRACE
 from hoof_env.errors import ParameterError
 
 Interval = tuple[float, float]
+"""Start and end [s]."""
 
 POINTS = ("toe", "heel")
+"""Points of the hoof that touch the ground."""
 
 SUMS = ("normal", "friction", "grf", "cop_x", "hoof_angle")
-"""Normal and friction force on both points and their resultant [N], centre of pressure [m] (NaN without
-load), and the hoof's angle, heel up positive [rad]."""
+"""Sums over both points: normal and friction force and their resultant [N], centre of pressure [m] (NaN
+without load), and the hoof's angle, heel up positive [rad]."""
 
 CYCLE = np.dtype([(name, "f8") for name in (*(TRACE.names or ()), *SUMS)])
-"""A cycle: a row for every substep, what the engine reports of one leg and the sums over its hoof points."""
+"""Type of a cycle's rows, one for every substep: the engine's reports on one leg, and `SUMS`."""
 
-Trace = NDArray[np.void]  # one cycle of dtype `CYCLE`
+Trace = NDArray[np.void]
+"""One cycle, rows of dtype `CYCLE`, shape (n,)."""
 
 
 def cycle_of(record: Mapping[str, Any]) -> Trace:
-    """Rows of dtype `CYCLE`, shape (n,), from the `record` of an environment with a fixed, level leg."""
+    """Convert the `record` of an environment with a fixed trunk and level ground to rows of dtype `CYCLE`,
+    shape (n,)."""
     cycle = np.zeros(len(record["time"]), CYCLE)
     for name in TRACE.names or ():
         cycle[name] = np.asarray(record[name]).reshape(len(cycle))
     for name in ("normal", "friction"):
         cycle[name] = cycle[f"toe_{name}"] + cycle[f"heel_{name}"]
     cycle["grf"] = np.hypot(cycle["normal"], cycle["friction"])
+    # Without load the centre of pressure does not exist; the inner `where` avoids a division by 0.
     loaded = cycle["normal"] > 0
     moment = cycle["toe_normal"] * cycle["toe_x"] + cycle["heel_normal"] * cycle["heel_x"]
     cycle["cop_x"] = np.where(loaded, moment / np.where(loaded, cycle["normal"], 1.0), np.nan)
@@ -48,20 +53,21 @@ def cycle_of(record: Mapping[str, Any]) -> Trace:
 
 @dataclass(frozen=True)
 class Stance:
-    """The stance of one cycle and its forces.
+    """Stance of one cycle and its forces.
 
     Attributes:
         period: length of the cycle [s].
         start, end: first and last contact [s].
         toe, heel: intervals in which each point is in the ground [s].
-        double: the longest interval in which both are [s], or None.
+        double: longest interval in which both points are in the ground [s], or None.
         angle_start_deg, angle_end_deg: hoof angle at first and last contact, heel up positive [deg].
-        angle_flat_deg: at the middle of `double` [deg], or None.
+        angle_flat_deg: hoof angle at the middle of `double` [deg], or None.
         angle_range_deg: largest minus smallest hoof angle in contact [deg].
-        peak, peak_time: maximum over the cycle of the normal force summed over both points [N], and when [s].
-        peak_resultant: the same maximum of the resultant sqrt(Fn^2 + Ft^2) [N].
+        peak, peak_time: maximum over the cycle of the normal force summed over both points [N], and its time
+            [s].
+        peak_resultant: maximum over the cycle of the resultant sqrt(Fn^2 + Ft^2) [N].
         mean: time average of the normal force over the whole cycle [N].
-        mean_stance: over stance alone [N].
+        mean_stance: time average of the normal force over the stance alone [N].
     """
 
     period: float
@@ -97,18 +103,28 @@ class Stance:
 
     @property
     def first_points(self) -> set[str]:
-        """The hoof points (toe, heel or both) that touch first."""
+        """Hoof points (toe, heel or both) that touch first."""
         return {name for name in POINTS if any(enter == self.start for enter, _ in getattr(self, name))}
 
     @property
     def last_points(self) -> set[str]:
-        """The hoof points that leave last."""
+        """Hoof points (toe, heel or both) that leave last."""
         return {name for name in POINTS if any(leave == self.end for _, leave in getattr(self, name))}
 
 
 def contact_intervals(t: NDArray[np.float64], penetration: NDArray[np.float64]) -> tuple[Interval, ...]:
-    """Intervals [s] in which a penetration [m], sampled at `t`, is positive, its zeros interpolated linearly;
-    `ParameterError` for a contact that the cycle cuts in two."""
+    """Find the intervals in which a point is in the ground.
+
+    Args:
+        t: times, shape (n,) [s].
+        penetration: penetration of the point, shape (n,) [m]; its zeros are interpolated linearly.
+
+    Returns:
+        Intervals [s], in order.
+
+    Raises:
+        ParameterError: the cycle starts or ends in contact, and so cuts a contact in two.
+    """
     inside = penetration > 0
     if inside[0] or inside[-1]:
         raise ParameterError(
@@ -116,20 +132,28 @@ def contact_intervals(t: NDArray[np.float64], penetration: NDArray[np.float64]) 
         )
     before = np.flatnonzero(np.diff(inside))
     part = penetration[before] / (penetration[before] - penetration[before + 1])
+    # Entries and exits alternate, as the cycle starts and ends in the air.
     zeros = (t[before] + part * (t[before + 1] - t[before])).tolist()
     return tuple(zip(zeros[::2], zeros[1::2], strict=True))
 
 
 def overlap(one: tuple[Interval, ...], two: tuple[Interval, ...]) -> Interval | None:
-    """The longest interval common to an interval of `one` and an interval of `two`, or None."""
+    """Return the longest interval [s] common to an interval of `one` and an interval of `two`, or None."""
     common = [(max(a[0], b[0]), min(a[1], b[1])) for a in one for b in two]
     longest = max(common, key=lambda interval: interval[1] - interval[0], default=(0.0, 0.0))
     return longest if longest[1] > longest[0] else None
 
 
 def integral(trace: Trace, values: NDArray[np.float64], start: float, end: float) -> float:
-    """Integral over [start, end] [s] of `values` sampled with the trace, linear between samples."""
+    """Integrate values over time, linear between samples.
+
+    Args:
+        trace: the cycle, for its times [s].
+        values: values at these times, shape (n,).
+        start, end: limits of the integral [s]; they may lie between samples.
+    """
     t = trace["time"]
+    # The limits are added as samples, so that the trapezoids end there.
     inner = (t > start) & (t < end)
     times = np.concatenate(([start], t[inner], [end]))
     sampled = np.interp(times, t, values)
@@ -137,7 +161,14 @@ def integral(trace: Trace, values: NDArray[np.float64], start: float, end: float
 
 
 def measure_stance(trace: Trace) -> Stance:
-    """Measure one cycle of dtype `CYCLE`, both ends included; `ParameterError` without a whole contact."""
+    """Measure one cycle.
+
+    Args:
+        trace: rows of dtype `CYCLE`, both ends of the cycle included.
+
+    Raises:
+        ParameterError: the cycle has no contact, or cuts one in two.
+    """
     t = trace["time"]
     toe, heel = (contact_intervals(t, trace[f"{name}_penetration"]) for name in POINTS)
     if not toe + heel:
@@ -146,6 +177,7 @@ def measure_stance(trace: Trace) -> Stance:
     end = max(leave for _, leave in toe + heel)
     double = overlap(toe, heel)
     angle = np.degrees(trace["hoof_angle"])
+    # The extremes of the angle may be at the instants of contact, which lie between samples.
     touching = np.concatenate((np.interp([start, end], t, angle), angle[(t > start) & (t < end)]))
     impulse = integral(trace, trace["normal"], float(t[0]), float(t[-1]))
     period = float(t[-1] - t[0])
@@ -170,13 +202,19 @@ def measure_stance(trace: Trace) -> Stance:
 
 
 def hoof_error(trace: Trace, exact: Trace) -> NDArray[np.float64]:
-    """How far toe or heel, whichever is further, is from where another cycle of the motion has it [m].
+    """Return the distance of toe or heel, whichever is larger, from its place in another cycle of the motion.
 
-    Shape of `trace`, at whose instants the other cycle is interpolated.
+    Args:
+        trace: the cycle.
+        exact: the other cycle, which is interpolated at the instants of `trace`.
+
+    Returns:
+        Distances, shape (n,) [m].
     """
     t = trace["time"]
     distances = []
     for name in POINTS:
-        columns = f"{name}_x", f"{name}_penetration"
-        distances.append(np.hypot(*(trace[c] - np.interp(t, exact["time"], exact[c]) for c in columns)))
+        across = trace[f"{name}_x"] - np.interp(t, exact["time"], exact[f"{name}_x"])
+        deep = f"{name}_penetration"
+        distances.append(np.hypot(across, trace[deep] - np.interp(t, exact["time"], exact[deep])))
     return np.maximum(*distances)

@@ -1,4 +1,4 @@
-"""Figure 1 of the paper: the labelled mechanism."""
+"""Figure 1 of the paper: the mechanism with its names and numbers."""
 
 from __future__ import annotations
 
@@ -26,6 +26,7 @@ from hoof_env.paper.drawing import (
 from hoof_env.paper.measure import POINTS
 from hoof_env.paper.rows import Reproduction
 
+# Links of one kind have one colour, and one entry in the legend.
 ROLE_COLOURS = {
     "crank": ORANGE,
     "coupler": GREY,
@@ -39,16 +40,21 @@ ROLE_COLOURS = {
     "hoof triangle": BLUE,
     "hoof triangle, sole": BLUE,
 }
-NUMBER_AT = {8: 0.75, 10: 0.65, 12: 0.35}  # where on its link a number stands, from the tail; 0.5 elsewhere
-NAME_TO = {"C": (1.0, 0.3)}  # the side of a name that cannot stand where its links leave room
+NUMBER_AT = {8: 0.75, 10: 0.65, 12: 0.35}
+"""Places of numbers along their links, from 0 at the tail to 1 at the head; 0.5 for other links."""
+
+NAME_TO = {"C": (1.0, 0.3)}
+"""Directions from a point to its name, for points without room on the side that their links leave free."""
 
 
 def draw_mechanism(figure: Any, reproduction: Reproduction) -> None:
-    """Figure 1: the leg in its walking stance: all of it, and its hoof with the forces on the point that
-    bears most, slip, penetration and angle; every point named, every link numbered as in Eq. 2."""
+    """Draw figure 1: the whole leg in its walking stance, and its hoof with the forces on the point that
+    bears most, its slip and penetration, and the hoof angle. Points are named, links are numbered as in Eq.
+    2."""
     geometry = reproduction.geometry
-    (trace, _) = elastic_cycles(reproduction)["walk"]
+    trace, _ = elastic_cycles(reproduction)["walk"]
     tip = max(POINTS, key=lambda point: trace[f"{point}_normal"].max())
+    # An instant with a large force and a hoof angle that can be seen.
     row = trace[int(np.argmax(trace[f"{tip}_normal"] * (0.01 + np.abs(trace["hoof_angle"]))))]
     at = leg_at(geometry, trace, float(row["time"]))
     points = np.array(list(at.values()))
@@ -58,18 +64,18 @@ def draw_mechanism(figure: Any, reproduction: Reproduction) -> None:
         np.array([np.minimum(points.min(axis=0) - 0.2, (np.inf, -0.2)), points.max(axis=0) + 0.2]),
         np.array([hoof.min(axis=0) - 0.45 * side, hoof.max(axis=0) + np.array([0.65, 0.1]) * side]),
     ]
-    head(
-        figure, panel_height(*boxes) + 1.7, reproduction,
-        "Figure 1. Mechanism of the leg and its contact with the ground", "elastic",
-        f"Walking at {row['time']:.3f} s. Links numbered as in Eq. 2.",
-    )  # fmt: skip
+    height = panel_height(*boxes) + 1.7
+    title = "Figure 1. Mechanism of the leg and its contact with the ground"
+    note = f"Walking at {row['time']:.3f} s. Links numbered as in Eq. 2."
+    head(figure, height, reproduction, title, "elastic", note)
     axes = figure.subplots(1, 2, width_ratios=[across / up for across, up in np.ptp(boxes, axis=1)])
     sole = {geometry.toe, geometry.heel}
-    titles = "(a) the leg", f"(b) its hoof, the {tip} in the ground"
-    for ax, box, names, title in zip(axes, boxes, (at.keys() - sole, {"G", *sole}), titles, strict=True):
+    hoof_points = {"G", *sole}
+    titles = ("(a) the leg", f"(b) its hoof, the {tip} in the ground")
+    for ax, box, names, title in zip(axes, boxes, (at.keys() - sole, hoof_points), titles, strict=True):
         show_box(ax, box)
         draw_ground(ax)
-        _draw_links(ax, at, close=names == {"G", *sole})
+        _draw_links(ax, at, close=names == hoof_points)
         _name_points(ax, at, names, geometry)
         ax.set(title=title, xlabel=FORWARD, ylabel=HEIGHT)
     _draw_contact(axes[1], at[getattr(geometry, tip)], at[geometry.toe], at[geometry.heel], tip, row, side)
@@ -77,7 +83,8 @@ def draw_mechanism(figure: Any, reproduction: Reproduction) -> None:
 
 
 def _draw_links(ax: Any, at: dict[str, Point], *, close: bool) -> None:
-    """All links, numbered: those of the hoof in the close view, the others in that of the whole leg."""
+    """Draw all links; number those of the hoof in the close view, and the others in the view of the leg."""
+    # The legend has the numbers of all links with the same role.
     numbers: dict[str, str] = {}
     for number, body in enumerate(BODIES, start=1):
         numbers[body.role] = f"{numbers[body.role]}, {number}" if body.role in numbers else str(number)
@@ -97,7 +104,7 @@ def _draw_links(ax: Any, at: dict[str, Point], *, close: bool) -> None:
 
 
 def _name_points(ax: Any, at: dict[str, Point], names: Any, geometry: Geometry) -> None:
-    """Mark every joint, and name some of them on the side that their links leave free."""
+    """Mark every joint, and write the names of some of them on the side that their links leave free."""
     sole = {geometry.toe: "toe", geometry.heel: "heel"}
     for name, point in at.items():
         fixed = name in ("O", "C")
@@ -106,7 +113,8 @@ def _name_points(ax: Any, at: dict[str, Point], names: Any, geometry: Geometry) 
         ax.plot(*point, mec="black", mew=0.8, zorder=7, **look)
         if name in names:
             ends = [(body.tail, body.head) for body in BODIES if name in (body.tail, body.head)]
-            others = np.array([at[two if one == name else one] - point for one, two in ends])
+            others = np.array([at[tip if tail == name else tail] - point for tail, tip in ends])
+            # Away from the mean direction of the links at this point.
             free = -(others / np.linalg.norm(others, axis=1, keepdims=True)).sum(axis=0)
             away = np.array(NAME_TO.get(name, free))
             offset = 10 * away / max(float(np.linalg.norm(away)), 1e-9)
@@ -120,7 +128,16 @@ def _name_points(ax: Any, at: dict[str, Point], names: Any, geometry: Geometry) 
 def _draw_contact(
     ax: Any, press: Point, toe: Point, heel: Point, tip: str, row: np.void, side: float
 ) -> None:
-    """Forces, slip, penetration and hoof angle of the point that presses; the hoof is `side` [m] large."""
+    """Draw forces, slip, penetration and hoof angle at the point that bears load.
+
+    Args:
+        ax: the axes.
+        press, toe, heel: positions (x, y) of that point and of both ends of the sole [m].
+        tip: name of the point, "toe" or "heel".
+        row: row of the trace.
+        side: size of the hoof, by which arrows are scaled [m].
+    """
+    # Arrows of fixed size; only the ratio of friction to the normal force is to scale.
     normal = 0.75 * side
     friction = normal * row[f"{tip}_friction"] / row[f"{tip}_normal"]
     slip = np.sign(row[f"{tip}_slide"]) * 0.3 * side
@@ -137,6 +154,7 @@ def _draw_contact(
     ax.plot([press[0], gauge], [press[1]] * 2, color="black", lw=0.6, ls=":")
     ax.plot([gauge] * 2, [press[1], 0], color="black", lw=0.8, marker="_", ms=5)
     ax.annotate(r"$\delta$", (gauge, press[1] / 2), (5, 0), textcoords="offset points", va="center")
+    # The hoof angle is measured at the toe, from the ground behind it up to the sole.
     length = float(np.linalg.norm(heel - toe))
     turn = np.linspace(np.pi - row["hoof_angle"], np.pi, 30)
     arc = toe + 0.75 * length * np.stack([np.cos(turn), np.sin(turn)], axis=1)

@@ -1,4 +1,4 @@
-"""The reproduction as a page to read: published beside simulated, claims about shape, versions, command."""
+"""Report of the reproduction: published and simulated numbers, claims about shape, versions and command."""
 
 from __future__ import annotations
 
@@ -28,14 +28,25 @@ from hoof_env.paper.rows import (
     slowest_root,
 )
 
-WORST = 3  # how many rows of each solver are named as its worst
-PAGE = Path(__file__).with_name("report.md.in")  # its numbers and tables begin with $
+WORST = 3
+"""Number of rows of each solver that are named as its worst."""
+
+PAGE = Path(__file__).with_name("report.md.in")
+"""Template of the page; its numbers and tables begin with $."""
+
+# Digits behind the decimal point by unit or by measure of a bar.
 _DIGITS = {"s": 4, "deg": 2, "N": 1, "%": 2, "-": 3, "point": 2, "": 3}
 _PACKAGES = ("gymnasium", "numpy", "numba")
 
 
 def markdown(reproduction: Reproduction, *, command: str, figures: bool) -> str:
-    """The whole page; it names `command` as what wrote it, and shows pictures if `figures` lie beside it."""
+    """Return the whole page in Markdown.
+
+    Args:
+        reproduction: the reproduction.
+        command: command that writes the page, for its head.
+        figures: True if the pictures of `paper.figures` are in the page's folder.
+    """
     solvers = list(dict.fromkeys(row["solver"] for row in reproduction.rows))
     geometry = reproduction.geometry
     published = reproduction.published
@@ -72,34 +83,41 @@ def markdown(reproduction: Reproduction, *, command: str, figures: bool) -> str:
 
 
 def _of(entries: Iterable[Mapping[str, Any]], **wanted: str) -> list[Any]:
+    """Return the entries with the wanted values."""
     return [entry for entry in entries if all(entry[key] == value for key, value in wanted.items())]
 
 
 def format_number(value: float | None, unit: str, sign: str = "") -> str:
+    """Return a number with the digits of its unit, "none" for None; with `sign` "+" its sign is shown."""
     return "none" if value is None else f"{value:{sign}.{_DIGITS[unit]}f}"
 
 
 def format_error(row: Mapping[str, Any], reproduction: Reproduction) -> str:
+    """Return the error of a row with its sign and the measure of its bar."""
     measure = reproduction.published.row(row["id"]).bar.measure
     name = {"point": " points"}.get(measure, f" {measure}" if measure else "")
     return "none" if row["error"] is None else format_number(row["error"], measure, "+") + name
 
 
 def _worst(reproduction: Reproduction, solver: str) -> list[dict[str, Any]]:
+    """Return the rows of a solver that are farthest outside their bars, at most `WORST`."""
     rows = [row for row in _of(reproduction.rows, solver=solver) if row["within_bar"] is False]
     return sorted(rows, key=lambda row: -severity(row, reproduction.published))[:WORST]
 
 
 def _summary(reproduction: Reproduction, solver: str) -> str:
+    """Return a paragraph on the rows and claims of a solver."""
     worst = ", ".join(
         f"{row['id']} {format_error(row, reproduction)} (bar {row['bar']})"
         for row in _worst(reproduction, solver)
     )
+    # The same sentence as on the command line.
     counts = counted(reproduction.rows, reproduction.shapes, solver)
     return f"Solver `{solver}`: {counts}. Worst: {worst or 'none outside'}."
 
 
 def _rows_table(reproduction: Reproduction, solvers: list[str]) -> str:
+    """Return the table of published rows with the value and the error of each solver."""
     worst = {(row["id"], solver) for solver in solvers for row in _worst(reproduction, solver)}
     lines = []
     for published in reproduction.published.rows:
@@ -107,9 +125,14 @@ def _rows_table(reproduction: Reproduction, solvers: list[str]) -> str:
         line = [f"`{published.id}`", published.quantity, published.unit, value, published.bar_text]
         for solver in solvers:
             (row,) = _of(reproduction.rows, id=published.id, solver=solver)
-            mark = " ✗" if row["within_bar"] is False else " †" if row["spared"] == ILL else ""
-            error = format_error(row, reproduction) + mark
-            error = f"**{error}**" if (row["id"], solver) in worst else error
+            error = format_error(row, reproduction)
+            # `within_bar` is None, and not False, for a row that is spared.
+            if row["within_bar"] is False:
+                error += " ✗"
+            elif row["spared"] == ILL:
+                error += " †"
+            if (row["id"], solver) in worst:
+                error = f"**{error}**"
             line += [format_number(row["simulated"], row["unit"]), error]
         lines.append(line)
     head = ["row", "quantity", "unit", "published", "bar"]
@@ -118,6 +141,7 @@ def _rows_table(reproduction: Reproduction, solvers: list[str]) -> str:
 
 
 def _ill_conditioned(reproduction: Reproduction) -> str:
+    """Return the section on ill-conditioned rows, "" if there are none."""
     spared = dict.fromkeys(row["id"] for row in _of(reproduction.rows, spared=ILL))
     if not spared:
         return ""
@@ -133,20 +157,23 @@ def _ill_conditioned(reproduction: Reproduction) -> str:
 
 
 def _resultants(reproduction: Reproduction, solvers: list[str]) -> str:
-    """Which reading of 'maximum force' is used, and what the other one would change."""
+    """Return how many rows are within their bars under the reading of 'maximum force' that is used, and under
+    the other one, which is the resultant."""
     parts = []
     for solver in solvers:
         readings = []
         for row in _of(reproduction.rows, solver=solver, spared=""):
             bar = reproduction.published.row(row["id"]).bar
-            other = [value for name, value in row["beside"].items() if name.startswith("resultant")]
-            readings += [(row["within_bar"], bar.holds(bar.error(v, row["published"]))) for v in other]
-        used, other_used = (sum(map(bool, verdicts)) for verdicts in zip(*readings, strict=True))
-        parts.append(f"{used} and {other_used} of {len(readings)} counted with solver `{solver}`")
+            resultants = [value for name, value in row["beside"].items() if name.startswith("resultant")]
+            readings += [(row["within_bar"], bar.holds(bar.error(v, row["published"]))) for v in resultants]
+        used = sum(bool(as_used) for as_used, _ in readings)
+        as_resultant = sum(bool(verdict) for _, verdict in readings)
+        parts.append(f"{used} and {as_resultant} of {len(readings)} counted with solver `{solver}`")
     return ", ".join(parts)
 
 
 def _beside_table(reproduction: Reproduction, solvers: list[str]) -> str:
+    """Return the table of values under other readings, and of errors against the number in print."""
     lines = []
     for published in reproduction.published.rows:
         by_solver = [row["beside"] for row in _of(reproduction.rows, id=published.id)]
@@ -158,6 +185,7 @@ def _beside_table(reproduction: Reproduction, solvers: list[str]) -> str:
 
 
 def _shape(reproduction: Reproduction, claim_id: str, figures: bool) -> str:
+    """Return a paragraph on a claim about shape, with the verdict of each solver."""
     entries = _of(reproduction.shapes, id=claim_id)
     first = entries[0]
     lines = [f"**`{claim_id}`**: {first['claim']}"]
@@ -173,6 +201,7 @@ def _shape(reproduction: Reproduction, claim_id: str, figures: bool) -> str:
 
 
 def _definitions(reproduction: Reproduction, solver: str) -> str:
+    """Return a list of the rows' definitions and readings, which are the same for all solvers."""
     lines = []
     for row in _of(reproduction.rows, solver=solver):
         reading = f" Reading: {row['reading']}." if row["reading"] else ""
@@ -181,13 +210,13 @@ def _definitions(reproduction: Reproduction, solver: str) -> str:
 
 
 def listed(items: Iterable[str], last: str = "and") -> str:
-    """'a', 'a and b', 'a, b and c'; 'none' without items."""
+    """Join items as 'a', 'a and b' or 'a, b and c'; return 'none' without items."""
     *first, end = list(items) or ["none"]
     return f"{', '.join(first)} {last} {end}" if first else end
 
 
 def which_beta(reproduction: Reproduction) -> dict[str, str]:
-    """What both readings of beta do in this run, by the names that the page has for it."""
+    """Return texts on the effect of both readings of beta in this run, by the names in the template."""
     published = reproduction.published
     alpha = published.parameters["baumgarte_alpha"]
     by_name = betas(published)
@@ -213,6 +242,7 @@ def which_beta(reproduction: Reproduction) -> dict[str, str]:
             f"{1e3 * a:.2f} mm, {1e3 * b:.2f} mm in stance ({name} β)," for name, (a, b) in drifts.items()
         ),
         "within": listed(f"{sum(rows)} of {len(rows)} ({name} β)" for name, rows in judged.items()),
+        # Both readings of beta share the leg, so that none, one or both can meet all rows.
         "verdict": {
             0: "This leg meets all of them with neither",
             1: f"This leg meets all of them with the {met[0] if met else ''} β only",
@@ -222,12 +252,15 @@ def which_beta(reproduction: Reproduction) -> dict[str, str]:
 
 
 def largest_drift(reproduction: Reproduction, solver: str) -> tuple[float, float]:
-    """Largest distance of toe or heel from the exact motion over both gaits [m]: in the cycle, in stance."""
+    """Return the largest distances of toe or heel from the exact motion over all gaits [m], in the cycle and
+    in stance."""
     cycle = []
     stance = []
     for gait in {gait for gait, _, _ in reproduction.traces}:
-        trace, exact = (reproduction.traces[gait, "elastic", name] for name in (solver, EXACT))
+        trace = reproduction.traces[gait, "elastic", solver]
+        exact = reproduction.traces[gait, "elastic", EXACT]
         error = hoof_error(trace, exact)
+        # The exact stance for all solvers: drift would move the contacts of the other.
         on_ground = measure_stance(exact)
         inside = (trace["time"] >= on_ground.start) & (trace["time"] <= on_ground.end)
         cycle.append(float(error.max()))

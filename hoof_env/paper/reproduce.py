@@ -1,6 +1,7 @@
-"""The paper's four conditions, walking and running, elastic and inelastic, through the public environment.
+"""Reproduction of the paper's four conditions: walking and running, on elastic and inelastic ground.
 
-The trunk is fixed and the action is zero, which is exactly the gait.
+The public environment simulates them. The trunk is fixed and the action is zero, so that the leg moves
+exactly in its gait.
 """
 
 from __future__ import annotations
@@ -38,12 +39,23 @@ FIGURES = {
     "walk.walks": "figure3",
     "run.walks": "figure3",
 }
-"""The picture that shows each claim about shape."""
+"""Pictures of the claims about shape, by the id of the claim."""
 
 
 def run_cycle(gait: str, solver: str, **settings: Any) -> Trace:
-    """One cycle of a gait on a fixed trunk under the zero action, with one of `SOLVERS`: one row a substep
-    and one for t = 0. `HoofEnvError` where the simulation stopped before its end."""
+    """Simulate one cycle of a gait on a fixed trunk under the zero action.
+
+    Args:
+        gait: "walk" or "run".
+        solver: one of `SOLVERS`.
+        **settings: other arguments of the environment.
+
+    Returns:
+        A row for t = 0 and one for each substep.
+
+    Raises:
+        HoofEnvError: the simulation failed before the end of the cycle.
+    """
     with gymnasium.make(ENVIRONMENT, gait=gait, **settings_of(solver) | settings) as env:
         env.reset(seed=0)
         action = np.zeros(env.action_space.shape or (), np.float32)
@@ -64,7 +76,9 @@ def run_cycle(gait: str, solver: str, **settings: Any) -> Trace:
 def reproduce(progress: Callable[[str], None] | None = None, *, preset: str | None = None) -> Reproduction:
     """Run the four conditions with every solver and compare them with the paper.
 
-    After each run `progress` is called with one line; `preset` is that of the environment if None.
+    Args:
+        progress: function that is called with one line of text after each run.
+        preset: name or file of a geometry; None takes the environment's default.
     """
     tell = progress or (lambda line: None)
     settings: dict[str, Any] = {} if preset is None else {"preset": preset}
@@ -84,6 +98,7 @@ def reproduce(progress: Callable[[str], None] | None = None, *, preset: str | No
                 traces[gait, condition, solver] = trace
                 stance = stances[gait, condition] = measure_stance(trace)
                 tell(f"{solver}, {gait}, {condition}: peak {stance.peak:.1f} N, mean {stance.mean:.1f} N")
+            # Deeper legs, for the claims that the gaits move an animal; see `shapes.gait_walks`.
             cycles = {0.0: traces[gait, "elastic", solver]}
             for depth in DEPTHS[1:]:
                 lower = {"restitution": CONDITIONS["elastic"], "hip_height": geometry.hip_height - depth}
@@ -104,7 +119,9 @@ def _judge_all(
     medians: Mapping[str, Mapping[str, Mapping[float, float]]],
     published: Published,
 ) -> list[dict[str, Any]]:
-    """Every claim with every solver; the exact one's walk decides how `walk.direction` is read."""
+    """Judge every claim with every solver; the reading of `walk.direction` is decided by the exact solver's
+    walk for all solvers."""
+    # One reading for all solvers, or a claim would mean different things in one row of the report.
     walk = traces["walk", "elastic", EXACT]
     brakes = walk_brakes(measure_stance(walk), walk)
     shapes: list[dict[str, Any]] = []
@@ -133,14 +150,26 @@ def write_reproduction(
     figures: bool = True,
     command: str = "hoof-env reproduce --out DIR",
 ) -> list[Path]:
-    """Write `reproduction.json`, `reproduction.md`, which names `command` as what wrote it, and the figures
-    into a folder; returns their paths. An older result is replaced only when all of them could be written."""
+    """Write `reproduction.json`, `reproduction.md` and the figures into a folder.
+
+    An older result is replaced only when all files could be written.
+
+    Args:
+        reproduction: the reproduction.
+        out_dir: the folder, which is made if it is missing.
+        figures: True draws the figures (needs matplotlib).
+        command: command that is named in `reproduction.md`.
+
+    Returns:
+        Paths of the files.
+    """
     out_dir = Path(out_dir)
     with staged(out_dir) as stage:
         entries = [*reproduction.rows, *reproduction.shapes]
         text = json.dumps(entries, indent=1, ensure_ascii=False, allow_nan=False)
         (stage / "reproduction.json").write_text(text + "\n", encoding="utf-8")
         if figures:
+            # Here, as matplotlib is an extra.
             from hoof_env.paper.figures import draw_all
 
             draw_all(reproduction, stage)

@@ -1,10 +1,10 @@
-"""The paper's published numbers and claims, and what a simulation gives beside them.
+"""Published numbers and claims of the paper, and their comparison with a simulation.
 
 A row is counted as within or outside its bar unless it is spared: its bar is 'reported', or it is one of
 `ILL_CONDITIONED` and the solver is one of the paper's. Solver "paper" is the paper's Eq. 8 in explicit Euler
 at 1 ms with Baumgarte's beta as printed, sqrt(2 alpha), and "paper, probable beta" the same with the beta
-that is probably meant, sqrt(2) alpha. "exact" is the closed form at a step at which the results no longer
-change.
+that is probably meant, sqrt(2) alpha. "exact" is the closed form with a time step so small that the results
+no longer change.
 """
 
 from __future__ import annotations
@@ -28,16 +28,17 @@ from hoof_env.paper.measure import Stance, Trace
 CONDITIONS = {"elastic": 1.0, "inelastic": 0.0}
 """Coefficient of restitution cr of each condition of the paper [-]."""
 
+# A bar in the file, as "0.005 s", and the measure that goes with the unit of a row.
 _BAR = re.compile(r"(\d+(?:\.\d+)?)(?: (s|deg|%|point))?")
 _BAR_OF_UNIT = {"s": "s", "deg": "deg", "N": "%", "%": "point", "-": ""}
 
 
 @dataclass(frozen=True)
 class Bar:
-    """How far a simulated value may lie from the published one.
+    """Largest accepted error of a simulated value against the published one.
 
     Attributes:
-        limit: largest error accepted, or None where the error is only reported.
+        limit: the largest error, or None if the error is only reported.
         measure: "s", "deg", "%" (relative to the published value), "point" (difference of two percentages) or
             "" (plain difference).
     """
@@ -46,20 +47,27 @@ class Bar:
     measure: str
 
     def error(self, simulated: float, published: float) -> float:
-        """Signed error in the bar's own measure."""
+        """Return the signed error in the bar's own measure."""
         difference = simulated - published
         return 100 * difference / published if self.measure == "%" else difference
 
     def holds(self, error: float | None) -> bool | None:
-        """Whether an error is within the bar: None if it is only reported, False if there is no value."""
+        """Return True if an error is within the bar, None if it is only reported, False without a value."""
         if self.limit is None:
             return None
         return error is not None and abs(error) <= self.limit
 
 
 def parse_bar(text: str, unit: str) -> Bar:
-    """The bar of a row in a unit: "0.005 s", "1 deg", "2 %", "1 point", "0.01" or "reported"; else
-    `ParameterError`."""
+    """Parse the bar of a row.
+
+    Args:
+        text: "0.005 s", "1 deg", "2 %", "1 point", "0.01" or "reported".
+        unit: unit of the row, which decides the bar's measure.
+
+    Raises:
+        ParameterError: the unit is unknown, or the bar does not fit it.
+    """
     measure = _BAR_OF_UNIT.get(unit)
     if measure is None:
         raise ParameterError(f"unit: expected one of {', '.join(_BAR_OF_UNIT)}, got {unit!r}")
@@ -76,17 +84,19 @@ def parse_bar(text: str, unit: str) -> Bar:
 
 @dataclass(frozen=True)
 class PublishedRow:
-    """One number of the paper.
+    """Published number of the paper.
 
     Attributes:
         id: "gait.quantity".
         gait: "walk", "run" or "both".
-        quantity, unit: what it is, and in which unit it is printed.
-        printed: the number in print.
-        value: the number as read; the two differ where the print is a slip.
-        bar: margin of its reproduction, and `bar_text` as written.
-        condition: "elastic", "inelastic" or None where the contact law does not matter.
-        reading: which of several readings is taken, or "".
+        quantity: name of the quantity.
+        unit: unit in which it is printed.
+        printed: number in print.
+        value: number as read; it differs from `printed` if the print is a slip.
+        bar: margin of its reproduction.
+        bar_text: the bar as written in the file.
+        condition: "elastic" or "inelastic", or None if the contact law does not matter.
+        reading: the reading that is taken if there are several, else "".
     """
 
     id: str
@@ -103,7 +113,7 @@ class PublishedRow:
 
 @dataclass(frozen=True)
 class Claim:
-    """One claim about shape: `id`, the `claim` in words and the `reading` of it, or ""."""
+    """Claim of the paper about shape: `id`, the `claim` in words, and the `reading` that is taken, or ""."""
 
     id: str
     claim: str
@@ -112,7 +122,7 @@ class Claim:
 
 @dataclass(frozen=True)
 class Published:
-    """The paper's numbers, its claims and its simulation parameters (see the file for their units)."""
+    """Numbers, claims and simulation parameters of the paper; published.json has the parameters' units."""
 
     source: str
     parameters: dict[str, Any]
@@ -120,12 +130,13 @@ class Published:
     claims: tuple[Claim, ...]
 
     def row(self, row_id: str) -> PublishedRow:
-        """The row of this id (KeyError if there is none)."""
+        """Return the row with an id; raise `KeyError` if there is none."""
         return {row.id: row for row in self.rows}[row_id]
 
 
 def load_published(path: Path | None = None) -> Published:
-    """Read the published numbers, by default those of this package; `DataFileError` if they are not whole."""
+    """Read the published numbers from a file, by default those of this package; raise `DataFileError` if the
+    file cannot be read, is incomplete, or has an id twice."""
     file: Any = path or resources.files("hoof_env.paper").joinpath("published.json")
     try:
         data = json.loads(file.read_text(encoding="utf-8"))
@@ -141,6 +152,7 @@ def load_published(path: Path | None = None) -> Published:
         raise DataFileError(f"{file}: {error}") from None
     except (ValueError, KeyError, TypeError) as error:
         raise DataFileError(f"{file}: expected source, parameters, rows and shapes: {error!r}") from None
+    # Ids are keys of the results and of the page's tables.
     ids = [row.id for row in published.rows] + [claim.id for claim in published.claims]
     if len(ids) != len(set(ids)):
         raise DataFileError(
@@ -150,7 +162,7 @@ def load_published(path: Path | None = None) -> Published:
 
 
 def read_row(entry: dict[str, Any]) -> PublishedRow:
-    """A row from its JSON object; `ParameterError` for a bar or condition that is none."""
+    """Convert a JSON object to a row; raise `ParameterError` for an invalid bar or condition."""
     condition = entry.get("condition")
     if condition not in (None, *CONDITIONS):
         raise ParameterError(f"condition: expected one of {', '.join(CONDITIONS)} or none, got {condition!r}")
@@ -168,14 +180,16 @@ def read_row(entry: dict[str, Any]) -> PublishedRow:
     )
 
 
+# Solvers, see the module.
 PRINTED = "paper"
 PROBABLE = "paper, probable beta"
 EXACT = "exact"
 
 EULER = {PRINTED: "printed", PROBABLE: "probable"}
-"""The reading of beta by solver, of those that integrate as the paper does."""
+"""Readings of beta by solver, for the solvers that integrate Eq. 8 by explicit Euler, as the paper does."""
 
 SOLVERS = (*EULER, EXACT)
+"""All solvers of a reproduction."""
 
 Stances = Mapping[tuple[str, str], Stance]
 """Measured cycles by (gait, condition)."""
@@ -184,21 +198,23 @@ ILL_CONDITIONED = ("walk.peak_inelastic", "walk.mean_inelastic", "walk.reduction
 """Rows without a bar for the paper's solver, with either beta: the walk grazes, and they depend on how its
 loop samples touch-down (docs/evidence/README.md has how far they move)."""
 
-# why a row is spared
+# Reasons why a row is spared.
 REPORTED = "reported"
 ILL = "ill-conditioned"
 
 
 @dataclass(frozen=True)
 class Reproduction:
-    """What the four conditions gave.
+    """Result of the four conditions.
 
     Attributes:
-        rows: one dictionary for each published row and solver, see `compare`.
-        shapes: one for each claim and solver: a `shapes.Verdict`, what it is of, and its figure.
-        traces: one cycle of dtype `measure.CYCLE`, its first row at t = 0, by (gait, condition, solver).
-        geometry, ground: the preset's leg, identified and not published, and its elastic ground.
-        published: what was compared with.
+        rows: a dictionary for each published row and solver, see `compare`.
+        shapes: a dictionary for each claim and solver: the claim, its solver, a `shapes.Verdict` and its
+            figure.
+        traces: cycles of dtype `measure.CYCLE`, with their first row at t = 0, by (gait, condition, solver).
+        geometry: leg of the preset, which is identified and not published.
+        published: the published numbers.
+        ground: elastic ground of the preset.
     """
 
     rows: list[dict[str, Any]]
@@ -211,12 +227,12 @@ class Reproduction:
 
 @dataclass(frozen=True)
 class Quantity:
-    """How a row is measured.
+    """Measure of a published row.
 
     Attributes:
-        value: from the stance in the row's condition (elastic where it has none) and the other one.
-        definition: the same in words.
-        beside: values under another reading, by name.
+        value: function of the stance in the row's condition (elastic if it has none) and in the other one.
+        definition: definition of the value in words.
+        beside: function of the same stances that returns values under other readings, by name.
     """
 
     value: Callable[[Stance, Stance], float | None]
@@ -225,6 +241,7 @@ class Quantity:
 
 
 def _reduction(elastic: float, inelastic: float) -> float:
+    """Return the reduction of a force by elastic ground [%]."""
     return 100 * (inelastic - elastic) / inelastic
 
 
@@ -267,19 +284,23 @@ QUANTITIES = {
         },
     ),
 }
-"""By the part of a row's id between the gait and the condition."""
+"""Measures by the part of a row's id between the gait and the condition."""
 
 
 def compare(published: Published, stances: Stances, solver: str) -> list[dict[str, Any]]:
-    """One dictionary for each published number, measured with one solver: what is published, definition,
-    simulated, error (signed, in the bar's measure), spared (why the row has no bar with this solver, or ""),
-    within_bar (None where it is spared) and beside (other readings by name)."""
+    """Compare the published numbers with the cycles of one solver.
+
+    Returns:
+        A dictionary for each published number: the published row, the definition of its measure, "simulated",
+        "error" (signed, in the bar's measure), "spared" (the reason why the row has no bar with this solver,
+        or ""), "within_bar" (None if the row is spared) and "beside" (values under other readings by name).
+    """
     return [_compare(row, stances, solver) for row in published.rows]
 
 
 def counted(rows: Iterable[Mapping[str, Any]], shapes: Iterable[Mapping[str, Any]], solver: str) -> str:
-    """How many rows of a solver are within their bar, how many are not counted and why, and how many claims
-    about shape hold, in words."""
+    """Return a sentence with the numbers of a solver's rows within their bars, of rows that are not counted
+    with the reason, and of claims about shape that hold."""
     mine = [row for row in rows if row["solver"] == solver]
     judged = [row["within_bar"] for row in mine if not row["spared"]]
     spared = [row["spared"] for row in mine]
@@ -292,12 +313,16 @@ def counted(rows: Iterable[Mapping[str, Any]], shapes: Iterable[Mapping[str, Any
 
 
 def _compare(row: PublishedRow, stances: Stances, solver: str) -> dict[str, Any]:
+    """Compare one published number, see `compare`."""
     simulated, definition, beside = _measure(row, stances)
     error = None if simulated is None else row.bar.error(simulated, row.value)
     if row.printed != row.value and simulated is not None:
         beside |= {"printed": row.printed, "error_against_printed": row.bar.error(simulated, row.printed)}
-    ill = solver in EULER and row.id in ILL_CONDITIONED
-    spared = REPORTED if row.bar.limit is None else ILL if ill else ""
+    spared = ""
+    if row.bar.limit is None:
+        spared = REPORTED
+    elif solver in EULER and row.id in ILL_CONDITIONED:
+        spared = ILL
     return {
         "kind": "row",
         "id": row.id,
@@ -319,6 +344,8 @@ def _compare(row: PublishedRow, stances: Stances, solver: str) -> dict[str, Any]
 
 
 def _measure(row: PublishedRow, stances: Stances) -> tuple[float | None, str, dict[str, Any]]:
+    """Return the simulated value of a row, its definition, and values under other readings by name."""
+    # The only row of both gaits; all others compare conditions of one gait.
     if row.id == "ratio.angle_variation":
         run = stances["run", "elastic"]
         walk = stances["walk", "elastic"]
@@ -329,13 +356,13 @@ def _measure(row: PublishedRow, stances: Stances) -> tuple[float | None, str, di
         )
     quantity = QUANTITIES[row.id.split(".")[1].removesuffix(f"_{row.condition}")]
     condition = row.condition or "elastic"
-    other = "inelastic" if condition == "elastic" else "elastic"
-    pair = stances[row.gait, condition], stances[row.gait, other]
+    opposite = "inelastic" if condition == "elastic" else "elastic"
+    pair = (stances[row.gait, condition], stances[row.gait, opposite])
     return quantity.value(*pair), quantity.definition, quantity.beside(*pair)
 
 
 def severity(row: Mapping[str, Any], published: Published) -> float:
-    """How many bars a row is off [-]: 0 where the bar is 'reported', infinite where there is no value."""
+    """Return the error of a row in bars [-]: 0 if the bar is 'reported', infinite without a value."""
     limit = published.row(row["id"]).bar.limit
     if limit is None:
         return 0.0
@@ -343,18 +370,21 @@ def severity(row: Mapping[str, Any], published: Published) -> float:
 
 
 def betas(published: Published) -> dict[str, float]:
-    """Baumgarte's beta [1/s] by its reading, in the order of `EULER`."""
+    """Return Baumgarte's beta of Eq. 8 [1/s] by its reading, in the order of `EULER`."""
     parameters = published.parameters
+    # sqrt(2) alpha gives a damping ratio alpha / beta of 0.71; the printed sqrt(2 alpha) has no unit of 1/s.
     return {"printed": parameters["baumgarte_beta"], "probable": math.sqrt(2) * parameters["baumgarte_alpha"]}
 
 
 def slowest_root(alpha: float, beta: float) -> float:
-    """Real part of the root of s^2 + 2 alpha s + beta^2, by which a closure error decays slowest [1/s]."""
+    """Return the real part [1/s] of the root of s^2 + 2 alpha s + beta^2 with which a closure error under
+    Eq. 8 decays slowest."""
     return max(float(root.real) for root in np.roots([1, 2 * alpha, beta**2]))
 
 
 def settings_of(solver: str) -> dict[str, Any]:
-    """The arguments of `hoof_env/HorseLegFixed-v0` that make it this solver, one of `SOLVERS`."""
+    """Return the arguments of `hoof_env/HorseLegFixed-v0` for one of `SOLVERS`."""
+    # The environment has one solver of the paper, with its printed beta as the default.
     if solver == PROBABLE:
         return {"solver": "paper", "baumgarte_beta": betas(load_published())["probable"]}
     return {"solver": solver}

@@ -1,13 +1,13 @@
-"""The paper's claims about shape, each decided by numbers: pure functions of measured cycles.
+"""Claims of the paper about shape, each decided by numbers: pure functions of measured cycles.
 
 `walk.direction` has two readings. Figure 6 shows a 'braking force' in walking, the ground reaction force
 'directed to the against moving direction'. Literally (`BRAKING`) the ground pushes the leg back throughout
-its stance. Under Coulomb friction that takes a hoof that slides forward under load, and such a walk cannot
+its stance. Under Coulomb friction this requires a hoof that slides forward under load, and such a walk cannot
 move an animal forward: it contradicts `walk.walks`. The arrows may also be the force of the hoof on the
 ground (`HOOF_ON_GROUND`): they point back while the ground pushes the leg forward. Both readings get a
-verdict, and the claim is counted by the one that the net impulse of the walking stance leaves possible
-(`walk_brakes`), the same for every solver. A walk that brakes in one half of stance and propels in the other
-fulfils neither.
+verdict. The claim is counted by the reading that the net impulse of the walking stance leaves possible
+(`walk_brakes`), which is the same for every solver. A walk that brakes in one half of stance and propels in
+the other fulfils neither reading.
 """
 
 from __future__ import annotations
@@ -20,22 +20,35 @@ from numpy.typing import NDArray
 
 from hoof_env.paper.measure import POINTS, Stance, Trace, integral, measure_stance
 
-PROMINENCE = 0.1  # a force peak counts if it stands out by this part of the highest force [-]
-PEAK_GAP = 0.01  # two peaks are apart in time if at least this far [s], ten time steps of the paper
-FLAT_DEG = 3.0  # a hoof is flat within this angle [deg]: the bar of the published angle at mid-stance
-DEPTHS = (0.0, 0.05, 0.1)  # how much deeper than the identified level a leg must walk and run, too [m]
-BACKWARD = 0.3  # how fast the sole must go back there under load [m/s]
-# readings of `walk.direction`
+PROMINENCE = 0.1
+"""Least prominence of a force peak that counts, as a share of the highest force [-]."""
+
+PEAK_GAP = 0.01
+"""Least distance of two peaks that are apart in time [s], ten time steps of the paper."""
+
+FLAT_DEG = 3.0
+"""Largest angle of a flat hoof [deg], the bar of the published angle at mid-stance."""
+
+DEPTHS = (0.0, 0.05, 0.1)
+"""Depths below the identified ground level at which a leg must walk and run [m]."""
+
+BACKWARD = 0.3
+"""Least backward speed of the sole under load at these depths [m/s]."""
+
+# Readings of `walk.direction`, see the module.
 BRAKING = "braking"
 HOOF_ON_GROUND = "hoof on ground"
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """Whether a claim holds, and the numbers that decide.
+    """Verdict on a claim.
 
     Attributes:
-        readings: where there are several, whether it holds under each; `used` is the one that `holds` is of.
+        holds: True if the claim holds.
+        evidence: numbers that decide it, as text.
+        readings: verdicts by reading, if there are several.
+        used: the reading of which `holds` is the verdict, or "".
     """
 
     holds: bool
@@ -45,17 +58,25 @@ class Verdict:
 
 
 def find_peaks(force: NDArray[np.float64]) -> list[int]:
-    """Indices of the local maxima of a force that rises from 0 and returns to it, if prominent enough.
+    """Find the prominent local maxima of a force that rises from 0 and returns to 0.
 
-    A maximum's prominence is its height above the higher of the two lowest points that separate it from
-    higher ground (or from the ends) on either side; it must reach `PROMINENCE` of the highest force. A
+    The prominence of a maximum is its height above the higher of the two lowest values between it and the
+    nearest higher values (or the ends) on either side; it must reach `PROMINENCE` of the highest force. A
     plateau counts once, at its first sample.
+
+    Args:
+        force: the force, shape (n,) [N].
+
+    Returns:
+        Indices of the maxima.
     """
     steps = np.diff(force)
+    # Without the steps of plateaus, where the sign does not change from + to -.
     moving = np.flatnonzero(steps)
     turns = (steps[moving[:-1]] > 0) & (steps[moving[1:]] < 0)
     places = []
     for k in (moving[:-1][turns] + 1).tolist():
+        # A pass to higher values on one side may be lower than on the other; the higher pass counts.
         higher = np.flatnonzero(force > force[k])
         left = higher[higher < k]
         right = higher[higher > k]
@@ -67,18 +88,20 @@ def find_peaks(force: NDArray[np.float64]) -> list[int]:
 
 
 def _first(stance: Stance) -> str:
+    """Return the first contact as text."""
     points = " and ".join(sorted(stance.first_points))
     return f"first in: {points} at {stance.start:.3f} s, {stance.angle_start_deg:.1f} deg"
 
 
 def _last(stance: Stance) -> str:
+    """Return the last contact as text."""
     points = " and ".join(sorted(stance.last_points))
     return f"last out: {points} at {stance.end:.3f} s, {stance.angle_end_deg:.1f} deg"
 
 
 def walk_order(walk: Stance, trace: Trace) -> Verdict:
-    """Heel-strike, flat, toe-off: the heel touches first, then both bear with the sole flat within
-    `FLAT_DEG` at some instant, and the toe leaves last."""
+    """Judge the order heel-strike, flat, toe-off: the heel touches first, then both points bear load with the
+    sole flat within `FLAT_DEG` at some instant, and the toe leaves last."""
     smallest = float("inf")
     phase = "never both in the ground"
     if walk.double:
@@ -93,7 +116,8 @@ def walk_order(walk: Stance, trace: Trace) -> Verdict:
 
 
 def walk_peaks(walk: Stance, trace: Trace) -> Verdict:
-    """Two peaks of the normal force, one in each half of stance; toe and heel both bear at the dip."""
+    """Judge the two peaks of the walking force: the normal force has two peaks, one in each half of stance,
+    and toe and heel both bear load at the minimum between them."""
     force = trace["normal"]
     t = trace["time"]
     peaks = find_peaks(force)
@@ -111,15 +135,17 @@ def walk_peaks(walk: Stance, trace: Trace) -> Verdict:
 
 
 def run_order(run: Stance, walk: Stance, run_trace: Trace, walk_trace: Trace) -> Verdict:
-    """Toe-strike, roll-over, toe-off with a large gap: the toe touches first, the heel follows and leaves
-    before the toe, and at toe-off it is higher above the ground than at toe-off in walking."""
+    """Judge the order toe-strike, roll-over, toe-off with a large gap: the toe touches first, the heel
+    follows and leaves before the toe, and at toe-off the heel is higher above the ground than at toe-off in
+    walking."""
     gaps = [
-        float(-np.interp(s.end, tr["time"], tr["heel_penetration"]))
-        for s, tr in ((run, run_trace), (walk, walk_trace))
+        float(-np.interp(stance.end, trace["time"], trace["heel_penetration"]))
+        for stance, trace in ((run, run_trace), (walk, walk_trace))
     ]
     rolls = run.first_points == {"toe"} and bool(run.heel) and run.last_points == {"toe"}
-    never = "never in the ground"
-    heel = f"in the ground {run.heel[0][0]:.3f}-{run.heel[-1][1]:.3f} s" if run.heel else never
+    heel = "never in the ground"
+    if run.heel:
+        heel = f"in the ground {run.heel[0][0]:.3f}-{run.heel[-1][1]:.3f} s"
     return Verdict(
         rolls and gaps[0] > gaps[1],
         f"{_first(run)}; heel {heel}; {_last(run)}; "
@@ -128,32 +154,35 @@ def run_order(run: Stance, walk: Stance, run_trace: Trace, walk_trace: Trace) ->
 
 
 def run_peaks(elastic: Trace, inelastic: Trace) -> Verdict:
-    """One peak of the normal force in each condition, at least `PEAK_GAP` apart in time."""
+    """Judge the peaks of the running force: one peak of the normal force in each condition, at least
+    `PEAK_GAP` apart in time."""
     peaks = [find_peaks(trace["normal"]) for trace in (elastic, inelastic)]
     times = [float(trace["time"][np.argmax(trace["normal"])]) for trace in (elastic, inelastic)]
     gap = times[0] - times[1]
     return Verdict(
-        all(len(found) == 1 for found in peaks) and abs(gap) >= PEAK_GAP,
+        all(len(places) == 1 for places in peaks) and abs(gap) >= PEAK_GAP,
         f"elastic {len(peaks[0])} peak(s), highest at {times[0]:.4f} s; inelastic {len(peaks[1])}, highest "
         f"at {times[1]:.4f} s; the elastic one is {1000 * gap:+.1f} ms later",
     )
 
 
 def step_length(trace: Trace, stance: Stance) -> tuple[float, float]:
-    """How far the middle of the sole travels back from first to last contact, and how far over the cycle [m].
+    """Measure the way of the middle of the sole relative to the trunk.
 
-    The second is the horizontal extent of its closed path. On a fixed trunk the
-    first is how far a body would pass over the foot in one stance.
+    Returns:
+        The way back from first to last contact [m], by which a body would pass over the hoof in one stance;
+        and the horizontal extent of the closed path over the cycle [m].
     """
+    # Relative to the trunk, which is fixed here, but need not be at x = 0.
     sole = (trace["toe_x"] + trace["heel_x"]) / 2 - trace["x"]
     start, end = np.interp([stance.start, stance.end], trace["time"], sole)
     return float(start - end), float(np.ptp(sole))
 
 
 def run_step(run: Stance, walk: Stance, run_trace: Trace, walk_trace: Trace) -> Verdict:
-    """The sole travels farther back in the running stance than in the walking one (`step_length`)."""
-    (run_step, run_path) = step_length(run_trace, run)
-    (walk_step, walk_path) = step_length(walk_trace, walk)
+    """Judge the step: the sole travels farther back in the running stance than in walking (`step_length`)."""
+    run_step, run_path = step_length(run_trace, run)
+    walk_step, walk_path = step_length(walk_trace, walk)
     return Verdict(
         run_step > walk_step,
         f"sole travels back {run_step:.3f} m in the running stance, {walk_step:.3f} m in the walking one; "
@@ -162,7 +191,8 @@ def run_step(run: Stance, walk: Stance, run_trace: Trace, walk_trace: Trace) -> 
 
 
 def half_impulses(trace: Trace, stance: Stance) -> list[tuple[float, float]]:
-    """Horizontal (forward positive) and vertical impulse on the leg in each half of stance [N s]."""
+    """Return the horizontal (forward positive) and the vertical impulse on the leg in each half of stance
+    [N s]."""
     halves = ((stance.start, stance.middle), (stance.middle, stance.end))
     return [
         (integral(trace, trace["friction"], *half), integral(trace, trace["normal"], *half))
@@ -171,14 +201,20 @@ def half_impulses(trace: Trace, stance: Stance) -> list[tuple[float, float]]:
 
 
 def walk_brakes(walk: Stance, trace: Trace) -> bool:
-    """Whether the ground pushes the leg back over the walking stance as a whole."""
+    """Return True if the net impulse of the ground over the walking stance pushes the leg back."""
     return sum(along for along, _ in half_impulses(trace, walk)) < 0
 
 
 def walk_direction(walk: Stance, trace: Trace, brakes: bool) -> Verdict:
-    """Braking through the walking stance: the force points back in both halves, under either reading; of a
-    leg that `walk_brakes` `BRAKING` is used, else `HOOF_ON_GROUND`."""
+    """Judge braking throughout the walking stance: the force points back in both halves.
+
+    Args:
+        walk: the walking stance.
+        trace: its cycle.
+        brakes: True, of a leg that `walk_brakes`, uses the reading `BRAKING`; False uses `HOOF_ON_GROUND`.
+    """
     (first, _), (second, _) = half_impulses(trace, walk)
+    # Friction is the force of the ground on the leg; the force of the hoof on the ground is its opposite.
     readings = {BRAKING: first < 0 and second < 0, HOOF_ON_GROUND: first > 0 and second > 0}
     used, why = (
         (BRAKING, "this walk is braked over its stance as a whole, and cannot move its animal forward")
@@ -197,7 +233,8 @@ def walk_direction(walk: Stance, trace: Trace, brakes: bool) -> Verdict:
 
 
 def run_direction(run: Stance, trace: Trace) -> Verdict:
-    """Turning towards propulsion: in the second half of stance the mean force is forward, and more so."""
+    """Judge the turn towards propulsion: in the second half of the running stance the mean force points
+    forward, and farther forward than in the first half."""
     halves = half_impulses(trace, run)
     first, second = (float(np.degrees(np.arctan2(*half))) for half in halves)
     return Verdict(
@@ -209,20 +246,26 @@ def run_direction(run: Stance, trace: Trace) -> Verdict:
 
 
 def sole_velocity(trace: Trace) -> float:
-    """Load-weighted median of the horizontal velocity of toe and heel [m/s]: half of the load acts below it.
+    """Return the load-weighted median of the horizontal velocity of toe and heel [m/s], NaN without load.
 
-    Under Coulomb friction and full sliding the ground propels where it is negative. NaN without load.
+    Half of the load acts below it. Under Coulomb friction and full sliding, the ground propels the leg if it
+    is negative.
     """
     velocity = np.concatenate([trace[f"{name}_slide"] for name in POINTS])
     load = np.concatenate([trace[f"{name}_normal"] for name in POINTS])
+    # Both points share the load, so that their samples are ranked together.
     order = np.argsort(velocity)
     below = np.cumsum(load[order])
     return float(velocity[order][np.searchsorted(below, below[-1] / 2)]) if below[-1] > 0 else float("nan")
 
 
 def gait_walks(medians: Mapping[float, float]) -> Verdict:
-    """A gait must move its animal: `sole_velocity` [m/s], given by depth [m], is backward by `BACKWARD` or
-    more, at the ground level and deeper, where a trunk with weight would settle."""
+    """Judge that a gait moves its animal: at the ground level and deeper, where a trunk with weight would
+    settle, the sole moves backward by `BACKWARD` or more.
+
+    Args:
+        medians: `sole_velocity` [m/s] by depth [m].
+    """
     values = ", ".join(
         f"{v:+.2f} m/s" + (f" {100 * depth:.0f} cm deeper" if depth else "") for depth, v in medians.items()
     )
@@ -235,8 +278,16 @@ def gait_walks(medians: Mapping[float, float]) -> Verdict:
 def judge(
     traces: Mapping[tuple[str, str], Trace], medians: Mapping[str, Mapping[float, float]], brakes: bool
 ) -> dict[str, Verdict]:
-    """Every claim by id, from a cycle for each (gait, condition), `gait_walks`'s medians by gait, and whether
-    the leg `walk_brakes`."""
+    """Judge every claim.
+
+    Args:
+        traces: cycles by (gait, condition).
+        medians: `gait_walks`'s medians by gait.
+        brakes: True if the leg `walk_brakes`.
+
+    Returns:
+        Verdicts by the id of the claim.
+    """
     walk_trace = traces["walk", "elastic"]
     run_trace = traces["run", "elastic"]
     walk = measure_stance(walk_trace)

@@ -15,7 +15,7 @@ from agents.runs import make_env
 from agents.score import Args, find_policy, play, score_vector
 from hoof_env.envs.policies import GAITS, Scripted, open_loop
 from hoof_env.errors import DataFileError, HoofEnvError, ParameterError
-from hoof_env.saved_policy import environment_of
+from hoof_env.saved_record import environment_of
 from tests.agents.conftest import ENV_ID, KWARGS, SHORT
 
 SEEDS = [7, 3, 4, 11, 12]

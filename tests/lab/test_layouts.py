@@ -7,8 +7,9 @@ import pytest
 
 from hoof_env import cli
 from hoof_env.errors import DataFileError, ParameterError
+from hoof_env.lab.columns import parse_mapping
 from hoof_env.lab.compare import compare
-from hoof_env.lab.read import parse_mapping, read_record
+from hoof_env.lab.read import read_record
 
 TIME = np.arange(300) / 100
 PHASE = (TIME - 0.4) % 1.0 / 0.5

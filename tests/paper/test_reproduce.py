@@ -210,7 +210,7 @@ def test_the_zero_action_is_the_gait(reproduction, gait):
             places.append(at.point(letter))
             rates.append(at.point_velocities[POINTS.index(letter)])
         (x, y), (slide, rise) = np.transpose(places), np.transpose(rates)
-        for name, expected in (("x", x), ("slide", slide), ("penetration", -y), ("rate", -rise)):
+        for name, expected in (("x", x), ("slide", slide), ("penetration", -y), ("penetration_rate", -rise)):
             np.testing.assert_allclose(trace[f"{point}_{name}"], expected, atol=1e-9, err_msg=name)
         spring = ground.stiffness * np.maximum(-y, 0) ** ground.exponent
         normal = np.maximum(spring * (1 - 0.75 * rise * trace[f"{point}_inverse_approach_speed"]), 0)

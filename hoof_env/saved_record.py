@@ -1,0 +1,198 @@
+"""Record of a saved policy: for which environment it was trained, and whether it fits the one at hand.
+
+A record is the content of run.json in a run folder, or the metadata of an .onnx file. `saved_policy` finds
+and plays the policies themselves.
+"""
+
+from __future__ import annotations
+
+import json
+import warnings
+from dataclasses import asdict, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+
+from hoof_env._version import __version__
+from hoof_env.errors import DataFileError, parse_json
+
+RECORD = {
+    "env_kwargs": dict,
+    "settings": dict,
+    "args": dict,
+    "versions": dict,
+    "finished": dict,
+    "resumed": list,
+}
+"""Types of the optional entries of run.json that are checked; env_id and algo are required."""
+
+
+def describe_spaces(env: Any) -> dict[str, Any]:
+    """Return both spaces of an environment or a model as text, to be saved with a policy and compared."""
+    return {"observation_space": str(env.observation_space), "action_space": str(env.action_space)}
+
+
+def describe(env: Any) -> dict[str, Any]:
+    """Return the spaces of an environment, the names of its observations and actions, and the form of its
+    actions; entries that the environment lacks are left out."""
+    description = describe_spaces(env)
+    for key in ("observation_names", "action_names"):
+        if names := getattr(env.unwrapped, key, None):
+            description[key] = list(names)
+    return description | describe_actions(env)
+
+
+def describe_actions(env: Any) -> dict[str, str]:
+    """Return the form of the actions of an environment of this package, to be saved with a policy; empty for
+    another package's environment."""
+    form = getattr(env.unwrapped, "action_form", None)
+    return {"actions": form} if form else {}
+
+
+def describe_env(env: gym.Env[Any, Any]) -> dict[str, Any]:
+    """Return the entries of run.json about an environment: spaces, form of the actions and all settings."""
+    settings = settings_of(env)
+    return describe_spaces(env) | describe_actions(env) | ({"settings": settings} if settings else {})
+
+
+def settings_of(env: Any) -> dict[str, Any]:
+    """Return all settings of an environment of this package with the types that JSON has; empty for another
+    package's environment."""
+    settings = getattr(env.unwrapped, "settings", None)
+    if not is_dataclass(settings) or isinstance(settings, type):
+        return {}
+    # Through JSON and back, because they are compared with what was read from a file: tuples become lists.
+    plain: dict[str, Any] = json.loads(json.dumps(asdict(settings), default=str))
+    return plain
+
+
+def environment_of(
+    path: Path | str, record: dict[str, Any], env_id: str | None = None
+) -> tuple[str | None, dict[str, Any]]:
+    """Return the id of the environment for a saved policy, and the arguments for it from the policy's record.
+
+    A file cannot cause an import: its id is looked up among the registered ones, without the module in front.
+
+    Args:
+        path: the policy's file, for error messages.
+        record: record of the policy.
+        env_id: the user's choice; None takes the record's id.
+
+    Returns:
+        The id, None if neither `env_id` nor the record has one; and the arguments, empty if the record is for
+        another environment than `env_id`.
+
+    Raises:
+        DataFileError: the record's id is not registered, or one of its arguments needs an import.
+    """
+    trained_id = record.get("env_id")
+    if trained_id is None or (env_id is not None and not same_id(env_id, trained_id)):
+        return env_id, {}  # arguments of another environment would not fit
+    kwargs: dict[str, Any] = record.get("env_kwargs", {})
+    if not isinstance(kwargs, dict):
+        raise DataFileError(f"{path}: env_kwargs: expected arguments by name, got {kwargs!r}")
+    # Ids that the file alone asks for. An `env_id` of the user is trusted and may import its module.
+    asks = {"env_id": trained_id} if env_id is None else {}
+    asks |= {"task": kwargs["task"]} if ":" in str(kwargs.get("task", "")) else {}
+    for name, asked in asks.items():
+        if own_id(asked) not in gym.registry:
+            option = f"--env-id {asked}" if name == "env_id" else "--env-id, with the task as its argument"
+            raise DataFileError(
+                f"{path}: expected the id of an environment that is registered here, got {name} {asked!r}; a "
+                f"file must not import a module. If you trust it, name it yourself: {option}"
+            )
+    if "task" in asks:
+        kwargs = kwargs | {"task": registered_task(asks["task"])}
+    return (own_id(trained_id) if env_id is None else env_id), kwargs
+
+
+def own_id(env_id: Any) -> str:
+    """Return an id "module:id" without the module, which `gymnasium.make` would import."""
+    return str(env_id).rpartition(":")[2]
+
+
+def same_id(one: Any, other: Any) -> bool:
+    """Return True if two ids name one environment; the module in front of an id does not count."""
+    return own_id(one) == own_id(other)
+
+
+def registered_task(task: str) -> str:
+    """Return the name under which `tasks.task_of` finds a registered task without importing its module."""
+    return str(gym.registry[own_id(task)].kwargs.get("task", own_id(task)))
+
+
+def refuse_misfit(path: Path, there: dict[str, Any], here: dict[str, Any]) -> None:
+    """Raise `DataFileError` if a policy was trained for another environment.
+
+    Args:
+        path: the policy's file, for error messages.
+        there: description of the environment in which it was trained; entries that it lacks are not compared.
+        here: description of the environment in which it is to play, as `describe` returns it.
+    """
+    is_old = bool(there) and "actions" in here and "actions" not in there
+    # Of an old policy spaces and names differ, too, but they follow from the form of its actions.
+    compared = {"env_id": here["env_id"]} if is_old else here
+    unlike = []
+    for key, expected in compared.items():
+        trained = there.get(key, expected)
+        if trained != expected and not (key == "env_id" and same_id(trained, expected)):
+            unlike.append(f"{key} {trained}, expected {expected}")
+    if is_old:
+        unlike.insert(0, f"actions of an older form (positions in a box), expected {here['actions']}")
+    if unlike:
+        name_there, _, version_there = str(there.get("env_id")).rpartition("-v")
+        name_here, _, version_here = str(here.get("env_id")).rpartition("-v")
+        if name_there == name_here != "" and version_there != version_here:
+            unlike.append("another version of an id is another task")
+        raise DataFileError(f"policy {path}: trained for {'; '.join(unlike)}")
+
+
+def check_record(path: Path, record: dict[str, Any], env: Any, env_id: str) -> None:
+    """Raise `DataFileError` if the record of a policy does not fit an environment; warn if the policy was
+    trained with other settings or another version of hoof-env.
+
+    Args:
+        path: the policy's file, for messages.
+        record: record of the policy.
+        env: the environment in which it is to play.
+        env_id: the id of `env`.
+    """
+    refuse_misfit(path, record, {"env_id": env_id, **describe(env)})
+    here = settings_of(env)
+    # A record without settings has the arguments only; the settings that they do not set count as equal.
+    there = record.get("settings", here | record.get("env_kwargs", {}))
+    # Environments of other packages have no settings to compare.
+    names = sorted({*here, *record.get("settings", {})}) if here else []
+    unlike = [
+        f"{key}={there.get(key)!r}, here {here.get(key)!r}"
+        for key in names
+        if there.get(key) != here.get(key)
+    ]
+    made_with = record.get("hoof_env", record.get("versions", {}).get("hoof-env", __version__))
+    if made_with != __version__:
+        unlike.append(f"hoof-env {made_with}, here {__version__}")
+    if unlike:
+        warnings.warn(f"policy {path}: trained with {'; '.join(unlike)}", stacklevel=3)
+
+
+def read_record(folder: Path) -> dict[str, Any]:
+    """Return the content of run.json in `folder`, empty if the file is missing; raise `DataFileError` if it
+    cannot be read."""
+    path = folder / "run.json"
+    if not path.is_file():
+        return {}
+    try:
+        record: dict[str, Any] = parse_json(path.read_text(encoding="utf-8"))
+        kinds = {"env_id": str, "algo": str} | {key: kind for key, kind in RECORD.items() if key in record}
+        if unlike := [key for key, kind in kinds.items() if not isinstance(record[key], kind)]:
+            raise TypeError(f"{unlike[0]}: {record[unlike[0]]!r}")
+        if "finished" in record:
+            steps = record["finished"]["steps"]
+            seconds = record["finished"]["seconds"]
+            record["finished"] |= {"steps": int(steps), "seconds": float(seconds)}
+        return record
+    except (OSError, ValueError, TypeError, KeyError) as error:
+        raise DataFileError(
+            f"{path}: expected the JSON object of agents.train with env_id and algo: {error!r}"
+        ) from None
