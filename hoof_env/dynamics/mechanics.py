@@ -32,8 +32,8 @@ MOVING = Moving.size
 
 @inline_llvm
 def add(total, x, lanes_are_legs):  # type: ignore[no-untyped-def]
-    """Return total + x, lane by lane; where the lanes are the legs of one trunk, total plus the x of all lanes,
-    one after the other as in a loop over legs."""
+    """Return total + x, lane by lane; where the lanes are the legs of one trunk, return total plus the x of
+    all lanes, one after the other as in a loop over legs."""
     if lanes_are_legs:
         return lane_sum(total, x)
     return total + x
@@ -109,8 +109,8 @@ def scale_functions(value, slope, length, mass):  # type: ignore[no-untyped-def]
 
 @inline_llvm
 def place_frame(trunk, leg, harmonics, elapsed):  # type: ignore[no-untyped-def]
-    """Compute the leg's frame (E1), and its first moment and inertia in the world. The swing is phi = offset +
-    A sin(theta) + B cos(theta) and higher harmonics, if any; each parameter moves as its filter does."""
+    """Compute the leg's frame (E1), and its first moment and inertia in the world. The swing is phi = offset
+    + A sin(theta) + B cos(theta) and higher harmonics, if any; each parameter moves as its filter does."""
     sine = leg.sine
     cosine = leg.cosine
     w = leg.theta_rate
