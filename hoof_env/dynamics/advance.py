@@ -262,7 +262,7 @@ def run(  # type: ignore[no-untyped-def]
     Args:
         data, model, tables, ground, constants, reactions: `TrunkEngine.arrays`.
         h: length of a substep [s].
-        steps: number of substeps; if negative, environments whose result is `RESET_REQUESTED` are started.
+        steps: number of substeps; if negative, environments with the result `RESET_REQUESTED` are started.
         keeps_account: true if energies and impulses are integrated.
         reacts: a constant; if false, no code for joint reactions is compiled.
         law, form: law of contact (`hoof.law_of`) and `form.EngineLayout`, constants.
@@ -284,8 +284,8 @@ def run(  # type: ignore[no-untyped-def]
         near = 0
         far = form.leg_rows * row
     if reacts or form.has_limits:
-        stride = CONSTANTS_SIZE if lanes_are_legs else 0
-        shared = columns(address(constants), lanes, None, 0, 1, stride)
+        constants_stride = CONSTANTS_SIZE if lanes_are_legs else 0
+        shared = columns(address(constants), lanes, None, 0, 1, constants_stride)
         for k in range(leg_count * CONSTANTS_SIZE):
             shapes[k] = shared[k]
     for n in range(begin, end, envs):
@@ -401,8 +401,8 @@ def _new_kernels(contact_law: Callable[..., Any] | None, features: Features, ide
         return kernel(advance, f"{name} {identity}", threads=not lanes_are_legs and lanes > 1)
 
     kernels = {}
-    for which, (legs, lanes, lanes_are_legs) in KERNELS.items():
-        for does in ("advance", "react"):
+    for does in ("advance", "react"):
+        for which, (legs, lanes, lanes_are_legs) in KERNELS.items():
             name = f"{does}_{which}"
             kernels[name] = new_kernel(name, legs, lanes, lanes_are_legs, reacts=does == "react")
     return Kernels(**kernels)

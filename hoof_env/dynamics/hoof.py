@@ -123,7 +123,7 @@ def press_rigidly(trunk, point, memory, penetration, rate, sliding_speed, model)
 
 @inline_llvm
 def press_through_spring(trunk, leg, point, memory, model):  # type: ignore[no-untyped-def]
-    """Compute the forces on a point of a compliant hoof, whose sole has no mass: spring and damper carry the
+    """Compute the forces on a point of a compliant hoof. Its sole has no mass: spring and damper carry the
     force of the ground.
 
     The leg's point is `depth` in the ground, the sole s less. With b = chi S / v0 + c of the ground, S + b

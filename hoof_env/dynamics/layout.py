@@ -3,8 +3,8 @@
 SI units and radians. beta = pitch + side phi is the world angle of a leg's frame. 'All' means trunk and legs
 together; a 'fixed' frame does not swing while the crank turns.
 
-Blocks that only some engines have (`Features`) are of size 0 in the others, whose memory, speed and bits they
-do not change.
+Blocks that only some engines have (`Features`) are of size 0 in the others. They do not change the memory,
+the speed and the bits of these.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from hoof_env.simd.layout import Block, Layout, Row, Size, Vector
 
 MAX_STATE = 1e9
 """Largest angle [rad] and place [m] of a state, where rounding is 6e-7 (6e-10 at 1e6); also the largest rate
-of a start, whose square must stay finite."""
+of a start, because its square must stay finite."""
 
 GAIT = Size("gait", 4)
 SPRING = Size("spring", 0)

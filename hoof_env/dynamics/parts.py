@@ -51,7 +51,7 @@ class Trunk:
         drag: resistance to forward motion [N s/m].
         height: height of O above the ground [m] where the spring is at rest, of the rail, or at a start.
         pitch_inertia: moment of inertia of the trunk about its centre of mass [kg m^2]; "free" only.
-        length: length of the trunk [m], beyond whose ends no hip may be; None is unlimited.
+        length: length of the trunk [m]; no hip may be beyond its ends. None is unlimited.
 
     Raises:
         ParameterError: an unknown kind or a value out of range.
@@ -161,7 +161,7 @@ class HoofSpring:
 
     @classmethod
     def with_ratio(cls, stiffness: float, mass: float, ratio: float = 0.1) -> HoofSpring:
-        """Return the spring whose damping has this ratio to the critical damping of a mass on it [kg]."""
+        """Return the spring with this ratio of its damping to the critical damping of a mass on it [kg]."""
         for name, value in (("stiffness", stiffness), ("mass", mass), ("ratio", ratio)):
             check_number(f"hoof_spring.{name}", value, low=0, high=1e12, exclusive_low=True)
         return cls(stiffness, 2 * ratio * math.sqrt(stiffness * mass))

@@ -1,5 +1,5 @@
-"""Sets of kernels that are in memory, some 60 MB each once compiled: those of this package stay, those with
-functions from outside go once nothing uses them, but for the last few."""
+"""Cache of kernels in memory, about 60 MB for each compiled set. Sets of this package stay; sets with
+functions from outside are dropped once they are unused, except for the last few."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from typing import Any
 from weakref import WeakValueDictionary
 
 MOST = 2
-"""Sets with functions from outside that stay though nothing uses them: an id that is made again is there at
-once."""
+"""Number of unused sets with functions from outside that are kept, so that an id that is made again needs no
+compiling."""
 
 
 class Kernels(SimpleNamespace):
-    """A set of kernels by name."""
+    """Set of kernels by name."""
 
-    __slots__ = ("__weakref__",)
+    __slots__ = ("__weakref__",)  # `SimpleNamespace` has no weak references
 
 
 class Kept:
-    """The sets of one kind."""
+    """Cache of the sets of one kind."""
 
     def __init__(self) -> None:
         self._own: dict[Hashable, Kernels] = {}
@@ -29,15 +29,22 @@ class Kept:
         self._last: deque[Kernels] = deque(maxlen=MOST)
 
     def get(self, key: Hashable, make: Callable[[], Kernels], from_outside: bool) -> Any:
-        """The kernels of a key, made where there are none."""
+        """Return the kernels of a key, and make them if there are none.
+
+        Args:
+            key: identifies the set.
+            make: makes it.
+            from_outside: true if the set contains functions from outside this package.
+        """
         if not from_outside:
             if key not in self._own:
                 self._own[key] = make()
             return self._own[key]
-        found = self._used.get(key)
-        if found is None:
-            found = self._used[key] = make()
-        if found in self._last:
-            self._last.remove(found)
-        self._last.append(found)
-        return found
+        kernels = self._used.get(key)
+        if kernels is None:
+            kernels = self._used[key] = make()
+        # to the end of the queue: the set used least recently is dropped first
+        if kernels in self._last:
+            self._last.remove(kernels)
+        self._last.append(kernels)
+        return kernels
