@@ -1,8 +1,8 @@
 """Checks that no other user could have written a file that can run code, before it is read.
 
 Compiled kernels are pickles. A user with the right to write to their folder could run code as every user that
-reads them, so a folder or file of another user, or one that others can write, is refused. A system without owners
-and modes, such as Windows, is not checked.
+reads them, so a folder or file of another user, or one that others can write, is refused. A system without
+owners and modes, such as Windows, is not checked.
 """
 
 from __future__ import annotations
