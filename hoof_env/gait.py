@@ -193,6 +193,7 @@ def load_gait(name: str, preset: Preset = DEFAULT_PRESET) -> GaitParameters:
     check_choice("gait", name, gaits)
     try:
         return (HarmonicGait if "higher" in gaits[name] else GaitParameters)(**gaits[name])
+    # an entry is missing or unknown, or a gait is not an object
     except TypeError as error:
         raise preset_error_type(preset)(
             f"{preset_label(preset)}, gait {name!r}: expected {', '.join(PARAMETERS)}, perhaps higher:"
@@ -309,6 +310,7 @@ def command_filters(filters, command, settings):  # type: ignore[no-untyped-def]
         gain = settings[row, 0]
         rate_bound = settings[row, 1]
         acc_bound = settings[row, 2]
+        # a cascade: the outer loop asks for a rate, the inner one, `INNER` times as fast, follows it
         wanted_rate = clip(gain * (command[k] - filters[k].value), rate_bound)
         filters[k].acc = clip(INNER * gain * (wanted_rate - filters[k].rate), acc_bound)
 
@@ -316,6 +318,7 @@ def command_filters(filters, command, settings):  # type: ignore[no-untyped-def]
 @kernel
 def advance_motion(motion, filters, h):  # type: ignore[no-untyped-def]
     """Advance filters and crank angle by `h` [s], exactly for constant filter accelerations."""
+    # before the filters: the angle is the integral of the speed from the step's start
     speed = filters[SPEED]
     motion.theta += h * (speed.value + h * (speed.rate / 2.0 + h * speed.acc / 6.0))
     for k in range(4):

@@ -61,5 +61,6 @@ def engine_layout(features: Features = PLAIN) -> EngineLayout:
     """Return the `EngineLayout` of engines with these features."""
     rows = [features.of(layout) for layout in (TrunkRows, LegRows, Account, TrunkMemory, LegMemory)]
     inner = [features.of(layout).size for layout in (TrunkState, LegState, Strides, StrideSums)]
+    # in the order of the fields of `_EngineLayout`
     sizes = [*(layout.size for layout in rows), *inner, features.gait_size]
     return EngineLayout._make([*rows, *sizes, features.harmonics, 2 * features.springs, features.has_limits])

@@ -19,6 +19,7 @@ MAX_STATE = 1e9
 """Largest angle [rad] and place [m] of a state, where rounding is 6e-7 (6e-10 at 1e6); also the largest rate
 of a start, because its square must stay finite."""
 
+# sizes of the blocks that depend on `Features`, with those of `PLAIN` as defaults
 GAIT = Size("gait", 4)
 SPRING = Size("spring", 0)
 LIMITED = Size("limited", 0)
@@ -47,6 +48,7 @@ class Features(NamedTuple):
 
     def of(self, layout: Any) -> Any:
         """Return a layout of this module in the sizes of engines with these features."""
+        # springs: normal and tangential; limits: lowest and highest pitch and height, and the clearance
         return layout.sized(
             gait=self.gait_size,
             spring=2 * self.springs,

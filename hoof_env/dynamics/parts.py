@@ -195,6 +195,7 @@ class Limits:
             if not low < high:
                 raise ParameterError(f"limits.{name}: expected a lower and a higher bound, got {bounds!r}")
             object.__setattr__(self, name, (low, high))
+        # bool is a kind of int to Python, but True is no height
         least: Any = self.clearance
         if isinstance(least, bool) or not isinstance(least, (int, float, np.number)) or math.isnan(least):
             raise ParameterError(f"limits.clearance: expected a number, got {least!r}")

@@ -118,7 +118,7 @@ class StepLength(Mechanics):
         return chosen
 
     def _bearable_floor(self, step: float) -> float | None:
-        """The smallest of `FLOORS` with which damping bears a step [s]."""
+        """Return the smallest of `FLOORS` with which damping allows a step [s]; None if there is none."""
         for floor in FLOORS:
             if self._ground_limits(replace(self.ground, approach_floor=floor))["damping"] >= step:
                 return floor
@@ -135,7 +135,9 @@ class StepLength(Mechanics):
                     if name == "hoof" or np.isfinite(sinks):
                         limits[name] = min(limits[name], longest)
                 continue
+            # fast touch-downs go deep, slow ones are damped strongly: either may need the shorter step
             for speed in {FAST, ground.approach_floor}:
+                # `contact_rates` refuses infinite masses; the limits of a point that cannot move are dropped
                 mass = min(sinks, whole)
                 sliding_mass = min(slides, whole)
                 rates = contact_rates(ground, mass, load, speed, sliding_mass, self.terrain)

@@ -30,6 +30,7 @@ def filter_accelerations(leg, count, settings):  # type: ignore[no-untyped-def]
         gain = settings[3 * k]
         rate_bound = settings[3 * k + 1]
         acc_bound = settings[3 * k + 2]
+        # a cascade: the outer loop asks for a rate, the inner one, `INNER` times as fast, follows it
         wanted = clip(gain * (leg.command[k] - leg.state.gait[k]), rate_bound)
         leg.gait_acceleration[k] = clip(INNER * gain * (wanted - leg.state.gait_rate[k]), acc_bound)
 
@@ -100,6 +101,7 @@ def next_stage(trunk, legs, leg_count, model, elapsed):  # type: ignore[no-untyp
     for i in range(leg_count):
         leg = block_at(legs, i)
         is_motor = leg.settings.is_motor > 0.0
+        # a prescribed crank is where its filter says at each stage, not where the scheme would bring it
         angle, spin = prescribed(leg, elapsed)
         leg.theta = where(is_motor, leg.state.theta + elapsed * leg.theta_rate, angle)
         leg.theta_rate = where(is_motor, leg.state.theta_rate + elapsed * leg.theta_acceleration, spin)

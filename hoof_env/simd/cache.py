@@ -231,7 +231,7 @@ class KernelCache(_caching.FunctionCache):
         return False
 
     def release(self) -> None:
-        """Release the lock, whether or not the kernel could be compiled."""
+        """Release the lock, also if the kernel could not be compiled."""
         if self._lock is not None:
             self._lock.release()
             self._lock = None

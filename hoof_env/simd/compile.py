@@ -1,5 +1,5 @@
-"""The one place where kernels are compiled: with numba, cached, and without fast-math, so that a result does
-not depend on how the compiler arranged a loop."""
+"""Compilation of all kernels: with numba, cached, and without fast-math, so that a result does not depend on
+how the compiler arranged a loop."""
 
 from __future__ import annotations
 

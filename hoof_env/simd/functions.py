@@ -154,7 +154,7 @@ def lane_sum(code: Code, start: Any, x: Any) -> Any:
 
 @instruction(types.boolean)
 def any_lane(code: Code, condition: Any) -> Any:
-    """Return true if a condition holds in any lane."""
+    """Return True if a condition holds in any lane."""
     count = code.args[0].count
     if count == 1:
         return condition

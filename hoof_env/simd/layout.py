@@ -118,11 +118,11 @@ def _sized(layout: Any, sizes: tuple[tuple[str, int], ...]) -> Any:
 def views(layout: Any, data: NDArray[Any]) -> Any:
     """Return the fields of memory by name, as views of an array. Its first axis is the rows; the view of a
     `Row` does not have that axis."""
-    found = {}
+    fields = {}
     for name, field in layout.fields.items():
         rows = data[layout.rows(name)]
-        found[name] = rows[0] if field.kind is Row else rows
-    return SimpleNamespace(**found)
+        fields[name] = rows[0] if field.kind is Row else rows
+    return SimpleNamespace(**fields)
 
 
 def _names(key: str, field: Field) -> list[str]:
@@ -230,10 +230,12 @@ def _set_field(context: Any, builder: Any, signature: Any, values: Any, name: st
     (place, value) = values
     (start, _, kind) = memory.layout.fields[name]
     code = Code(context, builder)
+    # a whole block would need a copy of memory; kernels have no use for it
     if kind not in (Row, Vector):
         raise TypeError(f"{name}: the rows of a block or a layout are set one by one")
-    for k, x in enumerate([value] if kind is Row else code.split(given, value)):
-        write_row(code, memory, place, INDEX(start + k), x)
+    parts = [value] if kind is Row else code.split(given, value)
+    for k, part in enumerate(parts):
+        write_row(code, memory, place, INDEX(start + k), part)
 
 
 for _memory in (Rows, Columns):

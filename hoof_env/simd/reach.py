@@ -333,24 +333,24 @@ def _top(module: str) -> str:
 
 
 def _is_ours(value: Any) -> bool:
-    """Return true for parts of the mechanics; the sources of these are in every kernel's stamp."""
+    """True if it is of the mechanics: the sources of these are in every kernel's stamp."""
     return _module_of(value).split(".")[:2] in [["hoof_env", room] for room in MECHANICS]
 
 
 def is_library(value: Any) -> bool:
-    """Return true for parts of the standard library or of an installed package, this one aside."""
+    """True if it is of the standard library or of an installed package, this one aside."""
     if isinstance(value, FunctionType):
         return _is_installed(value.__code__.co_filename) and _top(_module_of(value)) != "hoof_env"
     return _is_library(_module_of(value))
 
 
 def _is_foreign(value: Any) -> bool:
-    """Return true for a module of a library: its attributes need not be followed."""
+    """True if it is a module of a library: its attributes need not be followed."""
     return isinstance(value, ModuleType) and _is_library(value.__name__)
 
 
 def _is_library(module: str) -> bool:
-    """Return true for a module of a library. Its file decides: a user's file may have the name of a standard
+    """True if it is a module of a library. Its file decides: a user's file may have the name of a standard
     module."""
     if _top(module) == "hoof_env":
         return False

@@ -80,8 +80,8 @@ def _check(path: str, found: os.stat_result) -> None:
 
 
 def _is_ours(group: int) -> bool:
-    """Return true for a group without other members: the one that many systems make for each user, and let
-    write by the umask; or root's, unless this user is root."""
+    """True for a group without other members: the one that many systems make for each user, and let write by
+    the umask; or root's, unless this user is root."""
     if os.geteuid() == 0:
         return False
     # modules of POSIX only

@@ -91,6 +91,7 @@ def spread(builder: Any, x: Any, count: int) -> Any:
     """Return a scalar in every lane."""
     if count == 1:
         return x
+    # a constant stays one, so that LLVM can compute with it
     if isinstance(x, ir.Constant):
         return ir.Constant(ir.VectorType(x.type, count), [x.constant] * count)
     nothing = ir.Constant(ir.VectorType(x.type, count), ir.Undefined)
@@ -115,12 +116,13 @@ def gathered(builder: Any, scalars: list[Any]) -> Any:
 
 def count_of(*kinds: Any) -> int:
     """Return the number of lanes in an operation, 0 if it is not one on lanes."""
+    # 0 also for different numbers of lanes, which no operation combines
     counts = {kind.count for kind in kinds if isinstance(kind, _Counted)}
     return counts.pop() if len(counts) == 1 else 0
 
 
 def is_real(kind: Any) -> bool:
-    """Return true for types of real numbers: lanes, floats and integers."""
+    """True for types of real numbers: lanes, floats and integers."""
     return isinstance(kind, Lanes | types.Float | types.Integer)
 
 
